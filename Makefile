@@ -1,0 +1,70 @@
+# Each goal sets up all it needs in this folder: a virtual environment in .venv and a release build.
+# make demo | test | lint | bench | docs | format | clean
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+JOBS ?= 2
+RUST := Cargo.toml $(shell find rust -name '*.rs')
+
+.PHONY: help demo test lint format bench docs clean requirements
+.DELETE_ON_ERROR:
+
+help:
+	@echo "make demo    pictures of every system at work on built-in examples: demo/index.html"
+	@echo "make test    all tests, Rust and Python"
+	@echo "make lint    formatting, clippy, rustdoc, ruff, mypy, stubtest"
+	@echo "make format  rewrite the sources in the house's format"
+	@echo "make bench   criterion benches of the kernels"
+	@echo "make docs    API documentation of the kernels"
+	@echo "make clean   remove what the other goals made"
+
+requirements:
+	@command -v $(PYTHON) >/dev/null 2>&1 || { echo "texrs needs Python 3.11 or newer: $(PYTHON) was not found (make PYTHON=/path/to/python3)" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "texrs needs Python 3.11 or newer: $(PYTHON) is $$($(PYTHON) -V 2>&1) (make PYTHON=/path/to/python3)" >&2; exit 1; }
+	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo "texrs needs Python's venv module, which $(PYTHON) lacks (on Debian: apt install python3-venv)" >&2; exit 1; }
+	@command -v cargo >/dev/null 2>&1 || { echo "texrs needs a Rust toolchain: cargo was not found (see https://rustup.rs)" >&2; exit 1; }
+
+$(VENV)/.tools: pyproject.toml constraints.txt | requirements
+	@[ -x $(BIN)/python ] || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
+	$(BIN)/python -m pip install --quiet --group dev --constraint constraints.txt
+	@touch $@
+
+$(VENV)/.built: $(VENV)/.tools $(RUST)
+	PIP_QUIET=1 PIP_CONSTRAINT=$(abspath constraints.txt) VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/maturin develop --release --quiet
+	@touch $@
+
+demo: $(VENV)/.built
+	$(BIN)/texrs demo -o demo
+	@echo "Open demo/index.html in a browser."
+
+test: $(VENV)/.built
+	cargo test --quiet
+	$(BIN)/python -m pytest -n $(JOBS) -q
+
+lint: $(VENV)/.built
+	cargo fmt --check
+	cargo clippy --all-targets --quiet -- -D warnings
+	cargo clippy --all-targets --quiet --features python -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --quiet
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/python -m mypy.stubtest texrs._rust
+
+format: $(VENV)/.tools
+	cargo fmt
+	$(BIN)/ruff check --fix --quiet . || true
+	$(BIN)/ruff format .
+
+bench: | requirements
+	cargo bench
+
+docs: | requirements
+	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps
+	@echo "Open target/doc/texrs/index.html in a browser."
+
+clean:
+	rm -rf $(VENV) target demo dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find python -name '*.so' -delete
