@@ -1,0 +1,142 @@
+//! Grids of two or three axes: shape, row-major strides, and what lies beyond an edge.
+
+use crate::{Error, Result};
+
+/// A box of `shape` points in row-major order whose axes end or wrap.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Grid<const D: usize> {
+    shape: [usize; D],
+    wrap: [bool; D],
+}
+
+impl<const D: usize> Grid<D> {
+    /// A grid; refuses an empty axis and a number of points that overflows.
+    pub fn new(shape: [usize; D], wrap: [bool; D]) -> Result<Self> {
+        let mut points = 1usize;
+        for &n in &shape {
+            if n == 0 {
+                return Err(Error::value(
+                    "shape",
+                    format!("{shape:?} has an empty axis"),
+                ));
+            }
+            points = points.checked_mul(n).ok_or_else(|| {
+                Error::value(
+                    "shape",
+                    format!("{shape:?} has more points than can be counted"),
+                )
+            })?;
+        }
+        Ok(Self { shape, wrap })
+    }
+
+    /// Points along each axis.
+    pub fn shape(&self) -> [usize; D] {
+        self.shape
+    }
+
+    /// Which axes are cyclic.
+    pub fn wrap(&self) -> [bool; D] {
+        self.wrap
+    }
+
+    /// Number of points.
+    #[allow(clippy::len_without_is_empty)] // a grid is never empty
+    pub fn len(&self) -> usize {
+        self.shape.iter().product()
+    }
+
+    /// Distance in memory between neighbours along each axis.
+    pub fn strides(&self) -> [usize; D] {
+        let mut strides = [1; D];
+        for axis in (0..D.saturating_sub(1)).rev() {
+            strides[axis] = strides[axis + 1] * self.shape[axis + 1];
+        }
+        strides
+    }
+
+    /// Row-major position of a point.
+    pub fn index(&self, point: [usize; D]) -> usize {
+        point
+            .iter()
+            .zip(&self.shape)
+            .fold(0, |at, (&p, &n)| at * n + p)
+    }
+
+    /// The point at a row-major position.
+    pub fn point(&self, mut index: usize) -> [usize; D] {
+        let mut point = [0; D];
+        for axis in (0..D).rev() {
+            point[axis] = index % self.shape[axis];
+            index /= self.shape[axis];
+        }
+        point
+    }
+
+    /// Coordinate `i` brought onto the axis: around it where it wraps, to the nearest end where it does not.
+    pub fn resolve(&self, axis: usize, i: isize) -> usize {
+        let n = self.shape[axis] as isize;
+        if self.wrap[axis] {
+            i.rem_euclid(n) as usize
+        } else {
+            i.clamp(0, n - 1) as usize
+        }
+    }
+
+    /// Coordinate `i` if the axis has it, around the axis where it wraps.
+    pub fn inside(&self, axis: usize, i: isize) -> Option<usize> {
+        let n = self.shape[axis] as isize;
+        if self.wrap[axis] {
+            Some(i.rem_euclid(n) as usize)
+        } else {
+            (0..n).contains(&i).then_some(i as usize)
+        }
+    }
+
+    /// The next point along `axis`: `None` at an end, the first point where the axis wraps (and is longer than one).
+    pub fn next(&self, point: [usize; D], axis: usize) -> Option<[usize; D]> {
+        let mut next = point;
+        next[axis] += 1;
+        if next[axis] == self.shape[axis] {
+            if !self.wrap[axis] || self.shape[axis] == 1 {
+                return None;
+            }
+            next[axis] = 0;
+        }
+        Some(next)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn refuses_empty_and_uncountable_shapes() {
+        assert!(Grid::new([3, 0], [false; 2]).is_err());
+        assert!(Grid::new([usize::MAX, 2], [false; 2]).is_err());
+    }
+
+    #[test]
+    fn ends_clamp_and_cyclic_axes_wrap() {
+        let grid = Grid::new([4, 5], [true, false]).unwrap();
+        assert_eq!(grid.resolve(0, -1), 3);
+        assert_eq!(grid.resolve(1, -1), 0);
+        assert_eq!(grid.inside(0, 4), Some(0));
+        assert_eq!(grid.inside(1, 5), None);
+        assert_eq!(grid.next([3, 4], 0), Some([0, 4]));
+        assert_eq!(grid.next([3, 4], 1), None);
+    }
+
+    proptest! {
+        #[test]
+        fn index_and_point_are_inverse(shape in prop::array::uniform3(1usize..7), seed in 0usize..1000) {
+            let grid = Grid::new(shape, [false; 3]).unwrap();
+            let index = seed % grid.len();
+            prop_assert_eq!(grid.index(grid.point(index)), index);
+            let dot: usize = grid.point(index).iter().zip(grid.strides()).map(|(p, s)| p * s).sum();
+            prop_assert_eq!(dot, index);
+        }
+    }
+}

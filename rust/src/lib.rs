@@ -1,0 +1,39 @@
+//! Kernels of texrs: new textures from one example.
+//!
+//! The rooms, from the ground up. Each knows only those above it in this list.
+//!
+//! | room | noun |
+//! |---|---|
+//! | [`error`] | the one error type |
+//! | [`grid`] | shape, strides, wrap or clamp per axis; two and three dimensions from one source |
+//! | [`par`] | the process-local thread pool, fixed chunks, progress and cancellation |
+//! | [`hash`] | counter-based noise: randomness belongs to the position, never to a stream |
+//! | [`gather`] | an exemplar of any type looked up through coordinates |
+//! | [`seam`] | minimum cuts on grids: max-flow, planar strips, binary labels |
+//! | [`mean_shift`] | joint spatial and range filtering |
+//! | [`patch_search`] | exact best matches of a masked patch |
+//! | [`poisson`] | images from their differences, near given values |
+//! | [`complete`] | filling holes by example |
+//! | [`image_io`] | 8/16-bit and float image files, with limits |
+//!
+//! `py` is the door to Python; nothing here imports it.
+//!
+//! Every kernel gives the same bytes for any number of threads.
+
+pub mod error;
+pub mod grid;
+pub mod hash;
+pub mod image_io;
+pub mod par;
+
+pub mod complete;
+pub mod gather;
+pub mod mean_shift;
+pub mod patch_search;
+pub mod poisson;
+pub mod seam;
+
+#[cfg(feature = "python")]
+mod py;
+
+pub use error::{Error, Result};

@@ -1,0 +1,246 @@
+//! Threads: a pool that belongs to the process, fixed chunks, progress and cancellation.
+//!
+//! The only file that names rayon. Its global pool is never used: threads do not survive a `fork`, so a child that
+//! inherits a pool waits for ever. Pools here are keyed by the process id, built on first use and never dropped.
+
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::{Error, Result};
+
+/// A chain of pools that grows at its end. It is never locked while a pool is being built, so a `fork` at any moment
+/// leaves the child a chain that it can walk.
+struct Link {
+    process: u32,
+    threads: usize,
+    pool: ThreadPool,
+    next: OnceLock<Box<Link>>,
+}
+
+static POOLS: OnceLock<Box<Link>> = OnceLock::new();
+
+/// The number of threads in force when a caller asks for none: `RAYON_NUM_THREADS`, or what the machine offers.
+pub fn default_threads() -> usize {
+    std::env::var("RAYON_NUM_THREADS")
+        .ok()
+        .and_then(|text| text.parse().ok())
+        .filter(|&n| n > 0)
+        .or_else(|| std::thread::available_parallelism().ok().map(usize::from))
+        .unwrap_or(1)
+        .min(MAX_THREADS)
+}
+
+/// More threads than this only cost memory.
+pub const MAX_THREADS: usize = 1024;
+
+fn pool(threads: usize) -> Result<&'static ThreadPool> {
+    let process = std::process::id();
+    let mut slot = &POOLS;
+    let mut built = None;
+    loop {
+        match slot.get() {
+            Some(link) if link.process == process && link.threads == threads => {
+                return Ok(&link.pool);
+            }
+            Some(link) => slot = &link.next,
+            None => {
+                let pool = match built.take() {
+                    Some(pool) => pool,
+                    None => ThreadPoolBuilder::new()
+                        .num_threads(threads)
+                        .thread_name(|i| format!("texrs-{i}"))
+                        .build()
+                        .map_err(|e| {
+                            Error::value("threads", format!("cannot start {threads}: {e}"))
+                        })?,
+                };
+                let link = Box::new(Link {
+                    process,
+                    threads,
+                    pool,
+                    next: OnceLock::new(),
+                });
+                if let Err(lost) = slot.set(link) {
+                    built = Some(lost.pool);
+                }
+            }
+        }
+    }
+}
+
+/// What a running kernel and its caller tell each other.
+#[derive(Debug)]
+pub struct Monitor {
+    done: AtomicU64,
+    total: AtomicU64,
+    cancelled: AtomicBool,
+    started: Instant,
+}
+
+impl Default for Monitor {
+    fn default() -> Self {
+        Self {
+            done: AtomicU64::new(0),
+            total: AtomicU64::new(0),
+            cancelled: AtomicBool::new(false),
+            started: Instant::now(),
+        }
+    }
+}
+
+impl Monitor {
+    /// Announces how many steps are ahead.
+    pub fn expect(&self, steps: u64) {
+        self.total.store(steps, Ordering::Relaxed);
+    }
+
+    /// Says that `steps` more are done; an error once the caller has asked to stop.
+    pub fn advance(&self, steps: u64) -> Result<()> {
+        self.done.fetch_add(steps, Ordering::Relaxed);
+        self.check()
+    }
+
+    /// An error once the caller has asked to stop.
+    pub fn check(&self) -> Result<()> {
+        if self.cancelled.load(Ordering::Relaxed) {
+            return Err(Error::Cancelled(self.started.elapsed()));
+        }
+        Ok(())
+    }
+
+    /// Asks the kernel to stop.
+    pub fn cancel(&self) {
+        self.cancelled.store(true, Ordering::Relaxed);
+    }
+
+    /// Share of the announced steps that is done, 0 to 1.
+    pub fn fraction(&self) -> f64 {
+        let total = self.total.load(Ordering::Relaxed);
+        if total == 0 {
+            return 0.0;
+        }
+        (self.done.load(Ordering::Relaxed) as f64 / total as f64).min(1.0)
+    }
+}
+
+/// Runs `work` in the pool of `threads` threads (0: [`default_threads`]).
+pub fn install<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> Result<R> {
+    let threads = if threads == 0 {
+        default_threads()
+    } else {
+        threads.min(MAX_THREADS)
+    };
+    Ok(pool(threads)?.install(work))
+}
+
+/// Runs `work` in the pool while the calling thread calls `poll` about every `interval`.
+///
+/// When `poll` fails the monitor is cancelled, the kernel is awaited, and the error of `poll` is returned.
+pub fn watch<R: Send, E: From<Error>>(
+    threads: usize,
+    interval: Duration,
+    work: impl FnOnce(&Monitor) -> Result<R> + Send,
+    mut poll: impl FnMut(&Monitor) -> std::result::Result<(), E>,
+) -> std::result::Result<R, E> {
+    let threads = if threads == 0 {
+        default_threads()
+    } else {
+        threads.min(MAX_THREADS)
+    };
+    let monitor = Monitor::default();
+    let (send, receive) = std::sync::mpsc::sync_channel(1);
+    let mut stopped = None;
+    let result = pool(threads)?.in_place_scope(|scope| {
+        let monitor = &monitor;
+        // The sender moves in, so that a panic of the work drops it and ends the loop below. The receiver lives until
+        // the scope ends, so the send cannot fail.
+        scope.spawn(move |_| {
+            let _ = send.send(work(monitor));
+        });
+        loop {
+            match receive.recv_timeout(interval) {
+                Ok(result) => return Some(result),
+                Err(std::sync::mpsc::RecvTimeoutError::Timeout) => {
+                    if stopped.is_none()
+                        && let Err(error) = poll(monitor)
+                    {
+                        monitor.cancel();
+                        stopped = Some(error);
+                    }
+                }
+                Err(std::sync::mpsc::RecvTimeoutError::Disconnected) => return None,
+            }
+        }
+    });
+    match (stopped, result) {
+        (Some(error), _) => Err(error),
+        (None, Some(result)) => Ok(result?),
+        (None, None) => unreachable!("a scope resumes the panic of its task"),
+    }
+}
+
+/// Calls `f(i, chunk)` for each chunk of `size` items. Chunks are fixed by `size`, so results cannot depend on threads.
+pub fn chunks_mut<T: Send>(data: &mut [T], size: usize, f: impl Fn(usize, &mut [T]) + Sync + Send) {
+    data.par_chunks_mut(size.max(1))
+        .enumerate()
+        .for_each(|(i, chunk)| f(i, chunk));
+}
+
+/// `[f(0), f(1), ...]` in order.
+pub fn map<T: Send>(n: usize, f: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+    (0..n).into_par_iter().map(f).collect()
+}
+
+/// Runs both and returns both results.
+pub fn join<A: Send, B: Send>(
+    a: impl FnOnce() -> A + Send,
+    b: impl FnOnce() -> B + Send,
+) -> (A, B) {
+    rayon::join(a, b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pools_have_the_threads_asked_for() {
+        for threads in [1, 2, 7] {
+            assert_eq!(
+                install(threads, rayon::current_num_threads).unwrap(),
+                threads
+            );
+        }
+    }
+
+    #[test]
+    fn a_failing_poll_stops_the_work() {
+        let outcome: Result<()> = watch(
+            2,
+            Duration::from_millis(1),
+            |monitor| loop {
+                monitor.advance(1)?;
+                std::thread::sleep(Duration::from_millis(1));
+            },
+            |_| Err(Error::value("poll", "stop")),
+        );
+        assert_eq!(outcome, Err(Error::value("poll", "stop")));
+    }
+
+    #[test]
+    fn a_panic_in_the_work_reaches_the_caller() {
+        let outcome = std::panic::catch_unwind(|| {
+            watch::<(), Error>(
+                1,
+                Duration::from_millis(1),
+                |_| panic!("inside"),
+                |_| Ok(()),
+            )
+        });
+        assert!(outcome.is_err());
+    }
+}

@@ -1,0 +1,127 @@
+//! What a seam costs: the match of two images at the two ends of an edge, and its scaling to integer capacities.
+//!
+//! Kwatra, Schödl, Essa, Turk, Bobick, *Graphcut textures: image and video synthesis using graph cuts*, SIGGRAPH 2003.
+
+use crate::{Error, Result};
+
+/// How visible a seam between two neighbours is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cost {
+    /// `|A(s) - B(s)| + |A(t) - B(t)|`, summed over channels (Kwatra et al., eq. 1).
+    Difference,
+    /// The same divided by `|A(s) - A(t)| + |B(s) - B(t)| + 0.05` (Kwatra et al., eq. 2): seams hide along edges of the
+    /// images. The constant is for values of about unit range; it keeps flat regions from costing infinitely much.
+    Gradient,
+}
+
+/// Added to every edge, so that ties go to the shorter seam.
+pub const SHORTEST: f32 = 1e-4;
+/// Keeps the gradient cost finite where both images are flat.
+const FLAT: f32 = 0.05;
+
+/// Capacities are costs times a power of two, at most this one.
+const FINEST: f64 = 65536.0;
+/// No single cost becomes a larger capacity: the sums that a solver makes of a node's edges stay within `i32`.
+const LARGEST: f64 = (1u32 << 26) as f64;
+
+/// L1 distance of two pixels.
+#[inline(always)]
+pub(super) fn distance(a: &[f32], b: &[f32]) -> f32 {
+    a.iter().zip(b).fold(0.0, |sum, (x, y)| sum + (x - y).abs())
+}
+
+/// Two images on one canvas. `C` is the number of channels where that is known, so that loops over them unroll, or 0.
+#[derive(Clone, Copy)]
+pub(super) struct Pair<'a, const C: usize> {
+    pub a: &'a [f32],
+    pub b: &'a [f32],
+    pub channels: usize,
+}
+
+impl<const C: usize> Pair<'_, C> {
+    #[inline(always)]
+    fn channels(&self) -> usize {
+        if C == 0 { self.channels } else { C }
+    }
+
+    /// How far the images are apart at a pixel.
+    #[inline(always)]
+    pub(super) fn difference(&self, p: usize) -> f32 {
+        let (at, n) = (p * self.channels(), self.channels());
+        distance(&self.a[at..][..n], &self.b[at..][..n])
+    }
+
+    /// The cost of a seam between neighbours `s` and `t`, given the differences there.
+    #[inline(always)]
+    pub(super) fn edge(&self, cost: Cost, s: usize, t: usize, differences: f32) -> f32 {
+        let plain = match cost {
+            Cost::Difference => differences,
+            Cost::Gradient => {
+                let n = self.channels();
+                let (i, j) = (s * n, t * n);
+                let slope = distance(&self.a[i..][..n], &self.a[j..][..n])
+                    + distance(&self.b[i..][..n], &self.b[j..][..n]);
+                differences / (slope + FLAT)
+            }
+        };
+        plain + SHORTEST
+    }
+}
+
+/// The power of two by which costs are multiplied: 2^16, or less where the largest cost would pass 2^26.
+pub(super) fn scale(largest: f64) -> f64 {
+    let mut scale = FINEST;
+    while largest * scale > LARGEST {
+        scale *= 0.5;
+    }
+    scale
+}
+
+/// The power of two by which the largest cost becomes more than 2^25 and at most 2^26.
+pub(super) fn finest(largest: f64) -> f64 {
+    if largest <= 0.0 {
+        return 1.0;
+    }
+    // 1e-300 is far below any `f32`; powers of two stay finite.
+    let mut scale = (LARGEST / largest.max(1e-300)).log2().floor().exp2();
+    while largest * scale > LARGEST {
+        scale *= 0.5;
+    }
+    scale
+}
+
+/// A cost as a capacity, rounded to the nearest.
+#[inline(always)]
+pub(super) fn capacity(cost: f64, scale: f64) -> i32 {
+    (cost * scale + 0.5) as i32
+}
+
+/// Refuses negative and non-finite entries.
+pub(super) fn check_costs(argument: &'static str, costs: &[f32]) -> Result<()> {
+    // One comparison that NaN fails too.
+    match costs
+        .iter()
+        .position(|&c| !(0.0..f32::INFINITY).contains(&c))
+    {
+        None => Ok(()),
+        Some(at) => Err(Error::value(
+            argument,
+            format!(
+                "{} at {at}; finite values of at least 0 are allowed",
+                costs[at]
+            ),
+        )),
+    }
+}
+
+/// Refuses arrays of another length.
+pub(super) fn check_len(argument: &'static str, expected: usize, got: usize) -> Result<()> {
+    if expected == got {
+        return Ok(());
+    }
+    Err(Error::Shape {
+        argument,
+        expected: vec![expected],
+        got: vec![got],
+    })
+}
