@@ -1,0 +1,30 @@
+"""Make new textures from one example.
+
+The verbs: `design` (many natural textures from one example), `tile` (any picture made cyclic) and `complete` (holes
+filled by example). Each gives a `Synthesis`, whose `SourceMap` looks anything that is in register with the exemplar up
+in the same way.
+"""
+
+from texrs import errors, io, kernels, samples
+from texrs._rust import VERSION as __version__
+from texrs.completion import complete
+from texrs.cyclic import tile
+from texrs.papers.design import design
+from texrs.report import Synthesis
+from texrs.source_map import Reuse, SourceMap
+from texrs.threads import threads
+
+__all__ = [
+    "Reuse",
+    "SourceMap",
+    "Synthesis",
+    "__version__",
+    "complete",
+    "design",
+    "errors",
+    "io",
+    "kernels",
+    "samples",
+    "threads",
+    "tile",
+]

@@ -1,0 +1,187 @@
+"""Checks and conversions of arrays, shared by everything that takes an image from a user."""
+
+from __future__ import annotations
+
+import numbers
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from texrs._typing import Array, Bools, Floats
+from texrs.errors import InvalidInput, LimitExceeded
+
+MAX_PIXELS = 2**28
+"""Pixels or voxels that an array made by texrs may have, unless a limit is given."""
+
+_KINDS = (np.uint8, np.int8, np.uint16, np.int16, np.int32, np.uint32, np.float32, np.float64)
+
+
+def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int = 2) -> Array:
+    """Check an image (or a volume, with ``axes=3``) and return it with its channels last, contiguous.
+
+    Parameters
+    ----------
+    value : array_like
+        Shape (H, W) or (H, W, C); with ``axes=3`` (D, H, W) or (D, H, W, C). Integers of 8, 16 or 32 bit, floats of
+        16, 32 or 64 bit, or bool. Floats must be finite.
+    name : str
+        The argument's name, for messages.
+    minimum : int
+        The least length of an axis.
+    axes : int
+        Number of axes without the channels.
+
+    Returns
+    -------
+    ndarray
+        The same values and dtype, shape (..., C), C-contiguous and in native byte order. Not copied where it need not
+        be.
+
+    Raises
+    ------
+    InvalidInput
+        Not numbers, not finite, too small, or with the wrong number of axes.
+
+    """
+    try:
+        array = np.asarray(value)
+    except (ValueError, TypeError) as error:
+        raise InvalidInput(f"{name}: not an array of numbers ({error})") from None
+    if array.dtype == object or array.dtype.kind not in "buif":
+        raise InvalidInput(f"{name}: needs numbers (8, 16 or 32 bit integers, floats or bool), got dtype {array.dtype}")
+    if array.dtype.kind in "ui" and array.dtype.itemsize == 8:
+        raise InvalidInput(f"{name}: 64-bit integers are not image data; convert {array.dtype} to a smaller dtype")
+    if array.dtype.kind == "f" and array.dtype.itemsize not in (2, 4, 8):
+        raise InvalidInput(f"{name}: floats of 16, 32 or 64 bit are allowed, got {array.dtype}")
+    if array.ndim not in (axes, axes + 1):
+        shapes = ("(rows, columns)", "(planes, rows, columns)")[axes - 2]
+        hint = "; a volume is not an image" if array.ndim == 4 and axes == 2 else ""
+        raise InvalidInput(
+            f"{name}: needs shape {shapes} with channels last where there are any, got shape {array.shape}{hint}"
+        )
+    if array.ndim == axes:
+        array = array[..., np.newaxis]
+    elif array.shape[-1] > 64:
+        raise InvalidInput(
+            f"{name}: shape {array.shape} has {array.shape[-1]} channels, up to 64 are allowed; "
+            "a volume is not an image"
+        )
+    if array.size == 0 or min(array.shape[:axes]) < minimum:
+        raise InvalidInput(f"{name}: each side must be at least {max(minimum, 1)}, got shape {array.shape[:axes]}")
+    if array.dtype.kind == "f" and not np.isfinite(array).all():
+        bad = int(array.size - np.count_nonzero(np.isfinite(array)))
+        raise InvalidInput(f"{name}: {bad} of {array.size} values are NaN or infinite; all must be finite")
+    return np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("="))
+
+
+def as_kernel(array: Array) -> Array:
+    """Give the values in a dtype that the kernels take: bool as uint8, float16 as float32."""
+    if array.dtype == np.bool_:
+        return array.view(np.uint8)
+    if array.dtype == np.float16:
+        return array.astype(np.float32)
+    return array
+
+
+def to_unit(array: Array) -> Floats:
+    """Bring an image to [0, 1] in float32, so that thresholds mean the same for every dtype.
+
+    Integers are divided by the largest value of their dtype; floats beyond [0, 1] are brought to it by their own
+    range. ``v`` as uint8 and ``257 v`` as uint16 give the same result.
+    """
+    if array.dtype == np.bool_:
+        return array.astype(np.float32)
+    if array.dtype.kind in "ui":
+        info = np.iinfo(array.dtype)
+        return ((array.astype(np.float64) - min(info.min, 0)) / (float(info.max) - min(info.min, 0))).astype(np.float32)
+    low, high = float(array.min()), float(array.max())
+    if low >= 0 and high <= 1:
+        return array.astype(np.float32)
+    low = min(low, 0.0)
+    return ((array.astype(np.float64) - low) / (high - low)).astype(np.float32)
+
+
+def guidance(pixels: Array) -> Floats:
+    """Give the colours that decisions are made on: up to three channels in [0, 1], transparency over mid grey."""
+    unit = to_unit(pixels)
+    if unit.shape[-1] in (2, 4):
+        alpha = unit[..., -1:]
+        return np.ascontiguousarray(unit[..., :-1] * alpha + np.float32(0.5) * (1 - alpha))
+    return np.ascontiguousarray(unit[..., :3])
+
+
+def as_size(
+    value: object, name: str = "size", *, axes: int = 2, minimum: int = 1, limit: int = MAX_PIXELS
+) -> tuple[int, ...]:
+    """Check a size: an int for a square, or one int an axis (rows, columns).
+
+    Raises
+    ------
+    InvalidInput
+        Not integers, too few or too many, or below ``minimum``.
+    LimitExceeded
+        More than ``limit`` pixels.
+
+    """
+    order = ("(rows, columns)", "(planes, rows, columns)")[axes - 2]
+    if isinstance(value, numbers.Integral):
+        sides: tuple[Any, ...] = (value,) * axes
+    elif isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
+        sides = tuple(value)
+    else:
+        raise InvalidInput(f"{name}: needs {order} as integers, got {value!r}")
+    if len(sides) != axes or not all(isinstance(s, numbers.Integral) and not isinstance(s, bool) for s in sides):
+        raise InvalidInput(f"{name}: needs {order} as integers, got {value!r}")
+    result = tuple(int(s) for s in sides)
+    if min(result) < minimum:
+        raise InvalidInput(f"{name}: each side must be at least {minimum}, got {result}")
+    pixels = 1
+    for side in result:
+        pixels *= side
+    if pixels > limit:
+        raise LimitExceeded(f"{name}: {result} has {pixels} pixels, more than the limit of {limit}")
+    return result
+
+
+def as_wrap(value: object, name: str = "wrap", *, axes: int = 2) -> tuple[bool, ...]:
+    """Check a choice of cyclic axes: one bool for all, or one an axis."""
+    if isinstance(value, bool | np.bool_):
+        return (bool(value),) * axes
+    if (
+        isinstance(value, Sequence)
+        and not isinstance(value, str)
+        and len(value) == axes
+        and all(isinstance(v, bool | np.bool_) for v in value)
+    ):
+        return tuple(bool(v) for v in value)
+    raise InvalidInput(f"{name}: needs True, False or {axes} of them, one an axis; got {value!r}")
+
+
+def as_int(value: object, name: str, low: int, high: int) -> int:
+    """Check an integer in [low, high]."""
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral) or not low <= int(value) <= high:
+        raise InvalidInput(f"{name}: needs an integer from {low} to {high}, got {value!r}")
+    return int(value)
+
+
+def as_float(value: object, name: str, low: float, high: float) -> float:
+    """Check a number in [low, high]."""
+    if isinstance(value, bool) or not isinstance(value, numbers.Real) or not low <= float(value) <= high:
+        raise InvalidInput(f"{name}: needs a number from {low} to {high}, got {value!r}")
+    return float(value)
+
+
+def as_seed(value: object, name: str = "seed") -> int:
+    """Check a seed: an integer from 0 to 2^64 - 1."""
+    return as_int(value, name, 0, 2**64 - 1)
+
+
+def as_mask(value: object, name: str, shape: tuple[int, ...]) -> Bools:
+    """Check a mask: bool, or integers of which zero means False, of the given shape."""
+    array = np.asarray(value)
+    if array.dtype.kind not in "bui":
+        raise InvalidInput(f"{name}: needs bool or integers, got dtype {array.dtype}")
+    if array.shape != shape:
+        raise InvalidInput(f"{name}: needs shape {shape}, got {array.shape}")
+    return np.ascontiguousarray(array != 0)

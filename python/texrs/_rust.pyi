@@ -1,0 +1,132 @@
+from collections.abc import Callable, Sequence
+from typing import Any, Final, final
+
+from numpy import bool_, float32, int32, int64, uint8, uint16
+from numpy.typing import NDArray
+
+__all__ = [
+    "VERSION",
+    "PatchIndex",
+    "complete",
+    "decode_image",
+    "encode_image",
+    "exif_orientation",
+    "gather",
+    "mean_shift",
+    "philox",
+    "poisson",
+    "seam_cut",
+    "seam_labels",
+    "seam_strip",
+    "set_threads",
+    "uniform",
+]
+
+VERSION: Final[str]
+
+def set_threads(threads: int) -> int: ...
+def philox(counter: tuple[int, int, int, int] | Sequence[int], key: tuple[int, int] | Sequence[int]) -> list[int]: ...
+def uniform(seed: int, position: Sequence[int]) -> float: ...
+def gather(
+    exemplars: Sequence[NDArray[Any]],
+    wrap: Sequence[bool],
+    which: NDArray[uint16],
+    coordinates: NDArray[float32],
+    interpolation: str,
+) -> NDArray[Any]: ...
+
+@final
+class PatchIndex:
+    def __new__(
+        cls,
+        exemplars: Sequence[NDArray[float32]],
+        allowed: Sequence[NDArray[bool_] | None],
+        max_patch: tuple[int, int],
+    ) -> PatchIndex: ...
+    @property
+    def max_patch(self) -> list[int]: ...
+    def best(
+        self,
+        patch: NDArray[float32],
+        weight: NDArray[float32],
+        count: int,
+        separation: int,
+        ratio: float,
+    ) -> list[tuple[float, int, int, int]]: ...
+    def best_among(
+        self,
+        patch: NDArray[float32],
+        weight: NDArray[float32],
+        candidates: Sequence[tuple[int, int, int]],
+        count: int,
+        separation: int,
+        ratio: float,
+    ) -> list[tuple[float, int, int, int]]: ...
+    def cost_map(
+        self, patch: NDArray[float32], weight: NDArray[float32], exemplar: int
+    ) -> tuple[NDArray[float32], float]: ...
+
+def complete(
+    colours: NDArray[float32],
+    known: NDArray[bool_],
+    keep: NDArray[bool_] | None,
+    index: PatchIndex,
+    wrap: Sequence[bool],
+    patch: Sequence[int],
+    pick: tuple[int, int, float],
+    seed: int,
+    paper: bool,
+    progress: Callable[[float], object] | None,
+) -> tuple[NDArray[float32], NDArray[int32], NDArray[int64]]: ...
+def decode_image(name: str, file: bytes, limit: int) -> tuple[NDArray[uint8], str, tuple[int, int, int], int]: ...
+def encode_image(
+    name: str,
+    format: str,
+    sample: str,
+    shape: tuple[int, int, int],
+    pixels: NDArray[uint8],
+) -> NDArray[uint8]: ...
+def exif_orientation(exif: bytes) -> int: ...
+def poisson(
+    image: NDArray[float32],
+    gradient_rows: NDArray[float32],
+    gradient_columns: NDArray[float32],
+    screening: float,
+    edges: tuple[str, str],
+    mask: NDArray[bool_] | None,
+) -> NDArray[float32]: ...
+def mean_shift(
+    image: NDArray[float32],
+    radius: int,
+    range: float,
+    max_iterations: int,
+    tolerance: float,
+    wrap: Sequence[bool],
+    progress: Callable[[float], object] | None,
+) -> NDArray[float32]: ...
+def seam_cut(
+    a: NDArray[float32],
+    b: NDArray[float32],
+    mask_a: NDArray[bool_],
+    mask_b: NDArray[bool_],
+    core_a: NDArray[bool_] | None,
+    core_b: NDArray[bool_] | None,
+    penalty: NDArray[float32] | None,
+    old: Sequence[Sequence[NDArray[float32]]] | None,
+    cost: str,
+    wrap: Sequence[bool],
+) -> tuple[NDArray[bool_], float, int]: ...
+def seam_strip(
+    a: NDArray[float32],
+    b: NDArray[float32],
+    axis: int,
+    cyclic: bool,
+    penalty: NDArray[float32] | None,
+    cost: str,
+) -> tuple[NDArray[bool_], float, int]: ...
+def seam_labels(
+    unary: NDArray[float32],
+    forward: Sequence[NDArray[float32]],
+    backward: Sequence[NDArray[float32]],
+    wrap: Sequence[bool],
+) -> tuple[NDArray[bool_], float]: ...

@@ -1,0 +1,19 @@
+"""Names for the types that appear in signatures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from os import PathLike
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[Any]
+Floats: TypeAlias = NDArray[np.float32]
+Bools: TypeAlias = NDArray[np.bool_]
+Labels: TypeAlias = NDArray[np.int32]
+Path: TypeAlias = str | PathLike[str]
+Interpolation: TypeAlias = Literal["nearest", "linear", "cubic"]
+Progress: TypeAlias = Callable[[str, float], object]
+"""Called with the name of the stage and the share of it that is done; raising stops the work."""

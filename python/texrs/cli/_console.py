@@ -1,0 +1,208 @@
+"""How commands meet the shell: exit codes, errors of one line, signals and progress."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import sys
+import threading
+import time
+import traceback
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from types import FrameType
+from typing import Annotated, cast
+
+import typer
+
+from texrs._typing import Progress
+from texrs.errors import TexrsError
+
+__all__ = ["Quiet", "Stopped", "Threads", "complain", "note", "run", "say", "watching"]
+
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no progress.")]
+Threads = Annotated[
+    int | None,
+    typer.Option("--threads", metavar="N", help="Threads, 1 to 1024; same bytes with any.", show_default="all cores"),
+]
+
+DONE, INTERNAL, BAD_INPUT = 0, 1, 2
+"""Exit codes; a command that a signal ends has 128 plus the signal's number, so 130 for Ctrl-C."""
+TRACEBACK = "TEXRS_TRACEBACK"
+"""Environment variable that asks for the traceback of an internal error."""
+PAUSE = 5.0
+"""Least seconds between two lines of progress of one stage."""
+PIPE = int(getattr(signal, "SIGPIPE", 13))
+"""Windows knows no such signal, but pipes that break."""
+GRACE = 1.0
+"""Seconds after a signal in which others are ignored."""
+
+# The root of what typer raises on wrong usage. It is click's class or typer's own copy of it, by typer's version.
+UsageFailure = cast(type[Exception], next(c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException"))
+
+
+class Stopped(BaseException):
+    """A signal ended the work. No KeyboardInterrupt, from which typer makes an exit of its own."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = number
+
+
+def run(work: Callable[[], object]) -> int:
+    """Do the work of a command and give its exit code; say on one line of stderr what went wrong."""
+    try:
+        with stoppable(), unwarned():
+            code = work()
+            if sys.stdout is not None:
+                sys.stdout.flush()
+    except Stopped as stopped:
+        return _stopped(stopped.number)
+    except BrokenPipeError:
+        return _stopped(PIPE)
+    except (KeyboardInterrupt, typer.Abort):
+        return _stopped(signal.SIGINT)
+    except SystemExit as leaving:
+        code = leaving.code
+    except UsageFailure as failure:
+        complain(_usage(failure))
+        code = BAD_INPUT
+    except TexrsError as error:
+        complain(str(error))
+        code = BAD_INPUT
+    except MemoryError:
+        complain("this needs more memory than there is; a smaller size or exemplar needs less")
+        code = BAD_INPUT
+    except OSError as error:
+        name = f"{error.filename}: " if isinstance(error.filename, str) else ""
+        complain(f"{name}{(error.strerror or str(error)).lower()}")
+        code = BAD_INPUT
+    except BaseException as error:  # A panic of the compiled part is no Exception.
+        if os.environ.get(TRACEBACK, "0") not in ("", "0"):
+            traceback.print_exception(error)
+        else:
+            what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+            complain(f"internal error: {what} (run with {TRACEBACK}=1 for the traceback)")
+        code = INTERNAL
+    return code if isinstance(code, int) else DONE
+
+
+def say(line: str) -> None:
+    """Print a line of the result."""
+    try:
+        print(line, flush=True)
+    except BrokenPipeError:
+        # Not left to typer, which would make an error of it.
+        raise Stopped(PIPE) from None
+
+
+def note(line: str, *, quiet: bool) -> None:
+    """Tell what was done, unless nobody wants to know."""
+    if not quiet:
+        complain(line)
+
+
+def complain(message: str) -> None:
+    """Print one line to stderr, whatever the message holds: it may quote the name of a file."""
+    text = " ".join(message.split())
+    line = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+    with suppress(OSError, ValueError):
+        print(f"texrs: {line}", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def stoppable() -> Iterator[None]:
+    """Let Ctrl-C and requests to end raise `Stopped`, so that all that is half-written is removed."""
+    last = -math.inf
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        nonlocal last
+        now = time.monotonic()
+        # Impatient repetition must not stop the removal of files.
+        if now - last > GRACE:
+            last = now
+            raise Stopped(number)
+
+    before = {}
+    if threading.current_thread() is threading.main_thread():
+        for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+            number = getattr(signal, name, None)
+            # What is ignored stays ignored: nohup, and jobs in the background of a script.
+            if number is not None and signal.getsignal(number) not in (signal.SIG_IGN, None):
+                before[number] = signal.signal(number, stop)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def unwarned() -> Iterator[None]:
+    """Keep warnings, which speak to programmers, off the terminal unless Python was asked for them."""
+    with warnings.catch_warnings():
+        if not sys.warnoptions:
+            warnings.simplefilter("ignore")
+        yield
+
+
+@contextmanager
+def watching(*, quiet: bool) -> Iterator[Progress]:
+    """Give a callback that shows progress on stderr: a bar on a terminal, lines elsewhere."""
+    if quiet or sys.stderr is None:
+        yield lambda stage, share: None
+    elif sys.stderr.isatty() and os.environ.get("TERM") != "dumb":
+        with _bar() as progress:
+            yield progress
+    else:
+        yield _lines()
+
+
+@contextmanager
+def _bar() -> Iterator[Progress]:
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=1.0)
+        yield lambda stage, share: bar.update(task, description=stage, completed=share)
+
+
+def _lines() -> Progress:
+    last, since = "", 0.0
+
+    def show(stage: str, share: float) -> None:
+        nonlocal last, since
+        now = time.monotonic()
+        if share < 1 and (stage != last or now - since >= PAUSE):
+            complain(stage if stage != last else f"{stage} {share:.0%}")
+            last, since = stage, now
+
+    return show
+
+
+def _stopped(number: int) -> int:
+    """Give the exit code of a command that a signal ended; a broken pipe is no news to anybody."""
+    if number == PIPE:
+        # What is still buffered has nowhere to go, and Python would complain of that at its end.
+        with suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    else:
+        complain("stopped; nothing was left half-written")
+    return 128 + number
+
+
+def _usage(failure: Exception) -> str:
+    """Say what was wrong with the arguments, and where the right ones are listed."""
+    message = failure.format_message() if hasattr(failure, "format_message") else str(failure)
+    context = getattr(failure, "ctx", None)
+    command = context.command_path if context is not None else "texrs"
+    return f"{message.rstrip('.')} ({command} --help lists what is allowed)"

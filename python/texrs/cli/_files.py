@@ -1,0 +1,252 @@
+"""What commands read and write, checked before any long work."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import numpy as np
+
+from texrs import io, samples
+from texrs._arrays import as_image, as_size
+from texrs._typing import Array
+from texrs.errors import FileError, InvalidInput, TexrsError
+from texrs.report import Synthesis
+
+__all__ = [
+    "check_distinct",
+    "check_folder",
+    "check_npz",
+    "check_output",
+    "check_outputs",
+    "deliver",
+    "describe",
+    "named",
+    "output",
+    "parse_range",
+    "parse_size",
+    "parse_wrap",
+    "read_exemplar",
+    "read_hole",
+    "read_picture",
+]
+
+SAMPLE = "sample:"
+"""What the name of a built-in exemplar starts with."""
+LONGEST_PROBE = 2**17
+"""Longer than a side may be in any format that limits it."""
+
+
+# --- values ----------------------------------------------------------------------------------------------------------
+
+
+def parse_size(text: str | None, *, name: str = "--size", axes: int = 2) -> tuple[int, ...] | None:
+    """Read ``512x384`` as rows and columns, ``512`` as a square."""
+    if text is None:
+        return None
+    parts = re.split(r"[x×]", text.strip().lower())
+    if len(parts) not in (1, axes) or not all(re.fullmatch(r"\s*-?[0-9]{1,18}\s*", p) for p in parts):
+        raise InvalidInput(f"{name}: needs ROWSxCOLS, as in 512x384, or one number; got {text!r}")
+    sides = [int(p) for p in parts]
+    return as_size(sides if len(sides) > 1 else sides[0], name, axes=axes)
+
+
+def parse_wrap(text: str) -> tuple[bool, bool]:
+    """Read the axes that wrap: x is left to right, so along the columns, y is top to bottom."""
+    axes = {"none": "", "x": "x", "y": "y", "xy": "xy", "yx": "xy"}.get(text.strip().lower())
+    if axes is None:
+        raise InvalidInput(f"--wrap: allowed are xy, x, y and none; got {text!r}")
+    return "y" in axes, "x" in axes
+
+
+def parse_range(text: str, *, name: str) -> tuple[float, float]:
+    """Read ``0.8:1.2`` as the least and the largest, ``1`` as both."""
+    parts = text.split(":")
+    try:
+        values = [float(p) for p in parts]
+    except ValueError:
+        values = []
+    if len(values) not in (1, 2):
+        raise InvalidInput(f"{name}: needs LEAST:LARGEST, as in 0.8:1.2; got {text!r}")
+    return values[0], values[-1]
+
+
+@contextmanager
+def named(**names: str) -> Iterator[None]:
+    """Name the file or the option where an error names the argument of a function.
+
+    Arguments that are not given have the option of their own name.
+    """
+    try:
+        yield
+    except InvalidInput as error:
+        argument, colon, rest = str(error).partition(":")
+        if not colon or not argument.isidentifier():
+            raise
+        raise type(error)(f"{names.get(argument, f'--{argument}')}:{rest}") from None
+
+
+# --- reading ---------------------------------------------------------------------------------------------------------
+
+
+def read_picture(text: str) -> Array:
+    """Read an image file, or make the built-in exemplar that ``sample:NAME`` names."""
+    if text.startswith(SAMPLE):
+        image: Array = samples.load(text.removeprefix(SAMPLE)).image
+        return image
+    return io.read(text)
+
+
+def read_exemplar(text: str) -> Array:
+    """Read a picture as `read_picture`, all of which must be finite."""
+    image = read_picture(text)
+    as_image(image, text)
+    return image
+
+
+def read_hole(path: str) -> Array:
+    """Read a mask: any colour but black is the hole, whatever an alpha channel says."""
+    mask = io.read(path)
+    if mask.ndim == 2:
+        return mask
+    colours = mask[..., :-1] if mask.shape[-1] in (2, 4) else mask
+    hole: Array = (colours != 0).any(axis=-1)
+    return hole
+
+
+# --- writing ---------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def output(path: str) -> Iterator[Path]:
+    """Give a temporary name that takes the place of ``path`` at the end; errors speak of ``path``."""
+    with io.atomic(path) as temporary:
+        try:
+            yield temporary
+        except TexrsError as error:
+            message = str(error).replace(str(temporary), path)
+            if message.startswith("array:"):
+                message = path + message.removeprefix("array")
+            raise type(error)(message) from None
+
+
+class _Enough(Exception):
+    """What there was to try out worked."""
+
+
+def check_output(path: str, like: Array | None = None, size: tuple[int, ...] = (1, 1)) -> None:
+    """Try whether an image of the dtype and channels of ``like`` can be written; leave no trace of it.
+
+    Without ``like``, only whether a file can be.
+    """
+    with suppress(_Enough), output(path) as temporary:
+        if like is None:
+            temporary.touch()
+        else:
+            # As long as the result, which some formats limit, and with the value that .hdr may refuse.
+            axes = len(size)
+            longest = min(max(size), LONGEST_PROBE)
+            probe = np.full((longest, *(1,) * (axes - 1), *like.shape[axes:]), like.min(), like.dtype)
+            (io.write if axes == 2 else io.write_volume)(temporary, probe)
+        raise _Enough
+
+
+def check_outputs(out: str, source: str | None, stages: str | None) -> None:
+    """Check that what stands beside the result can be written: the source map and the folder of the stages."""
+    check_distinct(out=out, source=source, stages=stages)
+    if source is not None:
+        check_npz(source)
+        check_output(source)
+    if stages is not None:
+        check_folder(stages)
+
+
+def deliver(result: Synthesis, out: str, source: str | None, stages: str | None) -> None:
+    """Write a result and what was asked for beside it."""
+    # The result takes its name last, when all else is written.
+    with output(out) as temporary:
+        io.write(temporary, result.image)
+        if source is not None:
+            result.source.save(source)
+        if stages is not None:
+            result.save_stages(stages)
+
+
+def deliver_variants(made: Sequence[Synthesis], seed: int, out: str, source: str | None, stages: str | None) -> None:
+    """Write several results, each under a name that ends in its seed, and a contact sheet of them."""
+    for number, result in enumerate(made):
+        where = [None if p is None else beside(p, seed + number) for p in (out, source, stages)]
+        deliver(result, str(where[0]), where[1], where[2])
+    with output(out) as temporary:
+        io.write(temporary, contact_sheet([result.image for result in made]))
+
+
+def beside(path: str, seed: int) -> str:
+    """Give the name of one of several results."""
+    plain = Path(path)
+    return str(plain.with_name(f"{plain.stem}-{seed}{plain.suffix}"))
+
+
+def contact_sheet(images: Sequence[Array], side: int = 256) -> Array:
+    """Set small versions of images of one size into a grid, in their dtype."""
+    # Every n-th pixel, so that any dtype and any channels can be shown.
+    step = max(1, -(-max(images[0].shape[:2]) // side))
+    small = [image[::step, ::step] for image in images]
+    columns = int(np.ceil(np.sqrt(len(small))))
+    rows = -(-len(small) // columns)
+    height, width = small[0].shape[:2]
+    sheet = np.zeros((rows * height, columns * width, *small[0].shape[2:]), small[0].dtype)
+    for i, one in enumerate(small):
+        top, left = i // columns * height, i % columns * width
+        sheet[top : top + height, left : left + width] = one
+    return sheet
+
+
+def parse_shares(text: str | None) -> list[float] | None:
+    """Read shares such as 2:1:1."""
+    if text is None:
+        return None
+    try:
+        return [float(part) for part in text.split(":")]
+    except ValueError:
+        raise InvalidInput(f"--weights: needs numbers such as 2:1:1, one an example, got {text!r}") from None
+
+
+def check_npz(path: str) -> None:
+    """Check the name of a source map."""
+    if Path(path).suffix.lower() != ".npz":
+        raise InvalidInput(f"--source: needs a name that ends in .npz, got {path!r}")
+
+
+def describe(image: Array, axes: int) -> str:
+    """Say the size, the channels and the dtype of an image."""
+    channels = image.shape[axes] if image.ndim > axes else 1
+    sides = " x ".join(map(str, image.shape[:axes]))
+    return f"{sides}, {channels} channel{'s'[: channels != 1]}, {image.dtype}"
+
+
+def check_folder(path: str) -> None:
+    """Check that a folder is there and can be written to, or can be made."""
+    if not path or "\0" in path:
+        raise FileError(f"{path!r}: is not the name of a folder")
+    there = Path(path)
+    while not os.path.lexists(there) and there != there.parent:
+        there = there.parent
+    if not there.is_dir():
+        raise FileError(f"{path}: {there} is not a folder" if str(there) != path else f"{path}: is not a folder")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise FileError(f"{path}: the folder {there} cannot be written to")
+
+
+def check_distinct(**paths: str | None) -> None:
+    """Check that no two outputs are one file."""
+    seen: dict[str, str] = {}
+    for option, path in paths.items():
+        if path is None:
+            continue
+        other = seen.setdefault(os.path.realpath(path), option)
+        if other != option:
+            raise InvalidInput(f"--{option}: {path} is already the file of --{other}")

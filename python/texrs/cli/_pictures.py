@@ -1,0 +1,115 @@
+"""Commands that mend a picture: ``texrs tile`` and ``texrs complete``."""
+
+from __future__ import annotations
+
+import time
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from texrs.cli import _files
+from texrs.cli._console import Quiet, Threads, note, watching
+from texrs.cli._files import describe, named
+from texrs.completion import complete
+from texrs.cyclic import tile
+from texrs.threads import threads
+
+__all__ = ["complete_command", "tile_command"]
+
+Picture = Annotated[
+    str, typer.Argument(metavar="IN", help="The picture: an image file, or sample:NAME.", show_default=False)
+]
+Out = Annotated[str, typer.Option("--out", "-o", metavar="OUT", help="Image file to write.", show_default=False)]
+Stages = Annotated[
+    str | None,
+    typer.Option(metavar="DIR", help="Folder for pictures of the stages and report.json.", show_default=False),
+]
+Source = Annotated[
+    str | None,
+    typer.Option(metavar="FILE.npz", help="File for the source map, for texrs apply.", show_default=False),
+]
+
+
+def tile_command(
+    image: Picture,
+    out: Out,
+    wrap: Annotated[
+        str, typer.Option(metavar="AXES", help="Where the result tiles: xy, x (left-right), y (top-bottom) or none.")
+    ] = "xy",
+    overlap: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N|ROWSxCOLS",
+            help="Pixels of two opposite edges that are laid over each other, up to half the side.",
+            show_default="a cheap one between 25 and 100",
+        ),
+    ] = None,
+    stages: Stages = None,
+    source: Source = None,
+    count: Threads = None,
+    quiet: Quiet = False,
+) -> None:
+    """Make a picture cyclic, so that copies side by side have no edge between them."""
+    start = time.monotonic()
+    cyclic, lines = _files.parse_wrap(wrap), _files.parse_size(overlap, name="--overlap")
+    _files.check_outputs(out, source, stages)
+    pixels = _files.read_exemplar(image)
+    _files.check_output(out, pixels, pixels.shape[:2])
+    with named(image=image, count="--threads"), threads(count), watching(quiet=quiet) as progress:
+        result = tile(pixels, wrap=cyclic, overlap=lines, progress=progress)
+    _files.deliver(result, out, source, stages)
+    note(f"wrote {out}: {describe(result.image, 2)}, in {time.monotonic() - start:.1f} s", quiet=quiet)
+
+
+def complete_command(
+    image: Picture,
+    hole: Annotated[
+        str,
+        typer.Argument(metavar="HOLE", help="Image of the same size: what is not black is filled.", show_default=False),
+    ],
+    out: Out,
+    source_image: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE", help="Picture to copy from, of the same dtype and channels.", show_default="IN itself"
+        ),
+    ] = None,
+    patch: Annotated[
+        int | None,
+        typer.Option(help="Side of the patches, in pixels, at least 4.", show_default="by the picture's size"),
+    ] = None,
+    rim: Annotated[int, typer.Option(help="Pixels around the hole that may be replaced too, to hide the seam.")] = 0,
+    mirror: Annotated[bool, typer.Option("--mirror/--no-mirror", help="Whether patches may be mirrored.")] = True,
+    wrap: Annotated[
+        str, typer.Option(metavar="AXES", help="Where the picture tiles: xy, x (left-right), y (top-bottom) or none.")
+    ] = "none",
+    seed: Annotated[int, typer.Option(help="Chooses patches where nothing is known around.")] = 0,
+    stages: Stages = None,
+    source: Source = None,
+    count: Threads = None,
+    quiet: Quiet = False,
+) -> None:
+    """Fill a hole in a picture with patches of what is known of it, or of another picture."""
+    start = time.monotonic()
+    cyclic = _files.parse_wrap(wrap)
+    _files.check_outputs(out, source, stages)
+    pixels, mask = _files.read_picture(image), _files.read_hole(hole)
+    other = None if source_image is None else _files.read_exemplar(source_image)
+    # In the hole anything may stand that the format of the result cannot hold.
+    _files.check_output(out, np.nan_to_num(pixels), pixels.shape[:2])
+    names = {"image": image, "hole": hole, "source": str(source_image), "count": "--threads"}
+    with named(**names), threads(count), watching(quiet=quiet) as progress:
+        result = complete(
+            pixels,
+            mask,
+            source=other,
+            patch=patch,
+            rim=rim,
+            mirror=mirror,
+            wrap=cyclic,
+            seed=seed,
+            progress=progress,
+        )
+    _files.deliver(result, out, source, stages)
+    note(f"wrote {out}: {describe(result.image, 2)}, in {time.monotonic() - start:.1f} s", quiet=quiet)

@@ -1,0 +1,254 @@
+"""Holes in a picture filled with patches of what is around them, or of another picture.
+
+J. Shen, X. Jin, X. Mao and J. Feng, "Completion-based texture design using deformation", 2006, section 3.4: in scan
+order, the patches that fit best what is known around a hole, each cut into it, and the one with the cheapest cut
+pasted. Here as a verb of its own, for any picture: `texrs.papers.design` fills its own holes in the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_image, as_int, as_mask, as_seed, as_wrap, guidance
+from texrs._typing import Array, Bools, Floats, Progress
+from texrs.deform import Flip, flip, flip_coordinates, flip_frame, mirrors
+from texrs.errors import InvalidInput
+from texrs.kernels.complete import complete as fill
+from texrs.kernels.patch_search import PatchIndex
+from texrs.report import Synthesis
+from texrs.source_map import SourceMap
+
+__all__ = ["complete"]
+
+LEAST = 4
+"""Side of the smallest patch that still says anything of a texture."""
+PLACES = 64
+"""Places to copy from that a patch should have; where it has fewer, smaller patches are taken."""
+
+
+def complete(
+    image: Array,
+    hole: Array,
+    *,
+    source: Array | None = None,
+    method: str = "patch",
+    patch: int | None = None,
+    rim: int = 0,
+    mirror: bool = True,
+    wrap: bool | Sequence[bool] = False,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Synthesis:
+    """Fill a hole in a picture by example.
+
+    Parameters
+    ----------
+    image : (H, W) or (H, W, C) array
+        The picture, any real dtype, at least 4 pixels a side. What it holds in the hole does not matter; it may be NaN.
+    hole : (H, W) bool or integers
+        True, or not zero, where the picture is to be filled.
+    source : (h, w) or (h, w, C) array, optional
+        Another picture to copy from, of the same dtype and channels; by default what is known of ``image``.
+    method : {"patch"}
+        How: patches that fit what is around, cut in [1]_.
+    patch : int, optional
+        Side of a patch in pixels, at least 4: about the size of what repeats. By default a sixth of the shorter side,
+        12 to 32; less where no place, or few, would be free of holes.
+    rim : int
+        Pixels around the hole that may be replaced too, 0 to 1024, so that the cut can run where it shows least. 0
+        leaves all that is known as it is.
+    mirror : bool
+        Whether patches may be mirrored; False for lit or lettered textures.
+    wrap : bool or (rows, columns)
+        Axes along which the picture is cyclic, so that a hole at its border is also filled from across.
+    seed : int
+        Chooses patches where nothing is known around.
+    progress : callable, optional
+        Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
+
+    Returns
+    -------
+    Synthesis
+        The filled image, in the dtype and with the channels of the picture. Its source map looks into the picture, or
+        into ``[image, source]``; pixels that are kept map to themselves, and none maps into the hole. To render a
+        picture that is NaN in the hole through it, put any number there. The stages are ``"known"``, ``"patches"``
+        (each in a shade of its own) and ``"composite"``, the result.
+
+    Raises
+    ------
+    InvalidInput
+        A hole of another shape; a source of another dtype or other channels; nothing known to copy from; a patch larger
+        than the pictures, or with no place for it outside the hole.
+
+    References
+    ----------
+    .. [1] J. Shen, X. Jin, X. Mao, J. Feng, "Completion-based texture design using deformation", The Visual Computer
+       22, 2006, section 3.4. :doi:`10.1007/s00371-006-0040-9`
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import texrs
+    >>> wall = np.tile(np.uint8([[0, 0, 9, 9], [9, 9, 0, 0]]), (24, 12))
+    >>> hole = np.zeros(wall.shape, bool)
+    >>> hole[10:25, 12:30] = True
+    >>> result = texrs.complete(np.where(hole, 5, wall).astype(np.uint8), hole)
+    >>> bool((result.image == wall).all())
+    True
+
+    """
+    if method != "patch":
+        raise InvalidInput(f"method: allowed is 'patch', got {method!r}")
+    if not isinstance(mirror, bool | np.bool_):
+        raise InvalidInput(f"mirror: needs True or False, got {mirror!r}")
+    pictures, open_ = check_pictures(image, hole, source)
+    shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
+    cyclic, seed = as_wrap(wrap), as_seed(seed)
+    width = as_int(rim, "rim", 0, 1024)
+    largest = min(n for shape in shapes for n in shape)
+    chosen = None if patch is None else as_int(patch, "patch", LEAST, largest)
+    watch = progress or (lambda stage, share: None)
+
+    watch("complete", 0.0)
+    identity = SourceMap.identity(shapes[0])
+    places, side, count = SourceMap(identity.coordinates, identity.exemplar, identity.label, None, shapes), 0, 0
+    if open_.any():
+        guides = guides_of(pictures)
+        flips = mirrors(bool(mirror))
+        free = np.ones(shapes[-1], bool) if source is not None else ~open_
+        side = patch_side(free, chosen, largest)
+        index = PatchIndex(
+            [flip(guides[-1], f) for f in flips],
+            allowed=[corners(flip(free, f), side) for f in flips],
+            max_patch=side,
+        )
+        filled = fill(
+            guides[0],
+            ~open_,
+            index,
+            patch=side,
+            keep=~grown(open_, width, cyclic),
+            wrap=cyclic,
+            seed=seed,
+            progress=lambda share: watch("complete", share),
+        )
+        places, count = pasted(places, filled.label, filled.source, filled.coordinates, flips), len(filled.source)
+    result = places.render(pictures)
+    watch("done", 1.0)
+    known = pictures[0].copy()
+    known[open_] = known[~open_].min() if count and not open_.all() else 0
+    stages = {
+        "known": known,
+        "patches": np.where(places.label > 0, 55 + places.label * 67 % 200, 0).astype(np.uint8),
+        "composite": result,
+    }
+    report = {
+        "method": method,
+        "seed": seed,
+        "hole": float(open_.mean()),
+        "replaced_outside": int((~open_ & (places.label > 0)).sum()),
+        "patch": side,
+        "patches": count,
+        "mirror": bool(mirror),
+        "wrap": list(cyclic),
+    }
+    return Synthesis(result, places, stages, report)
+
+
+def check_pictures(image: object, hole: object, source: object | None) -> tuple[list[Array], Bools]:
+    """Give the picture with its hole painted over, the source if there is one, and the hole."""
+    array = np.asarray(image)
+    mask = None
+    if array.ndim in (2, 3) and array.dtype.kind in "buif" and array.size:
+        mask = as_mask(hole, "hole", array.shape[:2])
+        # What is in the hole must not matter, not even to the range of the values.
+        array = array.copy()
+        array[mask] = array[~mask][0] if not mask.all() else 0
+    pixels = as_image(array, "image", minimum=LEAST)
+    mask = as_mask(hole, "hole", pixels.shape[:2]) if mask is None else mask
+    if source is None:
+        if mask.all():
+            raise InvalidInput("hole: covers the whole image, so there is nothing to copy from; give a source")
+        return [pixels.reshape(array.shape)], mask
+    other = as_image(source, "source", minimum=LEAST)
+    if other.dtype != pixels.dtype or other.shape[-1] != pixels.shape[-1]:
+        raise InvalidInput(
+            f"source: needs the dtype and channels of the image, {pixels.dtype} and {pixels.shape[-1]}; "
+            f"got {other.dtype} and {other.shape[-1]}"
+        )
+    if mask.all():
+        pixels[...] = other[0, 0]
+    return [pixels.reshape(array.shape), other.reshape(other.shape[: array.ndim])], mask
+
+
+def guides_of(pictures: Sequence[Array]) -> list[Floats]:
+    """Give the colours that patches are compared by, brought to [0, 1] together."""
+    pixels = [as_image(p) for p in pictures]
+    lines = guidance(np.concatenate([p.reshape(1, -1, p.shape[-1]) for p in pixels], axis=1))
+    found, start = [], 0
+    for p in pixels:
+        count = p.shape[0] * p.shape[1]
+        found.append(np.ascontiguousarray(lines[0, start : start + count].reshape(*p.shape[:2], -1)))
+        start += count
+    return found
+
+
+def patch_side(free: Bools, chosen: int | None, largest: int) -> int:
+    """Give the side of the patches: the one asked for, or the usual one, smaller where few places are free for it."""
+    if chosen is not None:
+        if not corners(free, chosen).any():
+            fits = next((s for s in range(chosen - 1, LEAST - 1, -1) if corners(free, s).any()), None)
+            hint = f"at most {fits} has one" if fits else "nor has any other; give a source"
+            raise InvalidInput(f"patch: {chosen} has no place in the image that is free of holes; {hint}")
+        return chosen
+    usual = min(largest, max(12, min(32, min(free.shape) // 6)))
+    for side in range(usual, LEAST - 1, -1):
+        if np.count_nonzero(corners(free, side)) >= PLACES:
+            return side
+    if not corners(free, LEAST).any():
+        raise InvalidInput(f"hole: leaves no {LEAST} x {LEAST} pixels in one piece to copy from; give a source")
+    return LEAST
+
+
+def corners(free: Bools, side: int) -> Bools:
+    """Mark the top-left corners of the patches that are free of holes."""
+    rows, columns = free.shape
+    counts = np.zeros((rows + 1, columns + 1), np.int64)
+    counts[1:, 1:] = free.cumsum(0).cumsum(1)
+    whole = counts[side:, side:] - counts[:-side, side:] - counts[side:, :-side] + counts[:-side, :-side] == side * side
+    found = np.zeros(free.shape, bool)
+    found[: whole.shape[0], : whole.shape[1]] = whole
+    return found
+
+
+def grown(mask: Bools, width: int, wrap: Sequence[bool]) -> Bools:
+    """Widen a mask by so many pixels, around the edges of axes that wrap."""
+    from scipy.ndimage import maximum_filter1d
+
+    for axis, cyclic in enumerate(wrap):
+        reach = min(width, mask.shape[axis])
+        mask = maximum_filter1d(mask, 2 * reach + 1, axis, mode="wrap" if cyclic else "nearest")
+    return mask
+
+
+def pasted(
+    kept: SourceMap,
+    label: NDArray[np.int32],
+    origin: NDArray[np.int64],
+    coordinates: Floats,
+    flips: Sequence[Flip],
+) -> SourceMap:
+    """Give the map of a picture in which patches are pasted: those of the last exemplar, each in one of its mirrors."""
+    new = label >= 0
+    places, exemplar = kept.coordinates.copy(), kept.exemplar.copy()
+    which = np.where(new, origin[label], -1)
+    rows, columns = kept.shapes[-1]
+    for number, mirror in enumerate(flips):
+        here = which == number
+        places[here] = flip_coordinates(coordinates[here], mirror, (rows, columns))
+    exemplar[new] = len(kept.shapes) - 1
+    frames = np.stack([np.eye(2, dtype=np.float32), *(flip_frame(flips[o]) for o in origin)])
+    return SourceMap(places, exemplar, (label + 1).astype(np.uint32), frames, kept.shapes)

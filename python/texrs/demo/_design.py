@@ -1,0 +1,114 @@
+"""DESIGN on the page: results, stages and seeds."""
+
+from __future__ import annotations
+
+import colorsys
+from typing import Any
+
+import numpy as np
+
+from texrs._typing import Array
+from texrs.demo._html import code, figure, grid, row, tiled
+from texrs.demo._workshop import Section, Workshop
+from texrs.kernels.noise import uniform
+from texrs.report import preview
+
+__all__ = ["RESULTS", "SEEDS", "STAGES", "coloured"]
+
+SHOWN: tuple[tuple[str, str, dict[str, Any]], ...] = (
+    ("pebbles", "Rounded stones on sand", {}),
+    ("leaves_and_flowers", "Flowers on leaves", {}),
+    ("beans", "Touching beans of one colour", {}),
+    ("bark", "Furrowed bark, upright: rotate=0", {"rotate": 0.0}),
+    ("bricks", "A wall: no rotation, no scaling", {"rotate": 0.0, "scale": (1.0, 1.0), "translate": 0.05}),
+    ("gravel", "A grey photograph", {}),
+)
+
+CAPTIONS = {
+    "segmentation": ("Elements", "each in a colour of its own"),
+    "deformed": ("Deformed", "moved by chaos, stitched by graph cuts"),
+    "holes": ("Holes", "what no element covers"),
+    "completed": ("Completed", "holes filled by example"),
+    "composite": ("Composite", "variants stitched on the torus"),
+}
+
+
+def _results(workshop: Workshop) -> str:
+    rows = []
+    for i, (name, caption, options) in enumerate(SHOWN):
+        workshop.watch(i / len(SHOWN))
+        made = workshop.designed(name, **options)
+        reuse = made.result.source.reuse()
+        rows.append(
+            row(
+                figure(made.sample.image, "Example", note=_size(made.sample.image)),
+                tiled(
+                    made.result.image,
+                    caption,
+                    "The result, tiled 2 × 2",
+                    note=f"{_size(made.result.image)}; largest piece copied: {reuse.largest:.0%} of the example",
+                ),
+            )
+        )
+    return code("texrs design example.png -o result.png --size 320x320 --seed 7") + "".join(rows)
+
+
+def _stages(workshop: Workshop) -> str:
+    name, _, options = SHOWN[0]
+    made = workshop.designed(name, **options)
+    pictures = [figure(made.sample.image, "Example", note=_size(made.sample.image))]
+    for stage, image in made.result.stages.items():
+        caption, note = CAPTIONS.get(stage, (stage.capitalize(), ""))
+        flat = image.ndim == 2
+        seen = coloured(image, made.sample.image) if stage == "segmentation" else image
+        pictures.append(figure(preview(seen), caption, note=note, exact=flat))
+    return code("texrs design example.png -o result.png --stages stages") + grid(pictures)
+
+
+def _seeds(workshop: Workshop) -> str:
+    pictures: list[str] = []
+    for seed in range(1, 6):
+        workshop.watch((seed - 1) / 5)
+        made = workshop.designed("dots", 160, 200, seed=seed)
+        if not pictures:
+            pictures.append(figure(made.sample.image, "Example", share=160 / 200))
+        pictures.append(figure(made.result.image, f"Seed {seed}"))
+    return code("texrs design example.png -o result.png --size 200 --seed 1") + grid(pictures)
+
+
+def coloured(labels: Array, picture: Array | None = None) -> Array:
+    """Give each label a colour of its own, the background none; shade them by the picture."""
+    count = int(labels.max()) + 1
+    hues = [uniform(1, i, 0) for i in range(count)]
+    palette = np.array([colorsys.hsv_to_rgb(h, 0.6, 1.0) for h in hues])
+    palette[0] = 0.35
+    colours = palette[labels]
+    if picture is not None:
+        colours *= 0.45 + 0.55 * preview(picture).mean(axis=-1, keepdims=True) / 160
+    shaded: Array = np.rint(255 * np.clip(colours, 0, 1)).astype(np.uint8)
+    return shaded
+
+
+def _size(image: Array) -> str:
+    return f"{image.shape[0]} × {image.shape[1]}"
+
+
+RESULTS = Section(
+    "results",
+    "Any size from one example",
+    "DESIGN deforms the elements of the example, stitches them by graph cuts and fills what is left open. "
+    "The results repeat without a seam.",
+    _results,
+)
+STAGES = Section(
+    "stages",
+    "How it is made",
+    "The stages of one of the variants that the first result was stitched from, and the result.",
+    _stages,
+)
+SEEDS = Section(
+    "seeds",
+    "As many as you like",
+    "Each seed is another texture; the same seed is the same texture, byte for byte, on any number of threads.",
+    _seeds,
+)

@@ -1,0 +1,140 @@
+"""HTML of the demo: the page, its sections, its pictures."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from html import escape
+
+import imageio.v3 as iio
+
+import texrs
+from texrs._typing import Array
+from texrs.report import preview
+
+__all__ = ["code", "document", "figure", "grid", "row", "section", "tiled", "uri"]
+
+QUALITY = 90
+"""Of the JPEG pictures."""
+
+
+def uri(image: Array, *, exact: bool = False) -> str:
+    """Put a picture into a data URI: PNG where it must be exact or has an alpha channel, else JPEG."""
+    seen = preview(image)
+    if seen.ndim == 3 and seen.shape[2] == 1:
+        seen = seen[..., 0]
+    if exact or (seen.ndim == 3 and seen.shape[2] == 4):
+        kind, file = "png", iio.imwrite("<bytes>", seen, extension=".png", plugin="pillow")
+    else:
+        kind, file = "jpeg", iio.imwrite("<bytes>", seen, extension=".jpg", plugin="pillow", quality=QUALITY)
+    return f"data:image/{kind};base64,{base64.b64encode(file or b'').decode('ascii')}"
+
+
+def figure(image: Array, caption: str, *, exact: bool = False, share: float = 1.0, note: str = "") -> str:
+    """Show a picture with its caption; ``share`` is its width, of the place that it is given."""
+    height, width = image.shape[:2]
+    style = f' style="width:{share:.0%}"' if share != 1 else ""
+    size = f'width="{width}" height="{height}"{style}'
+    picture = f'<img src="{uri(image, exact=exact)}" alt="{escape(caption)}" {size}>'
+    return f"<figure>{picture}{_caption(caption, note)}</figure>"
+
+
+def tiled(image: Array, caption: str, tiles: str, *, note: str = "") -> str:
+    """Show a picture, and beside it the same data tiled 2 x 2 as a background."""
+    height, width = image.shape[:2]
+    ratio = f"aspect-ratio:{width}/{height}"
+    picture = '<div class="ground{}" role="img" aria-label="{}" style="{}"></div>'
+    return (
+        f'<div class="pair" style="--picture:url({uri(image)})">'
+        f"<figure>{picture.format('', escape(caption), ratio)}{_caption(caption, note)}</figure>"
+        f"<figure>{picture.format(' four', escape(tiles), ratio)}{_caption(tiles)}</figure></div>"
+    )
+
+
+def row(*parts: str) -> str:
+    """Put an exemplar before what was made from it."""
+    return f'<div class="row">{"".join(parts)}</div>'
+
+
+def grid(parts: Sequence[str], *, least: int = 150) -> str:
+    """Put pictures of one size beside each other, each at least so many pixels wide."""
+    return f'<div class="grid" style="--least:{least}px">{"".join(parts)}</div>'
+
+
+def code(text: str) -> str:
+    """Show a command."""
+    return f"<pre><code>{escape(text)}</code></pre>"
+
+
+def section(name: str, title: str, lead: str, body: str) -> str:
+    """Put a section together."""
+    return f'<section id="{escape(name)}"><h2>{escape(title)}</h2><p class="lead">{escape(lead)}</p>{body}</section>'
+
+
+def document(links: Sequence[tuple[str, str]], sections: Sequence[str]) -> str:
+    """Put the page together."""
+    menu = "".join(f'<a href="#{escape(name)}">{escape(title)}</a>' for name, title in links)
+    body = "\n".join(sections)
+    return f"""<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<title>texrs: new textures from one example</title>
+<style>{STYLE}</style>
+</head>
+<body>
+<header><h1>texrs</h1><p>New textures from one example.</p><nav>{menu}</nav></header>
+<main>
+{body}
+</main>
+<footer>Made by <code>texrs demo</code>, version {escape(texrs.__version__)}. All results were made when this page was
+written; the same version makes the same ones.</footer>
+</body>
+</html>
+"""
+
+
+def _caption(text: str, note: str = "") -> str:
+    extra = f"<small>{escape(note)}</small>" if note else ""
+    return f"<figcaption>{escape(text)}{extra}</figcaption>"
+
+
+STYLE = """
+:root { --ink: #1c1b19; --soft: #6a665f; --paper: #faf8f5; --card: #fff; --line: #e4dfd7; --accent: #a4491f; }
+@media (prefers-color-scheme: dark) {
+  :root { --ink: #ece8e1; --soft: #a09a90; --paper: #161513; --card: #201f1c; --line: #37342f; --accent: #e8996c; }
+}
+* { box-sizing: border-box; }
+html { scroll-behavior: smooth; }
+body { margin: 0; background: var(--paper); color: var(--ink); font: 16px/1.55 system-ui, sans-serif; }
+header, main, footer { max-width: 1080px; margin: 0 auto; padding: 0 1.25rem; }
+header { padding-top: 3rem; }
+h1 { margin: 0; font-size: 3rem; line-height: 1.1; letter-spacing: -.03em; }
+header p { margin: .25rem 0 1.25rem; font-size: 1.25rem; color: var(--soft); }
+nav { display: flex; flex-wrap: wrap; gap: .5rem; }
+nav a { padding: .3rem .8rem; border: 1px solid var(--line); border-radius: 99px; background: var(--card);
+  color: inherit; font-size: .9rem; text-decoration: none; }
+nav a:hover, nav a:focus-visible { border-color: var(--accent); color: var(--accent); }
+section { padding: 2.5rem 0 .5rem; }
+h2 { margin: 0; font-size: 1.6rem; letter-spacing: -.015em; }
+h3 { margin: 1.5rem 0 .5rem; font-size: 1.05rem; }
+.lead { max-width: 44rem; margin: .35rem 0 1.25rem; color: var(--soft); }
+pre { margin: 0 0 1.25rem; padding: .8rem 1rem; overflow-x: auto; border: 1px solid var(--line); border-radius: 8px;
+  background: var(--card); font-size: .85rem; line-height: 1.5; }
+figure { margin: 0; }
+img, .ground { display: block; width: 100%; height: auto; border-radius: 6px; }
+.ground { background: var(--picture) 0 0 / 100% 100%; }
+.ground.four { background-size: 50% 50%; }
+figcaption { padding-top: .4rem; font-size: .875rem; line-height: 1.35; }
+small { display: block; color: var(--soft); font-size: .8rem; }
+.row { display: grid; grid-template-columns: 1fr 4fr; gap: 1rem; margin-bottom: 1rem; padding: 1rem;
+  border: 1px solid var(--line); border-radius: 12px; background: var(--card); }
+.pair { display: grid; grid-template-columns: 1fr 1fr; gap: 1rem; }
+.grid { display: grid; grid-template-columns: repeat(auto-fit, minmax(var(--least), 1fr)); gap: 1rem;
+  margin-bottom: 1rem; }
+@media (max-width: 620px) { .row, .pair { grid-template-columns: 1fr; } .row > figure { width: 50%; } }
+footer { margin-top: 2.5rem; padding-top: 1rem; padding-bottom: 3rem; border-top: 1px solid var(--line);
+  color: var(--soft); font-size: .875rem; }
+"""

@@ -1,0 +1,74 @@
+"""Pictures mended on the page: made cyclic, and holes filled."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from texrs._typing import Bools
+from texrs.completion import complete
+from texrs.cyclic import tile
+from texrs.demo._html import code, figure, grid, row, tiled
+from texrs.demo._workshop import Section, Workshop, exemplar
+
+__all__ = ["COMPLETE", "TILE"]
+
+SIDE = 192
+"""Side of the pictures."""
+TILED = (
+    ("bricks", "A wall: the courses meet"),
+    ("leaves_and_flowers", "Flowers on leaves"),
+    ("gravel", "A grey photograph"),
+)
+FILLED = (("scales", "Scales of a fish"), ("net", "A rope net"), ("gravel", "Gravel"))
+
+
+def _tile(workshop: Workshop) -> str:
+    rows = []
+    for i, (name, caption) in enumerate(TILED):
+        workshop.watch(i / len(TILED))
+        picture = exemplar(name, SIDE).image
+        made = tile(picture)
+        note = " and ".join(str(n) for n in made.report["overlap"])
+        rows.append(
+            row(
+                figure(picture, "A picture", note=" × ".join(map(str, picture.shape[:2]))),
+                tiled(made.image, caption, "The result, tiled 2 × 2", note=f"overlap chosen: {note} pixels"),
+            )
+        )
+    return code("texrs tile photograph.jpg -o tile.png") + "".join(rows)
+
+
+def _complete(workshop: Workshop) -> str:
+    pictures = []
+    for i, (name, caption) in enumerate(FILLED):
+        workshop.watch(i / len(FILLED))
+        picture = exemplar(name, SIDE).image
+        made = complete(picture, scratched((SIDE, SIDE)))
+        pictures += [
+            figure(made.stages["known"], f"{caption}, with holes"),
+            figure(made.image, "Filled", note=f"{made.report['patches']} patches"),
+        ]
+    return code("texrs complete picture.png holes.png -o whole.png") + grid(pictures, least=300)
+
+
+def scratched(shape: tuple[int, int]) -> Bools:
+    """Mark a spot and a scratch."""
+    row_, column = (i / n for i, n in zip(np.indices(shape), shape, strict=True))
+    spot = ((row_ - 0.42) / 0.17) ** 2 + ((column - 0.5) / 0.22) ** 2 < 1
+    holes: Bools = spot | (np.abs(row_ - 0.85 + 0.15 * column) < 0.02)
+    return holes
+
+
+TILE = Section(
+    "tile",
+    "Any photograph, made to tile",
+    "The halves change places, so that the borders meet, and what were the borders is joined inside along the cut that "
+    "shows least. How far they overlap is chosen so that a pattern meets itself.",
+    _tile,
+)
+COMPLETE = Section(
+    "complete",
+    "Holes filled by example",
+    "Patches of what is around, each cut in where it shows least. Nothing outside the hole changes.",
+    _complete,
+)

@@ -1,0 +1,341 @@
+"""Images and volumes on disk: read with the dtype of the file, written so that they come back.
+
+===================== =========================================== ========== ====================
+Suffix                dtypes                                      Channels   Loses
+===================== =========================================== ========== ====================
+``.png``              bool, uint8, uint16                         1, 2, 3, 4 nothing
+``.tif`` ``.tiff``    bool, (u)int8/16/32, float16/32/64          1 to 64    nothing
+``.exr``              float16, float32                            1, 2, 3, 4 nothing
+``.hdr``              float32, finite, not negative               3          beyond 8 bits [1]_
+``.webp``             bool, uint8                                 3, 4       nothing
+``.jpg`` ``.jpeg``    bool, uint8                                 1, 3       JPEG, quality 95
+``.bmp``              bool, uint8                                 1, 3       nothing
+``.npy`` ``.npz``     bool, (u)int8/16/32/64, float16/32/64       1 to 64    nothing
+===================== =========================================== ========== ====================
+
+.. [1] of the largest channel of each pixel, with which the three share an exponent.
+
+Volumes are written to ``.tif``, ``.tiff``, ``.npy`` and ``.npz``. GIF is read, its first frame. A
+dtype that a format cannot hold is refused, never converted; bool is written as 0 and 255 (to
+``.npy`` and ``.npz`` as it is). A single channel is read without a channel axis (from ``.npy`` and
+``.npz`` as it was written). ``.npz`` files have the key ``image``.
+
+Files are recognised by their content when read and by their suffix when written. Headers are
+compared with the limit before memory is used. All files are written to a temporary name and
+renamed. What goes wrong is a `texrs.errors.FileError`, `~texrs.errors.LimitExceeded` or
+`~texrs.errors.InvalidInput`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from texrs._arrays import MAX_PIXELS, as_int
+from texrs._typing import Array
+from texrs._typing import Path as PathLike
+from texrs.errors import FileError, InvalidInput
+from texrs.io import _files, _npy, _pillow, _tiff
+from texrs.io._files import atomic
+from texrs.io._npy import read_arrays
+from texrs.kernels import image_io
+
+__all__ = ["atomic", "read", "read_arrays", "read_volume", "write", "write_volume"]
+
+_MAGIC = (
+    (b"\x89PNG\r\n\x1a\n", "png"),
+    (b"II*\0", "tiff"),
+    (b"MM\0*", "tiff"),
+    (b"II+\0", "tiff"),
+    (b"MM\0+", "tiff"),
+    (b"v/1\x01", "exr"),
+    (b"#?RADIANCE", "hdr"),
+    (b"#?RGBE", "hdr"),
+    (b"\xff\xd8\xff", "jpeg"),
+    (b"GIF87a", "gif"),
+    (b"GIF89a", "gif"),
+    (b"BM", "bmp"),
+    (_npy.MAGIC, "npy"),
+    (b"PK\x03\x04", "npz"),
+)
+
+_NUMBERS = frozenset(np.dtype(kind) for kind in ("?", "u1", "i1", "u2", "i2", "u4", "i4", "f2", "f4", "f8"))
+_SMALL = frozenset({np.dtype(np.bool_), np.dtype(np.uint8)})
+_MOST_CHANNELS = 64
+
+
+@dataclass(frozen=True, slots=True)
+class _Format:
+    """What the files of a suffix can hold."""
+
+    dtypes: frozenset[np.dtype[np.generic]]
+    channels: range
+    longest: int = 2**31 - 1
+    volumes: bool = False
+
+    def holds(self, dtype: np.dtype[np.generic], channels: int, volume: bool) -> bool:
+        return dtype in self.dtypes and channels in self.channels and self.volumes >= volume
+
+
+_TIFF = _Format(_NUMBERS, range(1, _MOST_CHANNELS + 1), volumes=True)
+_NUMPY = _Format(_NUMBERS | {np.dtype(np.int64), np.dtype(np.uint64)}, range(1, _MOST_CHANNELS + 1), volumes=True)
+_JPEG = _Format(_SMALL, range(1, 4, 2), 65_500)
+_FORMATS = {
+    ".png": _Format(_SMALL | {np.dtype(np.uint16)}, range(1, 5)),
+    ".tif": _TIFF,
+    ".tiff": _TIFF,
+    ".exr": _Format(frozenset({np.dtype(np.float16), np.dtype(np.float32)}), range(1, 5)),
+    ".hdr": _Format(frozenset({np.dtype(np.float32)}), range(3, 4)),
+    ".webp": _Format(_SMALL, range(3, 5), 16_383),
+    ".jpg": _JPEG,
+    ".jpeg": _JPEG,
+    ".bmp": _Format(_SMALL, range(1, 4, 2), 2**15),
+    ".npy": _NUMPY,
+    ".npz": _NUMPY,
+}
+
+
+def read(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
+    """Read an image.
+
+    Parameters
+    ----------
+    path : path_like
+        PNG, TIFF, EXR, HDR, WebP, JPEG, GIF (the first frame), BMP, .npy or .npz, whichever its
+        content says it is.
+    limit : int
+        Pixels that the image may have, and a sixteenth of the bytes.
+
+    Returns
+    -------
+    ndarray
+        Shape (H, W) or (H, W, C); the dtype is that of the file. Palettes are applied, samples of
+        less than 8 bit spread to 8, and the Exif orientation of JPEG, TIFF, PNG and WebP obeyed.
+
+    Raises
+    ------
+    FileError
+        Missing, not readable, empty, cut off, corrupt, or not an image of a kind that is read; or a
+        stack of images, for which there is `read_volume`.
+    LimitExceeded
+        More pixels or more memory than the limit.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "ramp.png")
+    ...     write(path, np.arange(12, dtype=np.uint16).reshape(3, 4))
+    ...     read(path)
+    array([[ 0,  1,  2,  3],
+           [ 4,  5,  6,  7],
+           [ 8,  9, 10, 11]], dtype=uint16)
+
+    """
+    name, limit = _files.as_path(path), as_int(limit, "limit", 1, 2**40)
+    kind = _kind(name)
+    if kind == "tiff":
+        planes, orientation = _tiff.read_tiff(name, limit)
+        return _tiff.image_of(name, planes, orientation)
+    if kind in ("npy", "npz"):
+        array = _npy.read_npy(name, limit) if kind == "npy" else _npy.read_npz(name, limit)
+        if array.ndim not in (2, 3):
+            hint = "; texrs.io.read_volume reads volumes" if array.ndim == 4 else ""
+            raise FileError(f"{name}: holds an array of shape {array.shape}; an image is (H, W) or (H, W, C){hint}")
+        channels = array.shape[2] if array.ndim == 3 else 1
+        _files.check_size(name, array.shape[:2], channels, array.itemsize, limit)
+        return array
+    file = _files.load(name, limit)
+    if kind == "jpeg":
+        return _pillow.read_jpeg(name, file, limit)
+    if kind == "gif":
+        return _pillow.read_gif(name, file, limit)
+    if kind == "bmp":
+        return _pillow.read_bmp(name, file, limit)
+    with _files.speaking(name, "decoding"):
+        image = image_io.decode(file, limit=limit, name=str(name))
+        return _files.upright(image.pixels, image.orientation)
+
+
+def read_volume(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
+    """Read a volume.
+
+    Parameters
+    ----------
+    path : path_like
+        A TIFF stack (a single image is a volume of one plane), .npy or .npz.
+    limit : int
+        Voxels that the volume may have, and a sixteenth of the bytes.
+
+    Returns
+    -------
+    ndarray
+        Shape (D, H, W) or (D, H, W, C); the dtype is that of the file.
+
+    Raises
+    ------
+    FileError
+        Missing, not readable, empty, cut off, corrupt, or not a volume.
+    LimitExceeded
+        More voxels or more memory than the limit.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "cube.tif")
+    ...     write_volume(path, np.zeros((5, 4, 3), np.float32))
+    ...     read_volume(path).shape
+    (5, 4, 3)
+
+    """
+    name, limit = _files.as_path(path), as_int(limit, "limit", 1, 2**40)
+    kind = _kind(name)
+    if kind == "tiff":
+        planes, orientation = _tiff.read_tiff(name, limit)
+        return _tiff.volume_of(name, planes, orientation)
+    if kind not in ("npy", "npz"):
+        raise FileError(f"{name}: is a {kind} file, which holds one image; volumes are read from TIFF, .npy and .npz")
+    array = _npy.read_npy(name, limit) if kind == "npy" else _npy.read_npz(name, limit)
+    if array.ndim not in (3, 4):
+        raise FileError(f"{name}: holds an array of shape {array.shape}, a volume is (D, H, W) or (D, H, W, C)")
+    channels = array.shape[3] if array.ndim == 4 else 1
+    _files.check_size(name, array.shape[:3], channels, array.itemsize, limit)
+    return array
+
+
+def write(path: PathLike, array: Array, *, overwrite: bool = True) -> None:
+    """Write an image, whole or not at all.
+
+    Parameters
+    ----------
+    path : path_like
+        Its suffix says the format; see the table of `texrs.io` for what each can hold.
+    array : array_like
+        Shape (H, W) or (H, W, C).
+    overwrite : bool
+        Whether a file that exists may be replaced.
+
+    Raises
+    ------
+    InvalidInput
+        Not an image, or not one that the format can hold; the message names the formats that can.
+    FileError
+        The suffix is not known, or the file cannot be written. A former file is as it was.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write(pathlib.Path(folder, "height.png"), np.zeros((2, 2), np.float32))
+    Traceback (most recent call last):
+        ...
+    texrs.errors.InvalidInput: array: .png cannot hold float32 with 1 channel; .exr, ... can
+
+    """
+    _write(path, array, 2, overwrite)
+
+
+def write_volume(path: PathLike, array: Array, *, overwrite: bool = True) -> None:
+    """Write a volume, whole or not at all.
+
+    Parameters
+    ----------
+    path : path_like
+        With the suffix .tif, .tiff, .npy or .npz.
+    array : array_like
+        Shape (D, H, W) or (D, H, W, C).
+    overwrite : bool
+        Whether a file that exists may be replaced.
+
+    Raises
+    ------
+    InvalidInput
+        Not a volume, or not one that the format can hold; the message names the formats that can.
+    FileError
+        The suffix is not known, or the file cannot be written. A former file is as it was.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "cube.npy")
+    ...     write_volume(path, np.zeros((5, 4, 3, 3), np.uint8))
+    ...     read_volume(path).shape
+    (5, 4, 3, 3)
+
+    """
+    _write(path, array, 3, overwrite)
+
+
+def _kind(path: Path) -> str:
+    """Say which format a file has, by its content."""
+    _files.size_of(path)
+    with _files.speaking(path, "reading"), path.open("rb") as file:
+        start = file.read(16)
+    for magic, kind in _MAGIC:
+        if start.startswith(magic):
+            return kind
+    if start.startswith(b"RIFF") and start[8:12] == b"WEBP":
+        return "webp"
+    raise FileError(f"{path}: its content is none of PNG, TIFF, EXR, HDR, WebP, JPEG, GIF, BMP, .npy and .npz")
+
+
+def _write(path: PathLike, value: Array, axes: int, overwrite: bool) -> None:
+    target = _files.as_path(path)
+    suffix = target.suffix.lower()
+    if suffix not in _FORMATS:
+        raise FileError(f"{target}: the suffix {suffix!r} is not one that is written: {', '.join(_FORMATS)}")
+    array = _checked(value, suffix, axes)
+    with atomic(target, overwrite=overwrite) as temporary, _files.speaking(target, "writing"):
+        if suffix == ".npy":
+            _npy.write_npy(temporary, array)
+            return
+        if suffix == ".npz":
+            _npy.write_npz(temporary, array)
+            return
+        if array.dtype == np.bool_:
+            array = array.astype(np.uint8) * np.uint8(255)
+        if suffix in (".tif", ".tiff"):
+            planes = array if axes == 3 else array[np.newaxis]
+            _tiff.write_tiff(temporary, planes if planes.ndim == 4 else planes[..., np.newaxis])
+            return
+        if array.ndim == 3 and array.shape[2] == 1:
+            array = array[..., 0]
+        if suffix in (".jpg", ".jpeg", ".bmp"):
+            file = _pillow.encode(array, ".bmp" if suffix == ".bmp" else ".jpg")
+        else:
+            file = image_io.encode(array, suffix[1:], name=str(target))
+        temporary.write_bytes(file)
+
+
+def _checked(value: object, suffix: str, axes: int) -> Array:
+    """Give what is to be written, contiguous and in native byte order."""
+    try:
+        array = np.asarray(value)
+    except (ValueError, TypeError) as error:
+        raise InvalidInput(f"array: not an array of numbers ({_files.reason(error)})") from None
+    if array.dtype.kind not in "buif" or array.dtype.itemsize > 8:
+        raise InvalidInput(f"array: needs bool, integers or floats, got dtype {array.dtype}")
+    if array.ndim not in (axes, axes + 1) or array.size == 0:
+        shapes = ("(H, W) or (H, W, C)", "(D, H, W) or (D, H, W, C)")[axes - 2]
+        raise InvalidInput(f"array: needs shape {shapes}, not empty; got shape {array.shape}")
+    array = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("="))
+    form, volume = _FORMATS[suffix], axes == 3
+    channels = array.shape[axes] if array.ndim > axes else 1
+    if not form.holds(array.dtype, channels, volume):
+        able = sorted(s for s, f in _FORMATS.items() if f.holds(array.dtype, channels, volume))
+        what = f"{'volumes of ' * volume}{array.dtype} with {channels} channel{'s'[: channels != 1]}"
+        can = f"{', '.join(able)} can" if able else f"no format can, of more than {_MOST_CHANNELS}"
+        raise InvalidInput(f"array: {suffix} cannot hold {what}; {can}")
+    if max(array.shape[:axes]) > form.longest:
+        raise InvalidInput(f"array: a side of {suffix} may have {form.longest} pixels, got shape {array.shape}")
+    if suffix == ".hdr" and not (np.isfinite(array).all() and (array >= 0).all()):
+        raise InvalidInput("array: .hdr cannot hold negative, infinite or NaN values; .exr, .npy and .tif can")
+    return array

@@ -1,0 +1,180 @@
+"""What all formats share: paths, errors, atomic writing."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import numpy as np
+
+from texrs._typing import Array
+from texrs._typing import Path as PathLike
+from texrs.errors import FileError, InvalidInput, LimitExceeded, TexrsError
+
+BYTES_PER_PIXEL = 16
+"""Bytes that what is read may have for each pixel of the limit: four floats."""
+
+
+def as_path(path: PathLike) -> Path:
+    """Check that a path was given."""
+    if not isinstance(path, str | os.PathLike) or not isinstance(os.fspath(path), str):
+        raise InvalidInput(f"path: needs a str or a pathlib.Path, got {type(path).__name__}")
+    if "\0" in os.fspath(path):
+        raise FileError(f"{os.fspath(path)!r}: a path cannot contain the null character")
+    return Path(path)
+
+
+@contextmanager
+def speaking(path: Path, what: str) -> Iterator[None]:
+    """Turn whatever a decoder or an encoder raises into one sentence that names the file."""
+    try:
+        yield
+    except TexrsError:
+        raise
+    except MemoryError:
+        raise LimitExceeded(f"{path}: {what} needs more memory than there is") from None
+    except OSError as error:
+        raise FileError(f"{path}: {what} failed ({reason(error)})") from error
+    except Exception as error:
+        raise FileError(
+            f"{path}: {what} failed; the file is corrupt, or of a kind that is not read ({reason(error)})"
+        ) from error
+
+
+def reason(error: BaseException) -> str:
+    """Say what an error says, on one line."""
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror.lower()
+    text = " ".join(str(error).split())
+    return text[:200] or type(error).__name__
+
+
+def size_of(path: Path) -> int:
+    """Check that a regular, non-empty file lies there and return its length."""
+    try:
+        status = path.stat()
+    except FileNotFoundError:
+        raise FileError(f"{path}: there is no such file") from None
+    except OSError as error:
+        raise FileError(f"{path}: cannot be opened ({reason(error)})") from None
+    if stat.S_ISDIR(status.st_mode):
+        raise FileError(f"{path}: is a folder, a file is needed")
+    if not stat.S_ISREG(status.st_mode):
+        raise FileError(f"{path}: is not a regular file")
+    if status.st_size == 0:
+        raise FileError(f"{path}: is empty (0 bytes)")
+    return status.st_size
+
+
+def load(path: Path, limit: int) -> bytes:
+    """Read a whole file that may not be larger than the pixels it may hold."""
+    length = size_of(path)
+    if length > BYTES_PER_PIXEL * limit + 2**26:
+        raise LimitExceeded(f"{path}: has {length} bytes, too many for an image of {limit} pixels")
+    with speaking(path, "reading"):
+        return path.read_bytes()
+
+
+def check_size(path: Path, sides: tuple[int, ...], channels: int, itemsize: int, limit: int) -> int:
+    """Compare what a header announces with the limit and return the number of pixels."""
+    pixels = 1
+    for side in sides:
+        pixels *= side
+    named = " x ".join(map(str, sides))
+    if pixels <= 0 or channels <= 0:
+        raise FileError(f"{path}: holds no pixels ({named}, {channels} channels)")
+    if pixels > limit:
+        raise LimitExceeded(f"{path}: {named} has {pixels} pixels, more than the limit of {limit}")
+    size, most = pixels * channels * itemsize, limit * BYTES_PER_PIXEL
+    if size > most:
+        raise LimitExceeded(
+            f"{path}: {named} with {channels} channels needs {size} bytes, more than the limit of {most}"
+        )
+    return pixels
+
+
+def upright(array: Array, orientation: int) -> Array:
+    """Apply an Exif orientation, 1 (nothing to do) to 8."""
+    if orientation in (5, 6, 7, 8):
+        array = array.swapaxes(0, 1)
+    if orientation in (3, 4, 7, 8):
+        array = array[::-1]
+    if orientation in (2, 3, 6, 7):
+        array = array[:, ::-1]
+    return np.ascontiguousarray(array)
+
+
+@contextmanager
+def atomic(path: PathLike, *, overwrite: bool = True) -> Iterator[Path]:
+    """Write a file whole or not at all.
+
+    Parameters
+    ----------
+    path : path_like
+        The file to make. A symbolic link is followed.
+    overwrite : bool
+        Whether a file that exists may be replaced.
+
+    Yields
+    ------
+    pathlib.Path
+        A name in the same folder, with the same suffix, to write to. When the block ends, what lies
+        there takes the place of ``path`` in one step; when it raises, it is removed, and a former
+        file stays as it was.
+
+    Raises
+    ------
+    FileError
+        The folder is missing or not writable, ``path`` is a folder or no regular file, or exists
+        already.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     target = pathlib.Path(folder, "report.html")
+    ...     with atomic(target) as temporary:
+    ...         _ = temporary.write_text("<p>done</p>")
+    ...     [file.name for file in target.parent.iterdir()]
+    ['report.html']
+
+    """
+    target = as_path(path)
+    try:
+        final = Path(os.path.realpath(target))
+        if final.is_dir():
+            raise FileError(f"{target}: is a folder, the name of a file is needed")
+        exists = os.path.lexists(final)
+        if exists and not final.is_file():
+            raise FileError(f"{target}: is not a regular file and is not replaced")
+        if exists and not overwrite:
+            raise FileError(f"{target}: exists already; overwrite=True replaces it")
+        if exists and not os.access(final, os.W_OK):
+            raise FileError(f"{target}: is write-protected")
+        if not final.parent.is_dir():
+            raise FileError(f"{target}: there is no folder {target.parent}")
+    except OSError as error:
+        if isinstance(error, FileError):
+            raise
+        raise FileError(f"{target}: cannot be written ({reason(error)})") from None
+    # A fixed, short stem: the target's own name may already be as long as names can be.
+    temporary = final.with_name(f".texrs-{secrets.token_hex(8)}{final.suffix}")
+    try:
+        yield temporary
+        if exists:
+            shutil.copymode(final, temporary)
+        elif not overwrite and os.path.lexists(final):
+            raise FileError(f"{target}: exists already; overwrite=True replaces it")
+        os.replace(temporary, final)
+    except OSError as error:
+        if isinstance(error, TexrsError):
+            raise
+        raise FileError(f"{target}: cannot be written ({reason(error)})") from error
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)

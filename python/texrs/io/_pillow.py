@@ -1,0 +1,168 @@
+"""JPEG, GIF and BMP, which hold nothing but 8 bits, by imageio and Pillow.
+
+The header is read here first. Pillow would warn of large images and of broken Exif blocks; the
+limit of the caller is in force instead, and the blocks are taken off.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from texrs._typing import Array
+from texrs.errors import FileError, LimitExceeded
+from texrs.io._files import check_size, speaking, upright
+from texrs.kernels.image_io import exif_orientation
+
+QUALITY = 95
+"""Of JPEG files that are written; colour is not subsampled."""
+
+
+def read_jpeg(path: Path, file: bytes, limit: int) -> Array:
+    """Decode a JPEG file and turn it upright."""
+    header = _jpeg(path, file)
+    if header.channels not in (1, 3):
+        raise FileError(
+            f"{path}: is a JPEG with {header.channels} channels (CMYK); grey and RGB are read, convert it first"
+        )
+    return upright(
+        _decode(path, header.stripped, ".jpg", header.sides, header.channels, limit),
+        header.orientation,
+    )
+
+
+def read_gif(path: Path, file: bytes, limit: int) -> Array:
+    """Decode the first frame of a GIF file to RGB, or RGBA where a pixel is transparent."""
+    array = _decode(path, file, ".gif", _gif(path, file), 4, limit, mode="RGBA")
+    return array if (array[..., 3] != 255).any() else np.ascontiguousarray(array[..., :3])
+
+
+def read_bmp(path: Path, file: bytes, limit: int) -> Array:
+    """Decode a BMP file."""
+    if int.from_bytes(file[14:18], "little") == 12:
+        sides = tuple(int.from_bytes(file[i : i + 2], "little") for i in (20, 18))
+    else:
+        sides = tuple(abs(int.from_bytes(file[i : i + 4], "little", signed=True)) for i in (22, 18))
+    array = _decode(path, file, ".bmp", sides, 4, limit)
+    return array.astype(np.uint8) * np.uint8(255) if array.dtype == np.bool_ else array
+
+
+def encode(array: Array, suffix: str) -> bytes:
+    """Encode uint8 pixels as JPEG or BMP."""
+    import imageio.v3 as iio
+
+    options: dict[str, Any] = {"quality": QUALITY, "subsampling": 0} if suffix == ".jpg" else {}
+    file = iio.imwrite("<bytes>", array, extension=suffix, plugin="pillow", is_batch=False, **options)
+    assert isinstance(file, bytes)
+    return file
+
+
+def _decode(
+    path: Path,
+    file: bytes,
+    suffix: str,
+    sides: tuple[int, ...],
+    channels: int,
+    limit: int,
+    mode: str | None = None,
+) -> Array:
+    pixels = check_size(path, sides, channels, 1, limit)
+    import imageio.v3 as iio
+
+    with speaking(path, "decoding"), _unwarned(path, pixels):
+        array = iio.imread(file, extension=suffix, plugin="pillow", index=0, mode=mode)
+    if array.dtype not in (np.uint8, np.bool_) or array.ndim not in (2, 3):
+        raise FileError(f"{path}: decoded to {array.dtype} of shape {array.shape}, not to an image")
+    return array
+
+
+@contextmanager
+def _unwarned(path: Path, pixels: int) -> Iterator[None]:
+    """Keep Pillow's own limit from warning of an image that the caller's limit allows."""
+    from PIL import Image
+
+    most = Image.MAX_IMAGE_PIXELS
+    if most is None or pixels <= most:
+        yield
+        return
+    if pixels > 2 * most:
+        raise LimitExceeded(
+            f"{path}: has {pixels} pixels, more than the limit of Pillow, {2 * most} "
+            "(PIL.Image.MAX_IMAGE_PIXELS), which decodes this format"
+        )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+        yield
+
+
+@dataclass(slots=True)
+class _Jpeg:
+    sides: tuple[int, int] = (0, 0)
+    channels: int = 0
+    orientation: int = 1
+    parts: list[bytes] = field(default_factory=list)
+
+    @property
+    def stripped(self) -> bytes:
+        return b"".join(self.parts)
+
+
+def _jpeg(path: Path, file: bytes) -> _Jpeg:
+    """Walk the segments before the first scan (ITU-T T.81, annex B)."""
+    header = _Jpeg(parts=[file[:2]])
+    at = 2
+    while at + 4 <= len(file) and file[at] == 0xFF:
+        marker = file[at + 1]
+        if marker == 0xFF:  # Fill byte.
+            at += 1
+            continue
+        if marker == 0xDA:  # Start of scan: the rest is pixels.
+            if header.channels == 0:
+                break
+            header.parts.append(file[at:])
+            return header
+        length = int.from_bytes(file[at + 2 : at + 4], "big")
+        segment = file[at : at + 2 + length]
+        if length < 2 or len(segment) < 2 + length:
+            break
+        if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):  # Start of frame.
+            if header.channels or len(segment) < 10:
+                break
+            header.sides = (
+                int.from_bytes(segment[5:7], "big"),
+                int.from_bytes(segment[7:9], "big"),
+            )
+            header.channels = segment[9]
+        if marker == 0xE1 and segment[4:10] == b"Exif\0\0":
+            header.orientation = exif_orientation(segment[10:])
+        # Of the application's segments, only JFIF and Adobe say how pixels are coded.
+        if marker == 0xEE or not (0xE1 <= marker <= 0xEF or marker == 0xFE):
+            header.parts.append(segment)
+        at += 2 + length
+    raise FileError(f"{path}: is cut off or corrupt; its JPEG header does not reach the pixels")
+
+
+def _gif(path: Path, file: bytes) -> tuple[int, int]:
+    """Give the sides of the screen, or of the first frame where that reaches beyond it."""
+    cut = FileError(f"{path}: is cut off or corrupt; its GIF header does not reach the pixels")
+    if len(file) < 13:
+        raise cut
+    columns, rows = (int.from_bytes(file[i : i + 2], "little") for i in (6, 8))
+    at = 13 + (3 << ((file[10] & 7) + 1) if file[10] & 0x80 else 0)
+    while at + 10 <= len(file):
+        if file[at] == 0x2C:  # Image descriptor.
+            left, top, width, height = (int.from_bytes(file[at + i : at + i + 2], "little") for i in (1, 3, 5, 7))
+            return max(rows, top + height), max(columns, left + width)
+        if file[at] != 0x21:  # Not an extension.
+            break
+        at += 2
+        while at < len(file) and file[at]:
+            at += 1 + file[at]
+        at += 1
+    raise cut

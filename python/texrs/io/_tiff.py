@@ -1,0 +1,181 @@
+"""TIFF, images and stacks, by tifffile; LZW, which it cannot decode alone, by the compiled one."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from texrs._typing import Array
+from texrs.errors import FileError
+from texrs.io._files import check_size, load, size_of, speaking, upright
+from texrs.kernels import image_io
+
+_LZW, _JPEG = 5, 7
+_ORIENTATION = 274
+_SHAPING = frozenset({256, 257, 258, 259, 262, 266, 273, 277, 278, 279, 284, 317, 320, 322, 323, 324, 325, 338, 339})
+"""Tags that say how the pixels lie. tifffile goes on without a tag that it cannot read."""
+_WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB, _PALETTE, _YCBCR = 0, 1, 2, 3, 6
+
+
+def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
+    """Read planes, rows, columns, channels, and the orientation that is left to apply.
+
+    Images of another size than the first (previews, resolution levels) are not read.
+    """
+    import tifffile
+
+    length = size_of(path)
+    # OME files can name other files to read; this one is all that was asked for.
+    with (
+        speaking(path, "decoding"),
+        _muted(),
+        tifffile.TiffFile(path, is_ome=False) as tif,
+    ):
+        if not tif.series or not tif.pages:
+            raise FileError(f"{path}: holds no image")
+        series, first = tif.series[0], tif.pages.first
+        _check_tags(path, tif, first)
+        dtype = series.dtype
+        if dtype is None or dtype.kind not in "buif" or dtype.itemsize > 8:
+            raise FileError(f"{path}: holds samples of {dtype}; integers and floats are read")
+        sides, channels = _sides(path, series.axes, series.shape)
+        palette = first.photometric == _PALETTE
+        check_size(path, sides, channels * (3 if palette else 1), dtype.itemsize, limit)
+        _check_segments(path, series, length)
+        tag = first.tags.get(_ORIENTATION)
+        orientation = int(tag.value) if tag is not None and tag.value in range(1, 9) else 1
+        if first.compression not in tifffile.TIFF.DECOMPRESSORS:
+            grey_or_rgb = first.photometric in (_WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB)
+            if first.compression == _LZW and sides[0] == 1 and grey_or_rgb:
+                array = image_io.decode(load(path, limit), limit=limit, name=str(path)).pixels
+                return array.reshape(*sides, channels), orientation
+            scheme = getattr(first.compression, "name", first.compression)
+            raise FileError(f"{path}: is compressed by {scheme}; to read it, install the package imagecodecs")
+        array = series.asarray(maxworkers=1)
+        if array.shape != series.shape:
+            raise FileError(f"{path}: is cut off or corrupt; not all of its pixels are there")
+        array = _arrange(array, series.axes, sides, channels)
+        return _colours(path, array, first), orientation
+
+
+def image_of(path: Path, planes: Array, orientation: int) -> Array:
+    """Give the only plane of a file."""
+    if planes.shape[0] != 1:
+        raise FileError(f"{path}: holds {planes.shape[0]} planes; texrs.io.read_volume reads them as a volume")
+    return upright(planes[0, ..., 0] if planes.shape[3] == 1 else planes[0], orientation)
+
+
+def volume_of(path: Path, planes: Array, orientation: int) -> Array:
+    """Give all planes of a file."""
+    if orientation != 1:
+        planes = np.stack([upright(plane, orientation) for plane in planes])
+    return planes[..., 0] if planes.shape[3] == 1 else planes
+
+
+def write_tiff(path: Path, planes: Array) -> None:
+    """Write planes, rows, columns, channels: one page a plane, uncompressed, for every reader."""
+    import tifffile
+
+    channels = planes.shape[3]
+    extra = {2: ["unassalpha"], 4: ["unassalpha"]}.get(channels, ["unspecified"] * (channels - 1))
+    options: dict[str, Any] = {
+        "photometric": "rgb" if channels in (3, 4) else "minisblack",
+        "metadata": None,
+    }
+    if channels not in (1, 3):
+        options["extrasamples"] = extra
+    if channels > 1:
+        options["planarconfig"] = "contig"
+    # Offsets of 32 bits end at 4 GB.
+    with tifffile.TiffWriter(path, bigtiff=planes.nbytes > 2**32 - 2**25) as tif:
+        for plane in planes:
+            tif.write(plane if channels > 1 else plane[..., 0], **options)
+
+
+def _sides(path: Path, axes: str, shape: tuple[int, ...]) -> tuple[tuple[int, int, int], int]:
+    """Give (planes, rows, columns) and channels: S and C are channels, T, Z and others planes."""
+    size = dict(zip(axes, shape, strict=True))
+    if "Y" not in size or "X" not in size or len(size) != len(axes):
+        raise FileError(f"{path}: has the axes {axes}; an image needs rows and columns")
+    channels = size.get("S", 1) * size.get("C", 1)
+    planes = prod(n for axis, n in size.items() if axis not in "YXSC")
+    return (planes, size["Y"], size["X"]), channels
+
+
+def _arrange(array: Array, axes: str, sides: tuple[int, int, int], channels: int) -> Array:
+    order = [a for a in axes if a not in "YXSC"] + [a for a in "YXCS" if a in axes]
+    array = array.transpose([axes.index(a) for a in order])
+    return np.ascontiguousarray(array.reshape(*sides, channels))
+
+
+def _check_tags(path: Path, tif: Any, page: Any) -> None:
+    """Check that all tags that the pixels depend on were read: the file may end among them."""
+    layout, file = tif.tiff, tif.filehandle
+    order: Any = "big" if tif.byteorder == ">" else "little"
+    file.seek(page.offset)
+    count = int.from_bytes(file.read(layout.tagnosize), order)
+    for _ in range(count):
+        code = int.from_bytes(file.read(layout.tagsize)[:2], order)
+        if code == 0 or (code in _SHAPING and code not in page.tags):
+            raise FileError(f"{path}: is cut off or corrupt; not all of its tags are there")
+
+
+def _check_segments(path: Path, series: Any, length: int) -> None:
+    """Check that all strips and tiles lie in the file: missing ones would be read as zeros."""
+    cut = FileError(f"{path}: is cut off or corrupt; not all of its pixels are there")
+    if series.dataoffset is not None and series.dataoffset + series.nbytes > length:
+        raise cut
+    for page in series.pages:
+        if page is None:  # A contiguous stack has one page; the others are where it says.
+            continue
+        offsets, counts = page.dataoffsets, page.databytecounts
+        if not offsets or len(offsets) != len(counts):
+            raise cut
+        for offset, count in zip(offsets, counts, strict=True):
+            if offset <= 0 or count <= 0 or offset + count > length:
+                raise cut
+
+
+def _colours(path: Path, array: Array, page: Any) -> Array:
+    """Apply what the file says about its samples: palettes, white as zero, single bits."""
+    photometric = page.photometric
+    if photometric == _PALETTE and page.colormap is not None and array.dtype.kind == "u":
+        table = page.colormap
+        # Eight bits, spread to sixteen by 257 or by 256, or by a careless writer not at all.
+        if (table < 256).all():
+            table = table.astype(np.uint8)
+        elif (table % 257 == 0).all() or (table % 256 == 0).all():
+            table = (table >> 8).astype(np.uint8)
+        return np.ascontiguousarray(np.moveaxis(table[:, array[..., 0]], 0, -1))
+    if array.dtype == np.bool_ or (page.bitspersample == 1 and array.dtype == np.uint8):
+        array = (array != 0).astype(np.uint8) * np.uint8(255)
+    if photometric == _WHITE_IS_ZERO and array.dtype.kind == "u":
+        return np.subtract(np.iinfo(array.dtype).max, array)
+    # tifffile turns YCbCr to RGB where it is compressed by JPEG, and there alone.
+    if photometric in (_BLACK_IS_ZERO, _RGB) or (photometric, page.compression) == (_YCBCR, _JPEG):
+        return array
+    name = getattr(photometric, "name", str(photometric))
+    raise FileError(f"{path}: holds {name} colours of {array.dtype}; grey, RGB and palettes are read")
+
+
+@contextmanager
+def _muted() -> Iterator[None]:
+    """Keep what tifffile logs of a corrupt file off the terminal: the error tells it."""
+    mine = threading.get_ident()
+
+    def others(record: logging.LogRecord) -> bool:
+        return record.thread != mine
+
+    logger = logging.getLogger("tifffile")
+    logger.addFilter(others)
+    try:
+        yield
+    finally:
+        logger.removeFilter(others)

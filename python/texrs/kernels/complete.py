@@ -1,0 +1,147 @@
+"""Fill holes with patches of exemplars: best match, cut into what is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs import _rust
+from texrs._arrays import as_float, as_int, as_mask, as_seed, as_wrap
+from texrs._typing import Array, Bools, Floats
+from texrs.errors import InvalidInput
+from texrs.kernels.patch_search import PatchIndex
+
+__all__ = ["Completion", "complete"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Completion:
+    """A picture without holes, and where its new pixels come from.
+
+    Attributes
+    ----------
+    colours : (H, W, C) float32
+        The picture.
+    label : (H, W) int32
+        The patch that a pixel comes from, counted from 0 in the order of pasting; -1 where the picture was kept.
+    source : (patches,) int
+        The exemplar of each patch.
+    coordinates : (H, W, 2) float32
+        The place in that exemplar, (row, column); 0 where the picture was kept.
+
+    """
+
+    colours: Floats
+    label: NDArray[np.int32]
+    source: NDArray[np.int64]
+    coordinates: Floats
+
+
+def complete(
+    colours: Array,
+    known: Bools,
+    index: PatchIndex,
+    *,
+    patch: int | tuple[int, int],
+    keep: Bools | None = None,
+    count: int = 5,
+    separation: int = 4,
+    ratio: float = 3.0,
+    wrap: bool | Sequence[bool] = False,
+    seed: int = 0,
+    paper: bool = False,
+    progress: Callable[[float], object] | None = None,
+) -> Completion:
+    """Fill the unknown pixels of a picture in scan order, patch by patch.
+
+    For each hole: the best matches of what is known around it [1]_, each cut into the known part by a minimum cut
+    [2]_; the one with the cheapest cut is pasted.
+
+    Parameters
+    ----------
+    colours : (H, W, C) array of float
+        The picture; anything finite where it is unknown.
+    known : (H, W) bool
+        False at the holes.
+    index : PatchIndex
+        The exemplars that patches are taken from, of C channels.
+    patch : int or (rows, columns)
+        Size of a patch, at most that of the picture and of an exemplar.
+    keep : (H, W) bool, optional
+        Known pixels that no patch may be cut into; by default seams may run through all of them.
+    count, separation, ratio
+        How many matches are tried; how far apart they are, in pixels; how much worse than the best they may be.
+    wrap : bool or (rows, columns)
+        Axes along which the picture is cyclic.
+    seed : int
+        Chooses patches where nothing is known.
+    paper : bool
+        As Shen, Jin, Mao and Feng (2006) print it: windows centred on the hole instead of those with the best share of
+        known pixels, all known pixels of one weight instead of more beside the hole, and plain cut costs. With
+        ``count=1`` that is their completion.
+    progress : callable, optional
+        Called with the share of the holes that is filled; raising stops the work.
+
+    Returns
+    -------
+    Completion
+        The filled picture and its sources.
+
+    Raises
+    ------
+    InvalidInput
+        Shapes that do not agree, a patch that does not fit, or values that are not finite.
+
+    References
+    ----------
+    .. [1] A. Criminisi, P. Perez, K. Toyama, "Region filling and object removal by exemplar-based image inpainting",
+       IEEE Trans. Image Processing 13(9), 2004.
+    .. [2] V. Kwatra et al., "Graphcut textures: image and video synthesis using graph cuts", SIGGRAPH 2003.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs.kernels.patch_search import PatchIndex
+    >>> stripes = np.tile(np.float32([0, 0, 1, 1]), (24, 6))[..., np.newaxis]
+    >>> known = np.ones((24, 24), bool)
+    >>> known[8:14, 9:16] = False
+    >>> filled = complete(stripes * known[..., np.newaxis], known, PatchIndex([stripes]), patch=12)
+    >>> bool((filled.colours == stripes).all())
+    True
+
+    """
+    picture = np.ascontiguousarray(colours, np.float32)
+    if picture.ndim != 3:
+        raise InvalidInput(f"colours: needs shape (rows, columns, channels), got {picture.shape}")
+    mask = as_mask(known, "known", picture.shape[:2])
+    if not np.isfinite(picture[mask]).all():
+        raise InvalidInput("colours: known pixels must be finite")
+    sides = (patch, patch) if isinstance(patch, int | np.integer) else tuple(patch)
+    if len(sides) != 2:
+        raise InvalidInput(f"patch: needs a side or (rows, columns), got {patch!r}")
+    rows, columns = (as_int(s, "patch", 1, n) for s, n in zip(sides, picture.shape[:2], strict=True))
+    pick = (
+        as_int(count, "count", 1, 1000),
+        as_int(separation, "separation", 0, 2**31),
+        as_float(ratio, "ratio", 1, 1e9),
+    )
+    filled, label, patches = _rust.complete(
+        np.where(mask[..., np.newaxis], picture, np.float32(0)),
+        mask,
+        None if keep is None else as_mask(keep, "keep", picture.shape[:2]),
+        index._index,
+        as_wrap(wrap),
+        (rows, columns),
+        pick,
+        as_seed(seed),
+        bool(paper),
+        progress,
+    )
+    coordinates = np.zeros((*mask.shape, 2), np.float32)
+    at = np.argwhere(label >= 0)
+    of = patches[label[label >= 0]]
+    coordinates[label >= 0] = (at - of[:, 3:5]) % np.array(mask.shape) + of[:, 1:3]
+    return Completion(filled, label, patches[:, 0], coordinates)

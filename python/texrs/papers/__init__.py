@@ -1,0 +1,1 @@
+"""One paper a file, each read from top to bottom; the verbs are exported by `texrs` itself."""

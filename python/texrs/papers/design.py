@@ -1,0 +1,606 @@
+"""DESIGN: many natural textures from one example.
+
+J. Shen, X. Jin, X. Mao and J. Feng, "Completion-based texture design using deformation", The Visual Computer 22,
+2006. The flow, in the paper's order:
+
+1. segment the exemplar into layers and child layers (section 3.2);
+2. deform each child by a chaotic choice of translations, rotations, mirrors and scales (section 3.3, Eq. 1 and 2);
+3. stitch the deformed layers by graph cut (section 3.4, Eq. 3) and mark the holes (Eq. 4);
+4. fill the holes by example (section 3.4);
+5. repeat for several tiles and stitch them into the large texture (section 3.1, step 4);
+6. correct its colours so that the seams disappear (section 3.6, Eq. 5 and 6).
+
+Departures, with their reasons:
+
+- Children are elements, not colour layers: a layer moved as a whole tears the elements that its border crosses.
+- The literal generator uses one number for the operation and for its extent, so it never enlarges and often does
+  nothing; here each operation takes three chaotic values. Each child has its own start, after a burn-in.
+- An element that the border of the exemplar cuts only slides along that border; elements keep out of each other's
+  cores.
+- In a cut, the core of an element is tied to it and a ring of its surroundings is offered with it: otherwise the
+  minimum cut makes a wholly overlapped element vanish.
+- Cut costs are divided by the local gradient (Kwatra et al., SIGGRAPH 2003), and raised inside elements, so seams run
+  between them.
+- Where elements lie in a heap most of them rest: if all moved there would be nothing left for them to lie on, and the holes
+  would be filled with pieces. An element brings only background along, not pieces of its neighbours.
+- Holes are filled with background alone where the example has enough of it.
+- Nothing is turned where the example has a direction of its own (bark, brickwork).
+- A cyclic texture (section 3.5) is stitched on the torus from the start: patches are chosen to fit both sides of the
+  wrap, where the paper folds a finished picture that was never chosen to fit.
+- The differences that the colours are corrected to are those of the sources on both sides of a seam, where the paper
+  takes those of the picture itself; some weight on the values keeps the colours from drifting.
+
+``method="paper"`` leaves the departures out (`texrs.papers._design_literal`), but for the torus.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal, TypeAlias, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_float, as_image, as_int, as_seed, as_size, as_wrap, guidance, to_unit
+from texrs._typing import Array, Bools, Floats, Labels, Progress
+from texrs.blend import SCREENING, blend, visibility
+from texrs.deform import (
+    CORE,
+    RING,
+    Flip,
+    Moves,
+    Placement,
+    chaotic_sequence,
+    elements_of,
+    fit,
+    flip,
+    flip_coordinates,
+    flip_frame,
+    mirrors,
+)
+from texrs.errors import InvalidInput
+from texrs.kernels.complete import complete
+from texrs.kernels.gather import gather
+from texrs.kernels.noise import uniform
+from texrs.kernels.patch_search import PatchIndex
+from texrs.kernels.seam import cut
+from texrs.papers._design_literal import Layered, start, stitch_layers
+from texrs.quilt import quilt
+from texrs.report import Synthesis
+from texrs.segment import Children, Segmentation, segment
+from texrs.source_map import SourceMap
+
+__all__ = ["design"]
+
+MINIMUM_SIDE = 16
+"""An exemplar with a shorter side holds no texture to speak of."""
+
+
+Exemplars: TypeAlias = Array | Sequence[Array]
+Size: TypeAlias = int | Sequence[int] | None
+Method: TypeAlias = Literal["default", "paper"]
+
+
+@overload
+def design(exemplar: Exemplars, size: Size = ..., *, variants: None = ..., **options: Any) -> Synthesis: ...
+@overload
+def design(exemplar: Exemplars, size: Size = ..., *, variants: int, **options: Any) -> list[Synthesis]: ...
+def design(  # type: ignore[misc]  # the overloads leave the options to this signature
+    exemplar: Exemplars,
+    size: Size = None,
+    *,
+    seed: int = 0,
+    variants: int | None = None,
+    wrap: bool | Sequence[bool] = (True, True),
+    weights: object = None,
+    layers: int = 2,
+    children: Children = "auto",
+    labels: NDArray[np.integer] | Sequence[NDArray[np.integer]] | None = None,
+    tiles: int = 4,
+    operations: int = 2,
+    translate: float = 0.12,
+    rotate: float | None = None,
+    scale: Sequence[float] = (0.8, 1.2),
+    mirror: bool = True,
+    x0: float | None = None,
+    chaos: float = 2.0,
+    patch: int | None = None,
+    poisson: float | None = SCREENING,
+    method: Method = "default",
+    progress: Progress | None = None,
+) -> Synthesis | list[Synthesis]:
+    """Design a large texture from one example.
+
+    Parameters
+    ----------
+    exemplar : (H, W) or (H, W, C) array, or a sequence of them
+        The example, any real dtype, at least 16 pixels a side. Several, of one dtype and one number of channels, are
+        mixed.
+    size : int or (rows, columns), optional
+        Size of the result, in pixels; twice the exemplar by default.
+    seed : int
+        Chooses the texture: the same exemplar, options, seed and version give the same bytes.
+    variants : int, optional
+        Make so many different textures, with the seeds ``seed``, ``seed + 1``, ...; the result is a list.
+    wrap : bool or (rows, columns)
+        Axes along which the result repeats without a seam.
+    weights : (n,), (rows, columns) of int, or (rows, columns, n) array, optional
+        Shares of n exemplars in the result, or which one is where, or their shares everywhere; equal by default.
+    layers, children, labels
+        How the exemplar is segmented: see `texrs.segment.segment`.
+    tiles : int
+        Deformed variants of the exemplar that the result is stitched from, 1 to 64.
+    operations : int
+        Deformations that are combined on each element, 0 to 8 (section 3.3).
+    translate : float
+        Longest translation, as a share of the exemplar's shorter side, 0 to 0.5.
+    rotate : float, optional
+        Largest rotation in degrees, 0 to 180; 0 for textures lit from one side or with letters. By default 60, but 0
+        where the example has a direction of its own (bark, brickwork), or no separate elements.
+    scale : (float, float)
+        Least and largest scaling, within 0.5 to 2.
+    mirror : bool
+        Whether elements, backgrounds and patches may be mirrored; False for lit or lettered textures.
+    x0 : float, optional
+        Start of the chaotic sequence (Eq. 2), within (-1, 1); the seed draws one for each element by default.
+    chaos : float
+        The lambda of Eq. 2, 0 to 2; below about 1.4 the sequence is periodic.
+    patch : int, optional
+        Side of the patches that fill holes, in pixels; a sixth of the shorter side, 12 to 32, by default.
+    poisson : float, optional
+        Weight of the values when colours are corrected so that seams disappear (section 3.6): the smaller, the wider
+        the correction. None or 0: no correction. See `texrs.blend.blend`, which corrects other maps in the same way.
+    method : {"default", "paper"}
+        "paper": the algorithm as printed, with only its misprints repaired, for comparison. Whole colour layers are moved,
+        once each, by the literal generator, and stitched at the plain cost; holes take the best match; colours are
+        corrected without weight on the values. ``children``, ``operations``, ``translate``, ``rotate``, ``scale`` and
+        ``mirror`` play no part, nor does the amount of ``poisson``.
+    progress : callable, optional
+        Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
+
+    Returns
+    -------
+    Synthesis, or a list of them with ``variants``
+        The image in the exemplar's dtype and channels, its source map, pictures of the stages, and the log of
+        operations.
+
+    Raises
+    ------
+    InvalidInput
+        An argument of the wrong type or out of range; a start that the chaotic sequence does not leave.
+    LimitExceeded
+        A size of more than 2^28 pixels.
+
+    References
+    ----------
+    .. [1] J. Shen, X. Jin, X. Mao, J. Feng, "Completion-based texture design using deformation", The Visual Computer
+       22, 2006. :doi:`10.1007/s00371-006-0040-9`
+
+    Examples
+    --------
+    >>> import texrs
+    >>> pebbles = texrs.samples.pebbles((96, 96)).image
+    >>> result = texrs.design(pebbles, (128, 160), seed=3)
+    >>> result.image.shape, result.image.dtype
+    ((128, 160, 3), dtype('uint8'))
+    >>> bool((result.source.render(pebbles) == result.stages["composite"]).all())
+    True
+
+    """
+    several: list[Any] = list(exemplar) if isinstance(exemplar, list | tuple) else [exemplar]
+    pixels = [as_image(e, "exemplar", minimum=MINIMUM_SIDE) for e in several]
+    check_sources(pixels, labels)
+    shape = as_size(size if size is not None else tuple(2 * n for n in pixels[0].shape[:2]), minimum=MINIMUM_SIDE)
+    seed, cyclic, count = as_seed(seed), as_wrap(wrap), as_int(tiles, "tiles", 1, 64)
+    shares = as_shares(weights, len(pixels), shape)
+    screening = as_float(0.0 if poisson is None else poisson, "poisson", 0, 1e6)
+    moves = check_moves(operations, translate, 0.0 if rotate is None else rotate, scale, mirror, x0, chaos)
+    side = None if patch is None else as_int(patch, "patch", 4, min(min(p.shape[:2]) for p in pixels))
+    if method not in ("default", "paper"):
+        raise InvalidInput(f"method: allowed are default and paper, got {method!r}")
+    paper = method == "paper"
+    total = 1 if variants is None else as_int(variants, "variants", 1, 4096)
+    watch = progress or (lambda stage, share: None)
+
+    watch("segment", 0.0)
+    unit = to_unit_together(pixels)
+    sources = []
+    for number, picture in enumerate(unit):
+        marked: Any = labels[number] if isinstance(labels, list | tuple) else labels
+        parts = segment(picture, layers=layers, children="none" if paper else children, labels=marked)
+        automatic = rotate is None
+        sources.append(Source.of(guidance(picture), parts, moves, automatic=automatic, side=side, paper=paper))
+        watch("segment", (number + 1) / len(pixels))
+    made = [
+        one(several, sources, shape, cyclic, shares, count, screening, (seed + k) % 2**64, watch) for k in range(total)
+    ]
+    watch("done", 1.0)
+    return made[0] if variants is None else made
+
+
+def one(
+    exemplars: list[Array],
+    sources: Sequence[Source],
+    size: tuple[int, ...],
+    wrap: tuple[bool, ...],
+    shares: NDArray[np.float64],
+    tiles: int,
+    screening: float,
+    seed: int,
+    watch: Progress,
+) -> Synthesis:
+    """Make one texture from analysed exemplars: the paper's steps 2 to 4, and section 3.6."""
+    shapes = tuple(s.guide.shape[:2] for s in sources)
+    pictures = []
+    for number in range(tiles * len(sources)):
+        watch("deform and complete", number / (tiles * len(sources)))
+        which = number % len(sources)
+        pictures.append(variant(sources[which], shapes, which, seed, number // len(sources)))
+    composite = large(sources, pictures, size, wrap, shares, seed, lambda share: watch("stitch", share))
+    picture = image = composite.render(exemplars)
+    before = after = visibility(composite, exemplars, picture, wrap=wrap)
+    if screening:
+        watch("blend", 0.0)
+        free = sources[0].paper
+        image = blend(composite, exemplars, wrap=False if free else wrap, screening=0.0 if free else screening)
+        after = visibility(composite, exemplars, image, wrap=wrap)
+    stages = {"segmentation": sources[0].parts.elements.astype(np.uint16), **pictures[0].stages, "composite": picture}
+    report: dict[str, Any] = {
+        "method": "design",
+        "seed": seed,
+        "size": list(size),
+        "wrap": list(wrap),
+        "elements": sum(s.parts.count for s in sources),
+        "children": sources[0].parts.children,
+        "children_reason": sources[0].parts.reason,
+        "rotate": sources[0].moves.rotate,
+        "shares": np.bincount(composite.exemplar.ravel(), minlength=len(sources)).tolist(),
+        "holes": [v.holes for v in pictures],
+        "literal": sources[0].paper,
+        "poisson": screening,
+        "seams": {"before": asdict(before), "after": asdict(after)},
+        "operations": [v.log for v in pictures],
+    }
+    return Synthesis(image, composite, stages, report)
+
+
+def check_sources(pixels: Sequence[Array], labels: object) -> None:
+    """Check that exemplars can be mixed."""
+    if not pixels:
+        raise InvalidInput("exemplar: at least one is needed, got none")
+    kinds = [(p.dtype.name, p.shape[-1]) for p in pixels]
+    if len(set(kinds)) > 1:
+        raise InvalidInput(f"exemplar: several must agree in dtype and channels, got {kinds}")
+    if isinstance(labels, list | tuple) and len(labels) != len(pixels):
+        raise InvalidInput(f"labels: needs one an exemplar, {len(pixels)}, got {len(labels)}")
+    if labels is not None and not isinstance(labels, list | tuple) and len(pixels) > 1:
+        raise InvalidInput("labels: needs a list of one an exemplar when there are several")
+
+
+def to_unit_together(pixels: Sequence[Array]) -> list[Floats]:
+    """Bring exemplars to [0, 1] on one scale."""
+    flat = to_unit(np.concatenate([p.reshape(-1, p.shape[-1]) for p in pixels]))
+    ends = np.cumsum([p.shape[0] * p.shape[1] for p in pixels])[:-1]
+    return [part.reshape(p.shape) for part, p in zip(np.split(flat, ends), pixels, strict=True)]
+
+
+def as_shares(weights: object, count: int, size: tuple[int, ...]) -> NDArray[np.float64]:
+    """Check the shares of the exemplars: (count,) for the whole, or (rows, columns, count) over the texture."""
+    if weights is None:
+        return np.full(count, 1 / count)
+    try:
+        array = np.asarray(weights, np.float64)
+    except (TypeError, ValueError):
+        raise InvalidInput(f"weights: needs numbers, got {weights!r}") from None
+    if array.shape == size and np.asarray(weights).dtype.kind in "iu":
+        if array.min() < 0 or array.max() >= count:
+            raise InvalidInput(
+                f"weights: a map of exemplars holds 0 to {count - 1}, got {array.min()} to {array.max()}"
+            )
+        return np.eye(count)[array.astype(np.intp)]
+    if array.shape not in ((count,), (*size, count)):
+        raise InvalidInput(
+            f"weights: needs one an exemplar, {count}, a map of exemplars {size} of integers, "
+            f"or weights {(*size, count)}; got shape {array.shape}"
+        )
+    if not np.isfinite(array).all() or array.min() < 0 or (array.sum(axis=-1) <= 0).any():
+        raise InvalidInput("weights: must be finite, not negative, and positive somewhere in each place")
+    shares: NDArray[np.float64] = array / array.sum(axis=-1, keepdims=True)
+    return shares
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Source:
+    """An exemplar, analysed: made once, and used by all variants."""
+
+    guide: Floats
+    parts: Segmentation
+    index: PatchIndex
+    flips: list[Flip]
+    moves: Moves
+    side: int
+    paper: bool
+    """Whether the paper is followed to the letter."""
+
+    @classmethod
+    def of(
+        cls, guide: Floats, parts: Segmentation, moves: Moves, *, automatic: bool, side: int | None, paper: bool = False
+    ) -> Source:
+        """Settle what depends on the exemplar: rotations, the side of a patch, and what holes are filled from."""
+        if paper:
+            parts, moves = replace(parts, children="none"), replace(moves, mirror=False)
+        if automatic and parts.children != "grid" and direction(guide) < DIRECTED:
+            moves = replace(moves, rotate=ROTATE)
+        if parts.children == "grid":
+            # Cells are no elements: turned or scaled they would show their outline.
+            moves = replace(moves, rotate=0.0, scale=(1.0, 1.0))
+        extent = side or patch_side(guide.shape[0], guide.shape[1])
+        flips = mirrors(moves.mirror)
+        return cls(guide, parts, filling(guide, parts, flips, extent), flips, moves, extent, paper)
+
+
+def check_moves(
+    operations: int,
+    translate: float,
+    rotate: float,
+    scale: Sequence[float],
+    mirror: bool,
+    x0: float | None,
+    chaos: float,
+) -> Moves:
+    """Check the arguments of `design` that say what elements may do."""
+    if not isinstance(scale, Sequence) or len(scale) != 2:
+        raise InvalidInput(f"scale: needs (least, largest), got {scale!r}")
+    low, high = (as_float(s, "scale", 0.5, 2) for s in scale)
+    if low > high:
+        raise InvalidInput(f"scale: the least comes first, got {scale!r}")
+    if not isinstance(mirror, bool | np.bool_):
+        raise InvalidInput(f"mirror: needs True or False, got {mirror!r}")
+    strength = as_float(chaos, "chaos", 0, 2)
+    if x0 is not None:
+        chaotic_sequence(x0, strength)
+    return Moves(
+        as_int(operations, "operations", 0, 8),
+        as_float(translate, "translate", 0, 0.5),
+        as_float(rotate, "rotate", 0, 180),
+        (low, high),
+        bool(mirror),
+        x0,
+        strength,
+    )
+
+
+def patch_side(height: int, width: int) -> int:
+    """Give the default side of a completion patch: about the size of an element."""
+    return min(height, width, max(12, min(32, min(height, width) // 6)))
+
+
+ROTATE, DIRECTED = 60.0, 0.25
+"""Largest rotation by default, in degrees, and the directedness from which on nothing is turned."""
+
+
+def direction(guide: Floats) -> float:
+    """Give how much the gradients of an image agree in direction: 0 not at all, 1 wholly (structure tensor)."""
+    from scipy.ndimage import gaussian_filter
+
+    rows, columns = np.gradient(gaussian_filter(guide.mean(axis=-1, dtype=np.float64), 1.5))
+    mixed, squares = (rows * columns).mean(), ((rows**2).mean(), (columns**2).mean())
+    total = squares[0] + squares[1]
+    return float(np.hypot(squares[0] - squares[1], 2 * mixed) / total) if total > 0 else 0.0
+
+
+BACKGROUND_PLACES = 64
+"""Places for a patch of pure background from which on holes are filled with background alone."""
+
+
+def filling(guide: Floats, parts: Segmentation, flips: Sequence[Flip], side: int) -> PatchIndex:
+    """Make the index of patches that holes are filled from: of background alone, if there is enough of it."""
+    from scipy.ndimage import minimum_filter
+
+    pictures = [flip(guide, f) for f in flips]
+    allowed = None
+    if parts.children in ("components", "labels"):
+        free = [flip(parts.elements, f) == 0 for f in flips]
+        # The origin puts the top-left corner of the window on the pixel.
+        masks = [minimum_filter(m, side, mode="constant", cval=0, origin=-(side // 2)) for m in free]
+        if sum(int(m.sum()) for m in masks) >= BACKGROUND_PLACES * len(flips):
+            allowed = masks
+    return PatchIndex(pictures, allowed=allowed, max_patch=side)
+
+
+# --- one variant: sections 3.3 and 3.4 -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Variant:
+    """A deformed and completed texture of the exemplar's size."""
+
+    source: SourceMap
+    colours: Floats
+    holes: float
+    log: list[Any]
+    stages: dict[str, Array]
+
+
+def variant(source: Source, shapes: tuple[tuple[int, ...], ...], which: int, seed: int, number: int) -> Variant:
+    """Deform the elements, or the layers to the letter, and fill what is left open."""
+    guide, flips = source.guide, source.flips
+    shape = guide.shape[:2]
+    canvas, base, log = deform_layers(source, which, seed, number) if source.paper else deform(source, seed, number)
+    holes = ~canvas.covered
+    deformed = np.where(holes[..., np.newaxis], np.float32(0), canvas.colours)
+    coordinates = flip_coordinates(canvas.coordinates, base, shape)
+    label = canvas.label
+    frames: list[NDArray[np.floating]] = [flip_frame(base) @ f for f in canvas.frames]
+    if holes.any():
+        filled = complete(
+            canvas.colours,
+            canvas.covered,
+            source.index,
+            patch=source.side,
+            seed=(seed + number) % 2**64,
+            count=1 if source.paper else CANDIDATES,
+            paper=source.paper,
+        )
+        pasted = filled.label >= 0
+        origin = np.where(pasted, filled.source[filled.label], -1)
+        for k, mirror in enumerate(flips):
+            coordinates[origin == k] = flip_coordinates(filled.coordinates[origin == k], mirror, shape)
+        label = np.where(pasted, len(frames) + filled.label, label).astype(np.uint32)
+        frames += [flip_frame(flips[k]) for k in filled.source]
+    exemplar = np.full(shape, which, np.uint16)
+    made = SourceMap(coordinates, exemplar, label, np.array(frames, np.float32), shapes)
+    colours = gather(guide, coordinates, interpolation="cubic")
+    return Variant(
+        made, colours, float(holes.mean()), log, {"deformed": deformed, "holes": holes, "completed": colours}
+    )
+
+
+CANDIDATES = 5
+"""Matches of a hole that are cut in; the cheapest is kept."""
+
+
+def deform_layers(source: Source, which: int, seed: int, number: int) -> tuple[Layered, Flip, list[Any]]:
+    """Move whole layers, as printed."""
+    moves = source.moves
+    x0 = start(moves.x0, moves.chaos, seed, which, number)
+    layered = stitch_layers(source.guide, source.parts.elements, x0, moves.chaos)
+    return layered, (False, False), layered.log
+
+
+def deform(source: Source, seed: int, number: int) -> tuple[Canvas, Flip, list[Any]]:
+    """Deform each element, and stitch them over the background by graph cut."""
+    parts, flips = source.parts, source.flips
+    # The background takes one of the mirrors, and the elements are cut out of the mirrored picture.
+    base = flips[int(uniform(seed, number, 0, 0, 1) * len(flips))]
+    picture, labels = flip(source.guide, base), flip(parts.elements, base)
+    still = resting(parts, seed, number)
+    canvas = Canvas.background(picture, labels, still)
+    log: list[dict[str, Any]] = [{"element": 0, "mirror": list(base)}]
+    for element in elements_of(labels):
+        if element.label in still:
+            log.append({"element": element.label, "operations": []})
+            continue
+        fitted = fit(element, canvas.cores, source.moves, seed, number)
+        if fitted is None:
+            log.append({"element": element.label, "operations": None})
+            continue
+        operations, placement = fitted
+        canvas.stitch(picture, labels, placement)
+        log.append(
+            {
+                "element": element.label,
+                "operations": [[o.kind, round(o.amount, 3), o.axis] for o in operations],
+            }
+        )
+    return canvas, base, log
+
+
+DENSE, MOVED = 0.45, 0.35
+"""Share of the image that elements cover from which on they lie in a heap, and the share of a heap that moves."""
+
+
+def resting(parts: Segmentation, seed: int, number: int) -> frozenset[int]:
+    """Choose the elements that stay where they are: in a heap most do, or nothing would be left to lie on."""
+    if parts.children in ("none", "grid") or np.count_nonzero(parts.elements) <= DENSE * parts.elements.size:
+        return frozenset()
+    return frozenset(e for e in range(1, parts.count + 1) if uniform(seed, number, e, 0, 4) >= MOVED)
+
+
+@dataclass(slots=True, eq=False)
+class Canvas:
+    """A picture in the making: colours, where they come from, and what is covered (the mask of Eq. 4)."""
+
+    colours: Floats
+    coordinates: Floats
+    label: NDArray[np.uint32]
+    covered: Bools
+    cores: Bools
+    """What the elements that are placed are tied to."""
+    frames: list[NDArray[np.float64]]
+    """The Jacobian of each label."""
+
+    @classmethod
+    def background(cls, picture: Floats, labels: Labels, still: frozenset[int]) -> Canvas:
+        """Start from the background: everything but the elements that move and the pixel around them."""
+        from scipy.ndimage import binary_dilation, binary_erosion
+
+        rest = np.isin(labels, sorted(still))
+        covered = ~binary_dilation((labels > 0) & ~rest, np.ones((3, 3), bool)) | rest
+        start = SourceMap.identity(labels.shape)
+        cores: Bools = binary_erosion(rest, np.ones((3, 3), bool), iterations=int(CORE), border_value=1)
+        return cls(picture.copy(), start.coordinates, start.label, covered, cores, [np.eye(2)])
+
+    def stitch(self, picture: Floats, labels: Labels, placement: Placement) -> None:
+        """Cut an element and its ring into the canvas (Eq. 3)."""
+        window, core = placement.window, placement.core
+        # Of its surroundings only background comes along: pieces of other elements would be torn ones.
+        ground = gather(labels, placement.coordinates, interpolation="nearest") == 0
+        offered = ((placement.distance > -1) | ((placement.distance > -RING) & ground)) & placement.inside
+        colours = gather(picture, placement.coordinates, interpolation="cubic")
+        known = self.covered[window]
+        taken = offered
+        if (offered & known).any():
+            old_core = self.cores[window] & known & ~core
+            taken = cut(self.colours[window], colours, known, offered, core_a=old_core, core_b=core).mask & offered
+        self.colours[window][taken] = colours[taken]
+        self.coordinates[window][taken] = placement.coordinates[taken]
+        self.label[window][taken] = len(self.frames)
+        self.covered[window] |= taken
+        self.cores[window] |= core
+        self.frames.append(placement.frame)
+
+
+# --- the large texture: section 3.1, step 4 --------------------------------------------------------------------------
+
+PATCH, OVERLAP = 0.75, 0.28
+"""Side of a patch and overlap of two, as shares of the exemplar's shorter side."""
+MIXED_PATCH = 0.6
+"""The same where several exemplars are mixed: smaller patches mix them better."""
+WHOLENESS = 8.0
+"""How many times dearer a seam is inside an element than between elements."""
+
+
+def large(
+    sources: Sequence[Source],
+    variants: Sequence[Variant],
+    size: tuple[int, ...],
+    wrap: tuple[bool, ...],
+    shares: NDArray[np.float64],
+    seed: int,
+    progress: Callable[[float], object],
+) -> SourceMap:
+    """Stitch patches of the variants into a texture of any size, on the torus where it wraps."""
+    inside = []
+    for source in sources:
+        whole = source.parts.children in ("components", "labels")
+        inside.append(WHOLENESS * source.parts.depth(3) if whole else np.zeros(source.guide.shape[:2], np.float32))
+    side = min(min(i.shape) for i in inside)
+    kinds = [int(v.source.exemplar[0, 0]) for v in variants]
+    patches = quilt(
+        [v.colours for v in variants],
+        (size[0], size[1]),
+        patch=round(PATCH * side) if len(sources) == 1 else round(MIXED_PATCH * side),
+        overlap=round(OVERLAP * side),
+        wrap=(wrap[0], wrap[1]),
+        penalties=[
+            gather(inside[k], v.source.coordinates, interpolation="nearest")
+            for k, v in zip(kinds, variants, strict=True)
+        ],
+        origins=[cells(v.source) for v in variants],
+        kinds=kinds,
+        shares=shares,
+        seed=seed,
+        progress=progress,
+    )
+    return patches.compose([v.source for v in variants])
+
+
+def cells(source: SourceMap) -> NDArray[np.int64]:
+    """Give the number of the 8 x 8 cell of the exemplars that each pixel shows."""
+    which = int(source.exemplar[0, 0])
+    first = sum((h // 8 + 1) * (w // 8 + 1) for h, w in source.shapes[:which])
+    cell = np.clip(source.coordinates, 0, np.array(source.shapes[which]) - 1).astype(np.int64) // 8
+    numbers: NDArray[np.int64] = first + cell[..., 0] * (source.shapes[which][1] // 8 + 1) + cell[..., 1]
+    return numbers

@@ -1,0 +1,165 @@
+"""Pictures and volumes whose contents are known exactly.
+
+Each generator draws a texture as a small photograph would show it (a relief under a sun and a sky,
+with colours that vary within and between its texels, and the grain of a sensor) and returns it
+with what it drew: where every texel is, which pixels are its own, how large the texture is
+on screen and how its frame is turned. They are what texrs is tested on and shown with, and they are
+CC0: use them as you like.
+
+====================  ====================================  ====  ==============================
+name                  what it shows                         tag   known
+====================  ====================================  ====  ==============================
+`bark`                furrowed bark                               nothing
+`beans`               touching beans of one colour          F=d   texels
+`bricks`              a wall, 21 whole vertical joints      B=c   texels
+`dots`                sewing buttons on paper               F=d   texels
+`grit`                crushed stone, several layers deep          nothing
+`leaves_and_flowers`  flowers of 5 to 8 petals on leaves    F=d   texels
+`net`                 a rope net over dark water            F=c   texels: the cells; the net
+`pebbles`             rounded stones on sand                F=d   texels
+`scales`              overlapping scales of a fish                texels
+`tilted_bricks`       a wall seen aslant                    B=c   texels, scale, frames
+`tilted_discs`        round tiles of a floor seen aslant    F=d   texels, scale, frames
+`weave`               a plain weave                               texels
+`particles`           a volume: ellipsoids of three colours  F=d   texels
+`stripes`             a volume: folded layers, 9 voxels apart        mask, frames
+`weave_solid`         a volume: layers of woven yarn              mask
+`wood_solid`          a volume: growth rings and fibres           mask
+====================  ====================================  ====  ==============================
+
+The same size and seed give the same bytes. `load` calls a generator by name, and knows the
+photographs that come with scikit-image besides.
+
+Examples
+--------
+>>> from texrs import samples
+>>> stones = samples.pebbles((128, 128), seed=1)
+>>> stones
+Sample('pebbles', 128x128x3, known: centres, labels, mask, tag)
+>>> samples.load("coins").image.shape
+(303, 384)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from texrs.errors import InvalidInput
+
+from ._perspective import tilted_bricks, tilted_discs
+from ._photographs import PHOTOGRAPHS, photograph
+from ._regular import bricks, net, scales, weave
+from ._sample import MIN_SIDE, Sample, Tag
+from ._scattered import beans, dots, leaves_and_flowers, pebbles
+from ._solid import particles, stripes, weave_solid, wood_solid
+from ._stochastic import bark, grit
+
+__all__ = [
+    "MIN_SIDE",
+    "Sample",
+    "Tag",
+    "bark",
+    "beans",
+    "bricks",
+    "dots",
+    "grit",
+    "leaves_and_flowers",
+    "load",
+    "names",
+    "net",
+    "particles",
+    "pebbles",
+    "photograph",
+    "photographs",
+    "scales",
+    "stripes",
+    "tilted_bricks",
+    "tilted_discs",
+    "weave",
+    "weave_solid",
+    "wood_solid",
+]
+
+_PLANAR = (
+    bark,
+    beans,
+    bricks,
+    dots,
+    grit,
+    leaves_and_flowers,
+    net,
+    pebbles,
+    scales,
+    tilted_bricks,
+    tilted_discs,
+    weave,
+)
+_SOLID = (particles, stripes, weave_solid, wood_solid)
+_GENERATORS: dict[str, Callable[..., Sample]] = {f.__name__: f for f in (*_PLANAR, *_SOLID)}
+
+
+def names() -> tuple[str, ...]:
+    """Return the names of all generated samples, the pictures before the volumes.
+
+    Examples
+    --------
+    >>> from texrs import samples
+    >>> len(samples.names()), samples.names()[-1]
+    (16, 'wood_solid')
+    """
+    return tuple(_GENERATORS)
+
+
+def photographs() -> tuple[str, ...]:
+    """Return the names of the photographs; none of them is the name of a generated sample.
+
+    Examples
+    --------
+    >>> from texrs import samples
+    >>> "grass" in samples.photographs()
+    True
+    """
+    return PHOTOGRAPHS
+
+
+def load(name: str, **options: Any) -> Sample:
+    """Return the sample of that name.
+
+    Parameters
+    ----------
+    name : str
+        One of `names` or `photographs`.
+    **options
+        What the generator takes: `size`, `seed`, and `wrap` where it has it. A photograph takes
+        none.
+
+    Returns
+    -------
+    Sample
+        Of a photograph, the image alone.
+
+    Raises
+    ------
+    InvalidInput
+        If nothing has that name, if a photograph is given options, or if the generator
+        refuses them.
+    TypeError
+        If the generator has no such option.
+
+    Examples
+    --------
+    >>> from texrs import samples
+    >>> samples.load("weave", size=(64, 96), seed=2).image.shape
+    (64, 96, 3)
+    """
+    if name in _GENERATORS:
+        return _GENERATORS[name](**options)
+    if name in PHOTOGRAPHS:
+        if options:
+            raise InvalidInput(f"a photograph takes no options, {name!r} got {', '.join(options)}")
+        return photograph(name)
+    raise InvalidInput(
+        f"name must be a generated sample ({', '.join(names())}) "
+        f"or a photograph ({', '.join(PHOTOGRAPHS)}), got {name!r}"
+    )

@@ -1,0 +1,257 @@
+"""Planes seen aslant: a known scale and a known Jacobian at every pixel.
+
+The eye looks at a plane through a pinhole of focal length f, along the picture's axis. With p the
+pixel's offset from the middle of the picture and ``a`` the slope of the plane's depth (so that
+|a| = tan(tilt)), the ray through p meets the plane at X = p / w, w = 1 - a.p / f. Lengths on the
+plane along a are 1 / cos(tilt) times those of X:
+
+    S = g M X,   J = dS/dp = g M (I / w + p a' / (f w^2)),   det J = g^2 / (cos(tilt) w^3),
+
+and the scale is det(J)^(-1/2) = sqrt(cos(tilt)) w^(3/2) / g. The factor g makes its geometric mean
+over the picture 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import cos, pi, radians, sin, sqrt, tan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._noise import Floats, mix, palette, ramp
+from ._regular import lay_bricks
+from ._sample import Sample, Tag, check_size, generator
+from ._scene import Scene, relabel
+
+__all__ = ["tilted_bricks", "tilted_discs"]
+
+_PITCH, _RADIUS = 26.0, 10.5
+
+
+def tilted_discs(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
+    """Return a floor of round glazed tiles that runs away upwards.
+
+    On the plane the tiles are discs of radius 10.5 pixels on a hexagonal lattice of pitch 26. Tag
+    ``F=d``.
+
+    Parameters
+    ----------
+    size : (int, int)
+        Rows and columns, at least 32.
+    seed : int
+        Chooses the tiles, not the plane.
+
+    Returns
+    -------
+    Sample
+        With `centres`, `labels`, `mask`, `scale_map` and `frames`. A centre is where the middle of
+        the disc on the plane is seen, which is near, not at, the centroid of the disc's picture.
+
+    Raises
+    ------
+    ValueError
+        If `size` or `seed` is not as above.
+
+    Examples
+    --------
+    >>> from texrs import samples
+    >>> sample = samples.tilted_discs((96, 96))
+    >>> sample.frames.shape, bool(sample.scale_map.max() > 3 * sample.scale_map.min())
+    ((96, 96, 2, 2), True)
+    """
+    rng = generator("tilted_discs", seed)
+    plane = _Plane.seen(check_size(size, 2), tilt=50.0, towards=pi)
+    rise = _PITCH * sqrt(3) / 2
+    rows = 2 * int(np.ceil(plane.extent[0] / (2 * rise)))
+    cols = int(np.ceil(plane.extent[1] / _PITCH))
+    scene = Scene((round(rows * rise), round(cols * _PITCH)), rng)
+    _lay_tiles(scene, rows, cols)
+    return _view(scene, plane, "tilted_discs", tag="F=d")
+
+
+def tilted_bricks(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
+    """Return a wall of bricks that runs away obliquely.
+
+    On the plane it is the wall of `bricks`, at four fifths of its size. Tag ``B=c``.
+
+    Parameters
+    ----------
+    size : (int, int)
+        Rows and columns, at least 32.
+    seed : int
+        Chooses the bricks, not the plane.
+
+    Returns
+    -------
+    Sample
+        With `centres`, `labels`, `mask`, `scale_map` and `frames`. A centre is where the centroid
+        of the brick on the plane is seen.
+
+    Raises
+    ------
+    ValueError
+        If `size` or `seed` is not as above.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs import samples
+    >>> sample = samples.tilted_bricks((96, 96))
+    >>> abs(float(np.log(sample.scale_map).mean())) < 1e-3
+    True
+    """
+    rng = generator("tilted_bricks", seed)
+    plane = _Plane.seen(check_size(size, 2), tilt=45.0, towards=radians(-112.0), zoom=1.25)
+    courses = 2 * int(np.ceil(plane.extent[0] / 68))
+    across = int(np.ceil(plane.extent[1] / 80))
+    scene = Scene((courses * 34, across * 80), rng)
+    lay_bricks(scene, courses, across)
+    return _view(scene, plane, "tilted_bricks", tag="B=c")
+
+
+@dataclass(frozen=True, slots=True)
+class _Plane:
+    """The map S from the picture to the plane.
+
+    Attributes
+    ----------
+    size : (int, int)
+        Rows and columns of the picture.
+    slope : float64 array, (2,)
+        a / f, of the depth.
+    stretch : float64 array, (2, 2)
+        g M, without `zoom`.
+    zoom : float
+        Units of the plane's own texture for one unit of S.
+    corner : float64 array, (2,)
+        What is added to put the picture's corner of the plane at (0, 0).
+    extent : float64 array, (2,)
+        Size of the part of the plane that is seen, in units of its texture.
+    """
+
+    size: tuple[int, int]
+    slope: NDArray[np.float64]
+    stretch: NDArray[np.float64]
+    zoom: float
+    corner: NDArray[np.float64]
+    extent: NDArray[np.float64]
+
+    @classmethod
+    def seen(cls, size: tuple[int, ...], *, tilt: float, towards: float, zoom: float = 1.0) -> _Plane:
+        """Return the plane whose depth grows `towards` an angle from +row to +col, by `tilt`."""
+        along = np.array([cos(towards), sin(towards)])
+        lean = radians(tilt)
+        slope = along * tan(lean) / (1.5 * max(size))
+        stretch = np.eye(2) + (1 / cos(lean) - 1) * np.outer(along, along)
+        plane = cls((size[0], size[1]), slope, stretch, zoom, np.zeros(2), np.zeros(2))
+        mean = float(np.exp(np.log(plane.scale()).mean()))
+        plane = replace(plane, stretch=stretch * mean)
+        ends = [(r, c) for r in (-1, size[0]) for c in (-1, size[1])]
+        corners = plane.source(np.array(ends, np.float64))
+        low, high = corners.min(0) - 4, corners.max(0) + 4
+        return replace(plane, corner=-low, extent=high - low)
+
+    def pixels(self, pitch: float = 1.0) -> NDArray[np.float64]:
+        """Return the coordinates of the picture's samples every `pitch` pixels, (H, W, 2)."""
+        axes = [np.arange(0, n - 1 + pitch / 2, pitch) for n in self.size]
+        return np.stack(np.meshgrid(*axes, indexing="ij"), -1)
+
+    def _offset(self, at: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return p and w."""
+        p = at - (np.array(self.size) - 1) / 2
+        # Depth grows along a, and what is far is small: the ray meets the plane at p / w.
+        return p, 1 - p @ self.slope
+
+    def source(self, at: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return where on the plane's texture the pixels `at` (..., 2) look."""
+        p, w = self._offset(at)
+        return (p / w[..., None]) @ (self.zoom * self.stretch.T) + self.corner
+
+    def picture(self, on_plane: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the pixels that look at `on_plane` (..., 2), the inverse of `source`."""
+        x = (on_plane - self.corner) @ np.linalg.inv(self.zoom * self.stretch).T
+        p = x / (1 + x @ self.slope)[..., None]
+        return np.asarray(p + (np.array(self.size) - 1) / 2)
+
+    def scale(self) -> NDArray[np.float64]:
+        """Return the scale at every pixel, (H, W)."""
+        _, w = self._offset(self.pixels())
+        return np.asarray(w**1.5 / sqrt(float(np.linalg.det(self.stretch))))
+
+    def jacobian(self) -> NDArray[np.float64]:
+        """Return dS/dp at every pixel, (H, W, 2, 2)."""
+        p, w = self._offset(self.pixels())
+        w = w[..., None, None]
+        inner = np.eye(2) / w + p[..., :, None] * self.slope / w**2
+        return np.asarray(self.stretch @ inner)
+
+
+def _lay_tiles(scene: Scene, rows_of: int, cols_of: int) -> None:
+    """Fill the torus of `scene` with a hexagonal lattice of round tiles in grout."""
+    rng = scene.rng
+    sand, cloud = scene.noise(3, 1, gain=1.0), scene.noise(40, 2, gain=0.7)
+    scene.height += np.float32(0.14) * sand
+    scene.albedo[:] = palette("8d857a")[0] * (1 + np.float32(0.16) * cloud + np.float32(0.08) * sand)[..., None]
+    tones = palette("3f5f6b", "587a7a", "a89f8c", "34474f", "7f8f86", "5d4c43", "b3a587")
+    glaze, craze = scene.noise(14, 2, gain=0.7), scene.noise(4, 1, gain=0.8)
+    pitch = (scene.period[0] / rows_of, scene.period[1] / cols_of)
+    for row in range(rows_of):
+        for k in range(cols_of):
+            middle = ((row + 0.5) * pitch[0], (k + 0.5 * (row % 2)) * pitch[1])
+            window = scene.window(middle, _RADIUS + 1.5)
+            rows, cols = window.where
+            r = np.hypot(window.y, window.x) / np.float32(_RADIUS)
+            edge = np.sqrt(np.clip(1 - np.clip((r - 0.72) / 0.28, 0, 1) ** 2, 0, 1))
+            lean = rng.uniform(-0.02, 0.02, 2)
+            height = 0.2 + 1.5 * edge + lean[0] * window.y + lean[1] * window.x
+            height = height + np.float32(0.06) * glaze[rows, cols]
+            tone = tones[rng.integers(len(tones))] * rng.uniform(0.8, 1.15)
+            shade = 1 + np.float32(0.13) * glaze[rows, cols] + np.float32(0.04) * craze[rows, cols]
+            albedo = tone * shade[..., None]
+            albedo = mix(albedo, tone * 1.5, 0.5 * ramp(r, 0.74, 0.86) * (1 - ramp(r, 0.88, 1.0)))
+            scene.paint(window, r <= 1, height, albedo, label=scene.add(middle), gloss=0.3, over=True)
+
+
+def _view(scene: Scene, plane: _Plane, name: str, *, tag: Tag) -> Sample:
+    """Return the photograph of the lit `scene` through the map `plane`."""
+    from scipy import ndimage
+
+    lit = scene.picture(grain=0.0, reach=6.0, exposure=0.95)
+    # Three by three rays a pixel, averaged: the far texture is finer than the near one.
+    rays = (np.arange(3) - 1) / 3
+    at = plane.pixels()
+    seen = np.zeros((*plane.size, 3), np.float32)
+    for dy in rays:
+        for dx in rays:
+            where = 2 * plane.source(at + np.array([dy, dx]))
+            coordinates = np.moveaxis(where, -1, 0)
+            for k in range(3):
+                seen[..., k] += ndimage.map_coordinates(
+                    lit[..., k], coordinates, order=1, mode="grid-wrap", output=np.float32
+                )
+    seen /= 9
+    grain = scene.rng.standard_normal(seen.shape, dtype=np.float32)
+    seen += np.float32(0.009) * grain
+    nearest = np.rint(2 * plane.source(at)).astype(np.intp)
+    raw = scene.label[nearest[..., 0] % scene.shape[0], nearest[..., 1] % scene.shape[1]]
+    centres, labels = relabel(raw, plane.picture(_once(scene, plane)))
+    image: NDArray[np.uint8] = np.rint(np.clip(seen, 0, 1) * 255).astype(np.uint8)
+    return Sample(
+        name,
+        image,
+        centres,
+        labels,
+        labels > 0,
+        tag,
+        plane.scale().astype(np.float32),
+        plane.jacobian().astype(np.float32),
+    )
+
+
+def _once(scene: Scene, plane: _Plane) -> NDArray[np.float64]:
+    """Return the centroids on the plane, each at that turn of the torus nearest the picture."""
+    box = np.array(scene.period, np.float64)
+    middle: Floats | NDArray[np.float64] = plane.extent / 2
+    return np.asarray((scene.centroids() - middle + box / 2) % box - box / 2 + middle)

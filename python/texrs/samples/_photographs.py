@@ -1,0 +1,52 @@
+"""The photographs that come with scikit-image, by their names there.
+
+All of them lie in the scikit-image package itself, so that nothing is downloaded. Their sources, as
+scikit-image states them: brick and gravel from CC0Textures and grass from DeviantArt (CC0), coffee
+by Rachel Michetti (CC0), rocket by SpaceX and hubble_deep_field by NASA (public domain), coins from
+the Brooklyn Museum (no known copyright restrictions).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs.errors import InvalidInput
+
+from ._sample import Sample
+
+__all__ = ["PHOTOGRAPHS", "photograph"]
+
+PHOTOGRAPHS = ("brick", "coffee", "coins", "grass", "gravel", "hubble_deep_field", "rocket")
+
+
+def photograph(name: str) -> Sample:
+    """Return one of the photographs; nothing is known of it but the picture.
+
+    Parameters
+    ----------
+    name : str
+        One of `texrs.samples.photographs`.
+
+    Returns
+    -------
+    Sample
+        Its image is uint8, (H, W, 3) or, where the photograph is grey, (H, W).
+
+    Raises
+    ------
+    InvalidInput
+        If there is no photograph of that name.
+
+    Examples
+    --------
+    >>> from texrs import samples
+    >>> samples.photograph("brick").image.shape
+    (512, 512)
+    """
+    if name not in PHOTOGRAPHS:
+        raise InvalidInput(f"name must be one of {', '.join(PHOTOGRAPHS)}, got {name!r}")
+    from skimage import data
+
+    image: NDArray[np.uint8] = np.ascontiguousarray(getattr(data, name)())
+    return Sample(name, image)

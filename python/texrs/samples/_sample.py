@@ -1,0 +1,93 @@
+"""The result of every generator, and the checks that all of them share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from numbers import Integral
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs.errors import InvalidInput
+
+__all__ = ["MIN_SIDE", "Sample", "Tag", "check_size", "generator"]
+
+#: What may move against what, in the words of texture design: ``F=d`` disjoint foreground,
+#: ``F=c`` connected foreground, ``B=c`` rigid connected background.
+Tag = Literal["F=d", "F=c", "B=c"]
+
+MIN_SIDE = 32
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sample:
+    """A picture or a volume whose contents are known exactly.
+
+    Coordinates are (row, col) or (plane, row, col) in pixels; pixel centres are at the integers,
+    so that a picture of H rows covers -0.5 <= row < H - 0.5. H, W and D stand for the picture's
+    rows and columns and the volume's planes; N is the number of texels whose centre is inside.
+
+    Attributes
+    ----------
+    name : str
+        What `texrs.samples.load` calls it.
+    image : uint8 array, (H, W, 3) or (D, H, W, 3); a grey photograph is (H, W)
+        The picture, sRGB.
+    centres : float64 array, (N, 2) or (N, 3), or None
+        Centroids of the texels, in pixels. A texel's centroid is that of its whole visible area,
+        before the border of the picture cuts it. The tilted samples give the point where the
+        centroid on the plane is seen instead.
+    labels : int32 array, (H, W) or (D, H, W), or None
+        0 is background; ``i + 1`` is the texel of ``centres[i]``. A texel that shows in the picture
+        with its centre outside has a label above N, so that ``labels > N`` is what only enters
+        from beyond the border. With `wrap` there are none: a texel that crosses the border
+        comes back on the other side under the same label.
+    mask : bool array, (H, W) or (D, H, W), or None
+        The foreground. It is ``labels > 0``, except where the generator says otherwise.
+    tag : {"F=d", "F=c", "B=c"} or None
+        Disjoint foreground, connected foreground, rigid connected background; None where the
+        texture is neither.
+    scale_map : float32 array, (H, W), or None
+        Local size of the texture: lengths are this many times the normal ones, as the square root
+        of the ratio of areas. Its geometric mean is 1.
+    frames : float32 array, (H, W, 2, 2) or (D, H, W, 3, 3), or None
+        The Jacobian J = dS/dp of the map from the picture to the undistorted texture;
+        ``frames[..., i, j]`` is dS_i / dp_j.
+    """
+
+    name: str
+    image: NDArray[np.uint8]
+    centres: NDArray[np.float64] | None = None
+    labels: NDArray[np.int32] | None = None
+    mask: NDArray[np.bool_] | None = None
+    tag: Tag | None = None
+    scale_map: NDArray[np.float32] | None = None
+    frames: NDArray[np.float32] | None = None
+
+    def __repr__(self) -> str:
+        """Return the name, the shape and which of the known answers are there."""
+        shape = "x".join(map(str, self.image.shape))
+        known = [f.name for f in fields(self)[2:] if getattr(self, f.name) is not None]
+        return f"Sample({self.name!r}, {shape}, known: {', '.join(known) or 'nothing'})"
+
+
+def check_size(size: object, axes: Literal[2, 3]) -> tuple[int, ...]:
+    """Return `size` as a tuple of `axes` ints of at least `MIN_SIDE`, or raise ValueError."""
+    words = "(rows, cols)" if axes == 2 else "(planes, rows, cols)"
+    given = tuple(size) if isinstance(size, Sequence | np.ndarray) else None
+    integers = given is not None and all(isinstance(n, Integral) and not isinstance(n, bool) for n in given)
+    if given is None or not integers or len(given) != axes:
+        raise InvalidInput(f"size must be {axes} ints {words}, got {size!r}")
+    if min(given) < MIN_SIDE:
+        raise InvalidInput(f"size must be at least {MIN_SIDE} along every axis {words}, got {size!r}")
+    return tuple(int(n) for n in given)
+
+
+def generator(name: str, seed: object) -> np.random.Generator:
+    """Return the generator of sample `name`: a seed gives unrelated numbers to each sample."""
+    if isinstance(seed, bool) or not isinstance(seed, Integral) or seed < 0:
+        raise InvalidInput(f"seed must be an int of at least 0, got {seed!r}")
+    words = [int(seed), *name.encode()]
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(words)))

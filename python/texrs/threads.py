@@ -1,0 +1,36 @@
+"""How many threads the kernels use."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from texrs import _rust
+from texrs._arrays import as_int
+
+__all__ = ["threads"]
+
+
+@contextmanager
+def threads(count: int | None = None) -> Iterator[None]:
+    """Use ``count`` threads in the kernels that this thread calls inside the ``with`` block.
+
+    Results do not depend on it. Without a count: ``RAYON_NUM_THREADS``, or as many as there are cores.
+
+    Raises
+    ------
+    InvalidInput
+        A count that is not an integer from 1 to 1024.
+
+    Examples
+    --------
+    >>> import texrs
+    >>> with texrs.threads(1):
+    ...     result = texrs.design(texrs.samples.dots((64, 64)).image, 64)
+
+    """
+    before = _rust.set_threads(0 if count is None else as_int(count, "count", 1, 1024))
+    try:
+        yield
+    finally:
+        _rust.set_threads(before)
