@@ -1,0 +1,107 @@
+"""Files of every format, made from scratch, for the tests of reading and writing."""
+
+import io
+import struct
+import zipfile
+import zlib
+
+import numpy as np
+from PIL import Image
+
+
+def picture(shape, dtype="uint8", seed=0):
+    """Smooth stripes and some noise: what compresses, but not to nothing."""
+    dtype = np.dtype(dtype)
+    rng = np.random.default_rng(seed)
+    values = 0.5 + 0.4 * np.sin(np.arange(np.prod(shape)) * 0.07).reshape(shape)
+    values = np.clip(values + rng.normal(0, 0.05, shape), 0, 1)
+    if dtype == np.bool_:
+        return values > 0.5
+    if dtype.kind == "f":
+        return (values * 8 - 2).astype(dtype)
+    info = np.iinfo(dtype)
+    low, high = max(info.min, -(2**52)), min(info.max, 2**52)
+    return (low + values * (high - low)).astype(dtype)
+
+
+def png(width, height, bits, colour, rows, chunks=(), behind=()):
+    """A PNG file by hand (any header over any stream)."""
+
+    def chunk(name, data):
+        body = name + data
+        return struct.pack(">I", len(data)) + body + struct.pack(">I", zlib.crc32(body))
+
+    header = struct.pack(">IIBBBBB", width, height, bits, colour, 0, 0, 0)
+    chunks = [(b"IHDR", header), *chunks, (b"IDAT", rows), *behind, (b"IEND", b"")]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(name, data) for name, data in chunks)
+
+
+def png_bomb(side=50_000):
+    """Two and a half gigapixels in 300 kB."""
+    packer = zlib.compressobj(9)
+    row = bytes((side + 7) // 8 + 1)
+    rows = b"".join(packer.compress(row * 1000) for _ in range(side // 1000)) + packer.flush()
+    return png(side, side, 1, 0, rows)
+
+
+def exif(orientation, order="<"):
+    """An Exif block that says nothing but how the picture is turned."""
+    mark = b"II*\0" if order == "<" else b"MM\0*"
+    entry = struct.pack(order + "HHIHH", 274, 3, 1, orientation, 0)
+    return mark + struct.pack(order + "IH", 8, 1) + entry + struct.pack(order + "I", 0)
+
+
+def pillow(array, kind, **options):
+    """Encode by Pillow."""
+    file = io.BytesIO()
+    Image.fromarray(array).save(file, kind, **options)
+    return file.getvalue()
+
+
+def palette_png(indices, colours, transparent=None):
+    """A PNG file with a palette of (n, 3) uint8."""
+    rows = b"".join(b"\0" + row.tobytes() for row in indices.astype(np.uint8))
+    chunks = [(b"PLTE", colours.astype(np.uint8).tobytes())]
+    if transparent is not None:
+        chunks.append((b"tRNS", bytes(transparent)))
+    return png(indices.shape[1], indices.shape[0], 8, 3, zlib.compress(rows), chunks)
+
+
+def npy(header, data=b""):
+    """An .npy file with any header."""
+    text = header.encode() + b"\n"
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text + data
+
+
+def npz(members):
+    """A deflated archive of any members."""
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in members.items():
+            archive.writestr(name, data)
+    return file.getvalue()
+
+
+def mutations(file, count, rng):
+    """Give corrupt versions of a file: changed, cut, doubled, blanked; half in the header."""
+    for _ in range(count):
+        data = bytearray(file)
+        for _ in range(rng.integers(1, 4)):
+            reach = len(data) if rng.random() < 0.5 else min(len(data), 128)
+            at = int(rng.integers(reach))
+            match rng.integers(6):
+                case 0 | 1:
+                    data[at] = int(rng.integers(256))
+                case 2:
+                    data[at : at + 4] = rng.choice(
+                        [b"\xff\xff\xff\xff", b"\0\0\0\0", b"\x7f\xff\xff\xff", b"\xff\xff\xff\x7f"]
+                    )[:4].ljust(4, b"\0")
+                case 3:
+                    del data[at : at + int(rng.integers(1, 40))]
+                case 4:
+                    data[at:at] = data[at : at + int(rng.integers(1, 40))]
+                case 5:
+                    del data[at:]
+            if not data:
+                break
+        yield bytes(data)

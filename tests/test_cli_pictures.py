@@ -1,0 +1,214 @@
+"""The commands that mend a picture, end to end: ``texrs tile`` and ``texrs complete``."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from pathlib import Path
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+import typer
+
+import texrs
+from texrs import SourceMap, samples
+from texrs.cli import app, main
+
+Capture = pytest.CaptureFixture[str]
+COLOURS = samples.load("pebbles", size=(64, 80)).image
+HOLE = np.zeros((64, 80), bool)
+HOLE[20:34, 30:50] = True
+BEFORE = b"before"
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in a folder that holds a picture, a hole in it, another picture and a result of earlier."""
+    monkeypatch.chdir(tmp_path)
+    iio.imwrite("in.png", COLOURS)
+    iio.imwrite("hole.png", HOLE.astype(np.uint8) * 255)
+    iio.imwrite("other.png", samples.load("beans", size=(64, 64)).image)
+    Path("out.png").write_bytes(BEFORE)
+    return tmp_path
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() if p.is_file() else b"" for p in folder.rglob("*")}
+
+
+# --- results ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options"),
+    [
+        ("", {}),
+        ("--wrap x --overlap 12", {"wrap": (False, True), "overlap": 12}),
+        ("--wrap y --overlap 10x30 --threads 1", {"wrap": (True, False), "overlap": (10, 30)}),
+        ("--wrap none", {"wrap": False}),
+    ],
+)
+def test_tile_writes_what_the_function_makes(here: Path, capsys: Capture, arguments: str, options: dict) -> None:
+    more = ["--stages", "stages", "--source", "s.npz"]
+    assert main(["tile", "in.png", "-o", "out.png", *arguments.split(), *more]) == 0
+    expected = texrs.tile(COLOURS, **options)
+    assert (iio.imread("out.png") == expected.image).all()
+    assert (SourceMap.load("s.npz").coordinates == expected.source.coordinates).all()
+    assert sorted(p.name for p in Path("stages").iterdir()) == [
+        "01-swapped.png",
+        "02-pieces.png",
+        "03-composite.png",
+        "report.json",
+    ]
+    rows, columns = expected.image.shape[:2]
+    out, err = capsys.readouterr()
+    assert out == ""
+    last = rf"texrs: wrote out.png: {rows} x {columns}, 3 channels, uint8, in [0-9.]+ s"
+    assert re.fullmatch(last, err.splitlines()[-1])
+
+
+def test_complete_writes_what_the_function_makes(here: Path, capsys: Capture) -> None:
+    options = "--patch 10 --rim 2 --no-mirror --wrap x --seed 4 --stages stages --source s.npz"
+    assert main(["complete", "in.png", "hole.png", "-o", "out.png", *options.split()]) == 0
+    expected = texrs.complete(COLOURS, HOLE, patch=10, rim=2, mirror=False, wrap=(False, True), seed=4)
+    assert (iio.imread("out.png") == expected.image).all()
+    assert (SourceMap.load("s.npz").label == expected.source.label).all()
+    assert (iio.imread("stages/01-known.png")[HOLE] == COLOURS[~HOLE].min()).all()
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.splitlines()[0] == "texrs: complete"
+
+
+def test_complete_from_another_picture_and_apply(here: Path) -> None:
+    command = ["complete", "in.png", "hole.png", "--source-image", "other.png", "-o", "out.png", "--source", "s.npz"]
+    assert main([*command, "-q"]) == 0
+    expected = texrs.complete(COLOURS, HOLE, source=iio.imread("other.png")).image
+    assert (iio.imread("out.png") == expected).all()
+    assert main(["apply", "s.npz", "in.png", "other.png", "-o", "again.png", "-q"]) == 0
+    assert (iio.imread("again.png") == expected).all()
+
+
+def test_any_mask_is_a_hole(here: Path) -> None:
+    grey = HOLE.astype(np.uint8) * 3
+    for name, mask in (
+        ("rgb.png", np.dstack([grey, 0 * grey, 0 * grey])),
+        ("rgba.png", np.dstack([grey, grey, grey, grey * 0 + 255])),
+        ("ga.png", np.dstack([grey, grey * 0 + 255])),
+        ("one.png", grey),
+        ("wide.png", grey.astype(np.uint16) * 257),
+    ):
+        iio.imwrite(name, mask)
+        assert main(["complete", "in.png", name, "-o", f"out-{name}", "-q"]) == 0
+        assert Path(f"out-{name}").read_bytes() == Path("out-rgb.png").read_bytes()
+
+
+def test_floats_may_be_unknown_in_the_hole(here: Path) -> None:
+    image = COLOURS.astype(np.float32) / 64
+    image[HOLE] = np.nan
+    np.save("in.npy", image)
+    assert main(["complete", "in.npy", "hole.png", "-o", "out.exr", "-q"]) == 0
+    result = texrs.io.read("out.exr")
+    assert np.isfinite(result).all()
+    assert (result[~HOLE] == image[~HOLE]).all()
+
+
+def test_defaults_are_those_of_the_functions() -> None:
+    for name, function in (("tile", texrs.tile), ("complete", texrs.complete)):
+        command = typer.main.get_command(app).commands[name]  # type: ignore[attr-defined]
+        ours = {p.name: p.default for p in command.params}
+        ours["wrap"] = {"xy": (True, True), "none": False}[ours["wrap"]]
+        for option, parameter in inspect.signature(function).parameters.items():
+            if option not in ("image", "hole", "source", "method", "progress"):
+                assert ours[option] == parameter.default, option
+
+
+def test_same_command_same_bytes(here: Path, capsys: Capture) -> None:
+    for command in (["tile", "in.png"], ["complete", "in.png", "hole.png"]):
+        for count in ("1", "2", "7"):
+            assert main([*command, "-q", "--threads", count, "-o", f"{count}.png"]) == 0
+        assert len({Path(f"{count}.png").read_bytes() for count in "127"}) == 1
+    assert capsys.readouterr() == ("", "")
+
+
+def test_photograph_by_name(here: Path) -> None:
+    assert main(["tile", "sample:dots", "-o", "out.png", "-q"]) == 0
+    assert (iio.imread("out.png") == texrs.tile(samples.load("dots").image).image).all()
+
+
+# --- what is refused -------------------------------------------------------------------------------------------------
+
+REFUSED = {
+    "tile no.png": "no.png",
+    "tile in.png --wrap z": "--wrap: allowed are",
+    "tile in.png --overlap 0": "--overlap: each side must be at least 1",
+    "tile in.png --overlap 33": "--overlap: needs an integer from 1 to 32, got 33: at most half of the 64 rows",
+    "tile in.png --overlap 10x41": "from 1 to 40, got 41: at most half of the 80 columns",
+    "tile in.png --overlap a": "--overlap: needs ROWSxCOLS",
+    "tile in.png --source s.png": "--source: needs a name that ends in .npz",
+    "tile in.png --stages in.png": "in.png: is not a folder",
+    "tile in.png --stages out.png": "--stages: out.png is already the file of --out",
+    "tile in.png --threads 0": "--threads: needs",
+    "tile in.png hole.png": "--help",
+    "tile": "--help",
+    "complete in.png": "--help",
+    "complete in.png no.png": "no.png",
+    "complete no.png hole.png": "no.png",
+    "complete in.png other.png": "other.png: needs shape (64, 80), got (64, 64)",
+    "complete in.png white.png": "white.png: covers the whole image",
+    "complete in.png lines.png": "lines.png: leaves no 4 x 4 pixels",
+    "complete in.png hole.png --patch 65": "--patch: needs an integer from 4 to 64, got 65",
+    "complete in.png hole.png --patch 60": "--patch: 60 has no place",
+    "complete in.png hole.png --rim -1": "--rim: needs",
+    "complete in.png hole.png --seed -1": "--seed: needs",
+    "complete in.png hole.png --wrap yes": "--wrap: allowed are",
+    "complete in.png hole.png --source-image hole.png": "hole.png: needs the dtype and channels of the image",
+    "complete in.png hole.png --source-image no.png": "no.png",
+    "complete nan.npy hole.png": "nan.npy",
+    "complete in.png nan.npy": "nan.npy: needs bool or integers",
+}
+
+
+@pytest.mark.parametrize("command", REFUSED)
+def test_bad_input_gets_one_line_and_leaves_what_was_there(here: Path, capsys: Capture, command: str) -> None:
+    lines = HOLE.copy()
+    lines[::3] = True
+    iio.imwrite("lines.png", lines.astype(np.uint8))
+    iio.imwrite("white.png", np.full((64, 80), 255, np.uint8))
+    np.save("nan.npy", np.where(np.arange(64 * 80).reshape(64, 80) == 3, np.nan, np.float32(1)))
+    before = files(here)
+    assert main([*command.split(), "-o", "out.png" if "nan.npy hole" not in command else "out.tif"]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    told = [line for line in err.splitlines() if line not in ("texrs: complete", "texrs: join columns")]
+    assert len(told) == 1, err
+    assert told[0].startswith("texrs: ")
+    assert REFUSED[command] in told[0]
+    assert files(here) == before
+
+
+@pytest.mark.parametrize("command", ["tile in.png", "complete in.png hole.png"])
+@pytest.mark.parametrize("out", ["out.xyz", "no/out.png", ".", "out.exr"])
+def test_outputs_are_checked_before_the_work(
+    here: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch, command: str, out: str
+) -> None:
+    for verb in ("tile", "complete"):
+        monkeypatch.setattr(f"texrs.cli._pictures.{verb}", None)  # Would be an internal error.
+    before = files(here)
+    assert main([*command.split(), "-o", out]) == 2
+    assert files(here) == before
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("command", ["tile in.png", "complete in.png hole.png"])
+def test_failed_writing_leaves_what_was_there(
+    here: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    def full(*args: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(SourceMap, "save", full)
+    before = files(here)
+    assert main([*command.split(), "-q", "-o", "out.png", "--source", "s.npz"]) == 2
+    assert "no space left on device" in capsys.readouterr().err
+    assert files(here) == before

@@ -1,0 +1,278 @@
+"""Completion of any picture: nothing known changes, nothing unknown is copied, every map in register."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+import texrs
+from texrs import samples
+from texrs.completion import PLACES, corners
+from texrs.errors import Cancelled, InvalidInput
+
+PEBBLES = samples.pebbles((96, 112)).image
+
+
+def disc(shape: tuple[int, int], at: tuple[float, float] = (0.5, 0.5), radius: float = 0.17) -> np.ndarray:
+    r, c = np.indices(shape)
+    return np.hypot(r - at[0] * shape[0], c - at[1] * shape[1]) < radius * min(shape)
+
+
+HOLE = disc((96, 112))
+SPECKS = np.random.default_rng(0).random((96, 112)) < 0.01
+
+
+def places(result: texrs.Synthesis) -> tuple[np.ndarray, np.ndarray]:
+    at = result.source.coordinates
+    assert (at == np.rint(at)).all()
+    return at[..., 0].astype(int), at[..., 1].astype(int)
+
+
+# --- what is filled, and with what -----------------------------------------------------------------------------------
+
+
+def test_periodic_pattern_is_restored_exactly():
+    unit = np.random.default_rng(1).integers(0, 256, (9, 11, 3), dtype=np.uint8)
+    whole = np.tile(unit, (10, 9, 1))
+    for hole in (disc(whole.shape[:2]), disc(whole.shape[:2], (0, 0.3), 0.2), disc(whole.shape[:2], (1, 1), 0.3)):
+        for mirror in (True, False):
+            image = whole.copy()
+            image[hole] = 128
+            np.testing.assert_array_equal(texrs.complete(image, hole, mirror=mirror).image, whole)
+
+
+def test_holes_at_the_border_are_filled_across_it():
+    unit = np.random.default_rng(2).integers(0, 256, (8, 12), dtype=np.uint8)
+    whole = np.tile(unit, (8, 6))
+    hole = np.zeros(whole.shape, bool)
+    hole[:3], hole[:, -4:] = True, True
+    result = texrs.complete(np.where(hole, 0, whole).astype(np.uint8), hole, wrap=True)
+    np.testing.assert_array_equal(result.image, whole)
+
+
+@pytest.mark.parametrize("rim", [0, 3])
+@pytest.mark.parametrize(
+    "hole", [HOLE, disc((96, 112), (0, 0), 0.5), np.random.default_rng(0).random((96, 112)) < 0.01]
+)
+def test_known_pixels_stay_and_unknown_ones_are_not_copied(hole, rim):
+    result = texrs.complete(PEBBLES, hole, rim=rim, seed=3)
+    row, column = places(result)
+    assert not hole[row, column].any()
+    own = (row == np.indices(row.shape)[0]) & (column == np.indices(row.shape)[1])
+    assert not own[hole].any()
+    far = texrs.complete(PEBBLES, hole, rim=0).source.label == 0
+    assert (far == ~hole).all()
+    kept = result.source.label == 0
+    assert own[kept].all()
+    assert (result.report["replaced_outside"] > 0) == (rim > 0)
+    np.testing.assert_array_equal(result.image, PEBBLES[row, column])
+
+
+def test_rim_is_not_exceeded():
+    from scipy.ndimage import binary_dilation
+
+    result = texrs.complete(PEBBLES, HOLE, rim=4)
+    assert (result.source.label[~binary_dilation(HOLE, np.ones((3, 3)), 4)] == 0).all()
+
+
+def test_what_is_in_the_hole_does_not_matter():
+    base = PEBBLES.astype(np.float32)
+    made = []
+    for content in (0.0, 1e6, -7.0, np.nan, np.inf):
+        image = base.copy()
+        image[HOLE] = content
+        made.append(texrs.complete(image, HOLE).image)
+    assert np.isfinite(made[0]).all()
+    for other in made[1:]:
+        np.testing.assert_array_equal(other, made[0])
+
+
+def test_filling_continues_the_texture():
+    result = texrs.complete(PEBBLES, HOLE)
+    grey = result.image.astype(float).mean(axis=-1)
+    for axis in (0, 1):
+        step = np.abs(np.diff(grey, axis=axis))
+        inside = HOLE.take(range(step.shape[axis]), axis)
+        assert step[inside].mean() < 1.5 * step[~inside].mean()
+    assert abs(grey[HOLE].mean() - grey[~HOLE].mean()) < 20
+
+
+def test_empty_hole_gives_the_image():
+    none = np.zeros((96, 112), bool)
+    result = texrs.complete(PEBBLES, none)
+    np.testing.assert_array_equal(result.image, PEBBLES)
+    assert result.source.reuse().regions == 1
+    assert result.report["patches"] == 0
+    assert texrs.complete(PEBBLES, none, source=PEBBLES[:20]).source.shapes == ((96, 112), (20, 112))
+
+
+# --- another picture -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+def test_source_is_the_second_exemplar(dtype):
+    other = np.ascontiguousarray(samples.beans((64, 80)).image.astype(dtype))
+    image = PEBBLES.astype(dtype)
+    result = texrs.complete(image, HOLE, source=other)
+    assert result.source.shapes == ((96, 112), (64, 80))
+    np.testing.assert_array_equal(result.source.exemplar, HOLE.astype(np.uint16))
+    np.testing.assert_array_equal(result.source.render([image, other]), result.image)
+    row, column = places(result)
+    np.testing.assert_array_equal(result.image[HOLE], other[row[HOLE], column[HOLE]])
+    np.testing.assert_array_equal(result.image[~HOLE], image[~HOLE])
+
+
+def test_whole_image_from_a_source():
+    everywhere = np.ones((40, 50), bool)
+    result = texrs.complete(np.full((40, 50, 3), np.nan, np.float32), everywhere, source=PEBBLES.astype(np.float32))
+    assert (result.source.exemplar == 1).all()
+    assert result.image.shape == (40, 50, 3)
+    seeds = [texrs.complete(PEBBLES, np.ones((96, 112)) > 0, source=PEBBLES, seed=s).image for s in (1, 1, 2)]
+    assert (seeds[0] == seeds[1]).all()
+    assert (seeds[0] != seeds[2]).any()
+
+
+def test_sources_of_floats_are_compared_in_one_range():
+    ramp = np.tile(np.linspace(0, 10, 48, dtype=np.float32), (48, 1))
+    hole = disc((48, 48))
+    result = texrs.complete(ramp, hole, source=ramp * 2)
+    # In a range of its own the doubled ramp would look like the ramp itself.
+    assert np.abs(result.image - ramp)[hole].mean() < 1
+
+
+# --- any array -------------------------------------------------------------------------------------------------------
+
+
+def test_every_map_in_register():
+    stack = [PEBBLES, PEBBLES.astype(np.uint16) * 257, PEBBLES.astype(np.float32) * (4 / 255), PEBBLES[..., 0] > 90]
+    made = [texrs.complete(each, HOLE) for each in stack]
+    for each, result in zip(stack, made, strict=True):
+        assert result.image.dtype == each.dtype
+        np.testing.assert_array_equal(result.source.render(each), result.image)
+        np.testing.assert_array_equal(result.stages["composite"], result.image)
+    np.testing.assert_array_equal(made[0].source.coordinates, made[1].source.coordinates)
+    np.testing.assert_array_equal(made[1].image, made[0].image.astype(np.uint16) * 257)
+
+
+def test_mirrored_patches_turn_normals():
+    result = texrs.complete(PEBBLES, HOLE)
+    turned = (result.source.frames() != np.eye(2)).any(axis=(2, 3))
+    assert turned.any()
+    plain = texrs.complete(PEBBLES, HOLE, mirror=False).source
+    assert (plain.frames() == np.eye(2)).all()
+    # Along a patch coordinates run as its frame says.
+    joined = result.source.continues(1)[:, :-1]
+    same = result.source.label[:, 1:] == result.source.label[:, :-1]
+    assert joined[same].all()
+
+
+@pytest.mark.parametrize("channels", [None, 1, 2, 4, 7])
+def test_any_number_of_channels(channels):
+    grey = PEBBLES[..., 0]
+    image = grey if channels is None else np.stack([np.roll(grey, c, axis=0) for c in range(channels)], axis=-1)
+    result = texrs.complete(image, HOLE.astype(np.uint8) * 255)
+    assert result.image.shape == image.shape
+    row, column = places(result)
+    np.testing.assert_array_equal(result.image, image[row, column])
+
+
+def test_smaller_patches_where_few_places_are_free():
+    grid = np.zeros((96, 112), bool)
+    grid[::9], grid[:, ::9] = True, True
+    result = texrs.complete(PEBBLES, grid)
+    assert result.report["patch"] == 8
+    assert corners(~grid, 8).sum() >= PLACES > corners(~grid, 9).sum()
+    dense = np.zeros((96, 112), bool)
+    dense[::5], dense[:, ::5] = True, True
+    assert texrs.complete(PEBBLES, dense).report["patch"] == 4
+    assert texrs.complete(PEBBLES, HOLE).report["patch"] == 16
+    assert texrs.complete(PEBBLES[:4, :4], np.zeros((4, 4), bool)).image.shape == (4, 4, 3)
+
+
+def test_corners():
+    free = np.random.default_rng(0).random((14, 11)) < 0.8
+    for side in (1, 2, 3, 5, 11):
+        expected = np.zeros(free.shape, bool)
+        for r in range(14 - side + 1):
+            for c in range(11 - side + 1):
+                expected[r, c] = free[r : r + side, c : c + side].all()
+        np.testing.assert_array_equal(corners(free, side), expected)
+
+
+# --- errors and running ----------------------------------------------------------------------------------------------
+
+EVERY_THIRD = np.zeros((96, 112), bool)
+EVERY_THIRD[::3] = True
+NAN = np.where(np.arange(96 * 112).reshape(96, 112) == 5, np.nan, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("image", "hole", "options", "words"),
+    [
+        (PEBBLES, HOLE[1:], {}, "hole: needs shape (96, 112), got (95, 112)"),
+        (PEBBLES, np.dstack([HOLE] * 3), {}, "hole: needs shape (96, 112), got (96, 112, 3)"),
+        (PEBBLES, HOLE.astype(float), {}, "hole: needs bool or integers"),
+        (
+            PEBBLES,
+            np.ones_like(HOLE),
+            {},
+            "hole: covers the whole image, so there is nothing to copy from; give a source",
+        ),
+        (PEBBLES, EVERY_THIRD, {}, "hole: leaves no 4 x 4 pixels in one piece to copy from; give a source"),
+        (PEBBLES, HOLE, {"patch": 3}, "patch: needs an integer from 4 to 96, got 3"),
+        (PEBBLES, HOLE, {"patch": 97}, "patch: needs an integer from 4 to 96, got 97"),
+        (PEBBLES, HOLE, {"patch": 60}, "patch: 60 has no place in the image that is free of holes; at most 42 has one"),
+        (PEBBLES, EVERY_THIRD, {"patch": 12}, "nor has any other; give a source"),
+        (PEBBLES, HOLE, {"patch": 40, "source": PEBBLES[:30]}, "patch: needs an integer from 4 to 30, got 40"),
+        (PEBBLES, HOLE, {"source": PEBBLES[..., 0]}, "source: needs the dtype and channels of the image, uint8 and 3"),
+        (PEBBLES, HOLE, {"source": PEBBLES / 255}, "got float64 and 3"),
+        (PEBBLES, HOLE, {"source": PEBBLES[:3]}, "source: each side must be at least 4"),
+        (PEBBLES, HOLE, {"method": "heal"}, "method: allowed is 'patch', got 'heal'"),
+        (PEBBLES, HOLE, {"rim": -1}, "rim: needs an integer from 0"),
+        (PEBBLES, HOLE, {"mirror": 1}, "mirror: needs True or False"),
+        (PEBBLES, HOLE, {"seed": -1}, "seed: needs"),
+        (PEBBLES, HOLE, {"wrap": "xy"}, "wrap: needs"),
+        (PEBBLES[:3], HOLE[:3], {}, "image: each side must be at least 4"),
+        (NAN, HOLE, {}, "image: 1 of 10752 values are NaN"),
+        (np.zeros((8, 8, 8, 3)), np.zeros((8, 8)), {}, "a volume is not an image"),
+        (np.array([["a", "b"]]), HOLE, {}, "image: needs numbers"),
+    ],
+)
+def test_arguments_are_checked(image, hole, options, words):
+    with pytest.raises(InvalidInput, match=re.escape(words)):
+        texrs.complete(image, hole, **options)
+
+
+def test_the_image_is_not_changed():
+    image, hole = PEBBLES.copy(), HOLE.copy()
+    texrs.complete(image, hole)
+    np.testing.assert_array_equal(image, PEBBLES)
+    np.testing.assert_array_equal(hole, HOLE)
+    everywhere, before = np.ones((96, 112), bool), image.copy()
+    texrs.complete(image, everywhere, source=PEBBLES)
+    np.testing.assert_array_equal(image, before)
+
+
+def test_progress_and_cancel():
+    seen = []
+    texrs.complete(PEBBLES, HOLE, progress=lambda stage, share: seen.append((stage, share)))
+    assert seen[0] == ("complete", 0.0)
+    assert seen[-1] == ("done", 1.0)
+
+    def stop(stage: str, share: float) -> None:
+        raise Cancelled("enough")
+
+    with pytest.raises(Cancelled):
+        texrs.complete(PEBBLES, HOLE, progress=stop)
+
+
+def test_same_bytes_for_any_number_of_threads():
+    made = []
+    for count in (1, 2, 7):
+        with texrs.threads(count):
+            made.append(texrs.complete(PEBBLES, HOLE, rim=2, seed=9))
+    for other in made[1:]:
+        assert other.image.tobytes() == made[0].image.tobytes()
+        assert other.source.coordinates.tobytes() == made[0].source.coordinates.tobytes()

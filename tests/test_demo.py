@@ -1,0 +1,104 @@
+"""The demo: one page that holds all it shows."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from texrs import samples
+from texrs.cli import main
+from texrs.demo import Section, page
+from texrs.demo._samples import cube
+from texrs.demo._workshop import Designed, Workshop
+
+
+class Page(HTMLParser):
+    """Collects what a page refers to, and checks that its elements are closed."""
+
+    VOID = ("meta", "img", "br", "link", "hr", "input")
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the demo make small textures, and each volume and picture at the least size."""
+    designed: Callable[..., Designed] = Workshop.designed
+    monkeypatch.setattr(
+        Workshop, "designed", lambda self, name, *sizes, **o: designed(self, name, 64, 64, tiles=1, **o)
+    )
+    monkeypatch.setattr("texrs.demo._pictures.SIDE", 64)
+    monkeypatch.setattr("texrs.demo._samples.SIDE", 64)
+    monkeypatch.setattr("texrs.demo._samples.EDGE", 32)
+
+
+@pytest.mark.usefixtures("small")
+def test_demo_is_one_whole_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["demo", "-o", "new/demo"]) == 0
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "texrs: Built-in examples" in err
+    assert [p.name for p in Path("new/demo").iterdir()] == ["index.html"]
+    text = Path("new/demo/index.html").read_text(encoding="utf-8")
+    parsed = Page(text)
+    assert not parsed.open
+    ids = [a["id"] for _, a in parsed.tags if "id" in a]
+    assert len(set(ids)) == len(ids)
+    pictures = 0
+    for tag, attributes in parsed.tags:
+        assert tag not in ("script", "link", "iframe", "object", "base")
+        assert not {"srcset", "data", "action", "poster"} & set(attributes)
+        assert not any(name.startswith("on") for name in attributes)
+        if "href" in attributes:
+            assert (attributes["href"] or "")[1:] in ids
+        if tag == "img":
+            kind = (attributes["src"] or "").partition(";base64,")[0]
+            assert kind in ("data:image/png", "data:image/jpeg")
+            assert attributes["alt"]
+            pictures += 1
+    assert pictures > 30
+    assert all(name in text for name in samples.names())
+    references = re.findall(r"url\((.{12})", text)
+    assert references
+    assert all(r.startswith("data:image/") for r in references)
+    assert "//" not in re.sub(r"base64,[A-Za-z0-9+/=]+", "", text)
+    assert page() == text
+
+
+def test_a_section_joins_the_page() -> None:
+    seen = []
+    mine = Section("mine", "A & B", "1 < 2", lambda workshop: "<p>body</p>")
+    text = page([mine], progress=lambda stage, share: seen.append((stage, share)))
+    assert '<section id="mine"><h2>A &amp; B</h2><p class="lead">1 &lt; 2</p><p>body</p></section>' in text
+    assert seen == [("A & B", 0.0), ("A & B", 1.0)]
+
+
+def test_cube_shows_three_faces() -> None:
+    volume = np.zeros((8, 8, 8, 3), np.uint8)
+    volume[0, :, :, 0], volume[1:, -1, :, 1], volume[1:, :-1, -1, 2] = 200, 200, 200
+    picture = cube(volume, 64)
+    assert picture[8, 32].tolist() == [200, 0, 0, 255]
+    assert picture[40, 20, 3] == picture[40, 44, 3] == 255
+    assert picture[40, 20, 0] == picture[40, 44, 0] == 0
+    assert picture[0, 0].tolist() == [0, 0, 0, 0]

@@ -1,0 +1,289 @@
+"""DESIGN, end to end: honest stages, exact look-up, the same bytes for any number of threads."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import texrs
+from texrs import samples
+from texrs.deform import Moves, Operation, chaotic_sequence, elements_of, place
+from texrs.errors import Cancelled, InvalidInput, LimitExceeded
+from texrs.segment import segment
+
+
+@pytest.fixture(scope="module")
+def pebbles():
+    return samples.pebbles((128, 128)).image
+
+
+@pytest.fixture(scope="module")
+def result(pebbles):
+    return texrs.design(pebbles, (160, 224), seed=5)
+
+
+# --- the result ------------------------------------------------------------------------------------------------------
+
+
+def test_size_dtype_and_content(pebbles, result):
+    assert result.image.shape == (160, 224, 3)
+    assert result.image.dtype == np.uint8
+    assert result.source.shape == (160, 224)
+    # Every colour comes from the exemplar: where coordinates are whole, exactly that sample.
+    whole = (result.source.coordinates == np.rint(result.source.coordinates)).all(axis=-1)
+    at = result.source.coordinates[whole].astype(int)
+    np.testing.assert_array_equal(result.stages["composite"][whole], pebbles[at[:, 0], at[:, 1]])
+    assert whole.mean() > 0.3
+
+
+def test_stages_are_pictures_in_order(result):
+    assert list(result.stages) == ["segmentation", "deformed", "holes", "completed", "composite"]
+    assert result.stages["holes"].any()
+    deformed, completed = result.stages["deformed"], result.stages["completed"]
+    assert (completed[result.stages["holes"]] != deformed[result.stages["holes"]]).any()
+
+
+def test_the_source_map_renders_the_composite_in_every_dtype(pebbles):
+    stack = {
+        "uint8": pebbles,
+        "uint16": pebbles.astype(np.uint16) * 257,
+        "float32": pebbles.astype(np.float32) * (4 / 255),
+    }
+    for name, exemplar in stack.items():
+        made = texrs.design(exemplar, 96, seed=2, tiles=2)
+        assert made.image.dtype == np.dtype(name)
+        np.testing.assert_array_equal(made.source.render(exemplar), made.stages["composite"])
+
+
+def test_depth_does_not_change_the_decisions(pebbles):
+    eight = texrs.design(pebbles, 96, seed=2, tiles=2).source
+    sixteen = texrs.design(pebbles.astype(np.uint16) * 257, 96, seed=2, tiles=2).source
+    np.testing.assert_array_equal(eight.coordinates, sixteen.coordinates)
+
+
+@pytest.mark.parametrize("channels", [None, 1, 2, 4, 6])
+def test_any_number_of_channels(pebbles, channels):
+    grey = pebbles[:80, :80].mean(axis=-1).astype(np.uint8)
+    exemplar = grey if channels is None else np.stack([np.roll(grey, c, axis=0) for c in range(channels)], axis=-1)
+    made = texrs.design(exemplar, (90, 70), tiles=1)
+    assert made.image.shape == ((90, 70) if channels is None else (90, 70, channels))
+
+
+def test_a_wrapped_result_has_no_seam(result):
+    image = result.image.astype(float)
+    for axis in range(2):
+        inner = np.abs(np.diff(image, axis=axis)).mean()
+        across = np.abs(np.take(image, 0, axis) - np.take(image, -1, axis)).mean()
+        assert across / inner < 1.5
+
+
+def test_without_wrap_opposite_edges_are_free(pebbles):
+    free = texrs.design(pebbles, 160, seed=5, wrap=False)
+    assert free.report["wrap"] == [False, False]
+    assert free.image.shape == (160, 160, 3)
+
+
+def test_elements_really_move(pebbles, result):
+    moved = [entry for entry in result.report["operations"][0][1:] if entry["operations"]]
+    assert len(moved) >= 0.4 * result.report["elements"]
+    other = texrs.design(pebbles, (160, 224), seed=6)
+    assert (other.image != result.image).mean() > 0.5
+
+
+def test_an_image_without_elements_takes_the_grid_and_says_so():
+    made = texrs.design(samples.grit().image, 128, tiles=1)
+    assert made.report["children"] == "grid"
+    assert made.report["children_reason"]
+
+
+def test_a_constant_image_gives_a_constant_result():
+    made = texrs.design(np.full((40, 40, 3), 77, np.uint8), (50, 64))
+    assert (made.image == 77).all()
+
+
+def test_labels_by_hand(pebbles):
+    truth = samples.pebbles((128, 128)).labels
+    made = texrs.design(pebbles, 128, labels=truth, tiles=1)
+    assert made.report["children"] == "labels"
+    assert made.report["elements"] == truth.max()
+
+
+def test_stages_are_saved(result, tmp_path):
+    names = [p.name for p in result.save_stages(tmp_path / "stages")]
+    assert names[0] == "01-segmentation.png"
+    assert names[-1] == "report.json"
+
+
+# --- deformation -----------------------------------------------------------------------------------------------------
+
+
+def test_chaotic_reference_values():
+    expected = [194, 41, 241, 202, 67, 219, 123, 135, 111, 157, 60, 226]
+    assert [int(h) for h in chaotic_sequence(0.76234783, count=12)] == expected
+
+
+@pytest.mark.parametrize("x0", [0.0, 0.5, -0.5, 1.0, -1.0, 0.5**0.5, 1.5, float("nan")])
+def test_absorbing_starts_are_refused(x0):
+    with pytest.raises(InvalidInput, match="^x0"):
+        chaotic_sequence(x0)
+
+
+def test_drawn_operations_obey_their_limits():
+    moves = Moves(2, 0.12, 60.0, (0.8, 1.2), True, None, 2.0)
+    counts = dict.fromkeys("TRMS", 0)
+    for element in range(200):
+        for operation in moves.draw(moves.values(1, 0, element), (False, False), 100):
+            counts[operation.kind] += 1
+            if operation.kind == "T":
+                assert abs(operation.amount) <= 12
+            if operation.kind == "R":
+                assert abs(operation.amount) <= 60
+            if operation.kind == "S":
+                assert 0.8 <= operation.amount <= 1.2
+    assert min(counts.values()) >= 40
+    still = Moves(2, 0.12, 0.0, (1.0, 1.0), False, None, 2.0)
+    kinds = {o.kind for e in range(50) for o in still.draw(still.values(1, 0, e), (False, False), 100)}
+    assert kinds <= {"T"}
+
+
+def test_elements_at_the_border_slide_along_it():
+    moves = Moves(2, 0.3, 60.0, (0.8, 1.2), True, None, 2.0)
+    for element in range(50):
+        for operation in moves.draw(moves.values(1, 0, element), (True, False), 100):
+            assert (operation.kind, operation.axis) == ("T", 1)
+        assert moves.draw(moves.values(1, 0, element), (True, True), 100) == []
+
+
+def test_a_placed_element_keeps_its_shape():
+    labels = np.zeros((60, 60), np.int32)
+    labels[20:32, 24:44] = 1
+    element = elements_of(labels)[0]
+    turned = place(element, [Operation("R", 90.0, 0)], (60, 60))
+    assert turned is not None
+    rows, columns = np.nonzero(turned.distance > 0)
+    assert abs(np.ptp(rows) + 1 - 20) <= 1
+    assert abs(np.ptp(columns) + 1 - 12) <= 1
+    assert abs(rows.mean() + turned.window[0].start - 25.5) < 0.6
+
+
+def test_segmentation_finds_the_pebbles():
+    sample = samples.pebbles()
+    found = segment(sample.image)
+    assert found.children == "components"
+    whole = [np.bincount(sample.labels[found.elements == i]).argmax() for i in range(1, found.count + 1)]
+    share = [
+        (sample.labels[found.elements == i] == truth).mean() for i, truth in enumerate(whole, start=1) if truth > 0
+    ]
+    assert len(share) >= 0.5 * len(sample.centres)
+    assert np.median(share) > 0.9
+
+
+# --- invariants ------------------------------------------------------------------------------------------------------
+
+SCRIPT = """
+import hashlib, os, sys, texrs
+def digest():
+    made = texrs.design(texrs.samples.pebbles((96, 96)).image, (100, 120), seed=4, tiles=2)
+    parts = (made.image, made.source.coordinates, made.source.label, made.source.frame)
+    return hashlib.sha256(b"".join(p.tobytes() for p in parts)).hexdigest()
+print(digest(), flush=True)
+if "fork" in sys.argv:
+    child = os.fork()
+    if child == 0:
+        print(digest(), flush=True)
+        os._exit(0)
+    sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"""
+
+
+def digests(*arguments, threads=None):
+    environment = {k: v for k, v in os.environ.items() if k != "RAYON_NUM_THREADS"}
+    if threads is not None:
+        environment["RAYON_NUM_THREADS"] = str(threads)
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", SCRIPT, *arguments],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env=environment,
+        check=True,
+    )
+    return done.stdout.split()
+
+
+def test_the_same_bytes_for_any_number_of_threads():
+    first, *others = [digests(threads=n) for n in (None, 1, 2, 7)]
+    assert all(other == first for other in others)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the platform has no fork")
+def test_a_forked_child_finishes_with_the_same_bytes():
+    parent, child = digests("fork", threads=2)
+    assert parent == child
+
+
+def test_progress_is_told_and_raising_stops():
+    seen = []
+    pebbles = samples.pebbles((64, 64)).image
+    texrs.design(pebbles, 64, tiles=2, progress=lambda stage, share: seen.append((stage, share)))
+    assert seen[0][0] == "segment"
+    assert seen[-1] == ("done", 1.0)
+    assert all(0 <= share <= 1 for _, share in seen)
+
+    def stop(stage, share):
+        raise Cancelled("enough")
+
+    with pytest.raises(Cancelled):
+        texrs.design(pebbles, 64, progress=stop)
+
+
+PICTURE = np.zeros((32, 32, 3), np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "names"),
+    [
+        ((PICTURE, 0), {}, "size"),
+        ((PICTURE, -5), {}, "size"),
+        ((PICTURE, (3, 200)), {}, "size"),
+        ((PICTURE, (1.5, 20)), {}, "size"),
+        ((PICTURE, "512x512"), {}, "size"),
+        ((PICTURE, (20, 20, 20)), {}, "size"),
+        ((np.full((32, 32), np.nan),), {}, "exemplar"),
+        ((np.array([[object()] * 20] * 20),), {}, "exemplar"),
+        ((np.zeros((8, 32, 32, 3)),), {}, "exemplar"),
+        ((np.zeros((100, 100, 100)),), {}, "exemplar"),
+        ((np.zeros((15, 40)),), {}, "exemplar"),
+        ((np.zeros((40, 40), complex),), {}, "exemplar"),
+        ((PICTURE,), {"seed": -1}, "seed"),
+        ((PICTURE,), {"seed": 1.5}, "seed"),
+        ((PICTURE,), {"wrap": "xy"}, "wrap"),
+        ((PICTURE,), {"wrap": (True,)}, "wrap"),
+        ((PICTURE,), {"layers": 0}, "layers"),
+        ((PICTURE,), {"children": "cells"}, "children"),
+        ((PICTURE,), {"labels": np.zeros((3, 3), int)}, "labels"),
+        ((PICTURE,), {"labels": np.full((32, 32), -1)}, "labels"),
+        ((PICTURE,), {"tiles": 0}, "tiles"),
+        ((PICTURE,), {"operations": 9}, "operations"),
+        ((PICTURE,), {"translate": 0.6}, "translate"),
+        ((PICTURE,), {"rotate": float("nan")}, "rotate"),
+        ((PICTURE,), {"scale": (1.2, 0.8)}, "scale"),
+        ((PICTURE,), {"scale": 1.0}, "scale"),
+        ((PICTURE,), {"mirror": "no"}, "mirror"),
+        ((PICTURE,), {"x0": 0.5}, "x0"),
+        ((PICTURE,), {"chaos": 2.5}, "chaos"),
+        ((PICTURE,), {"patch": 64}, "patch"),
+        ((PICTURE,), {"poisson": -0.1}, "poisson"),
+        ((PICTURE,), {"poisson": "strong"}, "poisson"),
+    ],
+)
+def test_bad_input_names_the_argument(arguments, options, names):
+    with pytest.raises(InvalidInput, match=f"^{names}"):
+        texrs.design(*arguments, **options)
+
+
+def test_a_size_beyond_the_limit_is_refused_at_once():
+    with pytest.raises(LimitExceeded, match="^size"):
+        texrs.design(PICTURE, (10**9, 10**9))

@@ -1,0 +1,239 @@
+"""DESIGN to the letter (``method="paper"``): the printed constants, and what the departures of the default are for."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import texrs
+from texrs import samples
+from texrs._arrays import to_unit
+from texrs.deform import chaotic_sequence, flip
+from texrs.errors import InvalidInput
+from texrs.kernels.complete import complete
+from texrs.kernels.patch_search import PatchIndex
+from texrs.papers._design_literal import X0, operation, start, stitch_layers
+
+WEAK = -0.356261
+"""A start whose first two operations are translations by nothing."""
+
+
+@pytest.fixture(scope="module")
+def pebbles():
+    return samples.pebbles((128, 128)).image
+
+
+@pytest.fixture(scope="module")
+def result(pebbles):
+    return texrs.design(pebbles, (160, 192), seed=1, tiles=2, method="paper")
+
+
+def apart(a, b):
+    """Give how different two pictures are, 1 being as different as one is from itself rolled by half its size."""
+    a, b = a.astype(float), b.astype(float)
+    rolled = np.roll(a, (a.shape[0] // 2, a.shape[1] // 2), (0, 1))
+    return np.abs(a - b).mean() / np.abs(a - rolled).mean()
+
+
+def nearest(a, b):
+    """Give the same against the nearest of a picture and its mirrors."""
+    return min(apart(a, flip(b, axes)) for axes in [(False, False), (True, False), (False, True), (True, True)])
+
+
+# --- the generator ---------------------------------------------------------------------------------------------------
+
+
+def test_reference_operations():
+    values = chaotic_sequence(X0, count=12)
+    assert [int(h) for h in values] == [194, 41, 241, 202, 67, 219, 123, 135, 111, 157, 60, 226]
+    assert " ".join(f"{operation(h, 100).kind}{int(h) % 10}" for h in values) == "T4 R1 R1 M2 S7 R9 S3 R5 R1 S7 T0 M6"
+
+
+def test_the_worked_example():
+    """h(k) = 37 gives n = 7, m = 3: scale by 0.91."""
+    assert (operation(37, 100).kind, operation(37, 100).amount) == ("S", 0.91)
+
+
+def test_scale_sees_two_numbers_and_never_enlarges():
+    drawn = [(h, operation(h, 100)) for h in range(256)]
+    assert {h % 10 for h, chosen in drawn if chosen.kind == "S"} == {3, 7}
+    assert {chosen.amount for _, chosen in drawn if chosen.kind == "S"} == {0.8, 0.91}
+
+
+def test_extents_and_directions():
+    assert operation(194, 100).amount == 20
+    assert operation(41, 100).amount == -9
+    assert {operation(h, 100).axis for h in range(0, 256, 10)} == {0, 1}
+    shifts = {tuple(np.sign(operation(h, 100).shift())) for h in range(256) if operation(h, 100).kind == "T"}
+    assert shifts >= {(0, 1), (0, -1), (1, 0), (-1, 0)}
+    assert max(abs(operation(h, 100).amount) for h in range(256) if operation(h, 100).kind == "R") == 81
+
+
+def test_the_first_variant_starts_as_printed_and_others_elsewhere():
+    assert start(None, 2.0, 5, 0, 0) == X0
+    assert start(0.3, 2.0, 5, 0, 0) == 0.3
+    others = {start(None, 2.0, seed, 0, number) for seed in range(3) for number in range(1, 4)}
+    assert len(others | {X0}) == 10
+
+
+# --- layers ----------------------------------------------------------------------------------------------------------
+
+
+def test_layers_are_moved_whole():
+    picture = np.random.default_rng(0).random((40, 40, 3)).astype(np.float32)
+    layers = np.zeros((40, 40), np.int32)
+    layers[15:25, 15:25] = 1
+    whole = stitch_layers(picture, layers, WEAK, 2.0)
+    assert whole.covered.all()
+    np.testing.assert_array_equal(whole.colours, picture)
+    np.testing.assert_array_equal(whole.label, layers)
+    moved = stitch_layers(picture, layers, X0, 2.0)
+    # T4 moves the ground by 8 pixels to the right; R1 turns the square by 9 degrees, into what the ground left open.
+    assert (~moved.covered[:, :8]).all()
+    assert 0 < (moved.label == 1).sum() <= 100
+
+
+def test_a_layer_over_others_altogether_is_lost():
+    """Nothing ties the minimum cut to it: the reason for the cores of the default."""
+    picture = np.random.default_rng(0).random((40, 40, 3)).astype(np.float32)
+    layers = np.zeros((40, 40), np.int32)
+    layers[4:10, 15:25] = 1
+    # M of the ground along columns leaves its hole where it was; M of the square along rows lays it over the ground.
+    starts = np.random.default_rng(1).uniform(-1, 1, 4000)
+    wanted = [("M", 1), ("M", 0)]
+    found = [x for x in starts if [(o.kind, o.axis) for o in chosen(x)] == wanted]
+    assert (stitch_layers(picture, layers, float(found[0]), 2.0).label == 0).all()
+
+
+def chosen(x0):
+    return [operation(h, 40) for h in chaotic_sequence(x0, count=2)]
+
+
+def test_whole_layers_leave_large_holes(result, pebbles):
+    assert result.report["holes"][0] > 0.2
+    assert all(0.0 < share < 0.6 for share in result.report["holes"])
+    assert [entry["element"] for entry in result.report["operations"][0]] == [0, 1]
+    assert result.report["literal"]
+    assert not texrs.design(pebbles, 64, tiles=1).report["literal"]
+
+
+def test_it_can_hand_back_its_input_and_the_default_does_not(pebbles):
+    unit = to_unit(pebbles)
+    literal = texrs.design(pebbles, 128, seed=1, tiles=1, x0=WEAK, method="paper")
+    assert nearest(literal.stages["completed"], unit) < 0.01
+    for x0 in (None, WEAK, 0.3, -0.61):
+        default = texrs.design(pebbles, 128, seed=1, tiles=1, x0=x0)
+        assert nearest(default.stages["completed"], unit) > 0.2
+        assert nearest(default.image, pebbles) >= 0.4
+
+
+def test_options_of_elements_play_no_part(pebbles, result):
+    other = texrs.design(
+        pebbles,
+        (160, 192),
+        seed=1,
+        tiles=2,
+        method="paper",
+        children="grid",
+        operations=0,
+        translate=0.0,
+        rotate=10.0,
+        scale=(1.0, 1.0),
+        mirror=False,
+        poisson=0.5,
+    )
+    np.testing.assert_array_equal(other.image, result.image)
+
+
+# --- completion ------------------------------------------------------------------------------------------------------
+
+
+def test_completion_takes_the_best_match_of_a_centred_window():
+    random = np.random.default_rng(3)
+    image = random.random((30, 34, 2)).astype(np.float32)
+    picture = random.random((20, 24, 2)).astype(np.float32)
+    known = np.ones((20, 24), bool)
+    known[11, 9] = False
+    window = (slice(11 - 4, 11 + 5), slice(9 - 4, 9 + 5))
+    weight = known[window][..., np.newaxis]
+    costs = np.array(
+        [
+            [((image[r : r + 9, c : c + 9] - picture[window]) ** 2 * weight).sum() for c in range(34 - 8)]
+            for r in range(30 - 8)
+        ]
+    )
+    best = np.unravel_index(costs.argmin(), costs.shape)
+    filled = complete(picture, known, PatchIndex([image], max_patch=9), patch=9, count=1, paper=True)
+    np.testing.assert_array_equal(filled.coordinates[11, 9], np.array(best) + 4)
+
+
+# --- the result ------------------------------------------------------------------------------------------------------
+
+
+def test_the_source_map_renders_the_composite(pebbles, result):
+    assert result.image.shape == (160, 192, 3)
+    np.testing.assert_array_equal(result.source.render(pebbles), result.stages["composite"])
+
+
+def test_unscreened_poisson_acts_and_keeps_the_rim(result):
+    before, after = result.report["seams"]["before"], result.report["seams"]["after"]
+    assert after["outliers"] < before["outliers"]
+    assert after["mean"] < before["mean"]
+    composite = result.stages["composite"]
+    for axis in range(2):
+        for line in (0, -1):
+            np.testing.assert_array_equal(np.take(result.image, line, axis), np.take(composite, line, axis))
+    plain = texrs.blend.blend(result.source, samples.pebbles((128, 128)).image, wrap=False, screening=0)
+    np.testing.assert_array_equal(result.image, plain)
+
+
+def test_screening_keeps_the_colours(result, pebbles):
+    """The reason for the weight on the values: without it colours drift."""
+    from scipy.ndimage import gaussian_filter
+
+    def drift(image):
+        shift = image.astype(float) - result.stages["composite"]
+        return np.abs(gaussian_filter(shift, (12, 12, 0))).max()
+
+    screened = texrs.blend.blend(result.source, pebbles, wrap=False)
+    assert drift(screened) < 0.5 * drift(result.image)
+
+
+def test_other_seeds_give_other_textures(pebbles, result):
+    other = texrs.design(pebbles, (160, 192), seed=2, tiles=2, method="paper")
+    assert (other.image != result.image).mean() > 0.5
+    assert other.report["operations"][0] == result.report["operations"][0]
+
+
+def test_layers_by_hand_and_several_exemplars(pebbles):
+    labels = (samples.pebbles((128, 128)).labels > 0).astype(int)
+    made = texrs.design(pebbles, 96, labels=labels, tiles=1, method="paper")
+    assert len(made.report["operations"][0]) == 2
+    two = texrs.design([pebbles, 255 - pebbles], 96, tiles=1, method="paper")
+    assert min(two.report["shares"]) > 0
+
+
+SCRIPT = """
+import hashlib, texrs
+made = texrs.design(texrs.samples.pebbles((80, 80)).image, 100, seed=4, tiles=2, method="paper")
+print(hashlib.sha256(made.image.tobytes() + made.source.coordinates.tobytes()).hexdigest())
+"""
+
+
+def test_the_same_bytes_for_any_number_of_threads():
+    found = set()
+    for threads in (1, 2, 7):
+        environment = {**os.environ, "RAYON_NUM_THREADS": str(threads)}
+        done = subprocess.run(
+            [sys.executable, "-c", SCRIPT], capture_output=True, text=True, timeout=120, env=environment, check=True
+        )
+        found.add(done.stdout)
+    assert len(found) == 1
+
+
+@pytest.mark.parametrize("method", ["literal", None, "Paper"])
+def test_an_unknown_method_is_refused(pebbles, method):
+    with pytest.raises(InvalidInput, match="^method"):
+        texrs.design(pebbles, 64, method=method)

@@ -1,0 +1,94 @@
+"""Looking up: exact at samples, in range between them, the same for every dtype."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from scipy.ndimage import map_coordinates
+
+import texrs
+from texrs.errors import InvalidInput
+from texrs.kernels.gather import gather
+
+DTYPES = [
+    np.bool_,
+    np.uint8,
+    np.int8,
+    np.uint16,
+    np.int16,
+    np.uint32,
+    np.int32,
+    np.float16,
+    np.float32,
+    np.float64,
+]
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("channels", [None, 1, 2, 3, 4, 7])
+@pytest.mark.parametrize("interpolation", ["nearest", "linear", "cubic"])
+def test_whole_coordinates_copy_every_dtype(dtype, channels, interpolation):
+    rng = np.random.default_rng(1)
+    shape = (9, 7) if channels is None else (9, 7, channels)
+    image = (rng.random(shape) * 100).astype(dtype)
+    at = np.stack(np.meshgrid(np.arange(9), np.arange(7), indexing="ij"), axis=-1)[::-1, ::2]
+    out = gather(image, at, interpolation=interpolation)
+    assert out.dtype == image.dtype
+    np.testing.assert_array_equal(out, image[::-1, ::2])
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    hnp.arrays(np.float64, (6, 8), elements=st.floats(-1e3, 1e3)),
+    hnp.arrays(np.float32, (20, 2), elements=st.floats(-3, 10, width=32)),
+    st.sampled_from(["nearest", "grid-wrap"]),
+)
+def test_linear_agrees_with_scipy(image, points, mode):
+    expected = map_coordinates(image, points.T.astype(np.float64), order=1, mode=mode)
+    got = gather(image, points, wrap=mode == "grid-wrap")
+    np.testing.assert_allclose(got, expected, atol=1e-9)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    hnp.arrays(np.float32, (5, 6), elements=st.floats(0, 4, width=32)),
+    hnp.arrays(np.float32, (20, 2), elements=st.floats(-2, 8, width=32)),
+)
+def test_cubic_stays_in_the_range_of_the_data(image, points):
+    out = gather(image, points, interpolation="cubic")
+    assert out.min() >= image.min()
+    assert out.max() <= image.max()
+
+
+def test_volumes_and_several_exemplars():
+    a = np.arange(24, dtype=np.uint16).reshape(2, 3, 4)
+    b = a[:, ::-1] + np.uint16(100)
+    at = np.array([[1, 2, 3], [0, 0, 0]])
+    np.testing.assert_array_equal(gather([a, b], at, np.array([0, 1])), [a[1, 2, 3], b[0, 0, 0]])
+
+
+@pytest.mark.parametrize("threads", [1, 2, 7])
+def test_threads_do_not_matter(threads):
+    rng = np.random.default_rng(2)
+    image, at = rng.random((64, 64, 3)).astype(np.float32), rng.random((90, 70, 2)) * 63
+    expected = gather(image, at, interpolation="cubic")
+    with texrs.threads(threads):
+        assert gather(image, at, interpolation="cubic").tobytes() == expected.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "names"),
+    [
+        (([np.zeros((4, 4))], np.array([[np.nan, 0.0]])), "coordinates"),
+        (([np.zeros((4, 4))], np.zeros((3, 5))), "coordinates"),
+        (([np.zeros((4, 4)), np.zeros((4, 4, 3))], np.zeros((3, 2))), "exemplars"),
+        (([np.zeros((4, 4)), np.zeros((4, 4), np.uint8)], np.zeros((3, 2))), "exemplars"),
+        (([], np.zeros((3, 2))), "exemplars"),
+        (([np.zeros((4, 4))], np.zeros((3, 2)), np.array([0, 1, 0])), "which"),
+        (([np.array([[None]])], np.zeros((3, 2))), "exemplars"),
+    ],
+)
+def test_bad_input_names_the_argument(arguments, names):
+    with pytest.raises(InvalidInput, match=f"^{names}"):
+        gather(*arguments)

@@ -1,0 +1,106 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from reference import poisson as reference
+from texrs._rust import set_threads
+from texrs.errors import InvalidInput
+from texrs.kernels import poisson
+
+
+def problem(seed, shape):
+    rng = np.random.default_rng(seed)
+    return [rng.uniform(-s, s, shape) for s in (128, 40, 40)]
+
+
+BOUNDARY = st.sampled_from(["dirichlet", "periodic", "free"])
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    shape=st.tuples(st.integers(1, 24), st.integers(1, 24)),
+    boundary=st.tuples(BOUNDARY, BOUNDARY),
+    screening=st.sampled_from([1e-3, 0.01, 1.0]),
+    masked=st.booleans(),
+    seed=st.integers(0, 2**32),
+)
+def test_agrees_with_the_sparse_direct_solution(shape, boundary, screening, masked, seed):
+    data = problem(seed, shape)
+    mask = np.random.default_rng(seed).random(shape) < 0.8 if masked else None
+    options = {"screening": screening, "boundary": boundary, "mask": mask}
+    expected = reference.solve(*data, **options)
+    np.testing.assert_allclose(poisson.solve(*data, **options), expected, atol=0.02)
+
+
+@pytest.mark.parametrize("masked", [False, True])
+def test_without_screening_within_a_twentieth_of_a_grey_level(masked):
+    data = problem(3, (97, 110))
+    y, x = np.mgrid[:97, :110]
+    mask = np.hypot(y - 45, x - 60) < 40 if masked else None
+    options = {"screening": 0.0, "boundary": ("dirichlet", "dirichlet"), "mask": mask}
+    expected = reference.solve(*data, **options)
+    np.testing.assert_allclose(poisson.solve(*data, **options), expected, atol=0.05)
+
+
+@pytest.mark.parametrize("masked", [False, True])
+def test_the_same_for_any_number_of_threads(masked):
+    data = problem(4, (150, 131, 3))
+    mask = np.random.default_rng(4).random((150, 131)) < 0.9 if masked else None
+    results = []
+    for threads in (1, 2, 7):
+        before = set_threads(threads)
+        results.append(poisson.solve(*data, mask=mask).tobytes())
+        set_threads(before)
+    assert results[0] == results[1] == results[2]
+
+
+def test_the_mean_is_kept_where_nothing_is_fixed():
+    image, rows, columns = problem(5, (40, 41))
+    for boundary in ("free", "periodic"):
+        solved = poisson.solve(image, rows, columns, screening=0, boundary=boundary)
+        assert abs(solved.mean() - image.mean()) < 1e-2
+
+
+@pytest.mark.parametrize("dtype", [bool, np.uint8, np.uint16, np.int16, np.float32, np.float64])
+@pytest.mark.parametrize("mixed", [False, True])
+def test_blend_touches_nothing_outside_the_mask(dtype, mixed):
+    rng = np.random.default_rng(6)
+    source, target = (rng.integers(0, 100, (30, 33, 2)).astype(dtype) for _ in range(2))
+    mask = rng.random((30, 33)) < 0.5
+    result = poisson.blend(source, target, mask, mixed=mixed)
+    assert result.dtype == target.dtype
+    assert (result[~mask] == target[~mask]).all()
+    assert not (result == target).all()
+
+
+def test_blending_an_image_into_itself_changes_nothing():
+    image = np.random.default_rng(7).integers(0, 256, (40, 50, 3), dtype=np.uint8)
+    mask = np.zeros((40, 50), bool)
+    mask[10:30, 5:45] = True
+    for wrap in (False, (True, False)):
+        assert (poisson.blend(image, image, mask, wrap=wrap) == image).all()
+    assert (poisson.blend(image, image, np.ones((40, 50), bool)) == image).all()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"screening": -1}, "screening"),
+        ({"screening": np.nan}, "screening"),
+        ({"boundary": "mirror"}, "boundary"),
+        ({"boundary": ("free",)}, "boundary"),
+        ({"mask": np.ones((3, 3), bool)}, "mask"),
+        ({"gradient_rows": np.zeros((3, 3))}, "gradient_rows: needs the image's shape"),
+        ({"image": np.full((8, 8), np.nan)}, "image"),
+        ({"image": np.full((8, 8), 1e300)}, "image: values up to"),
+        ({"gradient_rows": np.eye(8) * 3e38}, "too large"),
+    ],
+)
+def test_refuses_with_a_reason(options, message):
+    zeros = np.zeros((8, 8))
+    arguments = {"image": zeros, "gradient_rows": zeros, "gradient_columns": zeros} | options
+    with pytest.raises(InvalidInput, match=message):
+        poisson.solve(**arguments)
+    with pytest.raises(InvalidInput, match="source: needs the target's shape"):
+        poisson.blend(zeros, zeros[1:], zeros > 0)

@@ -1,0 +1,132 @@
+"""Source maps: looked up, composed, measured, saved."""
+
+import numpy as np
+import pytest
+
+from texrs import SourceMap
+from texrs.errors import FileError, InvalidInput
+
+
+def turned(shape, degrees):
+    """Give a map that turns an exemplar of ``shape`` about its middle, with its frame."""
+    angle = np.radians(degrees)
+    frame = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    middle = (np.array(shape) - 1) / 2
+    start = SourceMap.identity(shape)
+    coordinates = middle + (start.coordinates - middle) @ frame.T
+    return SourceMap(
+        coordinates.astype(np.float32),
+        start.exemplar,
+        start.label,
+        frame[None].astype(np.float32),
+        (shape,),
+    )
+
+
+def test_identity_renders_the_exemplar():
+    image = np.random.default_rng(0).random((8, 9, 4)).astype(np.float16)
+    np.testing.assert_array_equal(SourceMap.identity((8, 9)).render(image), image)
+
+
+def test_composition_of_turns_is_the_turn_by_the_sum():
+    a, b = turned((33, 33), 20), turned((33, 33), 40)
+    both = a.compose(b)
+    inner = np.s_[10:23, 10:23]
+    np.testing.assert_allclose(both.coordinates[inner], turned((33, 33), 60).coordinates[inner], atol=1e-4)
+    np.testing.assert_allclose(both.frames()[0, 0], turned((33, 33), 60).frames()[0, 0], atol=1e-6)
+
+
+def test_composition_through_several_pictures():
+    a, b = SourceMap.identity((6, 6)), turned((6, 6), 180)
+    rng = np.random.default_rng(3)
+    which = rng.integers(0, 2, (10, 12)).astype(np.uint16)
+    coordinates = rng.integers(0, 6, (10, 12, 2)).astype(np.float32)
+    outer = SourceMap(coordinates, which, which.astype(np.uint32), None, ((6, 6), (6, 6)))
+    image = rng.integers(0, 255, (6, 6, 3)).astype(np.uint8)
+    two_steps = outer.render([a.render(image), b.render(image)])
+    composed = outer.compose([a, b])
+    np.testing.assert_array_equal(composed.render(image, interpolation="nearest"), two_steps)
+    np.testing.assert_array_equal(composed.frames()[which == 1], b.frames()[0, 0][None].repeat((which == 1).sum(), 0))
+    dense = SourceMap(b.coordinates, b.exemplar, b.label, b.frames().copy(), b.shapes)
+    np.testing.assert_allclose(outer.compose([a, dense]).frames(), composed.frames())
+
+
+def test_reuse_counts_pieces():
+    start = SourceMap.identity((10, 10))
+    reuse = start.reuse()
+    assert (reuse.verbatim, reuse.largest, reuse.regions) == (1.0, 1.0, 1)
+    coordinates = start.coordinates.copy()
+    coordinates[:, 5:] = np.roll(coordinates[:, 5:], 3, axis=0)
+    two = SourceMap(coordinates, start.exemplar, start.label, None, start.shapes)
+    assert two.reuse().regions == 3
+    assert two.reuse().largest == 0.5
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+def test_normals_turn_with_the_frame(dtype):
+    # A plane that falls to the right: x of the normal is positive. Turned by 90 degrees it falls up or down.
+    normal = np.zeros((21, 21, 3))
+    normal[...] = np.array([0.6, 0.0, 0.8])
+    encoded = normal if dtype == np.float32 else np.rint((normal + 1) / 2 * np.iinfo(dtype).max)
+    encoded = encoded.astype(dtype)
+    if dtype == np.float32:
+        encoded[0, 0] = [-1e-3, 0, 1]  # a negative value says that floats are signed
+    quarter = turned((21, 21), 90)
+    out = quarter.render(encoded, kind="normal")[10, 10].astype(float)
+    out = out if dtype == np.float32 else out / np.iinfo(dtype).max * 2 - 1
+    # The height that these normals belong to, turned by the same map, gives the direction independently.
+    height = quarter.render(np.tile(-0.75 * np.arange(21.0), (21, 1)))
+    slope_row, slope_column = height[11, 10] - height[10, 10], height[10, 11] - height[10, 10]
+    expected = np.array([-slope_column, slope_row, 1]) / np.sqrt(slope_row**2 + slope_column**2 + 1)
+    np.testing.assert_allclose(out, expected, atol=0.01)
+    down = quarter.render(encoded, kind="normal", green="down")[10, 10].astype(float)
+    down = down if dtype == np.float32 else down / np.iinfo(dtype).max * 2 - 1
+    np.testing.assert_allclose(down * [1, -1, 1], expected, atol=0.01)
+
+
+def test_saved_and_loaded_it_is_the_same(tmp_path):
+    for number, source in enumerate([SourceMap.identity((5, 6)), turned((7, 7), 30)]):
+        path = tmp_path / f"{number}.npz"
+        source.save(path)
+        again = SourceMap.load(path)
+        for name in ("coordinates", "exemplar", "label"):
+            np.testing.assert_array_equal(getattr(again, name), getattr(source, name))
+        assert again.shapes == source.shapes
+        assert (again.frame is None) == (source.frame is None)
+        assert [p.name for p in tmp_path.iterdir()].count(path.name) == 1
+
+
+def test_files_that_are_not_source_maps(tmp_path):
+    bad = tmp_path / "bad.npz"
+    for content in (b"", b"text", b"PK\x03\x04 truncated"):
+        bad.write_bytes(content)
+        with pytest.raises(FileError, match="bad.npz"):
+            SourceMap.load(bad)
+    np.savez(bad, other=np.zeros(3))
+    with pytest.raises(FileError, match="not a source map"):
+        SourceMap.load(bad)
+    np.savez(bad, texrs_source_map=np.array([{}], dtype=object))
+    with pytest.raises(FileError, match="bad.npz"):
+        SourceMap.load(bad)
+    with pytest.raises(FileError, match="missing"):
+        SourceMap.load(tmp_path / "missing.npz")
+    with pytest.raises(FileError):
+        SourceMap.load(tmp_path)
+
+
+def test_parts_that_disagree_are_refused():
+    start = SourceMap.identity((4, 4))
+    with pytest.raises(InvalidInput, match="^label"):
+        SourceMap(start.coordinates, start.exemplar, start.label[:3], None, start.shapes)
+    with pytest.raises(InvalidInput, match="^frame"):
+        SourceMap(
+            start.coordinates,
+            start.exemplar,
+            start.label + np.uint32(1),
+            np.zeros((1, 2, 2), np.float32),
+            start.shapes,
+        )
+    with pytest.raises(InvalidInput, match="^exemplars"):
+        start.render(np.zeros((5, 4)))
+    with pytest.raises(InvalidInput, match="^exemplars"):
+        start.render([np.zeros((4, 4))] * 2)
