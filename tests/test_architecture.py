@@ -13,12 +13,13 @@ PACKAGE = ROOT / "python" / "texrs"
 FOUNDATION = {"errors", "_typing", "_arrays", "threads", "samples"}
 KERNELS = {"kernels"}
 NOUNS = {
-    "source_map": {"io"},
+    "source_map": {"io", "_pixels"},
+    "_pixels": {"source_map"},
     "io": set(),
     "report": {"source_map", "io"},
     "segment": set(),
     "deform": set(),
-    "quilt": {"source_map"},
+    "quilt": {"source_map", "_pixels"},
     "blend": {"source_map"},
     "cyclic": {"source_map", "report"},
     "completion": {"source_map", "report", "deform"},

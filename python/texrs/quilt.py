@@ -1,47 +1,73 @@
 """Patches of pictures stitched into a texture of any size.
 
-Raster order and minimum cuts after Efros and Freeman, "Image quilting", SIGGRAPH 2001, and Kwatra et al., "Graphcut
-textures",
-SIGGRAPH 2003. On a cyclic axis the patches lie on a ring, so the last one is chosen and cut to fit both its neighbours.
+Raster order after Efros and Freeman, "Image quilting", SIGGRAPH 2001: each patch is cut into what lies there along one
+least seam for each neighbour. On a cyclic axis the patches lie on a ring, so the last one is chosen and cut to fit both
+its neighbours.
+
+Departures, with their reasons:
+
+- Each seam is the exact minimum cut of its strip, which may turn back, and not a row-by-row recurrence.
+- A patch is charged for showing what others show already. A charge that multiplies the match would let the exact
+  continuation of a neighbour, whose match costs nothing, win for ever.
+- A patch that shows the mirror image of what it overlaps is refused: along the axis of a mirror the two meet without a
+  seam, and the eye sees nothing else.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from itertools import islice, pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._pixels import Pixels
 from texrs._typing import Bools, Floats
 from texrs.kernels.noise import uniform
 from texrs.kernels.patch_search import Match, PatchIndex
-from texrs.kernels.seam import cut
+from texrs.kernels.seam import cut_strip
 from texrs.source_map import SourceMap
 
-__all__ = ["quilt"]
+__all__ = ["Picture", "quilt"]
 
-POOL, CANDIDATES = 40, 5
-"""Matches that are looked at for how often their content was used; those of them that are cut in."""
-RATIO = 4.0
-"""How much worse than the best match the worst in the pool may be."""
-REPETITION = 4.0
-"""How much dearer a patch is that shows what all others show."""
+POOL, CANDIDATES = 48, 5
+"""Matches that are looked at for what they repeat; those of them that are cut in."""
+REPETITION = 1.0
+"""Charge for showing what all other patches show, in units of a typical match."""
 STRIDE = 4
-"""Use is counted on every fourth row and column."""
+"""Use is counted, and mirrors are looked for, on every fourth row and column."""
+CELL = 8
+"""Use is counted in cells of so many pixels a side."""
+MIRRORED, NEAR = 0.02, 6.0
+"""Share of its overlap on which a patch may show the mirror image of what lies there, within so many pixels."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """What patches are taken from: a picture made from one exemplar."""
+
+    colours: Floats
+    """(h, w, C)"""
+    source: SourceMap
+    penalty: Floats
+    """(h, w): how much dearer a seam is at a pixel; its cost is multiplied by one more than this."""
+
+    @property
+    def kind(self) -> int:
+        """The exemplar it was made from."""
+        return int(self.source.exemplar[0, 0])
 
 
 def quilt(
-    pictures: Sequence[Floats],
+    pictures: Sequence[Picture],
     size: tuple[int, int],
     *,
     patch: int,
     overlap: int,
     wrap: tuple[bool, bool],
-    penalties: Sequence[Floats],
-    origins: Sequence[NDArray[np.int64]],
-    kinds: Sequence[int],
     shares: NDArray[np.float64],
     seed: int,
     progress: Callable[[float], object],
@@ -50,232 +76,248 @@ def quilt(
 
     Parameters
     ----------
-    pictures : sequence of (h, w, C) float32
+    pictures : sequence of Picture
         What patches are taken from.
     size : (rows, columns)
         Size of the texture.
     patch, overlap : int
-        Side of a patch and overlap of neighbours, in pixels; the overlap grows so that patches divide the texture
-        evenly.
+        Side of a patch and overlap of neighbours, in pixels, the overlap at most half the patch; it grows so that
+        patches divide the texture evenly.
     wrap : (bool, bool)
         Axes along which the texture is cyclic.
-    penalties : sequence of (h, w) float32
-        For each picture, how much dearer a seam is at a pixel: its cost is multiplied by one more than this.
-    origins : sequence of (h, w) int64
-        Which cell of an exemplar each pixel of each picture shows, as a number from 0: patches that show the same cells
-        are avoided.
-    kinds : sequence of int
-        The kind of each picture, from 0.
-    shares : (kinds,) or (rows, columns, kinds) float64
-        Share of the texture that each kind gets, on the whole or place by place.
+    shares : (exemplars,) or (rows, columns, exemplars) float64
+        Share of the texture that each exemplar gets, on the whole or place by place.
     seed : int
-        Chooses the first patch, and the kinds.
+        Chooses the first patch, and the exemplars.
     progress : callable
         Called with the share that is done.
 
     Returns
     -------
     SourceMap
-        It looks into the pictures.
+        It looks into the exemplars.
 
     """
-    height, width = (min(p.shape[axis] for p in pictures) for axis in range(2))
-    rows = spans(size[0], height, min(patch, height), overlap, wrap[0])
-    columns = spans(size[1], width, min(patch, width), overlap, wrap[1])
-    shape = (rows[0][1], columns[0][1])
-    members = [[i for i, k in enumerate(kinds) if k == kind] for kind in range(max(kinds) + 1)]
-    indices = [PatchIndex([pictures[i] for i in mine], max_patch=shape) for mine in members]
-    canvas = Quilt.empty(size, pictures[0].shape[2], shape, wrap)
-    usage = Usage(origins, shape)
-    places = [(r, c) for r, _ in rows for c, _ in columns]
-    wanted = deal(places, shape, size, shares, seed)
-    for number, at in enumerate(places):
-        progress(number / len(places))
+    sides = [min(p.colours.shape[axis] for p in pictures) for axis in range(2)]
+    rows, columns = (spans(size[a], sides[a], min(patch, sides[a]), overlap, wrap[a]) for a in range(2))
+    shape = (rows[0].extent, columns[0].extent)
+    members = [[i for i, p in enumerate(pictures) if p.kind == kind] for kind in range(shares.shape[-1])]
+    indices = [PatchIndex([pictures[i].colours for i in mine], max_patch=shape) for mine in members]
+    canvas = Quilt(pictures, size)
+    windows = [Window(r, c) for r in rows for c in columns]
+    wanted = deal(windows, size, shares, seed)
+    for number, window in enumerate(windows):
+        progress(number / len(windows))
         mine = members[wanted[number]]
         if number == 0:
             which = mine[int(uniform(seed, 0, 0, 0, 3) * len(mine))]
-            free = (n - m + 1 for n, m in zip(pictures[which].shape, shape, strict=False))
+            free = [n - m + 1 for n, m in zip(pictures[which].colours.shape, shape, strict=False)]
             row, column = (int(uniform(seed, 1 + axis, 0, 0, 3) * n) for axis, n in enumerate(free))
-            matches = [Match(0.0, which, row, column)]
-        else:
-            window = canvas.window(at)
-            known = canvas.covered[window].astype(np.float32)
-            separation = max(2, min(shape) // 16)
-            found = indices[wanted[number]].best(
-                canvas.colours[window], known, count=POOL, separation=separation, ratio=RATIO
-            )
-            found = [Match(m.cost, mine[m.exemplar], m.row, m.column) for m in found]
-            matches = sorted(found, key=lambda m: m.cost * usage.factor(m))[:CANDIDATES]
-        usage.add(canvas.paste(at, matches, [usage.factor(m) for m in matches], pictures, penalties, number))
+            canvas.paste(window, [Match(0.0, which, row, column)])
+            continue
+        found = indices[wanted[number]].best(
+            canvas.colours(window), window.known(), count=POOL, separation=max(2, min(shape) // 16)
+        )
+        canvas.paste(window, [Match(m.cost, mine[m.exemplar], m.row, m.column) for m in found])
     progress(1.0)
-    shapes = tuple(p.shape[:2] for p in pictures)
-    return SourceMap(canvas.coordinates, canvas.picture, canvas.label, None, shapes)
+    return canvas.source()
 
 
-def deal(
-    places: Sequence[tuple[int, int]],
-    patch: tuple[int, int],
-    size: tuple[int, int],
-    shares: NDArray[np.float64],
-    seed: int,
-) -> list[int]:
-    """Give each patch its kind, so that every kind gets its share.
+# --- where patches lie -----------------------------------------------------------------------------------------------
 
-    Always taking the best match would let one kind win everywhere: it matches itself best.
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """The part of an axis that a patch covers, and its overlaps with patches that lie there already."""
+
+    start: int
+    extent: int
+    before: int
+    """Overlap in pixels at its beginning."""
+    after: int
+    """Overlap at its end: not 0 only for the last one of a ring."""
+
+
+def spans(length: int, side: int, patch: int, overlap: int, wrap: bool) -> list[Span]:
+    """Divide an axis evenly into overlapping patches, none longer than ``side``."""
+    if not wrap and length <= side:
+        return [Span(0, length, 0, 0)]
+    step = max(1, patch - overlap)
+    if wrap:
+        count = max(2, math.ceil(length / step))
+        extent = min(length, side, math.ceil(length / count) + overlap)
+        starts = [length * i // count for i in range(count)]
+    else:
+        count = max(2, math.ceil((length - overlap) / step))
+        extent = patch
+        starts = [(length - patch) * i // (count - 1) for i in range(count)]
+    before = [0] + [a + extent - b for a, b in pairwise(starts)]
+    after = [0] * (count - 1) + [starts[-1] + extent - length]
+    return [Span(*values) for values in zip(starts, [extent] * count, before, after, strict=True)]
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """Where a patch lies."""
+
+    rows: Span
+    columns: Span
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the patch."""
+        return self.rows.extent, self.columns.extent
+
+    def bands(self) -> list[tuple[int, bool, tuple[slice, slice]]]:
+        """Give the overlaps: the axis that the seam crosses, whether the patch lies after it, and where it is."""
+        whole = slice(None)
+        found = []
+        for axis, span in enumerate((self.rows, self.columns)):
+            for width, part, after in (
+                (span.before, slice(0, span.before), True),
+                (span.after, slice(span.extent - span.after, None), False),
+            ):
+                if width:
+                    found.append((axis, after, (part, whole) if axis == 0 else (whole, part)))
+        return found
+
+    def known(self) -> Bools:
+        """Mark what other patches cover."""
+        known = np.zeros(self.shape, bool)
+        for _, _, band in self.bands():
+            known[band] = True
+        return known
+
+    def on(self, size: tuple[int, int]) -> Any:
+        """Give the index of its pixels in a texture of this size, around the edges."""
+        ends = [s.start + s.extent <= n for s, n in zip((self.rows, self.columns), size, strict=True)]
+        if all(ends):
+            return tuple(slice(s.start, s.start + s.extent) for s in (self.rows, self.columns))
+        places = ((s.start + np.arange(s.extent)) % n for s, n in zip((self.rows, self.columns), size, strict=True))
+        return np.ix_(*places)
+
+
+def deal(windows: Sequence[Window], size: tuple[int, int], shares: NDArray[np.float64], seed: int) -> list[int]:
+    """Give each patch its exemplar, so that every one gets its share.
+
+    Always taking the best match would let one win everywhere: it matches itself best.
     """
     count = shares.shape[-1]
-    order = sorted(range(len(places)), key=lambda i: uniform(seed, i, 0, 0, 5))
-    due, kinds = np.zeros(count), [0] * len(places)
+    order = sorted(range(len(windows)), key=lambda i: uniform(seed, i, 0, 0, 5))
+    due, kinds = np.zeros(count), [0] * len(windows)
     for i in order:
         here = shares
         if shares.ndim == 3:
             # What the middle of the patch asks for: its borders are shared with its neighbours.
-            middle = tuple((start + n // 2) % m for start, n, m in zip(places[i], patch, size, strict=True))
-            here = shares[middle]
+            spans_of = (windows[i].rows, windows[i].columns)
+            here = shares[tuple((s.start + s.extent // 2) % n for s, n in zip(spans_of, size, strict=True))]
         due += here
-        due_here = np.where(here > 0, due, -np.inf)
-        kinds[i] = int(np.argmax(due_here))
+        kinds[i] = int(np.argmax(np.where(here > 0, due, -np.inf)))
         due[kinds[i]] -= 1
     return kinds
 
 
-@dataclass(slots=True, eq=False)
-class Usage:
-    """How often each place of the exemplar has been copied, so that no part of it stands out by repetition."""
-
-    origins: Sequence[NDArray[np.int64]]
-    patch: tuple[int, int]
-    count: NDArray[np.float64] = field(init=False)
-    pastes: int = 0
-
-    def __post_init__(self) -> None:
-        self.count = np.zeros(max(int(o.max()) for o in self.origins) + 1)
-
-    def shown(self, match: Match) -> NDArray[np.int64]:
-        """Give the places that a match shows, thinned out."""
-        rows = slice(match.row, match.row + self.patch[0], STRIDE)
-        return self.origins[match.exemplar][rows, match.column : match.column + self.patch[1] : STRIDE].ravel()
-
-    def factor(self, match: Match) -> float:
-        """Give how much dearer a match is because of what it repeats: 1 where nothing, 2 where what all others show."""
-        if not self.pastes:
-            return 1.0
-        return 1.0 + float(self.count[self.shown(match)].mean()) / self.pastes * REPETITION
-
-    def add(self, match: Match) -> None:
-        """Count a match."""
-        shown = self.shown(match)
-        self.count[np.unique(shown)] += 1
-        self.pastes += 1
+# --- the texture in the making ---------------------------------------------------------------------------------------
 
 
-def spans(length: int, side: int, patch: int, overlap: int, wrap: bool) -> list[tuple[int, int]]:
-    """Divide an axis evenly into overlapping patches: the start and the extent of each."""
-    step = max(1, patch - overlap)
-    if not wrap and length <= side:
-        return [(0, length)]
-    if wrap:
-        count = max(2, math.ceil(length / step))
-        extent = min(length, side, math.ceil(length / count) + overlap)
-        return [(length * i // count, extent) for i in range(count)]
-    count = max(2, math.ceil((length - overlap) / step))
-    return [((length - patch) * i // (count - 1), patch) for i in range(count)]
-
-
-@dataclass(slots=True, eq=False)
 class Quilt:
-    """The texture in the making."""
+    """The texture in the making.
 
-    colours: Floats
-    coordinates: Floats
-    picture: NDArray[np.uint16]
-    label: NDArray[np.uint32]
-    penalty: Floats
-    covered: Bools
-    patch: tuple[int, int]
-    wrap: tuple[bool, bool]
-    offsets: Floats
+    The pixels of all pictures stand in one row; what a texture shows at a pixel is a place in that row.
+    """
 
-    @classmethod
-    def empty(cls, size: tuple[int, int], channels: int, patch: tuple[int, int], wrap: tuple[bool, bool]) -> Quilt:
-        """Start with nothing covered."""
-        return cls(
-            np.zeros((*size, channels), np.float32),
-            np.zeros((*size, 2), np.float32),
-            np.zeros(size, np.uint16),
-            np.zeros(size, np.uint32),
-            np.zeros(size, np.float32),
-            np.zeros(size, bool),
-            patch,
-            wrap,
-            np.stack(
-                np.meshgrid(*(np.arange(n, dtype=np.float32) for n in patch), indexing="ij"),
-                axis=-1,
-            ),
+    def __init__(self, pictures: Sequence[Picture], size: tuple[int, int]) -> None:
+        channels = pictures[0].colours.shape[2]
+        self.pictures = pictures
+        self.size = size
+        self.place = np.zeros(size, np.uint32)
+        self.label = np.zeros(size, np.uint32)
+        self.pastes = 0
+        self.pixels = Pixels.of([p.source for p in pictures])
+        self.all_colours = np.concatenate([p.colours.reshape(-1, channels) for p in pictures])
+        self.all_penalties = np.concatenate([p.penalty.ravel() for p in pictures])
+        self.all_hands = np.concatenate([np.linalg.det(p.source.frames()).ravel() > 0 for p in pictures])
+        self.cells = [cells(p.source) for p in pictures]
+        self.used = np.zeros(max(int(c.max()) for c in self.cells) + 1)
+
+    def colours(self, window: Window) -> Floats:
+        """Give what the texture shows in a window; anything where there is nothing yet."""
+        colours: Floats = self.all_colours[self.place[window.on(self.size)]]
+        return colours
+
+    def box(self, match: Match, window: Window) -> tuple[slice, slice]:
+        """Give the part of a picture that a match copies."""
+        return slice(match.row, match.row + window.rows.extent), slice(
+            match.column, match.column + window.columns.extent
         )
 
-    def window(self, at: tuple[int, int]) -> tuple[NDArray[np.intp], ...]:
-        """Give the pixels of the patch that starts at ``at``, around the edges."""
-        size = self.covered.shape
-        return np.ix_(*((start + np.arange(n)) % m for start, n, m in zip(at, self.patch, size, strict=True)))
+    def places(self, match: Match, window: Window) -> NDArray[np.uint32]:
+        """Give the places in the row that a match copies."""
+        width = self.pictures[match.exemplar].penalty.shape[1]
+        corner = int(self.pixels.first[match.exemplar]) + match.row * width + match.column
+        rows, columns = np.arange(window.rows.extent), np.arange(window.columns.extent)
+        return np.asarray(corner + rows[:, np.newaxis] * width + columns, np.uint32)
 
-    def paste(
-        self,
-        at: tuple[int, int],
-        matches: Sequence[Match],
-        factors: Sequence[float],
-        pictures: Sequence[Floats],
-        penalties: Sequence[Floats],
-        label: int,
-    ) -> Match:
-        """Cut each match into what is covered, keep the one whose cut is the cheapest, and return it."""
-        window = self.window(at)
-        known, old = self.covered[window], self.colours[window]
-        everywhere = np.ones(self.patch, bool)
-        taken, chosen, least = everywhere, matches[0], math.inf
-        if known.any():
-            rim = known & self.rim(at) & ~beside(~known)
-            for match, factor in zip(matches, factors, strict=True):
-                there = self.box(match)
-                penalty = self.penalty[window] + penalties[match.exemplar][there]
-                seam = cut(
-                    old,
-                    pictures[match.exemplar][there],
-                    known,
-                    everywhere,
-                    core_a=rim,
-                    penalty=penalty,
-                )
-                if seam.value * factor < least:
-                    taken, chosen, least = seam.mask, match, seam.value * factor
-        there = self.box(chosen)
-        self.colours[window] = np.where(taken[..., np.newaxis], pictures[chosen.exemplar][there], old)
-        origin = np.array([chosen.row, chosen.column], np.float32)
-        self.coordinates[window] = np.where(taken[..., np.newaxis], self.offsets + origin, self.coordinates[window])
-        self.picture[window] = np.where(taken, chosen.exemplar, self.picture[window])
-        self.label[window] = np.where(taken, label, self.label[window])
-        self.penalty[window] = np.where(taken, penalties[chosen.exemplar][there], self.penalty[window])
-        self.covered[window] = True
-        return chosen
+    def paste(self, window: Window, matches: Sequence[Match]) -> None:
+        """Cut the most promising matches into what is there, and keep the one that shows and repeats the least."""
+        at = window.on(self.size)
+        old = self.place[at]
+        chosen, mask = matches[0], np.ones(window.shape, bool)
+        if self.pastes:
+            usual = float(np.median([m.cost for m in matches])) or 1.0
+            charges = {m: REPETITION * self.repeated(m, window) for m in matches}
+            order = sorted(matches, key=lambda m: m.cost / usual + charges[m])
+            best = list(islice((m for m in order if not self.mirrored(window, old, m)), CANDIDATES)) or order[:1]
+            seams = [self.cut(window, old, m) for m in best]
+            usual = float(np.median([value for value, _ in seams])) or 1.0
+            k = min(range(len(best)), key=lambda k: seams[k][0] / usual + charges[best[k]])
+            chosen, mask = best[k], seams[k][1]
+        self.place[at] = np.where(mask, self.places(chosen, window), old)
+        self.label[at] = np.where(mask, np.uint32(self.pastes), self.label[at])
+        self.used[np.unique(self.shown(chosen, window))] += 1
+        self.pastes += 1
 
-    def box(self, match: Match) -> tuple[slice, slice]:
-        """Give the part of a picture that a match copies."""
-        return slice(match.row, match.row + self.patch[0]), slice(match.column, match.column + self.patch[1])
+    def cut(self, window: Window, old: NDArray[np.uint32], match: Match) -> tuple[float, Bools]:
+        """Cut a match in along one seam for each overlap: what the seams cost, and where it is taken."""
+        picture, box = self.pictures[match.exemplar], self.box(match, window)
+        fresh, penalty = picture.colours[box], picture.penalty[box]
+        taken, value = np.ones(window.shape, bool), 0.0
+        for axis, after, band in window.bands():
+            there = self.all_colours[old[band]]
+            dear = penalty[band] + self.all_penalties[old[band]]
+            sides = (there, fresh[band]) if after else (fresh[band], there)
+            seam = cut_strip(*sides, axis=axis, penalty=dear)
+            taken[band] &= seam.mask == after
+            value += seam.value
+        return value, taken
 
-    def rim(self, at: tuple[int, int]) -> Bools:
-        """Mark the rim of a patch, but not where it is the edge of the texture: what is there stays."""
-        rim = np.zeros(self.patch, bool)
-        for axis, start in enumerate(at):
-            lines = np.moveaxis(rim, axis, 0)
-            if self.wrap[axis] or start > 0:
-                lines[0] = True
-            if self.wrap[axis] or start + self.patch[axis] < self.covered.shape[axis]:
-                lines[-1] = True
-        return rim
+    def mirrored(self, window: Window, old: NDArray[np.uint32], match: Match) -> bool:
+        """Tell whether a match shows the mirror image of what it overlaps."""
+        known = window.known()[::STRIDE, ::STRIDE]
+        there = old[::STRIDE, ::STRIDE][known]
+        here = self.places(match, window)[::STRIDE, ::STRIDE][known]
+        near = np.abs(self.pixels.coordinates[here] - self.pixels.coordinates[there]).max(axis=-1) <= NEAR
+        near &= self.pixels.exemplar[here] == self.pixels.exemplar[there]
+        near &= self.all_hands[here] != self.all_hands[there]
+        return bool(near.mean() > MIRRORED)
+
+    def shown(self, match: Match, window: Window) -> NDArray[np.int64]:
+        """Give the cells of the exemplar that a match shows, thinned out."""
+        return self.cells[match.exemplar][self.box(match, window)][::STRIDE, ::STRIDE].ravel()
+
+    def repeated(self, match: Match, window: Window) -> float:
+        """Give how much of a match others show: 0 nothing, 1 what they all do."""
+        return float(self.used[self.shown(match, window)].mean()) / self.pastes
+
+    def source(self) -> SourceMap:
+        """Give the map into the exemplars."""
+        return SourceMap.pick([p.source for p in self.pictures], self.place, self.label)
 
 
-def beside(mask: Bools) -> Bools:
-    """Mark the pixels that share a side with a marked one."""
-    padded = np.pad(mask, 1)
-    result: Bools = padded[:-2, 1:-1] | padded[2:, 1:-1] | padded[1:-1, :-2] | padded[1:-1, 2:]
-    return result
+def cells(source: SourceMap) -> NDArray[np.int64]:
+    """Give the number of the cell of the exemplars that each pixel shows."""
+    which = int(source.exemplar[0, 0])
+    first = sum((h // CELL + 1) * (w // CELL + 1) for h, w in source.shapes[:which])
+    cell = np.clip(source.coordinates, 0, np.array(source.shapes[which]) - 1).astype(np.int64) // CELL
+    numbers: NDArray[np.int64] = first + cell[..., 0] * (source.shapes[which][1] // CELL + 1) + cell[..., 1]
+    return numbers

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_image
+from texrs._pixels import Pixels, bands, dense
 from texrs._typing import Array, Bools, Interpolation, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.kernels.gather import gather
@@ -221,53 +222,71 @@ class SourceMap:
             raise InvalidInput(f"inner: needs outputs of sizes {self.shapes}, got {[m.shape for m in maps]}")
         if any(m.shapes != maps[0].shapes for m in maps):
             raise InvalidInput("inner: all maps must look into the same exemplars")
-        exemplar = np.zeros(self.shape, np.uint16)
-        coordinates = np.zeros((*self.shape, self.axes), np.float32)
-        inner_label = np.zeros(self.shape, np.uint64)
-        plain = self.frame is None and all(m.frame is None for m in maps)
-        dense = not all(f is None or f.ndim == 3 for f in (self.frame, *(m.frame for m in maps)))
-        frames = self.frames() if dense else None
-        composed = np.empty(frames.shape, np.float32) if frames is not None else None
-        tables: list[NDArray[np.float32]] = []
-        first_label = 0
-        for number, picture in enumerate(maps):
-            of = np.nonzero(self.exemplar == number)
-            looked = self.coordinates[of]
-            near = np.clip(np.floor(looked + np.float32(0.5)).astype(np.int64), 0, np.array(picture.shape) - 1)
-            at = tuple(np.moveaxis(near, -1, 0))
-            rest = looked - near.astype(np.float32)
-            coordinates[of] = picture.coordinates[at]
-            if rest.any():
-                coordinates[of] += np.einsum("...ij,...j->...i", picture.frames()[at], rest)
-            exemplar[of] = picture.exemplar[at]
-            inner_label[of] = picture.label[at].astype(np.uint64) + np.uint64(first_label)
-            if composed is not None and frames is not None:
-                composed[of] = picture.frames()[at] @ frames[of]
-            labels = int(picture.label.max()) + 1 if picture.label.size else 0
-            eye = np.broadcast_to(np.eye(self.axes, dtype=np.float32), (labels, self.axes, self.axes))
-            if picture.frame is not None and picture.frame.ndim == 3:
-                tables.append(picture.frame[:labels])
-            else:
-                tables.append(eye)
-            first_label += labels
-        keys, label = np.unique(
-            (self.label.astype(np.uint64) << np.uint64(32) | inner_label).ravel(),
-            return_inverse=True,
-        )
-        if not plain and composed is None:
-            outer_of, inner_of = (
-                (keys >> np.uint64(32)).astype(np.int64),
-                (keys & np.uint64(2**32 - 1)).astype(np.int64),
-            )
-            table = np.concatenate(tables)[inner_of]
-            composed = table if self.frame is None else (table @ self.frame[outer_of]).astype(np.float32)
-        return SourceMap(
-            coordinates,
-            exemplar,
-            label.reshape(self.shape).astype(np.uint32),
-            composed,
-            maps[0].shapes,
-        )
+        inners = Pixels.of(maps)
+        place = np.empty(self.shape, np.uint32 if inners.count < 2**32 else np.uint64)
+        rest = np.zeros_like(self.coordinates)
+        for band in bands(self.shape):
+            near = np.floor(self.coordinates[band] + np.float32(0.5)).astype(np.int64)
+            place[band] = inners.places(near, self.exemplar[band])
+            rest[band] = self.coordinates[band] - near.astype(np.float32)
+        return self._picked(inners, place, self.label, self.frame, rest if rest.any() else None, maps[0].shapes)
+
+    @classmethod
+    def pick(
+        cls, maps: Sequence[SourceMap], place: NDArray[np.unsignedinteger], label: NDArray[np.uint32]
+    ) -> SourceMap:
+        """Give the map of a picture that is put together from single pixels of pictures.
+
+        Parameters
+        ----------
+        maps : sequence of SourceMap
+            Those of the pictures; they look into the same exemplars.
+        place : (rows, columns) of unsigned int
+            Which pixel: counted row by row, through one picture after the other.
+        label : (rows, columns) uint32
+            Which patch: pixels of two patches get different labels, also where they are neighbours in a picture.
+
+        Returns
+        -------
+        SourceMap
+            It looks into the exemplars.
+
+        """
+        return cls._picked(Pixels.of(maps), place, label, None, None, maps[0].shapes)
+
+    @classmethod
+    def _picked(
+        cls,
+        inners: Pixels,
+        place: NDArray[np.unsignedinteger],
+        outer: NDArray[np.uint32],
+        frame: NDArray[np.float32] | None,
+        rest: NDArray[np.float32] | None,
+        shapes: tuple[tuple[int, ...], ...],
+    ) -> SourceMap:
+        """Put pixels together: S(p) = inner(q) + J_inner rest, J = J_inner frame."""
+        axes = place.ndim
+        exemplar = np.empty(place.shape, np.uint16)
+        coordinates = np.empty((*place.shape, axes), np.float32)
+        key = np.empty(place.shape, np.uint64)
+        each = inners.framed or (frame is not None and frame.ndim > 3)
+        frames = np.empty((*place.shape, axes, axes), np.float32) if each else None
+        for band in bands(place.shape):
+            at = place[band]
+            coordinates[band], exemplar[band] = inners.coordinates[at], inners.exemplar[at]
+            if rest is not None:
+                coordinates[band] += np.einsum("...ij,...j->...i", inners.frames(at), rest[band])
+            key[band] = outer[band].astype(np.uint64) * np.uint64(inners.labels) + inners.label[at]
+            if frames is not None:
+                frames[band] = inners.frames(at)
+                if frame is not None:
+                    frames[band] @= frame[band] if frame.ndim > 3 else frame[outer[band]]
+        keys, label = dense(key)
+        if frames is None and (frame is not None or inners.table is not None):
+            outer_of, inner_of = np.divmod(keys, np.uint64(max(1, inners.labels)))
+            frames = inners.frames_of(inner_of)
+            frames = np.asarray(frames if frame is None else frames @ frame[outer_of], np.float32)
+        return cls(coordinates, exemplar, label, frames, shapes)
 
     def continues(self, axis: int, *, wrap: bool = False) -> Bools:
         """Tell where a pixel and the next one along ``axis`` come from one piece of the exemplar.

@@ -63,7 +63,7 @@ from texrs.kernels.noise import uniform
 from texrs.kernels.seam import cut
 from texrs.papers._design_literal import Layered, start, stitch_layers
 from texrs.papers._design_source import Source, as_shares, check_moves, check_sources, to_unit_together
-from texrs.quilt import quilt
+from texrs.quilt import Picture, quilt
 from texrs.report import Synthesis
 from texrs.segment import Children, Segmentation, segment
 from texrs.source_map import SourceMap
@@ -430,30 +430,17 @@ def large(
         whole = source.parts.children in ("components", "labels")
         inside.append(WHOLENESS * source.parts.depth(3) if whole else np.zeros(source.guide.shape[:2], np.float32))
     side = min(min(i.shape) for i in inside)
-    kinds = [int(v.source.exemplar[0, 0]) for v in variants]
-    patches = quilt(
-        [v.colours for v in variants],
+    pictures = []
+    for v in variants:
+        penalty = gather(inside[int(v.source.exemplar[0, 0])], v.source.coordinates, interpolation="nearest")
+        pictures.append(Picture(v.colours, v.source, penalty))
+    return quilt(
+        pictures,
         (size[0], size[1]),
         patch=round(PATCH * side) if len(sources) == 1 else round(MIXED_PATCH * side),
         overlap=round(OVERLAP * side),
         wrap=(wrap[0], wrap[1]),
-        penalties=[
-            gather(inside[k], v.source.coordinates, interpolation="nearest")
-            for k, v in zip(kinds, variants, strict=True)
-        ],
-        origins=[cells(v.source) for v in variants],
-        kinds=kinds,
         shares=shares,
         seed=seed,
         progress=progress,
     )
-    return patches.compose([v.source for v in variants])
-
-
-def cells(source: SourceMap) -> NDArray[np.int64]:
-    """Give the number of the 8 x 8 cell of the exemplars that each pixel shows."""
-    which = int(source.exemplar[0, 0])
-    first = sum((h // 8 + 1) * (w // 8 + 1) for h, w in source.shapes[:which])
-    cell = np.clip(source.coordinates, 0, np.array(source.shapes[which]) - 1).astype(np.int64) // 8
-    numbers: NDArray[np.int64] = first + cell[..., 0] * (source.shapes[which][1] // 8 + 1) + cell[..., 1]
-    return numbers
