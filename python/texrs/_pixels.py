@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from texrs.source_map import SourceMap
 
-__all__ = ["Pixels", "bands", "dense"]
+__all__ = ["Pixels", "bands", "number_pairs"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,12 +102,27 @@ def bands(shape: tuple[int, ...]) -> Iterator[slice]:
         yield slice(start, start + step)
 
 
-def dense(key: NDArray[np.uint64]) -> tuple[NDArray[np.uint64], NDArray[np.uint32]]:
-    """Give the keys that occur, by rising value, and the number of each pixel among them."""
-    if not key.size or int(key.max()) >= max(1 << 22, 4 * key.size):
-        keys, number = np.unique(key, return_inverse=True)
-        return keys, number.reshape(key.shape).astype(np.uint32)
-    seen = np.zeros(int(key.max()) + 1, bool)
-    seen[key.ravel()] = True
-    numbers = (np.cumsum(seen) - 1).astype(np.uint32)
-    return np.flatnonzero(seen).astype(np.uint64), numbers[key]
+def number_pairs(
+    outer: NDArray[np.uint32], pixels: Pixels, place: NDArray[np.unsignedinteger], out: NDArray[np.uint32]
+) -> NDArray[np.uint64]:
+    """Give the pairs of an outer label and the label of the pixel at a place that occur, and number them by rising value.
+
+    Pairs are outer * pixels.labels + inner. The number of that of each pixel is written into ``out``.
+    """
+
+    def pairs(band: slice) -> NDArray[np.uint64]:
+        return np.asarray(outer[band] * np.uint64(pixels.labels) + pixels.label[place[band]], np.uint64)
+
+    most = (int(outer.max()) + 1) * pixels.labels if outer.size else 0
+    if most > max(1 << 22, place.size):
+        found = np.unique(np.concatenate([np.unique(pairs(band)) for band in bands(place.shape)]))
+        for band in bands(place.shape):
+            out[band] = np.searchsorted(found, pairs(band))
+        return found
+    seen = np.zeros(most, bool)
+    for band in bands(place.shape):
+        seen[pairs(band)] = True
+    number = (np.cumsum(seen, dtype=np.uint32) - np.uint32(1)).astype(np.uint32)
+    for band in bands(place.shape):
+        out[band] = number[pairs(band)]
+    return np.flatnonzero(seen).astype(np.uint64)

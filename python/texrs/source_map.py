@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_image
-from texrs._pixels import Pixels, bands, dense
+from texrs._pixels import Pixels, bands, number_pairs
 from texrs._typing import Array, Bools, Interpolation, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.kernels.gather import gather
@@ -268,7 +268,7 @@ class SourceMap:
         axes = place.ndim
         exemplar = np.empty(place.shape, np.uint16)
         coordinates = np.empty((*place.shape, axes), np.float32)
-        key = np.empty(place.shape, np.uint64)
+        label = np.empty(place.shape, np.uint32)
         each = inners.framed or (frame is not None and frame.ndim > 3)
         frames = np.empty((*place.shape, axes, axes), np.float32) if each else None
         for band in bands(place.shape):
@@ -276,12 +276,11 @@ class SourceMap:
             coordinates[band], exemplar[band] = inners.coordinates[at], inners.exemplar[at]
             if rest is not None:
                 coordinates[band] += np.einsum("...ij,...j->...i", inners.frames(at), rest[band])
-            key[band] = outer[band].astype(np.uint64) * np.uint64(inners.labels) + inners.label[at]
             if frames is not None:
                 frames[band] = inners.frames(at)
                 if frame is not None:
                     frames[band] @= frame[band] if frame.ndim > 3 else frame[outer[band]]
-        keys, label = dense(key)
+        keys = number_pairs(outer, inners, place, label)
         if frames is None and (frame is not None or inners.table is not None):
             outer_of, inner_of = np.divmod(keys, np.uint64(max(1, inners.labels)))
             frames = inners.frames_of(inner_of)
