@@ -33,14 +33,14 @@ from texrs.source_map import SourceMap
 
 __all__ = ["Picture", "quilt"]
 
-POOL, CANDIDATES = 48, 5
+POOL, CANDIDATES = 48, 3
 """Matches that are looked at for what they repeat; those of them that are cut in."""
-REPETITION = 1.0
+REPETITION = 1.5
 """Charge for showing what all other patches show, in units of a typical match."""
-STRIDE = 4
-"""Use is counted, and mirrors are looked for, on every fourth row and column."""
 CELL = 8
 """Use is counted in cells of so many pixels a side."""
+STRIDE = 4
+"""Mirrors are looked for on every fourth row and column."""
 MIRRORED, NEAR = 0.02, 6.0
 """Share of its overlap on which a patch may show the mirror image of what lies there, within so many pixels."""
 
@@ -102,23 +102,20 @@ def quilt(
     rows, columns = (spans(size[a], sides[a], min(patch, sides[a]), overlap, wrap[a]) for a in range(2))
     shape = (rows[0].extent, columns[0].extent)
     members = [[i for i, p in enumerate(pictures) if p.kind == kind] for kind in range(shares.shape[-1])]
-    indices = [PatchIndex([pictures[i].colours for i in mine], max_patch=shape) for mine in members]
+    finders = [Finder(pictures, mine, shape) for mine in members]
     canvas = Quilt(pictures, size)
     windows = [Window(r, c) for r in rows for c in columns]
     wanted = deal(windows, size, shares, seed)
     for number, window in enumerate(windows):
         progress(number / len(windows))
-        mine = members[wanted[number]]
         if number == 0:
+            mine = members[wanted[number]]
             which = mine[int(uniform(seed, 0, 0, 0, 3) * len(mine))]
             free = [n - m + 1 for n, m in zip(pictures[which].colours.shape, shape, strict=False)]
             row, column = (int(uniform(seed, 1 + axis, 0, 0, 3) * n) for axis, n in enumerate(free))
-            canvas.paste(window, [Match(0.0, which, row, column)])
-            continue
-        found = indices[wanted[number]].best(
-            canvas.colours(window), window.known(), count=POOL, separation=max(2, min(shape) // 16)
-        )
-        canvas.paste(window, [Match(m.cost, mine[m.exemplar], m.row, m.column) for m in found])
+            canvas.first(window, Match(0.0, which, row, column))
+        else:
+            canvas.paste(window, finders[wanted[number]])
     progress(1.0)
     return canvas.source()
 
@@ -217,6 +214,49 @@ def deal(windows: Sequence[Window], size: tuple[int, int], shares: NDArray[np.fl
     return kinds
 
 
+# --- what fits -------------------------------------------------------------------------------------------------------
+
+
+class Finder:
+    """Finds matches in some of the pictures: everywhere at half their size, then exactly around the few that are taken."""
+
+    def __init__(self, pictures: Sequence[Picture], members: Sequence[int], patch: tuple[int, int]) -> None:
+        colours = [pictures[i].colours for i in members]
+        self.members = members
+        self.shapes = [(c.shape[0] - patch[0], c.shape[1] - patch[1]) for c in colours]
+        self.whole = PatchIndex(colours, max_patch=patch)
+        self.half = PatchIndex([halved(c) for c in colours], max_patch=(patch[0] // 2, patch[1] // 2))
+
+    def pool(self, colours: Floats, known: Bools) -> list[Match]:
+        """Give matches of a patch that are apart, to within a pixel."""
+        weight = halved(known[..., np.newaxis].astype(np.float32))[..., 0] == 1
+        found = self.half.best(halved(colours), weight, count=POOL, separation=max(1, min(weight.shape) // 16))
+        pool = []
+        for m in found:
+            row, column = (
+                min(2 * at, most) for at, most in zip((m.row, m.column), self.shapes[m.exemplar], strict=True)
+            )
+            pool.append(Match(m.cost, m.exemplar, row, column))
+        return pool
+
+    def exact(self, match: Match, colours: Floats, known: Bools) -> Match:
+        """Give the best match within a pixel of one of the pool, in one of all pictures."""
+        rows, columns = (
+            range(max(0, at - 1), min(most, at + 1) + 1)
+            for at, most in zip((match.row, match.column), self.shapes[match.exemplar], strict=True)
+        )
+        near = [(match.exemplar, row, column) for row in rows for column in columns]
+        best = self.whole.best_among(colours, known, candidates=near)[0]
+        return Match(best.cost, self.members[best.exemplar], best.row, best.column)
+
+
+def halved(image: Floats) -> Floats:
+    """Give an image at half its size, each pixel the mean of four; an odd last line is left out."""
+    rows, columns = (n // 2 for n in image.shape[:2])
+    fours = image[: 2 * rows, : 2 * columns].reshape(rows, 2, columns, 2, -1)
+    return np.asarray(fours.mean(axis=(1, 3)), np.float32)
+
+
 # --- the texture in the making ---------------------------------------------------------------------------------------
 
 
@@ -237,13 +277,8 @@ class Quilt:
         self.all_colours = np.concatenate([p.colours.reshape(-1, channels) for p in pictures])
         self.all_penalties = np.concatenate([p.penalty.ravel() for p in pictures])
         self.all_hands = np.concatenate([np.linalg.det(p.source.frames()).ravel() > 0 for p in pictures])
-        self.cells = [cells(p.source) for p in pictures]
-        self.used = np.zeros(max(int(c.max()) for c in self.cells) + 1)
-
-    def colours(self, window: Window) -> Floats:
-        """Give what the texture shows in a window; anything where there is nothing yet."""
-        colours: Floats = self.all_colours[self.place[window.on(self.size)]]
-        return colours
+        self.cells = np.concatenate([cells(p.source).ravel() for p in pictures])
+        self.used = np.zeros(int(self.cells.max()) + 1)
 
     def box(self, match: Match, window: Window) -> tuple[slice, slice]:
         """Give the part of a picture that a match copies."""
@@ -251,30 +286,38 @@ class Quilt:
             match.column, match.column + window.columns.extent
         )
 
-    def places(self, match: Match, window: Window) -> NDArray[np.uint32]:
-        """Give the places in the row that a match copies."""
+    def places(self, match: Match, window: Window, step: int = 1) -> NDArray[np.uint32]:
+        """Give the places in the row that a match copies, or of each ``step``-th row and column."""
         width = self.pictures[match.exemplar].penalty.shape[1]
         corner = int(self.pixels.first[match.exemplar]) + match.row * width + match.column
-        rows, columns = np.arange(window.rows.extent), np.arange(window.columns.extent)
+        rows, columns = (np.arange(0, n, step) for n in window.shape)
         return np.asarray(corner + rows[:, np.newaxis] * width + columns, np.uint32)
 
-    def paste(self, window: Window, matches: Sequence[Match]) -> None:
+    def first(self, window: Window, match: Match) -> None:
+        """Lay the first patch."""
+        self._lay(window, match, np.ones(window.shape, bool))
+
+    def paste(self, window: Window, finder: Finder) -> None:
         """Cut the most promising matches into what is there, and keep the one that shows and repeats the least."""
+        old, known = self.place[window.on(self.size)], window.known()
+        colours = self.all_colours[old]
+        pool = finder.pool(colours, known)
+        matches = [Match(m.cost, finder.members[m.exemplar], m.row, m.column) for m in pool]
+        usual = float(np.median([m.cost for m in pool])) or 1.0
+        charges = REPETITION * self.repeated(matches, window)
+        order = sorted(range(len(pool)), key=lambda k: pool[k].cost / usual + charges[k])
+        best = list(islice((k for k in order if not self.mirrored(window, old, matches[k])), CANDIDATES)) or order[:1]
+        exact = [finder.exact(pool[k], colours, known) for k in best]
+        seams = [self.cut(window, old, m) for m in exact]
+        usual = float(np.median([value for value, _ in seams])) or 1.0
+        chosen = min(range(len(best)), key=lambda i: seams[i][0] / usual + charges[best[i]])
+        self._lay(window, exact[chosen], seams[chosen][1])
+
+    def _lay(self, window: Window, match: Match, mask: Bools) -> None:
         at = window.on(self.size)
-        old = self.place[at]
-        chosen, mask = matches[0], np.ones(window.shape, bool)
-        if self.pastes:
-            usual = float(np.median([m.cost for m in matches])) or 1.0
-            charges = {m: REPETITION * self.repeated(m, window) for m in matches}
-            order = sorted(matches, key=lambda m: m.cost / usual + charges[m])
-            best = list(islice((m for m in order if not self.mirrored(window, old, m)), CANDIDATES)) or order[:1]
-            seams = [self.cut(window, old, m) for m in best]
-            usual = float(np.median([value for value, _ in seams])) or 1.0
-            k = min(range(len(best)), key=lambda k: seams[k][0] / usual + charges[best[k]])
-            chosen, mask = best[k], seams[k][1]
-        self.place[at] = np.where(mask, self.places(chosen, window), old)
+        self.place[at] = np.where(mask, self.places(match, window), self.place[at])
         self.label[at] = np.where(mask, np.uint32(self.pastes), self.label[at])
-        self.used[np.unique(self.shown(chosen, window))] += 1
+        self.used[np.unique(self.cells[self.places(match, window, CELL)])] += 1
         self.pastes += 1
 
     def cut(self, window: Window, old: NDArray[np.uint32], match: Match) -> tuple[float, Bools]:
@@ -295,19 +338,17 @@ class Quilt:
         """Tell whether a match shows the mirror image of what it overlaps."""
         known = window.known()[::STRIDE, ::STRIDE]
         there = old[::STRIDE, ::STRIDE][known]
-        here = self.places(match, window)[::STRIDE, ::STRIDE][known]
+        here = self.places(match, window, STRIDE)[known]
         near = np.abs(self.pixels.coordinates[here] - self.pixels.coordinates[there]).max(axis=-1) <= NEAR
         near &= self.pixels.exemplar[here] == self.pixels.exemplar[there]
         near &= self.all_hands[here] != self.all_hands[there]
         return bool(near.mean() > MIRRORED)
 
-    def shown(self, match: Match, window: Window) -> NDArray[np.int64]:
-        """Give the cells of the exemplar that a match shows, thinned out."""
-        return self.cells[match.exemplar][self.box(match, window)][::STRIDE, ::STRIDE].ravel()
-
-    def repeated(self, match: Match, window: Window) -> float:
-        """Give how much of a match others show: 0 nothing, 1 what they all do."""
-        return float(self.used[self.shown(match, window)].mean()) / self.pastes
+    def repeated(self, matches: Sequence[Match], window: Window) -> NDArray[np.float64]:
+        """Give how much of each match others show: 0 nothing, 1 what they all do."""
+        shown = np.stack([self.places(m, window, CELL) for m in matches]).reshape(len(matches), -1)
+        shares: NDArray[np.float64] = self.used[self.cells[shown]].mean(axis=1) / self.pastes
+        return shares
 
     def source(self) -> SourceMap:
         """Give the map into the exemplars."""
