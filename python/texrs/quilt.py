@@ -41,6 +41,8 @@ CELL = 8
 """Use is counted in cells of so many pixels a side."""
 STRIDE = 4
 """Mirrors are looked for on every fourth row and column."""
+CALM, RUN = 64, 9
+"""Lines that are looked at for a calm one; pixels of a line that make a visible piece of an edge."""
 MIRRORED, NEAR = 0.02, 6.0
 """Share of its overlap on which a patch may show the mirror image of what lies there, within so many pixels."""
 
@@ -117,6 +119,11 @@ def quilt(
         else:
             canvas.paste(window, finders[wanted[number]])
     progress(1.0)
+    if shares.ndim == 1:
+        # A cyclic texture may begin anywhere. Beside a map of shares it stays where it is.
+        for axis in range(2):
+            if wrap[axis]:
+                canvas.roll(axis, uniform(seed, axis, 0, 0, 6))
     return canvas.source()
 
 
@@ -350,6 +357,13 @@ class Quilt:
         shares: NDArray[np.float64] = self.used[self.cells[shown]].mean(axis=1) / self.pastes
         return shares
 
+    def roll(self, axis: int, chance: float) -> None:
+        """Let a cyclic axis begin at one of the calm lines, so that the border of the texture does not follow an edge."""
+        lines = np.moveaxis(self.place, axis, 0)
+        found = calm(self.all_colours[lines[: CALM + 1]])
+        start = found[int(chance * len(found))]
+        self.place, self.label = (np.roll(a, -start, axis) for a in (self.place, self.label))
+
     def source(self) -> SourceMap:
         """Give the map into the exemplars."""
         return SourceMap.pick([p.source for p in self.pictures], self.place, self.label)
@@ -362,3 +376,14 @@ def cells(source: SourceMap) -> NDArray[np.int64]:
     cell = np.clip(source.coordinates, 0, np.array(source.shapes[which]) - 1).astype(np.int64) // CELL
     numbers: NDArray[np.int64] = first + cell[..., 0] * (source.shapes[which][1] // CELL + 1) + cell[..., 1]
     return numbers
+
+
+def calm(lines: Floats) -> list[int]:
+    """Give the lines that differ from the one before them no more than usual, on the whole and at their worst."""
+    from scipy.ndimage import uniform_filter1d
+
+    jumps = np.abs(np.diff(lines, axis=0)).mean(axis=-1)
+    whole, worst = jumps.mean(axis=1), uniform_filter1d(jumps, RUN, axis=1).max(axis=1)
+    usual = (whole <= np.median(whole)) & (worst <= np.median(worst))
+    found = np.flatnonzero(usual) if usual.any() else [np.argmin(whole)]
+    return [1 + int(line) for line in found]
