@@ -259,9 +259,9 @@ class Finder:
 
 def halved(image: Floats) -> Floats:
     """Give an image at half its size, each pixel the mean of four; an odd last line is left out."""
-    rows, columns = (n // 2 for n in image.shape[:2])
-    fours = image[: 2 * rows, : 2 * columns].reshape(rows, 2, columns, 2, -1)
-    return np.asarray(fours.mean(axis=(1, 3)), np.float32)
+    rows, columns = (n // 2 * 2 for n in image.shape[:2])
+    fours = [image[i:rows:2, j:columns:2] for i in range(2) for j in range(2)]
+    return np.asarray(sum(fours) * np.float32(0.25), np.float32)
 
 
 # --- the texture in the making ---------------------------------------------------------------------------------------
@@ -315,7 +315,8 @@ class Quilt:
         order = sorted(range(len(pool)), key=lambda k: pool[k].cost / usual + charges[k])
         best = list(islice((k for k in order if not self.mirrored(window, old, matches[k])), CANDIDATES)) or order[:1]
         exact = [finder.exact(pool[k], colours, known) for k in best]
-        seams = [self.cut(window, old, m) for m in exact]
+        penalty = self.all_penalties[old]
+        seams = [self.cut(window, colours, penalty, m) for m in exact]
         usual = float(np.median([value for value, _ in seams])) or 1.0
         chosen = min(range(len(best)), key=lambda i: seams[i][0] / usual + charges[best[i]])
         self._lay(window, exact[chosen], seams[chosen][1])
@@ -327,16 +328,14 @@ class Quilt:
         self.used[np.unique(self.cells[self.places(match, window, CELL)])] += 1
         self.pastes += 1
 
-    def cut(self, window: Window, old: NDArray[np.uint32], match: Match) -> tuple[float, Bools]:
+    def cut(self, window: Window, colours: Floats, penalty: Floats, match: Match) -> tuple[float, Bools]:
         """Cut a match in along one seam for each overlap: what the seams cost, and where it is taken."""
         picture, box = self.pictures[match.exemplar], self.box(match, window)
-        fresh, penalty = picture.colours[box], picture.penalty[box]
+        fresh, dear = picture.colours[box], picture.penalty[box] + penalty
         taken, value = np.ones(window.shape, bool), 0.0
         for axis, after, band in window.bands():
-            there = self.all_colours[old[band]]
-            dear = penalty[band] + self.all_penalties[old[band]]
-            sides = (there, fresh[band]) if after else (fresh[band], there)
-            seam = cut_strip(*sides, axis=axis, penalty=dear)
+            sides = (colours[band], fresh[band]) if after else (fresh[band], colours[band])
+            seam = cut_strip(*sides, axis=axis, penalty=dear[band])
             taken[band] &= seam.mask == after
             value += seam.value
         return value, taken
