@@ -1,0 +1,211 @@
+"""D1 to D4: whole, without seams, cyclic, like the exemplar patch by patch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import ndimage
+
+from ._ground import corners, gradient, gradients, nearest_patches, ratio, seams, unit
+
+
+@dataclass(frozen=True)
+class D1:
+    """Whole, finite, of the size that was asked for, with colours and places of the exemplar; holes are reported."""
+
+    size: bool
+    finite: bool
+    inside: bool
+    holes: tuple[float, ...]
+    applies: bool = True
+
+    @property
+    def passed(self) -> bool:
+        known = len(self.holes) > 0 and all(0 <= h < 1 for h in self.holes) and max(self.holes) > 0
+        return self.size and self.finite and self.inside and known
+
+    @property
+    def figures(self) -> str:
+        words = [word for word, ok in (("size", self.size), ("nan", self.finite), ("outside", self.inside)) if not ok]
+        return " ".join([f"{100 * np.mean(self.holes or [np.nan]):.1f} %", *words])
+
+
+def d1(exemplar: np.ndarray, result: Any, size: tuple[int, int]) -> D1:
+    image, source = np.asarray(result.image), result.source
+    floats = image.dtype.kind == "f"
+    bounds = np.array([source.shapes[e] for e in range(len(source.shapes))], np.float64)[source.exemplar] - 1
+    places = source.coordinates
+    inside = bool((places >= -1e-3).all() and (places <= bounds + 1e-3).all())
+    if floats:
+        # Cubic look-ups may overshoot, but are kept within the exemplar's range.
+        inside &= bool(image.min() >= exemplar.min() - 1e-6 and image.max() <= exemplar.max() + 1e-6)
+    return D1(
+        image.shape == (*size, *np.asarray(exemplar).shape[2:]) and image.dtype == exemplar.dtype,
+        bool(np.isfinite(image).all()) if floats else True,
+        inside,
+        tuple(float(h) for h in result.report.get("holes", ())),
+    )
+
+
+@dataclass(frozen=True)
+class D2:
+    """How seams show: their mean gradient against the exemplar's, and how many are above its 99th percentile."""
+
+    mean: float
+    above: float
+    seams: float
+    """Share of all edges that are seams."""
+    most_mean: float = 1.5
+    most_above: float = 0.03
+    applies: bool = True
+
+    @property
+    def passed(self) -> bool:
+        return self.mean <= self.most_mean and self.above <= self.most_above
+
+    @property
+    def figures(self) -> str:
+        return f"{self.mean:.2f}, {100 * self.above:.1f} %"
+
+
+def d2(exemplar: np.ndarray, image: np.ndarray, source: Any, wrap: tuple[bool, bool] = (True, True)) -> D2:
+    example, made = unit(exemplar), unit(image, exemplar)
+    usual = gradients(example)
+    over, edges = [], 0
+    for axis in range(2):
+        seam = seams(source, axis, wrap=wrap[axis])
+        over.append(gradient(made, axis, wrap=wrap[axis])[seam])
+        edges += seam.size
+    jumps = np.concatenate(over)
+    if not len(jumps) or not usual.any():
+        return D2(0.0, 0.0, len(jumps) / edges)
+    return D2(
+        float(jumps.mean() / usual.mean()),
+        float((jumps > np.percentile(usual, 99)).mean()),
+        len(jumps) / edges,
+    )
+
+
+@dataclass(frozen=True)
+class D2b:
+    """The colour correction acts: seams were worse before it."""
+
+    before: float
+    after: float
+    above_before: float
+    above_after: float
+    applies: bool
+
+    @property
+    def passed(self) -> bool:
+        return self.applies and self.before > self.after and self.above_before >= self.above_after
+
+    @property
+    def figures(self) -> str:
+        if not self.applies:
+            return "no correction"
+        return f"{self.before:.2f} > {self.after:.2f}, {100 * self.above_before:.1f} > {100 * self.above_after:.1f} %"
+
+
+def d2b(
+    exemplar: np.ndarray, composite: np.ndarray, image: np.ndarray, source: Any, wrap: tuple[bool, bool] = (True, True)
+) -> D2b:
+    before, after = d2(exemplar, composite, source, wrap), d2(exemplar, image, source, wrap)
+    applies = not np.array_equal(composite, image)
+    return D2b(before.mean, after.mean, before.above, after.above, applies)
+
+
+@dataclass(frozen=True)
+class D3:
+    """Across each wrap: the mean jump against the inner gradient, and the worst run of nine against the usual worst."""
+
+    mean: float
+    run: float
+    applies: bool = True
+    most_mean: float = 1.5
+    most_run: float = 2.0
+
+    @property
+    def passed(self) -> bool:
+        return self.mean <= self.most_mean and self.run <= self.most_run
+
+    @property
+    def figures(self) -> str:
+        return f"{self.mean:.2f}, {self.run:.2f}" if self.applies else "no wrap"
+
+
+def d3(image: np.ndarray, wrap: tuple[bool, bool] = (True, True)) -> D3:
+    made = unit(image)
+    means, runs = [0.0], [0.0]
+    for axis in range(2):
+        if not wrap[axis]:
+            continue
+        jumps = np.moveaxis(gradient(made, axis, wrap=True), axis, 0)
+        inner, across = jumps[:-1], jumps[-1]
+        if not across.any():
+            continue
+        # Runs of nine along the wrap against runs of nine along inner lines: like with like.
+        usual = np.percentile(ndimage.uniform_filter1d(inner, 9, axis=1, mode="wrap"), 99)
+        means.append(float(across.mean() / max(inner.mean(), 1e-12)))
+        runs.append(float(ndimage.uniform_filter1d(across, 9, mode="wrap").max() / max(usual, 1e-12)))
+    return D3(max(means), max(runs), any(wrap))
+
+
+@dataclass(frozen=True)
+class D3b:
+    """Tiled 2 x 2, the lines on which tiles meet are no outliers: deviations of their gradient, in sigmas."""
+
+    rows: float
+    columns: float
+    applies: bool = True
+    most: float = 3.0
+
+    @property
+    def passed(self) -> bool:
+        return max(abs(self.rows), abs(self.columns)) <= self.most
+
+    @property
+    def figures(self) -> str:
+        return f"{self.rows:+.1f}, {self.columns:+.1f}" if self.applies else "no wrap"
+
+
+def d3b(image: np.ndarray, wrap: tuple[bool, bool] = (True, True)) -> D3b:
+    made = unit(image)
+    tiled = np.tile(made, (2, 2, 1))
+    deviation = []
+    for axis in range(2):
+        lines = gradient(tiled, axis).mean(axis=1 - axis)
+        meeting = image.shape[axis] - 1
+        others = np.delete(lines[: image.shape[axis]], meeting)
+        spread = float(others.std())
+        excess = float(lines[meeting] - others.mean())
+        deviation.append(0.0 if not wrap[axis] or abs(excess) < 1e-12 else excess / max(spread, 1e-12))
+    return D3b(deviation[0], deviation[1], any(wrap))
+
+
+@dataclass(frozen=True)
+class D4:
+    """How far patches of the result are from the exemplar's, against how far its own are from each other."""
+
+    mean: float
+    p95: float
+    applies: bool = True
+    most_mean: float = 1.15
+    most_p95: float = 1.25
+
+    @property
+    def passed(self) -> bool:
+        return self.mean <= self.most_mean and self.p95 <= self.most_p95
+
+    @property
+    def figures(self) -> str:
+        return f"{self.mean:.2f}, {self.p95:.2f}"
+
+
+def d4(exemplar: np.ndarray, image: np.ndarray, *, count: int = 300, seed: int = 0) -> D4:
+    example, made = unit(exemplar), unit(image, exemplar)
+    of_image = nearest_patches(made, corners(made.shape, count, seed), example)
+    of_example = nearest_patches(example, corners(example.shape, count, seed + 1), example, own=8)
+    return D4(*(ratio(measure(of_image), measure(of_example)) for measure in (np.mean, lambda d: np.percentile(d, 95))))
