@@ -7,8 +7,8 @@ its neighbours.
 Departures, with their reasons:
 
 - Each seam is the exact minimum cut of its strip, which may turn back, and not a row-by-row recurrence.
-- A patch is charged for showing what others show already. A charge that multiplies the match would let the exact
-  continuation of a neighbour, whose match costs nothing, win for ever.
+- A patch is charged for showing what others show already, and for going on where a neighbour ends. A charge that
+  multiplies the match would let the exact continuation of a neighbour, whose match costs nothing, win for ever.
 - A patch that shows the mirror image of what it overlaps is refused: along the axis of a mirror the two meet without a
   seam, and the eye sees nothing else.
 """
@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import islice, pairwise
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -37,10 +37,10 @@ POOL, CANDIDATES = 48, 3
 """Matches that are looked at for what they repeat; those of them that are cut in."""
 REPETITION = 1.5
 """Charge for showing what all other patches show, in units of a typical match."""
+CONTINUATION = 2.0
+"""Charge for going on with the piece of the exemplar that lies there already, in the same units."""
 CELL = 8
-"""Use is counted in cells of so many pixels a side."""
-STRIDE = 4
-"""Mirrors are looked for on every fourth row and column."""
+"""Use is counted in cells of so many pixels a side, and overlaps are compared on as many rows and columns."""
 CALM, RUN = 64, 9
 """Lines that are looked at for a calm one; pixels of a line that make a visible piece of an edge."""
 MIRRORED, NEAR = 0.02, 6.0
@@ -312,8 +312,10 @@ class Quilt:
         matches = [Match(m.cost, finder.members[m.exemplar], m.row, m.column) for m in pool]
         usual = float(np.median([m.cost for m in pool])) or 1.0
         charges = REPETITION * self.repeated(matches, window)
-        order = sorted(range(len(pool)), key=lambda k: pool[k].cost / usual + charges[k])
-        best = list(islice((k for k in order if not self.mirrored(window, old, matches[k])), CANDIDATES)) or order[:1]
+        continued, mirrored = self.alike(matches, window, old)
+        charges += CONTINUATION * continued
+        free = np.flatnonzero(mirrored <= MIRRORED) if (mirrored <= MIRRORED).any() else np.arange(len(pool))
+        best = sorted(free.tolist(), key=lambda k: pool[k].cost / usual + charges[k])[:CANDIDATES]
         exact = [finder.exact(pool[k], colours, known) for k in best]
         penalty = self.all_penalties[old]
         seams = [self.cut(window, colours, penalty, m) for m in exact]
@@ -340,15 +342,17 @@ class Quilt:
             value += seam.value
         return value, taken
 
-    def mirrored(self, window: Window, old: NDArray[np.uint32], match: Match) -> bool:
-        """Tell whether a match shows the mirror image of what it overlaps."""
-        known = window.known()[::STRIDE, ::STRIDE]
-        there = old[::STRIDE, ::STRIDE][known]
-        here = self.places(match, window, STRIDE)[known]
-        near = np.abs(self.pixels.coordinates[here] - self.pixels.coordinates[there]).max(axis=-1) <= NEAR
-        near &= self.pixels.exemplar[here] == self.pixels.exemplar[there]
-        near &= self.all_hands[here] != self.all_hands[there]
-        return bool(near.mean() > MIRRORED)
+    def alike(
+        self, matches: Sequence[Match], window: Window, old: NDArray[np.uint32]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Give the shares of its overlap on which each match shows what lies there, and the mirror image of it."""
+        known = window.known()[::CELL, ::CELL]
+        there = old[::CELL, ::CELL][known]
+        here = np.stack([self.places(m, window, CELL)[known] for m in matches])
+        apart = np.abs(self.pixels.coordinates[here] - self.pixels.coordinates[there]).max(axis=-1)
+        apart[self.pixels.exemplar[here] != self.pixels.exemplar[there]] = np.inf
+        turned = self.all_hands[here] != self.all_hands[there]
+        return ((apart < 1) & ~turned).mean(axis=1), ((apart <= NEAR) & turned).mean(axis=1)
 
     def repeated(self, matches: Sequence[Match], window: Window) -> NDArray[np.float64]:
         """Give how much of each match others show: 0 nothing, 1 what they all do."""
