@@ -407,7 +407,7 @@ class Canvas:
 
 # --- the large texture: section 3.1, step 4 --------------------------------------------------------------------------
 
-PATCH, OVERLAP = 0.6, 0.25
+PATCH, OVERLAP = 0.5, 0.22
 """Side of a patch and overlap of two, as shares of the exemplar's shorter side."""
 MIXED_PATCH = 0.6
 """The same where several exemplars are mixed: smaller patches mix them better."""
