@@ -7,7 +7,7 @@ Feng, "Completion-based texture design using deformation", 2006, section 3.3.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -134,6 +134,8 @@ class Moves:
     mirror: bool
     x0: float | None
     chaos: float
+    shifts: tuple[tuple[int, int], ...] = ()
+    """The only translations allowed, (row, column) in pixels, if there are any: those of a lattice."""
 
     def values(self, seed: int, variant: int, element: int) -> Iterator[float]:
         """Give the chaotic values of one element of one variant; each has a start of its own."""
@@ -156,6 +158,10 @@ class Moves:
 
         ``touches`` says on which axes the exemplar's border cuts the element: it then only slides along that border.
         """
+        if self.shifts:
+            _, h2, h3 = next(values), next(values), next(values)
+            shift = self.shifts[min(int((h2 + h3 / 256) % 16 / 16 * len(self.shifts)), len(self.shifts) - 1)]
+            return [] if any(touches) else [Operation("T", float(n), axis) for axis, n in enumerate(shift) if n]
         allowed = {"T": True, "R": self.rotate > 0, "M": self.mirror, "S": self.scale != (1.0, 1.0)}
         kinds = [kind for kind, may in allowed.items() if may]
         chosen = []
@@ -292,9 +298,14 @@ def place(element: Element, operations: Sequence[Operation], shape: tuple[int, i
 
 
 def fit(
-    element: Element, cores: Bools, moves: Moves, seed: int, variant: int
+    element: Element,
+    cores: Bools,
+    moves: Moves,
+    seed: int,
+    variant: int,
+    agrees: Callable[[Placement], bool] | None = None,
 ) -> tuple[list[Operation], Placement] | None:
-    """Draw operations until the element keeps out of the cores that are placed.
+    """Draw operations until the element keeps out of the cores that are placed, and ``agrees`` with where it comes to.
 
     Takes the first good draw, else the best one, which may be not to move at all; None when even that collides.
     """
@@ -307,8 +318,8 @@ def fit(
             continue
         lost = 0.0 if any(element.touches) else max(0.0, 1 - placement.kept)
         score = float((placement.core & cores[placement.window]).sum()) / float(placement.core.sum()) + lost
-        if best is None or score < best[0]:
+        if (best is None or score < best[0]) and (agrees is None or not operations or agrees(placement)):
             best = (score, operations, placement)
-        if score <= GOOD:
-            break
+            if score <= GOOD:
+                break
     return None if best is None or best[0] > BAD else best[1:]

@@ -24,7 +24,8 @@ Departures, with their reasons:
 - Where elements lie in a heap most of them rest: if all moved there would be nothing left for them to lie on, and the holes
   would be filled with pieces. An element brings only background along, not pieces of its neighbours.
 - Holes are filled with background alone where the example has enough of it.
-- Nothing is turned where the example has a direction of its own (bark, brickwork).
+- Nothing is turned where the example has directions of its own (bark, brickwork); where it repeats on a lattice, elements
+  move from place to place of the lattice and nowhere else.
 - A cyclic texture (section 3.5) is stitched on the torus from the start: patches are chosen to fit both sides of the
   wrap, where the paper folds a finished picture that was never chosen to fit.
 - The differences that the colours are corrected to are those of the sources on both sides of a seam, where the paper
@@ -37,6 +38,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any, Literal, TypeAlias, overload
 
 import numpy as np
@@ -329,17 +331,22 @@ def deform(source: Source, seed: int, number: int) -> tuple[Canvas, Flip, list[A
     base = flips[int(uniform(seed, number, 0, 0, 1) * len(flips))]
     picture, labels = flip(source.guide, base), flip(parts.elements, base)
     still = resting(parts, seed, number)
-    canvas = Canvas.background(picture, labels, still)
+    # On a lattice every element has its place, which another one may take: nothing is left open.
+    canvas = Canvas.whole(picture) if parts.lattice else Canvas.background(picture, labels, still)
     log: list[dict[str, Any]] = [{"element": 0, "mirror": list(base)}]
     for element in elements_of(labels):
         if element.label in still:
             log.append({"element": element.label, "operations": []})
             continue
-        fitted = fit(element, canvas.cores, source.moves, seed, number)
+        agrees = partial(canvas.agrees, picture) if parts.lattice else None
+        fitted = fit(element, canvas.cores, source.moves, seed, number, agrees)
         if fitted is None:
             log.append({"element": element.label, "operations": None})
             continue
         operations, placement = fitted
+        if parts.lattice and not operations:
+            log.append({"element": element.label, "operations": []})
+            continue
         canvas.stitch(picture, labels, placement)
         log.append(
             {
@@ -350,15 +357,20 @@ def deform(source: Source, seed: int, number: int) -> tuple[Canvas, Flip, list[A
     return canvas, base, log
 
 
-DENSE, MOVED = 0.45, 0.35
-"""Share of the image that elements cover from which on they lie in a heap, and the share of a heap that moves."""
+AGREEMENT = 0.6
+"""Largest mean difference between the surroundings of an element and those that it comes to, in standard deviations."""
+DENSE, MOVED, COPIED = 0.45, 0.35, 0.6
+"""Share of the image that elements cover from which on they lie in a heap, and the shares that may move of a heap, and
+from place to place of a lattice."""
 
 
 def resting(parts: Segmentation, seed: int, number: int) -> frozenset[int]:
     """Choose the elements that stay where they are: in a heap most do, or nothing would be left to lie on."""
-    if parts.children in ("none", "grid") or np.count_nonzero(parts.elements) <= DENSE * parts.elements.size:
+    heap = parts.children in ("components", "labels") and np.count_nonzero(parts.elements) > DENSE * parts.elements.size
+    if not (heap or parts.lattice):
         return frozenset()
-    return frozenset(e for e in range(1, parts.count + 1) if uniform(seed, number, e, 0, 4) >= MOVED)
+    share = COPIED if parts.lattice else MOVED
+    return frozenset(e for e in range(1, parts.count + 1) if uniform(seed, number, e, 0, 4) >= share)
 
 
 @dataclass(slots=True, eq=False)
@@ -384,6 +396,22 @@ class Canvas:
         start = SourceMap.identity(labels.shape)
         cores: Bools = binary_erosion(rest, np.ones((3, 3), bool), iterations=int(CORE), border_value=1)
         return cls(picture.copy(), start.coordinates, start.label, covered, cores, [np.eye(2)])
+
+    @classmethod
+    def whole(cls, picture: Floats) -> Canvas:
+        """Start from the whole picture, which any element may cover."""
+        start = SourceMap.identity(picture.shape[:2])
+        everywhere = np.ones(picture.shape[:2], bool)
+        return cls(picture.copy(), start.coordinates, start.label, everywhere, ~everywhere, [np.eye(2)])
+
+    def agrees(self, picture: Floats, placement: Placement) -> bool:
+        """Whether the surroundings of an element are much like what it comes to lie on."""
+        ring = (placement.distance < 0) & (placement.distance > -RING) & placement.inside
+        if not ring.any():
+            return False
+        there = gather(picture, placement.coordinates, interpolation="nearest")
+        difference = np.abs(there - self.colours[placement.window]).mean(axis=-1)[ring].mean()
+        return bool(difference < AGREEMENT * picture.std(axis=(0, 1)).mean())
 
     def stitch(self, picture: Floats, labels: Labels, placement: Placement) -> None:
         """Cut an element and its ring into the canvas (Eq. 3)."""
