@@ -27,9 +27,11 @@ Children: TypeAlias = Literal["auto", "components", "grid", "none"]
 
 LEAST_COVERED, LARGEST, SPREAD = 0.05, 0.25, 1.6
 """Elements cover at least this share of the image, each at most this one, and their areas vary by at most so many means."""
-WHOLE, INSIDE, OUTSIDE, HEAP = 0.81, 1.6, 1.5, 0.6
+WHOLE, INSIDE, OUTSIDE, HEAP = 0.79, 1.6, 1.5, 0.6
 """Least solidity; least contrast across outlines over that inside; over that of the background, unless they lie in a heap,
 which covers at least this share of the image and has a background of gaps."""
+CONVINCING = 0.83
+"""Score of elements from which on no other background is tried."""
 GRID_SHARE = 1 / 6
 """Side of a grid cell, as a share of the exemplar's shorter side."""
 
@@ -155,7 +157,6 @@ def _from_labels(labels: NDArray[np.integer], shape: tuple[int, int]) -> Segment
     return Segmentation((dense > 0).astype(np.int32), dense.astype(np.int32), "labels", "")
 
 
-
 def _colours(unit: Floats) -> Floats:
     """Give three colour channels in [0, 1]: those there are, or the first of them three times."""
     chosen = unit[..., :3] if unit.shape[-1] >= 3 else np.repeat(unit[..., :1], 3, axis=-1)
@@ -177,6 +178,8 @@ def _best_background(layers: Labels, rgb: Floats) -> tuple[Labels, Labels, str]:
         score = evidence.solidity - 0.05 * background - (1.0 if trouble else 0.0)
         if best is None or score > best[0] + 1e-9:
             best = (score, swapped, elements, trouble)
+        if score >= CONVINCING:
+            break
     assert best is not None
     return best[1:]
 

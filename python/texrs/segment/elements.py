@@ -8,6 +8,7 @@ together speaks for two things.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,7 +76,7 @@ def _clean(mask: Bools, least: float) -> Bools:
     kept[0] = False
     mask = kept[pieces]
     holes, _ = ndimage.label(~mask)
-    marks = np.array([h.solidity >= ROUND for h in _hulls(holes)])
+    marks = Shapes.of(holes.astype(np.int32)).solidity() >= ROUND
     marks[0] = False
     for edge in (holes[0], holes[-1], holes[:, 0], holes[:, -1]):
         marks[edge] = False
@@ -150,89 +151,92 @@ def _join(parts: Labels, relief: Floats) -> Labels:
     keys, where = np.unique(low.astype(np.int64) << 32 | high, return_inverse=True)
     sums, lengths = np.bincount(where, strength), np.bincount(where)
     for key, total, length in zip(keys.tolist(), sums.tolist(), lengths.tolist(), strict=True):
-        one, other = key >> 32, key & 0xFFFFFFFF
-        borders.setdefault(one, {})[other] = (total, length)
-        borders.setdefault(other, {})[one] = (total, length)
-    c, d = _pairs(parts)
-    around = np.bincount(flat[c], minlength=int(flat.max()) + 1) + np.bincount(flat[d], minlength=int(flat.max()) + 1)
-    perimeter = around.tolist()
-    hulls = _hulls(parts)
-    into = np.arange(len(hulls), dtype=np.int32)
+        borders.setdefault(key >> 32, {})[key & 0xFFFFFFFF] = (total, length)
+        borders.setdefault(key & 0xFFFFFFFF, {})[key >> 32] = (total, length)
+    shapes = Shapes.of(parts)
+    perimeter = np.bincount(np.concatenate([flat[side] for side in _pairs(parts)]), minlength=len(shapes.area))
+    into = np.arange(len(shapes.area), dtype=np.int32)
 
-    def parting(one: int, other: int) -> float:
-        total, length = borders[one][other]
-        together = hulls[one].join(hulls[other])
-        apart = (hulls[one].area + hulls[other].area) / (hulls[one].hull + hulls[other].hull)
-        return total / length + CONVEXITY * (apart - together.solidity) - length / min(perimeter[one], perimeter[other])
+    def parting(one: Any, other: Any, mean: Any, share: Any) -> Any:
+        apart, together = shapes.solidity_apart_and_together(one, other)
+        return mean + CONVEXITY * (apart - together) - share
 
-    scores = {(p, q): parting(p, q) for p in borders for q in borders[p] if p < q}
+    one, other = (keys >> 32).astype(np.intp), (keys & 0xFFFFFFFF).astype(np.intp)
+    least = np.minimum(perimeter[one], perimeter[other])
+    first = parting(one, other, sums / lengths, lengths / least).tolist()
+    scores = dict(zip(zip(one.tolist(), other.tolist(), strict=True), first, strict=True))
     while scores:
-        (one, other), least = min(scores.items(), key=lambda item: (item[1], item[0]))
-        if least >= PARTED:
+        (p, q), score = min(scores.items(), key=lambda item: (item[1], item[0]))
+        if score >= PARTED:
             break
-        hulls[one] = hulls[one].join(hulls[other])
-        perimeter[one] += perimeter[other] - 2 * borders[one][other][1]
-        into[into == other] = one
-        for third, (total, length) in borders.pop(other).items():
-            del borders[third][other]
-            scores.pop((min(other, third), max(other, third)))
-            if third != one:
-                before = borders[one].get(third, (0.0, 0))
-                borders[one][third] = borders[third][one] = (before[0] + total, before[1] + length)
-        for third in borders[one]:
-            scores[min(one, third), max(one, third)] = parting(one, third)
+        shapes.join(p, q)
+        perimeter[p] += perimeter[q] - 2 * borders[p][q][1]
+        into[into == q] = p
+        for r, (total, length) in borders.pop(q).items():
+            del borders[r][q]
+            scores.pop((min(q, r), max(q, r)))
+            if r != p:
+                before = borders[p].get(r, (0.0, 0))
+                borders[p][r] = borders[r][p] = (before[0] + total, before[1] + length)
+        near = sorted(borders[p])
+        if near:
+            totals, borderings = np.array([borders[p][r] for r in near]).T
+            least = np.minimum(perimeter[p], perimeter[near])
+            again = parting(p, np.array(near), totals / borderings, borderings / least).tolist()
+            scores.update({(min(p, r), max(p, r)): value for r, value in zip(near, again, strict=True)})
     return into[parts]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Hull:
-    """A set of pixels and its convex hull."""
+TURN = 2 * np.pi / 32
+"""Angle between the directions in which shapes are measured: hulls come out at most 2 % too large."""
 
-    area: float
-    hull: float
-    corners: NDArray[np.float64]
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shapes:
+    """Areas of sets of pixels, and how far they reach in each direction, which is all that their hulls need."""
+
+    area: NDArray[np.float64]
+    reach: NDArray[np.float64]
 
     @classmethod
-    def of(cls, area: float, points: NDArray[np.float64]) -> Hull:
-        """Take the hull of points."""
-        from scipy.spatial import ConvexHull
+    def of(cls, labels: Labels) -> Shapes:
+        """Measure each label, 0 included, by the corners of the first and the last pixel of each row."""
+        height, width = labels.shape
+        change = np.ones((height, width + 1), bool)
+        change[:, 1:-1] = labels[:, 1:] != labels[:, :-1]
+        angle = TURN * np.arange(32)
+        reach = np.full((int(labels.max()) + 1, len(angle)), -np.inf)
+        for here, over in ((change[:, :-1], 0), (change[:, 1:], 1)):
+            row, column = np.nonzero(here)
+            label = labels[row, column]
+            order = np.argsort(label, kind="stable")
+            found, start = np.unique(label[order], return_index=True)
+            corners = np.outer(row[order], np.cos(angle)) + np.outer(column[order] + over, np.sin(angle))
+            corners += np.maximum(np.cos(angle), 0)
+            reach[found] = np.maximum(reach[found], np.maximum.reduceat(corners, start))
+        return cls(np.bincount(labels.ravel(), minlength=len(reach)).astype(np.float64), reach)
 
-        found = ConvexHull(points)
-        return cls(area, max(float(found.volume), area), points[found.vertices])
+    def join(self, one: int, other: int) -> None:
+        """Let one be both."""
+        self.area[one] += self.area[other]
+        self.reach[one] = np.maximum(self.reach[one], self.reach[other])
 
-    def join(self, other: Hull) -> Hull:
-        """Give the hull of two sets that share no pixel."""
-        return Hull.of(self.area + other.area, np.concatenate([self.corners, other.corners]))
+    def solidity(self) -> NDArray[np.float64]:
+        """Give the share of its hull that each fills; 0 for those of no pixel."""
+        return np.where(self.area > 0, self.area / np.maximum(_hull(self.reach), 1.0), 0.0)
 
-    @property
-    def solidity(self) -> float:
-        """Share of the hull that is filled."""
-        return self.area / self.hull
+    def solidity_apart_and_together(self, one: Any, other: Any) -> tuple[Any, Any]:
+        """Give the share of two hulls that is filled, and that of the hull of both."""
+        area = self.area[one] + self.area[other]
+        apart = _hull(self.reach[one]) + _hull(self.reach[other])
+        return area / apart, area / _hull(np.maximum(self.reach[one], self.reach[other]))
 
 
-def _hulls(labels: Labels) -> list[Hull]:
-    """Give the hull of each label, 0 included, by the corners of the first and last pixel of each row."""
-    count = int(labels.max()) + 1
-    height, width = labels.shape
-    row = np.repeat(np.arange(height), width)
-    column = np.tile(np.arange(width), height)
-    key = labels.ravel().astype(np.int64) * height + row
-    order = np.argsort(key, kind="stable")
-    keys, starts = np.unique(key[order], return_index=True)
-    ends = np.append(starts[1:], len(order)) - 1
-    left, right = column[order[starts]], column[order[ends]] + 1
-    label, line = np.divmod(keys, height)
-    area = np.bincount(labels.ravel(), minlength=count)
-    bounds = np.searchsorted(label, np.arange(count + 1))
-    found = []
-    for k in range(count):
-        mine = slice(bounds[k], bounds[k + 1])
-        if bounds[k] == bounds[k + 1]:
-            found.append(Hull(0.0, 1.0, np.zeros((0, 2))))
-            continue
-        points = [np.stack([line[mine] + d, x[mine]], -1) for d in (0, 1) for x in (left, right)]
-        found.append(Hull.of(float(area[k]), np.concatenate(points).astype(np.float64)))
-    return found
+def _hull(reach: NDArray[np.float64]) -> Any:
+    """Give the area of the polygon that reaches so far in each direction."""
+    finite = np.where(np.isfinite(reach), reach, 0.0)
+    side = (np.roll(finite, 1, -1) + np.roll(finite, -1, -1) - 2 * np.cos(TURN) * finite) / np.sin(TURN)
+    return 0.5 * (finite * side).sum(axis=-1)
 
 
 def _fill_holes(elements: Labels) -> Labels:
@@ -295,10 +299,9 @@ def evidence(elements: Labels, crease: Floats, contrasts: Floats) -> Evidence:
     """Weigh elements against the image that they were found in."""
     from scipy.ndimage import maximum_filter
 
-    outline = np.zeros(elements.size, bool)
+    outline = np.zeros(elements.shape, bool)
     for side in _pairs(elements):
-        outline[side] = True
-    outline = outline.reshape(elements.shape)
+        outline.reshape(-1)[side] = True
     far = ~maximum_filter(outline, 2 * CLEAR + 1)
     covered = elements > 0
     edge, within, around = outline & covered, far & covered, far & ~covered
@@ -320,6 +323,6 @@ def evidence(elements: Labels, crease: Floats, contrasts: Floats) -> Evidence:
 
 def solidity(elements: Labels) -> float:
     """Give the share of their convex hulls that elements fill, by area."""
-    hulls = _hulls(elements)[1:]
-    area = sum(h.area for h in hulls)
-    return sum(h.area * h.solidity for h in hulls) / area if area else 0.0
+    shapes = Shapes.of(elements)
+    area = shapes.area[1:]
+    return float((area * shapes.solidity()[1:]).sum() / area.sum()) if area.sum() else 0.0

@@ -67,12 +67,12 @@ def lattice(guide: Floats) -> Lattice | None:
 def _correlation(picture: Floats) -> Floats:
     """Correlate a picture with itself, without its slow changes; the middle is no shift at all."""
     from scipy.fft import irfft2, next_fast_len, rfft2
-    from scipy.ndimage import gaussian_filter
+    from scipy.ndimage import gaussian_filter, uniform_filter
 
     height, width = picture.shape
-    flat = gaussian_filter(picture, 1.0) - gaussian_filter(picture, min(picture.shape) / 6)
+    flat = gaussian_filter(picture, 1.0) - uniform_filter(picture, min(picture.shape) // 2)
     size = tuple(next_fast_len(2 * n, real=True) for n in picture.shape)
-    product = irfft2(np.abs(rfft2(flat.astype(np.float64), size)) ** 2, size)
+    product = irfft2(np.abs(rfft2(flat, size)) ** 2, size)
     rows, columns = (int(REACH * n) for n in picture.shape)
     near = np.roll(product, (rows, columns), (0, 1))[: 2 * rows + 1, : 2 * columns + 1]
     shift = np.abs(np.arange(-rows, rows + 1)), np.abs(np.arange(-columns, columns + 1))
@@ -108,8 +108,8 @@ def _fit(correlation: Floats) -> Lattice | None:
         return None
     best = max(mean for mean, _ in found.values())
     good = [(cell, pair, mean) for pair, (mean, cell) in found.items() if mean >= 0.85 * best]
-    _, (a, b), mean = min(good)
-    return Lattice(a, b, mean)
+    _, (first, second), mean = min(good)
+    return Lattice(first, second, mean)
 
 
 def _reduce(one: NDArray[np.intp], other: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
