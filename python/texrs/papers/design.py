@@ -48,9 +48,11 @@ from texrs._arrays import as_float, as_image, as_int, as_seed, as_size, as_wrap,
 from texrs._typing import Array, Bools, Floats, Labels, Progress
 from texrs.blend import SCREENING, blend, visibility
 from texrs.deform import (
-    CORE,
     RING,
+    Element,
     Flip,
+    Heap,
+    Operation,
     Placement,
     elements_of,
     fit,
@@ -330,47 +332,58 @@ def deform(source: Source, seed: int, number: int) -> tuple[Canvas, Flip, list[A
     # The background takes one of the mirrors, and the elements are cut out of the mirrored picture.
     base = flips[int(uniform(seed, number, 0, 0, 1) * len(flips))]
     picture, labels = flip(source.guide, base), flip(parts.elements, base)
-    still = resting(parts, seed, number)
-    # On a lattice every element has its place, which another one may take: nothing is left open.
-    canvas = Canvas.whole(picture) if parts.lattice else Canvas.background(picture, labels, still)
+    elements = elements_of(labels)
+    still, filled = resting(parts, seed, number), is_filled(parts)
+    heap = Heap.of(elements, labels) if is_heap(parts) else None
+    # Where all is full, an element has its place, which another one may take: nothing is left open.
+    canvas = Canvas.whole(picture) if filled else Canvas.background(picture, labels)
     log: list[dict[str, Any]] = [{"element": 0, "mirror": list(base)}]
-    for element in elements_of(labels):
+    for site, element in enumerate(elements):
+        moved: tuple[Element, list[Operation], Placement] | None = None
         if element.label in still:
-            log.append({"element": element.label, "operations": []})
-            continue
-        agrees = partial(canvas.agrees, picture) if parts.lattice else None
-        fitted = fit(element, canvas.cores, source.moves, seed, number, agrees)
-        if fitted is None:
-            log.append({"element": element.label, "operations": None})
-            continue
-        operations, placement = fitted
-        if parts.lattice and not operations:
-            log.append({"element": element.label, "operations": []})
-            continue
-        canvas.stitch(picture, labels, placement)
-        log.append(
-            {
-                "element": element.label,
-                "operations": [[o.kind, round(o.amount, 3), o.axis] for o in operations],
+            pass
+        elif heap is not None:
+            moved = heap.take_place(site, source.moves, seed, number)
+        else:
+            agrees = partial(canvas.agrees, picture) if parts.lattice else None
+            fitted = fit(element, canvas.cores, source.moves, seed, number, agrees)
+            moved = None if fitted is None else (element, *fitted)
+        entry: dict[str, Any] = {"element": element.label, "operations": [] if filled else None}
+        if moved is not None:
+            entry = {
+                "element": moved[0].label,
+                "operations": [[o.kind, round(o.amount, 3), o.axis] for o in moved[1]],
             }
-        )
+            if moved[1] or not filled:
+                canvas.stitch(picture, labels, moved[2])
+            if heap is not None:
+                canvas.clear(labels, element, len(canvas.frames) - 1)
+        log.append(entry)
     return canvas, base, log
 
 
 AGREEMENT = 0.6
 """Largest mean difference between the surroundings of an element and those that it comes to, in standard deviations."""
-DENSE, MOVED, COPIED = 0.45, 0.35, 0.6
-"""Share of the image that elements cover from which on they lie in a heap, and the shares that may move of a heap, and
-from place to place of a lattice."""
+DENSE, MOVED = 0.42, 0.7
+"""Share of the image that elements cover from which on they lie in a heap, and the share of places that others may take."""
+
+
+def is_heap(parts: Segmentation) -> bool:
+    """Whether elements lie so near to each other that they can only take each other's places."""
+    covered = bool(np.count_nonzero(parts.elements) > DENSE * parts.elements.size)
+    return parts.children in ("components", "labels") and parts.lattice is None and covered
+
+
+def is_filled(parts: Segmentation) -> bool:
+    """Whether elements only come to lie where others were: in heaps, on lattices, and in a grid."""
+    return parts.lattice is not None or parts.children == "grid" or is_heap(parts)
 
 
 def resting(parts: Segmentation, seed: int, number: int) -> frozenset[int]:
-    """Choose the elements that stay where they are: in a heap most do, or nothing would be left to lie on."""
-    heap = parts.children in ("components", "labels") and np.count_nonzero(parts.elements) > DENSE * parts.elements.size
-    if not (heap or parts.lattice):
+    """Choose the elements that stay where they are."""
+    if not is_filled(parts):
         return frozenset()
-    share = COPIED if parts.lattice else MOVED
-    return frozenset(e for e in range(1, parts.count + 1) if uniform(seed, number, e, 0, 4) >= share)
+    return frozenset(e for e in range(1, parts.count + 1) if uniform(seed, number, e, 0, 4) >= MOVED)
 
 
 @dataclass(slots=True, eq=False)
@@ -387,15 +400,13 @@ class Canvas:
     """The Jacobian of each label."""
 
     @classmethod
-    def background(cls, picture: Floats, labels: Labels, still: frozenset[int]) -> Canvas:
-        """Start from the background: everything but the elements that move and the pixel around them."""
-        from scipy.ndimage import binary_dilation, binary_erosion
+    def background(cls, picture: Floats, labels: Labels) -> Canvas:
+        """Start from the background: everything but the elements and the pixel around them."""
+        from scipy.ndimage import binary_dilation
 
-        rest = np.isin(labels, sorted(still))
-        covered = ~binary_dilation((labels > 0) & ~rest, np.ones((3, 3), bool)) | rest
         start = SourceMap.identity(labels.shape)
-        cores: Bools = binary_erosion(rest, np.ones((3, 3), bool), iterations=int(CORE), border_value=1)
-        return cls(picture.copy(), start.coordinates, start.label, covered, cores, [np.eye(2)])
+        covered: Bools = ~binary_dilation(labels > 0, np.ones((3, 3), bool))
+        return cls(picture.copy(), start.coordinates, start.label, covered, np.zeros_like(covered), [np.eye(2)])
 
     @classmethod
     def whole(cls, picture: Floats) -> Canvas:
@@ -412,6 +423,16 @@ class Canvas:
         there = gather(picture, placement.coordinates, interpolation="nearest")
         difference = np.abs(there - self.colours[placement.window]).mean(axis=-1)[ring].mean()
         return bool(difference < AGREEMENT * picture.std(axis=(0, 1)).mean())
+
+    def clear(self, labels: Labels, element: Element, label: int) -> None:
+        """Open what is left of an element whose place another one has taken, but for a rim of a pixel."""
+        from scipy.ndimage import binary_opening
+
+        low = np.maximum(element.origin.astype(int), 0)
+        high = element.origin.astype(int) + element.distance.shape
+        window = (slice(low[0], high[0]), slice(low[1], high[1]))
+        left = (labels[window] == element.label) & (self.label[window] != label)
+        self.covered[window] &= ~binary_opening(left, np.ones((2, 2), bool))
 
     def stitch(self, picture: Floats, labels: Labels, placement: Placement) -> None:
         """Cut an element and its ring into the canvas (Eq. 3)."""
