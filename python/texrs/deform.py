@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -137,6 +137,11 @@ class Moves:
     chaos: float
     shifts: tuple[tuple[int, int], ...] = ()
     """The only translations allowed, (row, column) in pixels, if there are any: those of a lattice."""
+
+    def flipped(self, axes: Flip) -> Moves:
+        """Give the moves in a mirrored picture: those of its lattice are mirrored too."""
+        shifts = tuple((-r if axes[0] else r, -c if axes[1] else c) for r, c in self.shifts)
+        return replace(self, shifts=shifts)
 
     def values(self, seed: int, variant: int, element: int) -> Iterator[float]:
         """Give the chaotic values of one element of one variant; each has a start of its own."""
@@ -375,7 +380,7 @@ class Heap:
     ) -> tuple[Element, list[Operation], Placement] | None:
         """Find an element that can lie where another one does, turned and scaled to its shape; None if none can."""
         place_of = self.elements[site]
-        if any(place_of.touches) or not moves.operations:
+        if any(place_of.touches) or not (moves.operations and moves.translate):
             return None
         values = moves.values(seed, variant, place_of.label)
         likely = self.takers(site, moves)

@@ -289,8 +289,9 @@ def contrast(rgb: Floats) -> Floats:
     lab = rgb2lab(rgb).astype(np.float32) / 100
     square = np.zeros(rgb.shape[:2], np.float32)
     for channel in range(3):
-        smooth = gaussian_filter(lab[..., channel], CONTRAST)
-        for slope in np.gradient(smooth):
+        for axis in range(2):
+            order = [int(axis == a) for a in range(2)]
+            slope = gaussian_filter(lab[..., channel], CONTRAST, order=order)
             square += slope * slope
     return np.sqrt(square)
 

@@ -52,6 +52,8 @@ def lattice(guide: Floats) -> Lattice | None:
     from scipy.ndimage import gaussian_filter
 
     height, width = guide.shape[:2]
+    if min(height, width) < 4 * SHORTEST:
+        return None
     top, left = max(0, height - WINDOW) // 2, max(0, width - WINDOW) // 2
     light = guide[top : top + WINDOW, left : left + WINDOW].mean(axis=-1, dtype=np.float32)
     if light.std() < 1e-4:

@@ -1,0 +1,153 @@
+"""Elements deformed and stitched over the background: sections 3.3 and 3.4 of `texrs.design`.
+
+Elements that lie apart are moved, and leave holes. In a heap, on a lattice and in a grid all is full: there an element comes
+to lie where another one was, cut into the picture as it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Bools, Floats, Labels
+from texrs.deform import RING, Element, Flip, Heap, Operation, Placement, elements_of, fit, flip
+from texrs.kernels.gather import gather
+from texrs.kernels.noise import uniform
+from texrs.kernels.seam import cut
+from texrs.papers._design_source import Source
+from texrs.segment import Segmentation
+from texrs.source_map import SourceMap
+
+__all__ = ["Canvas", "deform"]
+
+
+def deform(source: Source, seed: int, number: int) -> tuple[Canvas, Flip, list[Any]]:
+    """Deform each element, and stitch them over the background by graph cut."""
+    parts, flips = source.parts, source.flips
+    # The background takes one of the mirrors, and the elements are cut out of the mirrored picture.
+    base = flips[int(uniform(seed, number, 0, 0, 1) * len(flips))]
+    picture, labels = flip(source.guide, base), flip(parts.elements, base)
+    elements, moves = elements_of(labels), source.moves.flipped(base)
+    still, filled = resting(parts, seed, number), is_filled(parts)
+    heap = Heap.of(elements, labels) if is_heap(parts) else None
+    # Where all is full, an element has its place, which another one may take: nothing is left open.
+    canvas = Canvas.whole(picture) if filled else Canvas.background(picture, labels)
+    log: list[dict[str, Any]] = [{"element": 0, "mirror": list(base)}]
+    for site, element in enumerate(elements):
+        moved: tuple[Element, list[Operation], Placement] | None = None
+        if element.label in still:
+            pass
+        elif heap is not None:
+            moved = heap.take_place(site, moves, seed, number)
+        else:
+            agrees = partial(canvas.agrees, picture) if parts.lattice else None
+            fitted = fit(element, canvas.cores, moves, seed, number, agrees)
+            moved = None if fitted is None else (element, *fitted)
+        entry: dict[str, Any] = {"element": element.label, "operations": [] if filled else None}
+        if moved is not None:
+            entry = {
+                "element": moved[0].label,
+                "operations": [[o.kind, round(o.amount, 3), o.axis] for o in moved[1]],
+            }
+            if moved[1] or not filled:
+                canvas.stitch(picture, labels, moved[2])
+            if heap is not None:
+                canvas.clear(labels, element, len(canvas.frames) - 1)
+        log.append(entry)
+    return canvas, base, log
+
+
+AGREEMENT = 0.6
+"""Largest mean difference between the surroundings of an element and those that it comes to, in standard deviations."""
+DENSE, MOVED = 0.42, 0.7
+"""Share of the image that elements cover from which on they lie in a heap, and the share of places that others may take."""
+
+
+def is_heap(parts: Segmentation) -> bool:
+    """Whether elements lie so near to each other that they can only take each other's places."""
+    covered = bool(np.count_nonzero(parts.elements) > DENSE * parts.elements.size)
+    return parts.children in ("components", "labels") and parts.lattice is None and covered
+
+
+def is_filled(parts: Segmentation) -> bool:
+    """Whether elements only come to lie where others were: in heaps, on lattices, and in a grid."""
+    return parts.lattice is not None or parts.children == "grid" or is_heap(parts)
+
+
+def resting(parts: Segmentation, seed: int, number: int) -> frozenset[int]:
+    """Choose the elements that stay where they are."""
+    if not is_filled(parts):
+        return frozenset()
+    return frozenset(e for e in range(1, parts.count + 1) if uniform(seed, number, e, 0, 4) >= MOVED)
+
+
+@dataclass(slots=True, eq=False)
+class Canvas:
+    """A picture in the making: colours, where they come from, and what is covered (the mask of Eq. 4)."""
+
+    colours: Floats
+    coordinates: Floats
+    label: NDArray[np.uint32]
+    covered: Bools
+    cores: Bools
+    """What the elements that are placed are tied to."""
+    frames: list[NDArray[np.float64]]
+    """The Jacobian of each label."""
+
+    @classmethod
+    def background(cls, picture: Floats, labels: Labels) -> Canvas:
+        """Start from the background: everything but the elements and the pixel around them."""
+        from scipy.ndimage import binary_dilation
+
+        start = SourceMap.identity(labels.shape)
+        covered: Bools = ~binary_dilation(labels > 0, np.ones((3, 3), bool))
+        return cls(picture.copy(), start.coordinates, start.label, covered, np.zeros_like(covered), [np.eye(2)])
+
+    @classmethod
+    def whole(cls, picture: Floats) -> Canvas:
+        """Start from the whole picture, which any element may cover."""
+        start = SourceMap.identity(picture.shape[:2])
+        everywhere = np.ones(picture.shape[:2], bool)
+        return cls(picture.copy(), start.coordinates, start.label, everywhere, ~everywhere, [np.eye(2)])
+
+    def agrees(self, picture: Floats, placement: Placement) -> bool:
+        """Whether the surroundings of an element are much like what it comes to lie on."""
+        ring = (placement.distance < 0) & (placement.distance > -RING) & placement.inside
+        if not ring.any():
+            return False
+        there = gather(picture, placement.coordinates, interpolation="nearest")
+        difference = np.abs(there - self.colours[placement.window]).mean(axis=-1)[ring].mean()
+        return bool(difference < AGREEMENT * picture.std(axis=(0, 1)).mean())
+
+    def clear(self, labels: Labels, element: Element, label: int) -> None:
+        """Open what is left of an element whose place another one has taken, but for a rim of a pixel."""
+        from scipy.ndimage import binary_opening
+
+        low = np.maximum(element.origin.astype(int), 0)
+        high = element.origin.astype(int) + element.distance.shape
+        window = (slice(low[0], high[0]), slice(low[1], high[1]))
+        left = (labels[window] == element.label) & (self.label[window] != label)
+        self.covered[window] &= ~binary_opening(left, np.ones((2, 2), bool))
+
+    def stitch(self, picture: Floats, labels: Labels, placement: Placement) -> None:
+        """Cut an element and its ring into the canvas (Eq. 3)."""
+        window, core = placement.window, placement.core
+        # Of its surroundings only background comes along: pieces of other elements would be torn ones.
+        ground = gather(labels, placement.coordinates, interpolation="nearest") == 0
+        offered = ((placement.distance > -1) | ((placement.distance > -RING) & ground)) & placement.inside
+        colours = gather(picture, placement.coordinates, interpolation="cubic")
+        known = self.covered[window]
+        taken = offered
+        if (offered & known).any():
+            old_core = self.cores[window] & known & ~core
+            taken = cut(self.colours[window], colours, known, offered, core_a=old_core, core_b=core).mask & offered
+        self.colours[window][taken] = colours[taken]
+        self.coordinates[window][taken] = placement.coordinates[taken]
+        self.label[window][taken] = len(self.frames)
+        self.covered[window] |= taken
+        self.cores[window] |= core
+        self.frames.append(placement.frame)
