@@ -106,7 +106,7 @@ def test_heaps_move_without_holes_to_speak_of():
     beans = samples.beans((128, 128)).image
     made = texrs.design(beans, 96, tiles=2, seed=1)
     moved = [e for e in made.report["operations"][0][1:] if e["operations"]]
-    assert len(moved) >= 0.2 * made.report["elements"]
+    assert len(moved) >= 0.15 * made.report["elements"]
     assert max(made.report["holes"]) < 0.1
 
 

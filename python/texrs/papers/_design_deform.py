@@ -6,6 +6,7 @@ to lie where another one was, cut into the picture as it is.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -14,24 +15,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Bools, Floats, Labels
-from texrs.deform import RING, Element, Flip, Heap, Operation, Placement, elements_of, fit, flip
+from texrs.deform import RING, Element, Flip, Heap, Moves, Operation, Placement, elements_of, fit, flip
 from texrs.kernels.gather import gather
 from texrs.kernels.noise import uniform
 from texrs.kernels.seam import cut
-from texrs.papers._design_source import Source
 from texrs.segment import Segmentation
 from texrs.source_map import SourceMap
 
 __all__ = ["Canvas", "deform"]
 
 
-def deform(source: Source, seed: int, number: int) -> tuple[Canvas, Flip, list[Any]]:
+def deform(
+    guide: Floats, parts: Segmentation, moves: Moves, flips: Sequence[Flip], seed: int, number: int
+) -> tuple[Canvas, Flip, list[Any]]:
     """Deform each element, and stitch them over the background by graph cut."""
-    parts, flips = source.parts, source.flips
     # The background takes one of the mirrors, and the elements are cut out of the mirrored picture.
     base = flips[int(uniform(seed, number, 0, 0, 1) * len(flips))]
-    picture, labels = flip(source.guide, base), flip(parts.elements, base)
-    elements, moves = elements_of(labels), source.moves.flipped(base)
+    picture, labels = flip(guide, base), flip(parts.elements, base)
+    elements, moves = elements_of(labels), moves.flipped(base)
     still, filled = resting(parts, seed, number), is_filled(parts)
     heap = Heap.of(elements, labels) if is_heap(parts) else None
     # Where all is full, an element has its place, which another one may take: nothing is left open.

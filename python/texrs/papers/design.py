@@ -54,7 +54,7 @@ from texrs.deform import (
 from texrs.errors import InvalidInput
 from texrs.kernels.complete import complete
 from texrs.kernels.gather import gather
-from texrs.papers._design_deform import deform
+from texrs.papers._design_deform import Canvas, deform
 from texrs.papers._design_literal import Layered, start, stitch_layers
 from texrs.papers._design_source import Source, as_shares, check_moves, check_sources, to_unit_together
 from texrs.quilt import Picture, quilt
@@ -275,7 +275,11 @@ def variant(source: Source, shapes: tuple[tuple[int, ...], ...], which: int, see
     """Deform the elements, or the layers to the letter, and fill what is left open."""
     guide, flips = source.guide, source.flips
     shape = guide.shape[:2]
-    canvas, base, log = deform_layers(source, which, seed, number) if source.paper else deform(source, seed, number)
+    canvas: Layered | Canvas
+    if source.paper:
+        canvas, base, log = deform_layers(source, which, seed, number)
+    else:
+        canvas, base, log = deform(guide, source.parts, source.moves, flips, seed, number)
     holes = ~canvas.covered
     deformed = np.where(holes[..., np.newaxis], np.float32(0), canvas.colours)
     coordinates = flip_coordinates(canvas.coordinates, base, shape)
