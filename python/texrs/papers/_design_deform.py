@@ -1,7 +1,8 @@
 """Elements deformed and stitched over the background: sections 3.3 and 3.4 of `texrs.design`.
 
 Elements that lie apart are moved, and leave holes. In a heap, on a lattice and in a grid all is full: there an element comes
-to lie where another one was, cut into the picture as it is.
+to lie where another one was, cut into the picture as it is. In a heap of leaves, of which none has another one's shape, most
+rest, or there would be nothing left to lie on.
 """
 
 from __future__ import annotations
@@ -9,17 +10,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Bools, Floats, Labels
-from texrs.deform import RING, Element, Flip, Heap, Moves, Operation, Placement, elements_of, fit, flip
+from texrs.deform import CORE, RING, Element, Flip, Heap, Moves, Operation, Placement, elements_of, fit, flip
 from texrs.kernels.gather import gather
 from texrs.kernels.noise import uniform
 from texrs.kernels.seam import cut
 from texrs.segment import Segmentation
+from texrs.segment.elements import solidity
 from texrs.source_map import SourceMap
 
 __all__ = ["Canvas", "deform"]
@@ -33,10 +35,11 @@ def deform(
     base = flips[int(uniform(seed, number, 0, 0, 1) * len(flips))]
     picture, labels = flip(guide, base), flip(parts.elements, base)
     elements, moves = elements_of(labels), moves.flipped(base)
-    still, filled = resting(parts, seed, number), is_filled(parts)
-    heap = Heap.of(elements, labels) if is_heap(parts) else None
+    lie = arrangement(parts)
+    still, filled = resting(lie, parts.count, seed, number), lie in ("heap", "full")
+    heap = Heap.of(elements, labels) if lie == "heap" else None
     # Where all is full, an element has its place, which another one may take: nothing is left open.
-    canvas = Canvas.whole(picture) if filled else Canvas.background(picture, labels)
+    canvas = Canvas.whole(picture) if filled else Canvas.background(picture, labels, still)
     log: list[dict[str, Any]] = [{"element": 0, "mirror": list(base)}]
     for site, element in enumerate(elements):
         moved: tuple[Element, list[Operation], Placement] | None = None
@@ -48,7 +51,10 @@ def deform(
             agrees = partial(canvas.agrees, picture) if parts.lattice else None
             fitted = fit(element, canvas.cores, moves, seed, number, agrees)
             moved = None if fitted is None else (element, *fitted)
-        entry: dict[str, Any] = {"element": element.label, "operations": [] if filled else None}
+        entry: dict[str, Any] = {
+            "element": element.label,
+            "operations": [] if filled or element.label in still else None,
+        }
         if moved is not None:
             entry = {
                 "element": moved[0].label,
@@ -64,26 +70,28 @@ def deform(
 
 AGREEMENT = 0.6
 """Largest mean difference between the surroundings of an element and those that it comes to, in standard deviations."""
-DENSE, MOVED = 0.42, 0.7
-"""Share of the image that elements cover from which on they lie in a heap, and the share of places that others may take."""
+DENSE, RAGGED = 0.42, 0.825
+"""Share of the image that elements cover from which on they lie in a heap, and the solidity below which few of them have the
+shape of another one: leaves and flowers, which move as if they lay apart."""
+MOVED, MOVED_RAGGED = 0.7, 0.25
+"""Share of places that others may take, and share of a heap of leaves that moves."""
+
+Arrangement: TypeAlias = Literal["apart", "leaves", "heap", "full"]
 
 
-def is_heap(parts: Segmentation) -> bool:
-    """Whether elements lie so near to each other that they can only take each other's places."""
-    covered = bool(np.count_nonzero(parts.elements) > DENSE * parts.elements.size)
-    return parts.children in ("components", "labels") and parts.lattice is None and covered
+def arrangement(parts: Segmentation) -> Arrangement:
+    """Tell how elements lie: apart, in a heap, of leaves or of things of one shape, or on a lattice or grid, which is full."""
+    if parts.lattice is not None or parts.children == "grid":
+        return "full"
+    if parts.children == "none" or np.count_nonzero(parts.elements) <= DENSE * parts.elements.size:
+        return "apart"
+    return "heap" if solidity(parts.elements) >= RAGGED else "leaves"
 
 
-def is_filled(parts: Segmentation) -> bool:
-    """Whether elements only come to lie where others were: in heaps, on lattices, and in a grid."""
-    return parts.lattice is not None or parts.children == "grid" or is_heap(parts)
-
-
-def resting(parts: Segmentation, seed: int, number: int) -> frozenset[int]:
+def resting(lie: Arrangement, count: int, seed: int, number: int) -> frozenset[int]:
     """Choose the elements that stay where they are."""
-    if not is_filled(parts):
-        return frozenset()
-    return frozenset(e for e in range(1, parts.count + 1) if uniform(seed, number, e, 0, 4) >= MOVED)
+    share = {"apart": 1.0, "leaves": MOVED_RAGGED, "heap": MOVED, "full": MOVED}[lie]
+    return frozenset(e for e in range(1, count + 1) if uniform(seed, number, e, 0, 4) >= share)
 
 
 @dataclass(slots=True, eq=False)
@@ -100,13 +108,15 @@ class Canvas:
     """The Jacobian of each label."""
 
     @classmethod
-    def background(cls, picture: Floats, labels: Labels) -> Canvas:
-        """Start from the background: everything but the elements and the pixel around them."""
-        from scipy.ndimage import binary_dilation
+    def background(cls, picture: Floats, labels: Labels, still: frozenset[int]) -> Canvas:
+        """Start from the background: everything but the elements that move and the pixel around them."""
+        from scipy.ndimage import binary_dilation, binary_erosion
 
+        rest = np.isin(labels, sorted(still))
         start = SourceMap.identity(labels.shape)
-        covered: Bools = ~binary_dilation(labels > 0, np.ones((3, 3), bool))
-        return cls(picture.copy(), start.coordinates, start.label, covered, np.zeros_like(covered), [np.eye(2)])
+        covered: Bools = ~binary_dilation((labels > 0) & ~rest, np.ones((3, 3), bool)) | rest
+        cores: Bools = binary_erosion(rest, np.ones((3, 3), bool), iterations=int(CORE), border_value=1)
+        return cls(picture.copy(), start.coordinates, start.label, covered, cores, [np.eye(2)])
 
     @classmethod
     def whole(cls, picture: Floats) -> Canvas:
