@@ -21,8 +21,9 @@ Departures, with their reasons:
   minimum cut makes a wholly overlapped element vanish.
 - Cut costs are divided by the local gradient (Kwatra et al., SIGGRAPH 2003), and raised inside elements, so seams run
   between them.
-- Where elements lie in a heap they take each other's places, turned and scaled to the shape that they fill: a heap whose
-  elements move leaves nothing for them to lie on. An element brings only background along, not pieces of its neighbours.
+- Where elements of one shape lie in a heap they take each other's places, turned and scaled to the shape that they fill; in a
+  heap of leaves most rest. If all moved there would be nothing left to lie on. An element brings only background along, not
+  pieces of its neighbours.
 - Holes are filled with background alone where the example has enough of it.
 - Nothing is turned where the example has directions of its own (bark, brickwork); where it repeats on a lattice, elements
   move from place to place of the lattice and nowhere else.
