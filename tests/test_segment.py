@@ -7,7 +7,7 @@ from texrs import samples
 from texrs._rust import set_threads
 from texrs.errors import InvalidInput
 from texrs.segment import segment
-from texrs.segment.elements import Shapes, creases, find, solidity
+from texrs.segment.elements import Shapes, creases, find, solidity, whole
 from texrs.segment.regularity import direction, lattice
 
 
@@ -58,6 +58,17 @@ def test_a_mark_on_a_thing_is_part_of_it():
     found = find(ring, np.zeros((60, 60), np.float32))
     assert found.max() == 1
     assert found[30, 30] == 1
+
+
+def test_the_lit_part_of_a_thing_stands_for_it():
+    rows, columns = np.mgrid[:60, :120]
+    far = np.hypot(rows - 30, columns - 30)
+    crescent = (far < 20) & (np.hypot(rows - 26, columns - 24) > 16)
+    elements = crescent.astype(np.int32)
+    assert whole(elements).sum() > 1.3 * crescent.sum()
+    # Not over another element.
+    elements[20:24, 20:24] = 2
+    assert (whole(elements) == elements).all()
 
 
 def test_hulls_come_out_at_most_two_per_cent_too_large():

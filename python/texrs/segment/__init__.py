@@ -139,7 +139,7 @@ def segment(
     if children != "grid":
         found, elements, trouble = _best_background(found, rgb)
         if children == "components" or not trouble:
-            return Segmentation(found, elements, "components", "; ".join(reasons), regular)
+            return Segmentation(found, _elements.whole(elements), "components", "; ".join(reasons), regular)
         reasons.insert(0, trouble)
     return Segmentation(found, _grid(height, width), "grid", "; ".join(reasons), regular)
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from texrs._typing import Bools, Floats, Labels
 
-__all__ = ["Evidence", "contrast", "creases", "evidence", "find", "solidity"]
+__all__ = ["Evidence", "contrast", "creases", "evidence", "find", "solidity", "whole"]
 
 CREASE = 1.5
 """Standard deviation in pixels of the Gaussian under which creases are looked for."""
@@ -32,6 +32,8 @@ HOLE = 0.5
 """Share of an element's area below which a hole in it is filled."""
 ROUND = 0.92
 """Solidity from which on a hole is taken for a mark on a thing, not for a gap between things."""
+CRESCENT = 0.75
+"""Solidity below which an element is taken for the lit part of a thing."""
 CONTRAST, CLEAR = 2.0, 2
 """Standard deviation of the Gaussian under which contrasts are looked for, and how far inside is away from an outline."""
 LEAST_AREA, LEAST_SHARE = 20.0, 0.0015
@@ -258,6 +260,29 @@ def _fill_holes(elements: Labels) -> Labels:
     fill = np.where((around > 0) & (np.bincount(hole, minlength=count + 1) < HOLE * area[around]), around, 0)
     fill[0] = 0
     return np.where(elements > 0, elements, fill[holes]).astype(np.int32)
+
+
+def whole(elements: Labels) -> Labels:
+    """Fill the hulls of crescents: of a shaded thing, as of a bubble, only a part has the colour of the layer.
+
+    Crescents that touch are of one thing. A hull that other elements reach into is left as it is.
+    """
+    from scipy.ndimage import find_objects, label
+    from skimage.morphology import convex_hull_image
+
+    thin = Shapes.of(elements).solidity() < CRESCENT
+    thin[0] = False
+    crescents, _ = label(thin[elements], SQUARE)
+    result = elements.copy()
+    for number, box in enumerate(find_objects(crescents), start=1):
+        mine = crescents[box] == number
+        names = np.unique(elements[box][mine])
+        hull = convex_hull_image(mine)
+        if np.isin(result[box][hull], (0, *names)).all():
+            result[box][hull] = names[0]
+    present = np.bincount(result.ravel()) > 0
+    present[0] = False
+    return np.where(present, np.cumsum(present), 0).astype(np.int32)[result]
 
 
 # --- evidence --------------------------------------------------------------------------------------------------------
