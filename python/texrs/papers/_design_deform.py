@@ -1,6 +1,6 @@
 """Elements deformed and stitched over the background: sections 3.3 and 3.4 of `texrs.design`.
 
-Elements that lie apart are moved, and leave holes. In a heap, on a lattice and in a grid all is full: there an element comes
+Elements that lie apart are moved, and leave holes. In a heap and on a lattice all is full: there an element comes
 to lie where another one was, cut into the picture as it is. In a heap of leaves, of which none has another one's shape, most
 rest, or there would be nothing left to lie on.
 """
@@ -60,6 +60,10 @@ def deform(
                 "element": moved[0].label,
                 "operations": [[o.kind, round(o.amount, 3), o.axis] for o in moved[1]],
             }
+            if filled:
+                # The way to another one's place is no operation of the element's own.
+                entry["operations"] = [o for o in entry["operations"] if o[0] != "T"]
+                entry["place"] = [round(sum(o.shift()[axis] for o in moved[1])) for axis in range(2)]
             if moved[1] or not filled:
                 canvas.stitch(picture, labels, moved[2])
             if heap is not None:
@@ -80,10 +84,10 @@ Arrangement: TypeAlias = Literal["apart", "leaves", "heap", "full"]
 
 
 def arrangement(parts: Segmentation) -> Arrangement:
-    """Tell how elements lie: apart, in a heap, of leaves or of things of one shape, or on a lattice or grid, which is full."""
-    if parts.lattice is not None or parts.children == "grid":
+    """Tell how elements lie: apart, in a heap, of leaves or of things of one shape, or on a lattice, which is full."""
+    if parts.lattice is not None:
         return "full"
-    if parts.children == "none" or np.count_nonzero(parts.elements) <= DENSE * parts.elements.size:
+    if parts.children in ("none", "grid") or np.count_nonzero(parts.elements) <= DENSE * parts.elements.size:
         return "apart"
     return "heap" if solidity(parts.elements) >= RAGGED else "leaves"
 
