@@ -7,8 +7,8 @@ Feng, "Completion-based texture design using deformation", 2006, section 3.3.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from texrs.kernels.noise import uniform
 
 __all__ = [
     "Element",
+    "Heap",
     "Moves",
     "Operation",
     "Placement",
@@ -134,6 +135,13 @@ class Moves:
     mirror: bool
     x0: float | None
     chaos: float
+    shifts: tuple[tuple[int, int], ...] = ()
+    """The only translations allowed, (row, column) in pixels, if there are any: those of a lattice."""
+
+    def flipped(self, axes: Flip) -> Moves:
+        """Give the moves in a mirrored picture: those of its lattice are mirrored too."""
+        shifts = tuple((-r if axes[0] else r, -c if axes[1] else c) for r, c in self.shifts)
+        return replace(self, shifts=shifts)
 
     def values(self, seed: int, variant: int, element: int) -> Iterator[float]:
         """Give the chaotic values of one element of one variant; each has a start of its own."""
@@ -156,6 +164,10 @@ class Moves:
 
         ``touches`` says on which axes the exemplar's border cuts the element: it then only slides along that border.
         """
+        if self.shifts:
+            _, h2, h3 = next(values), next(values), next(values)
+            shift = self.shifts[min(int((h2 + h3 / 256) % 16 / 16 * len(self.shifts)), len(self.shifts) - 1)]
+            return [] if any(touches) else [Operation("T", float(n), axis) for axis, n in enumerate(shift) if n]
         allowed = {"T": True, "R": self.rotate > 0, "M": self.mirror, "S": self.scale != (1.0, 1.0)}
         kinds = [kind for kind, may in allowed.items() if may]
         chosen = []
@@ -201,6 +213,8 @@ class Element:
     origin: NDArray[np.float64]
     distance: Floats
     """Signed distance to the element's outline in pixels, positive inside, over a box that starts at ``origin``."""
+    axes: NDArray[np.float64]
+    """Standard deviation along the longest axis and across it, and the angle of that axis in degrees, as R turns."""
 
     @property
     def depth(self) -> float:
@@ -228,6 +242,8 @@ def elements_of(labels: Labels) -> list[Element]:
             columns.start == 0 or columns.stop == width,
         )
         mine = np.argwhere(labels[box] == label)
+        spread, turned = np.linalg.eigh(np.cov(mine.T, bias=True) + np.eye(2) / 12)
+        angle = math.degrees(math.atan2(turned[1, 1], turned[0, 1]))
         found.append(
             Element(
                 label,
@@ -236,6 +252,7 @@ def elements_of(labels: Labels) -> list[Element]:
                 touches,
                 np.array([rows.start - pad, columns.start - pad], np.float64),
                 distance.astype(np.float32),
+                np.array([*np.sqrt(spread[::-1]), angle]),
             )
         )
     return sorted(found, key=lambda e: (not any(e.touches), -e.area, e.label))
@@ -292,9 +309,14 @@ def place(element: Element, operations: Sequence[Operation], shape: tuple[int, i
 
 
 def fit(
-    element: Element, cores: Bools, moves: Moves, seed: int, variant: int
+    element: Element,
+    cores: Bools,
+    moves: Moves,
+    seed: int,
+    variant: int,
+    agrees: Callable[[Placement], bool] | None = None,
 ) -> tuple[list[Operation], Placement] | None:
-    """Draw operations until the element keeps out of the cores that are placed.
+    """Draw operations until the element keeps out of the cores that are placed, and ``agrees`` with where it comes to.
 
     Takes the first good draw, else the best one, which may be not to move at all; None when even that collides.
     """
@@ -307,8 +329,75 @@ def fit(
             continue
         lost = 0.0 if any(element.touches) else max(0.0, 1 - placement.kept)
         score = float((placement.core & cores[placement.window]).sum()) / float(placement.core.sum()) + lost
-        if best is None or score < best[0]:
+        if (best is None or score < best[0]) and (agrees is None or not operations or agrees(placement)):
             best = (score, operations, placement)
-        if score <= GOOD:
-            break
+            if score <= GOOD:
+                break
     return None if best is None or best[0] > BAD else best[1:]
+
+
+ALIKE, TAKERS = 0.8, 4
+"""Least share of two shapes' union that both cover for one to take the other's place, and how many of the most alike may."""
+LONG, SLANT = 1.25, 15.0
+"""How many times longer than wide an element is whose direction counts, and the largest difference of directions where nothing
+is turned, in degrees."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Heap:
+    """Elements that lie so near to each other that they can only take each other's places."""
+
+    elements: Sequence[Element]
+    labels: Labels
+    measures: NDArray[np.float64]
+    """Of each element: logarithms of its side and of its elongation, its angle, and whether the border leaves it whole."""
+
+    @classmethod
+    def of(cls, elements: Sequence[Element], labels: Labels) -> Heap:
+        """Measure elements."""
+        rows = [
+            (math.log(e.area) / 2, math.log(e.axes[0] / e.axes[1]), float(e.axes[2]), not any(e.touches))
+            for e in elements
+        ]
+        return cls(elements, labels, np.array(rows, np.float64).reshape(-1, 4))
+
+    def takers(self, site: int, moves: Moves) -> list[tuple[Element, float, float, bool]]:
+        """Give the elements most like one, how they are turned and scaled to it, and whether any turn would do."""
+        side, long, angle, whole = self.measures.T
+        angle = (angle[site] - angle + 90) % 180 - 90
+        directed = np.minimum(long, long[site]) >= math.log(LONG)
+        turn = np.where(directed & (moves.rotate > 0), angle, 0.0)
+        size = side[site] - side
+        scale = np.clip(size, math.log(moves.scale[0]), math.log(moves.scale[1]))
+        fits = (whole > 0) & (np.abs(turn) <= moves.rotate) & (~directed | (np.abs(angle - turn) <= SLANT))
+        fits[site] = False
+        unlike = np.where(fits, np.abs(size - scale) + np.abs(long[site] - long), np.inf)
+        chosen = np.argsort(unlike, kind="stable")[: min(TAKERS, int(fits.sum()))]
+        return [(self.elements[k], float(turn[k]), math.exp(scale[k]), not directed[k]) for k in chosen]
+
+    def take_place(
+        self, site: int, moves: Moves, seed: int, variant: int
+    ) -> tuple[Element, list[Operation], Placement] | None:
+        """Find an element that can lie where another one does, turned and scaled to its shape; None if none can."""
+        place_of = self.elements[site]
+        if any(place_of.touches) or not (moves.operations and moves.translate):
+            return None
+        values = moves.values(seed, variant, place_of.label)
+        likely = self.takers(site, moves)
+        while likely:
+            h1, h2 = next(values), next(values)
+            other, turn, scale, free = likely.pop(min(int(h1 / 256 * len(likely)), len(likely) - 1))
+            if free:
+                turn = (2 * h2 / 255 - 1) * moves.rotate
+            operations = [Operation("R", turn, 0)] if turn else []
+            operations += [Operation("S", scale, 0)] if scale != 1 else []
+            shift = np.round(place_of.centre - other.centre)
+            operations += [Operation("T", float(n), axis) for axis, n in enumerate(shift) if n]
+            placement = place(other, operations, self.labels.shape)
+            if placement is None:
+                continue
+            shape, there = placement.distance > 0, self.labels[placement.window] == place_of.label
+            both = np.count_nonzero(shape & there)
+            if both >= ALIKE * (np.count_nonzero(shape) + place_of.area - both):
+                return other, operations, placement
+        return None

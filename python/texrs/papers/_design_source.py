@@ -14,6 +14,7 @@ from texrs.deform import Flip, Moves, chaotic_sequence, flip, mirrors
 from texrs.errors import InvalidInput
 from texrs.kernels.patch_search import PatchIndex
 from texrs.segment import Segmentation
+from texrs.segment.regularity import direction
 
 __all__ = ["Source", "as_shares", "check_moves", "check_sources", "to_unit_together"]
 
@@ -116,14 +117,17 @@ class Source:
     ) -> Source:
         """Settle what depends on the exemplar: rotations, the side of a patch, and what holes are filled from."""
         if paper:
-            parts, moves = replace(parts, children="none"), replace(moves, mirror=False)
-        if automatic and parts.children != "grid" and direction(guide) < DIRECTED:
+            parts, moves = replace(parts, children="none", lattice=None), replace(moves, mirror=False)
+        extent = side or patch_side(guide.shape[0], guide.shape[1])
+        flips = mirrors(moves.mirror)
+        if parts.lattice:
+            shifts = parts.lattice.shifts(moves.translate * min(guide.shape[:2])) if moves.translate else []
+            moves = replace(moves, rotate=0.0, scale=(1.0, 1.0), mirror=False, shifts=tuple(shifts))
+        elif automatic and parts.children != "grid" and direction(guide) < DIRECTED:
             moves = replace(moves, rotate=ROTATE)
         if parts.children == "grid":
             # Cells are no elements: turned or scaled they would show their outline.
             moves = replace(moves, rotate=0.0, scale=(1.0, 1.0))
-        extent = side or patch_side(guide.shape[0], guide.shape[1])
-        flips = mirrors(moves.mirror)
         return cls(guide, parts, filling(guide, parts, flips, extent), flips, moves, extent, paper)
 
 
@@ -134,16 +138,6 @@ def patch_side(height: int, width: int) -> int:
 
 ROTATE, DIRECTED = 60.0, 0.25
 """Largest rotation by default, in degrees, and the directedness from which on nothing is turned."""
-
-
-def direction(guide: Floats) -> float:
-    """Give how much the gradients of an image agree in direction: 0 not at all, 1 wholly (structure tensor)."""
-    from scipy.ndimage import gaussian_filter
-
-    rows, columns = np.gradient(gaussian_filter(guide.mean(axis=-1, dtype=np.float64), 1.5))
-    mixed, squares = (rows * columns).mean(), ((rows**2).mean(), (columns**2).mean())
-    total = squares[0] + squares[1]
-    return float(np.hypot(squares[0] - squares[1], 2 * mixed) / total) if total > 0 else 0.0
 
 
 BACKGROUND_PLACES = 64

@@ -21,10 +21,12 @@ Departures, with their reasons:
   minimum cut makes a wholly overlapped element vanish.
 - Cut costs are divided by the local gradient (Kwatra et al., SIGGRAPH 2003), and raised inside elements, so seams run
   between them.
-- Where elements lie in a heap most of them rest: if all moved there would be nothing left for them to lie on, and the holes
-  would be filled with pieces. An element brings only background along, not pieces of its neighbours.
+- Where elements of one shape lie in a heap they take each other's places, turned and scaled to the shape that they fill; in a
+  heap of leaves most rest. If all moved there would be nothing left to lie on. An element brings only background along, not
+  pieces of its neighbours.
 - Holes are filled with background alone where the example has enough of it.
-- Nothing is turned where the example has a direction of its own (bark, brickwork).
+- Nothing is turned where the example has directions of its own (bark, brickwork); where it repeats on a lattice, elements
+  move from place to place of the lattice and nowhere else.
 - A cyclic texture (section 3.5) is stitched on the torus from the start: patches are chosen to fit both sides of the
   wrap, where the paper folds a finished picture that was never chosen to fit.
 - The differences that the colours are corrected to are those of the sources on both sides of a seam, where the paper
@@ -43,29 +45,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_image, as_int, as_seed, as_size, as_wrap, guidance
-from texrs._typing import Array, Bools, Floats, Labels, Progress
+from texrs._typing import Array, Floats, Progress
 from texrs.blend import SCREENING, blend, visibility
 from texrs.deform import (
-    CORE,
-    RING,
     Flip,
-    Placement,
-    elements_of,
-    fit,
-    flip,
     flip_coordinates,
     flip_frame,
 )
 from texrs.errors import InvalidInput
 from texrs.kernels.complete import complete
 from texrs.kernels.gather import gather
-from texrs.kernels.noise import uniform
-from texrs.kernels.seam import cut
+from texrs.papers._design_deform import Canvas, deform
 from texrs.papers._design_literal import Layered, start, stitch_layers
 from texrs.papers._design_source import Source, as_shares, check_moves, check_sources, to_unit_together
 from texrs.quilt import Picture, quilt
 from texrs.report import Synthesis
-from texrs.segment import Children, Segmentation, segment
+from texrs.segment import Children, segment
 from texrs.source_map import SourceMap
 
 __all__ = ["design"]
@@ -131,10 +126,11 @@ def design(  # type: ignore[misc]  # the overloads leave the options to this sig
     operations : int
         Deformations that are combined on each element, 0 to 8 (section 3.3).
     translate : float
-        Longest translation, as a share of the exemplar's shorter side, 0 to 0.5.
+        Longest translation, as a share of the exemplar's shorter side, 0 to 0.5. In a heap and on a lattice elements go as
+        far as the next place that fits, unless this is 0.
     rotate : float, optional
         Largest rotation in degrees, 0 to 180; 0 for textures lit from one side or with letters. By default 60, but 0
-        where the example has a direction of its own (bark, brickwork), or no separate elements.
+        where the example has directions of its own (bark, brickwork), no separate elements, or a lattice.
     scale : (float, float)
         Least and largest scaling, within 0.5 to 2.
     mirror : bool
@@ -280,7 +276,11 @@ def variant(source: Source, shapes: tuple[tuple[int, ...], ...], which: int, see
     """Deform the elements, or the layers to the letter, and fill what is left open."""
     guide, flips = source.guide, source.flips
     shape = guide.shape[:2]
-    canvas, base, log = deform_layers(source, which, seed, number) if source.paper else deform(source, seed, number)
+    canvas: Layered | Canvas
+    if source.paper:
+        canvas, base, log = deform_layers(source, which, seed, number)
+    else:
+        canvas, base, log = deform(guide, source.parts, source.moves, flips, seed, number)
     holes = ~canvas.covered
     deformed = np.where(holes[..., np.newaxis], np.float32(0), canvas.colours)
     coordinates = flip_coordinates(canvas.coordinates, base, shape)
@@ -320,89 +320,6 @@ def deform_layers(source: Source, which: int, seed: int, number: int) -> tuple[L
     x0 = start(moves.x0, moves.chaos, seed, which, number)
     layered = stitch_layers(source.guide, source.parts.elements, x0, moves.chaos)
     return layered, (False, False), layered.log
-
-
-def deform(source: Source, seed: int, number: int) -> tuple[Canvas, Flip, list[Any]]:
-    """Deform each element, and stitch them over the background by graph cut."""
-    parts, flips = source.parts, source.flips
-    # The background takes one of the mirrors, and the elements are cut out of the mirrored picture.
-    base = flips[int(uniform(seed, number, 0, 0, 1) * len(flips))]
-    picture, labels = flip(source.guide, base), flip(parts.elements, base)
-    still = resting(parts, seed, number)
-    canvas = Canvas.background(picture, labels, still)
-    log: list[dict[str, Any]] = [{"element": 0, "mirror": list(base)}]
-    for element in elements_of(labels):
-        if element.label in still:
-            log.append({"element": element.label, "operations": []})
-            continue
-        fitted = fit(element, canvas.cores, source.moves, seed, number)
-        if fitted is None:
-            log.append({"element": element.label, "operations": None})
-            continue
-        operations, placement = fitted
-        canvas.stitch(picture, labels, placement)
-        log.append(
-            {
-                "element": element.label,
-                "operations": [[o.kind, round(o.amount, 3), o.axis] for o in operations],
-            }
-        )
-    return canvas, base, log
-
-
-DENSE, MOVED = 0.45, 0.35
-"""Share of the image that elements cover from which on they lie in a heap, and the share of a heap that moves."""
-
-
-def resting(parts: Segmentation, seed: int, number: int) -> frozenset[int]:
-    """Choose the elements that stay where they are: in a heap most do, or nothing would be left to lie on."""
-    if parts.children in ("none", "grid") or np.count_nonzero(parts.elements) <= DENSE * parts.elements.size:
-        return frozenset()
-    return frozenset(e for e in range(1, parts.count + 1) if uniform(seed, number, e, 0, 4) >= MOVED)
-
-
-@dataclass(slots=True, eq=False)
-class Canvas:
-    """A picture in the making: colours, where they come from, and what is covered (the mask of Eq. 4)."""
-
-    colours: Floats
-    coordinates: Floats
-    label: NDArray[np.uint32]
-    covered: Bools
-    cores: Bools
-    """What the elements that are placed are tied to."""
-    frames: list[NDArray[np.float64]]
-    """The Jacobian of each label."""
-
-    @classmethod
-    def background(cls, picture: Floats, labels: Labels, still: frozenset[int]) -> Canvas:
-        """Start from the background: everything but the elements that move and the pixel around them."""
-        from scipy.ndimage import binary_dilation, binary_erosion
-
-        rest = np.isin(labels, sorted(still))
-        covered = ~binary_dilation((labels > 0) & ~rest, np.ones((3, 3), bool)) | rest
-        start = SourceMap.identity(labels.shape)
-        cores: Bools = binary_erosion(rest, np.ones((3, 3), bool), iterations=int(CORE), border_value=1)
-        return cls(picture.copy(), start.coordinates, start.label, covered, cores, [np.eye(2)])
-
-    def stitch(self, picture: Floats, labels: Labels, placement: Placement) -> None:
-        """Cut an element and its ring into the canvas (Eq. 3)."""
-        window, core = placement.window, placement.core
-        # Of its surroundings only background comes along: pieces of other elements would be torn ones.
-        ground = gather(labels, placement.coordinates, interpolation="nearest") == 0
-        offered = ((placement.distance > -1) | ((placement.distance > -RING) & ground)) & placement.inside
-        colours = gather(picture, placement.coordinates, interpolation="cubic")
-        known = self.covered[window]
-        taken = offered
-        if (offered & known).any():
-            old_core = self.cores[window] & known & ~core
-            taken = cut(self.colours[window], colours, known, offered, core_a=old_core, core_b=core).mask & offered
-        self.colours[window][taken] = colours[taken]
-        self.coordinates[window][taken] = placement.coordinates[taken]
-        self.label[window][taken] = len(self.frames)
-        self.covered[window] |= taken
-        self.cores[window] |= core
-        self.frames.append(placement.frame)
 
 
 # --- the large texture: section 3.1, step 4 --------------------------------------------------------------------------

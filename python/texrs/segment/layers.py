@@ -1,0 +1,60 @@
+"""Layers of an exemplar: regions of one colour, clustered.
+
+A mean-shift filter (Comaniciu and Meer, IEEE PAMI 2002), the graph-based merge of Felzenszwalb and Huttenlocher (IJCV
+2004), and a k-means of the regions' mean colours.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Floats, Labels
+from texrs.kernels.mean_shift import mean_shift
+
+__all__ = ["layers_of"]
+
+SPATIAL_RADIUS, RANGE_RADIUS = 6, 14 / 255
+"""Of the mean-shift filter: pixels, and colour units of [0, 1]."""
+MERGE_SCALE, MERGE_BLUR, MERGE_MINIMUM = 60, 0.4, 24
+"""k, sigma and least area in pixels of the graph-based merge, colours in 0..255."""
+
+
+def layers_of(rgb: Floats, count: int) -> Labels:
+    """Assign each pixel to one of ``count`` layers, the largest first."""
+    from skimage.color import rgb2lab
+    from skimage.segmentation import felzenszwalb
+
+    filtered: Floats = mean_shift(rgb, SPATIAL_RADIUS, RANGE_RADIUS)
+    region = felzenszwalb(filtered.astype(np.float64), MERGE_SCALE, MERGE_BLUR, MERGE_MINIMUM)
+    area = np.bincount(region.ravel()).astype(np.float64)
+    lab = rgb2lab(filtered).reshape(-1, 3)
+    mean = np.stack([np.bincount(region.ravel(), lab[:, c]) / area for c in range(3)], axis=-1)
+    layer = _weighted_k_means(mean, area, min(count, len(area)))
+    share = np.bincount(layer, area)
+    order = np.argsort(-share, kind="stable")
+    rank = np.empty(len(order), np.int32)
+    rank[order] = np.arange(len(order), dtype=np.int32)
+    result: Labels = rank[layer][region]
+    return result
+
+
+def _weighted_k_means(points: NDArray[np.float64], weight: NDArray[np.float64], count: int) -> NDArray[np.intp]:
+    """Cluster weighted points; starts at the heaviest and then the farthest ones, so it needs no randomness."""
+    centres = points[[int(np.argmax(weight))]]
+    while len(centres) < count:
+        distance = ((points[:, None] - centres[None]) ** 2).sum(axis=-1).min(axis=1)
+        if distance.max() < 1e-12:
+            break
+        centres = np.concatenate([centres, points[[int(np.argmax(distance * weight))]]])
+    nearest = np.zeros(len(points), np.intp)
+    for _ in range(100):
+        distance = ((points[:, None] - centres[None]) ** 2).sum(axis=-1)
+        nearest, before = distance.argmin(axis=1), nearest
+        if (nearest == before).all() and _ > 0:
+            break
+        for k in range(len(centres)):
+            mine = nearest == k
+            if mine.any():
+                centres[k] = np.average(points[mine], axis=0, weights=weight[mine])
+    return np.unique(nearest, return_inverse=True)[1]
