@@ -99,6 +99,30 @@ def test_filling_continues_the_texture():
     assert abs(grey[HOLE].mean() - grey[~HOLE].mean()) < 20
 
 
+def test_large_elements_are_not_torn_at_the_far_border():
+    # Stripes wider than a patch: filled row by row, the last patches would meet the lower border with no choice left.
+    rows, columns = np.indices((160, 160))
+    image = np.where((columns + rows // 3) % 56 < 28, 200, 40).astype(np.uint8)
+    hole = np.zeros(image.shape, bool)
+    hole[50:110, 50:110] = True
+    result = texrs.complete(np.where(hole, 128, image).astype(np.uint8), hole, mirror=False)
+    assert (result.image != image)[hole].mean() < 0.01
+
+
+def test_patches_do_not_mirror_or_repeat_what_is_beside_them():
+    image = samples.pebbles((160, 160), seed=2).image
+    hole = disc((160, 160), radius=0.22)
+    result = texrs.complete(image, hole)
+    row, column = places(result)
+    turned = (result.source.frames() != np.eye(2)).any(axis=(2, 3))
+    r, c = np.indices(row.shape)
+    near = np.hypot(row - r, column - c) < 10
+    assert (near & turned & hole).sum() < 0.02 * hole.sum()
+    # No place is shown by more than a few patches of a hole of so many.
+    used = np.bincount((row * 160 + column)[hole])
+    assert (used > 2).sum() < 0.1 * hole.sum()
+
+
 def test_empty_hole_gives_the_image():
     none = np.zeros((96, 112), bool)
     result = texrs.complete(PEBBLES, none)

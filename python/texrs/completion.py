@@ -1,8 +1,9 @@
 """Holes in a picture filled with patches of what is around them, or of another picture.
 
-J. Shen, X. Jin, X. Mao and J. Feng, "Completion-based texture design using deformation", 2006, section 3.4: in scan
-order, the patches that fit best what is known around a hole, each cut into it, and the one with the cheapest cut
-pasted. Here as a verb of its own, for any picture: `texrs.papers.design` fills its own holes in the same way.
+J. Shen, X. Jin, X. Mao and J. Feng, "Completion-based texture design using deformation", 2006, section 3.4: patches
+that fit what is known around a hole, each cut into it, and the one with the cheapest cut pasted; here from the rim of
+the hole inwards, where the paper goes in scan order. A verb of its own, for any picture: `texrs.papers.design` fills its
+own holes in the same way.
 """
 
 from __future__ import annotations
@@ -133,6 +134,7 @@ def complete(
             keep=~grown(open_, width, cyclic),
             wrap=cyclic,
             seed=seed,
+            shown=None if source is not None else 0,
             progress=lambda share: watch("complete", share),
         )
         places, count = pasted(places, filled.label, filled.source, filled.coordinates, flips), len(filled.source)
@@ -215,11 +217,14 @@ def patch_side(free: Bools, chosen: int | None, largest: int) -> int:
 
 def corners(free: Bools, side: int) -> Bools:
     """Mark the top-left corners of the patches that are free of holes."""
-    rows, columns = free.shape
-    counts = np.zeros((rows + 1, columns + 1), np.int64)
-    counts[1:, 1:] = free.cumsum(0).cumsum(1)
-    whole = counts[side:, side:] - counts[:-side, side:] - counts[side:, :-side] + counts[:-side, :-side] == side * side
     found = np.zeros(free.shape, bool)
+    whole, width = free, 1
+    while width < side:
+        # Two overlapping squares of `width` make one that is larger by `step`.
+        step = min(width, side - width)
+        whole = whole[step:] & whole[:-step]
+        whole = whole[:, step:] & whole[:, :-step]
+        width += step
     found[: whole.shape[0], : whole.shape[1]] = whole
     return found
 

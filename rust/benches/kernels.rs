@@ -1,5 +1,6 @@
 //! One criterion root; a group a kernel, sizes and pools as ids.
 
+mod complete;
 mod mean_shift;
 mod patch_search;
 mod poisson;
@@ -54,6 +55,7 @@ fn bench_gather(c: &mut Criterion) {
 criterion_group!(
     benches,
     bench_gather,
+    complete::bench,
     mean_shift::bench,
     patch_search::bench,
     poisson::bench,

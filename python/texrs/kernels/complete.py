@@ -53,12 +53,13 @@ def complete(
     wrap: bool | Sequence[bool] = False,
     seed: int = 0,
     paper: bool = False,
+    shown: int | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Completion:
-    """Fill the unknown pixels of a picture in scan order, patch by patch.
+    """Fill the unknown pixels of a picture from the rim of the holes inwards, patch by patch.
 
-    For each hole: the best matches of what is known around it [1]_, each cut into the known part by a minimum cut
-    [2]_; the one with the cheapest cut is pasted.
+    For each hole: good matches of what is known around it [1]_, less those that would repeat or mirror what lies near;
+    the three most promising are cut into the known part by a minimum cut [2]_, and the cheapest is pasted.
 
     Parameters
     ----------
@@ -73,15 +74,18 @@ def complete(
     keep : (H, W) bool, optional
         Known pixels that no patch may be cut into; by default seams may run through all of them.
     count, separation, ratio
-        How many matches are tried; how far apart they are, in pixels; how much worse than the best they may be.
+        How many matches are considered; how far apart they are, in pixels; how much worse than the best they may be.
     wrap : bool or (rows, columns)
         Axes along which the picture is cyclic.
     seed : int
         Chooses patches where nothing is known.
     paper : bool
-        As Shen, Jin, Mao and Feng (2006) print it: windows centred on the hole instead of those with the best share of
-        known pixels, all known pixels of one weight instead of more beside the hole, and plain cut costs. With
-        ``count=1`` that is their completion.
+        As Shen, Jin, Mao and Feng (2006) print it: holes in scan order, windows centred on them instead of those with
+        the best share of known pixels, all known pixels of one weight instead of more beside the hole, the exact best
+        matches, all of them cut, and plain cut costs. With ``count=1`` that is their completion.
+    shown : int, optional
+        The image of ``index`` that the picture shows in place, if it does: what lies beside a hole is then not repeated
+        or mirrored in it. Patches know of each other in any case, and which images of ``index`` are mirrors of others.
     progress : callable, optional
         Called with the share of the holes that is filled; raising stops the work.
 
@@ -138,6 +142,7 @@ def complete(
         pick,
         as_seed(seed),
         bool(paper),
+        None if shown is None else as_int(shown, "shown", 0, len(index.shapes) - 1),
         progress,
     )
     coordinates = np.zeros((*mask.shape, 2), np.float32)

@@ -60,6 +60,22 @@ impl Map {
         self.absolute + f64::from(f32::EPSILON) * f64::from(cost).abs()
     }
 
+    /// Calls `f` for each position that costs at most `limit`; few do, so they are looked for in strides.
+    fn within(&self, limit: f32, mut f: impl FnMut(usize, usize)) {
+        let width = self.valid[1].max(1);
+        for (i, chunk) in self.costs.chunks(16).enumerate() {
+            let least = chunk
+                .iter()
+                .fold(f32::INFINITY, |a, &b| if b < a { b } else { a });
+            if least <= limit {
+                for (k, _) in chunk.iter().enumerate().filter(|&(_, &cost)| cost <= limit) {
+                    let at = 16 * i + k;
+                    f(at / width, at % width);
+                }
+            }
+        }
+    }
+
     fn update(&mut self) {
         let mut lanes = [f32::INFINITY; 16];
         let (chunks, rest) = self.costs.as_chunks::<16>();
@@ -112,6 +128,7 @@ impl Index {
         self.scratch.give(scratch);
 
         let multipliers = &workspace.multipliers;
+        let spectra = self.spectra();
         let stride = 2 * self.plan.len() * layers;
         let (unit, offset) = prepared.unit();
         workspace.maps.resize_with(blocks.len(), Map::default);
@@ -128,7 +145,7 @@ impl Index {
             }
             let mut scratch = self.scratch.take();
             let written = self.plan.correlate(
-                &self.spectra[b * stride..][..stride],
+                &spectra.values[b * stride..][..stride],
                 multipliers,
                 map.valid,
                 &mut map.costs,
@@ -136,7 +153,7 @@ impl Index {
             );
             self.scratch.give(scratch);
             let (mut correlated, mut rounded, mut level) = (0.0, 0.0, 0.0);
-            for (layer, of) in self.levels[b * layers..][..layers].iter().enumerate() {
+            for (layer, of) in spectra.levels[b * layers..][..layers].iter().enumerate() {
                 let kernel = prepared.kernel(layer);
                 correlated += kernel.norm * of.norm;
                 rounded += kernel.norm * of.mean.abs();
@@ -270,15 +287,13 @@ impl Index {
             if map.least > limit {
                 continue;
             }
-            for (r, row) in map.rows().enumerate() {
-                for (c, _) in row.iter().enumerate().filter(|&(_, &cost)| cost <= limit) {
-                    let (r, c) = (block.corner[0] + r, block.corner[1] + c);
-                    candidates.push(Candidate {
-                        at: [block.exemplar as u32, r as u32, c as u32],
-                        cost: f64::NAN,
-                    });
-                }
-            }
+            map.within(limit, |r, c| {
+                let (r, c) = (block.corner[0] + r, block.corner[1] + c);
+                candidates.push(Candidate {
+                    at: [block.exemplar as u32, r as u32, c as u32],
+                    cost: f64::NAN,
+                });
+            });
         }
         candidates.sort_unstable_by_key(|c| c.at);
         let mut known = scored.iter().peekable();

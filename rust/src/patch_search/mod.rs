@@ -10,10 +10,11 @@
 //! the transforms, which is what makes the bound tight: on photographs it lets a handful of positions through.
 
 mod filter;
+mod half;
 mod maps;
 mod score;
 
-use std::sync::Mutex;
+use std::sync::{Mutex, OnceLock};
 
 use crate::par::{self, Monitor};
 use crate::{Error, Result};
@@ -85,14 +86,22 @@ pub struct Index {
     max_patch: [usize; 2],
     plan: Plan,
     blocks: Vec<Block>,
-    /// Interleaved spectra: of each block the channels, then the squares.
-    spectra: Vec<f32>,
-    /// Mean of each layer of each block, taken out before the transform, and the 2-norm of what is left.
-    levels: Vec<Level>,
+    /// Made by the first search that needs them.
+    spectra: OnceLock<Spectra>,
+    /// The same exemplars at half the resolution, if patches bear it.
+    half: OnceLock<Option<Box<Index>>>,
     mean: Vec<f64>,
     scale: f64,
     workspaces: Pool<Workspace>,
     scratch: Pool<Scratch>,
+}
+
+/// What the filter knows of the exemplars.
+struct Spectra {
+    /// Interleaved: of each block the channels, then the squares.
+    values: Vec<f32>,
+    /// Mean of each layer of each block, taken out before the transform, and the 2-norm of what is left.
+    levels: Vec<Level>,
 }
 
 #[derive(Clone, Copy, Default)]
@@ -124,6 +133,16 @@ impl<T: Default> Pool<T> {
             all.push(one);
         }
     }
+}
+
+/// What a cell holds, made now if it is empty. Made before the cell is locked: a thread of the pool that waited for the lock
+/// might be the one that has to make it. Two that come at once make the same, and the first is kept.
+fn once<T>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> &T {
+    if let Some(made) = cell.get() {
+        return made;
+    }
+    let made = make();
+    cell.get_or_init(|| made)
 }
 
 /// More samples than this in one exemplar cannot be addressed by a candidate.
@@ -163,10 +182,9 @@ impl Index {
                     .map(move |corner| Block { exemplar, corner })
             })
             .collect();
-        let layers = channels + 1;
-        let mut index = Self {
-            spectra: Vec::new(),
-            levels: Vec::new(),
+        Ok(Self {
+            spectra: OnceLock::new(),
+            half: OnceLock::new(),
             exemplars,
             channels,
             max_patch,
@@ -176,27 +194,32 @@ impl Index {
             scale,
             workspaces: Pool(Mutex::default()),
             scratch: Pool(Mutex::default()),
-        };
-        let levels = par::map(index.blocks.len() * layers, |i| {
-            index.level(index.blocks[i / layers], i % layers)
-        });
-        let layer = 2 * index.plan.len();
-        let mut spectra = vec![0.0; layer * levels.len()];
-        par::chunks_mut(&mut spectra, layer, |i, out| {
-            let mut scratch = index.scratch.take();
-            let (block, l) = (index.blocks[i / layers], i % layers);
-            let rows = index.exemplars[block.exemplar].shape[0] - block.corner[0];
-            let row = |r: usize, out: &mut [f32]| {
-                let samples = index.layer_row(block, l, r);
-                for (out, x) in out.iter_mut().zip(samples) {
-                    *out = (x - levels[i].mean) as f32;
-                }
-            };
-            index.plan.spectrum(rows, row, out, &mut scratch);
-            index.scratch.give(scratch);
-        });
-        (index.spectra, index.levels) = (spectra, levels);
-        Ok(index)
+        })
+    }
+
+    fn spectra(&self) -> &Spectra {
+        once(&self.spectra, || {
+            let layers = self.channels + 1;
+            let levels = par::map(self.blocks.len() * layers, |i| {
+                self.level(self.blocks[i / layers], i % layers)
+            });
+            let layer = 2 * self.plan.len();
+            let mut values = vec![0.0; layer * levels.len()];
+            par::chunks_mut(&mut values, layer, |i, out| {
+                let mut scratch = self.scratch.take();
+                let (block, l) = (self.blocks[i / layers], i % layers);
+                let rows = self.exemplars[block.exemplar].shape[0] - block.corner[0];
+                let row = |r: usize, out: &mut [f32]| {
+                    let samples = self.layer_row(block, l, r);
+                    for (out, x) in out.iter_mut().zip(samples) {
+                        *out = (x - levels[i].mean) as f32;
+                    }
+                };
+                self.plan.spectrum(rows, row, out, &mut scratch);
+                self.scratch.give(scratch);
+            });
+            Spectra { values, levels }
+        })
     }
 
     /// Row `r` of a layer of a block: a channel less its mean, or the sum of the squares of all, in units of the scale.
@@ -380,17 +403,24 @@ fn order(a: &Match, b: &Match) -> std::cmp::Ordering {
 
 /// Mean of each channel, and a power of two above all distances from it.
 fn moments(exemplars: &[Exemplar], channels: usize) -> (Vec<f64>, f64) {
-    let pixels = || exemplars.iter().flat_map(|e| e.data.chunks_exact(channels));
-    let count = pixels().count() as f64;
     let mut mean = vec![0.0; channels];
-    for pixel in pixels() {
-        for (m, &x) in mean.iter_mut().zip(pixel) {
-            *m += f64::from(x) / count;
+    let mut range = vec![[f32::INFINITY, f32::NEG_INFINITY]; channels];
+    let mut count = 0;
+    for e in exemplars {
+        for pixel in e.data.chunks_exact(channels) {
+            for ((m, r), &x) in mean.iter_mut().zip(&mut range).zip(pixel) {
+                *m += f64::from(x);
+                *r = [r[0].min(x), r[1].max(x)];
+            }
         }
+        count += e.data.len() / channels;
     }
-    let far = pixels()
-        .flat_map(|p| p.iter().zip(&mean).map(|(&x, m)| (f64::from(x) - m).abs()))
-        .fold(0.0, f64::max);
+    mean.iter_mut().for_each(|m| *m /= count as f64);
+    let far = mean
+        .iter()
+        .zip(range)
+        .flat_map(|(m, r)| r.map(|x| (f64::from(x) - m).abs()));
+    let far = far.fold(0.0, f64::max);
     let scale = if far > 0.0 {
         far.log2().ceil().exp2()
     } else {

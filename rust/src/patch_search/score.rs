@@ -14,6 +14,8 @@ pub(super) struct Prepared {
     patch: Vec<f32>,
     /// A weight for each sample of the patch.
     weight: Vec<f32>,
+    /// Rows with a weight other than zero.
+    weighed: Vec<bool>,
     /// Distances from the exemplars' mean, in units of the largest, where the weight is not zero.
     centred: Vec<f32>,
     largest_weight: f64,
@@ -68,6 +70,10 @@ impl Prepared {
                 self.weight.push(w);
             }
         }
+        let lines = query.weight.chunks_exact(columns);
+        self.weighed.clear();
+        self.weighed
+            .extend(lines.map(|line| line.iter().any(|&w| w > 0.0)));
         Ok(())
     }
 
@@ -190,6 +196,10 @@ impl Prepared {
         let rows = self.patch.chunks_exact(width);
         let rows = rows.zip(self.weight.chunks_exact(width)).enumerate();
         for (r, (patch, weight)) in rows {
+            if !self.weighed[r] {
+                // What adds nothing to any lane.
+                continue;
+            }
             let start = ((at[0] + r) * shape[1] + at[1]) * self.channels;
             let samples = &data[start..][..width];
             let (p, p_rest) = patch.as_chunks::<LANES>();

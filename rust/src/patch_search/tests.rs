@@ -88,6 +88,87 @@ fn a_copied_patch_is_found_where_it_was_taken() {
 }
 
 #[test]
+fn half_the_resolution_finds_what_is_there() {
+    let wave = |r: usize, c: usize| (r as f32 / 5.0).sin() * 90.0 + (c as f32 / 7.0).cos() * 60.0;
+    let mut e = exemplar([90, 81], 1, 5, 40);
+    for (i, x) in e.data.iter_mut().enumerate() {
+        *x += wave(i / 81, i % 81);
+    }
+    let index = Index::new(vec![exemplar([40, 33], 1, 2, 256), e.clone()], 1, [33, 33]).unwrap();
+    let monitor = Monitor::default();
+    for (row, column, side) in [
+        (20, 31, 32),
+        (33, 8, 17),
+        (0, 0, 33),
+        (58, 49, 16),
+        (7, 7, 9),
+    ] {
+        let patch: Vec<f32> = (0..side * side)
+            .map(|i| e.data[(row + i / side) * 81 + column + i % side])
+            .collect();
+        let weight: Vec<f32> = (0..side * side).map(|i| (i % 3) as f32).collect();
+        let query = Query {
+            patch: &patch,
+            weight: &weight,
+            shape: [side; 2],
+        };
+        let pick = Pick {
+            count: 5,
+            separation: 4,
+            ratio: f64::INFINITY,
+        };
+        let by_pool: Vec<_> = [1, 2, 7]
+            .map(|n| {
+                par::install(n, || index.good(&query, &pick, &monitor))
+                    .unwrap()
+                    .unwrap()
+            })
+            .into();
+        assert!(by_pool.iter().all(|found| *found == by_pool[0]));
+        let best = by_pool[0][0];
+        assert_eq!(
+            (best.exemplar, best.row, best.column, best.cost),
+            (1, row, column, 0.0)
+        );
+        assert!(by_pool[0].is_sorted_by(|a, b| order(a, b).is_lt()));
+        for m in &by_pool[0] {
+            assert_eq!(
+                m.cost,
+                index.at(&query, m.exemplar, m.row, m.column).unwrap()
+            );
+        }
+    }
+}
+
+#[test]
+fn half_the_resolution_keeps_to_what_is_allowed() {
+    let mut e = exemplar([64, 64], 2, 5, 256);
+    let mut allowed = vec![false; 64 * 64];
+    for at in [3 * 64 + 5, 21 * 64 + 40, 48 * 64 + 48] {
+        allowed[at] = true;
+    }
+    e.allowed = Some(allowed.clone());
+    let index = Index::new(vec![e], 2, [16, 16]).unwrap();
+    let (patch, weight) = (noise(16 * 16 * 2, 9, 256), vec![1.0; 16 * 16]);
+    let mut query = Query {
+        patch: &patch,
+        weight: &weight,
+        shape: [16, 16],
+    };
+    let pick = Pick {
+        count: 9,
+        ..Pick::default()
+    };
+    let found = index.good(&query, &pick, &Monitor::default()).unwrap();
+    assert_eq!(found.len(), 3);
+    assert!(found.iter().all(|m| allowed[m.row * 64 + m.column]));
+    query.shape = [16, 15];
+    assert!(index.good(&query, &pick, &Monitor::default()).is_err());
+    query.shape = [usize::MAX, 16];
+    assert!(index.good(&query, &pick, &Monitor::default()).is_err());
+}
+
+#[test]
 fn flat_exemplars_and_unknown_patches_give_the_first_positions() {
     let flat = Exemplar {
         data: vec![3.0; 40 * 50],

@@ -30,6 +30,7 @@ pub(super) fn complete<'py>(
     pick: (usize, usize, f64),
     seed: u64,
     paper: bool,
+    shown: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Filled<'py>> {
     let &[rows, columns, channels] = colours.shape() else {
@@ -51,6 +52,7 @@ pub(super) fn complete<'py>(
         },
         seed,
         paper,
+        shown,
     };
     let index = &index.0;
     let filled = run(py, progress, |monitor| {
