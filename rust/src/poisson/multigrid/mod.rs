@@ -172,7 +172,6 @@ fn conjugate_gradients(
             r.iter_mut().zip(ap).for_each(|(r, ap)| *r -= length * ap);
         });
         let left = inner(level, r, r);
-        if std::env::var("DBG").is_ok() { eprintln!("{step} {:.2e}", (left/first).sqrt()); }
         if left <= TOLERANCE * TOLERANCE * first {
             return Ok(x);
         }
