@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -212,47 +212,67 @@ def blend(
     if np.asarray(source).shape != shape:
         raise InvalidInput(f"source: needs the target's shape {shape}, got {np.asarray(source).shape}")
     inside = as_mask(mask, "mask", onto.shape[:2])
-    values, other = _floats(onto, "target"), _floats(taken, "source")
+    values, other = (_numbers(a, n) for a, n in ((onto, "target"), (taken, "source")))
     # With v = source + c no difference is wanted of c, but where the target shows through.
-    correction = values - other
     if inside.all() and screening == 0:
         # Nothing is left of the target but its mean.
+        correction = np.empty(onto.shape, np.float32)
         correction[...] = values.mean((0, 1)) - other.mean((0, 1))
     else:
-        correction[inside] = 0
-    gradients = None
-    if mixed:
-        gradients = (_mixed(values, other, 0), _mixed(values, other, 1))
+        correction = _beyond(values, other, inside)
+    gradients = (_mixed(values, other, 0), _mixed(values, other, 1)) if mixed else None
     rows, columns = ("periodic" if w else "free" for w in as_wrap(wrap))
     weight = as_float(screening, "screening", 0, math.inf)
     solved = _rust.poisson(correction, gradients, weight, (rows, columns), inside, None)
-    np.add(solved, other, out=solved)
-    return _cast(_finite(solved), onto, inside).reshape(shape)
+    result = onto.copy()
+    for band in _bands(len(onto)):
+        part = solved[band]
+        part += other[band]
+        _put(result[band], _finite(part), inside[band])
+    return result.reshape(shape)
 
 
-def _mixed(values: Floats, other: Floats, axis: int) -> Floats:
+def _beyond(values: Array, other: Array, inside: Bools) -> Floats:
+    """Give the differences of two images outside a mask, and 0 under it."""
+    result = np.empty(values.shape, np.float32)
+    for band in _bands(len(values)):
+        part = result[band]
+        with np.errstate(over="ignore", invalid="ignore"):
+            np.subtract(values[band], other[band], out=part, dtype=np.float32)
+            part *= np.repeat(~inside[band], part.shape[-1], axis=1).reshape(part.shape)
+    return result
+
+
+def _mixed(values: Array, other: Array, axis: int) -> Floats:
     """Give by how much the target's differences exceed the source's, where they are the larger ones."""
-    wanted, present = (np.roll(v, -1, axis) - v for v in (other, values))
+    floats = (v.astype(np.float32) for v in (other, values))
+    wanted, present = (np.roll(v, -1, axis) - v for v in floats)
     return np.where(np.abs(present) > np.abs(wanted), present - wanted, np.float32(0))
 
 
-def _cast(solved: Floats, onto: Array, inside: Bools) -> Array:
-    """Give the solution in the dtype of the target, whose own values stay as they are."""
+def _put(onto: Array, solved: Floats, inside: Bools) -> None:
+    """Put the solution into the target under the mask, in the target's dtype."""
     if onto.dtype.kind in "ui" and onto.dtype.itemsize <= 2:
         # Outside the mask the sum of source and correction is the target exactly.
         info = np.iinfo(onto.dtype)
-        np.clip(np.rint(solved, out=solved), info.min, info.max, out=solved)
-        return solved.astype(onto.dtype)
-    result = onto.copy()
-    if onto.dtype == np.bool_:
-        result[inside] = solved[inside] >= 0.5
+        onto[...] = np.clip(np.rint(solved, out=solved), info.min, info.max, out=solved)
+    elif onto.dtype == np.bool_:
+        onto[inside] = solved[inside] >= 0.5
     elif onto.dtype.kind in "ui":
         info = np.iinfo(onto.dtype)
-        rounded = np.rint(solved[inside].astype(np.float64))
-        result[inside] = np.clip(rounded, info.min, info.max).astype(onto.dtype)
+        onto[inside] = np.clip(np.rint(solved[inside].astype(np.float64)), info.min, info.max)
     else:
-        result[inside] = solved[inside].astype(onto.dtype)
-    return result
+        onto[inside] = solved[inside]
+
+
+def _bands(rows: int) -> Iterator[slice]:
+    """Divide rows so that what is made of them stays in the cache."""
+    return (slice(first, first + 32) for first in range(0, rows, 32))
+
+
+def _numbers(array: Array, name: str) -> Array:
+    """Give values that float32 holds; others than float64 as they are."""
+    return _floats(array, name) if array.dtype == np.float64 else array
 
 
 def _gradient(value: object, name: str, image: Floats) -> Floats:

@@ -11,11 +11,13 @@
 mod multigrid;
 mod sweep;
 mod transform;
+mod wide;
 
 use crate::par::{self, Monitor};
 use crate::{Error, Result};
 use sweep::PANEL;
 use transform::Transform;
+use wide::wide;
 
 /// What happens at both ends of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,9 +73,11 @@ pub fn solve(problem: &Problem<'_>, monitor: &Monitor) -> Result<Vec<f32>> {
     let width = columns * channels;
     let mut out = vec![0.0; problem.image.len()];
     par::chunks_mut(&mut out, ROWS * width, |chunk, out| {
-        for (r, out) in out.chunks_exact_mut(width).enumerate() {
-            residual(problem, chunk * ROWS + r, out);
-        }
+        wide(|| {
+            for (r, out) in out.chunks_exact_mut(width).enumerate() {
+                residual(problem, chunk * ROWS + r, out);
+            }
+        });
     });
     spread(&problem.domain, &mut out, monitor)?;
     par::chunks_mut(&mut out, ROWS * width, |chunk, out| {
@@ -90,10 +94,12 @@ pub fn spread(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) -> Resul
     let [rows, columns, _] = domain.shape;
     if !flow.is_empty() {
         match domain.mask {
-            Some(mask) if !mask.iter().all(|&m| m) => match inner_rectangle(mask, [rows, columns]) {
-                Some(window) => cut_out(domain, window, flow, monitor),
-                None => multigrid::spread(domain, mask, flow, monitor)?,
-            },
+            Some(mask) if !mask.iter().all(|&m| m) => {
+                match inner_rectangle(mask, [rows, columns]) {
+                    Some(window) => cut_out(domain, window, flow, monitor),
+                    None => multigrid::spread(domain, mask, flow, monitor)?,
+                }
+            }
             _ => rectangle(domain, flow, monitor),
         }
     }
@@ -170,7 +176,8 @@ impl Domain<'_> {
     }
 }
 
-/// What flows into row `y`, channels last, by the differences that the image lacks.
+/// Adds what flows into row `y`, channels last, by the differences that the image lacks.
+#[inline(always)]
 fn residual(problem: &Problem<'_>, y: usize, out: &mut [f32]) {
     let Domain {
         shape: [rows, columns, channels],
@@ -186,7 +193,6 @@ fn residual(problem: &Problem<'_>, y: usize, out: &mut [f32]) {
     };
     let here = row(y);
     let cyclic = edges[0] == Edge::Wrap;
-    out.fill(0.0);
     if y > 0 || cyclic {
         let before = y + rows - 1;
         lack(out, wanted(0, before), row(before), here, 1.0);
@@ -207,6 +213,7 @@ fn residual(problem: &Problem<'_>, y: usize, out: &mut [f32]) {
 }
 
 /// Adds by how much the differences wanted exceed those from `from` to `to`.
+#[inline(always)]
 fn lack(out: &mut [f32], wanted: Option<&[f32]>, from: &[f32], to: &[f32], sign: f32) {
     let pairs = out.iter_mut().zip(from.iter().zip(to));
     match wanted {
@@ -286,7 +293,7 @@ fn rectangle(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) {
             eigenvalue.map_or(1.0, |e| e + domain.screening)
         });
         let mut scratch = sweep::Scratch::default();
-        sweep::solve(domain.edges[0], &shifts, rows, panel, &mut scratch);
+        wide(|| sweep::solve(domain.edges[0], &shifts, rows, panel, &mut scratch));
         let _ = monitor.advance(present as u64);
     });
 

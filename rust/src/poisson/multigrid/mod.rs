@@ -7,6 +7,7 @@
 
 mod level;
 
+use super::wide::wide;
 use super::{Domain, Edge};
 use crate::par::{self, Monitor};
 use crate::{Error, Result};
@@ -71,7 +72,10 @@ pub(super) fn spread(
         });
         let solution = conjugate_gradients(&levels, &mut vectors, monitor)?;
         par::chunks_mut(flow, columns * channels, |y, out| {
-            out.iter_mut().skip(c).step_by(channels).for_each(|o| *o = 0.0);
+            out.iter_mut()
+                .skip(c)
+                .step_by(channels)
+                .for_each(|o| *o = 0.0);
             if (top..top + height).contains(&y) {
                 let from = &solution[fine.at(y - top, 0)..][..width];
                 let out = out[left * channels + c..].iter_mut().step_by(channels);
@@ -189,17 +193,23 @@ fn conjugate_gradients(
 fn inner(level: &Level, a: &[f32], b: &[f32]) -> f64 {
     let rows = level.chunk();
     let parts = par::map(level.rows.div_ceil(rows), |chunk| {
-        let mut lanes = [0.0f64; 8];
-        for r in chunk * rows..((chunk + 1) * rows).min(level.rows) {
-            let at = level.at(r, 0);
-            let (a, b) = (&a[at..][..level.columns], &b[at..][..level.columns]);
-            for (a, b) in a.chunks(8).zip(b.chunks(8)) {
-                for (lane, (a, b)) in lanes.iter_mut().zip(a.iter().zip(b)) {
+        wide(|| {
+            let mut lanes = [0.0f64; 8];
+            for r in chunk * rows..((chunk + 1) * rows).min(level.rows) {
+                let at = level.at(r, 0);
+                let (a, a_rest) = a[at..][..level.columns].as_chunks::<8>();
+                let (b, b_rest) = b[at..][..level.columns].as_chunks::<8>();
+                for (a, b) in a.iter().zip(b) {
+                    for l in 0..8 {
+                        lanes[l] += f64::from(a[l]) * f64::from(b[l]);
+                    }
+                }
+                for (lane, (a, b)) in lanes.iter_mut().zip(a_rest.iter().zip(b_rest)) {
                     *lane += f64::from(*a) * f64::from(*b);
                 }
             }
-        }
-        lanes.iter().sum::<f64>()
+            lanes.iter().sum::<f64>()
+        })
     });
     parts.iter().sum()
 }
