@@ -35,8 +35,8 @@ REACH = 9.0
 """Strips overlap by this over the root of the screening, in pixels: corrections fall to exp(-9) there."""
 BAND = 64
 """Rows whose values are converted at once."""
-LOOK = 2**24
-"""Pixels whose seams are measured, and 16 times as many as those of an exemplar that they are compared with."""
+LOOK = 2**22
+"""Pixels whose seams are measured, and four times as many as those of an exemplar that they are compared with."""
 
 
 def blend(
@@ -207,9 +207,10 @@ class Samples:
 
     def correct(self, pixels: Array, correction: Floats, channels: slice, kind: str) -> None:
         """Add a correction to channels of pixels in the exemplar's own values, in place."""
+        exact = np.dtype("f4" if pixels.dtype.itemsize <= 2 else "f8")
         for rows in _bands(len(pixels)):
             mine = pixels[rows, :, channels]
-            value = mine.astype(np.float64) + correction[rows].astype(np.float64) * self.span
+            value = mine.astype(exact) + correction[rows].astype(exact) * self.span
             if kind == "normal":
                 vector = 2 * (value - self.low) / self.span - 1
                 vector /= np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), 1e-12)
@@ -437,7 +438,7 @@ def visibility(
 
     Notes
     -----
-    Of a picture of more than 2^24 pixels, bands of rows spread over it are looked at; of an exemplar of more than 2^20,
+    Of a picture of more than 2^22 pixels, bands of rows spread over it are looked at; of an exemplar of more than 2^20,
     rows spread over it.
 
     Examples
@@ -477,7 +478,7 @@ def visibility(
 
 def _steps(image: Array, axis: int) -> NDArray[np.float64]:
     """Give the sizes of an exemplar's differences along an axis; of rows spread over a large one."""
-    every = -(-image.shape[0] * image.shape[1] // (LOOK // 16))
+    every = -(-image.shape[0] * image.shape[1] // (LOOK // 4))
     before = image[::every] if axis == 1 else image[:-1:every]
     after = before[:, 1:] if axis == 1 else image[1::every]
     before = before[:, :-1] if axis == 1 else before
