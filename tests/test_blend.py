@@ -236,11 +236,64 @@ def test_strips_give_the_whole(monkeypatch, patchwork, exemplar, wrap):
     tall = pasted(places, patchwork.shapes)
     image = exemplar.astype(np.float32)
     whole = blend(tall, image, wrap=wrap, screening=0.04)
-    monkeypatch.setattr(noun, "WHOLE", 0)
     monkeypatch.setattr(noun, "STRIP", 100 * 128)
     assert len(list(noun._strips(tall.shape, wrap, 0.04))) == 5
     assert len(list(noun._strips(tall.shape, wrap, 0.0))) == 1
     np.testing.assert_allclose(blend(tall, image, wrap=wrap, screening=0.04), whole, atol=0.02)
+
+
+@pytest.mark.parametrize("kind", ["colour", "normal"])
+def test_without_screening_a_large_picture_is_solved_whole(monkeypatch, patchwork, exemplar, kind):
+    image = exemplar.astype(np.float32) if kind == "colour" else exemplar
+    whole = blend(patchwork, image, wrap=(False, True), screening=0, kind=kind)
+    monkeypatch.setattr(noun, "STRIP", 1000)
+    np.testing.assert_array_equal(blend(patchwork, image, wrap=(False, True), screening=0, kind=kind), whole)
+
+
+def test_an_exemplar_of_many_rows_is_scaled_in_bands(monkeypatch, patchwork, exemplar):
+    whole = blend(patchwork, exemplar, wrap=True)
+    monkeypatch.setattr(noun, "BAND", 7)
+    np.testing.assert_array_equal(blend(patchwork, exemplar, wrap=True), whole)
+
+
+def test_work_can_be_watched_and_stopped(monkeypatch, patchwork, exemplar):
+    places = np.tile(patchwork.coordinates, (5, 1, 1))
+    tall = pasted(places, patchwork.shapes)
+    monkeypatch.setattr(noun, "STRIP", 100 * 128)
+    seen = []
+    blend(tall, exemplar, wrap=True, screening=0.04, progress=lambda stage, share: seen.append((stage, share)))
+    shares = [share for _, share in seen]
+    assert {stage for stage, _ in seen} == {"blend"}
+    assert shares == sorted(shares)
+    assert shares[-1] == 1
+    assert len(shares) >= 5
+
+    def stop(stage, share):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        blend(tall, exemplar, wrap=True, screening=0.04, progress=stop)
+
+
+@pytest.mark.parametrize("wrap", [True, False, (True, False)])
+def test_visibility_does_not_depend_on_bands(monkeypatch, patchwork, exemplar, wrap):
+    image = patchwork.render(exemplar)
+    monkeypatch.setattr(noun, "BAND", 96)
+    whole = visibility(patchwork, exemplar, image, wrap=wrap)
+    pair = (wrap, wrap) if isinstance(wrap, bool) else wrap
+    assert whole.edges == sum(len(noun.seams(patchwork, axis, pair[axis])[0][0]) for axis in range(2))
+    for rows in (1, 7, 64):
+        monkeypatch.setattr(noun, "BAND", rows)
+        banded = visibility(patchwork, exemplar, image, wrap=wrap)
+        assert banded.edges == whole.edges
+        assert banded.outliers == whole.outliers
+        assert abs(banded.mean - whole.mean) < 1e-9
+    # Every fourth row of the picture, every second of the exemplar.
+    monkeypatch.setattr(noun, "BAND", 1)
+    monkeypatch.setattr(noun, "LOOK", 96 * 128 // 4)
+    sampled = visibility(patchwork, exemplar, image, wrap=wrap)
+    assert 0 < sampled.edges < whole.edges
+    assert abs(sampled.mean - whole.mean) < 0.2 * whole.mean
 
 
 SCRIPT = """

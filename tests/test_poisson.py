@@ -55,6 +55,45 @@ def test_the_same_for_any_number_of_threads(masked):
     assert results[0] == results[1] == results[2]
 
 
+@pytest.mark.parametrize("masked", [False, True])
+def test_what_flows_in_is_carried_off(masked):
+    """`spread` is what `solve` adds: here of an image of zeros, whose differences say what flows."""
+    _, rows, columns = problem(8, (40, 37, 2))
+    mask = np.random.default_rng(8).random((40, 37)) < 0.8 if masked else None
+    options = {"screening": 0.02, "boundary": ("periodic", "free"), "mask": mask}
+    flow = np.roll(rows, 1, 0) - rows
+    flow[:, :-1] -= columns[:, :-1]
+    flow[:, 1:] += columns[:, :-1]
+    flow = flow.astype(np.float32)
+    poisson.spread(flow, **options)
+    np.testing.assert_allclose(flow, poisson.solve(np.zeros_like(rows), rows, columns, **options), atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    "wrong", [np.zeros((4, 4), np.float32), np.zeros((4, 4, 1)), np.zeros((4, 8, 1), "f4")[:, ::2]]
+)
+def test_flows_must_be_writeable_in_place(wrong):
+    with pytest.raises(InvalidInput, match="^flow"):
+        poisson.spread(wrong)
+
+
+@pytest.mark.parametrize("masked", [False, True])
+def test_a_solution_can_be_stopped(masked):
+    data = problem(9, (600, 640, 3))
+    mask = np.random.default_rng(9).random((600, 640)) < 0.9 if masked else None
+    poisson.solve(*data, mask=mask, progress=lambda share: None)
+
+    def stop(share):
+        assert 0 <= share <= 1
+        raise KeyboardInterrupt
+
+    flow = np.zeros((4000, 1021, 3), np.float32)
+    flow[::7, ::5] = 1
+    mask = None if mask is None else np.random.default_rng(9).random(flow.shape[:2]) < 0.9
+    with pytest.raises(KeyboardInterrupt):
+        poisson.spread(flow, screening=0, mask=mask, progress=stop)
+
+
 def test_the_mean_is_kept_where_nothing_is_fixed():
     image, rows, columns = problem(5, (40, 41))
     for boundary in ("free", "periodic"):

@@ -15,6 +15,7 @@ __all__ = [
     "mean_shift",
     "philox",
     "poisson",
+    "poisson_spread",
     "seam_cut",
     "seam_labels",
     "seam_strip",
@@ -90,12 +91,19 @@ def encode_image(
 def exif_orientation(exif: bytes) -> int: ...
 def poisson(
     image: NDArray[float32],
-    gradient_rows: NDArray[float32],
-    gradient_columns: NDArray[float32],
+    gradients: tuple[NDArray[float32], NDArray[float32]] | None,
     screening: float,
     edges: tuple[str, str],
     mask: NDArray[bool_] | None,
+    progress: Callable[[float], object] | None,
 ) -> NDArray[float32]: ...
+def poisson_spread(
+    flow: NDArray[float32],
+    screening: float,
+    edges: tuple[str, str],
+    mask: NDArray[bool_] | None,
+    progress: Callable[[float], object] | None,
+) -> None: ...
 def mean_shift(
     image: NDArray[float32],
     radius: int,

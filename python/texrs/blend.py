@@ -11,7 +11,7 @@ material: colours, heights, normals, in any dtype.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_image, as_int, as_wrap
-from texrs._typing import Array, Bools, Floats, Interpolation
+from texrs._typing import Array, Bools, Floats, Interpolation, Progress
 from texrs.errors import InvalidInput
-from texrs.kernels.poisson import Boundary, solve
+from texrs.kernels.poisson import Boundary, spread
 from texrs.source_map import SourceMap
 
 __all__ = ["Visibility", "blend", "visibility"]
@@ -29,12 +29,14 @@ __all__ = ["Visibility", "blend", "visibility"]
 SCREENING = 0.1
 """Weight of the values. On eleven textures the share of outliers across seams is within 0.1 % of that at 0.01, and
 colours averaged over 12 pixels drift by a fifth of what they do there."""
-WHOLE = 2**24
-"""Pixels up to which a picture is solved at once."""
 STRIP = 2**22
-"""Pixels of the strips in which a larger one is solved."""
-REACH = 12.0
-"""Strips overlap by this over the root of the screening, in pixels: corrections fall to exp(-12) there."""
+"""Pixels that are solved at once; up to four times as many where corrections reach far."""
+REACH = 9.0
+"""Strips overlap by this over the root of the screening, in pixels: corrections fall to exp(-9) there."""
+BAND = 64
+"""Rows whose values are converted at once."""
+LOOK = 2**22
+"""Pixels whose seams are measured, and four times as many as those of an exemplar that they are compared with."""
 
 
 def blend(
@@ -47,6 +49,7 @@ def blend(
     interpolation: Interpolation = "cubic",
     kind: Literal["colour", "normal"] = "colour",
     green: Literal["up", "down"] = "up",
+    progress: Progress | None = None,
 ) -> Array:
     """Render a map of the exemplar through a source map, and correct its values so that seams disappear.
 
@@ -73,6 +76,8 @@ def blend(
         As in `SourceMap.render`.
     kind, green
         As in `SourceMap.render`; normals are brought back to unit length.
+    progress : callable, optional
+        Called as ``progress("blend", share)``, with the share that is done; raising stops the work.
 
     Returns
     -------
@@ -90,8 +95,10 @@ def blend(
     Some values have no meaning between them, and come back as `SourceMap.render` gives them: the last of two or of four
     channels (transparency), and whatever is bool, signed integers or ``interpolation="nearest"`` (labels).
 
-    Pictures of more than 2^24 pixels are solved in overlapping strips, so that memory stays within bounds, where the
-    screening lets corrections die out within a strip: at 0.01, up to 2^15 pixels wide.
+    Pictures of more than 2^22 pixels are solved in overlapping strips of rows, so that beside the result at most
+    0.4 GB are needed, if the screening lets corrections die out within a strip: at 0.01, up to 2^15 pixels wide, at
+    0.001, up to 2^13. Others, as all without screening, are solved whole, one channel after another: 8 bytes a pixel,
+    and 24 for normals.
 
     References
     ----------
@@ -127,13 +134,26 @@ def blend(
         return result
     # Seen with a channel axis; what is written to it is written to the result.
     pixels = result.reshape((*source.shape, -1))
-    for part in _strips(source.shape, cyclic[0], weight):
-        piece = _rows(source, part.rows)
-        offer = Look(samples, piece, interpolation, kind, green)
-        correction = _correction(offer, (part.cyclic, cyclic[1]), weight, width)
-        if correction is not None:
-            samples.correct(pixels[part.kept], correction[part.inner], kind)
+    strips = list(_strips(source.shape, cyclic[0], weight))
+    groups = samples.groups(len(strips), math.prod(source.shape), kind)
+    steps = [(part, channels) for part in strips for channels in groups]
+    seen: list[Seam] = []
+    for number, (part, channels) in enumerate(steps):
+        around = (part.cyclic, cyclic[1])
+        if channels == groups[0]:
+            look = Look(samples, _rows(source, part.rows), interpolation, kind, green)
+            seen = [look.across(axis, around[axis]) for axis in range(2)]
+        if any(len(seam.lack) for seam in seen):
+            report = None if progress is None else _share(progress, number, len(steps))
+            correction = _correction(look.source.shape, seen, channels, around, weight, width, report)
+            samples.correct(pixels[part.kept], correction[part.inner], channels, kind)
+        if progress is not None:
+            progress("blend", (number + 1) / len(steps))
     return result
+
+
+def _share(progress: Progress, number: int, steps: int) -> Callable[[float], object]:
+    return lambda share: progress("blend", (number + share) / steps)
 
 
 # --- values ----------------------------------------------------------------------------------------------------------
@@ -170,9 +190,8 @@ class Samples:
             return None
         if not math.isfinite(high - low):
             raise InvalidInput(f"exemplars: the range of values is too large, {low:g} to {high:g}")
-        images = [((e[..., :channels].astype(np.float64) - low) / (high - low)).astype(np.float32) for e in given]
         return cls(
-            images,
+            [_scaled(e[..., :channels], low, high) for e in given],
             low,
             high - low,
             channels,
@@ -180,17 +199,38 @@ class Samples:
             np.max([e[..., :channels].max(axis=(0, 1)) for e in given], axis=0),
         )
 
-    def correct(self, pixels: Array, correction: Floats, kind: str) -> None:
-        """Add a correction to pixels in the exemplar's own values, in place."""
-        mine = pixels[..., : self.channels]
-        value = mine.astype(np.float64) + correction.astype(np.float64) * self.span
-        if kind == "normal":
-            vector = 2 * (value - self.low) / self.span - 1
-            vector /= np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), 1e-12)
-            value = (vector + 1) / 2 * self.span + self.low
-        else:
-            value = np.clip(value, self.least, self.most)
-        mine[...] = np.rint(value) if pixels.dtype.kind in "ui" else value
+    def groups(self, strips: int, pixels: int, kind: str) -> list[slice]:
+        """Give the channels that are solved together: all, but one by one where a large picture is one strip."""
+        if strips > 1 or pixels <= STRIP or kind == "normal":
+            return [slice(0, self.channels)]
+        return [slice(c, c + 1) for c in range(self.channels)]
+
+    def correct(self, pixels: Array, correction: Floats, channels: slice, kind: str) -> None:
+        """Add a correction to channels of pixels in the exemplar's own values, in place."""
+        exact = np.dtype("f4" if pixels.dtype.itemsize <= 2 else "f8")
+        for rows in _bands(len(pixels)):
+            mine = pixels[rows, :, channels]
+            value = mine.astype(exact) + correction[rows].astype(exact) * self.span
+            if kind == "normal":
+                vector = 2 * (value - self.low) / self.span - 1
+                vector /= np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), 1e-12)
+                value = (vector + 1) / 2 * self.span + self.low
+            else:
+                value = np.clip(value, self.least[channels], self.most[channels])
+            mine[...] = np.rint(value) if pixels.dtype.kind in "ui" else value
+
+
+def _scaled(image: Array, low: float, high: float) -> Floats:
+    """Bring ``low`` to ``high`` to [0, 1], a band of rows at a time."""
+    result = np.empty(image.shape, np.float32)
+    for rows in _bands(len(image)):
+        result[rows] = (image[rows].astype(np.float64) - low) / (high - low)
+    return result
+
+
+def _bands(rows: int) -> Iterator[slice]:
+    """Divide rows so that what is made of them in float64 stays small."""
+    return (slice(first, min(first + BAND, rows)) for first in range(0, rows, BAND))
 
 
 # --- differences -----------------------------------------------------------------------------------------------------
@@ -225,32 +265,54 @@ class Look:
         shown = row.render(self.samples.images, interpolation=self.interpolation, kind=self.kind, green=self.green)
         return shown[0], inside
 
+    def across(self, axis: int, wrap: bool) -> Seam:
+        """Give the seams that cross an axis: the differences wanted less those of the picture."""
+        at, after = seams(self.source, axis, wrap)
+        if not len(at[0]):
+            return Seam(at, after, np.zeros((0, self.samples.channels), np.float32))
+        here, _ = self.beside(at, axis, 0)
+        there, _ = self.beside(after, axis, 0)
+        ahead, forward = self.beside(at, axis, 1)
+        behind, backward = self.beside(after, axis, -1)
+        known = forward.astype(np.float32) + backward
+        total = (ahead - here) * forward[:, np.newaxis] + (there - behind) * backward[:, np.newaxis]
+        return Seam(at, after, total / np.maximum(known, 1)[:, np.newaxis] - (there - here))
 
-def _correction(look: Look, wrap: tuple[bool, bool], screening: float, band: int | None) -> Floats | None:
-    """Solve for what must be added to the composite, (H, W, C) in [0, 1]; None where there is no seam.
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seam:
+    """Pairs of neighbours that seams part."""
+
+    at: tuple[Array, ...]
+    after: tuple[Array, ...]
+    lack: Floats
+    """What the differences from ``at`` to ``after`` lack, (n, C) in [0, 1]."""
+
+
+def _correction(
+    shape: tuple[int, ...],
+    seen: Sequence[Seam],
+    channels: slice,
+    wrap: tuple[bool, bool],
+    screening: float,
+    band: int | None,
+    progress: Callable[[float], object] | None,
+) -> Floats:
+    """Solve for what must be added to some channels of the composite, (H, W, C) in [0, 1].
 
     With v = I + c the differences wanted of c are g less those of I: nothing but at seams.
     """
-    shape, wanted = look.source.shape, []
-    near = np.zeros(shape, bool)
-    for axis in range(2):
-        difference = np.zeros((*shape, look.samples.channels), np.float32)
-        at, after = seams(look.source, axis, wrap[axis])
-        if len(at[0]):
-            here, _ = look.beside(at, axis, 0)
-            there, _ = look.beside(after, axis, 0)
-            ahead, forward = look.beside(at, axis, 1)
-            behind, backward = look.beside(after, axis, -1)
-            known = forward.astype(np.float32) + backward
-            total = (ahead - here) * forward[:, np.newaxis] + (there - behind) * backward[:, np.newaxis]
-            difference[at] = total / np.maximum(known, 1)[:, np.newaxis] - (there - here)
-            near[at] = near[after] = True
-        wanted.append(difference)
-    if not near.any():
-        return None
+    flow = np.zeros((*shape, channels.stop - channels.start), np.float32)
+    near = np.zeros(shape if band is not None else (0, 0), bool)
+    for seam in seen:
+        flow[seam.at] -= seam.lack[:, channels]
+        flow[seam.after] += seam.lack[:, channels]
+        if band is not None:
+            near[seam.at] = near[seam.after] = True
     rows, columns = (_boundary(w) for w in wrap)
     mask = None if band is None else _within(near, band, wrap)
-    return solve(np.zeros_like(wanted[0]), *wanted, screening=screening, boundary=(rows, columns), mask=mask)
+    spread(flow, screening=screening, boundary=(rows, columns), mask=mask, progress=progress)
+    return flow
 
 
 def seams(source: SourceMap, axis: int, wrap: bool) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
@@ -292,7 +354,7 @@ def _within(near: Bools, band: int, wrap: tuple[bool, bool]) -> Bools:
 class Strip:
     """Rows that are solved together."""
 
-    rows: NDArray[np.intp]
+    rows: slice | NDArray[np.intp]
     kept: slice
     """The rows whose result is kept."""
     inner: slice
@@ -303,23 +365,28 @@ class Strip:
 def _strips(shape: tuple[int, ...], wrap: bool, screening: float) -> Iterator[Strip]:
     """Divide a picture into strips of rows, each with a margin in which corrections from beyond it die out."""
     height, width = shape
-    rows = max(1, STRIP // width)
     margin = math.ceil(REACH / math.sqrt(screening)) if screening > 0 else height
-    if height * width <= WHOLE or margin > rows:
-        yield Strip(np.arange(height), slice(0, height), slice(0, height), wrap)
+    rows = max(STRIP // width, 2 * margin)
+    whole = height * width <= STRIP or rows + 2 * margin >= height
+    if whole or (rows + 2 * margin) * width > 4 * STRIP:
+        yield Strip(slice(0, height), slice(0, height), slice(0, height), wrap)
         return
     for start in range(0, height, rows):
         stop = min(start + rows, height)
         first, last = start - margin, stop + margin
         if not wrap:
             first, last = max(first, 0), min(last, height)
-        yield Strip(np.arange(first, last) % height, slice(start, stop), slice(start - first, stop - first), False)
+        inner = slice(start - first, stop - first)
+        yield Strip(_around(first, last, height), slice(start, stop), inner, False)
 
 
-def _rows(source: SourceMap, rows: NDArray[np.intp]) -> SourceMap:
+def _around(first: int, last: int, height: int) -> slice | NDArray[np.intp]:
+    """Give rows of a picture that is cyclic, without a copy where they do not cross its end."""
+    return slice(first, last) if first >= 0 and last <= height else np.arange(first, last) % height
+
+
+def _rows(source: SourceMap, rows: slice | NDArray[np.intp]) -> SourceMap:
     """Take some rows of a source map."""
-    if len(rows) == source.shape[0]:
-        return source
     frame = source.frame if source.frame is None or source.frame.ndim == 3 else source.frame[rows]
     return SourceMap(source.coordinates[rows], source.exemplar[rows], source.label[rows], frame, source.shapes)
 
@@ -334,7 +401,7 @@ class Visibility:
     Attributes
     ----------
     edges : int
-        Pairs of neighbours that a seam parts.
+        Pairs of neighbours that a seam parts, of those that were looked at.
     mean : float
         Mean difference across seams over the exemplar's mean difference.
     outliers : float
@@ -369,6 +436,11 @@ def visibility(
     Visibility
         All 0 where there is no seam, or where the exemplar is constant.
 
+    Notes
+    -----
+    Of a picture of more than 2^22 pixels, bands of rows spread over it are looked at; of an exemplar of more than 2^20,
+    rows spread over it.
+
     Examples
     --------
     >>> import numpy as np
@@ -384,19 +456,31 @@ def visibility(
     if pixels.shape[:2] != source.shape:
         raise InvalidInput(f"image: needs the size of the source map, {source.shape}, got {pixels.shape[:2]}")
     count = min(3, pixels.shape[-1] - (pixels.shape[-1] == 2))
-    own = np.concatenate(
-        [
-            np.abs(np.diff(e[..., :count].astype(np.float64), axis=axis)).mean(axis=-1).ravel()
-            for e in several
-            for axis in range(2)
-        ]
-    )
+    own = np.concatenate([_steps(e[..., :count], axis) for e in several for axis in range(2)])
+    height, width = source.shape
     across = []
-    for axis in range(2):
-        at, after = seams(source, axis, cyclic[axis])
-        across.append(np.abs(pixels[after][:, :count].astype(np.float64) - pixels[at][:, :count]).mean(axis=-1))
+    for band in list(_bands(height))[:: -(-height * width // LOOK)]:
+        # With the row after it, for the differences that leave the band.
+        last = min(band.stop + 1, height + cyclic[0])
+        rows = _around(band.start, last, height)
+        piece, shown = _rows(source, rows), pixels[rows, :, :count]
+        for axis in range(2):
+            at, after = seams(piece, axis, axis == 1 and cyclic[1])
+            own_row = at[0] < band.stop - band.start
+            before, beyond = (shown[i[0][own_row], i[1][own_row]].astype(np.float64) for i in (at, after))
+            across.append(np.abs(beyond - before).mean(axis=-1))
     difference = np.concatenate(across)
     if not len(difference) or not own.any():
         return Visibility(len(difference), 0.0, 0.0)
     outliers = (difference > np.percentile(own, 99)).mean()
     return Visibility(len(difference), float(difference.mean() / own.mean()), float(outliers))
+
+
+def _steps(image: Array, axis: int) -> NDArray[np.float64]:
+    """Give the sizes of an exemplar's differences along an axis; of rows spread over a large one."""
+    every = -(-image.shape[0] * image.shape[1] // (LOOK // 4))
+    before = image[::every] if axis == 1 else image[:-1:every]
+    after = before[:, 1:] if axis == 1 else image[1::every]
+    before = before[:, :-1] if axis == 1 else before
+    sizes: NDArray[np.float64] = np.abs(after.astype(np.float64) - before).mean(axis=-1).ravel()
+    return sizes

@@ -2,7 +2,7 @@
 
 use criterion::{BenchmarkId, Criterion};
 use texrs::par::{self, Monitor};
-use texrs::poisson::{Edge, Problem, solve};
+use texrs::poisson::{Domain, Edge, Problem, solve};
 
 pub(crate) fn bench(c: &mut Criterion) {
     let mut group = c.benchmark_group("poisson");
@@ -26,12 +26,13 @@ pub(crate) fn bench(c: &mut Criterion) {
         ] {
             let problem = Problem {
                 image: &data[0],
-                gradient_rows: &data[1],
-                gradient_columns: &data[2],
-                shape: [side, side, 3],
-                edges: [edge; 2],
-                screening: 0.01,
-                mask,
+                gradients: Some([&data[1], &data[2]]),
+                domain: Domain {
+                    shape: [side, side, 3],
+                    edges: [edge; 2],
+                    screening: 0.01,
+                    mask,
+                },
             };
             for threads in [1, 2] {
                 let id = BenchmarkId::new(format!("{name} {side}"), threads);

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -13,7 +13,7 @@ from texrs._arrays import as_float, as_image, as_mask, as_wrap
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 
-__all__ = ["Boundary", "blend", "solve"]
+__all__ = ["Boundary", "blend", "solve", "spread"]
 
 Boundary: TypeAlias = Literal["dirichlet", "periodic", "free"]
 """What happens at the ends of an axis: the outermost pixels keep their values, the axis is cyclic,
@@ -30,6 +30,7 @@ def solve(
     screening: float = 0.01,
     boundary: Boundary | tuple[Boundary, Boundary] = "dirichlet",
     mask: object = None,
+    progress: Callable[[float], object] | None = None,
 ) -> Floats:
     """Find the image with the differences wanted whose values stay near a given image.
 
@@ -54,6 +55,8 @@ def solve(
         beyond; for both axes, or for the rows' and the columns'.
     mask : array_like of bool, optional
         Shape (H, W): the pixels to solve. All others keep their values. By default all.
+    progress : callable, optional
+        Called with the share that is done, 0 to 1; raising stops the work.
 
     Returns
     -------
@@ -93,13 +96,60 @@ def solve(
     columns = _gradient(gradient_columns, "gradient_columns", values)
     solved = _rust.poisson(
         values,
-        rows,
-        columns,
+        (rows, columns),
         as_float(screening, "screening", 0, math.inf),
         _boundary(boundary),
         None if mask is None else as_mask(mask, "mask", values.shape[:2]),
+        progress,
     )
     return _finite(solved).reshape(np.asarray(image).shape)
+
+
+def spread(
+    flow: Floats,
+    *,
+    screening: float = 0.01,
+    boundary: Boundary | tuple[Boundary, Boundary] = "dirichlet",
+    mask: object = None,
+    progress: Callable[[float], object] | None = None,
+) -> None:
+    """Turn what flows into each pixel into the values that carry it off, in place.
+
+    Solves ``(L + screening) v = flow``, where L is the sum of the differences of a pixel to its neighbours: what `solve`
+    adds to its image. For corrections of large pictures, where one array less counts.
+
+    Parameters
+    ----------
+    flow : (H, W, C) array of float32
+        Contiguous and writeable; becomes the solution, 0 where pixels are fixed.
+    screening, boundary, mask, progress
+        As in `solve`.
+
+    Raises
+    ------
+    InvalidInput
+        Another kind of array, or an option that `solve` refuses.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> values = np.zeros((3, 3, 1), np.float32)
+    >>> values[1, 1] = 4
+    >>> spread(values, screening=0)
+    >>> float(values[1, 1, 0])
+    1.0
+
+    """
+    given = flow.flags
+    if flow.dtype != np.float32 or flow.ndim != 3 or not (given.c_contiguous and given.writeable and given.aligned):
+        raise InvalidInput(f"flow: needs a contiguous writeable float32 array (H, W, C), got {flow.dtype} {flow.shape}")
+    _rust.poisson_spread(
+        flow,
+        as_float(screening, "screening", 0, math.inf),
+        _boundary(boundary),
+        None if mask is None else as_mask(mask, "mask", flow.shape[:2]),
+        progress,
+    )
 
 
 def blend(
@@ -162,42 +212,67 @@ def blend(
     if np.asarray(source).shape != shape:
         raise InvalidInput(f"source: needs the target's shape {shape}, got {np.asarray(source).shape}")
     inside = as_mask(mask, "mask", onto.shape[:2])
-    values, other = _floats(onto, "target"), _floats(taken, "source")
-    gradients = []
-    for axis in (0, 1):
-        wanted = np.roll(other, -1, axis) - other
-        if mixed:
-            present = np.roll(values, -1, axis) - values
-            wanted = np.where(np.abs(present) > np.abs(wanted), present, wanted)
-        gradients.append(wanted)
-    pasted = np.where(inside[..., np.newaxis], other, values)
-    rows, columns = ("periodic" if w else "free" for w in as_wrap(wrap))
+    values, other = (_numbers(a, n) for a, n in ((onto, "target"), (taken, "source")))
+    # With v = source + c no difference is wanted of c, but where the target shows through.
     if inside.all() and screening == 0:
         # Nothing is left of the target but its mean.
-        pasted = other + (values.mean((0, 1)) - other.mean((0, 1)))
-    solved = _rust.poisson(
-        np.ascontiguousarray(pasted),
-        np.ascontiguousarray(gradients[0]),
-        np.ascontiguousarray(gradients[1]),
-        as_float(screening, "screening", 0, math.inf),
-        (rows, columns),
-        inside,
-    )
-    return _cast(_finite(solved), onto, inside).reshape(shape)
-
-
-def _cast(solved: Floats, onto: Array, inside: Bools) -> Array:
-    """Give the solution in the dtype of the target, whose own values stay as they are."""
+        correction = np.empty(onto.shape, np.float32)
+        correction[...] = values.mean((0, 1)) - other.mean((0, 1))
+    else:
+        correction = _beyond(values, other, inside)
+    gradients = (_mixed(values, other, 0), _mixed(values, other, 1)) if mixed else None
+    rows, columns = ("periodic" if w else "free" for w in as_wrap(wrap))
+    weight = as_float(screening, "screening", 0, math.inf)
+    solved = _rust.poisson(correction, gradients, weight, (rows, columns), inside, None)
     result = onto.copy()
-    if onto.dtype == np.bool_:
-        result[inside] = solved[inside] >= 0.5
+    for band in _bands(len(onto)):
+        part = solved[band]
+        part += other[band]
+        _put(result[band], _finite(part), inside[band])
+    return result.reshape(shape)
+
+
+def _beyond(values: Array, other: Array, inside: Bools) -> Floats:
+    """Give the differences of two images outside a mask, and 0 under it."""
+    result = np.empty(values.shape, np.float32)
+    for band in _bands(len(values)):
+        part = result[band]
+        with np.errstate(over="ignore", invalid="ignore"):
+            np.subtract(values[band], other[band], out=part, dtype=np.float32)
+            part *= np.repeat(~inside[band], part.shape[-1], axis=1).reshape(part.shape)
+    return result
+
+
+def _mixed(values: Array, other: Array, axis: int) -> Floats:
+    """Give by how much the target's differences exceed the source's, where they are the larger ones."""
+    floats = (v.astype(np.float32) for v in (other, values))
+    wanted, present = (np.roll(v, -1, axis) - v for v in floats)
+    return np.where(np.abs(present) > np.abs(wanted), present - wanted, np.float32(0))
+
+
+def _put(onto: Array, solved: Floats, inside: Bools) -> None:
+    """Put the solution into the target under the mask, in the target's dtype."""
+    if onto.dtype.kind in "ui" and onto.dtype.itemsize <= 2:
+        # Outside the mask the sum of source and correction is the target exactly.
+        info = np.iinfo(onto.dtype)
+        onto[...] = np.clip(np.rint(solved, out=solved), info.min, info.max, out=solved)
+    elif onto.dtype == np.bool_:
+        onto[inside] = solved[inside] >= 0.5
     elif onto.dtype.kind in "ui":
         info = np.iinfo(onto.dtype)
-        rounded = np.rint(solved[inside].astype(np.float64))
-        result[inside] = np.clip(rounded, info.min, info.max).astype(onto.dtype)
+        onto[inside] = np.clip(np.rint(solved[inside].astype(np.float64)), info.min, info.max)
     else:
-        result[inside] = solved[inside].astype(onto.dtype)
-    return result
+        onto[inside] = solved[inside]
+
+
+def _bands(rows: int) -> Iterator[slice]:
+    """Divide rows so that what is made of them stays in the cache."""
+    return (slice(first, first + 32) for first in range(0, rows, 32))
+
+
+def _numbers(array: Array, name: str) -> Array:
+    """Give values that float32 holds; others than float64 as they are."""
+    return _floats(array, name) if array.dtype == np.float64 else array
 
 
 def _gradient(value: object, name: str, image: Floats) -> Floats:

@@ -11,11 +11,13 @@
 mod multigrid;
 mod sweep;
 mod transform;
+mod wide;
 
 use crate::par::{self, Monitor};
 use crate::{Error, Result};
 use sweep::PANEL;
 use transform::Transform;
+use wide::wide;
 
 /// What happens at both ends of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,15 +30,9 @@ pub enum Edge {
     Free,
 }
 
-/// A problem: images in row-major order, channels last.
+/// Pixels and their neighbours, and which of them keep their values.
 #[derive(Debug, Clone, Copy)]
-pub struct Problem<'a> {
-    /// The values to stay near.
-    pub image: &'a [f32],
-    /// The differences wanted to the next row, of the image's shape; those of the last row count on a cyclic axis alone.
-    pub gradient_rows: &'a [f32],
-    /// The differences wanted to the next column.
-    pub gradient_columns: &'a [f32],
+pub struct Domain<'a> {
     /// Rows, columns and channels.
     pub shape: [usize; 3],
     /// What happens at the ends of the rows' axis and of the columns' axis.
@@ -47,35 +43,67 @@ pub struct Problem<'a> {
     pub mask: Option<&'a [bool]>,
 }
 
+/// A problem: images in row-major order, channels last.
+#[derive(Debug, Clone, Copy)]
+pub struct Problem<'a> {
+    /// The values to stay near.
+    pub image: &'a [f32],
+    /// The differences wanted to the next row and to the next column, each of the image's shape; at the end of an axis
+    /// they count only where it is cyclic. None: no difference anywhere.
+    pub gradients: Option<[&'a [f32]; 2]>,
+    /// Where.
+    pub domain: Domain<'a>,
+}
+
 /// Rows that a task takes at a time; even, since transforms take two.
 const ROWS: usize = 8;
 
 /// The solution. Without screening, and with nothing fixed, the mean of the image is kept.
 pub fn solve(problem: &Problem<'_>, monitor: &Monitor) -> Result<Vec<f32>> {
-    check(problem)?;
-    let mut out = problem.image.to_vec();
-    let [rows, columns, channels] = problem.shape;
-    if out.is_empty() {
-        return Ok(out);
-    }
-    match problem.mask {
-        Some(mask) if !mask.iter().all(|&m| m) => match inner_rectangle(mask, [rows, columns]) {
-            Some(window) => cut_out(problem, window, &mut out, monitor)?,
-            None => multigrid::solve(problem, mask, &mut out, monitor)?,
-        },
-        _ => {
-            let [low, columns] =
-                [(0, rows), (1, columns)].map(|(axis, n)| match problem.edges[axis] {
-                    Edge::Fixed => n.saturating_sub(2),
-                    _ => n,
-                });
-            if low > 0 && columns > 0 && channels > 0 {
-                rectangle(problem, [low, columns], &mut out, monitor);
-            }
+    let Domain {
+        shape: [_, columns, channels],
+        ..
+    } = problem.domain;
+    problem.domain.check("image", problem.image.len())?;
+    for (argument, axis) in [("gradient_rows", 0), ("gradient_columns", 1)] {
+        if let Some(gradients) = problem.gradients {
+            problem.domain.check(argument, gradients[axis].len())?;
         }
     }
-    monitor.check()?;
+    let width = columns * channels;
+    let mut out = vec![0.0; problem.image.len()];
+    par::chunks_mut(&mut out, ROWS * width, |chunk, out| {
+        wide(|| {
+            for (r, out) in out.chunks_exact_mut(width).enumerate() {
+                residual(problem, chunk * ROWS + r, out);
+            }
+        });
+    });
+    spread(&problem.domain, &mut out, monitor)?;
+    par::chunks_mut(&mut out, ROWS * width, |chunk, out| {
+        let image = &problem.image[chunk * ROWS * width..];
+        out.iter_mut().zip(image).for_each(|(o, i)| *o += i);
+    });
     Ok(out)
+}
+
+/// Turns what flows into each pixel into the values that carry it off, in place: solves `(L + screening) v = flow`, L
+/// the sum of the differences to the neighbours; 0 where values are kept.
+pub fn spread(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) -> Result<()> {
+    domain.check("flow", flow.len())?;
+    let [rows, columns, _] = domain.shape;
+    if !flow.is_empty() {
+        match domain.mask {
+            Some(mask) if !mask.iter().all(|&m| m) => {
+                match inner_rectangle(mask, [rows, columns]) {
+                    Some(window) => cut_out(domain, window, flow, monitor),
+                    None => multigrid::spread(domain, mask, flow, monitor)?,
+                }
+            }
+            _ => rectangle(domain, flow, monitor),
+        }
+    }
+    monitor.check()
 }
 
 /// The rectangle (first and number of rows, of columns) that a mask is, if it is one and fixed pixels lie all around.
@@ -96,156 +124,153 @@ fn inner_rectangle(mask: &[bool], shape: [usize; 2]) -> Option<[(usize, usize); 
 
 /// Solves a rectangle within the image as an image of its own, with a ring of fixed pixels around it.
 fn cut_out(
-    problem: &Problem<'_>,
+    domain: &Domain<'_>,
     [(top, rows), (left, columns)]: [(usize, usize); 2],
-    out: &mut [f32],
+    flow: &mut [f32],
     monitor: &Monitor,
-) -> Result<()> {
-    let [_, width, channels] = problem.shape;
-    let shape = [rows + 2, columns + 2, channels];
-    let line = shape[1] * channels;
-    let start = |r: usize| ((top - 1 + r) * width + left - 1) * channels;
-    let cut = |data: &[f32]| -> Vec<f32> {
-        let rows = (0..shape[0]).flat_map(|r| &data[start(r)..][..line]);
-        rows.copied().collect()
-    };
-    let inner = Problem {
-        image: &cut(problem.image),
-        gradient_rows: &cut(problem.gradient_rows),
-        gradient_columns: &cut(problem.gradient_columns),
-        shape,
+) {
+    let [_, width, channels] = domain.shape;
+    let inner = Domain {
+        shape: [rows + 2, columns + 2, channels],
         edges: [Edge::Fixed; 2],
         mask: None,
-        ..*problem
+        ..*domain
     };
-    let solved = solve(&inner, monitor)?;
-    for (r, row) in solved.chunks_exact(line).enumerate() {
-        out[start(r)..][..line].copy_from_slice(row);
+    let line = (columns + 2) * channels;
+    let start = |r: usize| ((top - 1 + r) * width + left - 1) * channels;
+    let cut = (0..rows + 2).flat_map(|r| &flow[start(r)..][..line]);
+    let mut part: Vec<f32> = cut.copied().collect();
+    rectangle(&inner, &mut part, monitor);
+    flow.fill(0.0);
+    for (r, row) in part.chunks_exact(line).enumerate() {
+        flow[start(r)..][..line].copy_from_slice(row);
     }
-    Ok(())
 }
 
-fn check(problem: &Problem<'_>) -> Result<()> {
-    let [rows, columns, channels] = problem.shape;
-    let pixels = rows.checked_mul(columns);
-    let samples = pixels.and_then(|n| n.checked_mul(channels));
-    for (argument, got) in [
-        ("image", problem.image.len()),
-        ("gradient_rows", problem.gradient_rows.len()),
-        ("gradient_columns", problem.gradient_columns.len()),
-    ] {
-        if samples != Some(got) {
+impl Domain<'_> {
+    /// An error unless `samples` is the size of the domain, the mask fits and the screening is a weight.
+    fn check(&self, argument: &'static str, samples: usize) -> Result<()> {
+        let [rows, columns, channels] = self.shape;
+        let pixels = rows.checked_mul(columns);
+        if pixels.and_then(|n| n.checked_mul(channels)) != Some(samples) {
             return Err(Error::Shape {
                 argument,
-                expected: problem.shape.to_vec(),
-                got: vec![got],
+                expected: self.shape.to_vec(),
+                got: vec![samples],
             });
         }
+        if let Some(mask) = self.mask
+            && pixels != Some(mask.len())
+        {
+            return Err(Error::Shape {
+                argument: "mask",
+                expected: vec![rows, columns],
+                got: vec![mask.len()],
+            });
+        }
+        if !self.screening.is_finite() || self.screening < 0.0 {
+            let message = format!("must be finite and not negative, got {}", self.screening);
+            return Err(Error::value("screening", message));
+        }
+        Ok(())
     }
-    if let Some(mask) = problem.mask
-        && pixels != Some(mask.len())
-    {
-        return Err(Error::Shape {
-            argument: "mask",
-            expected: vec![rows, columns],
-            got: vec![mask.len()],
-        });
-    }
-    if !problem.screening.is_finite() || problem.screening < 0.0 {
-        let message = format!("must be finite and not negative, got {}", problem.screening);
-        return Err(Error::value("screening", message));
-    }
-    Ok(())
 }
 
-/// The right-hand side in row `y`, channels last: what flows in by the differences that the image lacks.
+/// Adds what flows into row `y`, channels last, by the differences that the image lacks.
+#[inline(always)]
 fn residual(problem: &Problem<'_>, y: usize, out: &mut [f32]) {
-    let [rows, columns, channels] = problem.shape;
-    let width = columns * channels;
-    let Problem {
-        image,
-        gradient_rows,
-        gradient_columns,
+    let Domain {
+        shape: [rows, columns, channels],
         edges,
         ..
-    } = *problem;
-    let here = &image[y * width..][..width];
+    } = problem.domain;
+    let width = columns * channels;
+    let image = problem.image;
+    let row = |r: usize| &image[r % rows * width..][..width];
+    let wanted = |axis: usize, r: usize| {
+        let rows = problem.gradients.map(|g| &g[axis][r % rows * width..]);
+        rows.map(|row| &row[..width])
+    };
+    let here = row(y);
     let cyclic = edges[0] == Edge::Wrap;
-    out.fill(0.0);
     if y > 0 || cyclic {
-        let before = (y + rows - 1) % rows * width;
-        let ends = here.iter().zip(&image[before..]);
-        for ((out, wanted), (to, from)) in out.iter_mut().zip(&gradient_rows[before..]).zip(ends) {
-            *out += wanted - (to - from);
-        }
+        let before = y + rows - 1;
+        lack(out, wanted(0, before), row(before), here, 1.0);
     }
     if y + 1 < rows || cyclic {
-        let ends = here.iter().zip(&image[(y + 1) % rows * width..]);
-        let wanted = &gradient_rows[y * width..];
-        for ((out, wanted), (from, to)) in out.iter_mut().zip(wanted).zip(ends) {
-            *out -= wanted - (to - from);
-        }
+        lack(out, wanted(0, y), here, row(y + 1), -1.0);
     }
     // Each pixel once as the start and once as the end of a difference.
-    let wanted = &gradient_columns[y * width..][..width];
-    let ends = here.iter().zip(&here[channels..]);
-    for ((out, wanted), (from, to)) in out.iter_mut().zip(wanted).zip(ends) {
-        *out -= wanted - (to - from);
-    }
-    let ends = here.iter().zip(&here[channels..]);
-    for ((out, wanted), (from, to)) in out[channels..].iter_mut().zip(wanted).zip(ends) {
-        *out += wanted - (to - from);
-    }
+    let beside = &here[channels..];
+    lack(out, wanted(1, y), here, beside, -1.0);
+    lack(&mut out[channels..], wanted(1, y), here, beside, 1.0);
     if edges[1] == Edge::Wrap {
-        let inner = width - channels;
-        for c in 0..channels {
-            let lack = wanted[inner + c] - (here[c] - here[inner + c]);
-            out[inner + c] -= lack;
-            out[c] += lack;
-        }
+        let last = width - channels;
+        let wanted = wanted(1, y).map(|w| &w[last..]);
+        lack(&mut out[last..], wanted, &here[last..], here, -1.0);
+        lack(out, wanted, &here[last..], here, 1.0);
     }
 }
 
-/// Solves for `unknown` rows and columns and adds the correction to `out`.
-fn rectangle(problem: &Problem<'_>, unknown: [usize; 2], out: &mut [f32], monitor: &Monitor) {
-    let [_, columns, channels] = problem.shape;
-    let [rows, slots] = unknown;
-    let width = columns * channels;
-    let [top, left] = problem.edges.map(|e| usize::from(e == Edge::Fixed));
-    let transform = Transform::new(problem.edges[1], slots);
-    monitor.expect(3);
+/// Adds by how much the differences wanted exceed those from `from` to `to`.
+#[inline(always)]
+fn lack(out: &mut [f32], wanted: Option<&[f32]>, from: &[f32], to: &[f32], sign: f32) {
+    let pairs = out.iter_mut().zip(from.iter().zip(to));
+    match wanted {
+        Some(wanted) => pairs
+            .zip(wanted)
+            .for_each(|((o, (from, to)), w)| *o += sign * (w - (to - from))),
+        None => pairs.for_each(|(o, (from, to))| *o += sign * (from - to)),
+    }
+}
 
-    // 1. Right-hand sides, transformed along the rows: row, channel, slot.
-    let mut spectrum = vec![0.0f32; rows * channels * slots];
-    par::chunks_mut(&mut spectrum, ROWS * channels * slots, |chunk, out| {
+/// Solves all that edges do not fix. Coefficients take the place of the rows that they are of, one channel after another.
+fn rectangle(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) {
+    let [height, columns, channels] = domain.shape;
+    let width = columns * channels;
+    let [top, left] = domain.edges.map(|e| usize::from(e == Edge::Fixed));
+    let (rows, slots) = (
+        height.saturating_sub(2 * top),
+        columns.saturating_sub(2 * left),
+    );
+    if rows == 0 || slots == 0 || channels == 0 {
+        return flow.fill(0.0);
+    }
+    if top > 0 {
+        flow[..width].fill(0.0);
+        flow[(height - 1) * width..].fill(0.0);
+    }
+    let inner = &mut flow[top * width..][..rows * width];
+    let transform = Transform::new(domain.edges[1], slots);
+    monitor.expect((2 * rows + slots) as u64);
+
+    // 1. Transformed along the rows, two at a time.
+    par::chunks_mut(inner, ROWS * width, |_, out| {
         if monitor.check().is_err() {
             return;
         }
         let mut scratch = transform::Scratch::default();
-        let mut sides = [vec![0.0; width], vec![0.0; width]];
-        let mut lines = [vec![0.0; slots], vec![0.0; slots]];
-        for (pair, out) in out.chunks_mut(2 * channels * slots).enumerate() {
-            let first = chunk * ROWS + 2 * pair;
-            let present = out.len() / (channels * slots);
-            for (r, side) in sides.iter_mut().take(present).enumerate() {
-                residual(problem, top + first + r, side);
-            }
-            for c in 0..channels {
-                for (line, side) in lines.iter_mut().zip(&sides) {
-                    let samples = side[left * channels + c..].iter().step_by(channels);
+        let mut lines = [vec![0.0; channels * slots], vec![0.0; channels * slots]];
+        for pair in out.chunks_mut(2 * width) {
+            for (line, row) in lines.iter_mut().zip(pair.chunks_exact(width)) {
+                for (c, line) in line.chunks_exact_mut(slots).enumerate() {
+                    let samples = row[left * channels + c..].iter().step_by(channels);
                     line.iter_mut().zip(samples).for_each(|(l, s)| *l = *s);
                 }
-                let [a, b] = &mut lines;
+            }
+            let [a, b] = &mut lines;
+            for (a, b) in a.chunks_exact_mut(slots).zip(b.chunks_exact_mut(slots)) {
                 transform.forward(a, b, &mut scratch);
-                for (r, line) in lines.iter().take(present).enumerate() {
-                    out[(r * channels + c) * slots..][..slots].copy_from_slice(line);
-                }
+            }
+            for (line, row) in lines.iter().zip(pair.chunks_exact_mut(width)) {
+                row[..line.len()].copy_from_slice(line);
             }
         }
+        let _ = monitor.advance((out.len() / width) as u64);
     });
-    let _ = monitor.advance(1);
 
     // 2. Systems across the rows: panel, channel, row.
+    let spectrum = &*inner;
     let mut panels = vec![0.0f32; slots.div_ceil(PANEL) * channels * rows * PANEL];
     let panels = panels.as_chunks_mut::<PANEL>().0;
     par::chunks_mut(panels, channels * rows, |p, panel| {
@@ -256,7 +281,7 @@ fn rectangle(problem: &Problem<'_>, unknown: [usize; 2], out: &mut [f32], monito
         let present = PANEL.min(slots - first);
         for (c, lines) in panel.chunks_exact_mut(rows).enumerate() {
             for (r, line) in lines.iter_mut().enumerate() {
-                let from = &spectrum[(r * channels + c) * slots + first..][..present];
+                let from = &spectrum[r * width + c * slots + first..][..present];
                 match <&[f32; PANEL]>::try_from(from) {
                     Ok(whole) => *line = *whole,
                     Err(_) => line[..present].copy_from_slice(from),
@@ -265,16 +290,15 @@ fn rectangle(problem: &Problem<'_>, unknown: [usize; 2], out: &mut [f32], monito
         }
         let shifts = std::array::from_fn(|l| {
             let eigenvalue = transform.eigenvalues.get(first + l);
-            eigenvalue.map_or(1.0, |e| e + problem.screening)
+            eigenvalue.map_or(1.0, |e| e + domain.screening)
         });
         let mut scratch = sweep::Scratch::default();
-        sweep::solve(problem.edges[0], &shifts, rows, panel, &mut scratch);
+        wide(|| sweep::solve(domain.edges[0], &shifts, rows, panel, &mut scratch));
+        let _ = monitor.advance(present as u64);
     });
-    let _ = monitor.advance(1);
-    drop(spectrum);
 
-    // 3. Back, and added.
-    let inner = &mut out[top * width..][..rows * width];
+    // 3. Back.
+    let panels = &*panels;
     par::chunks_mut(inner, ROWS * width, |chunk, out| {
         if monitor.check().is_err() {
             return;
@@ -298,12 +322,18 @@ fn rectangle(problem: &Problem<'_>, unknown: [usize; 2], out: &mut [f32], monito
                 transform.inverse(a, b, &mut scratch);
                 for (out, line) in out.chunks_exact_mut(width).zip(&lines) {
                     let samples = out[left * channels + c..].iter_mut().step_by(channels);
-                    samples.zip(line).for_each(|(o, l)| *o += l);
+                    samples.zip(line).for_each(|(o, l)| *o = *l);
+                }
+            }
+            if left > 0 {
+                for out in out.chunks_exact_mut(width) {
+                    out[..channels].fill(0.0);
+                    out[width - channels..].fill(0.0);
                 }
             }
         }
+        let _ = monitor.advance((out.len() / width) as u64);
     });
-    let _ = monitor.advance(1);
 }
 
 #[cfg(test)]

@@ -58,6 +58,7 @@ const STIFF: f64 = 4e-3;
 ///
 /// `panel` holds for each channel its rows of [`PANEL`] coefficients. A singular system (free or cyclic, no shift) gets
 /// the solution whose mean is zero.
+#[inline(always)]
 pub(super) fn solve(
     edge: Edge,
     shifts: &[f64; PANEL],
@@ -72,6 +73,7 @@ pub(super) fn solve(
     }
 }
 
+#[inline(always)]
 fn sweep<T: Real>(
     edge: Edge,
     shifts: &[f64; PANEL],

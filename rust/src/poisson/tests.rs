@@ -34,12 +34,13 @@ impl Owned {
     fn problem(&self) -> Problem<'_> {
         Problem {
             image: &self.image,
-            gradient_rows: &self.gradients[0],
-            gradient_columns: &self.gradients[1],
-            shape: self.shape,
-            edges: self.edges,
-            screening: self.screening,
-            mask: self.mask.as_deref(),
+            gradients: Some([&self.gradients[0], &self.gradients[1]]),
+            domain: Domain {
+                shape: self.shape,
+                edges: self.edges,
+                screening: self.screening,
+                mask: self.mask.as_deref(),
+            },
         }
     }
 
@@ -145,26 +146,28 @@ fn the_differences_of_an_image_give_it_back() {
 fn refuses_what_does_not_fit() {
     let owned = Owned::new([5, 6, 1], [Edge::Free; 2], 0.1, true, 1);
     let monitor = Monitor::default();
+    let right = owned.problem();
+    let elsewhere = |domain| Problem { domain, ..right };
     let wrong = [
-        Problem {
+        elsewhere(Domain {
             shape: [5, 5, 1],
-            ..owned.problem()
-        },
-        Problem {
+            ..right.domain
+        }),
+        elsewhere(Domain {
             shape: [usize::MAX, 2, 1],
-            ..owned.problem()
-        },
-        Problem {
+            ..right.domain
+        }),
+        elsewhere(Domain {
             screening: -1.0,
-            ..owned.problem()
-        },
-        Problem {
+            ..right.domain
+        }),
+        elsewhere(Domain {
             mask: Some(&[true]),
-            ..owned.problem()
-        },
+            ..right.domain
+        }),
         Problem {
-            gradient_rows: &[],
-            ..owned.problem()
+            gradients: Some([&[], &owned.gradients[1]]),
+            ..right
         },
     ];
     for problem in wrong {

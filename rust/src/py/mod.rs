@@ -90,7 +90,7 @@ mod _rust {
     #[pymodule_export]
     use super::patch_search::PatchIndex;
     #[pymodule_export]
-    use super::poisson::poisson;
+    use super::poisson::{poisson, poisson_spread};
     #[pymodule_export]
     use super::seam::{seam_cut, seam_labels, seam_strip};
     #[pymodule_export]

@@ -1,15 +1,17 @@
-//! Pixels under a mask: conjugate gradients, preconditioned by a multigrid cycle on squares of two by two.
+//! Pixels under a mask: conjugate gradients, preconditioned by a multigrid cycle.
 //!
 //! McAdams, Sifakis and Teran, *A parallel multigrid Poisson solver for fluids simulation on large grids*, SCA 2010, for the
-//! combination; squares are joined as in Braess, *Towards algebraic multigrid for elliptic problems of second
-//! order*, Computing 1995: sums of the links between them, halved because constants overrate a coarse difference.
+//! combination. Cells of two by two are joined, values between them are bilinear, and each level has the same five-point
+//! operator. The directions are those of Polak and Ribière, which forgive a cycle that is not quite symmetric: at sides of
+//! odd length it is not.
 
 mod level;
 
-use super::{Edge, Problem, residual};
+use super::wide::wide;
+use super::{Domain, Edge};
 use crate::par::{self, Monitor};
 use crate::{Error, Result};
-use level::{Level, Vectors};
+use level::{Level, Side, Vectors};
 
 /// The right-hand side left over, relative to the first, at which the solution is good: far below a grey level.
 const TOLERANCE: f64 = 1e-5;
@@ -23,149 +25,94 @@ const COARSEST: usize = 8;
 /// Samples a task takes at a time.
 const CHUNK: usize = 1 << 14;
 
-pub(super) fn solve(
-    problem: &Problem<'_>,
+pub(super) fn spread(
+    domain: &Domain<'_>,
     mask: &[bool],
-    out: &mut [f32],
+    flow: &mut [f32],
     monitor: &Monitor,
 ) -> Result<()> {
-    let [rows, columns, channels] = problem.shape;
+    let [rows, columns, channels] = domain.shape;
     let free = |y: usize, x: usize| {
         mask[y * columns + x]
-            && (problem.edges[0] != Edge::Fixed || (y > 0 && y + 1 < rows))
-            && (problem.edges[1] != Edge::Fixed || (x > 0 && x + 1 < columns))
+            && (domain.edges[0] != Edge::Fixed || (y > 0 && y + 1 < rows))
+            && (domain.edges[1] != Edge::Fixed || (x > 0 && x + 1 < columns))
     };
-    let Some(window) = window(problem, free) else {
+    let Some([(top, height), (left, width)]) = window(domain, free) else {
+        flow.fill(0.0);
         return Ok(());
     };
-    let levels = hierarchy(problem, window, free);
-    let fine = &levels[0];
-    let mut vectors: Vec<Vectors> = levels.iter().map(Level::vectors).collect();
-    monitor.expect(channels as u64);
-    let [top, left] = window.map(|w| w.0);
-    let mut right = vec![0.0; fine.len()];
-    let mut side = vec![0.0; columns * channels];
-    for c in 0..channels {
-        for y in 0..fine.rows {
-            residual(problem, top + y, &mut side);
-            for x in 0..fine.columns {
-                let inside = free(top + y, left + x);
-                right[fine.at(y, x)] = if inside {
-                    side[(left + x) * channels + c]
-                } else {
-                    0.0
-                };
-            }
-        }
-        let x = conjugate_gradients(&levels, &mut vectors, &mut right, monitor)?;
-        for y in 0..fine.rows {
-            for column in 0..fine.columns {
-                let at = ((top + y) * columns + left + column) * channels + c;
-                out[at] += x[fine.at(y, column)];
-            }
-        }
-        monitor.advance(1)?;
-    }
-    Ok(())
-}
-
-/// The rows and the columns (first, number) that hold all free pixels; a cyclic axis is kept whole.
-fn window(
-    problem: &Problem<'_>,
-    free: impl Fn(usize, usize) -> bool,
-) -> Option<[(usize, usize); 2]> {
-    let [rows, columns, _] = problem.shape;
-    let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
-    for y in 0..rows {
-        for x in (0..columns).filter(|&x| free(y, x)) {
-            low = [low[0].min(y), low[1].min(x)];
-            high = [high[0].max(y), high[1].max(x)];
-        }
-    }
-    if low[0] == usize::MAX {
-        return None;
-    }
-    Some(std::array::from_fn(|axis| {
-        if problem.edges[axis] == Edge::Wrap {
-            (0, problem.shape[axis])
-        } else {
-            (low[axis], high[axis] + 1 - low[axis])
-        }
-    }))
-}
-
-fn hierarchy(
-    problem: &Problem<'_>,
-    window: [(usize, usize); 2],
-    free: impl Fn(usize, usize) -> bool,
-) -> Vec<Level> {
-    let [(top, rows), (left, columns)] = window;
-    let wrap = problem.edges.map(|e| e == Edge::Wrap);
-    let mut fine = Level::empty(rows, columns, wrap);
-    let [height, width, _] = problem.shape;
-    for r in 0..rows {
-        for c in 0..columns {
-            let (y, x) = (top + r, left + c);
-            if !free(y, x) {
-                continue;
-            }
-            let i = fine.at(r, c);
-            fine.screened[i] = problem.screening as f32;
-            let next_row = if wrap[0] {
-                Some((y + 1) % height)
-            } else {
-                Some(y + 1).filter(|&n| n < height)
-            };
-            let next_column = if wrap[1] {
-                Some((x + 1) % width)
-            } else {
-                Some(x + 1).filter(|&n| n < width)
-            };
-            let row_before = if wrap[0] {
-                Some((y + height - 1) % height)
-            } else {
-                y.checked_sub(1)
-            };
-            let column_before = if wrap[1] {
-                Some((x + width - 1) % width)
-            } else {
-                x.checked_sub(1)
-            };
-            // A cyclic axis of one pixel has no differences.
-            if let Some(n) = next_row.filter(|&n| n != y) {
-                if free(n, x) {
-                    fine.down[i] = 1.0
-                } else {
-                    fine.tied[i] += 1.0
-                }
-            }
-            if let Some(n) = next_column.filter(|&n| n != x) {
-                if free(y, n) {
-                    fine.right[i] = 1.0
-                } else {
-                    fine.tied[i] += 1.0
-                }
-            }
-            if row_before.is_some_and(|n| n != y && !free(n, x)) {
-                fine.tied[i] += 1.0;
-            }
-            if column_before.is_some_and(|n| n != x && !free(y, n)) {
-                fine.tied[i] += 1.0;
-            }
-        }
-    }
-    fine.finish();
-    let mut levels = vec![fine];
+    let ends = [(top, height, rows), (left, width, columns)];
+    let sides = std::array::from_fn(|axis| {
+        let (first, count, all) = ends[axis];
+        [first == 0, first + count == all].map(|at_end| match domain.edges[axis] {
+            Edge::Wrap => Side::Wrap,
+            Edge::Free if at_end => Side::Mirror,
+            _ => Side::Fixed,
+        })
+    });
+    let screening = domain.screening as f32;
+    let inside = |r: usize, c: usize| free(top + r, left + c);
+    let mut levels = vec![Level::finest([height, width], sides, screening, inside)];
     while let Some(last) = levels.last()
         && last.rows.max(last.columns) > 3
     {
         let coarse = last.coarser();
         levels.push(coarse);
     }
-    levels
+    let fine = &levels[0];
+    let mut vectors: Vec<Vectors> = levels.iter().map(Level::vectors).collect();
+    monitor.expect(channels as u64);
+    for c in 0..channels {
+        fine.each_row(&mut vectors[0].b, |r, out| {
+            let from = ((top + r) * columns + left) * channels + c;
+            let samples = flow[from..].iter().step_by(channels);
+            for (x, (out, sample)) in out.iter_mut().zip(samples).enumerate() {
+                *out = if inside(r, x) { *sample } else { 0.0 };
+            }
+        });
+        let solution = conjugate_gradients(&levels, &mut vectors, monitor)?;
+        par::chunks_mut(flow, columns * channels, |y, out| {
+            out.iter_mut()
+                .skip(c)
+                .step_by(channels)
+                .for_each(|o| *o = 0.0);
+            if (top..top + height).contains(&y) {
+                let from = &solution[fine.at(y - top, 0)..][..width];
+                let out = out[left * channels + c..].iter_mut().step_by(channels);
+                out.zip(from).for_each(|(o, s)| *o = *s);
+            }
+        });
+        monitor.advance(1)?;
+    }
+    Ok(())
 }
 
-/// One symmetric cycle: `vectors[0].x` becomes about the solution for `vectors[0].b`.
+/// The rows and the columns (first, number) that hold all free pixels; a cyclic axis is kept whole.
+fn window(domain: &Domain<'_>, free: impl Fn(usize, usize) -> bool) -> Option<[(usize, usize); 2]> {
+    let [rows, columns, _] = domain.shape;
+    let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
+    for y in 0..rows {
+        let mut found = (0..columns).filter(|&x| free(y, x));
+        let Some(first) = found.next() else {
+            continue;
+        };
+        let last = (first..columns).rfind(|&x| free(y, x)).unwrap_or(first);
+        low = [low[0].min(y), low[1].min(first)];
+        high = [high[0].max(y), high[1].max(last)];
+    }
+    if low[0] == usize::MAX {
+        return None;
+    }
+    Some(std::array::from_fn(|axis| {
+        if domain.edges[axis] == Edge::Wrap {
+            (0, domain.shape[axis])
+        } else {
+            (low[axis], high[axis] + 1 - low[axis])
+        }
+    }))
+}
+
+/// One cycle: `vectors[0].x` becomes about the solution for `vectors[0].b`.
 fn cycle(levels: &[Level], vectors: &mut [Vectors]) {
     let (Some((level, coarser)), Some((v, below))) =
         (levels.split_first(), vectors.split_first_mut())
@@ -174,68 +121,43 @@ fn cycle(levels: &[Level], vectors: &mut [Vectors]) {
     };
     level.begin(v, STEPS[0]);
     level.relax(v, STEPS[1]);
-    let times = if coarser.is_empty() { COARSEST } else { 1 };
-    for _ in 1..times {
-        STEPS.iter().for_each(|&step| level.relax(v, step));
-    }
-    if let (Some(next), Some(w)) = (coarser.first(), below.first_mut()) {
-        let Vectors { x, other, b } = &mut *v;
-        level.lack(x, b, other);
-        next.each_row(&mut w.b, |r, out| {
-            out.fill(0.0);
-            for r in 2 * r..(2 * r + 2).min(level.rows) {
-                let row = &other[level.at(r, 0)..][..level.columns];
-                for (out, pair) in out.iter_mut().zip(row.chunks(2)) {
-                    *out += pair.iter().sum::<f32>();
-                }
-            }
-        });
-        cycle(coarser, below);
-        let coarse = &below[0].x;
-        level.each_row(&mut v.x, |r, out| {
-            let from = &coarse[next.at(r / 2, 0)..][..next.columns];
-            let free = level.reciprocal[level.at(r, 0)..][..level.columns].chunks(2);
-            for ((out, free), from) in out.chunks_mut(2).zip(free).zip(from) {
-                for (out, free) in out.iter_mut().zip(free) {
-                    *out += if *free > 0.0 { *from } else { 0.0 };
-                }
-            }
-        });
-    }
-    for _ in 0..times {
-        STEPS.iter().rev().for_each(|&step| level.relax(v, step));
-    }
+    let (Some(next), Some(w)) = (coarser.first(), below.first_mut()) else {
+        for _ in 1..COARSEST {
+            STEPS.iter().for_each(|&step| level.relax(v, step));
+        }
+        return;
+    };
+    level.restrict(v, next, &mut w.b);
+    cycle(coarser, below);
+    level.prolong(next, &below[0].x, &mut v.x);
+    STEPS.iter().rev().for_each(|&step| level.relax(v, step));
 }
 
-/// Solves for `r`, which is used up. Dot products are summed by fixed chunks, in order.
+/// Solves for `vectors[0].b`, which is used up. Sums run by fixed chunks, in order.
 fn conjugate_gradients(
     levels: &[Level],
     vectors: &mut [Vectors],
-    r: &mut [f32],
     monitor: &Monitor,
 ) -> Result<Vec<f32>> {
     let level = &levels[0];
-    let mut x = vec![0.0f32; level.len()];
-    let first = dot(r, r);
-    if first == 0.0 {
-        return Ok(x);
-    }
-    let mut p = vec![0.0f32; level.len()];
-    let mut ap = vec![0.0f32; level.len()];
-    let mut rz = 0.0;
+    let [mut x, mut p, mut ap] = std::array::from_fn(|_| level.zeros());
+    let first = inner(level, &vectors[0].b, &vectors[0].b);
+    let (mut rz, mut alpha) = (0.0, 0.0);
     for step in 0..MAX_CYCLES {
+        if first == 0.0 {
+            return Ok(x);
+        }
         monitor.check()?;
-        vectors[0].b.copy_from_slice(r);
         cycle(levels, vectors);
-        let z = &vectors[0].x;
+        let Vectors { x: z, b: r, .. } = &mut vectors[0];
         let previous = std::mem::replace(&mut rz, inner(level, r, z));
         let beta = if step == 0 {
             0.0
         } else {
-            (rz / previous) as f32
+            (-alpha * inner(level, z, &ap) / previous) as f32
         };
-        par::chunks_mut(&mut p, CHUNK, |i, p| {
-            let z = &z[i * CHUNK..];
+        level.each_row(&mut p, |r, p| {
+            let z = &z[level.at(r, 0)..];
             p.iter_mut().zip(z).for_each(|(p, z)| *p = z + beta * *p);
         });
         level.apply(&p, &mut ap);
@@ -243,20 +165,22 @@ fn conjugate_gradients(
         if !(curvature > 0.0 && rz.is_finite()) {
             break;
         }
-        let alpha = (rz / curvature) as f32;
-        par::chunks_mut(&mut x, CHUNK, |i, x| {
-            let p = &p[i * CHUNK..];
-            x.iter_mut().zip(p).for_each(|(x, p)| *x += alpha * p);
+        alpha = rz / curvature;
+        let length = alpha as f32;
+        level.each_row(&mut x, |r, x| {
+            let p = &p[level.at(r, 0)..];
+            x.iter_mut().zip(p).for_each(|(x, p)| *x += length * p);
         });
-        par::chunks_mut(r, CHUNK, |i, r| {
-            let ap = &ap[i * CHUNK..];
-            r.iter_mut().zip(ap).for_each(|(r, ap)| *r -= alpha * ap);
+        level.each_row(r, |y, r| {
+            let ap = &ap[level.at(y, 0)..];
+            r.iter_mut().zip(ap).for_each(|(r, ap)| *r -= length * ap);
         });
-        if inner(level, r, r) <= TOLERANCE * TOLERANCE * first {
+        let left = inner(level, r, r);
+        if left <= TOLERANCE * TOLERANCE * first {
             return Ok(x);
         }
     }
-    if r.iter().all(|v| v.is_finite()) {
+    if x.iter().all(|v| v.is_finite()) && first.is_finite() {
         return Ok(x);
     }
     Err(Error::value(
@@ -265,31 +189,27 @@ fn conjugate_gradients(
     ))
 }
 
-fn dot(a: &[f32], b: &[f32]) -> f64 {
-    let parts = par::map(a.len().div_ceil(CHUNK), |chunk| {
-        let (a, b) = (&a[chunk * CHUNK..], &b[chunk * CHUNK..]);
-        let n = CHUNK.min(a.len());
-        let mut lanes = [0.0f64; 8];
-        for (a, b) in a[..n].chunks(8).zip(b[..n].chunks(8)) {
-            for (lane, (a, b)) in lanes.iter_mut().zip(a.iter().zip(b)) {
-                *lane += f64::from(*a) * f64::from(*b);
+/// The dot product, without the margins.
+fn inner(level: &Level, a: &[f32], b: &[f32]) -> f64 {
+    let rows = level.chunk();
+    let parts = par::map(level.rows.div_ceil(rows), |chunk| {
+        wide(|| {
+            let mut lanes = [0.0f64; 8];
+            for r in chunk * rows..((chunk + 1) * rows).min(level.rows) {
+                let at = level.at(r, 0);
+                let (a, a_rest) = a[at..][..level.columns].as_chunks::<8>();
+                let (b, b_rest) = b[at..][..level.columns].as_chunks::<8>();
+                for (a, b) in a.iter().zip(b) {
+                    for l in 0..8 {
+                        lanes[l] += f64::from(a[l]) * f64::from(b[l]);
+                    }
+                }
+                for (lane, (a, b)) in lanes.iter_mut().zip(a_rest.iter().zip(b_rest)) {
+                    *lane += f64::from(*a) * f64::from(*b);
+                }
             }
-        }
-        lanes.iter().sum::<f64>()
+            lanes.iter().sum::<f64>()
+        })
     });
     parts.iter().sum()
-}
-
-/// [`dot`] of two vectors without what the margins repeat.
-fn inner(level: &Level, a: &[f32], b: &[f32]) -> f64 {
-    if level.wrap == [false; 2] {
-        return dot(a, b);
-    }
-    let rows = par::map(level.rows, |r| {
-        let at = level.at(r, 0);
-        let (a, b) = (&a[at..][..level.columns], &b[at..][..level.columns]);
-        let products = a.iter().zip(b).map(|(&a, &b)| f64::from(a) * f64::from(b));
-        products.sum::<f64>()
-    });
-    rows.iter().sum()
 }
