@@ -352,7 +352,8 @@ class Quilt:
         apart = np.abs(self.pixels.coordinates[here] - self.pixels.coordinates[there]).max(axis=-1)
         apart[self.pixels.exemplar[here] != self.pixels.exemplar[there]] = np.inf
         turned = self.all_hands[here] != self.all_hands[there]
-        return ((apart < 1) & ~turned).mean(axis=1), ((apart <= NEAR) & turned).mean(axis=1)
+        near = apart <= NEAR
+        return (near & ~turned).mean(axis=1), (near & turned).mean(axis=1)
 
     def repeated(self, matches: Sequence[Match], window: Window) -> NDArray[np.float64]:
         """Give how much of each match others show: 0 nothing, 1 what they all do."""

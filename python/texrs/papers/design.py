@@ -295,6 +295,7 @@ def variant(source: Source, shapes: tuple[tuple[int, ...], ...], which: int, see
             seed=(seed + number) % 2**64,
             count=1 if source.paper else CANDIDATES,
             paper=source.paper,
+            shown=flips.index(base),
         )
         pasted = filled.label >= 0
         origin = np.where(pasted, filled.source[filled.label], -1)
