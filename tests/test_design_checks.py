@@ -47,17 +47,13 @@ def made(name, seed):
 # --- the results -----------------------------------------------------------------------------------------------------
 
 LATTICE = "a lattice: no patch continues the courses on all sides, and where they break the seam shows"
-CROWDED = "touching stones of one colour: whole groups are taken for elements and cut apart, and the census joins some"
-MIRRORS = "a patch and its mirror image fit perfectly along their axis, so the stitching lays them side by side"
 FAVOURITES = "patches are chosen for how well they fit: easy places are shown more often than chance would"
+FEW = "ten elements of a photograph that is no texture, a cup: their sizes are chance"
 KNOWN: dict[tuple[str, str], str] = {
     ("d2", "brick"): LATTICE,
-    ("d3", "brick"): LATTICE,
     ("d4", "brick"): LATTICE,
-    ("d8", "grit"): CROWDED,
-    ("d8", "gravel"): CROWDED,
-    **{("d12", name): MIRRORS for name in ("pebbles", "leaves_and_flowers", "beans", "coffee")},
-    **{("d13", name): FAVOURITES for name in NAMES},
+    ("d8", "coffee"): FEW,
+    **{("d13", name): FAVOURITES for name in ("pebbles", "brick", "coffee")},
 }
 """(check, exemplar) that may fail for one of the seeds at least, with the reason."""
 

@@ -37,7 +37,7 @@ POOL, CANDIDATES = 48, 3
 """Matches that are looked at for what they repeat; those of them that are cut in."""
 REPETITION = 1.5
 """Charge for showing what all other patches show, in units of a typical match."""
-CONTINUATION = 6.0
+CONTINUATION = 2.0
 """Charge for going on with the piece of the exemplar that lies there already, in the same units."""
 CELL = 8
 """Use is counted in cells of so many pixels a side, and overlaps are compared on as many rows and columns."""

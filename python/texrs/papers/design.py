@@ -39,6 +39,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any, Literal, TypeAlias, overload
 
 import numpy as np
@@ -230,13 +231,18 @@ def one(
         watch("deform and complete", number / (tiles * len(sources)))
         which = number % len(sources)
         pictures.append(variant(sources[which], shapes, which, seed, number // len(sources)))
-    composite = large(sources, pictures, size, wrap, shares, seed, lambda share: watch("stitch", share))
+    composite = large(sources, pictures, size, wrap, shares, seed, partial(watch, "stitch"))
     picture = image = composite.render(exemplars)
     before = after = visibility(composite, exemplars, picture, wrap=wrap)
     if screening:
-        watch("blend", 0.0)
         free = sources[0].paper
-        image = blend(composite, exemplars, wrap=False if free else wrap, screening=0.0 if free else screening)
+        image = blend(
+            composite,
+            exemplars,
+            wrap=False if free else wrap,
+            screening=0.0 if free else screening,
+            progress=watch,
+        )
         after = visibility(composite, exemplars, image, wrap=wrap)
     stages = {"segmentation": sources[0].parts.elements.astype(np.uint16), **pictures[0].stages, "composite": picture}
     report: dict[str, Any] = {
@@ -325,7 +331,7 @@ def deform_layers(source: Source, which: int, seed: int, number: int) -> tuple[L
 
 # --- the large texture: section 3.1, step 4 --------------------------------------------------------------------------
 
-PATCH, OVERLAP = 0.5, 0.22
+PATCH, OVERLAP = 0.6, 0.25
 """Side of a patch and overlap of two, as shares of the exemplar's shorter side."""
 MIXED_PATCH = 0.6
 """The same where several exemplars are mixed: smaller patches mix them better."""
