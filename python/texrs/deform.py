@@ -159,10 +159,13 @@ class Moves:
                 continue
             return iter(sequence.tolist())
 
-    def draw(self, values: Iterator[float], touches: tuple[bool, bool], side: int) -> list[Operation]:
+    def draw(
+        self, values: Iterator[float], touches: tuple[bool, bool], side: int, reach: float = 1.0
+    ) -> list[Operation]:
         """Choose the operations of one element: three chaotic values each, for kind, sense and axis, and extent.
 
-        ``touches`` says on which axes the exemplar's border cuts the element: it then only slides along that border.
+        ``reach`` is the share of their extents that translations and rotations may have. ``touches`` says on which axes
+        the exemplar's border cuts the element: it then only slides along that border.
         """
         if self.shifts:
             _, h2, h3 = next(values), next(values), next(values)
@@ -181,8 +184,8 @@ class Moves:
                 kind, axis = "T", 1 if touches[0] else 0
             low, high = self.scale
             amount = {
-                "T": round(sense * extent * self.translate * side),
-                "R": sense * extent * self.rotate,
+                "T": round(sense * extent * reach * self.translate * side),
+                "R": sense * extent * reach * self.rotate,
                 "M": 0.0,
                 "S": low + extent * (high - low),
             }[kind]
@@ -198,7 +201,7 @@ CORE = 3.0
 """Depth in pixels from which on an element is tied to itself in the cut."""
 
 
-TRIES, GOOD, BAD = 6, 0.03, 0.25
+TRIES, GOOD, BAD = 12, 0.03, 0.12
 """Draws for an element; the collision score that is taken at once, and the one that is refused."""
 
 
@@ -310,25 +313,28 @@ def place(element: Element, operations: Sequence[Operation], shape: tuple[int, i
 
 def fit(
     element: Element,
-    cores: Bools,
+    occupied: Labels,
     moves: Moves,
     seed: int,
     variant: int,
     agrees: Callable[[Placement], bool] | None = None,
 ) -> tuple[list[Operation], Placement] | None:
-    """Draw operations until the element keeps out of the cores that are placed, and ``agrees`` with where it comes to.
+    """Draw operations until the element keeps out of what others occupy, and ``agrees`` with where it comes to.
 
-    Takes the first good draw, else the best one, which may be not to move at all; None when even that collides.
+    Draws shorter and shorter ways. Takes the first good one, else the best, which may be not to move at all; None when even
+    that collides.
     """
     values = moves.values(seed, variant, element.label)
     best: tuple[float, list[Operation], Placement] | None = None
     for attempt in range(TRIES + 1):
-        operations = moves.draw(values, element.touches, min(cores.shape)) if attempt < TRIES else []
-        placement = place(element, operations, cores.shape)
+        reach = 1 - attempt / TRIES
+        operations = moves.draw(values, element.touches, min(occupied.shape), reach) if reach else []
+        placement = place(element, operations, occupied.shape)
         if placement is None or not placement.core.any():
             continue
         lost = 0.0 if any(element.touches) else max(0.0, 1 - placement.kept)
-        score = float((placement.core & cores[placement.window]).sum()) / float(placement.core.sum()) + lost
+        there, mine = occupied[placement.window], (placement.distance > 0) & placement.inside
+        score = float((mine & (there > 0) & (there != element.label)).sum()) / float(mine.sum()) + lost
         if (best is None or score < best[0]) and (agrees is None or not operations or agrees(placement)):
             best = (score, operations, placement)
             if score <= GOOD:

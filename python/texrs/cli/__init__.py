@@ -110,7 +110,9 @@ def design_command(
             help="Make so many textures, OUT-SEED each, and OUT as their contact sheet.", show_default="one, in OUT"
         ),
     ] = None,
-    layers: Annotated[int, typer.Option(help="Colour layers of the example, 1 to 16.")] = 2,
+    layers: Annotated[
+        int | None, typer.Option(help="Colour layers of the example, 1 to 16; by default as many as find its elements.")
+    ] = None,
     children: Annotated[
         str, typer.Option(metavar="KIND", help="Elements of the layers: auto, components, grid or none.")
     ] = "auto",

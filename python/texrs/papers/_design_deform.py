@@ -39,7 +39,7 @@ def deform(
     still, filled = resting(lie, parts.count, seed, number), lie in ("heap", "full")
     heap = Heap.of(elements, labels) if lie == "heap" else None
     # Where all is full, an element has its place, which another one may take: nothing is left open.
-    canvas = Canvas.whole(picture) if filled else Canvas.background(picture, labels, still)
+    canvas = Canvas.whole(picture) if filled else Canvas.background(picture, labels, still, lie == "apart")
     log: list[dict[str, Any]] = [{"element": 0, "mirror": list(base)}]
     for site, element in enumerate(elements):
         moved: tuple[Element, list[Operation], Placement] | None = None
@@ -49,7 +49,7 @@ def deform(
             moved = heap.take_place(site, moves, seed, number)
         else:
             agrees = partial(canvas.agrees, picture) if parts.lattice else None
-            fitted = fit(element, canvas.cores, moves, seed, number, agrees)
+            fitted = fit(element, canvas.occupied, moves, seed, number, agrees)
             moved = None if fitted is None else (element, *fitted)
         entry: dict[str, Any] = {
             "element": element.label,
@@ -65,7 +65,7 @@ def deform(
                 entry["operations"] = [o for o in entry["operations"] if o[0] != "T"]
                 entry["place"] = [round(sum(o.shift()[axis] for o in moved[1])) for axis in range(2)]
             if moved[1] or not filled:
-                canvas.stitch(picture, labels, moved[2])
+                canvas.stitch(picture, labels, moved[2], moved[0].label)
             if heap is not None:
                 canvas.clear(labels, element, len(canvas.frames) - 1)
         log.append(entry)
@@ -80,21 +80,23 @@ shape of another one: leaves and flowers, which move as if they lay apart."""
 MOVED, MOVED_RAGGED = 0.7, 0.25
 """Share of places that others may take, and share of a heap of leaves that moves."""
 
-Arrangement: TypeAlias = Literal["apart", "leaves", "heap", "full"]
+Arrangement: TypeAlias = Literal["apart", "cells", "leaves", "heap", "full"]
 
 
 def arrangement(parts: Segmentation) -> Arrangement:
-    """Tell how elements lie: apart, in a heap, of leaves or of things of one shape, or on a lattice, which is full."""
+    """Tell how elements lie: apart, in a heap, of leaves or of things of one shape, or on a full lattice; or as cells."""
     if parts.lattice is not None:
         return "full"
-    if parts.children in ("none", "grid") or np.count_nonzero(parts.elements) <= DENSE * parts.elements.size:
+    if parts.children in ("none", "grid"):
+        return "cells"
+    if np.count_nonzero(parts.elements) <= DENSE * parts.elements.size:
         return "apart"
     return "heap" if solidity(parts.elements) >= RAGGED else "leaves"
 
 
 def resting(lie: Arrangement, count: int, seed: int, number: int) -> frozenset[int]:
     """Choose the elements that stay where they are."""
-    share = {"apart": 1.0, "leaves": MOVED_RAGGED, "heap": MOVED, "full": MOVED}[lie]
+    share = {"apart": 1.0, "cells": 1.0, "leaves": MOVED_RAGGED, "heap": MOVED, "full": MOVED}[lie]
     return frozenset(e for e in range(1, count + 1) if uniform(seed, number, e, 0, 4) >= share)
 
 
@@ -108,11 +110,13 @@ class Canvas:
     covered: Bools
     cores: Bools
     """What the elements that are placed are tied to."""
+    occupied: Labels
+    """Elements that others keep out of."""
     frames: list[NDArray[np.float64]]
     """The Jacobian of each label."""
 
     @classmethod
-    def background(cls, picture: Floats, labels: Labels, still: frozenset[int]) -> Canvas:
+    def background(cls, picture: Floats, labels: Labels, still: frozenset[int], free: bool) -> Canvas:
         """Start from the background: everything but the elements that move and the pixel around them."""
         from scipy.ndimage import binary_dilation, binary_erosion
 
@@ -120,14 +124,17 @@ class Canvas:
         start = SourceMap.identity(labels.shape)
         covered: Bools = ~binary_dilation((labels > 0) & ~rest, np.ones((3, 3), bool)) | rest
         cores: Bools = binary_erosion(rest, np.ones((3, 3), bool), iterations=int(CORE), border_value=1)
-        return cls(picture.copy(), start.coordinates, start.label, covered, cores, [np.eye(2)])
+        # Where elements lie apart, an element keeps out of places that others may still leave: then it can always stay.
+        occupied = labels.copy() if free else np.where(cores, labels, 0)
+        return cls(picture.copy(), start.coordinates, start.label, covered, cores, occupied, [np.eye(2)])
 
     @classmethod
     def whole(cls, picture: Floats) -> Canvas:
         """Start from the whole picture, which any element may cover."""
         start = SourceMap.identity(picture.shape[:2])
         everywhere = np.ones(picture.shape[:2], bool)
-        return cls(picture.copy(), start.coordinates, start.label, everywhere, ~everywhere, [np.eye(2)])
+        nothing = np.zeros(picture.shape[:2], np.int32)
+        return cls(picture.copy(), start.coordinates, start.label, everywhere, ~everywhere, nothing, [np.eye(2)])
 
     def agrees(self, picture: Floats, placement: Placement) -> bool:
         """Whether the surroundings of an element are much like what it comes to lie on."""
@@ -148,7 +155,7 @@ class Canvas:
         left = (labels[window] == element.label) & (self.label[window] != label)
         self.covered[window] &= ~binary_opening(left, np.ones((2, 2), bool))
 
-    def stitch(self, picture: Floats, labels: Labels, placement: Placement) -> None:
+    def stitch(self, picture: Floats, labels: Labels, placement: Placement, element: int) -> None:
         """Cut an element and its ring into the canvas (Eq. 3)."""
         window, core = placement.window, placement.core
         # Of its surroundings only background comes along: pieces of other elements would be torn ones.
@@ -165,4 +172,6 @@ class Canvas:
         self.label[window][taken] = len(self.frames)
         self.covered[window] |= taken
         self.cores[window] |= core
+        self.occupied[self.occupied == element] = 0
+        self.occupied[window][(placement.distance > 0) & placement.inside] = element
         self.frames.append(placement.frame)

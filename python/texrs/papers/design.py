@@ -87,7 +87,7 @@ def design(  # type: ignore[misc]  # the overloads leave the options to this sig
     variants: int | None = None,
     wrap: bool | Sequence[bool] = (True, True),
     weights: object = None,
-    layers: int = 2,
+    layers: int | None = None,
     children: Children = "auto",
     labels: NDArray[np.integer] | Sequence[NDArray[np.integer]] | None = None,
     tiles: int = 4,

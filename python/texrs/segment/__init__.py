@@ -18,7 +18,7 @@ from texrs._typing import Array, Floats, Labels
 from texrs.errors import InvalidInput
 from texrs.kernels.noise import uniform
 from texrs.segment import elements as _elements
-from texrs.segment.layers import layers_of
+from texrs.segment.layers import Regions
 from texrs.segment.regularity import Lattice, lattice
 
 __all__ = ["Children", "Segmentation", "segment"]
@@ -32,6 +32,11 @@ WHOLE, INSIDE, OUTSIDE, HEAP = 0.79, 1.6, 1.5, 0.6
 which covers at least this share of the image and has a background of gaps."""
 CONVINCING = 0.83
 """Score of elements from which on no other background is tried."""
+USUAL_LAYERS, MOST_LAYERS = 2, 4
+"""Layers by default, and at most unless asked for."""
+APART, CLEARLY, SAME_SIZE = 0.45, 1.15, 0.6
+"""Share of the image that elements which lie apart cover at most; how many times more of it further layers must bring; least
+ratio of median areas of elements that are of the same size."""
 GRID_SHARE = 1 / 6
 """Side of a grid cell, as a share of the exemplar's shorter side."""
 
@@ -86,7 +91,7 @@ class Segmentation:
 def segment(
     image: Array,
     *,
-    layers: int = 2,
+    layers: int | None = None,
     children: Children = "auto",
     labels: NDArray[np.integer] | None = None,
 ) -> Segmentation:
@@ -96,8 +101,9 @@ def segment(
     ----------
     image : (H, W) or (H, W, C) array
         The exemplar, any dtype; the first three channels count, or the first one when there are two.
-    layers : int
-        Number of colour layers, 1 to 16. Fewer are made where the image has fewer colours.
+    layers : int, optional
+        Number of colour layers, 1 to 16. Fewer are made where the image has fewer colours. By default two, or three or
+        four where these find clearly more elements of the same size that lie apart.
     children : {"auto", "components", "grid", "none"}
         "components": connected pieces of the layers above the background. "grid": jittered cells of 1/6 of the side,
         for images without separate elements. "none": whole layers. "auto": components, or the grid where nothing
@@ -125,19 +131,22 @@ def segment(
     """
     pixels = as_image(image)
     height, width = pixels.shape[:2]
-    as_int(layers, "layers", 1, 16)
+    most = USUAL_LAYERS if layers is None else as_int(layers, "layers", 1, 16)
     if children not in ("auto", "components", "grid", "none"):
         raise InvalidInput(f"children: allowed are auto, components, grid and none; got {children!r}")
     if labels is not None:
         return _from_labels(labels, (height, width))
     rgb = _colours(to_unit(pixels))
-    found = layers_of(rgb, layers)
+    regions = Regions.of(rgb)
+    found = regions.layers(most)
     if children == "none":
         return Segmentation(found, found.copy(), "none", "")
     regular = lattice(rgb)
     reasons = [f"elements keep to {regular}"] if regular else []
     if children != "grid":
         found, elements, trouble = _best_background(found, rgb)
+        if layers is None:
+            found, elements, trouble = _more_layers(regions, rgb, found, elements, trouble)
         if children == "components" or not trouble:
             return Segmentation(found, _elements.whole(elements), "components", "; ".join(reasons), regular)
         reasons.insert(0, trouble)
@@ -182,6 +191,25 @@ def _best_background(layers: Labels, rgb: Floats) -> tuple[Labels, Labels, str]:
             break
     assert best is not None
     return best[1:]
+
+
+def _more_layers(
+    regions: Regions, rgb: Floats, layers: Labels, elements: Labels, trouble: str
+) -> tuple[Labels, Labels, str]:
+    """Add layers as long as they find clearly more elements of the same size, which lie apart.
+
+    Two layers see the light stones on a dark ground, and not those that are as dark as the ground.
+    """
+    for count in range(USUAL_LAYERS + 1, MOST_LAYERS + 1):
+        if trouble or (elements > 0).mean() > APART:
+            break
+        more = _best_background(regions.layers(count), rgb)
+        area, before = (np.bincount(e.ravel())[1:] for e in (more[1], elements))
+        alike = len(area) > 0 and SAME_SIZE <= np.median(area) / np.median(before) <= 1 / SAME_SIZE
+        if more[2] or area.sum() > APART * elements.size or not alike or area.sum() < CLEARLY * before.sum():
+            break
+        layers, elements, trouble = more
+    return layers, elements, trouble
 
 
 def _trouble(evidence: _elements.Evidence) -> str:

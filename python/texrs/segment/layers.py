@@ -6,13 +6,15 @@ A mean-shift filter (Comaniciu and Meer, IEEE PAMI 2002), the graph-based merge 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Floats, Labels
 from texrs.kernels.mean_shift import mean_shift
 
-__all__ = ["layers_of"]
+__all__ = ["Regions"]
 
 SPATIAL_RADIUS, RANGE_RADIUS = 6, 14 / 255
 """Of the mean-shift filter: pixels, and colour units of [0, 1]."""
@@ -20,23 +22,38 @@ MERGE_SCALE, MERGE_BLUR, MERGE_MINIMUM = 60, 0.4, 24
 """k, sigma and least area in pixels of the graph-based merge, colours in 0..255."""
 
 
-def layers_of(rgb: Floats, count: int) -> Labels:
-    """Assign each pixel to one of ``count`` layers, the largest first."""
-    from skimage.color import rgb2lab
-    from skimage.segmentation import felzenszwalb
+@dataclass(frozen=True, slots=True, eq=False)
+class Regions:
+    """An image in regions of one colour."""
 
-    filtered: Floats = mean_shift(rgb, SPATIAL_RADIUS, RANGE_RADIUS)
-    region = felzenszwalb(filtered.astype(np.float64), MERGE_SCALE, MERGE_BLUR, MERGE_MINIMUM)
-    area = np.bincount(region.ravel()).astype(np.float64)
-    lab = rgb2lab(filtered).reshape(-1, 3)
-    mean = np.stack([np.bincount(region.ravel(), lab[:, c]) / area for c in range(3)], axis=-1)
-    layer = _weighted_k_means(mean, area, min(count, len(area)))
-    share = np.bincount(layer, area)
-    order = np.argsort(-share, kind="stable")
-    rank = np.empty(len(order), np.int32)
-    rank[order] = np.arange(len(order), dtype=np.int32)
-    result: Labels = rank[layer][region]
-    return result
+    region: NDArray[np.intp]
+    """(H, W): the region of each pixel, from 0."""
+    area: NDArray[np.float64]
+    colour: NDArray[np.float64]
+    """(n, 3): mean CIE Lab colour of each."""
+
+    @classmethod
+    def of(cls, rgb: Floats) -> Regions:
+        """Filter an image, and merge what is alike."""
+        from skimage.color import rgb2lab
+        from skimage.segmentation import felzenszwalb
+
+        filtered: Floats = mean_shift(rgb, SPATIAL_RADIUS, RANGE_RADIUS)
+        region = felzenszwalb(filtered.astype(np.float64), MERGE_SCALE, MERGE_BLUR, MERGE_MINIMUM)
+        area = np.bincount(region.ravel()).astype(np.float64)
+        lab = rgb2lab(filtered).reshape(-1, 3)
+        colour = np.stack([np.bincount(region.ravel(), lab[:, c]) / area for c in range(3)], axis=-1)
+        return cls(region, area, colour)
+
+    def layers(self, count: int) -> Labels:
+        """Assign each pixel to one of ``count`` layers, the largest first."""
+        layer = _weighted_k_means(self.colour, self.area, min(count, len(self.area)))
+        share = np.bincount(layer, self.area)
+        order = np.argsort(-share, kind="stable")
+        rank = np.empty(len(order), np.int32)
+        rank[order] = np.arange(len(order), dtype=np.int32)
+        result: Labels = rank[layer][self.region]
+        return result
 
 
 def _weighted_k_means(points: NDArray[np.float64], weight: NDArray[np.float64], count: int) -> NDArray[np.intp]:
