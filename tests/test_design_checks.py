@@ -53,6 +53,7 @@ KNOWN: dict[tuple[str, str], str] = {
     ("d2", "brick"): LATTICE,
     ("d4", "brick"): LATTICE,
     ("d8", "coffee"): FEW,
+    ("d5", "coffee"): FEW,
     ("d12", "coffee"): FEW,
     **{("d13", name): FAVOURITES for name in ("pebbles", "brick", "coffee")},
 }

@@ -383,11 +383,11 @@ def cells(source: SourceMap) -> NDArray[np.int64]:
 
 
 def calm(lines: Floats) -> list[int]:
-    """Give the lines that differ from the one before them no more than usual, on the whole and at their worst."""
+    """Give the lines that differ from the one before them as usual, rather less than more, and no more at their worst."""
     from scipy.ndimage import uniform_filter1d
 
     jumps = np.abs(np.diff(lines, axis=0)).mean(axis=-1)
     whole, worst = jumps.mean(axis=1), uniform_filter1d(jumps, RUN, axis=1).max(axis=1)
-    usual = (whole <= np.median(whole)) & (worst <= np.median(worst))
+    usual = (whole >= np.quantile(whole, 0.25)) & (whole <= np.median(whole)) & (worst <= np.median(worst))
     found = np.flatnonzero(usual) if usual.any() else [np.argmin(whole)]
     return [1 + int(line) for line in found]

@@ -1,8 +1,8 @@
 """Elements deformed and stitched over the background: sections 3.3 and 3.4 of `texrs.design`.
 
-Elements that lie apart are moved, and leave holes. In a heap and on a lattice all is full: there an element comes
-to lie where another one was, cut into the picture as it is. In a heap of leaves, of which none has another one's shape, most
-rest, or there would be nothing left to lie on.
+Elements that lie apart are moved, and leave holes. In a heap, on a lattice, and where they are only the cells of a grid,
+all is full: there an element comes to lie where another one was, cut into the picture as it is. In a heap of leaves, of
+which none has another one's shape, most rest, or there would be nothing left to lie on.
 """
 
 from __future__ import annotations
@@ -80,15 +80,15 @@ shape of another one: leaves and flowers, which move as if they lay apart."""
 MOVED, MOVED_RAGGED = 0.7, 0.25
 """Share of places that others may take, and share of a heap of leaves that moves."""
 
-Arrangement: TypeAlias = Literal["apart", "cells", "leaves", "heap", "full"]
+Arrangement: TypeAlias = Literal["apart", "layers", "leaves", "heap", "full"]
 
 
 def arrangement(parts: Segmentation) -> Arrangement:
-    """Tell how elements lie: apart, in a heap, of leaves or of things of one shape, or on a full lattice; or as cells."""
-    if parts.lattice is not None:
+    """Tell how elements lie: apart, in a heap, of leaves or of things of one shape, or so that all is full."""
+    if parts.lattice is not None or parts.children == "grid":
         return "full"
-    if parts.children in ("none", "grid"):
-        return "cells"
+    if parts.children == "none":
+        return "layers"
     if np.count_nonzero(parts.elements) <= DENSE * parts.elements.size:
         return "apart"
     return "heap" if solidity(parts.elements) >= RAGGED else "leaves"
@@ -96,7 +96,7 @@ def arrangement(parts: Segmentation) -> Arrangement:
 
 def resting(lie: Arrangement, count: int, seed: int, number: int) -> frozenset[int]:
     """Choose the elements that stay where they are."""
-    share = {"apart": 1.0, "cells": 1.0, "leaves": MOVED_RAGGED, "heap": MOVED, "full": MOVED}[lie]
+    share = {"apart": 1.0, "layers": 1.0, "leaves": MOVED_RAGGED, "heap": MOVED, "full": MOVED}[lie]
     return frozenset(e for e in range(1, count + 1) if uniform(seed, number, e, 0, 4) >= share)
 
 
