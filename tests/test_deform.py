@@ -5,7 +5,7 @@ import pytest
 
 import texrs
 from texrs import samples
-from texrs.deform import Heap, Moves, chaotic_sequence, elements_of, place
+from texrs.deform import Heap, Moves, chaotic_sequence, elements_of, fit, place
 from texrs.errors import InvalidInput
 
 FREE = Moves(2, 0.12, 60.0, (0.8, 1.2), True, None, 2.0)
@@ -140,3 +140,23 @@ def test_shifts_are_mirrored_with_the_picture():
     }
     assert drawn == {(("T", 3.0, 0), ("T", 5.0, 1)), (("T", -2.0, 0), ("T", 7.0, 1))}
     assert moves.draw(moves.values(0, 0, 1), (True, False), 99) == []
+
+
+def test_elements_keep_out_of_what_others_occupy():
+    """Also of the places of those that have yet to move: so an element can always stay."""
+    rows, columns = np.mgrid[:96, :96]
+    labels = np.zeros((96, 96), np.int32)
+    for number, (r, c) in enumerate([(24, 24), (24, 50), (50, 24), (50, 50), (74, 74)], start=1):
+        labels[(rows - r) ** 2 + (columns - c) ** 2 < 100] = number
+    moves = Moves(2, 0.3, 60.0, (0.8, 1.2), True, None, 2.0)
+    moved = 0
+    for seed in range(8):
+        for element in elements_of(labels):
+            fitted = fit(element, labels, moves, seed, 0)
+            assert fitted is not None
+            operations, placement = fitted
+            mine = (placement.distance > 0) & placement.inside
+            there = labels[placement.window]
+            assert (mine & (there > 0) & (there != element.label)).sum() <= 0.12 * mine.sum()
+            moved += bool(operations)
+    assert moved >= 20

@@ -48,7 +48,7 @@ def made(name, seed):
 
 LATTICE = "a lattice: no patch continues the courses on all sides, and where they break the seam shows"
 FAVOURITES = "patches are chosen for how well they fit: easy places are shown more often than chance would"
-FEW = "ten elements of a photograph that is no texture, a cup: their sizes and what fits beside them are chance"
+FEW = "unevenly lit wood, 128 x 116 pixels: its ten stains are all there is to move, and little fits beside them"
 KNOWN: dict[tuple[str, str], str] = {
     ("d2", "brick"): LATTICE,
     ("d4", "brick"): LATTICE,

@@ -225,3 +225,11 @@ def test_direction_sees_one_direction_and_two_at_right_angles():
     assert direction(squares[..., None].astype(np.float32)) > 0.5
     assert direction(noise[..., None].astype(np.float32)) < 0.15
     assert direction(np.zeros((128, 128, 1), np.float32)) == 0
+
+
+def test_further_layers_are_taken_where_they_find_more() -> None:
+    """The stones as dark as the ground are missed by two layers."""
+    sample = samples.pebbles((192, 192))
+    assert segment(sample.image).count > 1.3 * segment(sample.image, layers=2).count
+    flowers = samples.leaves_and_flowers((192, 192)).image
+    assert segment(flowers).count == segment(flowers, layers=2).count

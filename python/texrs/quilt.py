@@ -149,7 +149,9 @@ def spans(length: int, side: int, patch: int, overlap: int, wrap: bool) -> list[
     step = max(1, patch - overlap)
     if wrap:
         count = max(2, math.ceil(length / step))
-        extent = min(length, side, math.ceil(length / count) + overlap)
+        # On a ring only the last patch may meet the first one again.
+        most = 2 * (length // count) if count > 2 else length
+        extent = min(side, math.ceil(length / count) + overlap, most)
         starts = [length * i // count for i in range(count)]
     else:
         count = max(2, math.ceil((length - overlap) / step))
