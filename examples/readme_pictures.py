@@ -52,7 +52,7 @@ def main() -> None:
             framed = np.full((320, 192, 3), PAPER, np.uint8)
             framed[:192] = example
             pair += [framed, texrs.design(example, (320, 320), seed=1).image]
-        rows.append(row(pair, 224))
+        rows.append(row(pair, 200))
     texrs.io.write(FOLDER / "gallery.jpg", column(rows))
     planar = [n for n in texrs.samples.names() if texrs.samples.load(n).image.ndim == 3]
     tiles = [texrs.samples.load(n).image for n in planar]
