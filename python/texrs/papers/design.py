@@ -333,8 +333,6 @@ def deform_layers(source: Source, which: int, seed: int, number: int) -> tuple[L
 
 PATCH, OVERLAP = 0.6, 0.25
 """Side of a patch and overlap of two, as shares of the exemplar's shorter side."""
-MIXED_PATCH = 0.6
-"""The same where several exemplars are mixed: smaller patches mix them better."""
 WHOLENESS = 8.0
 """How many times dearer a seam is inside an element than between elements."""
 
@@ -361,7 +359,7 @@ def large(
     return quilt(
         pictures,
         (size[0], size[1]),
-        patch=round(PATCH * side) if len(sources) == 1 else round(MIXED_PATCH * side),
+        patch=round(PATCH * side),
         overlap=round(OVERLAP * side),
         wrap=(wrap[0], wrap[1]),
         shares=shares,
