@@ -18,6 +18,7 @@ NOUNS = {
     "io": set(),
     "report": {"source_map", "io"},
     "segment": set(),
+    "fields": set(),
     "deform": set(),
     "quilt": {"source_map", "_pixels"},
     "blend": {"source_map"},
