@@ -23,7 +23,7 @@ LEAST_DETERMINANT = 1e-3
 WORST_CONDITION = 100.0
 """Frames that stretch one way so many times as much as another are refused."""
 
-_BLOCK = 2**15
+_BLOCK = 2**13
 """Points evaluated at once; the result does not depend on it."""
 _NAMES = ("row", "column"), ("plane", "row", "column")
 
@@ -50,7 +50,7 @@ class Field(ABC):
 
     @abstractmethod
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
-        """Give the frames of (N, A) points, unchecked."""
+        """Give the frames (A, A, N) of (N, A) points, unchecked."""
 
     @abstractmethod
     def _content(self) -> tuple[Any, ...] | None:
@@ -194,7 +194,8 @@ class Field(ABC):
         for start in range(0, len(out), _BLOCK):
             index = np.unravel_index(np.arange(start, min(start + _BLOCK, len(out))), sides)
             at = np.stack([(i + o + 0.5) * step - 0.5 for i, o in zip(index, first.tolist(), strict=True)], axis=-1)
-            out[start : start + len(at)] = self._checked(np.asarray(at, np.float64), jacobians)
+            part = self._checked(np.asarray(at, np.float64), jacobians)
+            out[start : start + len(at)] = part.transpose(2, 0, 1)
         return out.reshape(*sides, self.axes, self.axes)
 
     def over(self, shape: Sequence[int]) -> Field:
@@ -241,7 +242,7 @@ class Field(ABC):
         out = np.empty((len(flat), self.axes, self.axes), np.float32)
         for start in range(0, len(flat), _BLOCK):
             part = slice(start, start + _BLOCK)
-            out[part] = self._checked(flat[part], jacobians)
+            out[part] = self._checked(flat[part], jacobians).transpose(2, 0, 1)
         return out.reshape(*at.shape, self.axes)
 
     def _checked(self, points: NDArray[np.float64], jacobians: bool) -> Matrices:
@@ -256,9 +257,9 @@ def refuse_flat(frames: Matrices, places: NDArray[np.float64], name: str = "fiel
     bad = too_flat(frames, inverse, det, LEAST_DETERMINANT, WORST_CONDITION)
     if bad.any():
         i = int(np.flatnonzero(bad)[0])
-        axes = frames.shape[-1]
+        axes = len(frames)
         place = f"({', '.join(_NAMES[axes - 2])}) = ({', '.join(f'{v:g}' for v in places[i])})"
-        if not np.isfinite(frames[i]).all():
+        if not np.isfinite(frames[:, :, i]).all():
             why = "is not finite"
         elif abs(det[i]) < LEAST_DETERMINANT:
             why = f"is flat: its determinant is {det[i]:.3g}, at least {LEAST_DETERMINANT:g} is needed"

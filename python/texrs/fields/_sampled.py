@@ -21,7 +21,7 @@ from texrs._arrays import as_size
 from texrs._typing import Array
 from texrs.errors import InvalidInput
 from texrs.fields._field import Field, as_points, refuse_flat
-from texrs.fields._matrices import Matrices, determinants, exponentials, inverses, multiply, rotations
+from texrs.fields._matrices import Matrices, determinants, exponentials, multiply, rotations, transposed
 
 __all__ = ["from_array", "from_function", "interpolate"]
 
@@ -82,7 +82,7 @@ def from_array(
     first = [o + (d - 1) / 2 for o, d in zip(start, step, strict=True)]
     places = np.stack(np.meshgrid(*(f + np.arange(n) * d for f, d, n in zip(first, step, sides, strict=True)),
                                   indexing="ij"), axis=-1)  # fmt: skip
-    turns, stretches = _split(given.reshape(-1, axes, axes).astype(np.float64), places.reshape(-1, axes), "frames")
+    turns, stretches = _split(_first(given), places.reshape(-1, axes), "frames")
     return _Grid(axes, sides, tuple(first), tuple(step), turns, stretches)
 
 
@@ -123,7 +123,7 @@ def interpolate(points: ArrayLike, frames: ArrayLike) -> Field:
         raise InvalidInput(f"points: needs shape {(len(given), axes)} for {len(given)} frames, got {at.shape}")
     if len(np.unique(at, axis=0)) < len(at):
         raise InvalidInput("points: two frames are set at one point")
-    turns, stretches = _split(given.astype(np.float64), at, "frames")
+    turns, stretches = _split(_first(given), at, "frames")
     return _Scattered(axes, at, turns, stretches)
 
 
@@ -179,17 +179,17 @@ class _Grid(Field):
             cell = np.minimum(np.floor(at).astype(np.int64), max(n - 2, 0))
             low.append(cell)
             share.append(at - cell)
-        turn = np.zeros((len(points), self.axes, self.axes))
-        stretch = None if self.stretches is None else np.zeros((len(points), *self.stretches.shape[1:]))
+        turn = np.zeros((self.axes, self.axes, len(points)))
+        stretch = None if self.stretches is None else np.zeros((*self.stretches.shape[:-1], len(points)))
         for corner in product((0, 1), repeat=self.axes):
             index = np.zeros(len(points), np.int64)
             weight = np.ones(len(points))
             for a, (up, n) in enumerate(zip(corner, self.sides, strict=True)):
                 index = index * n + np.minimum(low[a] + up, n - 1)
                 weight = weight * (share[a] if up else 1 - share[a])
-            turn += weight[:, np.newaxis, np.newaxis] * self.turns[index]
+            turn += weight * self.turns[..., index]
             if stretch is not None and self.stretches is not None:
-                stretch += _times(weight, self.stretches[index])
+                stretch += weight * self.stretches[..., index]
         return _join(turn, stretch, points)
 
     def _content(self) -> tuple[Any, ...]:
@@ -210,21 +210,21 @@ class _Scattered(Field):
         nearest = np.full(len(points), np.inf)
         for place in self.places:
             nearest = np.minimum(nearest, self._squared(points, place))
-        turn = np.zeros((len(points), self.axes, self.axes))
-        stretch = None if self.stretches is None else np.zeros((len(points), *self.stretches.shape[1:]))
+        turn = np.zeros((self.axes, self.axes, len(points)))
+        stretch = None if self.stretches is None else np.zeros((*self.stretches.shape[:-1], len(points)))
         total = np.zeros(len(points))
         for i, place in enumerate(self.places):
             # Relative to the nearest, so that no weight overflows on a point or vanishes far away.
             distance = self._squared(points, place)
             ratio = np.where(distance > 0, nearest / np.where(distance > 0, distance, 1), 1)
             weight = ratio * ratio
-            total = total + weight
-            turn += weight[:, np.newaxis, np.newaxis] * self.turns[i]
+            total += weight
+            turn += weight * self.turns[..., i : i + 1]
             if stretch is not None and self.stretches is not None:
-                stretch += _times(weight, self.stretches[i])
-        turn /= total[:, np.newaxis, np.newaxis]
+                stretch += weight * self.stretches[..., i : i + 1]
+        turn /= total
         if stretch is not None:
-            stretch = _times(1 / total, stretch)
+            stretch /= total
         return _join(turn, stretch, points)
 
     def _squared(self, points: NDArray[np.float64], place: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -259,7 +259,7 @@ class _Function(Field):
                 f"field: the function {name} gave {frames.dtype} of shape {frames.shape} for {len(points)} points; "
                 f"numbers of shape {wanted} are needed"
             )
-        return np.array(frames, np.float64)
+        return _first(frames)
 
     def _content(self) -> None:
         return None
@@ -271,42 +271,40 @@ class _Function(Field):
 def _split(
     frames: Matrices, places: NDArray[np.float64], name: str
 ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
-    """Split frames into rotations and logarithms of stretches: (N,) where all are uniform, else (N, A, A), or none."""
+    """Split frames into rotations and logarithms of stretches: (N,) where all are uniform, else (A, A, N), or none."""
     refuse_flat(frames, places, name)
+    count = frames.shape[2]
     mirrored = int((determinants(frames) < 0).sum())
-    if mirrored not in (0, len(frames)):
+    if mirrored not in (0, count):
         raise InvalidInput(
-            f"{name}: {mirrored} of {len(frames)} frames mirror and the others do not; between them one would be flat"
+            f"{name}: {mirrored} of {count} frames mirror and the others do not; between them one would be flat"
         )
     turns = rotations(frames)
-    stretch = multiply(turns.transpose(0, 2, 1), frames)
+    stretch = multiply(transposed(turns), frames).transpose(2, 0, 1)
     values, vectors = np.linalg.eigh((stretch + stretch.transpose(0, 2, 1)) / 2)
     logs = np.log(values)
     if np.ptp(logs, axis=1).max() > 1e-5:
-        return turns, multiply(vectors * logs[:, np.newaxis, :], vectors.transpose(0, 2, 1))
+        return turns, _first((vectors * logs[:, np.newaxis, :]) @ vectors.transpose(0, 2, 1))
     uniform = logs.mean(axis=1)
     return turns, uniform if np.abs(uniform).max() > 1e-7 else None
 
 
 def _join(turn: Matrices, stretch: NDArray[np.float64] | None, points: NDArray[np.float64]) -> Matrices:
     """Make frames of means of rotations and of logarithms of stretches."""
-    det = np.abs(inverses(turn)[1])
-    if (det < _FLATTEST).any():
-        place = ", ".join(f"{v:g}" for v in points[int(np.flatnonzero(det < _FLATTEST)[0])].tolist())
+    flat = np.abs(determinants(turn)) < _FLATTEST
+    if flat.any():
+        place = ", ".join(f"{v:g}" for v in points[int(np.flatnonzero(flat)[0])].tolist())
         raise InvalidInput(f"field: the frames around ({place}) point in opposite ways, so that there is none between")
     turn = rotations(turn)
     if stretch is None:
         return turn
-    if stretch.ndim == 1:
-        return turn * np.exp(np.ascontiguousarray(stretch))[:, np.newaxis, np.newaxis]
-    return multiply(turn, exponentials(stretch))
+    return turn * np.exp(stretch) if stretch.ndim == 1 else multiply(turn, exponentials(stretch))
 
 
-def _times(weight: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Multiply, whatever axes the values have beyond the first."""
-    if values.ndim == 1 or values.ndim == 0:
-        return weight * values
-    return weight[:, np.newaxis, np.newaxis] * values
+def _first(frames: Array) -> Matrices:
+    """Bring frames (..., A, A) to the order of `_matrices`, copied."""
+    axes = frames.shape[-1]
+    return np.array(frames.reshape(-1, axes, axes).transpose(1, 2, 0), np.float64, order="C")
 
 
 def _numbers(value: ArrayLike, name: str) -> Array:

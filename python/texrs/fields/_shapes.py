@@ -14,7 +14,7 @@ from texrs._arrays import as_float
 from texrs._typing import Array
 from texrs.errors import InvalidInput
 from texrs.fields._field import Field, as_points, refuse_flat
-from texrs.fields._matrices import Matrices, multiply
+from texrs.fields._matrices import Matrices, everywhere, multiply
 
 __all__ = ["circular", "constant", "identity", "scale_ramp", "shear", "slant", "slant_3d", "spiral", "zigzag"]
 
@@ -291,7 +291,7 @@ class _Constant(Field):
         return self.matrix.astype(np.float32)
 
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
-        return np.broadcast_to(self.matrix, (len(points), self.axes, self.axes)).copy()
+        return everywhere(self.matrix, len(points))
 
     def _content(self) -> tuple[Any, ...]:
         return (self.matrix,)
@@ -318,16 +318,14 @@ class _Wound(Field):
         far = np.where(middle, 1.0, far)
         out, along = np.where(middle, 1.0, out / far), along / far
         length = np.sqrt(out * out + along * along)
-        frames = np.zeros((len(points), self.axes, self.axes))
-        frames[:] = np.eye(self.axes)
+        frames = everywhere(np.eye(self.axes), len(points))
         r, t = self.radial, self.tangential
-        frames[:, r, r] = frames[:, t, t] = out / length
-        frames[:, t, r] = along / length
-        frames[:, r, t] = -frames[:, t, r]
+        frames[r, r] = frames[t, t] = out / length
+        frames[t, r] = along / length
+        frames[r, t] = -frames[t, r]
         if not self.angle:
             return frames
-        turn = _turn(self.angle, r, t, self.axes)
-        return multiply(frames, np.broadcast_to(turn, frames.shape))
+        return multiply(frames, everywhere(_turn(self.angle, r, t, self.axes), len(points)))
 
     def _content(self) -> tuple[Any, ...]:
         return (self.centre, self.radial, self.tangential, self.angle)
@@ -355,8 +353,8 @@ class _Zigzag(Field):
 
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
         odd = np.floor((points[:, self.across] + 0.5) / (self.period / 2)) % 2
-        both = np.stack([_turn(a, self.first, self.second, self.axes) for a in (self.angle, -self.angle)])
-        return np.asarray(both[odd.astype(np.intp)])
+        both = np.stack([_turn(a, self.first, self.second, self.axes) for a in (self.angle, -self.angle)], axis=-1)
+        return np.asarray(both[:, :, odd.astype(np.intp)])
 
     def _content(self) -> tuple[Any, ...]:
         return (self.period, self.angle, self.across, self.first, self.second)
@@ -381,7 +379,7 @@ class _Ramp(Field):
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
         way = np.clip(points[:, self.along] / (128.0 if self.length is None else self.length), 0, 1)
         size = np.exp(np.ascontiguousarray(log(self.start) + way * log(self.stop / self.start)))
-        return size[:, np.newaxis, np.newaxis] * np.eye(self.axes)
+        return everywhere(np.eye(self.axes), len(points)) * size
 
     def _content(self) -> tuple[Any, ...]:
         return (self.start, self.stop, self.along, self.length)
@@ -406,11 +404,13 @@ def _wound(axis: str, radial: str | None, centre: Sequence[float] | None, axes: 
     if out not in others:
         raise InvalidInput(f"radial: round {letter} it is {' or '.join(others)}, got {radial!r}")
     along = (set(others) - {out}).pop()
-    about = None if centre is None else tuple(as_points(centre, axes, "centre").ravel().tolist())
-    if about is not None and (len(about) != axes or max(map(abs, about)) > _FAR):
-        raise InvalidInput(f"centre: needs {axes} numbers within {_FAR:g}, got {centre!r}")
+    about = None if centre is None else as_points(centre, axes, "centre")
+    if about is not None and (about.ndim > 1 or np.abs(about).max() > _FAR):
+        raise InvalidInput(f"centre: needs {axes} numbers within {_FAR:g}, got shape {about.shape}, or larger ones")
     letters = _LETTERS[axes - 2]
-    return _Wound(axes, about, letters.index(out), letters.index(along), angle)
+    return _Wound(
+        axes, None if about is None else tuple(about.tolist()), letters.index(out), letters.index(along), angle
+    )
 
 
 def _turn(degrees: float, first: int, second: int, axes: int) -> NDArray[np.float64]:
@@ -462,5 +462,5 @@ def _matrix(value: ArrayLike) -> NDArray[np.float64]:
     matrix = np.ascontiguousarray(given, np.float64)
     if not all(isfinite(v) for v in matrix.ravel().tolist()):
         raise InvalidInput("matrix: all its numbers must be finite")
-    refuse_flat(matrix[np.newaxis], np.zeros((1, len(matrix))), "matrix")
+    refuse_flat(matrix[:, :, np.newaxis], np.zeros((1, len(matrix))), "matrix")
     return matrix
