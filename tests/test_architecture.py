@@ -19,6 +19,7 @@ NOUNS = {
     "report": {"source_map", "io"},
     "segment": set(),
     "fields": set(),
+    "volume": {"io", "fields", "source_map"},
     "deform": set(),
     "quilt": {"source_map", "_pixels"},
     "blend": {"source_map"},

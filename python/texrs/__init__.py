@@ -5,7 +5,7 @@ filled by example). Each gives a `Synthesis`, whose `SourceMap` looks anything t
 in the same way.
 """
 
-from texrs import errors, fields, io, kernels, samples
+from texrs import errors, fields, io, kernels, samples, volume
 from texrs._rust import VERSION as __version__
 from texrs.completion import complete
 from texrs.cyclic import tile
@@ -28,4 +28,5 @@ __all__ = [
     "samples",
     "threads",
     "tile",
+    "volume",
 ]
