@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from math import cos, isfinite, log, radians, sin
-from typing import Any
+from math import isfinite
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,11 +12,10 @@ from texrs._arrays import as_float
 from texrs._typing import Array
 from texrs.errors import InvalidInput
 from texrs.fields._field import Field, as_points, refuse_flat
-from texrs.fields._matrices import Matrices, everywhere, multiply
+from texrs.fields._kinds import LETTERS, Constant, Ramp, Wound, Zigzag, turn
 
 __all__ = ["circular", "constant", "identity", "scale_ramp", "shear", "slant", "slant_3d", "spiral", "zigzag"]
 
-_LETTERS = "yx", "zyx"
 _WORDS = {"plane": "z", "row": "y", "column": "x"}
 _FAR = 1e9
 """Lengths and centres are within so many voxels."""
@@ -40,7 +37,7 @@ def identity(axes: int = 3) -> Field:
            [0., 1.]], dtype=float32)
 
     """
-    return _Constant(_axes(axes), np.eye(axes), "identity")
+    return Constant(_axes(axes), np.eye(axes), "identity")
 
 
 def constant(matrix: ArrayLike) -> Field:
@@ -65,7 +62,7 @@ def constant(matrix: ArrayLike) -> Field:
     """
     m = _matrix(matrix)
     rows = ", ".join(f"[{', '.join(f'{v:g}' for v in row)}]" for row in m.tolist())
-    return _Constant(len(m), m, f"constant [{rows}]")
+    return Constant(len(m), m, f"constant [{rows}]")
 
 
 def slant(angle: float = 30, plane: str = "xy", *, axes: int = 3) -> Field:
@@ -96,7 +93,7 @@ def slant(angle: float = 30, plane: str = "xy", *, axes: int = 3) -> Field:
     """
     degrees = _angle(angle)
     first, second = _pair(plane, _axes(axes), "plane")
-    return _Constant(axes, _turn(degrees, first, second, axes), f"slant of {degrees:g} degrees in the plane {plane}")
+    return Constant(axes, turn(degrees, first, second, axes), f"slant of {degrees:g} degrees in the plane {plane}")
 
 
 def slant_3d(angle: float = 30, angle2: float = 30) -> Field:
@@ -117,9 +114,9 @@ def slant_3d(angle: float = 30, angle2: float = 30) -> Field:
 
     """
     first, second = _angle(angle), _angle(angle2, "angle2")
-    matrix = _turn(second, 1, 0, 3) @ _turn(first, 2, 1, 3)
+    matrix = turn(second, 1, 0, 3) @ turn(first, 2, 1, 3)
     text = f"slant of {first:g} degrees in the plane xy, then of {second:g} degrees in the plane yz"
-    return _Constant(3, matrix, text)
+    return Constant(3, matrix, text)
 
 
 def shear(amount: float = 0.5, plane: str = "xy", *, axes: int = 3) -> Field:
@@ -145,7 +142,7 @@ def shear(amount: float = 0.5, plane: str = "xy", *, axes: int = 3) -> Field:
     first, second = _pair(plane, _axes(axes), "plane")
     matrix = np.eye(axes)
     matrix[first, second] = as_float(amount, "amount", -9, 9)
-    return _Constant(axes, matrix, f"shear of {float(amount):g} in the plane {plane}")
+    return Constant(axes, matrix, f"shear of {float(amount):g} in the plane {plane}")
 
 
 def circular(
@@ -243,7 +240,7 @@ def zigzag(
     """
     first, second = _pair(plane, _axes(axes), "plane")
     across = first if axis is None else _index(axis, axes, "axis")
-    return _Zigzag(axes, as_float(period, "period", 2, _FAR), _angle(angle), across, first, second)
+    return Zigzag(axes, as_float(period, "period", 2, _FAR), _angle(angle), across, first, second)
 
 
 def scale_ramp(
@@ -277,120 +274,7 @@ def scale_ramp(
     ends = tuple(as_float(v, name, 0.125, 8) for v, name in ((start, "start"), (stop, "stop")))
     along = _index(axis, _axes(axes), "axis")
     reach = None if length is None else as_float(length, "length", 1, _FAR)
-    return _Ramp(axes, ends[0], ends[1], along, reach)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class _Constant(Field):
-    axes: int
-    matrix: NDArray[np.float64]
-    text: str
-
-    @property
-    def constant(self) -> NDArray[np.float32]:
-        return self.matrix.astype(np.float32)
-
-    def _frames(self, points: NDArray[np.float64]) -> Matrices:
-        return everywhere(self.matrix, len(points))
-
-    def _content(self) -> tuple[Any, ...]:
-        return (self.matrix,)
-
-    def describe(self) -> str:
-        return self.text
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class _Wound(Field):
-    axes: int
-    centre: tuple[float, ...] | None
-    radial: int
-    tangential: int
-    angle: float
-
-    def _frames(self, points: NDArray[np.float64]) -> Matrices:
-        at = (0.0,) * self.axes if self.centre is None else self.centre
-        out = points[:, self.radial] - at[self.radial]
-        along = points[:, self.tangential] - at[self.tangential]
-        # Quotients and roots, where sines of angles could differ in the last bit from one loop to another.
-        far = np.maximum(np.abs(out), np.abs(along))
-        middle = far == 0
-        far = np.where(middle, 1.0, far)
-        out, along = np.where(middle, 1.0, out / far), along / far
-        length = np.sqrt(out * out + along * along)
-        frames = everywhere(np.eye(self.axes), len(points))
-        r, t = self.radial, self.tangential
-        frames[r, r] = frames[t, t] = out / length
-        frames[t, r] = along / length
-        frames[r, t] = -frames[t, r]
-        if not self.angle:
-            return frames
-        return multiply(frames, everywhere(_turn(self.angle, r, t, self.axes), len(points)))
-
-    def _content(self) -> tuple[Any, ...]:
-        return (self.centre, self.radial, self.tangential, self.angle)
-
-    def over(self, shape: Sequence[int]) -> Field:
-        super().over(shape)
-        return self if self.centre is not None else replace(self, centre=tuple((n - 1) / 2 for n in shape))
-
-    def describe(self) -> str:
-        letters = _LETTERS[self.axes - 2]
-        name = f"spiral of {self.angle:g} degrees" if self.angle else "circular"
-        axis = f", round {(set('xyz') - {letters[self.radial], letters[self.tangential]}).pop()}" * (self.axes == 3)
-        about = "the middle" if self.centre is None else f"({', '.join(f'{c:g}' for c in self.centre)})"
-        return f"{name}{axis}, {letters[self.radial]} outwards, about {about}"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class _Zigzag(Field):
-    axes: int
-    period: float
-    angle: float
-    across: int
-    first: int
-    second: int
-
-    def _frames(self, points: NDArray[np.float64]) -> Matrices:
-        odd = np.floor((points[:, self.across] + 0.5) / (self.period / 2)) % 2
-        both = np.stack([_turn(a, self.first, self.second, self.axes) for a in (self.angle, -self.angle)], axis=-1)
-        return np.asarray(both[:, :, odd.astype(np.intp)])
-
-    def _content(self) -> tuple[Any, ...]:
-        return (self.period, self.angle, self.across, self.first, self.second)
-
-    def describe(self) -> str:
-        letters = _LETTERS[self.axes - 2]
-        plane = letters[self.first] + letters[self.second]
-        return (
-            f"zigzag of +-{self.angle:g} degrees in the plane {plane}, "
-            f"period {self.period:g} along {letters[self.across]}"
-        )
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class _Ramp(Field):
-    axes: int
-    start: float
-    stop: float
-    along: int
-    length: float | None
-
-    def _frames(self, points: NDArray[np.float64]) -> Matrices:
-        way = np.clip(points[:, self.along] / (128.0 if self.length is None else self.length), 0, 1)
-        size = np.exp(np.ascontiguousarray(log(self.start) + way * log(self.stop / self.start)))
-        return everywhere(np.eye(self.axes), len(points)) * size
-
-    def _content(self) -> tuple[Any, ...]:
-        return (self.start, self.stop, self.along, self.length)
-
-    def over(self, shape: Sequence[int]) -> Field:
-        super().over(shape)
-        return self if self.length is not None else replace(self, length=float(max(shape[self.along] - 1, 1)))
-
-    def describe(self) -> str:
-        reach = "" if self.length is None else f" over {self.length:g}"
-        return f"scale from {self.start:g} to {self.stop:g} along {_LETTERS[self.axes - 2][self.along]}{reach}"
+    return Ramp(axes, ends[0], ends[1], along, reach)
 
 
 def _wound(axis: str, radial: str | None, centre: Sequence[float] | None, axes: int, angle: float) -> Field:
@@ -407,19 +291,10 @@ def _wound(axis: str, radial: str | None, centre: Sequence[float] | None, axes: 
     about = None if centre is None else as_points(centre, axes, "centre")
     if about is not None and (about.ndim > 1 or np.abs(about).max() > _FAR):
         raise InvalidInput(f"centre: needs {axes} numbers within {_FAR:g}, got shape {about.shape}, or larger ones")
-    letters = _LETTERS[axes - 2]
-    return _Wound(
+    letters = LETTERS[axes - 2]
+    return Wound(
         axes, None if about is None else tuple(about.tolist()), letters.index(out), letters.index(along), angle
     )
-
-
-def _turn(degrees: float, first: int, second: int, axes: int) -> NDArray[np.float64]:
-    """Give the matrix that turns one axis towards another."""
-    matrix = np.eye(axes)
-    matrix[first, first] = matrix[second, second] = cos(radians(degrees))
-    matrix[second, first] = sin(radians(degrees))
-    matrix[first, second] = -matrix[second, first]
-    return matrix
 
 
 def _axes(axes: object) -> int:
@@ -440,12 +315,12 @@ def _letter(value: object, letters: str, name: str) -> str:
 
 
 def _index(value: object, axes: int, name: str) -> int:
-    letters = _LETTERS[axes - 2]
+    letters = LETTERS[axes - 2]
     return letters.index(_letter(value, letters, name))
 
 
 def _pair(value: object, axes: int, name: str) -> tuple[int, int]:
-    letters = _LETTERS[axes - 2]
+    letters = LETTERS[axes - 2]
     if not isinstance(value, str) or len(value) != 2 or not set(value) <= set(letters) or value[0] == value[1]:
         allowed = ", ".join(a + b for a in sorted(letters) for b in sorted(letters) if a != b)
         raise InvalidInput(f"{name}: allowed are {allowed}; got {value!r}")

@@ -20,21 +20,15 @@ Statistics, each of which can be used alone, most of them for pictures too; `com
 from texrs.volume.compare import Comparison, compare
 from texrs.volume.pictures import cube, oblique, slices, surface, turntable
 from texrs.volume.reuse import CellReuse, cell_reuse, coherent
-from texrs.volume.statistics import (
-    Classes,
-    Particles,
+from texrs.volume.statistics import Classes, Particles, classes, lightness, lineal_path, particles, two_point
+from texrs.volume.structure import (
     autocorrelation,
-    classes,
     frequency,
     isolated,
-    lightness,
-    lineal_path,
     orientation_errors,
-    particles,
     seam_planes,
     slice_distances,
     texture_normal,
-    two_point,
 )
 
 __all__ = [

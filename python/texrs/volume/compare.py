@@ -12,7 +12,8 @@ from texrs._typing import Array
 from texrs.errors import InvalidInput
 from texrs.fields import Field
 from texrs.source_map import SourceMap
-from texrs.volume import statistics as st
+from texrs.volume import statistics, structure
+from texrs.volume._values import axes_of
 from texrs.volume.reuse import CellReuse, cell_reuse
 
 __all__ = ["Comparison", "compare"]
@@ -56,7 +57,7 @@ class Comparison:
     """
 
     shares: NDArray[np.float64]
-    particles: tuple[st.Particles, st.Particles]
+    particles: tuple[statistics.Particles, statistics.Particles]
     frequency: tuple[float, float]
     two_point: NDArray[np.float64]
     lineal_path: NDArray[np.float64]
@@ -168,7 +169,7 @@ def compare(
 
     """
     first, second = np.asarray(exemplar), np.asarray(output)
-    count = as_int(st.axes_of(first) if axes is None else axes, "axes", 2, 3)
+    count = as_int(axes_of(first) if axes is None else axes, "axes", 2, 3)
     first, second = (as_image(a, n, minimum=16, axes=count) for a, n in ((first, "exemplar"), (second, "output")))
     if (first.dtype, first.shape[-1]) != (second.dtype, second.shape[-1]):
         raise InvalidInput(
@@ -184,30 +185,33 @@ def compare(
         before, after = (np.asarray(a / max(kinds - 1, 1), np.float32) for a in labels)
     else:
         first, second = _one_range(first, second)
-        found = st.classes(first, classes, axes=count)
+        found = statistics.classes(first, classes, axes=count)
         labels = found.of(first, axes=count), found.of(second, axes=count)
         kinds = len(found.centres)
         pick = tuple(range(kinds // 2 + kinds % 2, kinds)) if chosen is None else _chosen(chosen, kinds)
-        before, after = st.lightness(first, axes=count), st.lightness(second, axes=count)
+        before, after = statistics.lightness(first, axes=count), statistics.lightness(second, axes=count)
     grey = before, after
     masks = tuple(np.isin(a, pick) for a in labels)
-    seams = np.concatenate(st.seam_planes(grey[1]))
+    seams = np.concatenate(structure.seam_planes(grey[1]))
     window = min(64, *first.shape[:count], *second.shape[:count])
     orientation, turned = None, None
     if field is not None:
-        normal = st.texture_normal(grey[0])
-        errors = st.orientation_errors(grey[0], None, normal), st.orientation_errors(grey[1], field, normal)
+        normal = structure.texture_normal(grey[0])
+        errors = (
+            structure.orientation_errors(grey[0], None, normal),
+            structure.orientation_errors(grey[1], field, normal),
+        )
         orientation = np.array([[np.median(e), np.quantile(e, 0.9)] for e in errors])
         turned = _turned(field, second.shape[:count], normal)
     return Comparison(
         np.stack([np.bincount(a.ravel(), minlength=kinds) / a.size for a in labels]),
-        (st.particles(masks[0]), st.particles(masks[1])),
-        (st.frequency(grey[0], window=window), st.frequency(grey[1], window=window)),
-        np.stack([st.two_point(m, _REACH) for m in masks]),
-        np.stack([st.lineal_path(m, _REACH) for m in masks]),
-        np.stack([st.autocorrelation(g, _REACH) for g in grey]),
-        (st.isolated(grey[0]), st.isolated(grey[1])),
-        float(st.slice_distances(*grey).mean()),
+        (statistics.particles(masks[0]), statistics.particles(masks[1])),
+        (structure.frequency(grey[0], window=window), structure.frequency(grey[1], window=window)),
+        np.stack([statistics.two_point(m, _REACH) for m in masks]),
+        np.stack([statistics.lineal_path(m, _REACH) for m in masks]),
+        np.stack([structure.autocorrelation(g, _REACH) for g in grey]),
+        (structure.isolated(grey[0]), structure.isolated(grey[1])),
+        float(structure.slice_distances(*grey).mean()),
         np.array([seams.min(), seams.max()]),
         orientation,
         turned,
