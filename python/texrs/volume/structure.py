@@ -192,6 +192,7 @@ def orientation_errors(
     normal: ArrayLike | None = None,
     *,
     margin: int = 6,
+    step: int = 1,
 ) -> Floats:
     """Give the angle between the layers of a texture and where a field turns those of its exemplar.
 
@@ -208,11 +209,13 @@ def orientation_errors(
         n, (A,); by default `texture_normal` of the values themselves, which is that of an exemplar.
     margin : int
         Pixels at the border that are left out: there the structure tensor sees too little.
+    step : int
+        Every so many pixels along each axis are looked at.
 
     Returns
     -------
     ndarray
-        Degrees from 0 to 90, float32, of the shape less two margins.
+        Degrees from 0 to 90, float32, of the shape less two margins, divided by the step.
 
     Raises
     ------
@@ -229,6 +232,7 @@ def orientation_errors(
 
     """
     v, edge = as_values(values), as_int(margin, "margin", 0, 2**20)
+    each = as_int(step, "step", 1, 2**20)
     if min(v.shape) <= 2 * edge:
         raise InvalidInput(f"margin: {edge} on both sides leaves nothing of {v.shape}")
     if field is not None and (not isinstance(field, Field) or field.axes != v.ndim):
@@ -238,15 +242,15 @@ def orientation_errors(
     n = texture_normal(v) if normal is None else np.asarray(normal, np.float64)
     if n.shape != (v.ndim,) or not 1e-12 < float(np.abs(n).max()) < 1e12:
         raise InvalidInput(f"normal: needs {v.ndim} numbers, not all zero, got shape {n.shape}")
-    inner = (slice(edge, -edge or None),) * v.ndim
+    inner = (slice(edge, -edge or None, each),) * v.ndim
     tensor = _structure(v, 4.0)[inner]
     out = np.empty(tensor.shape[: v.ndim], np.float32)
     for i, plane in enumerate(tensor):  # A plane at once: a dense field of a large volume is many times its size.
         found = np.linalg.eigh(plane)[1][..., -1]
         wanted = n
         if field is not None:
-            index = np.stack(np.meshgrid(*map(np.arange, plane.shape[: v.ndim - 1]), indexing="ij"), axis=-1) + edge
-            points = np.concatenate([np.full((*index.shape[:-1], 1), i + edge), index], axis=-1)
+            index = np.stack(np.meshgrid(*map(np.arange, (1, *plane.shape[: v.ndim - 1])), indexing="ij"), axis=-1)[0]
+            points = (index + np.eye(v.ndim, dtype=int)[0] * i) * each + edge
             wanted = np.einsum("...ji,j->...i", field.jacobians(points).astype(np.float64), n)
         length = np.linalg.norm(wanted, axis=-1)
         cosine = np.abs((found * wanted).sum(axis=-1)) / np.maximum(length, 1e-30)
