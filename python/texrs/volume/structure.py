@@ -140,7 +140,9 @@ def isolated(values: ArrayLike, threshold: float = 0.35) -> float:
 
     v = as_values(values)
     limit = as_float(threshold, "threshold", 0, 1e9)
-    return float((np.abs(v - median_filter(v, size=3, mode="reflect")) > limit).mean())
+    around = np.ones((3,) * v.ndim, np.bool_)
+    around[(1,) * v.ndim] = False
+    return float((np.abs(v - median_filter(v, footprint=around, mode="reflect")) > limit).mean())
 
 
 def slice_distances(exemplar: ArrayLike, values: ArrayLike, *, quantiles: int = 256) -> NDArray[np.float64]:
