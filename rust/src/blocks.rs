@@ -13,7 +13,6 @@ use crate::fixed::{Frame, Frames, ONE, Place, add, apply, nearest, sub};
 use crate::grid::{Grid, Region};
 use crate::hash::Noise;
 use crate::par::{self, Monitor};
-use crate::wide::wide;
 use crate::{Error, Result};
 
 /// How far a centre strays from the middle of its cell, as a share of the cell.
@@ -89,7 +88,7 @@ pub fn blocks<const D: usize>(
                 return origins[c];
             }
             let chooser = Chooser::new(appearance, &cells, &list, frames, c);
-            wide(|| chooser.choose(&places, origins[c], &noise, round as u32, options))
+            chooser.choose(&places, origins[c], &noise, round as u32, options)
         });
         monitor.check()?;
         origins = chosen;

@@ -8,7 +8,6 @@
 //! | [`grid`] | shape, strides, wrap or clamp per axis; two and three dimensions from one source |
 //! | [`par`] | the process-local thread pool, fixed chunks, progress and cancellation |
 //! | [`hash`] | counter-based noise: randomness belongs to the position, never to a stream |
-//! | [`wide`] | inner loops compiled for the registers that the machine has |
 //! | [`fixed`] | coordinates and frames in fixed point |
 //! | [`pca`] | principal components |
 //! | [`appearance`] | what the surroundings of each sample of an exemplar look like |
@@ -34,7 +33,6 @@ pub mod hash;
 pub mod image_io;
 pub mod par;
 pub mod pca;
-pub mod wide;
 
 pub mod appearance;
 pub mod blocks;

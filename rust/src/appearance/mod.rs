@@ -15,7 +15,6 @@ use crate::grid::Grid;
 use crate::hash::Noise;
 use crate::par;
 use crate::pca::{Principal, principal};
-use crate::wide::wide;
 use crate::{Error, Result};
 
 pub use table::Parts;
@@ -313,16 +312,14 @@ impl<const D: usize> Appearance<D> {
     fn describe_all(&self) -> Vec<Feature> {
         let mut features = vec![[0; KEEP]; self.grid.len()];
         par::chunks_mut(&mut features, CHUNK, |chunk, features| {
-            wide(|| {
-                let mut window = self.scratch();
-                for (i, feature) in features.iter_mut().enumerate() {
-                    let centre = self.grid.point(chunk * CHUNK + i).map(|x| x as i32);
-                    if self.inside(centre).is_some() {
-                        self.cut(centre, &mut window);
-                        *feature = self.project(&mut window);
-                    }
+            let mut window = self.scratch();
+            for (i, feature) in features.iter_mut().enumerate() {
+                let centre = self.grid.point(chunk * CHUNK + i).map(|x| x as i32);
+                if self.inside(centre).is_some() {
+                    self.cut(centre, &mut window);
+                    *feature = self.project(&mut window);
                 }
-            });
+            }
         });
         features
     }
@@ -342,7 +339,7 @@ impl<const D: usize> Appearance<D> {
         let apart = 2 * self.radius as i32 - 1;
         let mut nearest = par::map(count, |k| {
             let me = centres.get(noise.below(centres.len() as u64, [k as u32, 0, 0, 0]) as usize);
-            wide(|| self.nearest_other(me, apart))
+            self.nearest_other(me, apart)
         });
         nearest.sort_unstable();
         nearest[count / 2]
@@ -387,8 +384,9 @@ impl<const D: usize> Appearance<D> {
 pub fn distance(a: &Feature, b: &Feature) -> i32 {
     let mut sum = 0;
     for k in 0..KEEP {
-        let d = i32::from(a[k]) - i32::from(b[k]);
-        sum += d * d;
+        // Twelve bits each, so the difference fits: products of 16 bits are what registers multiply fastest.
+        let d = a[k].wrapping_sub(b[k]);
+        sum += i32::from(d) * i32::from(d);
     }
     sum
 }
@@ -530,8 +528,28 @@ impl Projection {
         }
     }
 
-    #[inline(always)]
+    #[allow(unsafe_code)] // measured: twice as fast as with the baseline instructions
+    #[inline]
     fn apply(&self, window: &[i16]) -> Feature {
+        #[cfg(target_arch = "x86_64")]
+        {
+            if is_x86_feature_detected!("avx2") {
+                // SAFETY: the CPU has the feature that the function is compiled for.
+                return unsafe { self.apply_avx2(window) };
+            }
+        }
+        self.multiply(window)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn apply_avx2(&self, window: &[i16]) -> Feature {
+        self.multiply(window)
+    }
+
+    /// Whole numbers, so the order in which a compiler adds them does not matter.
+    #[inline(always)]
+    fn multiply(&self, window: &[i16]) -> Feature {
         let mut feature = [0; KEEP];
         for (k, row) in self.basis.chunks_exact(self.padded).enumerate() {
             let mut sum = 0i32;

@@ -6,7 +6,10 @@ use super::{CHUNK, Level};
 use crate::appearance::{Colour, Feature};
 use crate::fixed::{BITS, Frame, ONE, Place, add, apply, inverse, nearest, sub};
 use crate::par;
-use crate::wide::wide;
+
+/// Side of a window, and steps of the output that one looks across, of which tables are made.
+const SIDE: usize = 7;
+const REACH: usize = 12;
 
 /// The output as it is, where frames leave everything in place: a window is a box of it.
 pub(super) struct Seen {
@@ -62,18 +65,16 @@ impl<const D: usize> Level<'_, D> {
         };
         let lines = self.lines();
         par::chunks_mut(out, CHUNK, |chunk, out| {
-            wide(|| {
-                let mut window = self.appearance.scratch();
-                for (i, feature) in out.iter_mut().enumerate() {
-                    let p = first + chunk * CHUNK + i;
-                    *feature = if self.still {
-                        self.still_window(places, seen, p, &lines, &mut window)
-                    } else {
-                        self.turned_window(places, p, &looks, &mut window);
-                        self.appearance.project(&mut window)
-                    };
-                }
-            });
+            let mut window = self.appearance.scratch();
+            for (i, feature) in out.iter_mut().enumerate() {
+                let p = first + chunk * CHUNK + i;
+                *feature = if self.still {
+                    self.still_window(places, seen, p, &lines, &mut window)
+                } else {
+                    self.turned_window(places, p, &looks, &mut window);
+                    self.appearance.project(&mut window)
+                };
+            }
         });
     }
 
@@ -152,23 +153,115 @@ impl<const D: usize> Level<'_, D> {
     fn turned_window(&self, places: &[Place<D>], p: usize, looks: &[Look<D>], window: &mut [i16]) {
         let point = self.region.grid.point(p);
         let frame = self.frames.at(p);
-        let back = if looks.is_empty() {
-            inverse(&frame)
+        if looks.is_empty() {
+            let back = inverse(&frame);
+            if self.interior_window(places, p, point, &frame, &back, window) {
+                return;
+            }
+            for (k, &o) in self.appearance.offsets().iter().enumerate() {
+                self.look_at(places, p, point, k, o, look(&frame, &back, o), window);
+            }
         } else {
-            [[0; D]; D]
-        };
-        for (k, &o) in self.appearance.offsets().iter().enumerate() {
-            let (step, rest) = match looks.get(k) {
-                Some(&known) => known,
-                None => look(&frame, &back, o),
-            };
-            let place = match self.region.step(point, step) {
-                Some(q) => add(places[q], rest),
-                None => add(places[p], o.map(|x| x * ONE)),
-            };
-            let at = self.appearance.clamped(nearest(place));
-            self.appearance.put(window, k, self.appearance.colour(at));
+            for (k, (&o, &known)) in self.appearance.offsets().iter().zip(looks).enumerate() {
+                self.look_at(places, p, point, k, o, known, window);
+            }
         }
+    }
+
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)] // one point of one window
+    fn look_at(
+        &self,
+        places: &[Place<D>],
+        p: usize,
+        point: [usize; D],
+        k: usize,
+        o: [i32; D],
+        (step, rest): Look<D>,
+        window: &mut [i16],
+    ) {
+        let place = match self.region.step(point, step) {
+            Some(q) => add(places[q], rest),
+            None => add(places[p], o.map(|x| x * ONE)),
+        };
+        let at = self.appearance.clamped(nearest(place));
+        self.appearance.put(window, k, self.appearance.colour(at));
+    }
+
+    /// The window of a point far from all borders, by adding columns of F and J instead of multiplying; `false` where
+    /// that is not known to hold.
+    #[inline(always)]
+    fn interior_window(
+        &self,
+        places: &[Place<D>],
+        p: usize,
+        point: [usize; D],
+        frame: &Frame<D>,
+        back: &[[i32; D]; D],
+        window: &mut [i16],
+    ) -> bool {
+        let (shape, strides) = (self.region.grid.shape(), self.region.grid.strides());
+        let (radius, side) = (
+            self.appearance.radius() as i32,
+            2 * self.appearance.radius() + 1,
+        );
+        if side > SIDE || self.appearance.grid().wrap() != [false; D] {
+            return false;
+        }
+        for axis in 0..D {
+            let reach: i32 = back[axis].iter().map(|x| x.abs()).sum::<i32>() * radius / ONE + 1;
+            let rest: i32 = frame[axis].iter().map(|&x| i32::from(x).abs()).sum();
+            let at = point[axis] as i32;
+            if reach > REACH as i32
+                || at < reach
+                || at + reach >= shape[axis] as i32
+                || rest / 2 >= radius * ONE
+            {
+                return false;
+            }
+        }
+        // F o and J step for each value of one axis.
+        let mut forth = [[[0; D]; SIDE]; D];
+        let mut moved = [[[0; D]; 2 * REACH + 1]; D];
+        for axis in 0..D {
+            for k in 0..side {
+                for i in 0..D {
+                    forth[axis][k][i] = back[i][axis] * (k as i32 - radius);
+                }
+            }
+            for k in 0..=2 * REACH {
+                for i in 0..D {
+                    moved[axis][k][i] = i32::from(frame[i][axis]) * (k as i32 - REACH as i32);
+                }
+            }
+        }
+        let exemplar = self.appearance.grid().strides();
+        for (line, first) in self.appearance.offsets().chunks_exact(side).enumerate() {
+            let mut start = [ONE / 2; D];
+            for axis in 0..D - 1 {
+                start = add(start, forth[axis][(first[0][axis] + radius) as usize]);
+            }
+            // Half a sample more, for the place to be rounded down.
+            let mut o = first[0].map(|x| x * ONE + ONE / 2);
+            for k in 0..side {
+                let step = add(start, forth[D - 1][k]).map(|x| x >> BITS);
+                let mut q = p as isize;
+                let mut place = o;
+                for axis in 0..D {
+                    q += step[axis] as isize * strides[axis] as isize;
+                    place = sub(place, moved[axis][(step[axis] + REACH as i32) as usize]);
+                }
+                place = add(place, places[q as usize]);
+                let mut at = 0;
+                for axis in 0..D {
+                    at += (place[axis] >> BITS) as usize * exemplar[axis];
+                }
+                self.appearance
+                    .put(window, line * side + k, self.appearance.colour(at));
+                o[D - 1] += ONE;
+            }
+        }
+        true
     }
 }
 

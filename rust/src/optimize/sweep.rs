@@ -7,7 +7,6 @@ use crate::appearance::{Feature, distance};
 use crate::fixed::{ONE, Place, add, apply, nearest};
 use crate::hash::Noise;
 use crate::par;
-use crate::wide::wide;
 
 /// Matches drawn around the best: within the exemplar, then a half of it, a quarter and so on.
 const DRAWS: u32 = 6;
@@ -35,12 +34,10 @@ impl<const D: usize> Level<'_, D> {
         let first = planes.start * plane;
         let to = &mut to[first..planes.end * plane];
         par::chunks_mut(to, CHUNK, |chunk, to| {
-            wide(|| {
-                for (i, place) in to.iter_mut().enumerate() {
-                    let k = chunk * CHUNK + i;
-                    *place = self.improve(from, &features[k], first + k, reach, draws);
-                }
-            });
+            for (i, place) in to.iter_mut().enumerate() {
+                let k = chunk * CHUNK + i;
+                *place = self.improve(from, &features[k], first + k, reach, draws);
+            }
         });
     }
 

@@ -4,7 +4,6 @@ use super::{CHUNK, Level};
 use crate::appearance::{CHANNELS, Colour};
 use crate::fixed::{Place, add, apply, nearest};
 use crate::par;
-use crate::wide::wide;
 
 /// Standard deviation of a proposal's weight over the distance of its window, in points.
 const SIGMA: f64 = 2.0;
@@ -23,13 +22,11 @@ impl<const D: usize> Level<'_, D> {
     pub(super) fn vote(&self, matches: &[Place<D>], to: &mut [Place<D>], radius: usize) {
         let voters = self.voters(radius as i32);
         par::chunks_mut(to, CHUNK, |chunk, to| {
-            wide(|| {
-                let mut proposals = Vec::with_capacity(voters.len());
-                for (i, place) in to.iter_mut().enumerate() {
-                    let p = chunk * CHUNK + i;
-                    *place = self.elect(matches, &voters, p, &mut proposals);
-                }
-            });
+            let mut proposals = Vec::with_capacity(voters.len());
+            for (i, place) in to.iter_mut().enumerate() {
+                let p = chunk * CHUNK + i;
+                *place = self.elect(matches, &voters, p, &mut proposals);
+            }
         });
     }
 

@@ -11,12 +11,13 @@
 mod multigrid;
 mod sweep;
 mod transform;
+mod wide;
 
 use crate::par::{self, Monitor};
-use crate::wide::wide;
 use crate::{Error, Result};
 use sweep::PANEL;
 use transform::Transform;
+use wide::wide;
 
 /// What happens at both ends of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

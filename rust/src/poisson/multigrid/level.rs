@@ -2,7 +2,7 @@
 
 use super::CHUNK;
 use crate::par;
-use crate::wide::wide;
+use crate::poisson::wide::wide;
 
 /// What lies beyond one side of a grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -7,9 +7,9 @@
 
 mod level;
 
+use super::wide::wide;
 use super::{Domain, Edge};
 use crate::par::{self, Monitor};
-use crate::wide::wide;
 use crate::{Error, Result};
 use level::{Level, Side, Vectors};
 

@@ -1,10 +1,9 @@
-//! Wide registers for inner loops, chosen at run time. No operation is fused or reordered, so the values stay.
+//! Wide registers for loops over rows, chosen at run time. No operation is fused or reordered, so the values stay.
 
 /// Runs `work` compiled for the widest registers that the CPU has, as far as it is inlined.
-#[allow(unsafe_code)]
-// measured: masked Poisson takes a third more time, and projections twice as much, with the baseline instructions
+#[allow(unsafe_code)] // measured: masks take a third more time with the baseline instructions
 #[inline]
-pub fn wide<R>(work: impl FnOnce() -> R) -> R {
+pub(super) fn wide<R>(work: impl FnOnce() -> R) -> R {
     #[cfg(target_arch = "x86_64")]
     {
         if is_x86_feature_detected!("avx2") {
