@@ -170,6 +170,7 @@ def test_surfaces_are_closed_and_face_outwards(tmp_path):
         (lambda p: volume.cube(VOLUME, azimuth=float("nan")), "azimuth"),
         (lambda p: volume.turntable(VOLUME, p / "a.png"), r"ends in \.gif"),
         (lambda p: volume.turntable(VOLUME, p / "a.gif", frames=1), "frames"),
+        (lambda p: volume.turntable(VOLUME, p / "a.gif", frames=100, size=1024), "more than 67108864 pixels"),
         (lambda p: volume.turntable(VOLUME, p / "a.gif", background=(1, 2)), "background"),
         (lambda p: volume.turntable(VOLUME, p / "none" / "a.gif", size=16), "there is no folder"),
         (lambda p: volume.surface(np.zeros((4, 4, 4), bool)), "no surface"),

@@ -191,6 +191,8 @@ class _Grid(Field):
             for a, (up, n) in enumerate(zip(corner, self.sides, strict=True)):
                 index = index * n + np.minimum(low[a] + up, n - 1)
                 weight = weight * (share[a] if up else 1 - share[a])
+            if not weight.any():  # Voxels that lie on samples; to add zeros would change no bit.
+                continue
             turn += weight * self.turns[..., index]
             if stretch is not None and self.stretches is not None:
                 stretch += weight * self.stretches[..., index]

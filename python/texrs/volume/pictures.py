@@ -21,6 +21,8 @@ __all__ = ["cube", "oblique", "slices", "surface", "turntable"]
 _AXES = ("plane", "row", "column")
 _LARGEST = 4096
 """Pixels a side of pictures of cubes."""
+_MOST = 2**26
+"""Pixels of all pictures of a turntable."""
 _MARGIN = 1.04
 _FINE = 3
 """Rays a pixel, along each side."""
@@ -248,6 +250,8 @@ def turntable(
     ------
     InvalidInput
         Not a volume, or numbers beyond what is allowed.
+    LimitExceeded
+        More than 2^26 pixels in all.
     FileError
         Another suffix, or the file cannot be written.
 
@@ -266,6 +270,8 @@ def turntable(
 
     count, side = as_int(frames, "frames", 2, 360), as_int(size, "size", 16, 1024)
     above, period = as_float(elevation, "elevation", -90, 90), as_float(seconds, "seconds", 0.1, 600)
+    if count * side * side > _MOST:
+        raise LimitExceeded(f"frames, size: {count} pictures of {side} x {side} are more than {_MOST} pixels in all")
     if not str(path).lower().endswith(".gif"):
         raise FileError(f"{path}: needs a name that ends in .gif")
     if not isinstance(background, Sequence | np.ndarray) or len(background) != 3:

@@ -5,12 +5,13 @@ Each takes values of one channel, such as a `lightness`, in 2-D or in 3-D.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_float, as_int
+from texrs._arrays import as_float, as_int, as_wrap
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.fields import Field
@@ -98,11 +99,22 @@ def frequency(values: ArrayLike, *, window: int | None = None, whole: bool = Fal
     return _mean_frequency([plane for axis in range(3) for plane in np.moveaxis(v, axis, 0)], side)
 
 
-def seam_planes(values: ArrayLike) -> tuple[NDArray[np.float64], ...]:
+def seam_planes(values: ArrayLike, *, wrap: bool | Sequence[bool] = False) -> tuple[NDArray[np.float64], ...]:
     """Give, for each axis, the mean change from each plane (or line) to the next, over the median of all.
 
-    Values far from 1 at regular places are the traces of an algorithm's lattice; number i stands for the step from
-    plane i to plane i + 1.
+    Values far from 1 at regular places are the traces of an algorithm's lattice.
+
+    Parameters
+    ----------
+    values : array_like
+        (H, W) or (D, H, W), such as a `lightness`.
+    wrap : bool or one an axis
+        Axes along which the last plane is followed by the first.
+
+    Returns
+    -------
+    tuple of ndarray
+        For each axis one number a step: number i stands for that from plane i to plane i + 1.
 
     Examples
     --------
@@ -116,9 +128,11 @@ def seam_planes(values: ArrayLike) -> tuple[NDArray[np.float64], ...]:
     """
     v = as_values(values)
     out = []
-    for axis in range(v.ndim):
+    for axis, cyclic in enumerate(as_wrap(wrap, axes=v.ndim)):
         others = tuple(a for a in range(v.ndim) if a != axis)
-        change = np.abs(np.diff(v, axis=axis)).mean(axis=others, dtype=np.float64)
+        after = np.roll(v, -1, axis) if cyclic else trailing(v, axis, 1)
+        before = v if cyclic else leading(v, axis, 1)
+        change = np.abs(after - before).mean(axis=others, dtype=np.float64)
         out.append(change / max(float(np.median(change)) if change.size else 0.0, 1e-30))
     return tuple(out)
 
