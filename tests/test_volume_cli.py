@@ -94,6 +94,15 @@ def test_wrong_requests_get_a_line_and_change_nothing(here, capsys, arguments, s
     assert {p.name: p.read_bytes() for p in here.iterdir()} == before
 
 
+def test_labels_are_painted(here, capsys):
+    marked = samples.particles((32, 32, 32)).labels
+    io.write_volume("labels.npy", marked)
+    assert main(["slice", "labels.npy", "-o", "a.png", "--labels", "--at", "row=9"]) == 0
+    np.testing.assert_array_equal(iio.imread("a.png"), volume.paint(marked)[:, 9])
+    assert main(["slice", "v.npy", "-o", "b.png", "--labels"]) == 2
+    assert "v.npy: needs integers of shape" in capsys.readouterr().err
+
+
 def test_volumes_of_other_dtypes(here, capsys):
     io.write_volume("f.npy", VOLUME[..., 0] / np.float32(255))
     assert main(["slice", "f.npy", "-o", "a.png"]) == 2

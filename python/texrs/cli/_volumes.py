@@ -17,7 +17,7 @@ from texrs.cli._console import Quiet, Threads, note, watching
 from texrs.cli._files import SAMPLE, describe, named
 from texrs.errors import InvalidInput
 from texrs.threads import threads
-from texrs.volume import cube, oblique, slices, turntable
+from texrs.volume import cube, oblique, paint, slices, turntable
 
 __all__ = ["read_volume", "slice_command"]
 
@@ -69,6 +69,7 @@ def slice_command(
     interpolation: Annotated[
         str, typer.Option(help="Between voxels: linear, cubic, or nearest, for labels.")
     ] = "linear",
+    labels: Annotated[bool, typer.Option("--labels", help="The volume holds labels: each is given a colour.")] = False,
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
@@ -88,6 +89,10 @@ def slice_command(
         raise InvalidInput(f"--out: {'a picture is not' if moving else '--turntable is'} written to .gif, got {out!r}")
     _files.check_output(out, np.zeros((1, 1, 4), np.uint8) if as_cube else None)
     voxels = read_volume(volume)
+    if labels:
+        with named(labels=volume):
+            voxels = paint(voxels)
+        between = "nearest"
     if not (as_cube or as_turntable):
         _files.check_output(out, voxels[0])
     names = {"volume": volume, "point": "--oblique", "normal": "--oblique", "count": "--threads"}
