@@ -25,8 +25,8 @@ WORST_CONDITION = 100.0
 
 FAR = 1e9
 """Lengths and single places are within so many voxels."""
-MAX_FRAMES = 2**25
-"""That a lattice may have: 1.2 GB."""
+MOST_BYTES = 2**32
+"""Of a lattice of frames."""
 _BLOCK = 2**13
 """Points evaluated at once; the result does not depend on it."""
 _NAMES = ("row", "column"), ("plane", "row", "column")
@@ -187,7 +187,7 @@ class Field(ABC):
         InvalidInput
             As of `frames`, or the shape is not one.
         LimitExceeded
-            More than 2^25 samples, which need 1.2 GB in 3-D.
+            More samples than 4 GiB hold.
 
         Examples
         --------
@@ -196,7 +196,7 @@ class Field(ABC):
         (2, 3, 4, 3, 3)
 
         """
-        sides = as_size(shape, "shape", axes=self.axes, limit=MAX_FRAMES)
+        sides = as_size(shape, "shape", axes=self.axes, limit=MOST_BYTES // (4 * self.axes**2))
         first = np.broadcast_to(np.asarray(origin), (self.axes,) if np.ndim(origin) == 0 else np.shape(origin))
         if first.dtype.kind not in "ui" or first.shape != (self.axes,):
             raise InvalidInput(f"origin: needs an integer, or {self.axes} of them; got {first.dtype} of {first.shape}")
