@@ -18,7 +18,7 @@ from texrs.errors import FileError, InvalidInput
 from texrs.kernels.appearance import Appearance
 from texrs.kernels.pyramid import halve
 
-__all__ = ["Analysis", "analyse", "colours", "repeats"]
+__all__ = ["Analysis", "analyse", "are_labels", "colours", "repeats"]
 
 FORMAT = 1
 COARSEST = 16
@@ -127,8 +127,8 @@ def analyse(
     wrap : bool, or one an axis, optional
         Axes along which the exemplar repeats; None measures it (see `repeats`).
     labels : bool, optional
-        Whether values are classes without an order; None: integers of one channel with 3 to 16 values that leave
-        gaps no wider than one.
+        Whether values are classes without an order; None: where they are integers of one channel, 3 to 16 values
+        without a gap.
     radii : sequence of int
         Radius of the windows from the coarsest level on; the last one serves all that follow.
     coarsest : int
@@ -187,9 +187,7 @@ def colours(image: Array, labels: bool | None = None) -> Floats:
     Transparent colours count as little as they are seen. Classes become corners of a cube, all equally far apart or
     nearly so; more than four channels become their four principal components.
     """
-    if labels is None:
-        labels = _are_labels(image)
-    if labels:
+    if are_labels(image, labels):
         values, index = np.unique(image[..., 0], return_inverse=True)
         if len(values) > 4096:
             raise InvalidInput(f"labels: up to 4096 classes are allowed, got {len(values)}")
@@ -215,7 +213,12 @@ def colours(image: Array, labels: bool | None = None) -> Floats:
     return np.ascontiguousarray((found - found.min()) / max(float(np.ptp(found)), 1e-12))
 
 
-def _are_labels(image: Array) -> bool:
+def are_labels(image: Array, labels: bool | None = None) -> bool:
+    """Tell whether an exemplar's values are classes: as said, or integers of one channel, 3 to 16 without a gap."""
+    if labels is not None:
+        if labels and image.shape[-1] != 1:
+            raise InvalidInput(f"labels: classes need one channel, got {image.shape[-1]}")
+        return labels
     if image.dtype.kind not in "bui" or image.shape[-1] != 1:
         return False
     values = np.unique(image)

@@ -151,13 +151,17 @@ class Appearance:
             raise InvalidInput(f"analysis: lacks {', '.join(sorted(missing))}")
         made = cls.__new__(cls)
         try:
-            parts = [np.ascontiguousarray(arrays[name], np.int16) for name in ("colours", "features", "basis")]
+            colours, features, basis = (
+                np.ascontiguousarray(arrays[name], np.int16).reshape(-1) for name in ("colours", "features", "basis")
+            )
             made._inner = _rust.Appearance.from_parts(
                 [int(n) for n in arrays["shape"]],
                 [bool(w) for w in arrays["wrap"]],
                 int(arrays["radius"]),
                 int(arrays["channels"]),
-                *(p.reshape(-1) for p in parts),
+                colours,
+                features,
+                basis,
                 np.ascontiguousarray(arrays["bias"], np.int64).reshape(-1),
                 int(arrays["gain"]),
                 int(arrays["spacing"]),

@@ -136,7 +136,7 @@ def _fixed(frames: Array) -> NDArray[np.int16]:
     largest = float(np.abs(frames).max())
     if largest >= 7.99:
         raise InvalidInput(f"field: features may shrink to an eighth of their size, got 1/{largest:.3g}")
-    return np.rint(frames * ONE).astype(np.int16)
+    return np.asarray(np.rint(frames * ONE), np.int16)
 
 
 def halve(image: object, wrap: bool | Sequence[bool] = False, *, axes: int = 2) -> Floats:
@@ -223,7 +223,5 @@ def upsample(
     """
     axes = len(as_size(region.shape, "region", axes=len(region.shape)))
     if places.dtype != np.int32 or places.shape != (parents.points * axes,):
-        raise InvalidInput(
-            f"places: needs int32 of {parents.points * axes} numbers, got {places.dtype} {places.shape}"
-        )
+        raise InvalidInput(f"places: needs int32 of {parents.points * axes} numbers, got {places.dtype} {places.shape}")
     return _rust.upsample(places, parents.place, region.place, frames)

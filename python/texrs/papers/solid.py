@@ -29,18 +29,18 @@ Departures, with their reasons:
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_image, as_int, as_seed, as_size, as_wrap
+from texrs._arrays import as_image, as_seed, as_size, as_wrap
 from texrs._typing import Array, Interpolation, Progress
-from texrs.analysis import COARSEST, Analysis, analyse
+from texrs.analysis import COARSEST, Analysis, analyse, are_labels
 from texrs.errors import InvalidInput
 from texrs.fields import Field
-from texrs.kernels.appearance import Guide
+from texrs.kernels.appearance import Corrected
 from texrs.kernels.pyramid import ONE, Region, to_fixed, upsample
 from texrs.papers._solid_hold import Hold
 from texrs.papers._solid_limits import check_memory
@@ -48,7 +48,7 @@ from texrs.papers._solid_settings import Quality, Settings, settings_of
 from texrs.report import Synthesis
 from texrs.source_map import SourceMap
 
-__all__ = ["grow", "solid", "synthesize"]
+__all__ = ["solid", "synthesize"]
 
 Method: TypeAlias = Literal["paper"] | None
 Places: TypeAlias = NDArray[np.int32]
@@ -226,32 +226,167 @@ def _verb(
 ) -> Synthesis:
     image = as_image(exemplar, "exemplar", axes=axes, minimum=COARSEST)
     region = Region.whole(as_size(size, axes=axes), as_wrap(wrap, axes=axes))
-    field = as_field(field, region)
-    settings, seed = settings_of(quality), as_seed(seed)
-    check_memory(image, region, field, memory_limit)
     if method not in (None, "paper"):
         raise InvalidInput(f"method: None or 'paper' is allowed, got {method!r}")
-    hold = Hold.of(image, region, held, values, coordinates)
-    grower = Grower(image, field, settings, seed, labels, repeat, analysis)
-    grown = grower.grow(region, hold, progress)
+    settings, seed = settings_of(quality), as_seed(seed)
+    checked = as_field(field, axes)
+    if checked is not None:
+        checked = checked.over(region.shape)
+    check_memory(image, region, checked, memory_limit)
+    hold = Hold.of(image, region.shape, held, values, coordinates)
+    if analysis is None:
+        analysis = analyse(image, axes=axes, wrap=repeat, labels=labels, radii=settings.radii)
+    elif analysis.shape != image.shape[:axes]:
+        raise InvalidInput(f"analysis: is of an exemplar of {analysis.shape}, not {image.shape[:axes]}")
+    grown = Grower(image, analysis, checked, settings, seed).grow(region, hold, progress)
     source = SourceMap(
         (grown.places.reshape(*region.shape, axes) / np.float32(ONE)).astype(np.float32, copy=False),
         np.zeros(region.shape, np.uint16),
         np.zeros(region.shape, np.uint32),
-        field,
+        checked,
         (image.shape[:axes],),
     )
-    how: Interpolation = "nearest" if labels else interpolation
+    how: Interpolation = "nearest" if are_labels(image, labels) else interpolation
     composite = source.render(exemplar, interpolation=how)
-    result = hold.shown(composite)
     report = {
         "method": method or "default",
         "quality": quality,
         "seed": seed,
-        "field": None if field is None else field.describe(),
-        "repeats": list(grower.analysis.wrap),
+        "field": None if checked is None else checked.describe(),
+        "repeats": list(analysis.wrap),
         "interpolation": how,
         "held": hold.count,
         "levels": grown.report,
     }
-    return Synthesis(result, source, grown.stages | {"composite": composite}, report)
+    return Synthesis(hold.shown(composite), source, grown.stages | {"composite": composite}, report)
+
+
+def as_field(field: object, axes: int) -> Field | None:
+    """Check a field; the identity is none."""
+    if field is None:
+        return None
+    if not isinstance(field, Field):
+        raise InvalidInput(f"field: needs a field of texrs.fields, got {type(field).__name__}")
+    if field.axes != axes:
+        raise InvalidInput(f"field: needs {axes} axes, got one of {field.axes}")
+    still = field.constant is not None and np.array_equal(field.constant, np.eye(axes, dtype=np.float32))
+    return None if still else field
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Grown:
+    """Places of a region, what was done at each level, and pictures of it."""
+
+    places: Places
+    report: list[dict[str, Any]]
+    stages: dict[str, Array]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Grower:
+    """Grows regions from an analysed exemplar: steps 2 to 4."""
+
+    image: Array
+    analysis: Analysis
+    field: Field | None
+    settings: Settings
+    seed: int
+
+    def grow(self, region: Region, hold: Hold, progress: Progress | None = None) -> Grown:
+        """Grow a bounded region, whose borders are free."""
+        regions = [region]
+        for _ in self.analysis.levels[1:]:
+            regions.insert(0, regions[0].parents())
+        places: Places | None = None
+        report, stages = [], {}
+        for level, here in enumerate(regions):
+            frames = self.frames(level, here)
+            if places is None:
+                places = self.start(here, frames, hold, progress)
+                stages["blocks"] = self.picture(places, here, level)
+            else:
+                places = upsample(places, regions[level - 1], here, frames)
+            places, iterations, changed = self.correct(places, level, here, frames, hold, progress)
+            stages[f"level {level + 1}"] = self.picture(places, here, level)
+            report.append(
+                {
+                    "shape": list(here.shape),
+                    "spacing": round(self.analysis.levels[level].spacing, 6),
+                    "iterations": iterations,
+                    "changed": round(changed, 6),
+                }
+            )
+        assert places is not None  # there is at least one level
+        return Grown(places, report, stages)
+
+    def spacing(self, level: int) -> int:
+        """Voxels from one point of a level to the next."""
+        return 1 << (len(self.analysis.levels) - 1 - level)
+
+    def frames(self, level: int, region: Region) -> NDArray[np.int16]:
+        """Jacobians at the points of a level, of their places in the world: averages of turned frames would shrink."""
+        return to_fixed(self.field, region, self.spacing(level))
+
+    def start(self, region: Region, frames: NDArray[np.int16], hold: Hold, progress: Progress | None = None) -> Places:
+        """Step 2: coherent blocks."""
+        s, coarsest = self.settings, self.analysis.levels[0]
+        places = coarsest.blocks(
+            region,
+            frames,
+            cell=s.cell,
+            rounds=s.rounds,
+            candidates=s.candidates,
+            contrast=s.contrast,
+            continuation=s.continuation,
+            seed=self.seed,
+            guide=hold.guide(coarsest, region, self.spacing(0)),
+            progress=_stage(progress, "blocks"),
+        )
+        return hold.place(places, region, self.spacing(0))
+
+    def correct(
+        self,
+        places: Places,
+        level: int,
+        region: Region,
+        frames: NDArray[np.int16],
+        hold: Hold,
+        progress: Progress | None = None,
+        *,
+        first: int = 0,
+        iterations: int | None = None,
+    ) -> Corrected:
+        """Step 4: windows, matches, votes."""
+        here = self.analysis.levels[level]
+        step = self.settings.at(level, len(self.analysis.levels))
+        return here.correct(
+            hold.place(places, region, self.spacing(level)),
+            region,
+            frames,
+            iterations=step.iterations if iterations is None else iterations,
+            first=first,
+            exhaustive=step.exhaustive,
+            sweeps=step.sweeps,
+            hysteresis=self.settings.hysteresis,
+            vote=min(step.vote, here.radius),
+            settled=self.settings.settled,
+            # The noise of a level is its own.
+            seed=(self.seed + 0x9E3779B97F4A7C15 * (level + 1)) % (1 << 64),
+            held=hold.fixed(region, self.spacing(level)),
+            guide=hold.guide(here, region, self.spacing(level)),
+            progress=_stage(progress, f"level {level + 1} of {len(self.analysis.levels)}"),
+        )
+
+    def picture(self, places: Places, region: Region, level: int) -> Array:
+        """Show places of a level: all of a picture, the middle plane of a volume, through the exemplar itself."""
+        axes = len(region.shape)
+        shown = places.reshape(*region.shape, axes)
+        if axes == 3:
+            shown = shown[region.shape[0] // 2]
+        fine = (np.rint(shown / np.float32(ONE)) + 0.5) * self.spacing(level) - 0.5
+        at = tuple(np.clip(np.rint(fine[..., a]).astype(np.intp), 0, self.image.shape[a] - 1) for a in range(axes))
+        return self.image[at]
+
+
+def _stage(progress: Progress | None, name: str) -> Callable[[float], object] | None:
+    return None if progress is None else lambda share: progress(name, share)
