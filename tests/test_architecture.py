@@ -17,7 +17,7 @@ NOUNS = {
     "source_map": {"io", "_pixels"},
     "_pixels": {"source_map"},
     "io": set(),
-    "report": {"source_map", "io"},
+    "report": {"source_map", "io", "volume"},
     "segment": set(),
     "fields": set(),
     "volume": {"io", "fields", "source_map"},

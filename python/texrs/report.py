@@ -43,7 +43,10 @@ class Synthesis:
     report: Mapping[str, Any] = field(default_factory=dict)
 
     def save_stages(self, folder: Path) -> list[FilePath]:
-        """Write each stage as a numbered PNG, and the report as ``report.json``; return the paths."""
+        """Write each stage as a numbered PNG, and the report as ``report.json``; return the paths.
+
+        Of a volume three slices through its middle are shown.
+        """
         from texrs.io import atomic, write
 
         directory = FilePath(folder)
@@ -51,19 +54,27 @@ class Synthesis:
         paths = []
         for i, (name, stage) in enumerate(self.stages.items(), start=1):
             paths.append(directory / f"{i:02d}-{re.sub('[^a-z0-9]+', '-', name.lower())}.png")
-            write(paths[-1], preview(stage))
+            write(paths[-1], preview(self._flat(stage)))
         paths.append(directory / "report.json")
         with atomic(paths[-1]) as temporary:
             FilePath(temporary).write_text(json.dumps(self.report, indent=2) + "\n", encoding="utf-8")
         return paths
 
     def _repr_png_(self) -> bytes:
-        """Show the image in a notebook."""
+        """Show the image, or slices of a volume, in a notebook."""
         import imageio.v3 as iio
 
         buffer = io.BytesIO()
-        iio.imwrite(buffer, preview(self.image), extension=".png")
+        iio.imwrite(buffer, preview(self._flat(self.image)), extension=".png")
         return buffer.getvalue()
+
+    def _flat(self, stage: Array) -> Array:
+        """Give slices of what is as large as a volume; anything else is a picture already."""
+        if self.source.axes == 2 or stage.shape[:3] != self.source.shape:
+            return stage
+        from texrs.volume import slices
+
+        return slices(stage)
 
 
 def preview(image: Array) -> Array:

@@ -22,7 +22,7 @@ from texrs import io, samples
 from texrs._arrays import as_float
 from texrs.blend import SCREENING
 from texrs.blend import blend as healed
-from texrs.cli import _files, _pictures, _volumes
+from texrs.cli import _files, _pictures, _solid, _volumes
 from texrs.cli._console import Quiet, Threads, note, run, say, watching
 from texrs.cli._files import describe, named
 from texrs.errors import FileError, InvalidInput
@@ -42,6 +42,8 @@ app = typer.Typer(
 )
 app.command("tile")(_pictures.tile_command)
 app.command("complete")(_pictures.complete_command)
+app.command("solid")(_solid.solid_command)
+app.command("synthesize")(_solid.synthesize_command)
 app.command("slice")(_volumes.slice_command)
 
 
@@ -207,7 +209,7 @@ def design_command(
 @app.command("apply")
 def apply_command(
     source: Annotated[
-        str, typer.Argument(metavar="SOURCE.npz", help="A source map that design --source wrote.", show_default=False)
+        str, typer.Argument(metavar="SOURCE.npz", help="A source map that --source wrote.", show_default=False)
     ],
     maps: Annotated[
         list[str],

@@ -26,6 +26,7 @@ __all__ = [
     "describe",
     "named",
     "output",
+    "parse_axes",
     "parse_range",
     "parse_size",
     "parse_wrap",
@@ -44,12 +45,13 @@ LONGEST_PROBE = 2**17
 
 
 def parse_size(text: str | None, *, name: str = "--size", axes: int = 2) -> tuple[int, ...] | None:
-    """Read ``512x384`` as rows and columns, ``512`` as a square."""
+    """Read ``512x384`` as rows and columns, ``512`` as a square; with three axes planes come first."""
     if text is None:
         return None
     parts = re.split(r"[x×]", text.strip().lower())
     if len(parts) not in (1, axes) or not all(re.fullmatch(r"\s*-?[0-9]{1,18}\s*", p) for p in parts):
-        raise InvalidInput(f"{name}: needs ROWSxCOLS, as in 512x384, or one number; got {text!r}")
+        wanted = ("ROWSxCOLS, as in 512x384", "PLANESxROWSxCOLS, as in 64x96x128")[axes - 2]
+        raise InvalidInput(f"{name}: needs {wanted}, or one number; got {text!r}")
     sides = [int(p) for p in parts]
     return as_size(sides if len(sides) > 1 else sides[0], name, axes=axes)
 
@@ -60,6 +62,16 @@ def parse_wrap(text: str) -> tuple[bool, bool]:
     if axes is None:
         raise InvalidInput(f"--wrap: allowed are xy, x, y and none; got {text!r}")
     return "y" in axes, "x" in axes
+
+
+def parse_axes(text: str, *, axes: int) -> tuple[bool, ...]:
+    """Read the axes that wrap, of a picture as `parse_wrap` does, of a volume with z for the planes too."""
+    if axes == 2:
+        return parse_wrap(text)
+    letters = text.strip().lower()
+    if letters != "none" and (not letters or set(letters) - set("xyz") or len(set(letters)) < len(letters)):
+        raise InvalidInput(f"--wrap: needs axes among x, y and z, each once, or none; got {text!r}")
+    return tuple(letters != "none" and letter in letters for letter in "zyx")
 
 
 def parse_range(text: str, *, name: str) -> tuple[float, float]:
@@ -168,7 +180,7 @@ def deliver(result: Synthesis, out: str, source: str | None, stages: str | None)
     """Write a result and what was asked for beside it."""
     # The result takes its name last, when all else is written.
     with output(out) as temporary:
-        io.write(temporary, result.image)
+        (io.write if result.source.axes == 2 else io.write_volume)(temporary, result.image)
         if source is not None:
             result.source.save(source)
         if stages is not None:
