@@ -1,0 +1,164 @@
+"""The kernels of SOLID against their slow twins, exactly: all of it is integer arithmetic."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from texrs import fields
+from texrs.errors import Cancelled, InvalidInput
+from texrs.kernels.appearance import Appearance
+from texrs.kernels.pyramid import Region, to_fixed, upsample
+
+sys.path.insert(0, str(Path(__file__).parent / "reference"))
+from solid import ONE, Twin, upsampled
+
+
+def exemplar(axes, wrap=False, channels=2):
+    shape = (17, 20) if axes == 2 else (12, 13, 14)
+    noise = np.random.default_rng(4).random((*shape, channels))
+    for axis in range(axes):
+        noise = noise + np.roll(noise, 1, axis) + np.roll(noise, 2, axis)
+    return Appearance(noise, axes=axes, wrap=wrap)
+
+
+def region_of(axes, wrap=False, origin=-3):
+    shape = (13, 11) if axes == 2 else (5, 7, 6)
+    return Region(shape, (origin,) * axes, (wrap,) * axes)
+
+
+def scattered(appearance, region, seed=0):
+    """Give places of any kind: fractions, outside, far away."""
+    rng = np.random.default_rng(seed)
+    axes = len(region.shape)
+    at = rng.integers(-2 * ONE, (max(appearance.shape) + 1) * ONE, (region.points, axes))
+    at[::3] = at[::3] // ONE * ONE
+    return at.astype(np.int32).reshape(-1)
+
+
+FIELDS = {
+    "still": lambda axes: None,
+    "turned": lambda axes: fields.slant(33, axes=axes),
+    "larger": lambda axes: fields.constant(np.eye(axes) * 1.7),
+    "smaller": lambda axes: fields.constant(np.eye(axes) * 0.4),
+    "sheared": lambda axes: fields.shear(0.7, axes=axes),
+    "circular": lambda axes: fields.circular(centre=(2.5,) * axes, axes=axes),
+}
+
+
+@pytest.mark.parametrize("axes", [2, 3])
+@pytest.mark.parametrize("kind", FIELDS)
+@pytest.mark.parametrize("wrap", [False, True])
+def test_an_iteration_is_that_of_the_twin(axes, kind, wrap):
+    appearance, region = exemplar(axes, wrap=kind == "sheared"), region_of(axes, wrap)
+    frames = to_fixed(FIELDS[kind](axes), region)
+    twin = Twin(appearance.arrays(), region, frames)
+    start = scattered(appearance, region)
+    options = {"first": 5, "sweeps": 2, "hysteresis": 0.5, "vote": 1, "seed": (7 << 40) + 3}
+    found = appearance.correct(start, region, frames, iterations=1, **options)
+    wanted = twin.correct(start, **options)
+    np.testing.assert_array_equal(found.places.reshape(-1, axes), wanted)
+    changed = (wanted != twin.bring_inside(start.astype(np.int64).reshape(-1, axes))).any(axis=1)
+    assert found.iterations == 1
+    assert found.changed == pytest.approx(changed.mean())
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"sweeps": 1, "vote": 0},
+        {"sweeps": 2, "vote": 0, "hysteresis": 0.0},
+        {"sweeps": 1, "vote": 2, "hysteresis": 100.0},
+        {"sweeps": 2, "vote": 1, "exhaustive": True},
+    ],
+)
+@pytest.mark.parametrize("axes", [2, 3])
+def test_each_option_is_that_of_the_twin(axes, options):
+    appearance, region = exemplar(axes, channels=4 if axes == 2 else 1), region_of(axes, origin=9)
+    frames = to_fixed(fields.slant(-20, axes=axes), region)
+    held = np.arange(region.points) % 5 == 0
+    start = scattered(appearance, region, seed=1)
+    found = appearance.correct(start, region, frames, iterations=1, held=held, **options)
+    wanted = Twin(appearance.arrays(), region, frames).correct(start, held=held, **options)
+    np.testing.assert_array_equal(found.places.reshape(-1, axes), wanted)
+
+
+def test_work_in_parts_is_the_work():
+    appearance, region = exemplar(2), region_of(2)
+    frames = to_fixed(None, region)
+    # Fractions at the exemplar's border would be brought inside between the parts.
+    start = scattered(appearance, region) // ONE * ONE
+    whole = appearance.correct(start, region, frames, iterations=3, seed=2).places
+    part = start
+    for first in range(3):
+        part = appearance.correct(part, region, frames, iterations=1, first=first, seed=2).places
+    np.testing.assert_array_equal(part, whole)
+
+
+@pytest.mark.parametrize("axes", [2, 3])
+@pytest.mark.parametrize("kind", FIELDS)
+@pytest.mark.parametrize("wrap", [False, True])
+def test_upsampling_is_that_of_the_twin(axes, kind, wrap):
+    region = region_of(axes, wrap, origin=0 if wrap else -3)
+    parents = region.parents()
+    frames = to_fixed(FIELDS[kind](axes), region)
+    start = np.random.default_rng(2).integers(-(2**20), 2**20, parents.points * axes).astype(np.int32)
+    found = upsample(start, parents, region, frames).reshape(-1, axes)
+    np.testing.assert_array_equal(found, upsampled(start, parents, region, frames))
+
+
+@pytest.mark.parametrize("wrap", [False, True])
+def test_blocks_are_pieces_of_the_exemplar(wrap):
+    appearance, region = exemplar(3, wrap), Region.whole((18, 24, 20))
+    places = appearance.blocks(region, to_fixed(None, region), seed=1).reshape(*region.shape, 3)
+    assert (places % ONE == 0).all()
+    joined = (places[:, :, 1:] - places[:, :, :-1] == (0, 0, ONE)).all(axis=-1)
+    assert joined.mean() > 0.75  # cells are 6 wide
+    low, high = (0, appearance.shape) if wrap else (2, np.array(appearance.shape) - 2)
+    at = places // ONE
+    assert wrap or ((at >= low) & (at < high)).all()
+
+
+def test_what_a_block_becomes_belongs_to_the_world():
+    appearance = exemplar(2)
+    whole, part = Region((60, 60), (-30, -30), (False,) * 2), Region((50, 50), (-25, -25), (False,) * 2)
+    one, other = (appearance.blocks(r, to_fixed(None, r), cell=4, rounds=1, seed=3) for r in (whole, part))
+    one, other = one.reshape(60, 60, 2)[5:55, 5:55], other.reshape(50, 50, 2)
+    np.testing.assert_array_equal(one[10:40, 10:40], other[10:40, 10:40])
+
+
+def test_kernels_report_and_stop():
+    appearance, region = exemplar(3), Region.whole((16, 16, 16))
+    frames, shares = to_fixed(None, region), []
+    appearance.correct(appearance.blocks(region, frames, progress=shares.append), region, frames)
+    assert shares == sorted(shares)
+
+    def stop(share):
+        raise KeyError("enough")
+
+    with pytest.raises((Cancelled, KeyError)):
+        appearance.blocks(region, frames, progress=stop)
+
+
+def test_wrong_arrays_get_a_sentence():
+    appearance, region = exemplar(2), region_of(2)
+    frames, good = to_fixed(None, region), scattered(exemplar(2), region_of(2))
+    for call, says in (
+        (lambda: appearance.correct(good[:-1], region, frames), "places: needs int32, 2 for each of 143 points"),
+        (lambda: appearance.correct(good, region, frames[:, :1]), "frames"),
+        (lambda: appearance.correct(good, region, np.repeat(frames, 3, axis=0)), "frames"),
+        (lambda: appearance.correct(good, region, frames, held=np.zeros(3, bool)), "places"),
+        (lambda: appearance.correct(good, region, frames, sweeps=3), "sweeps: needs an integer from 1 to 2"),
+        (lambda: appearance.correct(good, region, frames, vote=3), "vote: needs an integer from 0 to 2"),
+        (lambda: appearance.correct(good, region_of(3), frames), "region: the exemplar has 2 axes"),
+        (lambda: appearance.blocks(region, frames, cell=1), "cell: needs an integer from 2"),
+        (lambda: appearance.blocks(region, frames, contrast=2), "contrast: needs a number from 0 to 1"),
+        (lambda: Appearance(np.zeros((4, 4)), axes=2), "too small"),
+    ):
+        with pytest.raises(InvalidInput) as caught:
+            call()
+        assert says in str(caught.value)
+        assert "\n" not in str(caught.value)
