@@ -71,7 +71,7 @@ class Analysis:
         """Write the analysis to a .npz file; a former file is replaced only when all is written."""
         from texrs.io import atomic
 
-        arrays: dict[str, Array] = {"format": np.array(FORMAT), "key": np.array(self.key)}
+        arrays: dict[str, Array] = {"format": np.array(FORMAT), "key": np.frombuffer(bytes.fromhex(self.key), np.uint8)}
         for i, level in enumerate(self.levels):
             arrays |= {f"{i}/{name}": value for name, value in level.arrays().items()}
         with atomic(path) as temporary, FilePath(temporary).open("wb") as file:
@@ -87,9 +87,11 @@ class Analysis:
             The file cannot be read, is of another version, or is damaged.
 
         """
+        from texrs.io import read_arrays
+
+        # Single numbers come back as arrays of one.
+        arrays = {name: a.reshape(()) if a.size == 1 else a for name, a in read_arrays(path).items()}
         try:
-            with np.load(path, allow_pickle=False) as file:
-                arrays = {name: file[name] for name in file.files}
             if int(arrays.get("format", -1)) != FORMAT:
                 raise FileError(f"{path}: not an analysis of this version of texrs")
             count = len({name.split("/")[0] for name in arrays if "/" in name})
@@ -99,11 +101,11 @@ class Analysis:
             )
             if not levels:
                 raise FileError(f"{path}: has no levels")
-            return cls(levels, str(arrays["key"]))
+            return cls(levels, arrays["key"].astype(np.uint8).tobytes().hex())
         except FileError:
             raise
-        except Exception as error:  # a damaged archive raises what its part of it raises
-            raise FileError(f"{path}: cannot be read as an analysis ({error})") from None
+        except (InvalidInput, KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
+            raise FileError(f"{path}: is damaged ({error})") from None
 
 
 def analyse(

@@ -236,6 +236,8 @@ def _verb(
     hold = Hold.of(image, region.shape, held, values, coordinates)
     if analysis is None:
         analysis = analyse(image, axes=axes, wrap=repeat, labels=labels, radii=settings.radii)
+    elif not isinstance(analysis, Analysis):
+        raise InvalidInput(f"analysis: needs an Analysis, got {type(analysis).__name__}")
     elif analysis.shape != image.shape[:axes]:
         raise InvalidInput(f"analysis: is of an exemplar of {analysis.shape}, not {image.shape[:axes]}")
     grown = Grower(image, analysis, checked, settings, seed).grow(region, hold, progress)
@@ -389,4 +391,7 @@ class Grower:
 
 
 def _stage(progress: Progress | None, name: str) -> Callable[[float], object] | None:
-    return None if progress is None else lambda share: progress(name, share)
+    if progress is None:
+        return None
+    progress(name, 0.0)  # Short work may be done before it is asked how far it is.
+    return lambda share: progress(name, share)

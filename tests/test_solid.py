@@ -1,0 +1,481 @@
+"""SOLID, end to end: any array, any size, any border; honest maps; the same bytes for any number of threads."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tracemalloc
+
+import numpy as np
+import pytest
+
+import texrs
+from texrs import fields, samples, volume
+from texrs.analysis import Analysis, analyse, colours, repeats
+from texrs.errors import Cancelled, FileError, InvalidInput, LimitExceeded
+from texrs.kernels.pyramid import ONE
+
+STRIPES = samples.stripes((32, 32, 32)).image
+PARTICLES = samples.particles((32, 32, 32))
+WEAVE = samples.weave((48, 48)).image
+TURNING = fields.zigzag(period=24)
+
+
+@pytest.fixture(scope="module")
+def result():
+    return texrs.solid(STRIPES, (33, 40, 21), seed=3, field=TURNING)
+
+
+def rendered(made, exemplar):
+    return made.source.render(exemplar, interpolation=made.report["interpolation"])
+
+
+# --- any array -------------------------------------------------------------------------------------------------------
+
+GREY = STRIPES[..., 0]
+ARRAYS = {
+    "uint8, three channels": STRIPES,
+    "uint8, none": GREY,
+    "uint16, one": GREY[..., None].astype(np.uint16) * 257,
+    "float32, colours and alpha": np.concatenate(
+        [STRIPES / np.float32(255), PARTICLES.mask[..., None]], axis=-1
+    ).astype(np.float32),
+    "float64, beyond the unit": (GREY * 3.0 - 200),
+    "float16, two": np.stack([GREY, GREY[::-1]], axis=-1).astype(np.float16) / 255,
+    "int16, six": np.stack([np.roll(GREY, c, 0) for c in range(6)], axis=-1).astype(np.int16) - 99,
+    "bool": PARTICLES.mask,
+    "constant": np.full((16, 16, 16), 7, np.uint8),
+}
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_what_comes_in_is_what_comes_out(name):
+    exemplar = ARRAYS[name]
+    made = texrs.solid(exemplar, 24, seed=1, quality="fast", field=fields.slant(25))
+    assert made.image.dtype == exemplar.dtype
+    assert made.image.shape == (24, 24, 24, *exemplar.shape[3:])
+    np.testing.assert_array_equal(rendered(made, exemplar), made.stages["composite"])
+    np.testing.assert_array_equal(made.image, made.stages["composite"])
+    assert made.image.min() >= exemplar.min() - 1e-3  # the linear look-up stays within
+    assert made.image.max() <= exemplar.max() + 1e-3
+
+
+@pytest.mark.parametrize("interpolation", ["nearest", "linear", "cubic"])
+def test_the_map_renders_the_picture(interpolation):
+    made = texrs.synthesize(WEAVE, (40, 56), field=fields.spiral(axes=2), interpolation=interpolation)
+    assert made.report["interpolation"] == interpolation
+    np.testing.assert_array_equal(made.source.render(WEAVE, interpolation=interpolation), made.stages["composite"])
+
+
+def test_labels_are_classes_without_an_order():
+    marked = (np.cumsum(np.random.default_rng(0).random((24, 24, 24)) < 0.06, axis=0) % 5).astype(np.uint8)
+    made = texrs.solid(marked, 32, field=TURNING, quality="fast")
+    assert made.report["interpolation"] == "nearest"
+    assert set(np.unique(made.image)) <= set(range(5))
+    # Another name for each class changes nothing.
+    renamed = np.array([3, 0, 4, 1, 2], np.uint8)
+    codes = colours(marked[..., None])
+    assert all(len(np.unique(codes[marked == k], axis=0)) == 1 for k in range(5))
+    assert texrs.solid(renamed[marked], 32, field=TURNING, quality="fast").image.shape == made.image.shape
+    assert texrs.solid(marked, 20, labels=False, quality="fast").report["interpolation"] == "linear"
+    sparse = (marked * 40).astype(np.int32)
+    assert set(np.unique(texrs.solid(sparse, 20, labels=True, quality="fast").image)) <= set(np.unique(sparse))
+
+
+def test_every_map_in_register_follows(result):
+    coded = np.stack(np.meshgrid(*[np.arange(32, dtype=np.uint16)] * 3, indexing="ij"), axis=-1)
+    at = result.source.render(coded, interpolation="nearest")
+    np.testing.assert_array_equal(at, np.floor(result.source.coordinates + np.float32(0.5)))
+    nearest = result.source.render(STRIPES, interpolation="nearest")
+    np.testing.assert_array_equal(nearest, STRIPES[tuple(np.moveaxis(at, -1, 0))])
+    sixteen = result.source.render(STRIPES.astype(np.uint16) * 257, interpolation="linear")
+    assert sixteen.dtype == np.uint16
+    assert np.abs(sixteen / 257 - result.image).max() <= 0.51
+
+
+def test_depth_does_not_change_the_decisions():
+    eight = texrs.solid(GREY, 24, seed=2, quality="fast").source
+    sixteen = texrs.solid(GREY.astype(np.uint16) * 257, 24, seed=2, quality="fast").source
+    np.testing.assert_array_equal(eight.coordinates, sixteen.coordinates)
+
+
+# --- any size, any border --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", [17, (33, 40, 21), (1, 5, 30), (16, 2, 65), 1])
+def test_any_size(size):
+    made = texrs.solid(STRIPES, size, quality="fast", wrap=(False, True, False))
+    sides = (size,) * 3 if isinstance(size, int) else size
+    assert made.image.shape == (*sides, 3)
+    assert made.source.coordinates.shape == (*sides, 3)
+    assert (made.source.coordinates >= 0).all()
+    assert (made.source.coordinates <= 31).all()
+
+
+@pytest.mark.parametrize("shape", [(16, 16, 16), (16, 40, 72), (50, 19, 23)])
+def test_any_exemplar(shape):
+    exemplar = samples.particles((80, 80, 80)).image[tuple(slice(0, n) for n in shape)]
+    made = texrs.solid(exemplar, 30, quality="fast")
+    assert made.image.shape == (30, 30, 30, 3)
+    assert len(made.report["levels"]) == 1
+    # A copy of all of it would not be a texture.
+    assert volume.cell_reuse(made.source).largest < 0.6
+
+
+@pytest.mark.parametrize("size", [(36, 40), (37, 41), (64, 33)])
+def test_pictures_close_along_the_axes_that_wrap(size):
+    pebbles = samples.pebbles((96, 96)).image
+    free, closed = (texrs.synthesize(pebbles, size, wrap=w, seed=2).image for w in (False, (True, False)))
+    inner, across = changes(closed, (True, False))[0]
+    assert across <= 1.25 * np.quantile(inner, 0.95)
+    inner, across = changes(free, True)[0]
+    assert across > 1.25 * np.quantile(inner, 0.95)
+
+
+def changes(image, wrap):
+    """Give, for each axis, the changes from line to line inside, and that from the last to the first."""
+    seen = volume.lightness(image)
+    return [(c[:-1], c[-1]) for c in volume.seam_planes(seen, wrap=wrap)]
+
+
+@pytest.mark.parametrize("size", [(32, 36, 40), (33, 35, 41)])
+@pytest.mark.parametrize("wrap", [(True, True, True), (False, False, True)])
+def test_volumes_close_along_the_axes_that_wrap(size, wrap):
+    made = texrs.solid(samples.particles((48, 48, 48), seed=1).image[:41, :41, :41], size, wrap=wrap, seed=1)
+    for (inner, across), closed in zip(changes(made.image, True), wrap, strict=True):
+        assert (across <= 1.1 * inner.max()) or not closed, (across, inner.max())
+        assert (across > 1.1 * inner.max()) or closed, (across, inner.max())
+
+
+def test_exemplars_that_repeat_are_found_by_measurement():
+    whole = samples.particles((64, 64, 64)).image
+    assert repeats(whole, axes=3) == (True, True, True)
+    assert repeats(whole[:, 5:], axes=3) == (True, False, True)
+    assert repeats(np.roll(whole, 9, 1), axes=3) == (True, True, True)
+    assert repeats(STRIPES, axes=3) != (True, True, True)
+    around = texrs.solid(whole, 40, seed=4)
+    assert around.report["repeats"] == [True, True, True]
+    bounded = texrs.solid(whole, 40, seed=4, repeat=False)
+    assert bounded.report["repeats"] == [False, False, False]
+    # Where it repeats, pieces go on across its end: all of it can be used.
+    ends = (around.source.coordinates >= 63).any(axis=-1).mean()
+    assert ends > 0.02 > 3 * (bounded.source.coordinates >= 63).any(axis=-1).mean()
+
+
+# --- same bytes ------------------------------------------------------------------------------------------------------
+
+SCRIPT = """
+import hashlib, os, sys
+import texrs
+from texrs import fields, samples
+
+def digest():
+    made = texrs.solid(samples.stripes((32, 32, 32)).image, (21, 32, 27), seed=5, field=fields.circular(axis="x"))
+    flat = texrs.synthesize(samples.weave((48, 48)).image, (50, 41), seed=5, wrap=True)
+    return hashlib.sha256(made.source.coordinates.tobytes() + made.image.tobytes() + flat.image.tobytes()).hexdigest()
+
+if "fork" in sys.argv:
+    print(digest(), flush=True)
+    child = os.fork()
+    if child == 0:
+        print(digest(), flush=True)
+        os._exit(0)
+    assert os.waitpid(child, 0)[1] == 0
+else:
+    for count in (1, 2, 7):
+        with texrs.threads(count):
+            texrs.analysis._KEPT._kept.clear()
+            print(digest())
+    print(digest())
+"""
+
+
+def digests(*arguments):
+    command = [sys.executable, "-c", SCRIPT, *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=True)
+    return done.stdout.split()
+
+
+def test_same_bytes_for_any_number_of_threads():
+    found = digests()
+    assert len(found) == 4
+    assert len(set(found)) == 1
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the platform has no fork")
+def test_a_forked_child_finishes_with_the_same_bytes():
+    parent, child = digests("fork")
+    assert parent == child
+
+
+@pytest.mark.parametrize("field", [None, TURNING])
+def test_another_seed_is_another_texture(field):
+    one, again, other = (
+        texrs.solid(STRIPES, 30, seed=s, field=field, quality="fast").source for s in (1, 1, 2**64 - 1)
+    )
+    np.testing.assert_array_equal(one.coordinates, again.coordinates)
+    assert (one.coordinates != other.coordinates).any(axis=-1).mean() > 0.9
+
+
+# --- hard data -------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def boxed():
+    """Give a mask of a box, and what it shows: a piece of the exemplar from elsewhere."""
+    held = np.zeros((32, 36, 40), bool)
+    held[10:24, 12:26, 8:22] = True
+    values = np.zeros((32, 36, 40, 3), np.uint8)
+    values[10:24, 12:26, 8:22] = STRIPES[9:23, 9:23, 9:23]
+    return held, values
+
+
+def edge(image, held):
+    """Give the mean change across the border of what is held."""
+    seen, total, count = image.astype(float), 0.0, 0
+    for axis in range(3):
+        border = np.diff(held.astype(int), axis=axis) != 0
+        total += np.abs(np.diff(seen, axis=axis))[border].sum()
+        count += border.sum()
+    return total / count
+
+
+@pytest.mark.parametrize("quality", ["preserve", "fast"])
+def test_held_values_stay_and_their_surroundings_agree(boxed, quality):
+    held, values = boxed
+    made = texrs.solid(STRIPES, held.shape, seed=3, held=held, values=values, quality=quality)
+    assert made.report["held"] == held.sum()
+    np.testing.assert_array_equal(made.image[held], values[held])
+    np.testing.assert_array_equal(made.image[~held], made.stages["composite"][~held])
+    np.testing.assert_array_equal(rendered(made, STRIPES), made.stages["composite"])
+    free = texrs.solid(STRIPES, held.shape, seed=3, quality=quality).image
+    pasted = np.where(held[..., None], values, free)
+    assert edge(made.image, held) < 0.7 * edge(pasted, held)
+    # The texture itself goes through what is held.
+    off = np.abs(made.stages["composite"][held].astype(int) - values[held]).mean()
+    assert off < 0.5 * np.abs(free[held].astype(int) - values[held]).mean()
+
+
+def test_held_coordinates_stay_and_their_surroundings_agree(boxed):
+    held, values = boxed
+    places = np.full((*held.shape, 3), np.nan, np.float32)
+    places[held] = np.argwhere(held) - (10, 12, 8) + 9
+    made = texrs.solid(STRIPES, held.shape, seed=3, held=held, coordinates=places)
+    np.testing.assert_array_equal(made.source.coordinates[held], places[held])
+    np.testing.assert_array_equal(made.image, made.stages["composite"])
+    np.testing.assert_array_equal(made.image[held], values[held])
+    pasted = np.where(held[..., None], values, texrs.solid(STRIPES, held.shape, seed=3).image)
+    assert edge(made.image, held) < 0.8 * edge(pasted, held)
+
+
+def test_held_pixels_of_pictures_and_of_labels():
+    held = np.zeros((40, 44), bool)
+    held[5:25, 30:] = True
+    grey = WEAVE[..., 0]
+    values = np.pad(grey[:40, :44], ((0, 0), (0, 0)))
+    made = texrs.synthesize(grey, held.shape, held=held.astype(np.uint8), values=values[..., None])
+    np.testing.assert_array_equal(made.image[held], values[held])
+    classes = (grey // 52).astype(np.uint8)
+    made = texrs.synthesize(classes, held.shape, held=held, values=classes[:40, :44], labels=True)
+    np.testing.assert_array_equal(made.image[held], classes[:40, :44][held])
+
+
+# --- analyses --------------------------------------------------------------------------------------------------------
+
+
+def test_analyses_are_kept_and_taken_back(tmp_path):
+    first = analyse(STRIPES, axes=3)
+    assert analyse(STRIPES.copy(), axes=3) is first
+    assert analyse(STRIPES, axes=3, cache=False) is not first
+    other = STRIPES.copy()
+    other[0, 0, 0, 0] ^= 1
+    assert analyse(other, axes=3).key != first.key
+    first.save(tmp_path / "a.npz")
+    again = Analysis.load(tmp_path / "a.npz")
+    assert (again.key, again.shape, again.wrap) == (first.key, first.shape, first.wrap)
+    one, two = (texrs.solid(STRIPES, 24, analysis=a, seed=2).source.coordinates for a in (first, again))
+    np.testing.assert_array_equal(one, two)
+
+
+def test_damaged_analyses_are_refused(tmp_path):
+    path = tmp_path / "a.npz"
+    analyse(STRIPES, axes=3).save(path)
+    with np.load(path) as file:
+        arrays = {name: file[name] for name in file.files}
+    whole = path.read_bytes()
+    damages = {
+        "cut off": lambda: path.write_bytes(whole[: len(whole) // 2]),
+        "of another version": lambda: np.savez(path, **{**arrays, "format": np.array(99)}),
+        "without an array": lambda: np.savez(path, **{k: v for k, v in arrays.items() if k != "0/basis"}),
+        "of other sizes": lambda: np.savez(path, **{**arrays, "1/features": arrays["1/features"][:-24]}),
+        "out of range": lambda: np.savez(path, **{**arrays, "0/colours": arrays["0/colours"] * 0 + 30000}),
+        "without levels": lambda: np.savez(path, format=arrays["format"], key=arrays["key"]),
+        "not one": lambda: path.write_bytes(b"nothing of the kind"),
+    }
+    for damage in damages.values():
+        damage()
+        with pytest.raises(FileError) as caught:
+            Analysis.load(path)
+        assert str(path) in str(caught.value)
+        assert "\n" not in str(caught.value)
+    with pytest.raises(FileError):
+        Analysis.load(tmp_path / "none.npz")
+
+
+# --- maps, reports, stages -------------------------------------------------------------------------------------------
+
+
+def test_a_map_with_a_varying_field_is_kept(result, tmp_path):
+    result.source.save(tmp_path / "map.npz")
+    again = texrs.SourceMap.load(tmp_path / "map.npz")
+    np.testing.assert_array_equal(again.render(STRIPES, interpolation="linear"), result.image)
+    np.testing.assert_allclose(again.frames(), result.source.frames(), atol=1e-6)
+    whole = volume.compare(STRIPES, result.image, result.source, TURNING)
+    loaded = volume.compare(STRIPES, result.image, again, TURNING)
+    assert whole.text == loaded.text
+    assert volume.cell_reuse(result.source) == volume.cell_reuse(again)
+    assert whole.reuse.coherent > 0.4
+
+
+def test_reports_and_stages_are_saved(result, tmp_path):
+    import imageio.v3 as iio
+
+    assert [level["shape"] for level in result.report["levels"]] == [[17, 20, 11], [33, 40, 21]]
+    assert list(result.stages) == ["blocks", "level 1", "level 2", "composite"]
+    names = [p.name for p in result.save_stages(tmp_path / "stages")]
+    assert names == ["01-blocks.png", "02-level-1.png", "03-level-2.png", "04-composite.png", "report.json"]
+    shown = iio.imread(tmp_path / "stages" / "04-composite.png")
+    np.testing.assert_array_equal(shown, volume.slices(result.image))
+    assert result._repr_png_().startswith(b"\x89PNG")
+    flat = texrs.synthesize(WEAVE, 40)
+    flat.save_stages(tmp_path / "flat")
+    np.testing.assert_array_equal(iio.imread(tmp_path / "flat" / "04-composite.png"), flat.image)
+
+
+def test_open_fields_are_set_by_the_size():
+    made = texrs.solid(STRIPES, 20, field=fields.circular(axis="x"), quality="fast")
+    assert "about (9.5, 9.5, 9.5)" in made.report["field"]
+    assert texrs.solid(STRIPES, 20, field=fields.identity(), quality="fast").report["field"] is None
+
+
+def test_progress_is_told_and_raising_stops_at_each_stage():
+    told = []
+    texrs.solid(STRIPES, 20, progress=lambda stage, share: told.append((stage, share)))
+    stages = list(dict.fromkeys(stage for stage, _ in told))
+    assert stages == ["blocks", "level 1 of 2", "level 2 of 2"]
+    for name in stages:
+        shares = [share for stage, share in told if stage == name]
+        assert shares == sorted(shares)
+        assert 0 <= shares[0] <= shares[-1] <= 1
+
+        def stop(stage, share, name=name):
+            if stage == name:
+                raise Cancelled("enough")
+
+        with pytest.raises(Cancelled):
+            texrs.solid(STRIPES, 20, progress=stop)
+
+
+def test_memory_is_refused_before_it_is_taken():
+    analyse(STRIPES, axes=3)
+    tracemalloc.start()
+    try:
+        for size, options in (
+            (10_000, {}),
+            ((2**27, 2, 1), {"field": TURNING}),
+            (64, {"memory_limit": 2**20}),
+            (2**40, {}),
+        ):
+            with pytest.raises(LimitExceeded, match="size: "):
+                texrs.solid(STRIPES, size, **options)
+        assert tracemalloc.get_traced_memory()[1] < 2**20
+    finally:
+        tracemalloc.stop()
+
+
+# --- bad input -------------------------------------------------------------------------------------------------------
+
+NAN = STRIPES.astype(np.float32)
+NAN[3, 4, 5, 0] = np.nan
+SIZED = np.ones((20, 20, 20), bool)
+
+
+@pytest.mark.parametrize(
+    ("exemplar", "options", "says"),
+    [
+        (NAN, {}, "exemplar: 1 of 98304 values are NaN"),
+        (STRIPES[:1], {}, "exemplar: each side must be at least 16, got shape (1, 32, 32)"),
+        (STRIPES[:15], {}, "exemplar: each side must be at least 16"),
+        (np.zeros((0, 32, 32)), {}, "exemplar: each side"),
+        (STRIPES.astype(object), {}, "exemplar: needs numbers"),
+        ([["a"]], {}, "exemplar: needs numbers"),
+        (None, {}, "exemplar: needs numbers"),
+        (STRIPES.astype(np.complex64), {}, "exemplar: needs numbers"),
+        (STRIPES.astype(np.int64), {}, "exemplar: 64-bit integers"),
+        (STRIPES[0, 0], {}, "exemplar: needs shape (planes, rows, columns)"),
+        (STRIPES, {"size": 0}, "size: each side must be at least 1"),
+        (STRIPES, {"size": (20, 20)}, "size: needs (planes, rows, columns)"),
+        (STRIPES, {"size": 20.5}, "size: needs (planes, rows, columns)"),
+        (STRIPES, {"size": None}, "size: needs (planes, rows, columns)"),
+        (STRIPES, {"field": fields.zigzag(axes=2)}, "field: needs 3 axes, got one of 2"),
+        (STRIPES, {"field": "circular"}, "field: needs a field of texrs.fields, got str"),
+        (STRIPES, {"field": np.eye(3)}, "field: needs a field of texrs.fields, got ndarray"),
+        (STRIPES, {"field": fields.constant(np.eye(3) * 0.12)}, "field: features may shrink to an eighth"),
+        (
+            STRIPES,
+            {"field": fields.from_function(lambda p: np.eye(3) * (10 - p[:, 2, None, None]), 3)},
+            "field: the frame at (plane, row, column)",
+        ),
+        (STRIPES, {"seed": -1}, "seed: needs an integer from 0"),
+        (STRIPES, {"seed": 1.5}, "seed: needs an integer from 0"),
+        (STRIPES, {"wrap": (True, False)}, "wrap: needs True, False or 3"),
+        (STRIPES, {"quality": "best"}, "quality: allowed are preserve, fast, optimise; got 'best'"),
+        (STRIPES, {"quality": None}, "quality: allowed are"),
+        (STRIPES, {"method": "default"}, "method: None or 'paper' is allowed"),
+        (STRIPES, {"labels": True}, "labels: classes need one channel, got 3"),
+        (np.arange(32**3, dtype=np.int32).reshape(32, 32, 32), {"labels": True}, "labels: up to 4096 classes"),
+        (STRIPES, {"repeat": "xyz"}, "needs True, False or 3"),
+        (STRIPES, {"interpolation": "best"}, "interpolation: "),
+        (STRIPES, {"memory_limit": 0}, "memory_limit: needs a positive number"),
+        (STRIPES, {"memory_limit": "1G"}, "memory_limit: needs a positive number"),
+        (STRIPES, {"held": SIZED}, "held: needs either values or coordinates"),
+        (STRIPES, {"values": STRIPES}, "held: needed with values or coordinates"),
+        (STRIPES, {"held": SIZED[:9], "values": STRIPES}, "held: needs shape (20, 20, 20)"),
+        (STRIPES, {"held": SIZED * 0.5, "values": STRIPES}, "held: needs bool or integers"),
+        (STRIPES, {"held": SIZED, "values": STRIPES}, "values: needs uint8 of shape (20, 20, 20, 3)"),
+        (STRIPES, {"held": SIZED, "values": np.zeros((20, 20, 20, 3))}, "values: needs uint8"),
+        (
+            NAN[8:24, 8:24, 8:24],
+            {"size": 20, "held": SIZED, "values": np.full((20, 20, 20, 3), np.inf, np.float32)},
+            "values: those of held points must be finite",
+        ),
+        (STRIPES, {"held": SIZED, "coordinates": np.full((20, 20, 20, 3), 32.0)}, "coordinates: those of held points"),
+        (STRIPES, {"held": SIZED, "coordinates": np.full((20, 20, 20, 3), np.nan)}, "coordinates: those of held"),
+        (STRIPES, {"held": SIZED, "coordinates": np.zeros((20, 20, 20, 2))}, "coordinates: needs numbers of shape"),
+        (STRIPES, {"analysis": analyse(GREY[:20], axes=3)}, "analysis: is of an exemplar of (20, 32, 32)"),
+        (STRIPES, {"analysis": "a.npz"}, "analysis: needs an Analysis"),
+    ],
+)
+def test_bad_input_gets_a_sentence(exemplar, options, says):
+    with pytest.raises(InvalidInput) as caught:
+        texrs.solid(exemplar, **{"size": 20, **options})
+    assert says in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_bad_input_of_pictures():
+    for exemplar, size, options, says in (
+        (WEAVE[:10], 20, {}, "exemplar: each side must be at least 16"),
+        (STRIPES, 20, {}, "a volume is not an image"),
+        (WEAVE, (20, 20, 20), {}, "size: needs (rows, columns)"),
+        (WEAVE, 20, {"field": fields.slant_3d()}, "field: needs 2 axes, got one of 3"),
+    ):
+        with pytest.raises(InvalidInput) as caught:
+            texrs.synthesize(exemplar, size, **options)
+        assert says in str(caught.value)
+
+
+def test_places_are_exact_in_fixed_point(result):
+    steps = result.source.coordinates.astype(np.float64) * ONE
+    np.testing.assert_array_equal(steps, np.rint(steps))
