@@ -1,0 +1,194 @@
+"""``texrs solid`` and ``texrs synthesize``, end to end."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import re
+from pathlib import Path
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+import typer
+
+import texrs
+from texrs import SourceMap, fields, io, samples
+from texrs.cli import app, main
+from texrs.cli._files import parse_axes
+from texrs.cli._solid import parse_bytes
+from texrs.errors import InvalidInput
+
+Capture = pytest.CaptureFixture[str]
+VOLUME = samples.stripes((32, 32, 32)).image
+PICTURE = samples.dots((64, 64)).image
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in a folder that holds a volume, a picture and results of earlier."""
+    monkeypatch.chdir(tmp_path)
+    io.write_volume("v.npy", VOLUME)
+    iio.imwrite("in.png", PICTURE)
+    for name in ("out.tif", "out.png"):
+        Path(name).write_bytes(b"before")
+    return tmp_path
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() if p.is_file() else b"" for p in folder.rglob("*")}
+
+
+def test_solid_writes_what_the_function_makes(here: Path, capsys: Capture) -> None:
+    options = "--size 20x24x18 --field zigzag:period=16 --seed 3 --quality fast --wrap zx --interpolation cubic"
+    more = "--no-labels --memory-limit 1G --threads 1 --stages stages --map map.npz"
+    assert main(["solid", "v.npy", "-o", "out.tif", *options.split(), *more.split()]) == 0
+    expected = texrs.solid(
+        VOLUME,
+        (20, 24, 18),
+        field=fields.zigzag(16),
+        seed=3,
+        quality="fast",
+        wrap=(True, False, True),
+        interpolation="cubic",
+    )
+    np.testing.assert_array_equal(io.read_volume("out.tif"), expected.image)
+    places = SourceMap.load("map.npz")
+    np.testing.assert_array_equal(places.coordinates, expected.source.coordinates)
+    assert json.loads(Path("stages/report.json").read_text()) == json.loads(json.dumps(expected.report))
+    assert sorted(p.name for p in Path("stages").iterdir())[3] == "04-composite.png"
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert "blocks" in told.err
+    assert re.search(r"wrote out.tif: 20 x 24 x 18, 3 channels, uint8, in [0-9.]+ s\n$", told.err)
+    assert not list(here.glob(".texrs*"))
+    # Another map of the example goes the same way.
+    io.write_volume("height.npy", VOLUME[..., 0].astype(np.float32))
+    assert main(["apply", "map.npz", "height.npy", "-o", "height.tif", "--interpolation", "linear", "-q"]) == 0
+    assert io.read_volume("height.tif").shape == (20, 24, 18)
+    assert main(["info", "map.npz"]) == 0
+    assert "20 x 24 x 18, made from 32 x 32 x 32" in capsys.readouterr().out
+
+
+def test_synthesize_writes_what_the_function_makes(here: Path, capsys: Capture) -> None:
+    arguments = "--size 40x56 --field spiral:angle=15 --seed 9 --wrap y --quality fast --source s.npz --quiet"
+    assert main(["synthesize", "in.png", "-o", "out.png", *arguments.split()]) == 0
+    spiral = fields.spiral(15, axes=2)
+    expected = texrs.synthesize(PICTURE, (40, 56), field=spiral, seed=9, wrap=(True, False), quality="fast")
+    np.testing.assert_array_equal(iio.imread("out.png"), expected.image)
+    np.testing.assert_array_equal(SourceMap.load("s.npz").coordinates, expected.source.coordinates)
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("name", ["a.npy", "a.npz", "a.tif", "a.vti"])
+def test_volumes_are_written_in_many_formats(here: Path, name: str) -> None:
+    assert main(["solid", "sample:particles", "-o", name, "--size", "16", "--quality", "fast", "-q"]) == 0
+    assert Path(name).stat().st_size > 16**3 / 4
+    if not name.endswith(".vti"):
+        assert io.read_volume(name).shape == (16, 16, 16, 3)
+
+
+def test_held_values_come_from_files(here: Path) -> None:
+    held = np.zeros((20, 20, 20), np.uint8)
+    held[6:14, 6:14, 6:14] = 255
+    values = VOLUME[:20, :20, :20].copy()
+    io.write_volume("held.tif", held)
+    io.write_volume("values.npy", values)
+    arguments = "--size 20 --held held.tif --values values.npy --quality fast -q"
+    assert main(["solid", "v.npy", "-o", "out.tif", *arguments.split()]) == 0
+    np.testing.assert_array_equal(io.read_volume("out.tif")[held > 0], values[held > 0])
+    mask = np.zeros((64, 64), np.uint8)
+    mask[20:40] = 255
+    iio.imwrite("mask.png", mask)
+    arguments = "--size 64 --held mask.png --values in.png --quality fast -q"
+    assert main(["synthesize", "in.png", "-o", "out.png", *arguments.split()]) == 0
+    np.testing.assert_array_equal(iio.imread("out.png")[mask > 0], PICTURE[mask > 0])
+
+
+def test_frames_come_from_a_file_and_sizes_from_the_example(here: Path) -> None:
+    frames = np.stack([fields.slant(a, "xy", axes=2).constant for a in range(4)]).reshape(2, 2, 2, 2)
+    np.savez("frames.npz", frames)
+    assert main(["synthesize", "in.png", "-o", "out.png", "--field", "frames.npz", "--quality", "fast", "-q"]) == 0
+    field = fields.from_array(frames, (128, 128))
+    np.testing.assert_array_equal(
+        iio.imread("out.png"), texrs.synthesize(PICTURE, 128, field=field, quality="fast").image
+    )
+
+
+@pytest.mark.parametrize(("command", "verb"), [("solid", texrs.solid), ("synthesize", texrs.synthesize)])
+def test_defaults_are_those_of_the_functions(command: str, verb: object) -> None:
+    ours = {p.name: p.default for p in typer.main.get_command(app).commands[command].params}  # type: ignore[attr-defined]
+    theirs = {n: p.default for n, p in inspect.signature(verb).parameters.items()}  # type: ignore[arg-type]
+    words = {"wrap": ("none", False), "method": ("default", None)}
+    for name in ("field", "seed", "quality", "held", "values", "labels", "interpolation", "memory_limit"):
+        assert ours[name] == theirs[name], name
+    for name, (said, meant) in words.items():
+        assert (ours[name], theirs[name]) == (said, meant)
+
+
+WRONG = [
+    ("solid v.npy -o out.tif --size 20x20", "--size: needs PLANESxROWSxCOLS, as in 64x96x128, or one number"),
+    ("solid v.npy -o out.tif --size 0", "--size: each side must be at least 1"),
+    ("solid v.npy -o out.tif --size 10000", "--size: (10000, 10000, 10000) has 1000000000000 pixels"),
+    ("solid v.npy -o out.tif --size 64 --memory-limit 9M", "--size: (64, 64, 64) would take"),
+    ("solid v.npy -o out.tif --memory-limit lots", "--memory-limit: needs a number of bytes, as in 900M"),
+    ("solid v.npy -o out.tif --field circles", "--field: there is no 'circles'; did you mean circular?"),
+    ("solid v.npy -o out.tif --field zigzag:angle=x", "--field: angle needs a number"),
+    ("solid v.npy -o out.tif --size 20 --field scale_ramp:start=0.125,stop=0.12", "--field: scale_ramp: stop"),
+    ("solid v.npy -o out.tif --field none.npz", "none.npz: there is no such file"),
+    ("solid v.npy -o out.tif --wrap xxy", "--wrap: needs axes among x, y and z"),
+    ("solid v.npy -o out.tif --quality best", "--quality: allowed are preserve, fast, optimise; got 'best'"),
+    ("solid v.npy -o out.tif --method literal", "--method: allowed are default and paper"),
+    ("solid v.npy -o out.tif --interpolation best", "--interpolation: allowed are cubic, linear and nearest"),
+    ("solid v.npy -o out.tif --seed -1", "--seed: needs an integer from 0"),
+    ("solid v.npy -o out.tif --labels --size 20", "--labels: classes need one channel, got 3"),
+    ("solid v.npy -o out.tif --held m.npy", "--held and --values: needed together"),
+    ("solid v.npy -o out.tif --size 20 --held v.npy --values v.npy", "v.npy: needs shape (20, 20, 20)"),
+    ("solid v.npy -o out.tif --threads 0", "--threads: needs an integer from 1"),
+    ("solid v.npy -o out.png", "out.png: .png cannot hold volumes of uint8 with 3 channels"),
+    ("solid v.npy -o out.tif --map m.txt", "--source: needs a name that ends in .npz"),
+    ("solid v.npy -o none/out.tif", "there is no folder"),
+    ("solid w.npy -o out.tif", "w.npy: there is no such file"),
+    ("solid in.png -o out.tif", "in.png: is a png file, which holds one image"),
+    ("solid sample:dots -o out.tif", "sample:dots: is a picture; volumes are particles"),
+    ("solid sample:dotz -o out.tif", "name must be a generated sample"),
+    ("solid v.npy", "Missing option"),
+    ("synthesize v.npy -o out.png", "v.npy"),
+    ("synthesize in.png -o out.png --size 9x9x9", "--size: needs ROWSxCOLS"),
+    ("synthesize in.png -o out.png --wrap z", "--wrap: allowed are xy, x, y and none"),
+    ("synthesize in.png -o out.png --field slant_3d", "--field: slant_3d is for volumes"),
+    ("synthesize in.png -o out.exr", "out.exr: .exr cannot hold"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "says"), WRONG)
+def test_wrong_requests_get_a_line_and_change_nothing(here: Path, capsys: Capture, arguments: str, says: str) -> None:
+    before = files(here)
+    assert main([*arguments.split(), "--quiet"]) == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert says in told.err
+    assert told.err.count("\n") == 1
+    assert files(here) == before
+
+
+def test_thin_and_broken_volumes(here: Path, capsys: Capture) -> None:
+    io.write_volume("thin.npy", VOLUME[:1])
+    io.write_volume("nan.npy", np.full((20, 20, 20), np.nan, np.float32))
+    for name, says in (
+        ("thin", "each side must be at least 16, got shape (1, 32, 32)"),
+        ("nan", "8000 of 8000 values"),
+    ):
+        assert main(["solid", f"{name}.npy", "-o", "out.tif", "-q"]) == 2
+        assert f"{name}.npy: {says}" in capsys.readouterr().err
+    assert Path("out.tif").read_bytes() == b"before"
+
+
+def test_words() -> None:
+    assert parse_axes("zx", axes=3) == (True, False, True)
+    assert parse_axes("none", axes=3) == (False, False, False)
+    assert parse_axes("x", axes=2) == (False, True)
+    assert [parse_bytes(t) for t in ("7", "900M", "2 GiB".replace(" ", ""), "1kb")] == [7, 900 << 20, 2 << 30, 1024]
+    for text in ("", "0", "1.5G", "-1", "G"):
+        with pytest.raises(InvalidInput, match="--memory-limit"):
+            parse_bytes(text)
