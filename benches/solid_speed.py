@@ -1,0 +1,142 @@
+"""SOLID as a whole: how long each part of the work takes, beside its floor. Interleaved rounds, medians; markdown tables.
+
+    python benches/solid_speed.py [--rounds 3] [--threads N] [--quick] [--optimise]
+
+Volumes grow from 64^3 voxels of the sample "particles", under the field circular:axis=x unless said; pictures from
+256 x 256 pixels of "pebbles" under zigzag:period=64. The floor is the time of as many multiplications and additions
+as the windows' projections have, in a matrix product of 32-bit floats on the same cores. `--quick` leaves out 256^3.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import nullcontext
+from math import prod
+from typing import Any
+
+import numpy as np
+
+import texrs
+from texrs import analysis, fields, samples
+
+KEEP, WINDOW = 24, 5
+GROWTH = (64, 128, 256)
+
+
+def timed(task: Callable[[], Any]) -> tuple[float, Any]:
+    start = time.perf_counter()
+    result = task()
+    return time.perf_counter() - start, result
+
+
+def products(report: dict[str, Any], channels: int) -> float:
+    """Give the multiplications of the windows' projections: each window of each iteration of each level."""
+    axes = len(report["levels"][0]["shape"])
+    each = KEEP * channels * WINDOW**axes
+    return sum(float(prod(level["shape"])) * level["iterations"] * each for level in report["levels"])
+
+
+def rate() -> float:
+    """Give the multiplications a second of a matrix product of windows and components."""
+    rng = np.random.default_rng(0)
+    windows, basis = (rng.random(shape, dtype=np.float32) for shape in ((1 << 16, 375), (375, KEEP)))
+    seconds = min(timed(lambda: windows @ basis)[0] for _ in range(7))
+    return windows.shape[0] * 375 * KEEP / seconds
+
+
+def peak(size: int, quality: str) -> tuple[float, float]:
+    """Give the peak of memory of a process that grows a volume, and that of one that only loads texrs, in MiB."""
+    script = (
+        "import resource, sys, texrs; from texrs import fields, samples\n"
+        "size = int(sys.argv[1])\n"
+        "image = samples.particles().image\n"
+        "if size: texrs.solid(image, size, quality=sys.argv[2], field=fields.circular(axis='x'))\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
+    )
+    found = []
+    for side in (size, 0):
+        done = subprocess.run(
+            [sys.executable, "-c", script, str(side), quality], capture_output=True, text=True, check=True
+        )
+        found.append(int(done.stdout) / (2**20 if sys.platform == "darwin" else 2**10))
+    return found[0], found[1]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--threads", type=int)
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--optimise", action="store_true")
+    options = parser.parse_args()
+    with texrs.threads(options.threads) if options.threads else nullcontext():
+        run(options)
+
+
+def run(options: argparse.Namespace) -> None:
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
+    print(f"{platform.machine()}, {os.cpu_count()} cores, load {load:.1f} at the start; medians of {options.rounds}\n")
+    solid, flat = samples.particles().image, samples.pebbles((256, 256)).image
+    wound, zigzag = fields.circular(axis="x"), fields.zigzag(64, axes=2)
+
+    def grow(size: int, **more: Any) -> Callable[[], Any]:
+        return lambda: texrs.solid(solid, size, **more)
+
+    def draw(size: int, **more: Any) -> Callable[[], Any]:
+        return lambda: texrs.synthesize(flat, size, field=zigzag, **more)
+
+    tasks: dict[str, Callable[[], Any]] = {
+        "analysis of 64^3": lambda: analysis.analyse(solid, axes=3, cache=False),
+        "analysis of 256^2": lambda: analysis.analyse(flat, axes=2, cache=False),
+        "128^3 fast": grow(128, field=wound, quality="fast"),
+        "128^3 fast, no field": grow(128, quality="fast"),
+        "128^3 preserve": grow(128, field=wound),
+        "128^3 preserve, no field": grow(128),
+        "256^2 fast": draw(256, quality="fast"),
+        "256^2 preserve": draw(256),
+        "2048^2 fast": draw(2048, quality="fast"),
+    }
+    if options.optimise:
+        tasks["128^3 optimise"] = grow(128, field=wound, quality="optimise")
+    sizes = GROWTH[:-1] if options.quick else GROWTH
+    for size in sizes:
+        if size != 128:
+            tasks[f"{size}^3 fast"] = grow(size, field=wound, quality="fast")
+    for quality in ("fast", "optimise") if options.optimise else ("fast",):
+        texrs.solid(solid, 32, quality=quality)  # The analysis is made once, and timed apart.
+        texrs.synthesize(flat, 64, quality="fast")
+    times: dict[str, list[float]] = {name: [] for name in tasks}
+    work: dict[str, float] = {}
+    rates = []
+    for _ in range(options.rounds):
+        rates.append(rate())
+        for name, task in tasks.items():
+            seconds, made = timed(task)
+            times[name].append(seconds)
+            if isinstance(made, texrs.Synthesis):
+                work[name] = products(made.report, 3)
+    fastest = max(rates)
+    print(f"{fastest / 1e9:.0f} thousand million multiplications a second in a matrix product\n")
+    print("| task | seconds | points a second | floor, seconds | over the floor |\n|---|---|---|---|---|")
+    median = {name: float(np.median(t)) for name, t in times.items()}
+    for name, seconds in median.items():
+        side, axes = (int(n) for n in name.removeprefix("analysis of ").split()[0].split("^"))
+        floor = work.get(name, 0.0) / fastest
+        cells = (f"{floor:.2f}", f"{seconds / floor:.1f}") if floor else ("", "")
+        print(f"| {name} | {seconds:.3f} | {side**axes / seconds / 1e6:.2f} million | {cells[0]} | {cells[1]} |")
+    each = [median[f"{n}^3 fast"] / n**3 for n in sizes]
+    growth = ", ".join(f"{n}^3 {1e6 * t:.2f}" for n, t in zip(sizes, each, strict=True))
+    print(f"\nMicroseconds a voxel, fast: {growth}; the largest over the least {max(each) / min(each):.2f}")
+    for quality in ("fast", "preserve"):
+        whole, empty = peak(128, quality)
+        print(f"Peak of memory of 128^3 {quality}: {whole:.0f} MiB, {whole - empty:.0f} MiB more than texrs itself")
+
+
+if __name__ == "__main__":
+    main()
