@@ -195,6 +195,7 @@ class Appearance:
         exhaustive: bool,
         sweeps: int,
         hysteresis: float,
+        unity: float,
         vote: int,
         settled: float,
         seed: int,
