@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -177,7 +178,7 @@ class PatchIndex:
         """
         samples, weights = self._query(patch, weight)
         most = (("exemplar", len(self.shapes) - 1), ("row", _MOST), ("column", _MOST))
-        positions = [
+        positions: Any = [
             # The type first: it costs a tenth of the full check, and there may be many.
             tuple(
                 n if type(n) is int and 0 <= n <= high else as_int(n, f"candidates: {name}", 0, high)

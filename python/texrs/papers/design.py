@@ -228,7 +228,7 @@ SPARE = 500_000_000
 def memory(size: tuple[int, ...], exemplar: Array, variants: int, shares: NDArray[np.float64], *, paper: bool) -> int:
     """Give the bytes that textures take: the source map is 14 a pixel, 18 while it is made; the picture is kept twice."""
     kept = 14 + 2 * exemplar.shape[-1] * exemplar.itemsize
-    return math.prod(size) * (max(18, kept) + 24 * paper + (variants - 1) * kept) + shares.nbytes + SPARE
+    return int(math.prod(size) * (max(18, kept) + 24 * paper + (variants - 1) * kept) + shares.nbytes + SPARE)
 
 
 def one(
