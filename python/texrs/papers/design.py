@@ -210,7 +210,9 @@ def design(  # type: ignore[misc]  # the overloads leave the options to this sig
     sources = []
     for number, picture in enumerate(unit):
         marked: Any = labels[number] if isinstance(labels, list | tuple) else labels
-        parts = segment(picture, layers=layers, children="none" if paper else children, labels=marked)
+        done = partial(_part, watch, number, len(pixels))
+        kind: Children = "none" if paper else children
+        parts = segment(picture, layers=layers, children=kind, labels=marked, progress=done)
         automatic = rotate is None
         sources.append(Source.of(guidance(picture), parts, moves, automatic=automatic, side=side, paper=paper))
         watch("segment", (number + 1) / len(pixels))
@@ -219,6 +221,11 @@ def design(  # type: ignore[misc]  # the overloads leave the options to this sig
     ]
     watch("done", 1.0)
     return made[0] if variants is None else made
+
+
+def _part(watch: Progress, number: int, count: int, stage: str, share: float) -> None:
+    """Report the share of one of several alike."""
+    watch(stage, (number + share) / count)
 
 
 SPARE = 500_000_000
