@@ -18,6 +18,8 @@ NOUNS = {
     "io": set(),
     "report": {"source_map", "io"},
     "segment": set(),
+    "fields": set(),
+    "volume": {"io", "fields", "source_map"},
     "deform": set(),
     "quilt": {"source_map", "_pixels"},
     "blend": {"source_map"},

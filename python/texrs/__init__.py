@@ -5,7 +5,7 @@ filled by example). Each gives a `Synthesis`, whose `SourceMap` looks anything t
 in the same way.
 """
 
-from texrs import errors, io, kernels, samples
+from texrs import errors, fields, io, kernels, samples, volume
 from texrs._rust import VERSION as __version__
 from texrs.completion import complete
 from texrs.cyclic import tile
@@ -22,9 +22,11 @@ __all__ = [
     "complete",
     "design",
     "errors",
+    "fields",
     "io",
     "kernels",
     "samples",
     "threads",
     "tile",
+    "volume",
 ]
