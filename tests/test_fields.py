@@ -279,6 +279,14 @@ def narrowing(points):
         (lambda: fields.identity().frames((1, 2, np.nan)), "points: 1 of 3 values"),
         (lambda: fields.identity().frames("here"), "points"),
         (lambda: fields.identity().lattice((3, 3)), "shape"),
+        (lambda: fields.identity().lattice("abc"), "shape"),
+        (lambda: fields.identity().lattice((3, 3, 3), origin=0.5), "origin: needs an integer"),
+        (lambda: fields.identity().lattice((3, 3, 3), origin=(1, 2)), "origin: needs an integer"),
+        (lambda: fields.identity().lattice((3, 3, 3), step=0), "step"),
+        (lambda: fields.from_array(np.tile(np.eye(2), (2, 2, 1, 1)), origin=np.zeros((4, 2))), "origin"),
+        (lambda: fields.from_array(np.tile(np.eye(2), (2, 2, 1, 1)), "wide"), "extent"),
+        (lambda: fields.check(fields.identity(), 2.5), "shape"),
+        (lambda: fields.check(fields.identity(), (3, 3, 3), "here"), "origin"),
         (lambda: fields.identity().over((3, 3)), "shape"),
         (lambda: fields.check(fields.identity(), (3, 3)), "has 3 axes, a size of 2"),
         (lambda: fields.check(np.eye(3), (3, 3, 3)), "needs a field"),
@@ -293,9 +301,23 @@ def test_bad_input_gets_a_sentence(make, says):
 
 def test_memory_is_bounded():
     with pytest.raises(LimitExceeded):
-        fields.identity().lattice((10_000,) * 3)
+        fields.identity().lattice((512,) * 3)
     fields.check(fields.circular(), (10, 100, 1000))
+    fields.check(fields.circular(), 50)
     fields.check(fields.identity(), (600,) * 3, (-300, 0, 5))
+
+
+def test_dense_arrays_of_frames_are_kept_small():
+    import tracemalloc
+
+    dense = np.broadcast_to(np.diag([1, 2, 1]).astype(np.float32), (64, 64, 64, 3, 3)).copy()
+    tracemalloc.start()
+    field = fields.from_array(dense)
+    held, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert held < 2.1 * dense.nbytes
+    assert peak < 5 * dense.nbytes
+    assert_allclose(field.frames((3.5, 7, 8)), dense[0, 0, 0], rtol=1e-6)
 
 
 def test_the_cause_is_kept():

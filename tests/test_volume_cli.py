@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from texrs import io, samples, volume
+from texrs import fields, io, samples, volume
 from texrs.cli import main
+from texrs.cli._volumes import read_field
+from texrs.errors import TexrsError
 
 VOLUME = samples.stripes((32, 36, 40)).image
 
@@ -92,6 +94,36 @@ def test_wrong_requests_get_a_line_and_change_nothing(here, capsys, arguments, s
     assert says in told.err
     assert told.err.count("\n") == 1
     assert {p.name: p.read_bytes() for p in here.iterdir()} == before
+
+
+def test_labels_are_painted(here, capsys):
+    marked = samples.particles((32, 32, 32)).labels
+    io.write_volume("labels.npy", marked)
+    assert main(["slice", "labels.npy", "-o", "a.png", "--labels", "--at", "row=9"]) == 0
+    np.testing.assert_array_equal(iio.imread("a.png"), volume.paint(marked)[:, 9])
+    assert main(["slice", "v.npy", "-o", "b.png", "--labels"]) == 2
+    assert "v.npy: needs integers of shape" in capsys.readouterr().err
+
+
+def test_fields_in_words_and_in_files(here):
+    size = (40, 48, 56)
+    assert read_field("circular:axis=y", size) == fields.circular("y").over(size)
+    frames = np.stack([fields.slant_3d(a, a).constant for a in range(8)]).reshape(2, 2, 2, 3, 3)
+    np.savez("frames.npz", frames)
+    assert read_field("frames.npz", size) == fields.from_array(frames, size)
+    np.savez("two.npz", frames, frames)
+    np.savez("flat.npz", frames * 0)
+    for text, extent, says in (
+        ("round", size, "--field: there is no 'round'"),
+        ("slant_3d", size[:2], "--field: slant_3d is for volumes"),
+        ("two.npz", size, "two.npz: needs a single array of frames, has 2"),
+        ("flat.npz", size, "flat.npz: the frame at"),
+        ("frames.npz", size[:2], "frames.npz: holds frames of 3 axes, 2 are needed"),
+        ("none.npz", size, "none.npz: there is no such file"),
+    ):
+        with pytest.raises(TexrsError) as caught:
+            read_field(text, extent)
+        assert says in str(caught.value)
 
 
 def test_volumes_of_other_dtypes(here, capsys):

@@ -141,6 +141,60 @@ def test_surfaces(tmp_path):
     assert_allclose(facet["n"][0], [0, 0, -1])
 
 
+@pytest.mark.parametrize("suffix", [".npy", ".tif"])
+@pytest.mark.parametrize("shape", [(9, 5, 4), (9, 5, 4, 3), (9, 5, 4, 2)])
+@pytest.mark.parametrize("dtype", ["uint8", "float32", "bool"])
+def test_slabs_make_up_a_volume(tmp_path, suffix, shape, dtype):
+    volume = make.picture(shape, dtype)
+    tio.write_slabs(tmp_path / f"slabs{suffix}", (volume[a:b] for a, b in ((0, 2), (2, 3), (3, 9))), shape)
+    tio.write_volume(tmp_path / f"whole{suffix}", volume)
+    slabs, whole = ((tmp_path / f"{name}{suffix}") for name in ("slabs", "whole"))
+    assert_array_equal(tio.read_volume(slabs), tio.read_volume(whole))
+    assert slabs.read_bytes() == whole.read_bytes()
+
+
+def test_slabs_need_the_memory_of_one(tmp_path):
+    import tracemalloc
+
+    tracemalloc.start()
+    tio.write_slabs(tmp_path / "a.npy", (np.full((2, 256, 256), i, np.float32) for i in range(64)), (128, 256, 256))
+    assert tracemalloc.get_traced_memory()[1] < 4 * 2**20
+    tracemalloc.stop()
+    assert tio.read_volume(tmp_path / "a.npy")[-1, 0, 0] == 63
+
+
+def failing():
+    yield np.zeros((2, 4, 4))
+    raise RuntimeError("no more")
+
+
+SLAB = np.zeros((2, 4, 4))
+
+
+@pytest.mark.parametrize(
+    ("slabs", "shape", "name", "error", "says"),
+    [
+        ([SLAB], (4, 4, 4), "a.npy", InvalidInput, "end after 2 of 4 planes"),
+        ([], (4, 4, 4), "a.npy", InvalidInput, "end after 0 of 4 planes"),
+        ([SLAB] * 3, (4, 4, 4), "a.npy", InvalidInput, "go on after 4 planes"),
+        ([SLAB, SLAB[:, :3]], (4, 4, 4), "a.npy", InvalidInput, r"from plane 2 on is float64 of shape \(2, 3, 4\)"),
+        ([SLAB, SLAB.astype(int)], (4, 4, 4), "a.npy", InvalidInput, "float64 of shape \\(d, 4, 4\\) is needed"),
+        ([SLAB], (2, 4, 4, 1), "a.npy", InvalidInput, "is needed"),
+        ([SLAB[0]], (2, 4, 4), "a.npy", InvalidInput, "array: needs shape"),
+        ([SLAB], (2, 4), "a.npy", InvalidInput, "shape: needs"),
+        ([SLAB], (2, 4, -4), "a.npy", InvalidInput, "shape: needs"),
+        ([SLAB], "abc", "a.npy", InvalidInput, "shape: needs"),
+        ([SLAB.astype(np.int64)], (2, 4, 4), "a.tif", InvalidInput, "cannot hold"),
+        ([SLAB], (2, 4, 4), "a.vti", FileError, "suffix '.vti'"),
+        (failing(), (4, 4, 4), "a.tif", RuntimeError, "no more"),
+    ],
+)
+def test_slabs_that_do_not_fit_leave_nothing(tmp_path, slabs, shape, name, error, says):
+    with pytest.raises(error, match=says):
+        tio.write_slabs(tmp_path / name, slabs, shape)
+    assert not list(tmp_path.iterdir())
+
+
 # --- what is refused -------------------------------------------------------------------------------------------------
 
 

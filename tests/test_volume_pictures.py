@@ -125,6 +125,19 @@ def test_a_turntable_that_is_stopped_leaves_nothing(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_labels_are_painted_apart():
+    labels = np.arange(60).reshape(3, 4, 5)
+    painted = volume.paint(labels)
+    assert painted.shape == (3, 4, 5, 3)
+    table = painted.reshape(60, 3).astype(int)
+    apart = np.abs(table[:, None] - table).sum(-1) + 999 * np.eye(60, dtype=int)
+    assert apart.min() > 5
+    assert apart[:16, :16].min() > 40
+    assert (volume.paint(labels % 7)[0, 0] == painted[0, 0]).all()
+    assert volume.paint(np.array([[0, 2**40]]))[0, 1].tolist() != volume.paint([[0]])[0, 0].tolist()
+    assert volume.paint(np.eye(3, dtype=bool), [(0, 0, 0), (255, 0, 9)])[1, 1].tolist() == [255, 0, 9]
+
+
 def signed_volume(vertices, faces):
     a, b, c = np.moveaxis(vertices.astype(float)[faces], 1, 0)
     return float((np.cross(a, b) * c).sum()) / 6
@@ -170,8 +183,13 @@ def test_surfaces_are_closed_and_face_outwards(tmp_path):
         (lambda p: volume.cube(VOLUME, azimuth=float("nan")), "azimuth"),
         (lambda p: volume.turntable(VOLUME, p / "a.png"), r"ends in \.gif"),
         (lambda p: volume.turntable(VOLUME, p / "a.gif", frames=1), "frames"),
+        (lambda p: volume.turntable(VOLUME, p / "a.gif", frames=100, size=1024), "more than 67108864 pixels"),
         (lambda p: volume.turntable(VOLUME, p / "a.gif", background=(1, 2)), "background"),
         (lambda p: volume.turntable(VOLUME, p / "none" / "a.gif", size=16), "there is no folder"),
+        (lambda p: volume.paint(np.zeros((4, 4))), "labels: needs integers"),
+        (lambda p: volume.paint([[0, -1]]), "at least 0, got -1"),
+        (lambda p: volume.paint([[0, 2]], [(0, 0, 0)]), "reach 2, but there are 1 colours"),
+        (lambda p: volume.paint([[0, 2]], [(0, 0, 300)]), "from 0 to 255"),
         (lambda p: volume.surface(np.zeros((4, 4, 4), bool)), "no surface"),
         (lambda p: volume.surface(np.zeros((4, 4, 4))), "mask: needs bool"),
         (lambda p: volume.surface(np.zeros((1, 4, 4), bool)), "at least 2"),

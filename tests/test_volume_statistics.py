@@ -154,6 +154,9 @@ def test_seams_and_speckle():
     changes = volume.seam_planes(noise)
     assert changes[1].argmax() == 23
     assert changes[1][23] > 2
+    cyclic = volume.seam_planes(noise, wrap=(False, True, False))
+    assert [len(change) for change in cyclic] == [47, 48, 47]
+    assert cyclic[1][47] > 2
     speckled = noise.copy()
     speckled[5::10, 5::10, 5::10] = 1
     assert volume.isolated(noise) == 0

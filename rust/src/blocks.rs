@@ -11,6 +11,7 @@
 use crate::appearance::{Appearance, UNIT, distance};
 use crate::fixed::{Frame, Frames, ONE, Place, add, apply, nearest, sub};
 use crate::grid::{Grid, Region};
+use crate::guide::Guide;
 use crate::hash::Noise;
 use crate::par::{self, Monitor};
 use crate::{Error, Result};
@@ -61,6 +62,7 @@ pub fn blocks<const D: usize>(
     appearance: &Appearance<D>,
     region: &Region<D>,
     frames: Frames<'_, D>,
+    guide: Option<Guide<'_>>,
     options: &Options,
     monitor: &Monitor,
 ) -> Result<Vec<Place<D>>> {
@@ -88,7 +90,8 @@ pub fn blocks<const D: usize>(
                 return origins[c];
             }
             let chooser = Chooser::new(appearance, &cells, &list, frames, c);
-            chooser.choose(&places, origins[c], &noise, round as u32, options)
+            let asked = chooser.asked(&cells, guide);
+            chooser.choose(&places, origins[c], &asked, &noise, round as u32, options)
         });
         monitor.check()?;
         origins = chosen;
@@ -240,10 +243,17 @@ impl<const D: usize> Cells<D> {
     }
 }
 
+/// The points of a cell of which a guide asks something, with the steps from its centre.
+struct Asked<'a, const D: usize> {
+    guide: Option<Guide<'a>>,
+    points: Vec<(usize, [i32; D])>,
+}
+
 /// The places that one cell may take, and what they cost.
 struct Chooser<'a, const D: usize> {
     appearance: &'a Appearance<D>,
     cell: &'a Cell<D>,
+    index: usize,
     /// World index of the cell.
     world: [i32; D],
     frame: Frame<D>,
@@ -290,6 +300,7 @@ impl<'a, const D: usize> Chooser<'a, D> {
         Self {
             appearance,
             cell,
+            index: c,
             world: std::array::from_fn(|axis| cells.first[axis] + index[axis] as i32),
             frame,
             range,
@@ -312,6 +323,7 @@ impl<'a, const D: usize> Chooser<'a, D> {
         &self,
         places: &[Place<D>],
         present: Place<D>,
+        asked: &Asked<'_, D>,
         noise: &Noise,
         round: u32,
         options: &Options,
@@ -319,15 +331,43 @@ impl<'a, const D: usize> Chooser<'a, D> {
         let credit = (options.contrast * 256.0) as i64;
         let continuation = (options.continuation * f64::from(UNIT)) as i64;
         let mut best = present;
-        let mut least = self.cost(places, present, credit, continuation);
+        let cost =
+            |origin| self.cost(places, origin, credit, continuation) + self.obey(origin, asked);
+        let mut least = cost(present);
         for draw in 0..options.candidates as u32 {
             let origin = self.place(noise, round, draw);
-            let cost = self.cost(places, origin, credit, continuation);
-            if cost < least {
-                (best, least) = (origin, cost);
+            let sum = cost(origin);
+            if sum < least {
+                (best, least) = (origin, sum);
             }
         }
         best
+    }
+
+    /// The points of the cell of which something is asked.
+    fn asked<'g>(&self, cells: &Cells<D>, guide: Option<Guide<'g>>) -> Asked<'g, D> {
+        let mut points = Vec::new();
+        if let Some(guide) = guide {
+            for &p in self.cell.points.iter().filter(|&&p| guide.asks(p as usize)) {
+                let world = cells.region.world(cells.region.grid.point(p as usize));
+                points.push((p as usize, cells.step_from_centre(self.index, world)));
+            }
+        }
+        Asked { guide, points }
+    }
+
+    /// What a place costs by the guide.
+    #[inline(always)]
+    fn obey(&self, origin: Place<D>, asked: &Asked<'_, D>) -> i64 {
+        let Some(guide) = &asked.guide else {
+            return 0;
+        };
+        let mut sum = 0;
+        for &(p, step) in &asked.points {
+            let sample = nearest(add(origin, apply(&self.frame, step)));
+            sum += guide.cost(p, self.appearance.clamped(sample));
+        }
+        sum
     }
 
     /// Sum over the shell: difference to what lies there, less the credit for the piece's own contrast.
@@ -425,7 +465,15 @@ mod tests {
             origin,
         };
         let frames = Frames::Constant(identity());
-        blocks(exemplar, &region, frames, options, &Monitor::default()).unwrap()
+        blocks(
+            exemplar,
+            &region,
+            frames,
+            None,
+            options,
+            &Monitor::default(),
+        )
+        .unwrap()
     }
 
     #[test]
@@ -459,6 +507,39 @@ mod tests {
                 .collect::<Vec<_>>()
         });
         assert_eq!(a, b);
+    }
+
+    #[test]
+    fn a_guide_is_followed() {
+        let exemplar = exemplar(false);
+        // The exemplar's rows as the guide: the left half of the output asks for the first, the right for the last.
+        let rows: Vec<[i16; 4]> = (0..1024).map(|i| [(i / 32 * 60) as i16, 0, 0, 0]).collect();
+        let wanted: Vec<[i16; 4]> = (0..1600)
+            .map(|i| [if i % 40 < 20 { 0 } else { 1860 }, 0, 0, 0])
+            .collect();
+        let weight = vec![256; 1600];
+        let guide = Guide::new(&rows, &wanted, &weight, 1024, 1600).unwrap();
+        let region = Region {
+            grid: Grid::new([40; 2], [false; 2]).unwrap(),
+            origin: [0; 2],
+        };
+        let frames = Frames::Constant(identity());
+        let places = blocks(
+            &exemplar,
+            &region,
+            frames,
+            Some(guide),
+            &OPTIONS,
+            &Monitor::default(),
+        )
+        .unwrap();
+        let mean = |side: usize| -> i32 {
+            let all = (0..1600)
+                .filter(|i| (i % 40 < 20) == (side == 0))
+                .map(|i| places[i][0] / ONE);
+            all.sum::<i32>() / 800
+        };
+        assert!(mean(0) < 12 && mean(1) > 20, "{} {}", mean(0), mean(1));
     }
 
     #[test]

@@ -11,6 +11,7 @@
 //! | [`fixed`] | coordinates and frames in fixed point |
 //! | [`pca`] | principal components |
 //! | [`appearance`] | what the surroundings of each sample of an exemplar look like |
+//! | [`guide`] | what an output is asked to show beside looking like the exemplar |
 //! | [`blocks`] | a coherent start: cells filled by pieces that fit |
 //! | [`pyramid`] | from one resolution to the next |
 //! | [`optimize`] | coordinates corrected until every window is like one of the exemplar |
@@ -38,6 +39,7 @@ pub mod appearance;
 pub mod blocks;
 pub mod complete;
 pub mod gather;
+pub mod guide;
 pub mod mean_shift;
 pub mod optimize;
 pub mod patch_search;

@@ -9,17 +9,18 @@ from typing import Annotated, cast
 import numpy as np
 import typer
 
-from texrs import io, samples
+from texrs import fields, io, samples
 from texrs._arrays import as_image, as_int
 from texrs._typing import Array, Interpolation
 from texrs.cli import _files
 from texrs.cli._console import Quiet, Threads, note, watching
 from texrs.cli._files import SAMPLE, describe, named
-from texrs.errors import InvalidInput
+from texrs.errors import FileError, InvalidInput
+from texrs.fields import Field
 from texrs.threads import threads
-from texrs.volume import cube, oblique, slices, turntable
+from texrs.volume import cube, oblique, paint, slices, turntable
 
-__all__ = ["read_volume", "slice_command"]
+__all__ = ["read_field", "read_volume", "slice_command"]
 
 _AXES = ("plane", "row", "column")
 _BETWEEN = ("linear", "cubic", "nearest")
@@ -36,6 +37,21 @@ def read_volume(text: str) -> Array:
         volume = io.read_volume(text)
     as_image(volume, text, axes=3)
     return volume
+
+
+def read_field(text: str, size: tuple[int, ...]) -> Field:
+    """Make the field that words describe, or sample the frames of an .npz file, over an output of a size."""
+    if Path(text).suffix.lower() != ".npz":
+        with named(field="--field"):
+            return fields.parse(text, len(size), size)
+    arrays = list(io.read_arrays(text).values())
+    if len(arrays) != 1:
+        raise FileError(f"{text}: needs a single array of frames, has {len(arrays)}")
+    with named(frames=text):
+        field = fields.from_array(arrays[0], size if arrays[0].ndim == len(size) + 2 else None)
+    if field.axes != len(size):
+        raise InvalidInput(f"{text}: holds frames of {field.axes} axes, {len(size)} are needed")
+    return field
 
 
 def slice_command(
@@ -69,6 +85,7 @@ def slice_command(
     interpolation: Annotated[
         str, typer.Option(help="Between voxels: linear, cubic, or nearest, for labels.")
     ] = "linear",
+    labels: Annotated[bool, typer.Option("--labels", help="The volume holds labels: each is given a colour.")] = False,
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
@@ -88,6 +105,10 @@ def slice_command(
         raise InvalidInput(f"--out: {'a picture is not' if moving else '--turntable is'} written to .gif, got {out!r}")
     _files.check_output(out, np.zeros((1, 1, 4), np.uint8) if as_cube else None)
     voxels = read_volume(volume)
+    if labels:
+        with named(labels=volume):
+            voxels = paint(voxels)
+        between = "nearest"
     if not (as_cube or as_turntable):
         _files.check_output(out, voxels[0])
     names = {"volume": volume, "point": "--oblique", "normal": "--oblique", "count": "--threads"}

@@ -13,16 +13,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_size
+from texrs._arrays import as_float, as_size
 from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput
-from texrs.fields._matrices import Matrices, inverses, too_flat
+from texrs.fields._matrices import Matrices, inverses, too_flat, transposed
 
 LEAST_DETERMINANT = 1e-3
 """Frames of a smaller determinant are refused: they are flat, and have no inverse worth the name."""
 WORST_CONDITION = 100.0
 """Frames that stretch one way so many times as much as another are refused."""
 
+FAR = 1e9
+"""Lengths and single places are within so many voxels."""
+MOST_BYTES = 2**32
+"""Of a lattice of frames."""
 _BLOCK = 2**13
 """Points evaluated at once; the result does not depend on it."""
 _NAMES = ("row", "column"), ("plane", "row", "column")
@@ -47,6 +51,8 @@ class Field(ABC):
     """
 
     axes: int
+    _rigid = False
+    """Whether every frame is a rotation: then J is the transposed F, and none is singular."""
 
     @abstractmethod
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
@@ -180,6 +186,8 @@ class Field(ABC):
         ------
         InvalidInput
             As of `frames`, or the shape is not one.
+        LimitExceeded
+            More samples than 4 GiB hold.
 
         Examples
         --------
@@ -188,12 +196,15 @@ class Field(ABC):
         (2, 3, 4, 3, 3)
 
         """
-        sides = as_size(tuple(shape), "shape", axes=self.axes)
-        first = np.broadcast_to(np.asarray(origin, np.int64), (self.axes,))
+        sides = as_size(shape, "shape", axes=self.axes, limit=MOST_BYTES // (4 * self.axes**2))
+        first = np.broadcast_to(np.asarray(origin), (self.axes,) if np.ndim(origin) == 0 else np.shape(origin))
+        if first.dtype.kind not in "ui" or first.shape != (self.axes,):
+            raise InvalidInput(f"origin: needs an integer, or {self.axes} of them; got {first.dtype} of {first.shape}")
+        spread = as_float(step, "step", 2.0**-20, 2.0**20)
         out = np.empty((prod(sides), self.axes, self.axes), np.float32)
         for start in range(0, len(out), _BLOCK):
             index = np.unravel_index(np.arange(start, min(start + _BLOCK, len(out))), sides)
-            at = np.stack([(i + o + 0.5) * step - 0.5 for i, o in zip(index, first.tolist(), strict=True)], axis=-1)
+            at = np.stack([(i + o + 0.5) * spread - 0.5 for i, o in zip(index, first.tolist(), strict=True)], axis=-1)
             part = self._checked(np.asarray(at, np.float64), jacobians)
             out[start : start + len(at)] = part.transpose(2, 0, 1)
         return out.reshape(*sides, self.axes, self.axes)
@@ -218,7 +229,7 @@ class Field(ABC):
         'circular, x outwards, about (32, 16)'
 
         """
-        as_size(tuple(shape), "shape", axes=self.axes)
+        as_size(shape, "shape", axes=self.axes)
         return self
 
     def inverse(self) -> Field:
@@ -247,7 +258,7 @@ class Field(ABC):
 
     def _checked(self, points: NDArray[np.float64], jacobians: bool) -> Matrices:
         frames = self._frames(points)
-        inverse = refuse_flat(frames, points)
+        inverse = transposed(frames) + 0.0 if self._rigid else refuse_flat(frames, points)
         return inverse if jacobians else frames
 
 
@@ -283,6 +294,16 @@ def as_points(points: ArrayLike, axes: int, name: str = "points") -> NDArray[np.
     at = np.ascontiguousarray(given, np.float64)
     if not np.isfinite(at).all():
         raise InvalidInput(f"{name}: {int((~np.isfinite(at)).sum())} of {at.size} values are NaN or infinite")
+    return at
+
+
+def as_place(place: ArrayLike | None, axes: int, name: str) -> NDArray[np.float64]:
+    """Check a single point, (A,); by default the origin."""
+    if place is None:
+        return np.zeros(axes)
+    at = as_points(place, axes, name)
+    if at.ndim > 1 or np.abs(at).max() > FAR:
+        raise InvalidInput(f"{name}: needs {axes} numbers within {FAR:g}, got shape {at.shape}, or larger ones")
     return at
 
 
@@ -351,13 +372,12 @@ def check(field: Field, shape: Sequence[int], origin: Sequence[float] | None = N
     """
     if not isinstance(field, Field):
         raise InvalidInput(f"field: needs a field, made by texrs.fields, got {type(field).__name__}")
-    if len(shape) != field.axes:
+    if isinstance(shape, Sequence) and len(shape) != field.axes:
         raise InvalidInput(f"field: has {field.axes} axes, a size of {len(shape)} is asked for")
-    sides = as_size(tuple(shape), "shape", axes=field.axes)
+    sides = as_size(shape, "shape", axes=field.axes)
     most = 32 if field.axes == 3 else 181
-    start = as_points(np.zeros(field.axes) if origin is None else origin, field.axes, "origin")
+    start = as_place(origin, field.axes, "origin")
     lines = [
-        o + np.unique(np.linspace(0, n - 1, min(n, most)).round())
-        for o, n in zip(start.ravel().tolist(), sides, strict=True)
+        o + np.unique(np.linspace(0, n - 1, min(n, most)).round()) for o, n in zip(start.tolist(), sides, strict=True)
     ]
     field.jacobians(np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1))

@@ -44,6 +44,7 @@ class Wound(Field):
     radial: int
     tangential: int
     angle: float
+    _rigid = True
 
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
         at = (0.0,) * self.axes if self.centre is None else self.centre
@@ -87,6 +88,7 @@ class Zigzag(Field):
     across: int
     first: int
     second: int
+    _rigid = True
 
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
         odd = np.floor((points[:, self.across] + 0.5) / (self.period / 2)) % 2

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from texrs._arrays import as_size
-from texrs._typing import Array
+from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput
-from texrs.fields._field import Field, as_points, refuse_flat
+from texrs.fields._field import Field, as_place, as_points, refuse_flat
 from texrs.fields._matrices import Matrices, determinants, exponentials, multiply, rotations, transposed
 
 __all__ = ["from_array", "from_function", "interpolate"]
@@ -30,6 +30,8 @@ MAX_FRAMES = 2**24
 MAX_POINTS = 4096
 """At which frames may be set: all of them are looked at for each voxel."""
 
+_BLOCK = 2**14
+"""Frames that are split at once."""
 _FLATTEST = 0.02
 """Determinant of a mean of rotations below which it is no guide to a rotation."""
 
@@ -76,13 +78,15 @@ def from_array(
     sides = given.shape[:axes]
     if prod(sides) > MAX_FRAMES:
         raise InvalidInput(f"frames: up to {MAX_FRAMES} frames are taken, got {prod(sides)}; fewer are interpolated")
-    box = sides if extent is None else as_size(tuple(extent), "extent", axes=axes, limit=2**62)
-    start = as_points(np.zeros(axes) if origin is None else origin, axes, "origin").ravel().tolist()
+    box = sides if extent is None else as_size(extent, "extent", axes=axes, limit=2**62)
+    start = as_place(origin, axes, "origin").tolist()
     step = [n / s for n, s in zip(box, sides, strict=True)]
     first = [o + (d - 1) / 2 for o, d in zip(start, step, strict=True)]
-    places = np.stack(np.meshgrid(*(f + np.arange(n) * d for f, d, n in zip(first, step, sides, strict=True)),
-                                  indexing="ij"), axis=-1)  # fmt: skip
-    turns, stretches = _split(_first(given), places.reshape(-1, axes), "frames")
+
+    def places(index: NDArray[np.intp]) -> NDArray[np.float64]:
+        return np.asarray(np.stack(np.unravel_index(index, sides), axis=-1) * step + first, np.float64)
+
+    turns, stretches = _split(given.reshape(-1, axes, axes), places)
     return _Grid(axes, sides, tuple(first), tuple(step), turns, stretches)
 
 
@@ -123,7 +127,7 @@ def interpolate(points: ArrayLike, frames: ArrayLike) -> Field:
         raise InvalidInput(f"points: needs shape {(len(given), axes)} for {len(given)} frames, got {at.shape}")
     if len(np.unique(at, axis=0)) < len(at):
         raise InvalidInput("points: two frames are set at one point")
-    turns, stretches = _split(_first(given), at, "frames")
+    turns, stretches = _split(given, lambda index: at[index])
     return _Scattered(axes, at, turns, stretches)
 
 
@@ -169,8 +173,8 @@ class _Grid(Field):
     sides: tuple[int, ...]
     first: tuple[float, ...]
     step: tuple[float, ...]
-    turns: NDArray[np.float64]
-    stretches: NDArray[np.float64] | None
+    turns: Floats
+    stretches: Floats | None
 
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
         low, share = [], []
@@ -187,6 +191,8 @@ class _Grid(Field):
             for a, (up, n) in enumerate(zip(corner, self.sides, strict=True)):
                 index = index * n + np.minimum(low[a] + up, n - 1)
                 weight = weight * (share[a] if up else 1 - share[a])
+            if not weight.any():  # Voxels that lie on samples; to add zeros would change no bit.
+                continue
             turn += weight * self.turns[..., index]
             if stretch is not None and self.stretches is not None:
                 stretch += weight * self.stretches[..., index]
@@ -203,8 +209,8 @@ class _Grid(Field):
 class _Scattered(Field):
     axes: int
     places: NDArray[np.float64]
-    turns: NDArray[np.float64]
-    stretches: NDArray[np.float64] | None
+    turns: Floats
+    stretches: Floats | None
 
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
         nearest = np.full(len(points), np.inf)
@@ -268,25 +274,35 @@ class _Function(Field):
         return f"function {getattr(self.function, '__name__', type(self.function).__name__)}"
 
 
-def _split(
-    frames: Matrices, places: NDArray[np.float64], name: str
-) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
-    """Split frames into rotations and logarithms of stretches: (N,) where all are uniform, else (A, A, N), or none."""
-    refuse_flat(frames, places, name)
-    count = frames.shape[2]
-    mirrored = int((determinants(frames) < 0).sum())
+def _split(frames: Array, places: Callable[[NDArray[np.intp]], NDArray[np.float64]]) -> tuple[Floats, Floats | None]:
+    """Split frames (N, A, A) into rotations and logarithms of stretches.
+
+    The rotations are (A, A, N). The logarithms are so too, or (N,) where no frame stretches one way more than another,
+    or none where none stretches at all. float32, for a dense array of frames is large.
+    """
+    count, axes = frames.shape[:2]
+    turns, logs = (np.empty((axes, axes, count), np.float32) for _ in range(2))
+    mirrored, uneven = 0, 0.0
+    for start in range(0, count, _BLOCK):
+        part = _first(frames[start : start + _BLOCK])
+        index = np.arange(start, start + part.shape[2])
+        refuse_flat(part, places(index), "frames")
+        mirrored += int((determinants(part) < 0).sum())
+        turn = rotations(part)
+        stretch = multiply(transposed(turn), part).transpose(2, 0, 1)
+        values, vectors = np.linalg.eigh((stretch + stretch.transpose(0, 2, 1)) / 2)
+        log = np.log(values)
+        uneven = max(uneven, float(np.ptp(log, axis=1).max()))
+        turns[..., index] = turn
+        logs[..., index] = _first((vectors * log[:, np.newaxis, :]) @ vectors.transpose(0, 2, 1))
     if mirrored not in (0, count):
         raise InvalidInput(
-            f"{name}: {mirrored} of {count} frames mirror and the others do not; between them one would be flat"
+            f"frames: {mirrored} of {count} frames mirror and the others do not; between them one would be flat"
         )
-    turns = rotations(frames)
-    stretch = multiply(transposed(turns), frames).transpose(2, 0, 1)
-    values, vectors = np.linalg.eigh((stretch + stretch.transpose(0, 2, 1)) / 2)
-    logs = np.log(values)
-    if np.ptp(logs, axis=1).max() > 1e-5:
-        return turns, _first((vectors * logs[:, np.newaxis, :]) @ vectors.transpose(0, 2, 1))
-    uniform = logs.mean(axis=1)
-    return turns, uniform if np.abs(uniform).max() > 1e-7 else None
+    if uneven > 1e-5:
+        return turns, logs
+    uniform = np.mean([logs[a, a] for a in range(axes)], axis=0, dtype=np.float32)
+    return turns, np.asarray(uniform, np.float32) if np.abs(uniform).max() > 1e-6 else None
 
 
 def _join(turn: Matrices, stretch: NDArray[np.float64] | None, points: NDArray[np.float64]) -> Matrices:

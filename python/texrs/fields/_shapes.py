@@ -11,14 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from texrs._arrays import as_float
 from texrs._typing import Array
 from texrs.errors import InvalidInput
-from texrs.fields._field import Field, as_points, refuse_flat
+from texrs.fields._field import FAR, Field, as_place, refuse_flat
 from texrs.fields._kinds import LETTERS, Constant, Ramp, Wound, Zigzag, turn
 
 __all__ = ["circular", "constant", "identity", "scale_ramp", "shear", "slant", "slant_3d", "spiral", "zigzag"]
 
 _WORDS = {"plane": "z", "row": "y", "column": "x"}
-_FAR = 1e9
-"""Lengths and centres are within so many voxels."""
 
 
 def identity(axes: int = 3) -> Field:
@@ -240,7 +238,7 @@ def zigzag(
     """
     first, second = _pair(plane, _axes(axes), "plane")
     across = first if axis is None else _index(axis, axes, "axis")
-    return Zigzag(axes, as_float(period, "period", 2, _FAR), _angle(angle), across, first, second)
+    return Zigzag(axes, as_float(period, "period", 2, FAR), _angle(angle), across, first, second)
 
 
 def scale_ramp(
@@ -273,7 +271,7 @@ def scale_ramp(
     """
     ends = tuple(as_float(v, name, 0.125, 8) for v, name in ((start, "start"), (stop, "stop")))
     along = _index(axis, _axes(axes), "axis")
-    reach = None if length is None else as_float(length, "length", 1, _FAR)
+    reach = None if length is None else as_float(length, "length", 1, FAR)
     return Ramp(axes, ends[0], ends[1], along, reach)
 
 
@@ -288,9 +286,7 @@ def _wound(axis: str, radial: str | None, centre: Sequence[float] | None, axes: 
     if out not in others:
         raise InvalidInput(f"radial: round {letter} it is {' or '.join(others)}, got {radial!r}")
     along = (set(others) - {out}).pop()
-    about = None if centre is None else as_points(centre, axes, "centre")
-    if about is not None and (about.ndim > 1 or np.abs(about).max() > _FAR):
-        raise InvalidInput(f"centre: needs {axes} numbers within {_FAR:g}, got shape {about.shape}, or larger ones")
+    about = None if centre is None else as_place(centre, axes, "centre")
     letters = LETTERS[axes - 2]
     return Wound(
         axes, None if about is None else tuple(about.tolist()), letters.index(out), letters.index(along), angle

@@ -23,10 +23,11 @@ Suffix                dtypes                                      Channels   Los
 
 Volumes are written to ``.tif``, ``.tiff``, ``.npy``, ``.npz`` and to the last four, which also keep
 the distances between voxels. What is (plane, row, column) here is z, y, x there, and x runs fastest
-in the file. Surfaces of volumes are written as ``.stl`` (`write_surface`). GIF is read, its first frame. A
-dtype that a format cannot hold is refused, never converted; bool is written as 0 and 255 (to
-``.npy`` and ``.npz`` as it is). A single channel is read without a channel axis (from ``.npy`` and
-``.npz`` as it was written). ``.npz`` files have the key ``image``.
+in the file. Volumes larger than memory are written slab by slab (`write_slabs`), surfaces as
+``.stl`` (`write_surface`). GIF is read, its first frame. A dtype that a format cannot hold is
+refused, never converted; bool is written as 0 and 255 (to ``.npy`` and ``.npz`` as it is). A single
+channel is read without a channel axis (from ``.npy`` and ``.npz`` as it was written). ``.npz``
+files have the key ``image``.
 
 Files are recognised by their content when read and by their suffix when written. Headers are
 compared with the limit before memory is used. All files are written to a temporary name and
@@ -36,8 +37,10 @@ renamed. What goes wrong is a `texrs.errors.FileError`, `~texrs.errors.LimitExce
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
+from math import prod
 from pathlib import Path
 
 import numpy as np
@@ -46,12 +49,12 @@ from texrs._arrays import MAX_PIXELS, as_float, as_int
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput
-from texrs.io import _files, _npy, _pillow, _tiff, _volumes
+from texrs.io import _files, _npy, _pillow, _slabs, _tiff, _volumes
 from texrs.io._files import atomic
 from texrs.io._npy import read_arrays
 from texrs.kernels import image_io
 
-__all__ = ["atomic", "read", "read_arrays", "read_volume", "write", "write_surface", "write_volume"]
+__all__ = ["atomic", "read", "read_arrays", "read_volume", "write", "write_slabs", "write_surface", "write_volume"]
 
 _MAGIC = (
     (b"\x89PNG\r\n\x1a\n", "png"),
@@ -310,6 +313,55 @@ def write_volume(
     _write(path, array, 3, overwrite, spacing)
 
 
+def write_slabs(path: PathLike, slabs: Iterable[Array], shape: Sequence[int], *, overwrite: bool = True) -> None:
+    """Write a volume that is made slab by slab, whole or not at all: no more than a slab is in memory.
+
+    Parameters
+    ----------
+    path : path_like
+        With the suffix .npy, .tif or .tiff.
+    slabs : iterable of array_like
+        Shapes (d, H, W) or (d, H, W, C), of one dtype, that follow each other along the planes.
+    shape : sequence of int
+        Of the whole volume, with the channels where there are any.
+    overwrite : bool
+        Whether a file that exists may be replaced.
+
+    Raises
+    ------
+    InvalidInput
+        Slabs that do not make up the volume, or not one that the format can hold.
+    FileError
+        Another suffix, or the file cannot be written. A former file is as it was, also if making a slab fails.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "large.npy")
+    ...     write_slabs(path, (np.full((2, 3, 4), i, np.uint8) for i in range(5)), (10, 3, 4))
+    ...     read_volume(path)[::2, 0, 0]
+    array([0, 1, 2, 3, 4], dtype=uint8)
+
+    """
+    target = _files.as_path(path)
+    suffix = target.suffix.lower()
+    if suffix not in (".npy", ".tif", ".tiff"):
+        raise FileError(f"{target}: the suffix {suffix!r} is not one that slabs are written to: .npy, .tif, .tiff")
+    sides = _slabs.as_shape(shape)
+    with atomic(target, overwrite=overwrite) as temporary:
+        # What a slab's maker raises is its own affair and passes as it is.
+        parts = _slabs.checked((_checked(slab, suffix, 3) for slab in slabs), sides)
+        first = next(parts)
+        whole = chain((first,), parts)
+        if suffix == ".npy":
+            _npy.write_parts(temporary, whole, sides, first.dtype)
+        else:
+            channels, size = prod(sides[3:]), prod(sides) * first.itemsize
+            _tiff.write_tiff(temporary, _slabs.planes(whole), channels, size)
+
+
 def write_surface(path: PathLike, vertices: Array, faces: Array, *, overwrite: bool = True) -> None:
     """Write a surface of triangles as .stl, whole or not at all (see `texrs.volume.surface`).
 
@@ -389,7 +441,8 @@ def _write(path: PathLike, value: Array, axes: int, overwrite: bool, spacing: Se
             array = array.astype(np.uint8) * np.uint8(255)
         if suffix in (".tif", ".tiff"):
             planes = array if axes == 3 else array[np.newaxis]
-            _tiff.write_tiff(temporary, planes if planes.ndim == 4 else planes[..., np.newaxis])
+            planes = planes if planes.ndim == 4 else planes[..., np.newaxis]
+            _tiff.write_tiff(temporary, planes, planes.shape[3], planes.nbytes)
             return
         if axes == 3:
             volume = array[..., 0] if array.ndim == 4 and array.shape[3] == 1 else array

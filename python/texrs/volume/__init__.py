@@ -1,6 +1,6 @@
 """Looking at volumes, and measuring whether a synthesised one is like its exemplar.
 
-Pictures: `slices`, `oblique`, `cube`, `turntable`; `surface` gives the triangles around a material.
+Pictures: `slices`, `oblique`, `cube`, `turntable`; `paint` gives labels colours, `surface` the triangles around one.
 
 Statistics, each of which can be used alone, most of them for pictures too; `compare` makes a report of them all:
 
@@ -18,7 +18,8 @@ Statistics, each of which can be used alone, most of them for pictures too; `com
 """
 
 from texrs.volume.compare import Comparison, compare
-from texrs.volume.pictures import cube, oblique, slices, surface, turntable
+from texrs.volume.labels import paint, surface
+from texrs.volume.pictures import cube, oblique, slices, turntable
 from texrs.volume.reuse import CellReuse, cell_reuse, coherent
 from texrs.volume.statistics import Classes, Particles, classes, lightness, lineal_path, particles, two_point
 from texrs.volume.structure import (
@@ -48,6 +49,7 @@ __all__ = [
     "lineal_path",
     "oblique",
     "orientation_errors",
+    "paint",
     "particles",
     "seam_planes",
     "slice_distances",

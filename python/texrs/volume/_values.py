@@ -5,13 +5,13 @@ from __future__ import annotations
 from contextlib import suppress
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from texrs._arrays import as_image, guidance
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 
-__all__ = ["as_region", "as_values", "axes_of", "colours_of", "leading", "trailing"]
+__all__ = ["as_direction", "as_region", "as_values", "axes_of", "colours_of", "leading", "trailing"]
 
 
 def leading(array: Array, axis: int, step: int) -> Array:
@@ -57,3 +57,14 @@ def as_region(mask: ArrayLike) -> Bools:
     if array.dtype.kind not in "bui" or array.ndim not in (2, 3) or array.size == 0:
         raise InvalidInput(f"mask: needs bool of shape (H, W) or (D, H, W), got {array.dtype} of {array.shape}")
     return np.ascontiguousarray(array != 0)
+
+
+def as_direction(value: object, name: str) -> NDArray[np.float64]:
+    """Check three numbers, for planes, rows and columns; a normal has a length."""
+    try:
+        out = np.asarray(value, np.float64)
+    except (TypeError, ValueError):
+        out = np.empty(0)
+    if out.shape != (3,) or not np.isfinite(out).all() or (name == "normal" and not np.abs(out).max() > 1e-12):
+        raise InvalidInput(f"{name}: needs three numbers (plane, row, column), got {str(value)[:60]}")
+    return out

@@ -139,7 +139,8 @@ def compare(
     source : SourceMap, optional
         That of the output: adds what is reused.
     field : Field, optional
-        What the output followed: adds the orientation of its layers, and says when neighbours are coherent.
+        What the output followed: adds the orientation of its layers, and says when neighbours are coherent. What it
+        leaves open is set by the size of the output (`texrs.fields.Field.over`).
     classes : int or None
         How many classes of colour are made of the exemplar, 2 to 16; None: both arrays are labels, whole numbers
         from 0 to 255 without channels.
@@ -196,6 +197,9 @@ def compare(
     window = min(64, *first.shape[:count], *second.shape[:count])
     orientation, turned = None, None
     if field is not None:
+        if not isinstance(field, Field) or field.axes != count:
+            raise InvalidInput(f"field: needs a field of {count} axes, got {type(field).__name__}")
+        field = field.over(second.shape[:count])
         normal = structure.texture_normal(grey[0])
         errors = (
             structure.orientation_errors(grey[0], None, normal),

@@ -1,4 +1,4 @@
-"""Pictures of volumes: slices, oblique cuts, a cube, a turntable, and the surface of what lies in them."""
+"""Pictures of volumes: slices, oblique cuts, a cube and a turntable."""
 
 from __future__ import annotations
 
@@ -15,12 +15,14 @@ from texrs._typing import Array, Floats, Interpolation, Path, Progress
 from texrs.errors import FileError, InvalidInput, LimitExceeded
 from texrs.io import atomic
 from texrs.kernels.gather import gather
+from texrs.volume._values import as_direction
 
-__all__ = ["cube", "oblique", "slices", "surface", "turntable"]
+__all__ = ["cube", "oblique", "slices", "turntable"]
 
-_AXES = ("plane", "row", "column")
 _LARGEST = 4096
 """Pixels a side of pictures of cubes."""
+_MOST = 2**26
+"""Pixels of all pictures of a turntable."""
 _MARGIN = 1.04
 _FINE = 3
 """Rays a pixel, along each side."""
@@ -127,10 +129,10 @@ def oblique(
     """
     v = as_image(volume, "volume", axes=3)
     shape = np.array(v.shape[:3])
-    middle = (shape - 1) / 2 if point is None else _three(point, "point")
+    middle = (shape - 1) / 2 if point is None else as_direction(point, "point")
     if (normal is None) == (axes is None):
         raise InvalidInput("normal, axes: needs one of the two")
-    steps = _across(_three(normal, "normal")) if axes is None else np.asarray(axes, np.float64)
+    steps = _across(as_direction(normal, "normal")) if axes is None else np.asarray(axes, np.float64)
     if steps.shape != (2, 3) or not np.isfinite(steps).all() or np.linalg.norm(np.cross(*steps)) < 1e-6:
         raise InvalidInput("axes: needs two directions of three numbers that are not parallel")
     if size is None:
@@ -248,6 +250,8 @@ def turntable(
     ------
     InvalidInput
         Not a volume, or numbers beyond what is allowed.
+    LimitExceeded
+        More than 2^26 pixels in all.
     FileError
         Another suffix, or the file cannot be written.
 
@@ -266,6 +270,8 @@ def turntable(
 
     count, side = as_int(frames, "frames", 2, 360), as_int(size, "size", 16, 1024)
     above, period = as_float(elevation, "elevation", -90, 90), as_float(seconds, "seconds", 0.1, 600)
+    if count * side * side > _MOST:
+        raise LimitExceeded(f"frames, size: {count} pictures of {side} x {side} are more than {_MOST} pixels in all")
     if not str(path).lower().endswith(".gif"):
         raise FileError(f"{path}: needs a name that ends in .gif")
     if not isinstance(background, Sequence | np.ndarray) or len(background) != 3:
@@ -294,61 +300,6 @@ def turntable(
         )
     if progress is not None:
         progress("turning", 1.0)
-
-
-def surface(
-    mask: ArrayLike, *, spacing: Sequence[float] = (1, 1, 1), closed: bool = True
-) -> tuple[Floats, NDArray[np.int64]]:
-    """Give the surface of a material as triangles, for `texrs.io.write_surface` (marching cubes).
-
-    Parameters
-    ----------
-    mask : array_like
-        Bool or integers, (D, H, W): where the material is, as ``labels == 2``.
-    spacing : sequence of 3 float
-        From plane to plane, row to row and column to column.
-    closed : bool
-        Whether pieces that the border cuts are closed there, so that the surface has an inside.
-
-    Returns
-    -------
-    vertices : (N, 3) float32
-        Corners as x, y, z: columns, rows and planes times their spacing.
-    faces : (M, 3) int64
-        Three corners each, counter-clockwise as seen from outside.
-
-    Raises
-    ------
-    InvalidInput
-        Not a mask of at least 2 voxels a side, or one without a surface.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from texrs import volume
-    >>> block = np.zeros((8, 8, 8), bool)
-    >>> block[2:6, 2:6, 2:6] = True
-    >>> vertices, faces = volume.surface(block)
-    >>> vertices.min(), vertices.max()
-    (np.float32(1.5), np.float32(5.5))
-
-    """
-    from skimage.measure import marching_cubes
-
-    array = np.asarray(mask)
-    if array.dtype.kind not in "bui" or array.ndim != 3 or min(array.shape) < 2:
-        raise InvalidInput(f"mask: needs bool (D, H, W) of at least 2 a side, got {array.dtype} of {array.shape}")
-    if array.size > 2**28:
-        raise LimitExceeded(f"mask: {array.size} voxels are more than the limit of {2**28}")
-    steps = [as_float(s, "spacing", 1e-12, 1e12) for s in _three(spacing, "spacing").tolist()]
-    solid = array != 0
-    if closed:
-        solid = np.pad(solid, 1)
-    if solid.all() or not solid.any():
-        raise InvalidInput("mask: is all of one kind, so that there is no surface")
-    corners, faces, _, _ = marching_cubes(solid.astype(np.float32), 0.5, allow_degenerate=False)
-    vertices = ((corners - (1 if closed else 0)) * steps)[:, ::-1]
-    return np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int64)
 
 
 def _render(
@@ -423,13 +374,3 @@ def _cut(
         return np.zeros(2), -np.ones(2)
     at = np.linalg.lstsq(steps.T, (np.array(found) - point).T, rcond=None)[0]
     return at.min(axis=1) - 1e-6, at.max(axis=1) + 1e-6
-
-
-def _three(value: object, name: str) -> NDArray[np.float64]:
-    try:
-        out = np.asarray(value, np.float64)
-    except (TypeError, ValueError):
-        out = np.empty(0)
-    if out.shape != (3,) or not np.isfinite(out).all() or (name == "normal" and not np.abs(out).max() > 1e-12):
-        raise InvalidInput(f"{name}: needs three numbers ({', '.join(_AXES)}), got {str(value)[:60]}")
-    return out

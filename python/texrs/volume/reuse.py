@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -65,7 +66,7 @@ def coherent(source: SourceMap, axis: int, field: Field | None = None) -> Bools:
     True
 
     """
-    _check(source, field)
+    field = _check(source, field)
     along = as_int(axis, "axis", 0, source.axes - 1)
     here = tuple(slice(0, -1) if a == along else slice(None) for a in range(source.axes))
     there = tuple(slice(1, None) if a == along else slice(None) for a in range(source.axes))
@@ -102,7 +103,7 @@ def cell_reuse(source: SourceMap, field: Field | None = None, *, cell: int = 8) 
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    _check(source, field)
+    field = _check(source, field)
     side = as_int(cell, "cell", 1, 2**20)
     count = source.label.size
     index = np.arange(count, dtype=np.int32 if count < 2**31 else np.int64).reshape(source.shape)
@@ -146,17 +147,20 @@ def _step(source: SourceMap, field: Field | None, i: int, here: tuple[slice, ...
         grid = np.stack(np.meshgrid(*map(np.arange, source.shape[1:]), indexing="ij"), axis=-1)[here]
         points = np.concatenate([np.full((*grid.shape[:-1], 1), i), grid], axis=-1)
         return np.asarray(field.jacobians(points)[..., along])
-    if source.frame is None:
+    frame: Any = source.frame
+    if frame is None:
         return np.asarray(np.eye(source.axes, dtype=np.float32)[along])
-    if source.frame.ndim == 3:
-        return np.asarray(source.frame[:, :, along][source.label[i][here]])
-    return np.asarray(source.frame[i][here][..., along])
+    if frame.ndim == 3:
+        return np.asarray(frame[:, :, along][source.label[i][here]])
+    return np.asarray(frame[i][here][..., along])
 
 
-def _check(source: SourceMap, field: Field | None) -> None:
+def _check(source: SourceMap, field: Field | None) -> Field | None:
+    """Give the field that J is taken from: the one that is given, or the map's own, where that is a field."""
     if not isinstance(source, SourceMap):
         raise InvalidInput(f"source: needs a source map, got {type(source).__name__}")
     if field is not None and (not isinstance(field, Field) or field.axes != source.axes):
-        raise InvalidInput(
-            f"field: needs a field of {source.axes} axes, got {field if isinstance(field, Field) else type(field).__name__}"
-        )
+        got = field if isinstance(field, Field) else type(field).__name__
+        raise InvalidInput(f"field: needs a field of {source.axes} axes, got {got}")
+    frame: Any = source.frame
+    return frame if field is None and isinstance(frame, Field) else field

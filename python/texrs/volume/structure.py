@@ -5,12 +5,13 @@ Each takes values of one channel, such as a `lightness`, in 2-D or in 3-D.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_float, as_int
+from texrs._arrays import as_float, as_int, as_wrap
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.fields import Field
@@ -98,11 +99,22 @@ def frequency(values: ArrayLike, *, window: int | None = None, whole: bool = Fal
     return _mean_frequency([plane for axis in range(3) for plane in np.moveaxis(v, axis, 0)], side)
 
 
-def seam_planes(values: ArrayLike) -> tuple[NDArray[np.float64], ...]:
+def seam_planes(values: ArrayLike, *, wrap: bool | Sequence[bool] = False) -> tuple[NDArray[np.float64], ...]:
     """Give, for each axis, the mean change from each plane (or line) to the next, over the median of all.
 
-    Values far from 1 at regular places are the traces of an algorithm's lattice; number i stands for the step from
-    plane i to plane i + 1.
+    Values far from 1 at regular places are the traces of an algorithm's lattice.
+
+    Parameters
+    ----------
+    values : array_like
+        (H, W) or (D, H, W), such as a `lightness`.
+    wrap : bool or one an axis
+        Axes along which the last plane is followed by the first.
+
+    Returns
+    -------
+    tuple of ndarray
+        For each axis one number a step: number i stands for that from plane i to plane i + 1.
 
     Examples
     --------
@@ -116,9 +128,11 @@ def seam_planes(values: ArrayLike) -> tuple[NDArray[np.float64], ...]:
     """
     v = as_values(values)
     out = []
-    for axis in range(v.ndim):
+    for axis, cyclic in enumerate(as_wrap(wrap, axes=v.ndim)):
         others = tuple(a for a in range(v.ndim) if a != axis)
-        change = np.abs(np.diff(v, axis=axis)).mean(axis=others, dtype=np.float64)
+        after = np.roll(v, -1, axis) if cyclic else trailing(v, axis, 1)
+        before = v if cyclic else leading(v, axis, 1)
+        change = np.abs(after - before).mean(axis=others, dtype=np.float64)
         out.append(change / max(float(np.median(change)) if change.size else 0.0, 1e-30))
     return tuple(out)
 
@@ -140,7 +154,9 @@ def isolated(values: ArrayLike, threshold: float = 0.35) -> float:
 
     v = as_values(values)
     limit = as_float(threshold, "threshold", 0, 1e9)
-    return float((np.abs(v - median_filter(v, size=3, mode="reflect")) > limit).mean())
+    around = np.ones((3,) * v.ndim, np.bool_)
+    around[(1,) * v.ndim] = False
+    return float((np.abs(v - median_filter(v, footprint=around, mode="reflect")) > limit).mean())
 
 
 def slice_distances(exemplar: ArrayLike, values: ArrayLike, *, quantiles: int = 256) -> NDArray[np.float64]:
@@ -192,6 +208,7 @@ def orientation_errors(
     normal: ArrayLike | None = None,
     *,
     margin: int = 6,
+    step: int = 1,
 ) -> Floats:
     """Give the angle between the layers of a texture and where a field turns those of its exemplar.
 
@@ -208,11 +225,13 @@ def orientation_errors(
         n, (A,); by default `texture_normal` of the values themselves, which is that of an exemplar.
     margin : int
         Pixels at the border that are left out: there the structure tensor sees too little.
+    step : int
+        Every so many pixels along each axis are looked at.
 
     Returns
     -------
     ndarray
-        Degrees from 0 to 90, float32, of the shape less two margins.
+        Degrees from 0 to 90, float32, of the shape less two margins, divided by the step.
 
     Raises
     ------
@@ -229,6 +248,7 @@ def orientation_errors(
 
     """
     v, edge = as_values(values), as_int(margin, "margin", 0, 2**20)
+    each = as_int(step, "step", 1, 2**20)
     if min(v.shape) <= 2 * edge:
         raise InvalidInput(f"margin: {edge} on both sides leaves nothing of {v.shape}")
     if field is not None and (not isinstance(field, Field) or field.axes != v.ndim):
@@ -238,15 +258,15 @@ def orientation_errors(
     n = texture_normal(v) if normal is None else np.asarray(normal, np.float64)
     if n.shape != (v.ndim,) or not 1e-12 < float(np.abs(n).max()) < 1e12:
         raise InvalidInput(f"normal: needs {v.ndim} numbers, not all zero, got shape {n.shape}")
-    inner = (slice(edge, -edge or None),) * v.ndim
+    inner = (slice(edge, -edge or None, each),) * v.ndim
     tensor = _structure(v, 4.0)[inner]
     out = np.empty(tensor.shape[: v.ndim], np.float32)
     for i, plane in enumerate(tensor):  # A plane at once: a dense field of a large volume is many times its size.
         found = np.linalg.eigh(plane)[1][..., -1]
         wanted = n
         if field is not None:
-            index = np.stack(np.meshgrid(*map(np.arange, plane.shape[: v.ndim - 1]), indexing="ij"), axis=-1) + edge
-            points = np.concatenate([np.full((*index.shape[:-1], 1), i + edge), index], axis=-1)
+            index = np.stack(np.meshgrid(*map(np.arange, (1, *plane.shape[: v.ndim - 1])), indexing="ij"), axis=-1)[0]
+            points = (index + np.eye(v.ndim, dtype=int)[0] * i) * each + edge
             wanted = np.einsum("...ji,j->...i", field.jacobians(points).astype(np.float64), n)
         length = np.linalg.norm(wanted, axis=-1)
         cosine = np.abs((found * wanted).sum(axis=-1)) / np.maximum(length, 1e-30)

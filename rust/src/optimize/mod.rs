@@ -19,6 +19,7 @@ mod vote;
 use crate::appearance::{Appearance, KEEP};
 use crate::fixed::{Frames, Place};
 use crate::grid::Region;
+use crate::guide::Guide;
 use crate::hash::Noise;
 use crate::par::{self, Monitor};
 use crate::{Error, Result};
@@ -33,6 +34,10 @@ const SLAB: usize = 1 << 17;
 pub struct Options {
     /// Iterations, at most.
     pub iterations: usize,
+    /// Number of the first, for work that is done in parts.
+    pub first: u32,
+    /// Compare each window with all of the exemplar's before the sweeps: for small ones.
+    pub exhaustive: bool,
     /// Sweeps an iteration, 1 or 2; the second looks twice as far.
     pub sweeps: usize,
     /// How much better a drawn match must be, in units of the exemplar's spacing.
@@ -50,15 +55,18 @@ struct Level<'a, const D: usize> {
     appearance: &'a Appearance<D>,
     region: &'a Region<D>,
     frames: Frames<'a, D>,
+    guide: Option<Guide<'a>>,
     still: bool,
 }
 
 /// Corrects `places`, one a point of `region`, and returns the number of iterations and the share of the points that the
 /// last one changed. Points that are `held` keep their places.
+#[allow(clippy::too_many_arguments)] // the exemplar, the region, and what is known of it
 pub fn correct<const D: usize>(
     appearance: &Appearance<D>,
     region: &Region<D>,
     frames: Frames<'_, D>,
+    guide: Option<Guide<'_>>,
     held: &[bool],
     places: &mut Vec<Place<D>>,
     options: &Options,
@@ -87,6 +95,7 @@ pub fn correct<const D: usize>(
         appearance,
         region,
         frames,
+        guide,
         still: frames.is_identity(),
     };
     let noise = Noise::new(options.seed).part(3);
@@ -102,8 +111,9 @@ pub fn correct<const D: usize>(
     for iteration in 0..options.iterations {
         let draws = sweep::Draws {
             noise,
-            iteration: iteration as u32,
+            iteration: options.first + iteration as u32,
             limit,
+            exhaustive: options.exhaustive,
         };
         level.matches(
             places,
@@ -151,6 +161,12 @@ pub fn correct<const D: usize>(
 }
 
 impl<const D: usize> Level<'_, D> {
+    /// What the guide says of showing a sample at a point.
+    #[inline(always)]
+    fn asked(&self, point: usize, sample: usize) -> i64 {
+        self.guide.as_ref().map_or(0, |g| g.cost(point, sample))
+    }
+
     /// Points of a plane: all axes but the first.
     fn plane(&self) -> usize {
         self.region.grid.len() / self.region.grid.shape()[0]

@@ -17,6 +17,7 @@ pub(super) struct Draws {
     pub(super) iteration: u32,
     /// What a drawn match must be better by.
     pub(super) limit: i64,
+    pub(super) exhaustive: bool,
 }
 
 impl<const D: usize> Level<'_, D> {
@@ -55,7 +56,19 @@ impl<const D: usize> Level<'_, D> {
         let frame = self.frames.at(p);
         let mut best = from[p];
         let mut at = appearance.clamped(nearest(best));
-        let mut least = i64::from(distance(feature, appearance.feature(at)));
+        let cost_of = |at| i64::from(distance(feature, appearance.feature(at))) + self.asked(p, at);
+        let mut least = cost_of(at);
+        if draws.exhaustive && reach == 1 {
+            let centres = appearance.valid_centres();
+            for k in 0..centres.len() {
+                let centre = centres.get(k);
+                let there = appearance.clamped(centre);
+                let cost = cost_of(there);
+                if cost < least {
+                    (best, at, least) = (centre.map(|x| x * ONE), there, cost);
+                }
+            }
+        }
         for axis in 0..D {
             for side in [-reach, reach] {
                 let mut step = [0; D];
@@ -67,7 +80,7 @@ impl<const D: usize> Level<'_, D> {
                 let place = add(from[q], apply(&frame, step));
                 match appearance.inside(nearest(place)) {
                     Some(there) if there != at => {
-                        let cost = i64::from(distance(feature, appearance.feature(there)));
+                        let cost = cost_of(there);
                         if cost < least {
                             (best, at, least) = (place, there, cost);
                         }
@@ -92,7 +105,7 @@ impl<const D: usize> Level<'_, D> {
                 place[axis] += shift * ONE;
             }
             if let Some(there) = appearance.inside(nearest(place)) {
-                let cost = i64::from(distance(feature, appearance.feature(there))) + draws.limit;
+                let cost = cost_of(there) + draws.limit;
                 if cost < least {
                     (best, least) = (place, cost);
                 }

@@ -1,7 +1,7 @@
 //! One coordinate for each point, out of those that the windows around it propose.
 
 use super::{CHUNK, Level};
-use crate::appearance::{CHANNELS, Colour};
+use crate::appearance::{CHANNELS, Colour, UNIT};
 use crate::fixed::{Place, add, apply, nearest};
 use crate::par;
 
@@ -21,11 +21,13 @@ impl<const D: usize> Level<'_, D> {
     /// Takes, for each point, the proposal nearest in colour to the weighted mean of all of them: a copy, never an average.
     pub(super) fn vote(&self, matches: &[Place<D>], to: &mut [Place<D>], radius: usize) {
         let voters = self.voters(radius as i32);
+        // From the units of vectors to those of colours.
+        let unit = (256.0 * self.appearance.colour_variance() / f64::from(UNIT)) as i64;
         par::chunks_mut(to, CHUNK, |chunk, to| {
             let mut proposals = Vec::with_capacity(voters.len());
             for (i, place) in to.iter_mut().enumerate() {
                 let p = chunk * CHUNK + i;
-                *place = self.elect(matches, &voters, p, &mut proposals);
+                *place = self.elect(matches, &voters, unit, p, &mut proposals);
             }
         });
     }
@@ -53,6 +55,7 @@ impl<const D: usize> Level<'_, D> {
         &self,
         matches: &[Place<D>],
         voters: &[Voter<D>],
+        unit: i64,
         p: usize,
         proposals: &mut Vec<(Place<D>, Colour, i64)>,
     ) -> Place<D> {
@@ -73,7 +76,8 @@ impl<const D: usize> Level<'_, D> {
                     sum[c] += voter.weight * i32::from(colour[c]);
                 }
                 total += voter.weight;
-                proposals.push((place, colour, voter.handicap));
+                let asked = (self.asked(p, at) * unit) >> 8;
+                proposals.push((place, colour, voter.handicap + asked));
             }
         }
         let mut best = (i64::MAX, matches[p]);

@@ -5,6 +5,7 @@ use super::run;
 use crate::appearance::{CHANNELS, KEEP, Parts};
 use crate::fixed::{Frame, Frames, Place};
 use crate::grid::{Grid, Region};
+use crate::guide::Guide;
 use crate::{Error, Result, appearance, blocks, optimize, pyramid};
 
 /// An exemplar at one resolution, analysed.
@@ -74,6 +75,27 @@ fn frames<const D: usize>(values: &[i16], points: usize) -> Result<Frames<'_, D>
             got: vec![values.len()],
         }),
     }
+}
+
+/// Values of the exemplar's samples and of the output's points, four each, and a weight a point.
+type GuideIn<'py> = (
+    PyReadonlyArray1<'py, i16>,
+    PyReadonlyArray1<'py, i16>,
+    PyReadonlyArray1<'py, u16>,
+);
+type GuideSlices<'a> = Option<(&'a [i16], &'a [i16], &'a [u16])>;
+
+fn slices<'a>(guide: &'a Option<GuideIn<'_>>) -> PyResult<GuideSlices<'a>> {
+    Ok(match guide {
+        Some((a, b, c)) => Some((a.as_slice()?, b.as_slice()?, c.as_slice()?)),
+        None => None,
+    })
+}
+
+fn guide<'a>(arrays: GuideSlices<'a>, samples: usize, points: usize) -> Result<Option<Guide<'a>>> {
+    arrays
+        .map(|(a, b, c)| Guide::new(a.as_chunks().0, b.as_chunks().0, c, samples, points))
+        .transpose()
 }
 
 #[pymethods]
@@ -194,8 +216,10 @@ impl Appearance {
         contrast: f64,
         continuation: f64,
         seed: u64,
+        guide: Option<GuideIn<'py>>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<PlacesOut<'py>> {
+        let guide = slices(&guide)?;
         let options = blocks::Options {
             cell,
             rounds,
@@ -209,7 +233,9 @@ impl Appearance {
             either!(&self.0, a, {
                 let region = region::<D>(&place)?;
                 let frames = self::frames(values, region.grid.len())?;
-                blocks::blocks(a, &region, frames, &options, monitor).map(Vec::into_flattened)
+                let guide = self::guide(guide, a.grid().len(), region.grid.len())?;
+                blocks::blocks(a, &region, frames, guide, &options, monitor)
+                    .map(Vec::into_flattened)
             })
         })?;
         Ok(PyArray1::from_vec(py, places))
@@ -225,15 +251,21 @@ impl Appearance {
         frames: PyReadonlyArray3<'py, i16>,
         held: PyReadonlyArray1<'py, bool>,
         iterations: usize,
+        first: u32,
+        exhaustive: bool,
         sweeps: usize,
         hysteresis: f64,
         vote: usize,
         settled: f64,
         seed: u64,
+        guide: Option<GuideIn<'py>>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(PlacesOut<'py>, usize, f64)> {
+        let guide = slices(&guide)?;
         let options = optimize::Options {
             iterations,
+            first,
+            exhaustive,
             sweeps,
             hysteresis,
             vote,
@@ -246,8 +278,17 @@ impl Appearance {
                 let region = region::<D>(&place)?;
                 let frames = self::frames(values, region.grid.len())?;
                 let mut places: Vec<Place<D>> = places.as_chunks().0.to_vec();
-                let (done, changed) =
-                    optimize::correct(a, &region, frames, held, &mut places, &options, monitor)?;
+                let guide = self::guide(guide, a.grid().len(), region.grid.len())?;
+                let (done, changed) = optimize::correct(
+                    a,
+                    &region,
+                    frames,
+                    guide,
+                    held,
+                    &mut places,
+                    &options,
+                    monitor,
+                )?;
                 Ok((places.into_flattened(), done, changed))
             })
         })?;
@@ -260,7 +301,7 @@ impl Appearance {
 pub(super) fn upsample<'py>(
     py: Python<'py>,
     parents: PyReadonlyArray1<'py, i32>,
-    from: Where,
+    from_: Where,
     to: Where,
     frames: PyReadonlyArray3<'py, i16>,
 ) -> PyResult<PlacesOut<'py>> {
@@ -276,8 +317,8 @@ pub(super) fn upsample<'py>(
     }
     let (parents, values) = (parents.as_slice()?, frames.as_slice()?);
     let places = run(py, None, |_| match to.0.len() {
-        2 => work::<2>(parents, &from, &to, values),
-        _ => work::<3>(parents, &from, &to, values),
+        2 => work::<2>(parents, &from_, &to, values),
+        _ => work::<3>(parents, &from_, &to, values),
     })?;
     Ok(PyArray1::from_vec(py, places))
 }
