@@ -149,6 +149,19 @@ def test_drawn_operations_obey_their_limits():
     assert kinds <= {"T"}
 
 
+def test_what_is_lit_from_one_side_is_not_mirrored():
+    """Beans lit from a corner on no axis, bark lit from the left only upside down; nothing lit from nowhere is kept from it."""
+    mirrors = {}
+    for name in ("beans", "bark", "pebbles"):
+        made = texrs.design(getattr(samples, name)((192, 192)).image, 192, seed=2, variants=3)
+        log = [entry for result in made for tile in result.report["operations"] for entry in tile]
+        mirrors[name] = {tuple(entry["mirror"]) for entry in log if "mirror" in entry}
+        assert name == "pebbles" or not any(o[0] == "M" for entry in log for o in entry.get("operations") or [])
+    assert mirrors["beans"] == {(False, False)}
+    assert all(not columns for _, columns in mirrors["bark"])
+    assert len(mirrors["pebbles"]) == 4
+
+
 def test_elements_at_the_border_slide_along_it():
     moves = Moves(2, 0.3, 60.0, (0.8, 1.2), True, None, 2.0)
     for element in range(50):

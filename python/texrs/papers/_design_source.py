@@ -14,7 +14,7 @@ from texrs.deform import Flip, Moves, chaotic_sequence, flip, mirrors
 from texrs.errors import InvalidInput
 from texrs.kernels.patch_search import PatchIndex
 from texrs.segment import Segmentation
-from texrs.segment.regularity import direction
+from texrs.segment.regularity import direction, polarity
 
 __all__ = ["Source", "as_shares", "check_moves", "check_sources", "to_unit_together"]
 
@@ -119,15 +119,19 @@ class Source:
         if paper:
             parts, moves = replace(parts, children="none", lattice=None), replace(moves, mirror=False)
         extent = side or patch_side(guide.shape[0], guide.shape[1])
-        flips = mirrors(moves.mirror)
+        if moves.mirror and not paper:
+            along = polarity(guide)
+            moves = replace(moves, axes=(along[0] < POLAR, along[1] < POLAR))
+        flips = [f for f in mirrors(moves.mirror) if all(allowed or not f[a] for a, allowed in enumerate(moves.axes))]
         if parts.lattice:
             shifts = parts.lattice.shifts(moves.translate * min(guide.shape[:2])) if moves.translate else []
             moves = replace(moves, rotate=0.0, scale=(1.0, 1.0), mirror=False, shifts=tuple(shifts))
         elif automatic and parts.children != "grid" and direction(guide) < DIRECTED:
             moves = replace(moves, rotate=ROTATE)
         if parts.children == "grid":
-            # Cells are no elements: turned or scaled they would show their outline.
-            moves = replace(moves, rotate=0.0, scale=(1.0, 1.0))
+            # Cells are no elements: turned or scaled they would show their outline, and mirrored they would meet the mirror
+            # image of what they show.
+            moves = replace(moves, rotate=0.0, scale=(1.0, 1.0), mirror=False)
         return cls(guide, parts, filling(guide, parts, flips, extent), flips, moves, extent, paper)
 
 
@@ -139,6 +143,9 @@ def patch_side(height: int, width: int) -> int:
 ROTATE, DIRECTED = 60.0, 0.25
 """Largest rotation by default, in degrees, and the directedness from which on nothing is turned."""
 
+
+POLAR = 5.0
+"""How surely, in standard errors, an example differs from its mirror image from which on it is not mirrored along that axis."""
 
 BACKGROUND_PLACES = 64
 """Places for a patch of pure background from which on holes are filled with background alone."""

@@ -25,7 +25,8 @@ Departures, with their reasons:
   heap of leaves most rest. If all moved there would be nothing left to lie on. An element brings only background along, not
   pieces of its neighbours.
 - Holes are filled with background alone where the example has enough of it.
-- Nothing is turned where the example has directions of its own (bark, brickwork); where it repeats on a lattice, elements
+- Nothing is mirrored along an axis on which the example plainly differs from its mirror image (light from one side, leaves
+  that hang), nor turned where the example has directions of its own (bark, brickwork); where it repeats on a lattice, elements
   move from place to place of the lattice and nowhere else.
 - A cyclic texture (section 3.5) is stitched on the torus from the start: patches are chosen to fit both sides of the
   wrap, where the paper folds a finished picture that was never chosen to fit.
@@ -135,7 +136,8 @@ def design(  # type: ignore[misc]  # the overloads leave the options to this sig
     scale : (float, float)
         Least and largest scaling, within 0.5 to 2.
     mirror : bool
-        Whether elements, backgrounds and patches may be mirrored; False for lit or lettered textures.
+        Whether elements, backgrounds and patches may be mirrored; False for lettered textures. Where the example plainly
+        differs from its mirror image, as lit from one side, it is not mirrored along that axis in any case.
     x0 : float, optional
         Start of the chaotic sequence (Eq. 2), within (-1, 1); the seed draws one for each element by default.
     chaos : float

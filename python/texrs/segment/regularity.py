@@ -1,4 +1,4 @@
-"""How regular an exemplar is: the lattice that it repeats on, and the directions that it has."""
+"""How regular an exemplar is: the lattice that it repeats on, its directions, and whether its mirror image is like it."""
 
 from __future__ import annotations
 
@@ -23,6 +23,9 @@ REGULAR = 0.3
 """Mean correlation on a lattice from which on it is believed; scattered things have up to 0.2."""
 DIP = 0.75
 """A correlation falls below this share of its peak on the way to it, else it is a stripe and no period."""
+FINE, BLOCKS = (0.7, 1.5), 4
+"""Standard deviations of the Gaussians under which an image is compared with its mirror image; parts of a side that its spread
+is known from."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,3 +165,40 @@ def direction(guide: Floats) -> float:
     second = slope**2
     fourth = second**2 / np.maximum(energy, 1e-300)
     return float(max(abs(second.sum()), abs(fourth.sum())) / total)
+
+
+def polarity(guide: Floats) -> tuple[float, float]:
+    """Give how surely an image differs from itself mirrored along rows and along columns, in standard errors.
+
+    What is lit from one side grows dark slowly and bright at once, on the way along rows or along columns. So slopes that are
+    weighed by their square, or by that of the other slope, do not sum to 0 as they do where a mirror image is as likely.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    height, width = guide.shape[:2]
+    top, left = max(0, height - WINDOW) // 2, max(0, width - WINDOW) // 2
+    light = guide[top : top + WINDOW, left : left + WINDOW].mean(axis=-1, dtype=np.float64)
+    if min(light.shape) < BLOCKS * SHORTEST:
+        return 0.0, 0.0
+    most = [0.0, 0.0]
+    for sigma in FINE:
+        slopes = [gaussian_filter(light, sigma, order=order) for order in ((1, 0), (0, 1))]
+        energy = np.hypot(*slopes)
+        scale = _by_block(energy**3)
+        if scale.sum() < 1e-12:
+            continue
+        for axis, (along, across) in enumerate((slopes, slopes[::-1])):
+            for odd in (along**3, along * across**2):
+                sums = _by_block(odd)
+                mean = sums.sum() / scale.sum()
+                error = np.sqrt(((sums - mean * scale) ** 2).sum()) / scale.sum()
+                most[axis] = max(most[axis], abs(float(mean)) / max(float(error), 1e-6))
+    return most[0], most[1]
+
+
+def _by_block(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sum over equal parts of an image; what does not divide evenly is left out."""
+    rows, columns = (n // BLOCKS for n in values.shape)
+    parts = values[: BLOCKS * rows, : BLOCKS * columns].reshape(BLOCKS, rows, BLOCKS, columns)
+    sums: NDArray[np.float64] = parts.sum(axis=(1, 3)).ravel()
+    return sums
