@@ -19,8 +19,7 @@ Departures, with their reasons:
   cores.
 - In a cut, the core of an element is tied to it and a ring of its surroundings is offered with it: otherwise the
   minimum cut makes a wholly overlapped element vanish.
-- Costs of cutting elements in are divided by the local gradient (Kwatra et al., SIGGRAPH 2003); all cuts are dearer
-  inside elements, so seams run between them.
+- Where patches of the large texture meet, cuts are dearer inside elements, so seams run between them.
 - Where elements of one shape lie in a heap they take each other's places, turned and scaled to the shape that they fill; in a
   heap of leaves most rest. If all moved there would be nothing left to lie on. An element brings only background along, not
   pieces of its neighbours.
