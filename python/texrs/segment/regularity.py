@@ -177,28 +177,29 @@ def polarity(guide: Floats) -> tuple[float, float]:
 
     height, width = guide.shape[:2]
     top, left = max(0, height - WINDOW) // 2, max(0, width - WINDOW) // 2
-    light = guide[top : top + WINDOW, left : left + WINDOW].mean(axis=-1, dtype=np.float64)
+    light = guide[top : top + WINDOW, left : left + WINDOW].mean(axis=-1, dtype=np.float32)
     if min(light.shape) < BLOCKS * SHORTEST:
         return 0.0, 0.0
     most = [0.0, 0.0]
     for sigma in FINE:
         slopes = [gaussian_filter(light, sigma, order=order) for order in ((1, 0), (0, 1))]
-        energy = np.hypot(*slopes)
-        scale = _by_block(energy**3)
+        squares = [slope * slope for slope in slopes]
+        energy = squares[0] + squares[1]
+        scale = _by_block(energy * np.sqrt(energy))
         if scale.sum() < 1e-12:
             continue
-        for axis, (along, across) in enumerate((slopes, slopes[::-1])):
-            for odd in (along**3, along * across**2):
-                sums = _by_block(odd)
+        for axis, slope in enumerate(slopes):
+            for square in squares:
+                sums = _by_block(slope * square)
                 mean = sums.sum() / scale.sum()
                 error = np.sqrt(((sums - mean * scale) ** 2).sum()) / scale.sum()
                 most[axis] = max(most[axis], abs(float(mean)) / max(float(error), 1e-6))
     return most[0], most[1]
 
 
-def _by_block(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _by_block(values: Floats) -> NDArray[np.float64]:
     """Sum over equal parts of an image; what does not divide evenly is left out."""
     rows, columns = (n // BLOCKS for n in values.shape)
     parts = values[: BLOCKS * rows, : BLOCKS * columns].reshape(BLOCKS, rows, BLOCKS, columns)
-    sums: NDArray[np.float64] = parts.sum(axis=(1, 3)).ravel()
+    sums: NDArray[np.float64] = parts.sum(axis=(1, 3), dtype=np.float64).ravel()
     return sums
