@@ -13,11 +13,14 @@ PACKAGE = ROOT / "python" / "texrs"
 FOUNDATION = {"errors", "_typing", "_arrays", "threads", "samples"}
 KERNELS = {"kernels"}
 NOUNS = {
+    "analysis": {"io"},
     "source_map": {"io", "_pixels"},
     "_pixels": {"source_map"},
     "io": set(),
     "report": {"source_map", "io"},
     "segment": set(),
+    "fields": set(),
+    "volume": {"io", "fields", "source_map"},
     "deform": set(),
     "quilt": {"source_map", "_pixels"},
     "blend": {"source_map"},
@@ -105,7 +108,7 @@ def test_kernels_do_not_import_the_door() -> None:
             assert "crate::py" not in path.read_text(encoding="utf-8"), name
 
 
-FOUNDATION_RUST = {"error", "grid", "par", "hash", "Error", "Result"}
+FOUNDATION_RUST = {"error", "grid", "par", "hash", "fixed", "pca", "Error", "Result"}
 KERNEL_ARROWS = {
     "gather": set(),
     "image_io": set(),
@@ -113,6 +116,11 @@ KERNEL_ARROWS = {
     "patch_search": set(),
     "mean_shift": set(),
     "poisson": set(),
+    "appearance": set(),
+    "guide": {"appearance"},
+    "blocks": {"appearance", "guide"},
+    "optimize": {"appearance", "guide"},
+    "pyramid": set(),
     "complete": {"seam", "patch_search"},
 }
 

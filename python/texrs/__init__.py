@@ -1,15 +1,16 @@
 """Make new textures from one example.
 
-The verbs: `design` (many natural textures from one example), `tile` (any picture made cyclic) and `complete` (holes
-filled by example). Each gives a `Synthesis`, whose `SourceMap` looks anything that is in register with the exemplar up
-in the same way.
+The verbs: `design` (many natural textures from one example), `solid` and `synthesize` (volumes and pictures grown
+under a frame field), `tile` (any picture made cyclic) and `complete` (holes filled by example). Each gives a
+`Synthesis`, whose `SourceMap` looks anything that is in register with the exemplar up in the same way.
 """
 
-from texrs import errors, io, kernels, samples
+from texrs import analysis, errors, fields, io, kernels, samples, volume
 from texrs._rust import VERSION as __version__
 from texrs.completion import complete
 from texrs.cyclic import tile
 from texrs.papers.design import design
+from texrs.papers.solid import solid, synthesize
 from texrs.report import Synthesis
 from texrs.source_map import Reuse, SourceMap
 from texrs.threads import threads
@@ -19,12 +20,17 @@ __all__ = [
     "SourceMap",
     "Synthesis",
     "__version__",
+    "analysis",
     "complete",
     "design",
     "errors",
+    "fields",
     "io",
     "kernels",
     "samples",
+    "solid",
+    "synthesize",
     "threads",
     "tile",
+    "volume",
 ]

@@ -39,14 +39,15 @@ class Pixels:
         counts = [int(m.label.max()) + 1 if m.label.size else 0 for m in maps]
         offsets = np.cumsum([0, *counts]).astype(np.uint64)
         table = pixels = None
-        if any(m.frame is not None and m.frame.ndim > 3 for m in maps):
+        arrays = [m.frame_array() for m in maps]
+        if any(f is not None and f.ndim > 3 for f in arrays):
             pixels = np.concatenate([m.frames().reshape(-1, axes, axes) for m in maps])
-        elif any(m.frame is not None for m in maps):
+        elif any(f is not None for f in arrays):
             eye = np.eye(axes, dtype=np.float32)
             table = np.concatenate(
                 [
-                    np.broadcast_to(eye, (n, axes, axes)) if m.frame is None else m.frame[:n]
-                    for m, n in zip(maps, counts, strict=True)
+                    np.broadcast_to(eye, (n, axes, axes)) if frame is None else frame[:n]
+                    for frame, n in zip(arrays, counts, strict=True)
                 ]
             )
         return cls(

@@ -1,11 +1,12 @@
 from collections.abc import Callable, Sequence
 from typing import Any, Final, final
 
-from numpy import bool_, float32, int32, int64, uint8, uint16
+from numpy import bool_, float32, int16, int32, int64, uint8, uint16
 from numpy.typing import NDArray
 
 __all__ = [
     "VERSION",
+    "Appearance",
     "PatchIndex",
     "complete",
     "decode_image",
@@ -21,6 +22,7 @@ __all__ = [
     "seam_strip",
     "set_threads",
     "uniform",
+    "upsample",
 ]
 
 VERSION: Final[str]
@@ -139,3 +141,70 @@ def seam_labels(
     backward: Sequence[NDArray[float32]],
     wrap: Sequence[bool],
 ) -> tuple[NDArray[bool_], float]: ...
+
+@final
+class Appearance:
+    def __new__(
+        cls, colours: NDArray[float32], shape: Sequence[int], wrap: Sequence[bool], radius: int
+    ) -> Appearance: ...
+    @property
+    def shape(self) -> list[int]: ...
+    @property
+    def wrap(self) -> list[bool]: ...
+    @property
+    def radius(self) -> int: ...
+    @property
+    def channels(self) -> int: ...
+    @property
+    def spacing(self) -> float: ...
+    def parts(self) -> tuple[NDArray[int16], NDArray[int16], NDArray[int16], NDArray[int64], int, int]: ...
+    @staticmethod
+    def from_parts(
+        shape: Sequence[int],
+        wrap: Sequence[bool],
+        radius: int,
+        channels: int,
+        colours: NDArray[int16],
+        features: NDArray[int16],
+        basis: NDArray[int16],
+        bias: NDArray[int64],
+        gain: int,
+        spacing: int,
+    ) -> Appearance: ...
+    def blocks(
+        self,
+        place: tuple[Sequence[int], Sequence[int], Sequence[bool]],
+        frames: NDArray[int16],
+        cell: int,
+        rounds: int,
+        candidates: int,
+        contrast: float,
+        continuation: float,
+        seed: int,
+        guide: tuple[NDArray[int16], NDArray[int16], NDArray[uint16]] | None,
+        progress: Callable[[float], object] | None,
+    ) -> NDArray[int32]: ...
+    def correct(
+        self,
+        places: NDArray[int32],
+        place: tuple[Sequence[int], Sequence[int], Sequence[bool]],
+        frames: NDArray[int16],
+        held: NDArray[bool_],
+        iterations: int,
+        first: int,
+        exhaustive: bool,
+        sweeps: int,
+        hysteresis: float,
+        vote: int,
+        settled: float,
+        seed: int,
+        guide: tuple[NDArray[int16], NDArray[int16], NDArray[uint16]] | None,
+        progress: Callable[[float], object] | None,
+    ) -> tuple[NDArray[int32], int, float]: ...
+
+def upsample(
+    parents: NDArray[int32],
+    from_: tuple[Sequence[int], Sequence[int], Sequence[bool]],
+    to: tuple[Sequence[int], Sequence[int], Sequence[bool]],
+    frames: NDArray[int16],
+) -> NDArray[int32]: ...

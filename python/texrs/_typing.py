@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from os import PathLike
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,3 +17,13 @@ Path: TypeAlias = str | PathLike[str]
 Interpolation: TypeAlias = Literal["nearest", "linear", "cubic"]
 Progress: TypeAlias = Callable[[str, float], object]
 """Called with the name of the stage and the share of it that is done; raising stops the work."""
+
+
+@runtime_checkable
+class Frames(Protocol):
+    """A frame for each point of a lattice, as `texrs.fields` has them."""
+
+    axes: int
+
+    def lattice(self, shape: Sequence[int], *, origin: Any = 0, step: float = 1) -> Floats:
+        """Give the Jacobians (..., A, A) of a lattice of that shape."""

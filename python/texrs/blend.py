@@ -327,9 +327,10 @@ def seams(source: SourceMap, axis: int, wrap: bool) -> tuple[tuple[Array, ...], 
 
 def _frames(source: SourceMap, at: tuple[Array, ...]) -> NDArray[np.float32]:
     """Give the Jacobians of some pixels, (n, 2, 2)."""
-    if source.frame is None:
+    frame = source.frame_array()
+    if frame is None:
         return np.broadcast_to(np.eye(2, dtype=np.float32), (len(at[0]), 2, 2))
-    return source.frame[source.label[at]] if source.frame.ndim == 3 else source.frame[at]
+    return frame[source.label[at]] if frame.ndim == 3 else frame[at]
 
 
 def _boundary(wrap: bool) -> Boundary:
@@ -387,7 +388,8 @@ def _around(first: int, last: int, height: int) -> slice | NDArray[np.intp]:
 
 def _rows(source: SourceMap, rows: slice | NDArray[np.intp]) -> SourceMap:
     """Take some rows of a source map."""
-    frame = source.frame if source.frame is None or source.frame.ndim == 3 else source.frame[rows]
+    frame = source.frame_array()
+    frame = frame if frame is None or frame.ndim == 3 else frame[rows]
     return SourceMap(source.coordinates[rows], source.exemplar[rows], source.label[rows], frame, source.shapes)
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_image
 from texrs._pixels import Pixels, bands, number_pairs
-from texrs._typing import Array, Bools, Interpolation, Path
+from texrs._typing import Array, Bools, Frames, Interpolation, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.kernels.gather import gather
 
@@ -58,9 +58,10 @@ class SourceMap:
         Which exemplar.
     label : (...) uint32
         Which patch.
-    frame : None, (L, A, A) or (..., A, A) float32
-        The Jacobian J = dS/dp of each pixel's patch: none (the identity), a table by label, or dense. Its inverse says
-        where the exemplar's axes point in the output.
+    frame : None, (L, A, A) or (..., A, A) float32, or a field
+        The Jacobian J = dS/dp of each pixel's patch: none (the identity), a table by label, dense, or a field of
+        `texrs.fields`, which is evaluated where it is needed. Its inverse says where the exemplar's axes point in the
+        output.
     shapes : tuple of tuple of int
         Shapes of the exemplars, without channels: what `render` expects.
 
@@ -69,7 +70,7 @@ class SourceMap:
     coordinates: NDArray[np.float32]
     exemplar: NDArray[np.uint16]
     label: NDArray[np.uint32]
-    frame: NDArray[np.float32] | None
+    frame: NDArray[np.float32] | Frames | None
     shapes: tuple[tuple[int, ...], ...]
 
     def __post_init__(self) -> None:
@@ -88,7 +89,10 @@ class SourceMap:
         ):
             if array.dtype != dtype or array.shape[:axes] != shape:
                 raise InvalidInput(f"{name}: needs {np.dtype(dtype)} over {shape}, got {array.dtype} {array.shape}")
-        if self.frame is not None:
+        if isinstance(self.frame, Frames):
+            if self.frame.axes != axes:
+                raise InvalidInput(f"frame: the field has {self.frame.axes} axes, the map {axes}")
+        elif self.frame is not None:
             table = self.frame.ndim == 3
             wanted = self.frame.shape[:1] if table else shape
             if self.frame.dtype != np.float32 or self.frame.shape != (*wanted, axes, axes):
@@ -118,11 +122,16 @@ class SourceMap:
         """Number of axes, 2 or 3."""
         return self.label.ndim
 
+    def frame_array(self) -> NDArray[np.float32] | None:
+        """Give `frame` as an array: none, a table by label, or dense."""
+        return self.frame.lattice(self.shape) if isinstance(self.frame, Frames) else self.frame
+
     def frames(self) -> NDArray[np.float32]:
         """Give the Jacobian of every pixel, dense: (..., A, A) float32."""
-        if self.frame is None:
+        frame = self.frame_array()
+        if frame is None:
             return np.broadcast_to(np.eye(self.axes, dtype=np.float32), (*self.shape, self.axes, self.axes))
-        return self.frame[self.label] if self.frame.ndim == 3 else self.frame
+        return frame[self.label] if frame.ndim == 3 else frame
 
     def render(
         self,
@@ -229,7 +238,7 @@ class SourceMap:
             near = np.floor(self.coordinates[band] + np.float32(0.5)).astype(np.int64)
             place[band] = inners.places(near, self.exemplar[band])
             rest[band] = self.coordinates[band] - near.astype(np.float32)
-        return self._picked(inners, place, self.label, self.frame, rest if rest.any() else None, maps[0].shapes)
+        return self._picked(inners, place, self.label, self.frame_array(), rest if rest.any() else None, maps[0].shapes)
 
     @classmethod
     def pick(
@@ -294,12 +303,13 @@ class SourceMap:
         wrap the last one is False. False means a seam.
         """
         joined = self.exemplar == np.roll(self.exemplar, -1, axis)
+        frame = self.frame_array()
         # One coordinate at a time, for a dense frame of a large picture is many times its size.
         for a in range(self.axes):
             place = self.coordinates[..., a]
             step: Any = np.float32(a == axis)
-            if self.frame is not None:
-                step = self.frame[:, a, axis][self.label] if self.frame.ndim == 3 else self.frame[..., a, axis]
+            if frame is not None:
+                step = frame[:, a, axis][self.label] if frame.ndim == 3 else frame[..., a, axis]
             joined &= np.abs(place + step - np.roll(place, -1, axis)) < 0.1
         if not wrap:
             joined[tuple(slice(None) if a != axis else -1 for a in range(self.axes))] = False
@@ -336,8 +346,8 @@ class SourceMap:
             "label": self.label,
             "shapes": np.array(self.shapes, np.int64),
         }
-        if self.frame is not None:
-            parts["frame"] = self.frame
+        if (frame := self.frame_array()) is not None:
+            parts["frame"] = frame
         with atomic(path) as temporary, open(temporary, "wb") as file:
             np.savez_compressed(file, **parts)
 

@@ -107,6 +107,47 @@ impl<const D: usize> Grid<D> {
     }
 }
 
+/// A part of an endless lattice: its points, and where its first one lies in the world. What is hashed is the place in
+/// the world, so every part that holds a point gives it the same noise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Region<const D: usize> {
+    /// Its points; cyclic axes are those along which the output repeats.
+    pub grid: Grid<D>,
+    /// World coordinates of its first point.
+    pub origin: [i32; D],
+}
+
+impl<const D: usize> Region<D> {
+    /// World coordinates of a point.
+    #[inline(always)]
+    pub fn world(&self, point: [usize; D]) -> [i32; D] {
+        let mut world = self.origin;
+        for axis in 0..D {
+            world[axis] = world[axis].wrapping_add(point[axis] as i32);
+        }
+        world
+    }
+
+    /// Row-major position of the point a step away, around cyclic axes; `None` beyond an end.
+    #[inline(always)]
+    pub fn step(&self, point: [usize; D], step: [i32; D]) -> Option<usize> {
+        let (shape, wrap) = (self.grid.shape(), self.grid.wrap());
+        let mut at = 0;
+        for axis in 0..D {
+            let n = shape[axis] as i32;
+            let mut i = point[axis] as i32 + step[axis];
+            if !(0..n).contains(&i) {
+                if !wrap[axis] {
+                    return None;
+                }
+                i = i.rem_euclid(n);
+            }
+            at = at * n as usize + i as usize;
+        }
+        Some(at)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

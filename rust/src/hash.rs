@@ -40,6 +40,21 @@ impl Noise {
         }
     }
 
+    /// The noise of one use among several, independent of that of the others.
+    pub fn part(&self, use_: u32) -> Self {
+        let [a, b, ..] = self.words([use_, 0x7061_7274, 0, 0]);
+        Self { key: [a, b] }
+    }
+
+    /// The four words of a point of the world of two or three axes.
+    pub fn at<const D: usize>(&self, world: [i32; D], count: u32) -> [u32; 4] {
+        let mut position = [0, 0, 0, count];
+        for axis in 0..D.min(3) {
+            position[axis] = world[axis] as u32;
+        }
+        self.words(position)
+    }
+
     /// Four independent words for a position of up to four coordinates.
     pub fn words(&self, position: [u32; 4]) -> [u32; 4] {
         philox(position, self.key)

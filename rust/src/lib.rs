@@ -8,6 +8,13 @@
 //! | [`grid`] | shape, strides, wrap or clamp per axis; two and three dimensions from one source |
 //! | [`par`] | the process-local thread pool, fixed chunks, progress and cancellation |
 //! | [`hash`] | counter-based noise: randomness belongs to the position, never to a stream |
+//! | [`fixed`] | coordinates and frames in fixed point |
+//! | [`pca`] | principal components |
+//! | [`appearance`] | what the surroundings of each sample of an exemplar look like |
+//! | [`guide`] | what an output is asked to show beside looking like the exemplar |
+//! | [`blocks`] | a coherent start: cells filled by pieces that fit |
+//! | [`pyramid`] | from one resolution to the next |
+//! | [`optimize`] | coordinates corrected until every window is like one of the exemplar |
 //! | [`gather`] | an exemplar of any type looked up through coordinates |
 //! | [`seam`] | minimum cuts on grids: max-flow, planar strips, binary labels |
 //! | [`mean_shift`] | joint spatial and range filtering |
@@ -21,16 +28,23 @@
 //! Every kernel gives the same bytes for any number of threads.
 
 pub mod error;
+pub mod fixed;
 pub mod grid;
 pub mod hash;
 pub mod image_io;
 pub mod par;
+pub mod pca;
 
+pub mod appearance;
+pub mod blocks;
 pub mod complete;
 pub mod gather;
+pub mod guide;
 pub mod mean_shift;
+pub mod optimize;
 pub mod patch_search;
 pub mod poisson;
+pub mod pyramid;
 pub mod seam;
 
 #[cfg(feature = "python")]

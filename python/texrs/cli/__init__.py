@@ -22,7 +22,7 @@ from texrs import io, samples
 from texrs._arrays import as_float
 from texrs.blend import SCREENING
 from texrs.blend import blend as healed
-from texrs.cli import _files, _pictures
+from texrs.cli import _files, _pictures, _volumes
 from texrs.cli._console import Quiet, Threads, note, run, say, watching
 from texrs.cli._files import describe, named
 from texrs.errors import FileError, InvalidInput
@@ -42,6 +42,7 @@ app = typer.Typer(
 )
 app.command("tile")(_pictures.tile_command)
 app.command("complete")(_pictures.complete_command)
+app.command("slice")(_volumes.slice_command)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

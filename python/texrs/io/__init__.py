@@ -11,14 +11,23 @@ Suffix                dtypes                                      Channels   Los
 ``.jpg`` ``.jpeg``    bool, uint8                                 1, 3       JPEG, quality 95
 ``.bmp``              bool, uint8                                 1, 3       nothing
 ``.npy`` ``.npz``     bool, (u)int8/16/32/64, float16/32/64       1 to 64    nothing
+``.nrrd`` [2]_        bool, (u)int8/16/32/64, float32/64          1 to 64    nothing
+``.nii`` [2]_         bool, (u)int8/16/32/64, float32/64          1 to 64    nothing
+``.nii.gz`` [2]_      the same                                    1 to 64    nothing
+``.vti`` [3]_         bool, (u)int8/16/32/64, float32/64          1 to 64    not read
 ===================== =========================================== ========== ====================
 
 .. [1] of the largest channel of each pixel, with which the three share an exponent.
+.. [2] volumes alone; needs the extra: ``pip install texrs[vol]``.
+.. [3] volumes alone, for ParaView.
 
-Volumes are written to ``.tif``, ``.tiff``, ``.npy`` and ``.npz``. GIF is read, its first frame. A
-dtype that a format cannot hold is refused, never converted; bool is written as 0 and 255 (to
-``.npy`` and ``.npz`` as it is). A single channel is read without a channel axis (from ``.npy`` and
-``.npz`` as it was written). ``.npz`` files have the key ``image``.
+Volumes are written to ``.tif``, ``.tiff``, ``.npy``, ``.npz`` and to the last four, which also keep
+the distances between voxels. What is (plane, row, column) here is z, y, x there, and x runs fastest
+in the file. Volumes larger than memory are written slab by slab (`write_slabs`), surfaces as
+``.stl`` (`write_surface`). GIF is read, its first frame. A dtype that a format cannot hold is
+refused, never converted; bool is written as 0 and 255 (to ``.npy`` and ``.npz`` as it is). A single
+channel is read without a channel axis (from ``.npy`` and ``.npz`` as it was written). ``.npz``
+files have the key ``image``.
 
 Files are recognised by their content when read and by their suffix when written. Headers are
 compared with the limit before memory is used. All files are written to a temporary name and
@@ -28,21 +37,24 @@ renamed. What goes wrong is a `texrs.errors.FileError`, `~texrs.errors.LimitExce
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
+from math import prod
 from pathlib import Path
 
 import numpy as np
 
-from texrs._arrays import MAX_PIXELS, as_int
+from texrs._arrays import MAX_PIXELS, as_float, as_int
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput
-from texrs.io import _files, _npy, _pillow, _tiff
+from texrs.io import _files, _npy, _pillow, _slabs, _tiff, _volumes
 from texrs.io._files import atomic
 from texrs.io._npy import read_arrays
 from texrs.kernels import image_io
 
-__all__ = ["atomic", "read", "read_arrays", "read_volume", "write", "write_volume"]
+__all__ = ["atomic", "read", "read_arrays", "read_volume", "write", "write_slabs", "write_surface", "write_volume"]
 
 _MAGIC = (
     (b"\x89PNG\r\n\x1a\n", "png"),
@@ -59,11 +71,16 @@ _MAGIC = (
     (b"BM", "bmp"),
     (_npy.MAGIC, "npy"),
     (b"PK\x03\x04", "npz"),
+    (_volumes.NRRD_MAGIC, "nrrd"),
+    (_volumes.GZIP_MAGIC, "nii.gz"),
+    *((magic, "nii") for magic in _volumes.NIFTI_MAGIC),
 )
 
 _NUMBERS = frozenset(np.dtype(kind) for kind in ("?", "u1", "i1", "u2", "i2", "u4", "i4", "f2", "f4", "f8"))
 _SMALL = frozenset({np.dtype(np.bool_), np.dtype(np.uint8)})
 _MOST_CHANNELS = 64
+_VOLUMES = ("nrrd", "nii", "nii.gz")
+_UNIT = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,13 +91,17 @@ class _Format:
     channels: range
     longest: int = 2**31 - 1
     volumes: bool = False
+    images: bool = True
 
     def holds(self, dtype: np.dtype[np.generic], channels: int, volume: bool) -> bool:
-        return dtype in self.dtypes and channels in self.channels and self.volumes >= volume
+        fits = self.volumes if volume else self.images
+        return dtype in self.dtypes and channels in self.channels and fits
 
 
 _TIFF = _Format(_NUMBERS, range(1, _MOST_CHANNELS + 1), volumes=True)
 _NUMPY = _Format(_NUMBERS | {np.dtype(np.int64), np.dtype(np.uint64)}, range(1, _MOST_CHANNELS + 1), volumes=True)
+_SCIENCE = _Format(_NUMPY.dtypes - {np.dtype(np.float16)}, _NUMPY.channels, volumes=True, images=False)
+_NIFTI = replace(_SCIENCE, longest=2**15 - 1)
 _JPEG = _Format(_SMALL, range(1, 4, 2), 65_500)
 _FORMATS = {
     ".png": _Format(_SMALL | {np.dtype(np.uint16)}, range(1, 5)),
@@ -94,6 +115,10 @@ _FORMATS = {
     ".bmp": _Format(_SMALL, range(1, 4, 2), 2**15),
     ".npy": _NUMPY,
     ".npz": _NUMPY,
+    ".nrrd": _SCIENCE,
+    ".nii": _NIFTI,
+    ".nii.gz": _NIFTI,
+    ".vti": _SCIENCE,
 }
 
 
@@ -148,6 +173,8 @@ def read(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
         channels = array.shape[2] if array.ndim == 3 else 1
         _files.check_size(name, array.shape[:2], channels, array.itemsize, limit)
         return array
+    if kind in _VOLUMES:
+        raise FileError(f"{name}: is a {kind} file, which holds a volume; texrs.io.read_volume reads it")
     file = _files.load(name, limit)
     if kind == "jpeg":
         return _pillow.read_jpeg(name, file, limit)
@@ -166,7 +193,8 @@ def read_volume(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
     Parameters
     ----------
     path : path_like
-        A TIFF stack (a single image is a volume of one plane), .npy or .npz.
+        A TIFF stack (a single image is a volume of one plane), .npy, .npz, NRRD or NIfTI (with the extra ``vol``),
+        whichever its content says it is. A NIfTI file that scales its samples gives float32.
     limit : int
         Voxels that the volume may have, and a sixteenth of the bytes.
 
@@ -198,8 +226,14 @@ def read_volume(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
     if kind == "tiff":
         planes, orientation = _tiff.read_tiff(name, limit)
         return _tiff.volume_of(name, planes, orientation)
+    if kind == "nrrd":
+        return _volumes.read_nrrd(name, limit)
+    if kind in ("nii", "nii.gz"):
+        return _volumes.read_nifti(name, limit, compressed=kind == "nii.gz")
     if kind not in ("npy", "npz"):
-        raise FileError(f"{name}: is a {kind} file, which holds one image; volumes are read from TIFF, .npy and .npz")
+        raise FileError(
+            f"{name}: is a {kind} file, which holds one image; volumes are read from TIFF, .npy, .npz, NRRD and NIfTI"
+        )
     array = _npy.read_npy(name, limit) if kind == "npy" else _npy.read_npz(name, limit)
     if array.ndim not in (3, 4):
         raise FileError(f"{name}: holds an array of shape {array.shape}, a volume is (D, H, W) or (D, H, W, C)")
@@ -238,20 +272,25 @@ def write(path: PathLike, array: Array, *, overwrite: bool = True) -> None:
     texrs.errors.InvalidInput: array: .png cannot hold float32 with 1 channel; .exr, ... can
 
     """
-    _write(path, array, 2, overwrite)
+    _write(path, array, 2, overwrite, None)
 
 
-def write_volume(path: PathLike, array: Array, *, overwrite: bool = True) -> None:
+def write_volume(
+    path: PathLike, array: Array, *, overwrite: bool = True, spacing: Sequence[float] | None = None
+) -> None:
     """Write a volume, whole or not at all.
 
     Parameters
     ----------
     path : path_like
-        With the suffix .tif, .tiff, .npy or .npz.
+        With the suffix .tif, .tiff, .npy, .npz, .nrrd, .nii, .nii.gz (these three with the extra ``vol``) or .vti.
     array : array_like
         Shape (D, H, W) or (D, H, W, C).
     overwrite : bool
         Whether a file that exists may be replaced.
+    spacing : sequence of 3 float, optional
+        From plane to plane, from row to row and from column to column, in whatever unit; by default 1. The last four
+        formats keep it, the others cannot.
 
     Raises
     ------
@@ -271,7 +310,103 @@ def write_volume(path: PathLike, array: Array, *, overwrite: bool = True) -> Non
     (5, 4, 3, 3)
 
     """
-    _write(path, array, 3, overwrite)
+    _write(path, array, 3, overwrite, spacing)
+
+
+def write_slabs(path: PathLike, slabs: Iterable[Array], shape: Sequence[int], *, overwrite: bool = True) -> None:
+    """Write a volume that is made slab by slab, whole or not at all: no more than a slab is in memory.
+
+    Parameters
+    ----------
+    path : path_like
+        With the suffix .npy, .tif or .tiff.
+    slabs : iterable of array_like
+        Shapes (d, H, W) or (d, H, W, C), of one dtype, that follow each other along the planes.
+    shape : sequence of int
+        Of the whole volume, with the channels where there are any.
+    overwrite : bool
+        Whether a file that exists may be replaced.
+
+    Raises
+    ------
+    InvalidInput
+        Slabs that do not make up the volume, or not one that the format can hold.
+    FileError
+        Another suffix, or the file cannot be written. A former file is as it was, also if making a slab fails.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "large.npy")
+    ...     write_slabs(path, (np.full((2, 3, 4), i, np.uint8) for i in range(5)), (10, 3, 4))
+    ...     read_volume(path)[::2, 0, 0]
+    array([0, 1, 2, 3, 4], dtype=uint8)
+
+    """
+    target = _files.as_path(path)
+    suffix = target.suffix.lower()
+    if suffix not in (".npy", ".tif", ".tiff"):
+        raise FileError(f"{target}: the suffix {suffix!r} is not one that slabs are written to: .npy, .tif, .tiff")
+    sides = _slabs.as_shape(shape)
+    with atomic(target, overwrite=overwrite) as temporary:
+        # What a slab's maker raises is its own affair and passes as it is.
+        parts = _slabs.checked((_checked(slab, suffix, 3) for slab in slabs), sides)
+        first = next(parts)
+        whole = chain((first,), parts)
+        if suffix == ".npy":
+            _npy.write_parts(temporary, whole, sides, first.dtype)
+        else:
+            channels, size = prod(sides[3:]), prod(sides) * first.itemsize
+            _tiff.write_tiff(temporary, _slabs.planes(whole), channels, size)
+
+
+def write_surface(path: PathLike, vertices: Array, faces: Array, *, overwrite: bool = True) -> None:
+    """Write a surface of triangles as .stl, whole or not at all (see `texrs.volume.surface`).
+
+    Parameters
+    ----------
+    path : path_like
+        With the suffix .stl; binary.
+    vertices : (N, 3) array_like
+        Corners, as x, y, z.
+    faces : (M, 3) array_like
+        Three corners each, counter-clockwise as seen from outside.
+    overwrite : bool
+        Whether a file that exists may be replaced.
+
+    Raises
+    ------
+    InvalidInput
+        Not triangles, or of corners that are not there.
+    FileError
+        Another suffix, or the file cannot be written. A former file is as it was.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "triangle.stl")
+    ...     write_surface(path, [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)])
+    ...     path.stat().st_size
+    134
+
+    """
+    target = _files.as_path(path)
+    if target.suffix.lower() != ".stl":
+        raise FileError(f"{target}: the suffix {target.suffix!r} is not one that surfaces are written to: .stl")
+    corners, triangles = np.asarray(vertices), np.asarray(faces)
+    if corners.ndim != 2 or corners.shape[-1] != 3 or corners.dtype.kind not in "uif":
+        raise InvalidInput(f"vertices: needs numbers of shape (N, 3), got {corners.dtype} of {corners.shape}")
+    if triangles.ndim != 2 or triangles.shape[-1] != 3 or triangles.dtype.kind not in "ui":
+        raise InvalidInput(f"faces: needs integers of shape (M, 3), got {triangles.dtype} of {triangles.shape}")
+    if not np.isfinite(corners).all() or not 0 < len(triangles) < 2**32:
+        raise InvalidInput("vertices, faces: needs finite corners and at least one triangle")
+    if int(triangles.min()) < 0 or int(triangles.max()) >= len(corners):
+        raise InvalidInput(f"faces: name corners from 0 to {len(corners) - 1}")
+    with atomic(target, overwrite=overwrite) as temporary, _files.speaking(target, "writing"):
+        _volumes.write_stl(temporary, corners.astype(np.float32), triangles.astype(np.int64))
 
 
 def _kind(path: Path) -> str:
@@ -284,15 +419,17 @@ def _kind(path: Path) -> str:
             return kind
     if start.startswith(b"RIFF") and start[8:12] == b"WEBP":
         return "webp"
-    raise FileError(f"{path}: its content is none of PNG, TIFF, EXR, HDR, WebP, JPEG, GIF, BMP, .npy and .npz")
+    raise FileError(
+        f"{path}: its content is none of PNG, TIFF, EXR, HDR, WebP, JPEG, GIF, BMP, .npy, .npz, NRRD, NIfTI"
+    )
 
 
-def _write(path: PathLike, value: Array, axes: int, overwrite: bool) -> None:
+def _write(path: PathLike, value: Array, axes: int, overwrite: bool, spacing: Sequence[float] | None) -> None:
     target = _files.as_path(path)
-    suffix = target.suffix.lower()
+    suffix = ".nii.gz" if target.name.lower().endswith(".nii.gz") else target.suffix.lower()
     if suffix not in _FORMATS:
         raise FileError(f"{target}: the suffix {suffix!r} is not one that is written: {', '.join(_FORMATS)}")
-    array = _checked(value, suffix, axes)
+    array, steps = _checked(value, suffix, axes), _spacing(spacing, suffix)
     with atomic(target, overwrite=overwrite) as temporary, _files.speaking(target, "writing"):
         if suffix == ".npy":
             _npy.write_npy(temporary, array)
@@ -304,7 +441,17 @@ def _write(path: PathLike, value: Array, axes: int, overwrite: bool) -> None:
             array = array.astype(np.uint8) * np.uint8(255)
         if suffix in (".tif", ".tiff"):
             planes = array if axes == 3 else array[np.newaxis]
-            _tiff.write_tiff(temporary, planes if planes.ndim == 4 else planes[..., np.newaxis])
+            planes = planes if planes.ndim == 4 else planes[..., np.newaxis]
+            _tiff.write_tiff(temporary, planes, planes.shape[3], planes.nbytes)
+            return
+        if axes == 3:
+            volume = array[..., 0] if array.ndim == 4 and array.shape[3] == 1 else array
+            if suffix == ".nrrd":
+                _volumes.write_nrrd(temporary, volume, steps)
+            elif suffix == ".vti":
+                _volumes.write_vti(temporary, volume, steps)
+            else:
+                _volumes.write_nifti(temporary, volume, steps, compressed=suffix == ".nii.gz")
             return
         if array.ndim == 3 and array.shape[2] == 1:
             array = array[..., 0]
@@ -313,6 +460,21 @@ def _write(path: PathLike, value: Array, axes: int, overwrite: bool) -> None:
         else:
             file = image_io.encode(array, suffix[1:], name=str(target))
         temporary.write_bytes(file)
+
+
+def _common_first() -> list[str]:
+    return sorted(_FORMATS, key=lambda suffix: (not _FORMATS[suffix].images, suffix))
+
+
+def _spacing(spacing: Sequence[float] | None, suffix: str) -> tuple[float, ...]:
+    if spacing is None:
+        return _UNIT
+    if _FORMATS[suffix].images:
+        raise InvalidInput(f"spacing: {suffix} cannot keep it; .nrrd, .nii, .nii.gz and .vti can")
+    steps = tuple(spacing) if isinstance(spacing, Sequence | np.ndarray) else ()
+    if len(steps) != 3:
+        raise InvalidInput(f"spacing: needs three numbers, of planes, rows and columns; got {spacing!r}")
+    return tuple(as_float(s, "spacing", 1e-12, 1e12) for s in steps)
 
 
 def _checked(value: object, suffix: str, axes: int) -> Array:
@@ -330,7 +492,7 @@ def _checked(value: object, suffix: str, axes: int) -> Array:
     form, volume = _FORMATS[suffix], axes == 3
     channels = array.shape[axes] if array.ndim > axes else 1
     if not form.holds(array.dtype, channels, volume):
-        able = sorted(s for s, f in _FORMATS.items() if f.holds(array.dtype, channels, volume))
+        able = [s for s in _common_first() if _FORMATS[s].holds(array.dtype, channels, volume)]
         what = f"{'volumes of ' * volume}{array.dtype} with {channels} channel{'s'[: channels != 1]}"
         can = f"{', '.join(able)} can" if able else f"no format can, of more than {_MOST_CHANNELS}"
         raise InvalidInput(f"array: {suffix} cannot hold {what}; {can}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 import zipfile
+from collections.abc import Iterable
 from pathlib import Path
 from typing import BinaryIO, cast
 
@@ -71,6 +72,15 @@ def write_npy(path: Path, array: Array) -> None:
     """Write an .npy file."""
     with path.open("xb") as file:
         np.lib.format.write_array(file, array, allow_pickle=False)
+
+
+def write_parts(path: Path, parts: Iterable[Array], shape: tuple[int, ...], dtype: np.dtype[np.generic]) -> None:
+    """Write an .npy file of arrays that follow each other along the first axis."""
+    header = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
+    with path.open("xb") as file:
+        np.lib.format.write_array_header_1_0(file, header)
+        for part in parts:
+            file.write(np.ascontiguousarray(part, dtype).data)
 
 
 def write_npz(path: Path, array: Array) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from math import prod
 from pathlib import Path
@@ -79,11 +79,10 @@ def volume_of(path: Path, planes: Array, orientation: int) -> Array:
     return planes[..., 0] if planes.shape[3] == 1 else planes
 
 
-def write_tiff(path: Path, planes: Array) -> None:
-    """Write planes, rows, columns, channels: one page a plane, uncompressed, for every reader."""
+def write_tiff(path: Path, planes: Iterable[Array], channels: int, size: int) -> None:
+    """Write planes of rows, columns, channels, of so many bytes in all: one page a plane, uncompressed."""
     import tifffile
 
-    channels = planes.shape[3]
     extra = {2: ["unassalpha"], 4: ["unassalpha"]}.get(channels, ["unspecified"] * (channels - 1))
     options: dict[str, Any] = {
         "photometric": "rgb" if channels in (3, 4) else "minisblack",
@@ -94,7 +93,7 @@ def write_tiff(path: Path, planes: Array) -> None:
     if channels > 1:
         options["planarconfig"] = "contig"
     # Offsets of 32 bits end at 4 GB.
-    with tifffile.TiffWriter(path, bigtiff=planes.nbytes > 2**32 - 2**25) as tif:
+    with tifffile.TiffWriter(path, bigtiff=size > 2**32 - 2**25) as tif:
         for plane in planes:
             tif.write(plane if channels > 1 else plane[..., 0], **options)
 

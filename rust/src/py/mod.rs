@@ -9,6 +9,7 @@ mod mean_shift;
 mod patch_search;
 mod poisson;
 mod seam;
+mod solid;
 
 use std::cell::Cell;
 use std::time::Duration;
@@ -95,6 +96,8 @@ mod _rust {
     use super::seam::{seam_cut, seam_labels, seam_strip};
     #[pymodule_export]
     use super::set_threads;
+    #[pymodule_export]
+    use super::solid::{Appearance, upsample};
 
     #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");

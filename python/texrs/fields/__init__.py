@@ -1,0 +1,62 @@
+"""Frame fields: how a texture is turned, stretched and sheared at each point of the output.
+
+A `Field` gives a frame F for any point: its columns are where the exemplar's axes go in the output, so a column of
+length 2 means features twice as large. J = F^-1 takes steps in the output to steps in the exemplar; source maps keep
+J. Points are (row, column) or (plane, row, column) in voxels of the output, with centres at the integers; the letters
+x, y and z stand for the axes of columns, rows and planes.
+
+===================  ==========================================================================
+`identity`           as the exemplar stands
+`circular`           wound round an axis
+`spiral`             the same, turned by an angle
+`zigzag`             turned by an angle and by its opposite, in bands
+`slant`              turned by an angle in a plane
+`slant_3d`           turned in two planes
+`shear`              leaning
+`scale_ramp`         growing along an axis
+`constant`           any matrix
+`from_array`         frames on a grid of any resolution
+`interpolate`        frames set at points
+`from_function`      a function of the point
+===================  ==========================================================================
+
+The field is kept, not a dense array of frames: what is evaluated at a point depends on that point alone. `parse`
+makes a field of words (``zigzag:period=64,angle=30``), `names` lists them, `check` looks for singular frames before
+long work.
+"""
+
+from texrs.fields._field import LEAST_DETERMINANT, WORST_CONDITION, Field, check
+from texrs.fields._parse import names, parse
+from texrs.fields._sampled import from_array, from_function, interpolate
+from texrs.fields._shapes import (
+    circular,
+    constant,
+    identity,
+    scale_ramp,
+    shear,
+    slant,
+    slant_3d,
+    spiral,
+    zigzag,
+)
+
+__all__ = [
+    "LEAST_DETERMINANT",
+    "WORST_CONDITION",
+    "Field",
+    "check",
+    "circular",
+    "constant",
+    "from_array",
+    "from_function",
+    "identity",
+    "interpolate",
+    "names",
+    "parse",
+    "scale_ramp",
+    "shear",
+    "slant",
+    "slant_3d",
+    "spiral",
+    "zigzag",
+]

@@ -1,0 +1,383 @@
+"""What every field is: a frame for any point, checked, the same however many points are asked for at once."""
+
+from __future__ import annotations
+
+import hashlib
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import prod
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from texrs._arrays import as_float, as_size
+from texrs._typing import Array, Floats
+from texrs.errors import InvalidInput
+from texrs.fields._matrices import Matrices, inverses, too_flat, transposed
+
+LEAST_DETERMINANT = 1e-3
+"""Frames of a smaller determinant are refused: they are flat, and have no inverse worth the name."""
+WORST_CONDITION = 100.0
+"""Frames that stretch one way so many times as much as another are refused."""
+
+FAR = 1e9
+"""Lengths and single places are within so many voxels."""
+MOST_BYTES = 2**32
+"""Of a lattice of frames."""
+_BLOCK = 2**13
+"""Points evaluated at once; the result does not depend on it."""
+_NAMES = ("row", "column"), ("plane", "row", "column")
+
+
+class Field(ABC):
+    """A frame for every point of the plane or of space (made by the functions of `texrs.fields`).
+
+    The columns of a frame F are where the exemplar's axes go in the output: a column of length 2 means features
+    twice as large along that axis. Its inverse J maps steps in the output to steps in the exemplar; that is what a
+    source map keeps. Points are in voxels of the output, (row, column) or (plane, row, column), with centres at the
+    integers; they may be any finite numbers. A frame depends on its point alone, to the last bit, so that any window
+    of an unbounded texture is the same however it is cut.
+
+    Fields can be pickled. Two fields are equal if they have the same `key`.
+
+    Attributes
+    ----------
+    axes : int
+        2 or 3.
+
+    """
+
+    axes: int
+    _rigid = False
+    """Whether every frame is a rotation: then J is the transposed F, and none is singular."""
+
+    @abstractmethod
+    def _frames(self, points: NDArray[np.float64]) -> Matrices:
+        """Give the frames (A, A, N) of (N, A) points, unchecked."""
+
+    @abstractmethod
+    def _content(self) -> tuple[Any, ...] | None:
+        """Give what the field is made of, for its key; None if that cannot be known."""
+
+    @abstractmethod
+    def describe(self) -> str:
+        """Say on one line what the field is.
+
+        Examples
+        --------
+        >>> from texrs import fields
+        >>> fields.zigzag(period=64).describe()
+        'zigzag of +-30 degrees in the plane xy, period 64 along x'
+
+        """
+
+    @property
+    def constant(self) -> NDArray[np.float32] | None:
+        """The frame, (A, A) float32, where it is the same everywhere; None where it varies."""
+        return None
+
+    @cached_property
+    def key(self) -> bytes | None:
+        """A digest of all that the field depends on, for caches; None of a field that calls a function."""
+        content = self._content()
+        if content is None:
+            return None
+        digest = hashlib.blake2b(digest_size=16, person=b"texrs.fields")
+        for part in (type(self).__name__, self.axes, *content):
+            data = np.ascontiguousarray(part).tobytes() if isinstance(part, np.ndarray) else repr(part).encode()
+            digest.update(len(data).to_bytes(8, "little") + data)
+        return digest.digest()
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Field):
+            return NotImplemented
+        return self is other or (self.key is not None and self.key == other.key)
+
+    def __hash__(self) -> int:
+        return object.__hash__(self) if self.key is None else hash(self.key)
+
+    def __repr__(self) -> str:
+        return f"<{self.axes}-D field: {self.describe()}>"
+
+    def frames(self, points: ArrayLike) -> Floats:
+        """Give the frames F.
+
+        Parameters
+        ----------
+        points : array_like
+            Shape (..., A), in voxels of the output.
+
+        Returns
+        -------
+        ndarray
+            Shape (..., A, A), float32; column j is where the exemplar's axis j goes.
+
+        Raises
+        ------
+        InvalidInput
+            Not points, or a frame at one of them is singular: not finite, of a determinant below 0.001, or of a
+            condition number above 100. The message names the place.
+
+        Examples
+        --------
+        >>> from texrs import fields
+        >>> fields.scale_ramp(1, 2, length=100, axes=2).frames([[0, 0], [0, 100]]).round(3)
+        array([[[1., 0.],
+                [0., 1.]],
+               [[2., 0.],
+                [0., 2.]]], dtype=float32)
+
+        """
+        return self._evaluate(points, False)
+
+    def jacobians(self, points: ArrayLike) -> Floats:
+        """Give the Jacobians J, the inverses of the frames: output steps to exemplar steps.
+
+        Parameters
+        ----------
+        points : array_like
+            Shape (..., A), in voxels of the output.
+
+        Returns
+        -------
+        ndarray
+            Shape (..., A, A), float32.
+
+        Raises
+        ------
+        InvalidInput
+            As of `frames`.
+
+        Examples
+        --------
+        >>> from texrs import fields
+        >>> fields.constant([[2, 0], [0, 1]]).jacobians((7, 9))
+        array([[0.5, 0. ],
+               [0. , 1. ]], dtype=float32)
+
+        """
+        return self._evaluate(points, True)
+
+    def lattice(
+        self, shape: Sequence[int], *, origin: ArrayLike = 0, step: float = 1, jacobians: bool = True
+    ) -> Floats:
+        """Give the Jacobians (or the frames) at the samples of a level of a pyramid.
+
+        Parameters
+        ----------
+        shape : sequence of int
+            Samples along each axis.
+        origin : int, or one an axis
+            Index of the first sample, on the level's own lattice.
+        step : float
+            Voxels from one sample to the next: 1, 2, 4 ... Sample i lies at (i + 1/2) step - 1/2.
+        jacobians : bool
+            False gives the frames.
+
+        Returns
+        -------
+        ndarray
+            Shape of the lattice, then (A, A); float32.
+
+        Raises
+        ------
+        InvalidInput
+            As of `frames`, or the shape is not one.
+        LimitExceeded
+            More samples than 4 GiB hold.
+
+        Examples
+        --------
+        >>> from texrs import fields
+        >>> fields.circular(centre=(0, 0, 0)).lattice((2, 3, 4), origin=-8, step=4).shape
+        (2, 3, 4, 3, 3)
+
+        """
+        sides = as_size(shape, "shape", axes=self.axes, limit=MOST_BYTES // (4 * self.axes**2))
+        first = np.broadcast_to(np.asarray(origin), (self.axes,) if np.ndim(origin) == 0 else np.shape(origin))
+        if first.dtype.kind not in "ui" or first.shape != (self.axes,):
+            raise InvalidInput(f"origin: needs an integer, or {self.axes} of them; got {first.dtype} of {first.shape}")
+        spread = as_float(step, "step", 2.0**-20, 2.0**20)
+        out = np.empty((prod(sides), self.axes, self.axes), np.float32)
+        for start in range(0, len(out), _BLOCK):
+            index = np.unravel_index(np.arange(start, min(start + _BLOCK, len(out))), sides)
+            at = np.stack([(i + o + 0.5) * spread - 0.5 for i, o in zip(index, first.tolist(), strict=True)], axis=-1)
+            part = self._checked(np.asarray(at, np.float64), jacobians)
+            out[start : start + len(at)] = part.transpose(2, 0, 1)
+        return out.reshape(*sides, self.axes, self.axes)
+
+    def over(self, shape: Sequence[int]) -> Field:
+        """Give the field as it lies over a bounded output: what was left open (a centre, a length) is set by its size.
+
+        Parameters
+        ----------
+        shape : sequence of int
+            Rows and columns, or planes, rows and columns, of the output.
+
+        Returns
+        -------
+        Field
+            The field itself where nothing is open.
+
+        Examples
+        --------
+        >>> from texrs import fields
+        >>> fields.circular(axes=2).over((65, 33)).describe()
+        'circular, x outwards, about (32, 16)'
+
+        """
+        as_size(shape, "shape", axes=self.axes)
+        return self
+
+    def inverse(self) -> Field:
+        """Give the field whose frames are the inverses of these at each point.
+
+        Examples
+        --------
+        >>> from texrs import fields
+        >>> fields.constant([[2, 0], [0, 4]]).inverse().constant
+        array([[0.5 , 0.  ],
+               [0.  , 0.25]], dtype=float32)
+        >>> fields.slant(30).inverse().inverse() == fields.slant(30)
+        True
+
+        """
+        return _Inverse(self)
+
+    def _evaluate(self, points: ArrayLike, jacobians: bool) -> Floats:
+        at = as_points(points, self.axes)
+        flat = at.reshape(-1, self.axes)
+        out = np.empty((len(flat), self.axes, self.axes), np.float32)
+        for start in range(0, len(flat), _BLOCK):
+            part = slice(start, start + _BLOCK)
+            out[part] = self._checked(flat[part], jacobians).transpose(2, 0, 1)
+        return out.reshape(*at.shape, self.axes)
+
+    def _checked(self, points: NDArray[np.float64], jacobians: bool) -> Matrices:
+        frames = self._frames(points)
+        inverse = transposed(frames) + 0.0 if self._rigid else refuse_flat(frames, points)
+        return inverse if jacobians else frames
+
+
+def refuse_flat(frames: Matrices, places: NDArray[np.float64], name: str = "field") -> Matrices:
+    """Give the inverses of frames, or raise InvalidInput that names the first place where there is none."""
+    inverse, det = inverses(frames)
+    bad = too_flat(frames, inverse, det, LEAST_DETERMINANT, WORST_CONDITION)
+    if bad.any():
+        i = int(np.flatnonzero(bad)[0])
+        axes = len(frames)
+        place = f"({', '.join(_NAMES[axes - 2])}) = ({', '.join(f'{v:g}' for v in places[i])})"
+        if not np.isfinite(frames[:, :, i]).all():
+            why = "is not finite"
+        elif abs(det[i]) < LEAST_DETERMINANT:
+            why = f"is flat: its determinant is {det[i]:.3g}, at least {LEAST_DETERMINANT:g} is needed"
+        else:
+            why = f"stretches one way more than {WORST_CONDITION:g} times as much as another"
+        raise InvalidInput(f"{name}: the frame at {place} {why}")
+    return inverse
+
+
+def as_points(points: ArrayLike, axes: int, name: str = "points") -> NDArray[np.float64]:
+    """Check points of shape (..., A): finite numbers."""
+    try:
+        given: Array = np.asarray(points)
+    except (ValueError, TypeError):
+        given = np.empty(0, np.object_)
+    if given.dtype.kind not in "buif" or given.ndim == 0 or given.shape[-1] != axes:
+        raise InvalidInput(
+            f"{name}: needs numbers of shape (..., {axes}), ({', '.join(_NAMES[axes - 2])}) each; "
+            f"got {given.dtype} of shape {given.shape}"
+        )
+    at = np.ascontiguousarray(given, np.float64)
+    if not np.isfinite(at).all():
+        raise InvalidInput(f"{name}: {int((~np.isfinite(at)).sum())} of {at.size} values are NaN or infinite")
+    return at
+
+
+def as_place(place: ArrayLike | None, axes: int, name: str) -> NDArray[np.float64]:
+    """Check a single point, (A,); by default the origin."""
+    if place is None:
+        return np.zeros(axes)
+    at = as_points(place, axes, name)
+    if at.ndim > 1 or np.abs(at).max() > FAR:
+        raise InvalidInput(f"{name}: needs {axes} numbers within {FAR:g}, got shape {at.shape}, or larger ones")
+    return at
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Inverse(Field):
+    """The inverses of another field's frames."""
+
+    field: Field
+
+    @property
+    def axes(self) -> int:  # type: ignore[override]
+        return self.field.axes
+
+    @property
+    def constant(self) -> NDArray[np.float32] | None:
+        if self.field.constant is None:
+            return None
+        return self.frames(np.zeros(self.axes))
+
+    def _frames(self, points: NDArray[np.float64]) -> Matrices:
+        return refuse_flat(self.field._frames(points), points)
+
+    def _content(self) -> tuple[Any, ...] | None:
+        return None if self.field.key is None else (self.field.key,)
+
+    def describe(self) -> str:
+        return f"inverse of: {self.field.describe()}"
+
+    def over(self, shape: Sequence[int]) -> Field:
+        return _Inverse(self.field.over(shape))
+
+    def inverse(self) -> Field:
+        return self.field
+
+
+def check(field: Field, shape: Sequence[int], origin: Sequence[float] | None = None) -> None:
+    """Check a field over a box before any long work.
+
+    Parameters
+    ----------
+    field : Field
+        Of 2 or 3 axes.
+    shape : sequence of int
+        Size of the box in voxels.
+    origin : sequence of float, optional
+        Its first voxel; by default 0.
+
+    Raises
+    ------
+    InvalidInput
+        Not a field, or of another number of axes, or singular at one of up to 32768 voxels spread evenly over the
+        box, corners included.
+
+    Examples
+    --------
+    >>> from texrs import fields
+    >>> fields.check(fields.identity(2), (64, 64))
+    >>> import numpy as np
+    >>> def flattening(p):
+    ...     return np.eye(2) * (40 - p[:, 1])[:, None, None]
+    >>> fields.check(fields.from_function(flattening, 2), (64, 64))
+    Traceback (most recent call last):
+        ...
+    texrs.errors.InvalidInput: field: the frame at (row, column) = (0, 40) is flat: ...
+
+    """
+    if not isinstance(field, Field):
+        raise InvalidInput(f"field: needs a field, made by texrs.fields, got {type(field).__name__}")
+    if isinstance(shape, Sequence) and len(shape) != field.axes:
+        raise InvalidInput(f"field: has {field.axes} axes, a size of {len(shape)} is asked for")
+    sides = as_size(shape, "shape", axes=field.axes)
+    most = 32 if field.axes == 3 else 181
+    start = as_place(origin, field.axes, "origin")
+    lines = [
+        o + np.unique(np.linspace(0, n - 1, min(n, most)).round()) for o, n in zip(start.tolist(), sides, strict=True)
+    ]
+    field.jacobians(np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1))

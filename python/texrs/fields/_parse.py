@@ -1,0 +1,118 @@
+"""Fields in words, for the command line."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable, Sequence
+from difflib import get_close_matches
+
+from texrs.errors import InvalidInput
+from texrs.fields import _shapes
+from texrs.fields._field import Field
+
+__all__ = ["names", "parse"]
+
+_KNOWN: dict[str, Callable[..., Field]] = {
+    f.__name__: f
+    for f in (
+        _shapes.identity,
+        _shapes.circular,
+        _shapes.zigzag,
+        _shapes.slant,
+        _shapes.slant_3d,
+        _shapes.shear,
+        _shapes.spiral,
+        _shapes.scale_ramp,
+    )
+}
+_WORDS = ("axis", "plane", "radial")
+
+
+def names() -> dict[str, str]:
+    """Give the fields that have a name in words, with their parameters and the defaults of these.
+
+    Examples
+    --------
+    >>> from texrs import fields
+    >>> fields.names()["zigzag"]
+    'zigzag:period=32,angle=30,axis=,plane=xy'
+
+    """
+    out = {}
+    for name, make in _KNOWN.items():
+        options = [f"{k}={'' if v is None else v}" for k, v in _parameters(make).items()]
+        out[name] = name + ":" * bool(options) + ",".join(options)
+    return out
+
+
+def parse(text: str, axes: int = 3, size: Sequence[int] | None = None) -> Field:
+    """Make a field of words: its name, and what differs from the defaults.
+
+    Parameters
+    ----------
+    text : str
+        ``name`` or ``name:key=value,key=value``; a centre is written ``16x24.5x0``. `names` lists what there is.
+    axes : int
+        2 or 3.
+    size : sequence of int, optional
+        Size of the output: sets what was left open, as `Field.over`.
+
+    Raises
+    ------
+    InvalidInput
+        Not such words; the sentence says what is allowed.
+
+    Examples
+    --------
+    >>> from texrs import fields
+    >>> fields.parse("circular:axis=y,centre=0x0x0").describe()
+    'circular, round y, z outwards, about (0, 0, 0)'
+    >>> fields.parse("zigzak")
+    Traceback (most recent call last):
+        ...
+    texrs.errors.InvalidInput: field: there is no 'zigzak'; did you mean zigzag? Known are identity, ...
+
+    """
+    if not isinstance(text, str):
+        raise InvalidInput(f"field: needs words such as zigzag:period=64, got {type(text).__name__}")
+    name, _, rest = text.strip().partition(":")
+    if name not in _KNOWN:
+        near = get_close_matches(name, _KNOWN, 1)
+        hint = f"; did you mean {near[0]}? Known are" if near else "; known are"
+        raise InvalidInput(f"field: there is no {name!r}{hint} {', '.join(_KNOWN)}")
+    make, options = _KNOWN[name], {}
+    allowed = _parameters(make)
+    for part in rest.split(",") if rest.strip() else []:
+        key, equals, value = (p.strip() for p in part.partition("="))
+        if key not in allowed or not equals or not value:
+            takes = ", ".join(f"{k}=" for k in allowed) or "nothing"
+            raise InvalidInput(f"field: {name} takes {takes}; got {part.strip()!r}")
+        if key in options:
+            raise InvalidInput(f"field: {key} is given twice in {text.strip()!r}")
+        options[key] = _value(key, value)
+    if "axes" in inspect.signature(make).parameters:
+        options["axes"] = axes
+    elif axes != 3:
+        raise InvalidInput(f"field: {name} is for volumes, not for pictures")
+    try:
+        field = make(**options)
+    except InvalidInput as error:
+        raise InvalidInput(f"field: {name}: {error}") from None
+    return field if size is None else field.over(size)
+
+
+def _parameters(make: Callable[..., Field]) -> dict[str, object]:
+    return {k: p.default for k, p in inspect.signature(make).parameters.items() if k != "axes"}
+
+
+def _value(key: str, text: str) -> object:
+    if key in _WORDS:
+        return text
+    try:
+        if key == "centre":
+            return tuple(float(p) for p in re.split(r"[x×]", text))
+        return float(text)
+    except ValueError:
+        wanted = "numbers such as 16x24x32" if key == "centre" else "a number"
+        raise InvalidInput(f"field: {key} needs {wanted}, got {text!r}") from None

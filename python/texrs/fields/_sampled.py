@@ -1,0 +1,333 @@
+"""Fields from frames at some places: an array of any resolution, points, a function.
+
+A mean of frames is not a frame: of two that are turned 30 degrees either way it is 13 % too small. So each frame is
+split once into a rotation (or a mirrored one) and the logarithm of a stretch, F = R exp(L). Between samples R is the
+rotation nearest to the mean of the R, and L is the mean of the L: sizes are kept, and what turns without stretching
+never stretches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import prod
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from texrs._arrays import as_size
+from texrs._typing import Array, Floats
+from texrs.errors import InvalidInput
+from texrs.fields._field import Field, as_place, as_points, refuse_flat
+from texrs.fields._matrices import Matrices, determinants, exponentials, multiply, rotations, transposed
+
+__all__ = ["from_array", "from_function", "interpolate"]
+
+MAX_FRAMES = 2**24
+"""Of an array of frames: 256 voxels a side."""
+MAX_POINTS = 4096
+"""At which frames may be set: all of them are looked at for each voxel."""
+
+_BLOCK = 2**14
+"""Frames that are split at once."""
+_FLATTEST = 0.02
+"""Determinant of a mean of rotations below which it is no guide to a rotation."""
+
+
+def from_array(
+    frames: ArrayLike, extent: Sequence[int] | None = None, *, origin: Sequence[float] | None = None
+) -> Field:
+    """Give a field that is sampled from an array, of any resolution.
+
+    The array's cells divide the box of ``extent`` voxels from ``origin`` evenly; each frame holds at the middle of
+    its cell, and lies exactly on a voxel where the array has the box's own resolution. Between samples rotations and
+    stretches are interpolated linearly, apart from each other; beyond the outermost samples the field goes on as it
+    is there.
+
+    Parameters
+    ----------
+    frames : array_like
+        Shape (R, C, 2, 2) or (P, R, C, 3, 3), real numbers.
+    extent : sequence of int, optional
+        Voxels that the array spreads over; by default one for each frame.
+    origin : sequence of float, optional
+        The first voxel; by default 0.
+
+    Raises
+    ------
+    InvalidInput
+        Not such an array, singular somewhere, or mirrored in one place and not in another.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs import fields
+    >>> corners = np.stack([[fields.slant(a, axes=2).constant for a in (-30, 30)]] * 2)
+    >>> field = fields.from_array(corners, extent=(64, 64))
+    >>> field.frames((31.5, 31.5)).round(3) + 0  # in the middle between the two, and as large as they are
+    array([[1., 0.],
+           [0., 1.]], dtype=float32)
+
+    """
+    given = _numbers(frames, "frames")
+    axes = given.shape[-1] if given.ndim else 0
+    if axes not in (2, 3) or given.shape[-2:] != (axes, axes) or given.ndim != axes + 2 or given.size == 0:
+        raise InvalidInput(f"frames: needs shape (R, C, 2, 2) or (P, R, C, 3, 3), got {given.shape}")
+    sides = given.shape[:axes]
+    if prod(sides) > MAX_FRAMES:
+        raise InvalidInput(f"frames: up to {MAX_FRAMES} frames are taken, got {prod(sides)}; fewer are interpolated")
+    box = sides if extent is None else as_size(extent, "extent", axes=axes, limit=2**62)
+    start = as_place(origin, axes, "origin").tolist()
+    step = [n / s for n, s in zip(box, sides, strict=True)]
+    first = [o + (d - 1) / 2 for o, d in zip(start, step, strict=True)]
+
+    def places(index: NDArray[np.intp]) -> NDArray[np.float64]:
+        return np.asarray(np.stack(np.unravel_index(index, sides), axis=-1) * step + first, np.float64)
+
+    turns, stretches = _split(given.reshape(-1, axes, axes), places)
+    return _Grid(axes, sides, tuple(first), tuple(step), turns, stretches)
+
+
+def interpolate(points: ArrayLike, frames: ArrayLike) -> Field:
+    """Give a smooth field through frames that are set at points.
+
+    Each point counts by the inverse fourth power of its distance: the field has the given frame at a given point,
+    follows the nearest points elsewhere, and far away becomes the mean of all. Rotations and stretches are averaged
+    apart from each other.
+
+    Parameters
+    ----------
+    points : array_like
+        Shape (N, A), in voxels of the output; up to 4096.
+    frames : array_like
+        Shape (N, A, A).
+
+    Raises
+    ------
+    InvalidInput
+        Not such arrays, two points in one place, a singular frame, or mirrored frames among others.
+
+    Examples
+    --------
+    >>> from texrs import fields
+    >>> turned = fields.slant(90, axes=2).constant
+    >>> field = fields.interpolate([(0, 0), (0, 100)], [fields.identity(2).constant, turned])
+    >>> field.frames([(0, 0), (0, 50), (0, 100)])[:, 0, 1].round(3) + 0  # half a right angle half-way
+    array([0.   , 0.707, 1.   ], dtype=float32)
+
+    """
+    given = _numbers(frames, "frames")
+    axes = given.shape[-1] if given.ndim == 3 else 0
+    if axes not in (2, 3) or given.shape[1] != axes or not 0 < len(given) <= MAX_POINTS:
+        raise InvalidInput(f"frames: needs shape (N, 2, 2) or (N, 3, 3), N up to {MAX_POINTS}; got {given.shape}")
+    at = as_points(points, axes)
+    if at.shape != (len(given), axes):
+        raise InvalidInput(f"points: needs shape {(len(given), axes)} for {len(given)} frames, got {at.shape}")
+    if len(np.unique(at, axis=0)) < len(at):
+        raise InvalidInput("points: two frames are set at one point")
+    turns, stretches = _split(given, lambda index: at[index])
+    return _Scattered(axes, at, turns, stretches)
+
+
+def from_function(function: Callable[[NDArray[np.float64]], ArrayLike], axes: int = 3) -> Field:
+    """Give a field that a function describes.
+
+    Parameters
+    ----------
+    function : callable
+        Takes points (N, A), float64, and gives frames (N, A, A). The frame of a point must depend on that point
+        alone: not on the others of a call, nor on what was asked before. To be pickled the field needs a function
+        that can be pickled. Such a field has no `Field.key`.
+    axes : int
+        2 or 3.
+
+    Raises
+    ------
+    InvalidInput
+        Not a function. What the function raises, or what it gives that is no frames, is raised when it is called.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs import fields
+    >>> def swelling(points):
+    ...     return (1 + 0.5 * np.sin(points[:, 0] / 20))[:, None, None] * np.eye(2)
+    >>> field = fields.from_function(swelling, 2)
+    >>> field.frames((0, 0)), field.key
+    (array([[1., 0.],
+           [0., 1.]], dtype=float32), None)
+
+    """
+    if not callable(function):
+        raise InvalidInput(f"function: needs a function of points, got {type(function).__name__}")
+    if axes not in (2, 3) or isinstance(axes, bool):
+        raise InvalidInput(f"axes: needs 2 or 3, got {axes!r}")
+    return _Function(axes, function)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Grid(Field):
+    axes: int
+    sides: tuple[int, ...]
+    first: tuple[float, ...]
+    step: tuple[float, ...]
+    turns: Floats
+    stretches: Floats | None
+
+    def _frames(self, points: NDArray[np.float64]) -> Matrices:
+        low, share = [], []
+        for a, n in enumerate(self.sides):
+            at = np.clip((points[:, a] - self.first[a]) / self.step[a], 0, n - 1)
+            cell = np.minimum(np.floor(at).astype(np.int64), max(n - 2, 0))
+            low.append(cell)
+            share.append(at - cell)
+        turn = np.zeros((self.axes, self.axes, len(points)))
+        stretch = None if self.stretches is None else np.zeros((*self.stretches.shape[:-1], len(points)))
+        for corner in product((0, 1), repeat=self.axes):
+            index = np.zeros(len(points), np.int64)
+            weight = np.ones(len(points))
+            for a, (up, n) in enumerate(zip(corner, self.sides, strict=True)):
+                index = index * n + np.minimum(low[a] + up, n - 1)
+                weight = weight * (share[a] if up else 1 - share[a])
+            if not weight.any():  # Voxels that lie on samples; to add zeros would change no bit.
+                continue
+            turn += weight * self.turns[..., index]
+            if stretch is not None and self.stretches is not None:
+                stretch += weight * self.stretches[..., index]
+        return _join(turn, stretch, points)
+
+    def _content(self) -> tuple[Any, ...]:
+        return (self.sides, self.first, self.step, self.turns, self.stretches)
+
+    def describe(self) -> str:
+        return f"array of {' x '.join(map(str, self.sides))} frames, {' x '.join(f'{d:g}' for d in self.step)} apart"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Scattered(Field):
+    axes: int
+    places: NDArray[np.float64]
+    turns: Floats
+    stretches: Floats | None
+
+    def _frames(self, points: NDArray[np.float64]) -> Matrices:
+        nearest = np.full(len(points), np.inf)
+        for place in self.places:
+            nearest = np.minimum(nearest, self._squared(points, place))
+        turn = np.zeros((self.axes, self.axes, len(points)))
+        stretch = None if self.stretches is None else np.zeros((*self.stretches.shape[:-1], len(points)))
+        total = np.zeros(len(points))
+        for i, place in enumerate(self.places):
+            # Relative to the nearest, so that no weight overflows on a point or vanishes far away.
+            distance = self._squared(points, place)
+            ratio = np.where(distance > 0, nearest / np.where(distance > 0, distance, 1), 1)
+            weight = ratio * ratio
+            total += weight
+            turn += weight * self.turns[..., i : i + 1]
+            if stretch is not None and self.stretches is not None:
+                stretch += weight * self.stretches[..., i : i + 1]
+        turn /= total
+        if stretch is not None:
+            stretch /= total
+        return _join(turn, stretch, points)
+
+    def _squared(self, points: NDArray[np.float64], place: NDArray[np.float64]) -> NDArray[np.float64]:
+        total = np.zeros(len(points))
+        for a in range(self.axes):
+            away = points[:, a] - place[a]
+            total = total + away * away
+        return total
+
+    def _content(self) -> tuple[Any, ...]:
+        return (self.places, self.turns, self.stretches)
+
+    def describe(self) -> str:
+        return f"interpolated between {len(self.places)} frames"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Function(Field):
+    axes: int
+    function: Callable[[NDArray[np.float64]], ArrayLike]
+
+    def _frames(self, points: NDArray[np.float64]) -> Matrices:
+        name = getattr(self.function, "__name__", type(self.function).__name__)
+        try:
+            frames = np.asarray(self.function(points.copy()))
+        except Exception as error:
+            what = " ".join(str(error).split())[:200]
+            raise InvalidInput(f"field: the function {name} failed with {type(error).__name__}: {what}") from error
+        wanted = (len(points), self.axes, self.axes)
+        if frames.dtype.kind not in "buif" or frames.shape != wanted:
+            raise InvalidInput(
+                f"field: the function {name} gave {frames.dtype} of shape {frames.shape} for {len(points)} points; "
+                f"numbers of shape {wanted} are needed"
+            )
+        return _first(frames)
+
+    def _content(self) -> None:
+        return None
+
+    def describe(self) -> str:
+        return f"function {getattr(self.function, '__name__', type(self.function).__name__)}"
+
+
+def _split(frames: Array, places: Callable[[NDArray[np.intp]], NDArray[np.float64]]) -> tuple[Floats, Floats | None]:
+    """Split frames (N, A, A) into rotations and logarithms of stretches.
+
+    The rotations are (A, A, N). The logarithms are so too, or (N,) where no frame stretches one way more than another,
+    or none where none stretches at all. float32, for a dense array of frames is large.
+    """
+    count, axes = frames.shape[:2]
+    turns, logs = (np.empty((axes, axes, count), np.float32) for _ in range(2))
+    mirrored, uneven = 0, 0.0
+    for start in range(0, count, _BLOCK):
+        part = _first(frames[start : start + _BLOCK])
+        index = np.arange(start, start + part.shape[2])
+        refuse_flat(part, places(index), "frames")
+        mirrored += int((determinants(part) < 0).sum())
+        turn = rotations(part)
+        stretch = multiply(transposed(turn), part).transpose(2, 0, 1)
+        values, vectors = np.linalg.eigh((stretch + stretch.transpose(0, 2, 1)) / 2)
+        log = np.log(values)
+        uneven = max(uneven, float(np.ptp(log, axis=1).max()))
+        turns[..., index] = turn
+        logs[..., index] = _first((vectors * log[:, np.newaxis, :]) @ vectors.transpose(0, 2, 1))
+    if mirrored not in (0, count):
+        raise InvalidInput(
+            f"frames: {mirrored} of {count} frames mirror and the others do not; between them one would be flat"
+        )
+    if uneven > 1e-5:
+        return turns, logs
+    uniform = np.mean([logs[a, a] for a in range(axes)], axis=0, dtype=np.float32)
+    return turns, np.asarray(uniform, np.float32) if np.abs(uniform).max() > 1e-6 else None
+
+
+def _join(turn: Matrices, stretch: NDArray[np.float64] | None, points: NDArray[np.float64]) -> Matrices:
+    """Make frames of means of rotations and of logarithms of stretches."""
+    flat = np.abs(determinants(turn)) < _FLATTEST
+    if flat.any():
+        place = ", ".join(f"{v:g}" for v in points[int(np.flatnonzero(flat)[0])].tolist())
+        raise InvalidInput(f"field: the frames around ({place}) point in opposite ways, so that there is none between")
+    turn = rotations(turn)
+    if stretch is None:
+        return turn
+    return turn * np.exp(stretch) if stretch.ndim == 1 else multiply(turn, exponentials(stretch))
+
+
+def _first(frames: Array) -> Matrices:
+    """Bring frames (..., A, A) to the order of `_matrices`, copied."""
+    axes = frames.shape[-1]
+    return np.array(frames.reshape(-1, axes, axes).transpose(1, 2, 0), np.float64, order="C")
+
+
+def _numbers(value: ArrayLike, name: str) -> Array:
+    try:
+        given: Array = np.asarray(value)
+    except (ValueError, TypeError):
+        given = np.empty(0, np.object_)
+    if given.dtype.kind not in "buif":
+        raise InvalidInput(f"{name}: needs an array of real numbers, got {given.dtype}")
+    return given

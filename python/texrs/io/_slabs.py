@@ -1,0 +1,44 @@
+"""Volumes that are made and written slab by slab."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from numbers import Integral
+
+import numpy as np
+
+from texrs._typing import Array
+from texrs.errors import InvalidInput
+
+
+def as_shape(shape: object) -> tuple[int, ...]:
+    """Check the shape of a volume, with or without channels."""
+    sides = tuple(shape) if isinstance(shape, Sequence | np.ndarray) and not isinstance(shape, str) else ()
+    if len(sides) not in (3, 4) or not all(isinstance(n, Integral) and 1 <= int(n) < 2**40 for n in sides):
+        raise InvalidInput(f"shape: needs (D, H, W) or (D, H, W, C) as integers of at least 1, got {shape!r}")
+    return tuple(int(n) for n in sides)
+
+
+def checked(slabs: Iterable[Array], shape: tuple[int, ...]) -> Iterator[Array]:
+    """Give slabs on, as long as they fit together; there is at least one."""
+    done, dtype = 0, None
+    for slab in slabs:
+        dtype = dtype or slab.dtype
+        if slab.dtype != dtype or slab.shape[1:] != shape[1:]:
+            raise InvalidInput(
+                f"slabs: the one from plane {done} on is {slab.dtype} of shape {slab.shape}; "
+                f"{dtype} of shape {('d', *shape[1:])} is needed".replace("'", "")
+            )
+        done += len(slab)
+        if done > shape[0]:
+            raise InvalidInput(f"slabs: go on after {shape[0]} planes")
+        yield slab
+    if done < shape[0]:
+        raise InvalidInput(f"slabs: end after {done} of {shape[0]} planes")
+
+
+def planes(slabs: Iterable[Array]) -> Iterator[Array]:
+    """Give the planes of slabs, with channels; bool as 0 and 255."""
+    for slab in slabs:
+        part = slab.astype(np.uint8) * np.uint8(255) if slab.dtype == np.bool_ else slab
+        yield from part if part.ndim == 4 else part[..., np.newaxis]

@@ -1,0 +1,299 @@
+"""Volumes for other programs: NRRD by pynrrd, NIfTI by nibabel (extra ``vol``), ParaView's image data, STL surfaces.
+
+The libraries read and write headers. Samples are read here, when the header has been compared with the limit and with
+the length of the file, so that neither a huge header nor a bomb of compressed zeros takes memory.
+
+In NRRD and NIfTI the axis that runs fastest comes first, so that (plane, row, column) is z, y, x there.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import io
+import warnings
+import zlib
+from collections.abc import Sequence
+from math import prod
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Array
+from texrs.errors import FileError
+from texrs.io._files import check_size, size_of, speaking
+
+NRRD_MAGIC = b"NRRD000"
+GZIP_MAGIC = b"\x1f\x8b"
+NIFTI_MAGIC = (b"\x5c\x01\0\0", b"\0\0\x01\x5c", b"\x1c\x02\0\0", b"\0\0\x02\x1c")
+"""The length of the header, which a file of either version and byte order starts with."""
+
+_MOST_CHANNELS = 64
+_LONGEST_HEADER = 2**16
+_NRRD_ENCODINGS = {"raw": False, "gzip": True, "gz": True}
+_NRRD_CHANNELS = {3: "RGB-color", 4: "RGBA-color"}
+_NRRD_TYPES = {
+    name: dtype
+    for dtype, names in {
+        "|i1": "signed char, int8, int8_t",
+        "|u1": "uchar, unsigned char, uint8, uint8_t",
+        "<i2": "short, short int, signed short, signed short int, int16, int16_t",
+        "<u2": "ushort, unsigned short, unsigned short int, uint16, uint16_t",
+        "<i4": "int, signed int, int32, int32_t",
+        "<u4": "uint, unsigned int, uint32, uint32_t",
+        "<i8": "longlong, long long, long long int, signed long long, signed long long int, int64, int64_t",
+        "<u8": "ulonglong, unsigned long long, unsigned long long int, uint64, uint64_t",
+        "<f4": "float",
+        "<f8": "double",
+    }.items()
+    for name in names.split(", ")
+}
+_VTI_TYPES = {"u": "UInt", "i": "Int", "f": "Float"}
+_FIRST = 3 * 2**20 - 8
+_STL_TITLE = b"texrs".ljust(80)
+
+
+# --- NRRD ------------------------------------------------------------------------------------------------------------
+
+
+def read_nrrd(path: Path, limit: int) -> Array:
+    """Read an NRRD volume whose samples lie in the file itself, raw or compressed by gzip."""
+    nrrd: Any = _library("nrrd", "pynrrd", path)
+    length = size_of(path)
+    with speaking(path, "reading"), path.open("rb") as file:
+        # The library reads lines of any length: give it no more than a header may have.
+        start = file.read(_LONGEST_HEADER)
+        end = min((at + n for n, at in ((2, start.find(b"\n\n")), (4, start.find(b"\r\n\r\n"))) if at >= 0), default=-1)
+        if end < 0:
+            raise FileError(f"{path}: its NRRD header does not end within {_LONGEST_HEADER} bytes")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            header = nrrd.read_header(io.BytesIO(start[:end]))
+        if "data file" in header or "datafile" in header:
+            raise FileError(f"{path}: keeps its samples in other files, which are not read")
+        encoding = str(header.get("encoding", "")).lower()
+        if encoding not in _NRRD_ENCODINGS:
+            raise FileError(f"{path}: its encoding is {encoding!r}; raw and gzip are read")
+        if any(header.get(key, 0) not in (0, None) for key in ("line skip", "lineskip", "byte skip", "byteskip")):
+            raise FileError(f"{path}: skips lines or bytes before its samples, which is not read")
+        kind = " ".join(str(header.get("type", "")).lower().split())
+        if kind not in _NRRD_TYPES:
+            raise FileError(f"{path}: holds samples of type {kind!r}; integers and floats are read")
+        dtype = np.dtype(_NRRD_TYPES[kind])
+        if header.get("endian", "little") == "big":
+            dtype = dtype.newbyteorder(">")
+        sizes = [int(n) for n in np.atleast_1d(header["sizes"])]
+        kinds = [str(kind).lower() for kind in header.get("kinds", [])]
+        channel = _nrrd_channel(path, sizes, kinds)
+        _check_sides(path, sizes)
+        sides = tuple(n for a, n in enumerate(sizes) if a != channel)[::-1]
+        channels = 1 if channel is None else sizes[channel]
+        check_size(path, sides, channels, dtype.itemsize, limit)
+        file.seek(end)
+        flat = _samples(path, file, length - end, prod(sizes), dtype, compressed=_NRRD_ENCODINGS[encoding])
+    volume = flat.reshape(sizes[::-1])
+    if channel is not None:
+        volume = np.moveaxis(volume, len(sizes) - 1 - channel, -1)
+    return _tidy(volume)
+
+
+def write_nrrd(path: Path, volume: Array, spacing: Sequence[float]) -> None:
+    """Write an NRRD volume, raw."""
+    nrrd: Any = _library("nrrd", "pynrrd", path)
+    axes = [repr(float(s)) for s in reversed(spacing)]
+    header: dict[str, Any] = {"encoding": "raw", "endian": "little"}
+    if volume.ndim == 4:
+        header["kinds"] = [_NRRD_CHANNELS.get(volume.shape[3], "vector"), "domain", "domain", "domain"]
+        header["spacings"] = [float("nan"), *map(float, axes)]
+    else:
+        header["kinds"] = ["domain"] * 3
+        header["spacings"] = [*map(float, axes)]
+    little = volume.astype(volume.dtype.newbyteorder("<"), copy=False)
+    with path.open("xb") as file:
+        nrrd.write(file, little, header, index_order="C", compression_level=1)
+
+
+def _nrrd_channel(path: Path, sizes: list[int], kinds: list[str]) -> int | None:
+    """Say which axis is the channels; without kinds the fastest of four."""
+    if len(sizes) == 3:
+        return None
+    if len(sizes) != 4:
+        raise FileError(f"{path}: has {len(sizes)} axes; a volume has three, and channels")
+    space = ("domain", "space", "???", "none", "")
+    others = [a for a, kind in enumerate(kinds) if kind not in space]
+    channel = others[0] if len(kinds) == 4 and len(others) == 1 else 0
+    if sizes[channel] > _MOST_CHANNELS:
+        raise FileError(f"{path}: has {sizes[channel]} channels, up to {_MOST_CHANNELS} are read")
+    return channel
+
+
+# --- NIfTI -----------------------------------------------------------------------------------------------------------
+
+
+def read_nifti(path: Path, limit: int, *, compressed: bool) -> Array:
+    """Read a NIfTI volume in one file, of version 1 or 2."""
+    nibabel: Any = _library("nibabel", "nibabel", path)
+    length = size_of(path)
+    with speaking(path, "reading"), path.open("rb") as raw:
+        file: BinaryIO = gzip.GzipFile(fileobj=raw) if compressed else raw  # type: ignore[assignment]
+        start = file.read(540)
+        if start[:4] not in NIFTI_MAGIC:
+            raise FileError(f"{path}: is compressed, but not a NIfTI file")
+        second = start[:4] in NIFTI_MAGIC[2:]
+        need = 540 if second else 348
+        if len(start) < need:
+            raise FileError(f"{path}: is cut off; its NIfTI header does not end")
+        if (start[4:7] if second else start[344:347]) != (b"n+2" if second else b"n+1"):
+            raise FileError(f"{path}: is not a NIfTI file that holds its own samples")
+        kind = nibabel.Nifti2Header if second else nibabel.Nifti1Header
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            header = kind(start[:need], check=False)
+            dtype = np.dtype(header.get_data_dtype())
+        fields = dtype.names or ()
+        colours = len(fields) if fields and all(dtype[n] == np.uint8 for n in fields) else 0
+        if not colours and (dtype.kind not in "uif" or dtype.itemsize > 8):
+            raise FileError(f"{path}: holds samples of {dtype}; integers, floats and RGB are read")
+        count = int(header["dim"][0])
+        sizes = [int(n) for n in header["dim"][1 : 1 + max(0, min(count, 7))]]
+        sizes += [1] * (3 - len(sizes))
+        several = [n for n in sizes[3:] if n != 1]
+        if not 1 <= count <= 7 or len(several) > 1 or (several and (colours or several[0] > _MOST_CHANNELS)):
+            raise FileError(f"{path}: has the sides {sizes}; three axes and up to {_MOST_CHANNELS} channels are read")
+        _check_sides(path, sizes)
+        channels = several[0] if several else 1
+        offset = float(header["vox_offset"])
+        if not need <= offset <= (_LONGEST_HEADER if compressed else length) or offset != int(offset):
+            raise FileError(f"{path}: says that its samples start at byte {offset:g}")
+        check_size(path, tuple(sizes[2::-1]), max(channels, colours), dtype.itemsize // (colours or 1), limit)
+        file.seek(int(offset))
+        whole = prod(sizes)
+        flat = _samples(path, file, None if compressed else length - int(offset), whole, dtype, compressed=False)
+        slope, intercept = header.get_slope_inter() if not colours else (None, None)
+    if colours:
+        volume = flat.view(np.uint8).reshape(*sizes[2::-1], colours)
+    elif several:
+        volume = np.moveaxis(flat.reshape(channels, *sizes[2::-1]), 0, -1)
+    else:
+        volume = flat.reshape(sizes[2::-1])
+    if slope is not None and (slope, intercept or 0) != (1, 0):
+        volume = (volume * float(slope) + float(intercept or 0)).astype(np.float32)
+    return _tidy(volume)
+
+
+def write_nifti(path: Path, volume: Array, spacing: Sequence[float], *, compressed: bool) -> None:
+    """Write a NIfTI volume of version 1: bytes of three or four channels as colours, others as vectors."""
+    nibabel: Any = _library("nibabel", "nibabel", path)
+    channels = volume.shape[3] if volume.ndim == 4 else 1
+    vector = False
+    if volume.ndim == 3:
+        data = volume
+    elif volume.dtype == np.uint8 and channels in (3, 4):
+        colour = np.dtype([(name, np.uint8) for name in "RGBA"[:channels]])
+        data = np.ascontiguousarray(volume).view(colour)[..., 0]
+    else:
+        vector = True
+        data = np.moveaxis(volume, -1, 0)[:, np.newaxis]
+    affine = np.diag([*(float(s) for s in reversed(spacing)), 1.0])
+    image = nibabel.Nifti1Image(data.T, affine, dtype=data.dtype)
+    if vector:
+        image.header.set_intent("vector")
+    content = image.to_bytes()
+    path.write_bytes(gzip.compress(content, 1, mtime=0) if compressed else content)
+
+
+# --- ParaView and surfaces -------------------------------------------------------------------------------------------
+
+
+def write_vti(path: Path, volume: Array, spacing: Sequence[float]) -> None:
+    """Write ParaView's image data: a value a point, at the middle of each voxel, in base64."""
+    channels = volume.shape[3] if volume.ndim == 4 else 1
+    kind = f"{_VTI_TYPES[volume.dtype.kind]}{8 * volume.dtype.itemsize}"
+    extent = " ".join(f"0 {n - 1}" for n in volume.shape[2::-1])
+    steps = " ".join(repr(float(s)) for s in reversed(spacing))
+    little = np.ascontiguousarray(volume, volume.dtype.newbyteorder("<"))
+    with path.open("xb") as file:
+        file.write(
+            '<?xml version="1.0"?>\n'
+            '<VTKFile type="ImageData" version="1.0" byte_order="LittleEndian" header_type="UInt64">\n'
+            f'<ImageData WholeExtent="{extent}" Origin="0 0 0" Spacing="{steps}">\n'
+            f'<Piece Extent="{extent}">\n<PointData Scalars="texture">\n'
+            f'<DataArray type="{kind}" Name="texture" NumberOfComponents="{channels}" format="appended" offset="0"/>\n'
+            '</PointData>\n<CellData/>\n</Piece>\n</ImageData>\n<AppendedData encoding="base64">\n_'.encode()
+        )
+        # The length and the samples are one stream; coded in threes of bytes, its parts join.
+        head, data = little.nbytes.to_bytes(8, "little"), little.reshape(-1).view(np.uint8).data
+        file.write(base64.b64encode(head + bytes(data[:_FIRST])))
+        for start in range(_FIRST, len(data), 3 * 2**20):
+            file.write(base64.b64encode(data[start : start + 3 * 2**20]))
+        file.write(b"\n</AppendedData>\n</VTKFile>\n")
+
+
+def write_stl(path: Path, vertices: NDArray[np.float32], faces: NDArray[np.int64]) -> None:
+    """Write triangles, their corners as x, y, z."""
+    facet = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    with path.open("xb") as file:
+        file.write(_STL_TITLE + len(faces).to_bytes(4, "little"))
+        for start in range(0, len(faces), 2**18):
+            corners = vertices[faces[start : start + 2**18]]
+            out = np.zeros(len(corners), facet)
+            out["corners"] = corners
+            normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            out["normal"] = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+            file.write(out.tobytes())
+
+
+# --- shared ----------------------------------------------------------------------------------------------------------
+
+
+def _samples(
+    path: Path, file: BinaryIO, left: int | None, count: int, dtype: np.dtype[Any], *, compressed: bool
+) -> Array:
+    """Read so many samples, and no byte more than they need, in native byte order."""
+    size = count * dtype.itemsize
+    if left is not None and not compressed and left < size:
+        raise FileError(f"{path}: is cut off; its samples need {size} bytes, {left} are there")
+    inflate = zlib.decompressobj(31) if compressed else None
+    out, filled, rest = bytearray(), 0, b""
+    # What is compressed may promise more than it holds: memory grows with what is there.
+    while filled < size:
+        part = rest or file.read(min(2**20, size - filled) if inflate is None else 2**20)
+        if inflate is not None:
+            data = inflate.decompress(part, min(2**24, size - filled))
+            rest = inflate.unconsumed_tail
+            if not data and (inflate.eof or not part):
+                part = b""
+            elif not data:
+                continue
+            part = data
+        if not part:
+            raise FileError(f"{path}: is cut off; {filled} of {size} bytes of samples are there")
+        out += part
+        filled += len(part)
+    flat = np.frombuffer(out, dtype)
+    return flat if dtype.names else flat.astype(dtype.newbyteorder("="), copy=False)
+
+
+def _check_sides(path: Path, sizes: list[int]) -> None:
+    """Refuse what has no extent: of two negative sides the product would be positive."""
+    if min(sizes) < 1:
+        raise FileError(f"{path}: holds no voxels ({' x '.join(map(str, sizes))})")
+
+
+def _tidy(volume: Array) -> Array:
+    if volume.ndim == 4 and volume.shape[3] == 1:
+        volume = volume[..., 0]
+    return np.array(volume, volume.dtype.newbyteorder("="), order="C")
+
+
+def _library(name: str, package: str, path: Path) -> Any:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return __import__(name)
+    except ImportError:
+        raise FileError(
+            f"{path}: needs the package {package}, which is not installed (pip install texrs[vol])"
+        ) from None

@@ -1,0 +1,142 @@
+"""Hard data: points of the output whose values or places are given."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_mask
+from texrs._typing import Array, Bools, Floats
+from texrs.errors import InvalidInput
+from texrs.kernels.appearance import Appearance, Guide
+from texrs.kernels.gather import gather
+from texrs.kernels.pyramid import ONE, Region
+
+__all__ = ["Hold"]
+
+WEIGHT = 1500
+"""Cost of another colour than the given one, in 1/256: a tenth of the range costs about as much as windows that have
+nothing to do with each other."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hold:
+    """What is held, over the whole output; nothing where ``mask`` is none."""
+
+    image: Array
+    mask: Bools | None = None
+    values: Array | None = None
+    coordinates: Floats | None = None
+
+    @classmethod
+    def of(cls, image: Array, shape: tuple[int, ...], held: object, values: object, coordinates: object) -> Hold:
+        """Check what a caller gives."""
+        if held is None:
+            if values is not None or coordinates is not None:
+                raise InvalidInput("held: needed with values or coordinates, to say which points they are for")
+            return cls(image)
+        mask = as_mask(held, "held", shape)
+        if (values is None) == (coordinates is None):
+            raise InvalidInput("held: needs either values or coordinates of the held points")
+        axes = len(shape)
+        if coordinates is not None:
+            places = np.asarray(coordinates)
+            if places.dtype.kind not in "iuf" or places.shape != (*shape, axes):
+                raise InvalidInput(
+                    f"coordinates: needs numbers of shape {(*shape, axes)}, got {places.dtype} {places.shape}"
+                )
+            inside = (places >= 0) & (places <= np.array(image.shape[:axes]) - 1)
+            if not inside[mask].all():
+                raise InvalidInput("coordinates: those of held points must lie inside the exemplar and be finite")
+            places = np.where(mask[..., np.newaxis], places, 0).astype(np.float32)
+            return cls(image, mask, gather(image, places, interpolation="nearest"), places)
+        given = np.asarray(values)
+        wanted = (*shape, image.shape[-1])
+        if given.dtype != image.dtype or given.shape not in (wanted, wanted[:-1] if wanted[-1] == 1 else wanted):
+            raise InvalidInput(
+                f"values: needs {image.dtype} of shape {wanted}, as the exemplar has, got {given.dtype} {given.shape}"
+            )
+        given = given.reshape(wanted)
+        if given.dtype.kind == "f" and not np.isfinite(given[mask]).all():
+            raise InvalidInput("values: those of held points must be finite")
+        return cls(image, mask, np.where(mask[..., np.newaxis], given, np.zeros((), given.dtype)))
+
+    @property
+    def count(self) -> int:
+        """Number of held points."""
+        return 0 if self.mask is None else int(self.mask.sum())
+
+    def shown(self, composite: Array) -> Array:
+        """Give the picture with the held values, exactly."""
+        if self.mask is None or self.values is None or self.coordinates is not None:
+            return composite
+        result = composite.copy()
+        result[self.mask] = self.values.reshape(*self.mask.shape, -1)[self.mask].reshape(result[self.mask].shape)
+        return result
+
+    def guide(self, appearance: Appearance, region: Region, spacing: int) -> Guide | None:
+        """Ask for the held values at a level: the mean of those that a point of the level stands for."""
+        if self.mask is None or self.values is None or not self.mask.any():
+            return None
+        exemplar = _channels(self.image, self.image)
+        wanted = _channels(self.values.reshape(*self.mask.shape, -1), self.image)
+        total = _pooled(wanted * self.mask[..., np.newaxis], region, spacing)
+        count = _pooled(self.mask[..., np.newaxis].astype(np.float32), region, spacing)
+        mean = np.asarray(total / np.maximum(count, 1), np.float32)
+        weight = np.where(count[..., 0] > 0, WEIGHT, 0).astype(np.uint16)
+        small = _shrunk(exemplar, appearance.shape, spacing)
+        return Guide(_coded(small), _coded(mean), weight.reshape(-1))
+
+    def fixed(self, region: Region, spacing: int) -> Bools | None:
+        """Tell which points of a level keep their places."""
+        if self.mask is None or self.coordinates is None:
+            return None
+        return (_pooled(self.mask[..., np.newaxis].astype(np.float32), region, spacing)[..., 0] > 0).reshape(-1)
+
+    def place(self, places: NDArray[np.int32], region: Region, spacing: int) -> NDArray[np.int32]:
+        """Give held points of a level the places that are given."""
+        fixed = self.fixed(region, spacing)
+        if fixed is None or self.coordinates is None or self.mask is None:
+            return places
+        axes = len(region.shape)
+        # The first held point that a point of the level stands for speaks for it.
+        at = np.argwhere(self.mask)[::-1]
+        held = self.coordinates[self.mask][::-1]
+        out = places.reshape(-1, axes).copy()
+        index = np.ravel_multi_index(tuple(np.minimum(at // spacing, np.array(region.shape) - 1).T), region.shape)
+        out[index] = np.rint(((held + 0.5) / spacing - 0.5) * ONE).astype(np.int32)
+        return out.reshape(-1)
+
+
+def _channels(values: Array, image: Array) -> Floats:
+    """Give up to four channels in units of the exemplar's range."""
+    low = image.reshape(-1, image.shape[-1]).min(axis=0).astype(np.float64)
+    span = float((image.reshape(-1, image.shape[-1]).max(axis=0) - low).max()) or 1.0
+    return np.asarray((values[..., :4].astype(np.float64) - low[:4]) / span, np.float32)
+
+
+def _coded(values: Floats) -> NDArray[np.int16]:
+    """Give values in [0, 1] as four numbers of 12 bits each."""
+    flat = values.reshape(-1, values.shape[-1])
+    out = np.zeros((len(flat), 4), np.int16)
+    out[:, : flat.shape[1]] = np.clip(np.rint(flat * 2047), -2048, 2047)
+    return out.reshape(-1)
+
+
+def _pooled(values: Floats, region: Region, spacing: int) -> Floats:
+    """Sum values of the output over the points of a level."""
+    for axis, n in enumerate(region.shape):
+        starts = np.minimum(np.arange(n) * spacing, values.shape[axis] - 1)
+        values = np.add.reduceat(values, starts, axis=axis)
+    return values
+
+
+def _shrunk(exemplar: Floats, shape: tuple[int, ...], spacing: int) -> Floats:
+    """Give the mean of the samples that a sample of a level stands for."""
+    trimmed = exemplar[tuple(slice(0, n * spacing) for n in shape)]
+    for axis, n in enumerate(shape):
+        line = np.moveaxis(trimmed, axis, 0)
+        trimmed = np.moveaxis(line.reshape(n, spacing, *line.shape[1:]).mean(axis=1), 0, axis)
+    return np.ascontiguousarray(trimmed, np.float32)

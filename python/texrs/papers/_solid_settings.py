@@ -1,0 +1,73 @@
+"""How much work each quality does at each level."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
+
+from texrs.errors import InvalidInput
+
+Quality: TypeAlias = Literal["preserve", "fast", "optimise"]
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """The numbers of one quality. Sequences are for the coarsest level, those between, and the finest."""
+
+    iterations: tuple[int, int, int] = (10, 6, 3)
+    sweeps: tuple[int, int, int] = (2, 2, 2)
+    votes: tuple[int, int, int] = (1, 1, 0)
+    radii: tuple[int, ...] = (2,)
+    cell: int = 6
+    rounds: int = 6
+    candidates: int = 512
+    contrast: float = 1.0
+    continuation: float = 0.3
+    hysteresis: float = 2.0
+    settled: float = 0.005
+    exhaustive: bool = False
+
+    def at(self, level: int, levels: int) -> Step:
+        """Give what is done at a level, counted from the coarsest."""
+        which = 2 if level == levels - 1 else 1 if level else 0
+        return Step(
+            self.iterations[which], self.sweeps[which], self.votes[which], self.exhaustive and level == 0 and levels > 1
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """What is done at one level."""
+
+    iterations: int
+    sweeps: int
+    vote: int
+    exhaustive: bool
+
+
+PRESERVE = Settings()
+"""Keeps what is rare, and copies where a copy is good enough."""
+
+FAST = replace(PRESERVE, iterations=(6, 3, 1), sweeps=(2, 2, 1), rounds=4, candidates=256, settled=0.0)
+"""Fixed counts: what a point becomes hangs on what is near it alone."""
+
+OPTIMISE = replace(
+    PRESERVE,
+    iterations=(20, 8, 3),
+    votes=(3, 2, 0),
+    radii=(3, 2),
+    contrast=0.8,
+    hysteresis=0.1,
+    settled=0.0,
+    exhaustive=True,
+)
+"""Straightens lattices and walls, but washes rare things out: for gated use."""
+
+QUALITIES: dict[str, Settings] = {"preserve": PRESERVE, "fast": FAST, "optimise": OPTIMISE}
+
+
+def settings_of(quality: object) -> Settings:
+    """Give the settings of a quality by name."""
+    if not isinstance(quality, str) or quality not in QUALITIES:
+        raise InvalidInput(f"quality: allowed are {', '.join(QUALITIES)}; got {quality!r}")
+    return QUALITIES[quality]

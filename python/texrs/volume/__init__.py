@@ -1,0 +1,61 @@
+"""Looking at volumes, and measuring whether a synthesised one is like its exemplar.
+
+Pictures: `slices`, `oblique`, `cube`, `turntable`; `paint` gives labels colours, `surface` the triangles around one.
+
+Statistics, each of which can be used alone, most of them for pictures too; `compare` makes a report of them all:
+
+===========================  ===============================================================
+`classes`                    the colours of a texture's materials, and their shares
+`two_point` `lineal_path`    how materials lie along the axes
+`particles`                  how many pieces of a material there are, and how large
+`autocorrelation`            of values along the axes
+`frequency`                  how fine a texture is
+`orientation_errors`         whether layers lie as a field turns them
+`seam_planes` `isolated`     traces of an algorithm: its lattice, and speckle
+`slice_distances`            whether each slice has the values of the exemplar
+`coherent` `cell_reuse`      which parts of the exemplar are used, in how large pieces
+===========================  ===============================================================
+"""
+
+from texrs.volume.compare import Comparison, compare
+from texrs.volume.labels import paint, surface
+from texrs.volume.pictures import cube, oblique, slices, turntable
+from texrs.volume.reuse import CellReuse, cell_reuse, coherent
+from texrs.volume.statistics import Classes, Particles, classes, lightness, lineal_path, particles, two_point
+from texrs.volume.structure import (
+    autocorrelation,
+    frequency,
+    isolated,
+    orientation_errors,
+    seam_planes,
+    slice_distances,
+    texture_normal,
+)
+
+__all__ = [
+    "CellReuse",
+    "Classes",
+    "Comparison",
+    "Particles",
+    "autocorrelation",
+    "cell_reuse",
+    "classes",
+    "coherent",
+    "compare",
+    "cube",
+    "frequency",
+    "isolated",
+    "lightness",
+    "lineal_path",
+    "oblique",
+    "orientation_errors",
+    "paint",
+    "particles",
+    "seam_planes",
+    "slice_distances",
+    "slices",
+    "surface",
+    "texture_normal",
+    "turntable",
+    "two_point",
+]

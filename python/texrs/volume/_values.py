@@ -1,0 +1,70 @@
+"""Checks and views that the statistics share."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from texrs._arrays import as_image, guidance
+from texrs._typing import Array, Bools, Floats
+from texrs.errors import InvalidInput
+
+__all__ = ["as_direction", "as_region", "as_values", "axes_of", "colours_of", "leading", "trailing"]
+
+
+def leading(array: Array, axis: int, step: int) -> Array:
+    """Give all but the last lines along an axis."""
+    return array[(slice(None),) * axis + (slice(0, array.shape[axis] - step),)]
+
+
+def trailing(array: Array, axis: int, step: int) -> Array:
+    """Give all but the first lines along an axis."""
+    return array[(slice(None),) * axis + (slice(step, None),)]
+
+
+def axes_of(image: Array) -> int:
+    """Guess how many axes are not channels: up to 4 along the last one of three are channels."""
+    return {2: 2, 4: 3}.get(image.ndim, 2 if image.ndim == 3 and image.shape[-1] <= 4 else 3)
+
+
+def colours_of(image: ArrayLike, name: str, axes: int | None) -> Floats:
+    """Check a picture or a volume and give its colours in [0, 1], channels last."""
+    if axes is None:
+        with suppress(ValueError, TypeError):  # Of what is no array `as_image` tells.
+            axes = axes_of(np.asarray(image))
+    count = 3 if axes is None else axes
+    if count not in (2, 3):
+        raise InvalidInput(f"axes: needs 2 or 3, got {axes!r}")
+    return guidance(as_image(image, name, axes=count))
+
+
+def as_values(values: ArrayLike, name: str = "values") -> Floats:
+    """Check values of one channel, finite, in 2-D or in 3-D."""
+    array = np.asarray(values)
+    if array.dtype.kind not in "buif" or array.ndim not in (2, 3) or array.size == 0:
+        raise InvalidInput(f"{name}: needs numbers of shape (H, W) or (D, H, W), got {array.dtype} of {array.shape}")
+    out = np.ascontiguousarray(array, np.float32)
+    if not np.isfinite(out).all():
+        raise InvalidInput(f"{name}: all must be finite")
+    return out
+
+
+def as_region(mask: ArrayLike) -> Bools:
+    """Check a mask in 2-D or in 3-D."""
+    array = np.asarray(mask)
+    if array.dtype.kind not in "bui" or array.ndim not in (2, 3) or array.size == 0:
+        raise InvalidInput(f"mask: needs bool of shape (H, W) or (D, H, W), got {array.dtype} of {array.shape}")
+    return np.ascontiguousarray(array != 0)
+
+
+def as_direction(value: object, name: str) -> NDArray[np.float64]:
+    """Check three numbers, for planes, rows and columns; a normal has a length."""
+    try:
+        out = np.asarray(value, np.float64)
+    except (TypeError, ValueError):
+        out = np.empty(0)
+    if out.shape != (3,) or not np.isfinite(out).all() or (name == "normal" and not np.abs(out).max() > 1e-12):
+        raise InvalidInput(f"{name}: needs three numbers (plane, row, column), got {str(value)[:60]}")
+    return out

@@ -1,0 +1,264 @@
+"""A report on how like its exemplar a synthesised picture or volume is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from texrs._arrays import as_image, as_int
+from texrs._typing import Array
+from texrs.errors import InvalidInput
+from texrs.fields import Field
+from texrs.source_map import SourceMap
+from texrs.volume import statistics, structure
+from texrs.volume._values import axes_of
+from texrs.volume.reuse import CellReuse, cell_reuse
+
+__all__ = ["Comparison", "compare"]
+
+_REACH = 12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Comparison:
+    """What `compare` finds. Pairs are of the exemplar and of the output.
+
+    Attributes
+    ----------
+    shares : (2, K) float64
+        Share of each class, from dark to light (or by label).
+    particles : tuple of Particles
+        Pieces of the material that was chosen.
+    frequency : tuple of float
+        Mean spectral frequency of the slices.
+    two_point : (2, A, 13) float64
+        Two-point correlation of the chosen material, along each axis, by step.
+    lineal_path : (2, A, 13) float64
+        Its lineal path.
+    autocorrelation : (2, A, 13) float64
+        Of the lightness.
+    isolated : tuple of float
+        Share of voxels that differ from their surroundings.
+    values : float
+        Mean distance of the values of the slices from those of the exemplar, in [0, 1].
+    seams : (2,) float64
+        Least and largest change from plane to plane of the output, over the median of its axis.
+    orientation : (2, 2) float64 or None
+        Median and 90th percentile of the angle between the layers and where they should be, in degrees: of the
+        exemplar against its own normal, of the output against the field. None without a field.
+    turned : float or None
+        How far the field turns the exemplar's normal, in degrees on average: where it is 0 the orientation says
+        nothing.
+    reuse : CellReuse or None
+        Use of the exemplar. None without a source map.
+
+    """
+
+    shares: NDArray[np.float64]
+    particles: tuple[statistics.Particles, statistics.Particles]
+    frequency: tuple[float, float]
+    two_point: NDArray[np.float64]
+    lineal_path: NDArray[np.float64]
+    autocorrelation: NDArray[np.float64]
+    isolated: tuple[float, float]
+    values: float
+    seams: NDArray[np.float64]
+    orientation: NDArray[np.float64] | None
+    turned: float | None
+    reuse: CellReuse | None
+
+    @property
+    def relative_shares(self) -> NDArray[np.float64]:
+        """Share of each class in the output over that in the exemplar, (K,)."""
+        return np.asarray(self.shares[1] / np.maximum(self.shares[0], 1e-30))
+
+    @property
+    def frequency_ratio(self) -> float:
+        """Frequency of the output over that of the exemplar; 1 is as fine, 0.5 twice as large."""
+        return self.frequency[1] / self.frequency[0]
+
+    @property
+    def text(self) -> str:
+        """The report as a table."""
+        rows = [("", "exemplar", "output", "output/exemplar")]
+
+        def row(name: str, pair: tuple[float, float], form: str) -> None:
+            rows.append((name, format(pair[0], form), format(pair[1], form), f"{_ratio(pair):.2f}"))
+
+        for k, (before, after) in enumerate(self.shares.T.tolist()):
+            row(f"share of class {k}", (before, after), ".3f")
+        first, second = self.particles
+        row("particles in 100 000", (first.density, second.density), ".1f")
+        row("mean size", (first.mean, second.mean), ".0f")
+        row("median size", (first.median, second.median), ".0f")
+        for d in (1, 9):
+            row(f"{d}0 % are not above", (first.deciles[d - 1], second.deciles[d - 1]), ".0f")
+        row("mean frequency", self.frequency, ".4f")
+        row("isolated voxels", self.isolated, ".4f")
+        rows.append(("distance of two-point correlations", "", f"{_distance(self.two_point):.3f}", ""))
+        rows.append(("distance of lineal paths", "", f"{_distance(self.lineal_path):.3f}", ""))
+        rows.append(("distance of autocorrelations", "", f"{_distance(self.autocorrelation):.3f}", ""))
+        rows.append(("distance of values", "", f"{self.values:.3f}", ""))
+        rows.append(("change from plane to plane / median", "", f"{self.seams[0]:.2f} to {self.seams[1]:.2f}", ""))
+        if self.orientation is not None:
+            rows.append(("the field turns the normal by", "", f"{self.turned:.1f}", ""))
+            for i, name in enumerate(("median error of the normal", "nine tenths are within")):
+                row(name, (float(self.orientation[0, i]), float(self.orientation[1, i])), ".1f")
+        if self.reuse is not None:
+            rows.append(("coherent neighbours", "", f"{self.reuse.coherent:.3f}", ""))
+            rows.append(("largest patch / output", "", f"{self.reuse.largest:.3f}", ""))
+            rows.append(("most used cell / mean", "", f"{self.reuse.most_used:.1f}", ""))
+            rows.append(("cells not used", "", f"{self.reuse.unused:.3f}", ""))
+        widths = [max(len(r[i]) for r in rows) for i in range(4)]
+        lines = [r[0].ljust(widths[0]) + "".join("  " + r[i].rjust(widths[i]) for i in (1, 2, 3)) for r in rows]
+        return "\n".join(line.rstrip() for line in lines)
+
+    def __str__(self) -> str:
+        """Return the table."""
+        return self.text
+
+
+def compare(
+    exemplar: ArrayLike,
+    output: ArrayLike,
+    source: SourceMap | None = None,
+    field: Field | None = None,
+    *,
+    classes: int | None = 4,
+    chosen: int | tuple[int, ...] | None = None,
+    axes: int | None = None,
+) -> Comparison:
+    """Compare a synthesised picture or volume with its exemplar.
+
+    Parameters
+    ----------
+    exemplar, output : array_like
+        (H, W[, C]) or (D, H, W[, C]), of one dtype and one number of channels, of any sizes of at least 16 a side.
+    source : SourceMap, optional
+        That of the output: adds what is reused.
+    field : Field, optional
+        What the output followed: adds the orientation of its layers, and says when neighbours are coherent. What it
+        leaves open is set by the size of the output (`texrs.fields.Field.over`).
+    classes : int or None
+        How many classes of colour are made of the exemplar, 2 to 16; None: both arrays are labels, whole numbers
+        from 0 to 255 without channels.
+    chosen : int or tuple of int, optional
+        The classes or labels whose particles are counted; by default the lighter half of the classes, and of labels
+        all but 0.
+    axes : int, optional
+        2 or 3; by default by the shape, up to 4 along the last of three axes are channels.
+
+    Returns
+    -------
+    Comparison
+        Its `text` is a table.
+
+    Raises
+    ------
+    InvalidInput
+        Not two such arrays, or too small ones, or nothing chosen that is there.
+
+    Examples
+    --------
+    >>> from texrs import samples, volume
+    >>> one, other = (samples.particles((32, 32, 32), seed=s).image for s in (0, 1))
+    >>> report = volume.compare(one, other)
+    >>> report.relative_shares.shape, report.text.splitlines()[0]
+    ((4,), '... exemplar  output  output/exemplar')
+
+    """
+    first, second = np.asarray(exemplar), np.asarray(output)
+    count = as_int(axes_of(first) if axes is None else axes, "axes", 2, 3)
+    first, second = (as_image(a, n, minimum=16, axes=count) for a, n in ((first, "exemplar"), (second, "output")))
+    if (first.dtype, first.shape[-1]) != (second.dtype, second.shape[-1]):
+        raise InvalidInput(
+            f"output: needs {first.dtype} with {first.shape[-1]} channels as the exemplar has, "
+            f"got {second.dtype} with {second.shape[-1]}"
+        )
+    if source is not None and (not isinstance(source, SourceMap) or source.shape != second.shape[:count]):
+        raise InvalidInput(f"source: needs the source map of the output, over {second.shape[:count]}")
+    if classes is None:
+        labels = _labels(first, "exemplar"), _labels(second, "output")
+        kinds = int(max(a.max() for a in labels)) + 1
+        pick = tuple(range(1, kinds)) if chosen is None else _chosen(chosen, kinds)
+        before, after = (np.asarray(a / max(kinds - 1, 1), np.float32) for a in labels)
+    else:
+        first, second = _one_range(first, second)
+        found = statistics.classes(first, classes, axes=count)
+        labels = found.of(first, axes=count), found.of(second, axes=count)
+        kinds = len(found.centres)
+        pick = tuple(range(kinds // 2 + kinds % 2, kinds)) if chosen is None else _chosen(chosen, kinds)
+        before, after = statistics.lightness(first, axes=count), statistics.lightness(second, axes=count)
+    grey = before, after
+    masks = tuple(np.isin(a, pick) for a in labels)
+    seams = np.concatenate(structure.seam_planes(grey[1]))
+    window = min(64, *first.shape[:count], *second.shape[:count])
+    orientation, turned = None, None
+    if field is not None:
+        if not isinstance(field, Field) or field.axes != count:
+            raise InvalidInput(f"field: needs a field of {count} axes, got {type(field).__name__}")
+        field = field.over(second.shape[:count])
+        normal = structure.texture_normal(grey[0])
+        errors = (
+            structure.orientation_errors(grey[0], None, normal),
+            structure.orientation_errors(grey[1], field, normal),
+        )
+        orientation = np.array([[np.median(e), np.quantile(e, 0.9)] for e in errors])
+        turned = _turned(field, second.shape[:count], normal)
+    return Comparison(
+        np.stack([np.bincount(a.ravel(), minlength=kinds) / a.size for a in labels]),
+        (statistics.particles(masks[0]), statistics.particles(masks[1])),
+        (structure.frequency(grey[0], window=window), structure.frequency(grey[1], window=window)),
+        np.stack([statistics.two_point(m, _REACH) for m in masks]),
+        np.stack([statistics.lineal_path(m, _REACH) for m in masks]),
+        np.stack([structure.autocorrelation(g, _REACH) for g in grey]),
+        (structure.isolated(grey[0]), structure.isolated(grey[1])),
+        float(structure.slice_distances(*grey).mean()),
+        np.array([seams.min(), seams.max()]),
+        orientation,
+        turned,
+        None if source is None else cell_reuse(source, field),
+    )
+
+
+def _turned(field: Field, shape: tuple[int, ...], normal: NDArray[np.float64]) -> float:
+    """Give the mean angle between the exemplar's normal and where the field takes it."""
+    lines = [np.linspace(0, n - 1, min(n, 16)) for n in shape]
+    frames = field.jacobians(np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)).astype(np.float64)
+    there = np.einsum("...ji,j->...i", frames, normal)
+    cosine = np.abs(there @ normal) / np.linalg.norm(there, axis=-1)
+    return float(np.degrees(np.arccos(np.minimum(cosine, 1))).mean())
+
+
+def _one_range(first: Array, second: Array) -> tuple[Array, Array]:
+    """Bring floats to [0, 1] by the exemplar's range, where that goes beyond; integers have theirs."""
+    low, high = (float(f(first)) for f in (np.min, np.max))
+    if first.dtype.kind != "f" or (low >= 0 and high <= 1):
+        return first, np.clip(second, 0, 1) if second.dtype.kind == "f" else second
+    low = min(low, 0.0)
+    return tuple(np.clip((a.astype(np.float64) - low) / (high - low), 0, 1) for a in (first, second))  # type: ignore[return-value]
+
+
+def _labels(array: Array, name: str) -> Array:
+    if array.shape[-1] != 1 or array.dtype.kind not in "bui" or array.min() < 0 or array.max() > 255:
+        raise InvalidInput(f"{name}: labels are whole numbers from 0 to 255, without channels")
+    return array[..., 0].astype(np.uint8)
+
+
+def _chosen(chosen: object, kinds: int) -> tuple[int, ...]:
+    several = chosen if isinstance(chosen, tuple | list) else (chosen,)
+    if not several:
+        raise InvalidInput("chosen: needs at least one class")
+    return tuple(as_int(k, "chosen", 0, kinds - 1) for k in several)
+
+
+def _ratio(pair: tuple[float, float]) -> float:
+    return pair[1] / pair[0] if pair[0] else float("nan")
+
+
+def _distance(pair: NDArray[np.float64]) -> float:
+    """Give the mean absolute difference where both are known."""
+    off = np.abs(pair[1] - pair[0])
+    return float(off[np.isfinite(off)].mean())

@@ -1,0 +1,133 @@
+"""Volumes of labels: painted, and the surface of what a label marks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from texrs._arrays import as_float
+from texrs._typing import Array, Floats
+from texrs.errors import InvalidInput, LimitExceeded
+from texrs.volume._values import as_direction
+
+__all__ = ["paint", "surface"]
+
+_GROUND = (233, 230, 222)
+_MOST_COLOURS = 2**16
+_GOLDEN = 0.6180339887498949
+"""Steps of hue that come back to none they were at."""
+
+
+def paint(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArray[np.uint8]:
+    """Give each label a colour, so that a picture shows it.
+
+    Parameters
+    ----------
+    labels : array_like
+        Bool or integers of at least 0, (H, W) or (D, H, W).
+    colours : (K, 3) array_like, optional
+        uint8, in the order of the labels, which then are below K. By default 0 is light, and the others have colours
+        that differ; a label has the same colour in each volume.
+
+    Returns
+    -------
+    ndarray
+        Shape (..., 3), uint8.
+
+    Raises
+    ------
+    InvalidInput
+        Not labels, or a label without a colour.
+
+    Examples
+    --------
+    >>> from texrs import volume
+    >>> volume.paint([[0, 1], [1, 0]], [(255, 255, 255), (200, 30, 20)])[0, 1]
+    array([200,  30,  20], dtype=uint8)
+
+    """
+    array = np.asarray(labels)
+    if array.dtype.kind not in "bui" or array.ndim not in (2, 3) or array.size == 0:
+        raise InvalidInput(f"labels: needs integers of shape (H, W) or (D, H, W), got {array.dtype} of {array.shape}")
+    least, largest = int(array.min()), int(array.max())
+    if least < 0:
+        raise InvalidInput(f"labels: must be at least 0, got {least}")
+    if colours is None:
+        table = _table(min(largest + 1, _MOST_COLOURS))
+        # Of very many labels some share a colour, though never that of the ground.
+        index = np.where(array < len(table), array, array % (_MOST_COLOURS - 1) + 1).astype(np.intp)
+        return np.ascontiguousarray(table[index])
+    given = np.asarray(colours)
+    if given.ndim != 2 or given.shape[1] != 3 or given.dtype.kind not in "ui" or given.min() < 0 or given.max() > 255:
+        raise InvalidInput(f"colours: needs numbers from 0 to 255 of shape (K, 3), got {given.dtype} of {given.shape}")
+    if largest >= len(given):
+        raise InvalidInput(f"labels: reach {largest}, but there are {len(given)} colours")
+    return np.ascontiguousarray(given.astype(np.uint8)[array.astype(np.intp)])
+
+
+def surface(
+    mask: ArrayLike, *, spacing: Sequence[float] = (1, 1, 1), closed: bool = True
+) -> tuple[Floats, NDArray[np.int64]]:
+    """Give the surface of a material as triangles, for `texrs.io.write_surface` (marching cubes).
+
+    Parameters
+    ----------
+    mask : array_like
+        Bool or integers, (D, H, W): where the material is, as ``labels == 2``.
+    spacing : sequence of 3 float
+        From plane to plane, row to row and column to column.
+    closed : bool
+        Whether pieces that the border cuts are closed there, so that the surface has an inside.
+
+    Returns
+    -------
+    vertices : (N, 3) float32
+        Corners as x, y, z: columns, rows and planes times their spacing.
+    faces : (M, 3) int64
+        Three corners each, counter-clockwise as seen from outside.
+
+    Raises
+    ------
+    InvalidInput
+        Not a mask of at least 2 voxels a side, or one without a surface.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs import volume
+    >>> block = np.zeros((8, 8, 8), bool)
+    >>> block[2:6, 2:6, 2:6] = True
+    >>> vertices, faces = volume.surface(block)
+    >>> vertices.min(), vertices.max()
+    (np.float32(1.5), np.float32(5.5))
+
+    """
+    from skimage.measure import marching_cubes
+
+    array = np.asarray(mask)
+    if array.dtype.kind not in "bui" or array.ndim != 3 or min(array.shape) < 2:
+        raise InvalidInput(f"mask: needs bool (D, H, W) of at least 2 a side, got {array.dtype} of {array.shape}")
+    if array.size > 2**28:
+        raise LimitExceeded(f"mask: {array.size} voxels are more than the limit of {2**28}")
+    steps = [as_float(s, "spacing", 1e-12, 1e12) for s in as_direction(spacing, "spacing").tolist()]
+    solid = array != 0
+    if closed:
+        solid = np.pad(solid, 1)
+    if solid.all() or not solid.any():
+        raise InvalidInput("mask: is all of one kind, so that there is no surface")
+    corners, faces, _, _ = marching_cubes(solid.astype(np.float32), 0.5, allow_degenerate=False)
+    vertices = ((corners - (1 if closed else 0)) * steps)[:, ::-1]
+    return np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int64)
+
+
+def _table(count: int) -> Array:
+    """Give colours of hues that go round by the golden section, of three brightnesses in turn."""
+    k = np.arange(count)
+    hue = 6 * (k * _GOLDEN % 1)
+    value = np.array([0.86, 0.66, 0.48])[k % 3]
+    pure = np.clip(np.abs((hue[:, np.newaxis] - (0, 2, 4) + 3) % 6 - 3) * -1 + 2, 0, 1)
+    table: Array = np.rint(255 * value[:, np.newaxis] * (0.3 + 0.7 * pure)).astype(np.uint8)
+    table[0] = _GROUND
+    return table

@@ -1,0 +1,376 @@
+"""Pictures of volumes: slices, oblique cuts, a cube and a turntable."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from math import cos, radians, sin
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from texrs._arrays import as_float, as_image, as_int, as_size, guidance
+from texrs._typing import Array, Floats, Interpolation, Path, Progress
+from texrs.errors import FileError, InvalidInput, LimitExceeded
+from texrs.io import atomic
+from texrs.kernels.gather import gather
+from texrs.volume._values import as_direction
+
+__all__ = ["cube", "oblique", "slices", "turntable"]
+
+_LARGEST = 4096
+"""Pixels a side of pictures of cubes."""
+_MOST = 2**26
+"""Pixels of all pictures of a turntable."""
+_MARGIN = 1.04
+_FINE = 3
+"""Rays a pixel, along each side."""
+_BAND = 16
+"""Lines of pixels rendered at once."""
+_LIGHT = np.array([0.86, 1.0, 0.72], np.float32)
+"""Brightness of faces across planes, rows and columns: the light falls from above."""
+
+
+def slices(volume: ArrayLike, at: Sequence[int] | None = None, *, gap: int = 2) -> Array:
+    """Set three slices side by side: across the planes, the rows and the columns.
+
+    Parameters
+    ----------
+    volume : array_like
+        Shape (D, H, W) or (D, H, W, C).
+    at : sequence of 3 int, optional
+        Plane, row and column to cut at; by default the middle. Negative ones count from the end.
+    gap : int
+        Pixels between the slices. They and what remains beside unequal slices are white (the largest value).
+
+    Returns
+    -------
+    ndarray
+        In the volume's dtype. The first slice shows rows and columns, the second planes and columns, the third planes
+        and rows.
+
+    Raises
+    ------
+    InvalidInput
+        Not a volume, or a place outside it.
+
+    Examples
+    --------
+    >>> from texrs import samples, volume
+    >>> volume.slices(samples.stripes((32, 40, 48)).image).shape
+    (40, 140, 3)
+
+    """
+    v = as_image(volume, "volume", axes=3)
+    places = [n // 2 for n in v.shape[:3]] if at is None else list(at)
+    if len(places) != 3:
+        raise InvalidInput(f"at: needs plane, row and column, got {at!r}")
+    places = [as_int(p, "at", -n, n - 1) for p, n in zip(places, v.shape[:3], strict=True)]
+    space = as_int(gap, "gap", 0, 1024)
+    cuts = [np.take(v, place, axis=axis) for axis, place in enumerate(places)]
+    height = max(c.shape[0] for c in cuts)
+    width = sum(c.shape[1] for c in cuts) + 2 * space
+    white = np.iinfo(v.dtype).max if v.dtype.kind in "ui" else max(1.0, float(v.max())) if v.dtype.kind == "f" else True
+    out = np.full((height, width, v.shape[3]), white, v.dtype)
+    left = 0
+    for cut in cuts:
+        out[: cut.shape[0], left : left + cut.shape[1]] = cut
+        left += cut.shape[1] + space
+    return out if np.ndim(volume) == 4 else out[..., 0]
+
+
+def oblique(
+    volume: ArrayLike,
+    point: Sequence[float] | None = None,
+    normal: Sequence[float] | None = None,
+    *,
+    axes: ArrayLike | None = None,
+    size: int | Sequence[int] | None = None,
+    interpolation: Interpolation = "linear",
+) -> Array:
+    """Cut a volume along any plane.
+
+    Parameters
+    ----------
+    volume : array_like
+        Shape (D, H, W) or (D, H, W, C).
+    point : sequence of 3 float, optional
+        (plane, row, column) of a point of the cut, in voxels; by default the middle of the volume.
+    normal : sequence of 3 float, optional
+        Direction that the cut is across. The picture's columns run along the volume's as well as they can, or along
+        its rows where the cut is across the columns.
+    axes : (2, 3) array_like, optional
+        Instead of ``normal``: the steps of the picture's rows and of its columns, in voxels.
+    size : int or (rows, columns), optional
+        Of the picture, whose middle is the point; by default all of the volume that is cut.
+    interpolation : {"linear", "cubic", "nearest"}
+        "nearest" for labels.
+
+    Returns
+    -------
+    ndarray
+        In the volume's dtype; 0 outside it.
+
+    Raises
+    ------
+    InvalidInput
+        Not a volume, a point or a direction; or a cut that misses the volume.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs import volume
+    >>> ramp = np.arange(20)[:, None, None] * np.ones((20, 20, 20), np.float32)
+    >>> cut = volume.oblique(ramp, (10, 10, 10), normal=(1, 1, 0))
+    >>> cut.shape  # from corner to corner across, and a side
+    (25, 20)
+
+    """
+    v = as_image(volume, "volume", axes=3)
+    shape = np.array(v.shape[:3])
+    middle = (shape - 1) / 2 if point is None else as_direction(point, "point")
+    if (normal is None) == (axes is None):
+        raise InvalidInput("normal, axes: needs one of the two")
+    steps = _across(as_direction(normal, "normal")) if axes is None else np.asarray(axes, np.float64)
+    if steps.shape != (2, 3) or not np.isfinite(steps).all() or np.linalg.norm(np.cross(*steps)) < 1e-6:
+        raise InvalidInput("axes: needs two directions of three numbers that are not parallel")
+    if size is None:
+        low, high = _cut(steps, middle, shape)
+        start, sides = np.ceil(low), tuple((np.floor(high) - np.ceil(low) + 1).astype(int).tolist())
+        if min(sides) < 1:
+            raise InvalidInput("point, normal: this cut does not meet the volume")
+    else:
+        sides = as_size(size, "size")
+        start = -(np.array(sides) - 1) / 2
+    as_size(sides, "size")
+    rows, columns = (s + np.arange(n) for s, n in zip(start, sides, strict=True))
+    out = np.zeros((*sides, v.shape[3]), v.dtype)
+    for top in range(0, sides[0], 256):
+        part = slice(top, top + 256)
+        at = middle + rows[part, np.newaxis, np.newaxis] * steps[0] + columns[:, np.newaxis] * steps[1]
+        inside = ((at >= -0.5) & (at <= shape - 0.5)).all(axis=-1)
+        found = gather(v, np.clip(at, 0, shape - 1), interpolation=interpolation)
+        out[part] = np.where(inside[..., np.newaxis], found, np.zeros((), v.dtype))
+    return out if np.ndim(volume) == 4 else out[..., 0]
+
+
+def cube(
+    volume: ArrayLike,
+    size: int = 512,
+    *,
+    azimuth: float = 40,
+    elevation: float = 30,
+    interpolation: Interpolation = "linear",
+) -> NDArray[np.uint8]:
+    """Show a volume as a block of its material, seen from its front, its right and above.
+
+    The front is plane 0, as a picture shows it; to its right lies the last column, above it row 0.
+
+    Parameters
+    ----------
+    volume : array_like
+        Shape (D, H, W) or (D, H, W, C). Transparency is shown over mid grey; of more than 3 channels the first ones.
+    size : int
+        Pixels of the longer side, 16 to 4096.
+    azimuth : float
+        Degrees that the eye moves to the right; at 0 the front is seen alone.
+    elevation : float
+        Degrees that it moves up, within 90 either way.
+    interpolation : {"linear", "cubic", "nearest"}
+        Between voxels; "nearest" shows each as a square.
+
+    Returns
+    -------
+    ndarray
+        Shape (rows, columns, 4), uint8: colours, and alpha 0 outside. Edges are smooth.
+
+    Raises
+    ------
+    InvalidInput
+        Not a volume, or not such angles.
+
+    Examples
+    --------
+    >>> from texrs import samples, volume
+    >>> picture = volume.cube(samples.wood_solid((32, 32, 32)).image, 128)
+    >>> picture.shape[1:], picture[0, 0, 3], picture[60, 60, 3]
+    ((115, 4), np.uint8(0), np.uint8(255))
+
+    """
+    colours = guidance(as_image(volume, "volume", axes=3))
+    longer = as_int(size, "size", 16, _LARGEST)
+    view = _view(as_float(azimuth, "azimuth", -1e6, 1e6), as_float(elevation, "elevation", -90, 90))
+    half = np.array(colours.shape[:3]) / 2
+    reach = np.abs(view[:2]) @ half * _MARGIN
+    pixel = 2 * reach.max() / longer
+    sides = np.maximum(np.ceil(2 * reach / pixel - 1e-6), 1).astype(int)
+    return _render(colours, view, (int(sides[0]), int(sides[1])), float(pixel), interpolation)
+
+
+def turntable(
+    volume: ArrayLike,
+    path: Path,
+    *,
+    frames: int = 24,
+    size: int = 320,
+    elevation: float = 25,
+    seconds: float = 4,
+    background: Sequence[int] = (255, 255, 255),
+    interpolation: Interpolation = "linear",
+    overwrite: bool = True,
+    progress: Progress | None = None,
+) -> None:
+    """Write an animated GIF of a volume that turns once, without end.
+
+    Parameters
+    ----------
+    volume : array_like
+        As of `cube`.
+    path : path_like
+        With the suffix .gif; written whole or not at all.
+    frames : int
+        Pictures of a turn, 2 to 360.
+    size : int
+        Side of the picture, 16 to 1024 pixels.
+    elevation : float
+        Degrees that the eye is above.
+    seconds : float
+        Of a turn.
+    background : sequence of 3 int
+        Colour around, 0 to 255 each.
+    interpolation : {"linear", "cubic", "nearest"}
+        As of `cube`.
+    overwrite : bool
+        Whether a file that exists may be replaced.
+    progress : callable, optional
+        Called with what is done and its share.
+
+    Raises
+    ------
+    InvalidInput
+        Not a volume, or numbers beyond what is allowed.
+    LimitExceeded
+        More than 2^26 pixels in all.
+    FileError
+        Another suffix, or the file cannot be written.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from texrs import samples, volume
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "turn.gif")
+    ...     volume.turntable(samples.stripes((32, 32, 32)).image, path, frames=3, size=64)
+    ...     path.read_bytes()[:6]
+    b'GIF89a'
+
+    """
+    from PIL import Image
+
+    count, side = as_int(frames, "frames", 2, 360), as_int(size, "size", 16, 1024)
+    above, period = as_float(elevation, "elevation", -90, 90), as_float(seconds, "seconds", 0.1, 600)
+    if count * side * side > _MOST:
+        raise LimitExceeded(f"frames, size: {count} pictures of {side} x {side} are more than {_MOST} pixels in all")
+    if not str(path).lower().endswith(".gif"):
+        raise FileError(f"{path}: needs a name that ends in .gif")
+    if not isinstance(background, Sequence | np.ndarray) or len(background) != 3:
+        raise InvalidInput(f"background: needs three integers, got {background!r}")
+    ground = np.array([as_int(b, "background", 0, 255) for b in background], np.float32)
+    colours = guidance(as_image(volume, "volume", axes=3))
+    half = np.array(colours.shape[:3]) / 2
+    wide = float(np.hypot(half[0], half[2]))
+    tall = abs(cos(radians(above))) * half[1] + abs(sin(radians(above))) * wide
+    pixel = 2 * max(wide, float(tall)) * _MARGIN / side
+    pictures = []
+    with atomic(path, overwrite=overwrite) as temporary:
+        for i in range(count):
+            if progress is not None:
+                progress("turning", i / count)
+            seen = _render(colours, _view(360 * i / count, above), (side, side), pixel, interpolation)
+            alpha = seen[..., 3:] / np.float32(255)
+            pictures.append(np.rint(seen[..., :3] * alpha + ground * (1 - alpha)).astype(np.uint8))
+        # One palette for all, for colours that change from picture to picture flicker.
+        few = Image.fromarray(np.concatenate(pictures[:: max(1, count // 6)]))
+        palette = few.quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+        images: list[Any] = [Image.fromarray(p).quantize(palette=palette, dither=Image.Dither.NONE) for p in pictures]
+        duration = max(20, round(1000 * period / count))
+        images[0].save(
+            temporary, format="GIF", save_all=True, append_images=images[1:], duration=duration, loop=0, optimize=False
+        )
+    if progress is not None:
+        progress("turning", 1.0)
+
+
+def _render(
+    colours: Floats, view: NDArray[np.float64], sides: tuple[int, int], pixel: float, interpolation: Interpolation
+) -> NDArray[np.uint8]:
+    """Look along parallel rays at a block whose middle is that of the picture."""
+    shape = np.array(colours.shape[:3])
+    half, (down, right, forward) = shape / 2, view
+    out = np.zeros((*sides, 4), np.uint8)
+    # A ray that is parallel to a face never meets it.
+    slope = np.where(np.abs(forward) < 1e-6, 1e-6, forward)
+    across = ((np.arange(sides[1] * _FINE) + 0.5) / _FINE - sides[1] / 2) * pixel
+    for top in range(0, sides[0], _BAND):
+        rows = min(_BAND, sides[0] - top)
+        along = ((np.arange(rows * _FINE) + 0.5) / _FINE + top - sides[0] / 2) * pixel
+        eye = [np.add.outer(along * down[k], across * right[k]).astype(np.float32) for k in range(3)]
+        near = [(np.float32(-half[k] * np.sign(slope[k])) - eye[k]) / np.float32(slope[k]) for k in range(3)]
+        entry = np.maximum(np.maximum(near[0], near[1]), near[2])
+        leave = [near[k] + np.float32(2 * half[k] / abs(slope[k])) for k in range(3)]
+        hit = entry < np.minimum(np.minimum(leave[0], leave[1]), leave[2])
+        if not hit.any():
+            continue
+        way = entry[hit]
+        face = np.where(way == near[0][hit], 0, np.where(way == near[1][hit], 1, 2))
+        at = np.stack([eye[k][hit] + way * np.float32(forward[k]) + np.float32(half[k] - 0.5) for k in range(3)], -1)
+        found = gather(colours, np.clip(at, 0, shape - 1), interpolation=interpolation)
+        shaded = np.zeros((*hit.shape, 4), np.float32)
+        shaded[hit, :3] = np.clip(found, 0, 1) * _LIGHT[face][:, np.newaxis]
+        shaded[hit, 3] = 1
+        total = shaded.reshape(rows, _FINE, sides[1], _FINE, 4).sum(axis=(1, 3))
+        weight = total[..., 3:]
+        total[..., :3] /= np.maximum(weight, 1)
+        total[..., 3:] = weight / _FINE**2
+        out[top : top + rows] = np.rint(total * 255)
+    return out
+
+
+def _view(azimuth: float, elevation: float) -> NDArray[np.float64]:
+    """Give the directions down, right and away from the eye, as (plane, row, column)."""
+    a, e = radians(azimuth), radians(elevation)
+    return np.array(
+        [
+            [-sin(e) * cos(a), cos(e), sin(e) * sin(a)],
+            [sin(a), 0.0, cos(a)],
+            [cos(e) * cos(a), sin(e), -cos(e) * sin(a)],
+        ]
+    )
+
+
+def _across(normal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give unit steps of rows and columns on a plane: as those of a slice where it is one."""
+    n = normal / np.linalg.norm(normal)
+    along = np.eye(3)[2 if abs(n[2]) < 0.9 else 1]
+    columns = along - n * (n @ along)
+    columns /= np.linalg.norm(columns)
+    rows = np.cross(n, columns)
+    return np.stack([rows * (1 if rows[np.abs(rows).argmax()] > 0 else -1), columns])
+
+
+def _cut(
+    steps: NDArray[np.float64], point: NDArray[np.float64], shape: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give the least and the largest steps from the point that stay in the box."""
+    corners = np.array(list(product((0, 1), repeat=3))) * (shape - 1)
+    normal = np.cross(*steps)
+    side = (corners - point) @ normal
+    found = [corners[i] for i in np.flatnonzero(np.abs(side) < 1e-9)]
+    for i, j in product(range(8), repeat=2):
+        if side[i] * side[j] < 0 and (corners[i] != corners[j]).sum() == 1:
+            found.append(corners[i] + (corners[j] - corners[i]) * side[i] / (side[i] - side[j]))
+    if not found:
+        return np.zeros(2), -np.ones(2)
+    at = np.linalg.lstsq(steps.T, (np.array(found) - point).T, rcond=None)[0]
+    return at.min(axis=1) - 1e-6, at.max(axis=1) + 1e-6

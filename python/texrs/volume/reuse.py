@@ -1,0 +1,166 @@
+"""Which parts of the exemplar a synthesis uses, how often, and in how large pieces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from texrs._arrays import as_int
+from texrs._typing import Bools, Floats
+from texrs.errors import InvalidInput
+from texrs.fields import Field
+from texrs.source_map import SourceMap
+
+__all__ = ["CellReuse", "cell_reuse", "coherent"]
+
+_CLOSE = 0.6
+"""Exemplar voxels that two neighbours may be off and still go on in one piece."""
+
+
+@dataclass(frozen=True, slots=True)
+class CellReuse:
+    """How a synthesis uses its exemplar (see `cell_reuse`).
+
+    Attributes
+    ----------
+    coherent : float
+        Share of neighbours along the axes that go on in one piece of the exemplar.
+    largest : float
+        Largest connected patch of such neighbours, as a share of the output.
+    most_used : float
+        Use of the most used cell of the exemplar over the mean of all.
+    unused : float
+        Share of the cells that are not used at all.
+
+    """
+
+    coherent: float
+    largest: float
+    most_used: float
+    unused: float
+
+
+def coherent(source: SourceMap, axis: int, field: Field | None = None) -> Bools:
+    """Tell where a voxel and the next along an axis go on in one piece: max |S(p + e) - S(p) - J e| < 0.6.
+
+    Parameters
+    ----------
+    source : SourceMap
+        Of a picture or a volume.
+    axis : int
+        Along which.
+    field : Field, optional
+        Where J is taken from; by default from the map's own frames.
+
+    Returns
+    -------
+    ndarray
+        Bool, one shorter than the output along the axis.
+
+    Examples
+    --------
+    >>> from texrs import SourceMap, volume
+    >>> bool(volume.coherent(SourceMap.identity((8, 8, 8)), 0).all())
+    True
+
+    """
+    field = _check(source, field)
+    along = as_int(axis, "axis", 0, source.axes - 1)
+    here = tuple(slice(0, -1) if a == along else slice(None) for a in range(source.axes))
+    there = tuple(slice(1, None) if a == along else slice(None) for a in range(source.axes))
+    out: Bools = source.exemplar[here] == source.exemplar[there]
+    # A plane at once, for a dense field of a large volume is many times its size.
+    for i in range(out.shape[0]):
+        at = np.float32(0) if along else np.float32(1)
+        first = source.coordinates[i][here[1:]]
+        second = source.coordinates[i + int(at)][there[1:]]
+        off = np.abs(second - first - _step(source, field, i, here[1:], along))
+        out[i] &= off.max(axis=-1) < _CLOSE
+    return out
+
+
+def cell_reuse(source: SourceMap, field: Field | None = None, *, cell: int = 8) -> CellReuse:
+    """Measure how a synthesis uses its exemplar.
+
+    Parameters
+    ----------
+    source : SourceMap
+        Of a picture or a volume, from one exemplar or several.
+    field : Field, optional
+        As of `coherent`.
+    cell : int
+        Side of the exemplar's cells, in voxels. Cells that its border cuts count by what is left of them.
+
+    Examples
+    --------
+    >>> from texrs import SourceMap, volume
+    >>> volume.cell_reuse(SourceMap.identity((16, 16, 16)))
+    CellReuse(coherent=1.0, largest=1.0, most_used=1.0, unused=0.0)
+
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    field = _check(source, field)
+    side = as_int(cell, "cell", 1, 2**20)
+    count = source.label.size
+    index = np.arange(count, dtype=np.int32 if count < 2**31 else np.int64).reshape(source.shape)
+    starts, ends, pairs = [], [], 0
+    for axis in range(source.axes):
+        joined = coherent(source, axis, field)
+        pairs += joined.size
+        starts.append(np.delete(index, -1, axis)[joined])
+        ends.append(np.delete(index, 0, axis)[joined])
+    start, end = np.concatenate(starts), np.concatenate(ends)
+    graph = coo_array((np.ones(len(start), np.uint8), (start, end)), shape=(count, count))
+    _, patch = connected_components(graph, directed=False)
+    use = np.concatenate([_cell_use(source, number, side) for number in range(len(source.shapes))])
+    return CellReuse(
+        len(start) / max(pairs, 1),
+        float(np.bincount(patch).max()) / count,
+        float(use.max() / max(float(use.mean()), 1e-30)),
+        float((use == 0).mean()),
+    )
+
+
+def _cell_use(source: SourceMap, number: int, side: int) -> Floats:
+    """Give the uses of a voxel of each cell of an exemplar, on average."""
+    shape = np.array(source.shapes[number])
+    cells = -(-shape // side)
+    place = np.floor(source.coordinates[source.exemplar == number] + np.float32(0.5)).astype(np.int64)
+    place = np.clip(place, 0, shape - 1) // side
+    used = np.bincount(np.ravel_multi_index(tuple(place.T), tuple(cells)), minlength=int(cells.prod()))
+    lengths = [np.minimum(side, n - side * np.arange(c)) for n, c in zip(shape, cells, strict=True)]
+    size = lengths[0]
+    for more in lengths[1:]:
+        size = np.multiply.outer(size, more)
+    return np.asarray(used / size.ravel(), np.float32)
+
+
+def _step(source: SourceMap, field: Field | None, i: int, here: tuple[slice, ...], along: int) -> Floats:
+    """Give J e of the voxels of one plane."""
+    if field is not None:
+        if field.constant is not None:
+            return np.asarray(field.jacobians(np.zeros(source.axes))[:, along])
+        grid = np.stack(np.meshgrid(*map(np.arange, source.shape[1:]), indexing="ij"), axis=-1)[here]
+        points = np.concatenate([np.full((*grid.shape[:-1], 1), i), grid], axis=-1)
+        return np.asarray(field.jacobians(points)[..., along])
+    frame: Any = source.frame
+    if frame is None:
+        return np.asarray(np.eye(source.axes, dtype=np.float32)[along])
+    if frame.ndim == 3:
+        return np.asarray(frame[:, :, along][source.label[i][here]])
+    return np.asarray(frame[i][here][..., along])
+
+
+def _check(source: SourceMap, field: Field | None) -> Field | None:
+    """Give the field that J is taken from: the one that is given, or the map's own, where that is a field."""
+    if not isinstance(source, SourceMap):
+        raise InvalidInput(f"source: needs a source map, got {type(source).__name__}")
+    if field is not None and (not isinstance(field, Field) or field.axes != source.axes):
+        got = field if isinstance(field, Field) else type(field).__name__
+        raise InvalidInput(f"field: needs a field of {source.axes} axes, got {got}")
+    frame: Any = source.frame
+    return frame if field is None and isinstance(frame, Field) else field

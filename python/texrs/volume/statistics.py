@@ -1,0 +1,267 @@
+"""Numbers on the materials of a picture or a volume: their colours, their shares and how their pieces lie.
+
+Values are brought to [0, 1] by the dtype, or, of floats beyond that, by their own range (`compare` uses one range for
+both of what it compares).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from texrs._arrays import as_int
+from texrs._typing import Floats
+from texrs.errors import InvalidInput
+from texrs.volume._values import as_region, colours_of, leading, trailing
+
+__all__ = ["Classes", "Particles", "classes", "lightness", "lineal_path", "particles", "two_point"]
+
+_SAMPLE = 2**15
+"""Pixels that classes are found on."""
+_RESTARTS, _TURNS = 6, 40
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Classes:
+    """Colours that stand for the materials of a texture, from dark to light.
+
+    Attributes
+    ----------
+    centres : (K, C) float32
+        The mean colour of each, in [0, 1].
+
+    """
+
+    centres: Floats
+
+    def of(self, image: ArrayLike, *, axes: int | None = None) -> NDArray[np.uint8]:
+        """Give the class of each pixel or voxel: the nearest centre; the lower one of two as near."""
+        colours = colours_of(image, "image", axes)
+        if colours.shape[-1] != self.centres.shape[1]:
+            raise InvalidInput(f"image: needs {self.centres.shape[1]} colour channels, got {colours.shape[-1]}")
+        return self._nearest(colours)
+
+    def shares(self, image: ArrayLike, *, axes: int | None = None) -> NDArray[np.float64]:
+        """Give the share of each class, (K,); they sum to 1."""
+        labels = self.of(image, axes=axes)
+        return np.bincount(labels.ravel(), minlength=len(self.centres)) / labels.size
+
+    def _nearest(self, colours: Floats) -> NDArray[np.uint8]:
+        best = np.full(colours.shape[:-1], np.inf, np.float32)
+        label = np.zeros(colours.shape[:-1], np.uint8)
+        for k, centre in enumerate(self.centres):
+            far = ((colours - centre) ** 2).sum(axis=-1, dtype=np.float32)
+            nearer = far < best
+            label[nearer], best[nearer] = k, far[nearer]
+        return label
+
+
+@dataclass(frozen=True, slots=True)
+class Particles:
+    """How many connected pieces of a material there are, and how large (see `particles`).
+
+    Attributes
+    ----------
+    count : int
+        Pieces of at least the least size.
+    density : float
+        Pieces for each 100 000 pixels or voxels.
+    mean, median : float
+        Size, in pixels or voxels; NaN where there are none.
+    deciles : tuple of float
+        The nine sizes that 10 %, 20 % ... of the pieces are not above.
+
+    """
+
+    count: int
+    density: float
+    mean: float
+    median: float
+    deciles: tuple[float, ...]
+
+
+def lightness(image: ArrayLike, *, axes: int | None = None) -> Floats:
+    """Give the mean of the colour channels in [0, 1], float32; transparency counts as mid grey.
+
+    Parameters
+    ----------
+    image : array_like
+        A picture or a volume, with or without channels.
+    axes : int, optional
+        2 for a picture, 3 for a volume; by default by its shape: up to 4 along the last axis are channels.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs import volume
+    >>> volume.lightness(np.full((2, 2, 3), 51, np.uint8))
+    array([[0.2, 0.2],
+           [0.2, 0.2]], dtype=float32)
+
+    """
+    return np.asarray(colours_of(image, "image", axes).mean(axis=-1, dtype=np.float32))
+
+
+def classes(exemplar: ArrayLike, count: int = 4, *, axes: int | None = None) -> Classes:
+    """Find the colours that best stand for an exemplar's own (k-means), from dark to light.
+
+    Parameters
+    ----------
+    exemplar : array_like
+        A picture or a volume.
+    count : int
+        How many, 2 to 16. An exemplar of fewer colours has as many classes as colours.
+    axes : int, optional
+        As of `lightness`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs import volume
+    >>> found = volume.classes(np.repeat([10, 20, 200], 100).astype(np.uint8).reshape(3, 10, 10), 3)
+    >>> (found.centres.ravel() * 255).round()
+    array([ 10.,  20., 200.], dtype=float32)
+
+    """
+    k = as_int(count, "count", 2, 16)
+    colours = colours_of(exemplar, "exemplar", axes)
+    flat = colours.reshape(-1, colours.shape[-1])
+    rng = np.random.default_rng(0)
+    if len(flat) > _SAMPLE:
+        flat = flat[rng.choice(len(flat), _SAMPLE, replace=False)]
+    points, weights = np.unique(flat, axis=0, return_counts=True)
+    k = min(k, len(points))
+    best, least = points[:k].astype(np.float64), np.inf
+    for _ in range(_RESTARTS):
+        centres, spread = _means(points, weights.astype(np.float64), k, rng)
+        if spread < least * (1 - 1e-9):
+            best, least = centres, spread
+    return Classes(np.ascontiguousarray(best[np.argsort(best.mean(axis=1), kind="stable")], np.float32))
+
+
+def two_point(mask: ArrayLike, reach: int = 16) -> NDArray[np.float64]:
+    """Give the two-point correlation S2 along each axis: how often both ends of a step are in a material.
+
+    Parameters
+    ----------
+    mask : array_like
+        Bool, (H, W) or (D, H, W): where the material is.
+    reach : int
+        Longest step; one that is longer than a side is NaN there.
+
+    Returns
+    -------
+    ndarray
+        Shape (A, reach + 1); at step 0 the material's share.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs import volume
+    >>> stripes = np.arange(40) % 4 < 2
+    >>> volume.two_point(np.tile(stripes, (40, 1)), 4)[1].round(2)
+    array([0.5 , 0.26, 0.  , 0.24, 0.5 ])
+
+    """
+    phase, far = as_region(mask), as_int(reach, "reach", 1, 2**20)
+    out = np.full((phase.ndim, far + 1), np.nan)
+    for axis in range(phase.ndim):
+        for step in range(min(far + 1, phase.shape[axis])):
+            out[axis, step] = (leading(phase, axis, step) & trailing(phase, axis, step)).mean()
+    return out
+
+
+def lineal_path(mask: ArrayLike, reach: int = 16) -> NDArray[np.float64]:
+    """Give the lineal path along each axis: how often all of a step, with its ends, is in a material.
+
+    Parameters
+    ----------
+    mask : array_like
+        Bool, (H, W) or (D, H, W).
+    reach : int
+        Longest step; one that is longer than a side is NaN there.
+
+    Returns
+    -------
+    ndarray
+        Shape (A, reach + 1); at step 0 the material's share.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs import volume
+    >>> volume.lineal_path(np.tile(np.arange(40) % 4 < 2, (40, 1)), 2)[1].round(2)
+    array([0.5 , 0.26, 0.  ])
+
+    """
+    phase, far = as_region(mask), as_int(reach, "reach", 1, 2**20)
+    out = np.full((phase.ndim, far + 1), np.nan)
+    for axis in range(phase.ndim):
+        path = phase
+        for step in range(min(far + 1, phase.shape[axis])):
+            if step:
+                path = leading(path, axis, 1) & trailing(phase, axis, step)
+            out[axis, step] = path.mean()
+    return out
+
+
+def particles(mask: ArrayLike, *, least: int = 8) -> Particles:
+    """Count the connected pieces of a material, of neighbours that share a side.
+
+    Parameters
+    ----------
+    mask : array_like
+        Bool, (H, W) or (D, H, W).
+    least : int
+        Smaller pieces are grain and are not counted.
+
+    Examples
+    --------
+    >>> from texrs import samples, volume
+    >>> stone = samples.particles((48, 48, 48))
+    >>> volume.particles(stone.mask).count >= len(stone.centres)  # a piece at the border may be two
+    True
+
+    """
+    from scipy.ndimage import label
+
+    phase, low = as_region(mask), as_int(least, "least", 1, 2**40)
+    pieces, count = label(phase)
+    sizes = np.bincount(pieces.ravel(), minlength=count + 1)[1:]
+    sizes = sizes[sizes >= low]
+    if not len(sizes):
+        return Particles(0, 0.0, np.nan, np.nan, (np.nan,) * 9)
+    deciles = np.quantile(sizes, np.arange(1, 10) / 10, method="inverted_cdf")
+    return Particles(
+        len(sizes),
+        1e5 * len(sizes) / phase.size,
+        float(sizes.mean()),
+        float(np.median(sizes)),
+        tuple(deciles.astype(float).tolist()),
+    )
+
+
+def _means(
+    points: Floats, weights: NDArray[np.float64], k: int, rng: np.random.Generator
+) -> tuple[NDArray[np.float64], float]:
+    """Give k centres by Lloyd's turns, and the spread about them; starts are spread out by their distance."""
+    p = points.astype(np.float64)
+    centres = p[rng.choice(len(p), 1, p=weights / weights.sum())]
+    while len(centres) < k:
+        far = _squared(p, centres).min(axis=1) * weights
+        centres = np.concatenate([centres, p[rng.choice(len(p), 1, p=far / far.sum())]])
+    for _ in range(_TURNS):
+        label = _squared(p, centres).argmin(axis=1)
+        total = np.asarray(np.bincount(label, weights, k), np.float64)
+        moved = np.stack([np.asarray(np.bincount(label, weights * c, k), np.float64) for c in p.T], axis=1)
+        moved = np.where(total[:, np.newaxis] > 0, moved / np.maximum(total, 1e-30)[:, np.newaxis], centres)
+        if np.abs(moved - centres).max() < 1e-6:
+            break
+        centres = moved
+    return centres, float((_squared(p, centres).min(axis=1) * weights).sum())
+
+
+def _squared(points: NDArray[np.float64], centres: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.stack([((points - c) ** 2).sum(axis=1) for c in centres], axis=1)

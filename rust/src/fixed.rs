@@ -1,0 +1,156 @@
+//! Coordinates and frames in fixed point.
+//!
+//! A synthesis moves coordinates by frames many thousand times, and its choices hang on where they round to. In fixed
+//! point every step is exact, so the result is the same on any machine and in any order of work.
+
+/// Binary digits after the point.
+pub const BITS: u32 = 12;
+/// One sample.
+pub const ONE: i32 = 1 << BITS;
+
+/// A place in an exemplar, in units of 1 / [`ONE`] of a sample; sample centres are at the multiples of [`ONE`].
+pub type Place<const D: usize> = [i32; D];
+
+/// A Jacobian dS/dp, in units of 1 / [`ONE`]: entries from -8 to 8. Row: axis of the exemplar; column: of the output.
+pub type Frame<const D: usize> = [[i16; D]; D];
+
+/// The frame that leaves everything as it is.
+pub const fn identity<const D: usize>() -> Frame<D> {
+    let mut frame = [[0; D]; D];
+    let mut axis = 0;
+    while axis < D {
+        frame[axis][axis] = ONE as i16;
+        axis += 1;
+    }
+    frame
+}
+
+/// The sample nearest to a place; half-way goes to the higher one.
+#[inline(always)]
+pub fn nearest<const D: usize>(place: Place<D>) -> [i32; D] {
+    place.map(|x| (x + ONE / 2) >> BITS)
+}
+
+/// The displacement J step of a step in whole samples of the output.
+#[inline(always)]
+pub fn apply<const D: usize>(frame: &Frame<D>, step: [i32; D]) -> Place<D> {
+    let mut moved = [0; D];
+    for i in 0..D {
+        for j in 0..D {
+            moved[i] += i32::from(frame[i][j]) * step[j];
+        }
+    }
+    moved
+}
+
+/// `a + b`.
+#[inline(always)]
+pub fn add<const D: usize>(a: Place<D>, b: Place<D>) -> Place<D> {
+    let mut sum = a;
+    for i in 0..D {
+        sum[i] += b[i];
+    }
+    sum
+}
+
+/// `a - b`.
+#[inline(always)]
+pub fn sub<const D: usize>(a: Place<D>, b: Place<D>) -> Place<D> {
+    let mut difference = a;
+    for i in 0..D {
+        difference[i] -= b[i];
+    }
+    difference
+}
+
+/// The frames of a region: one for all of it, or one a point.
+#[derive(Debug, Clone, Copy)]
+pub enum Frames<'a, const D: usize> {
+    /// The same everywhere.
+    Constant(Frame<D>),
+    /// One a point, in row-major order.
+    Dense(&'a [Frame<D>]),
+}
+
+impl<const D: usize> Frames<'_, D> {
+    /// The frame of the point at a row-major position.
+    #[inline(always)]
+    pub fn at(&self, index: usize) -> Frame<D> {
+        match self {
+            Self::Constant(frame) => *frame,
+            Self::Dense(frames) => frames[index],
+        }
+    }
+
+    /// Whether nothing is turned or stretched anywhere.
+    pub fn is_identity(&self) -> bool {
+        matches!(self, Self::Constant(frame) if *frame == identity())
+    }
+}
+
+/// F = J^-1 in fixed point, as far as 32 bits hold it; a singular frame gives the identity.
+pub fn inverse<const D: usize>(frame: &Frame<D>) -> [[i32; D]; D] {
+    // Gauss-Jordan elimination with pivots: at most three rows.
+    let mut a = frame.map(|row| row.map(f64::from));
+    let mut b = [[0.0; D]; D];
+    for i in 0..D {
+        b[i][i] = 1.0;
+    }
+    for column in 0..D {
+        let mut pivot = column;
+        for row in column + 1..D {
+            if a[row][column].abs() > a[pivot][column].abs() {
+                pivot = row;
+            }
+        }
+        if a[pivot][column] == 0.0 {
+            return identity().map(|row| row.map(i32::from));
+        }
+        a.swap(column, pivot);
+        b.swap(column, pivot);
+        let scale = 1.0 / a[column][column];
+        for j in 0..D {
+            a[column][j] *= scale;
+            b[column][j] *= scale;
+        }
+        for row in 0..D {
+            if row != column {
+                let factor = a[row][column];
+                for j in 0..D {
+                    a[row][j] -= factor * a[column][j];
+                    b[row][j] -= factor * b[column][j];
+                }
+            }
+        }
+    }
+    let unit = f64::from(ONE);
+    // Beyond this a window would not fit on any lattice.
+    let most = 64.0 * unit;
+    b.map(|row| row.map(|x| (x * unit * unit).clamp(-most, most).round() as i32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn half_way_goes_up_on_both_sides_of_zero() {
+        assert_eq!(nearest([ONE / 2, -ONE / 2, ONE / 2 - 1]), [1, 0, 0]);
+    }
+
+    proptest! {
+        #[test]
+        fn the_inverse_undoes_a_rotation(turn in 0.0f64..6.0, step in prop::array::uniform2(-4i32..5)) {
+            let one = f64::from(ONE);
+            let [c, s] = [turn.cos(), turn.sin()].map(|x| (x * one).round() as i16);
+            let frame = [[c, -s], [s, c]];
+            let back = inverse(&frame);
+            let there = apply(&frame, step);
+            for i in 0..2 {
+                let x: i64 = (0..2).map(|j| i64::from(back[i][j]) * i64::from(there[j])).sum();
+                prop_assert!((x / i64::from(ONE) - i64::from(step[i] * ONE)).abs() < 16);
+            }
+        }
+    }
+}

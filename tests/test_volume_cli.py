@@ -1,0 +1,137 @@
+"""``texrs slice``, end to end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+from PIL import Image
+
+from texrs import fields, io, samples, volume
+from texrs.cli import main
+from texrs.cli._volumes import read_field
+from texrs.errors import TexrsError
+
+VOLUME = samples.stripes((32, 36, 40)).image
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    io.write_volume("v.npy", VOLUME)
+    Path("out.png").write_bytes(b"before")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        ("", lambda: volume.slices(VOLUME)),
+        ("--at 3,4,-5", lambda: volume.slices(VOLUME, (3, 4, -5))),
+        ("--at plane=30", lambda: VOLUME[30]),
+        ("--at row=-1", lambda: VOLUME[:, -1]),
+        ("--at column=7", lambda: VOLUME[:, :, 7]),
+        ("--oblique /1,1,0", lambda: volume.oblique(VOLUME, None, (1, 1, 0))),
+        (
+            "--oblique 9,8.5,7/1,-1,0.2 --interpolation nearest",
+            lambda: volume.oblique(VOLUME, (9, 8.5, 7), (1, -1, 0.2), interpolation="nearest"),
+        ),
+        ("--cube --size 64 --threads 1", lambda: volume.cube(VOLUME, 64)),
+    ],
+)
+def test_slice_writes_what_the_functions_make(here, capsys, arguments, expected):
+    assert main(["slice", "v.npy", "-o", "out.png", *arguments.split()]) == 0
+    np.testing.assert_array_equal(iio.imread("out.png"), expected())
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert told.err.startswith("texrs: wrote out.png: ")
+    assert sorted(p.name for p in here.iterdir()) == ["out.png", "v.npy"]
+
+
+def test_turntables_and_samples(here, capsys):
+    assert (
+        main(["slice", "sample:particles", "-o", "t.gif", "--turntable", "--size", "48", "--frames", "3", "--quiet"])
+        == 0
+    )
+    with Image.open("t.gif") as gif:
+        assert (gif.n_frames, gif.size) == (3, (48, 48))
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ("v.npy -o out.png --at depth=3", "--at: needs plane="),
+        ("v.npy -o out.png --at plane=3.5", "--at: needs plane="),
+        ("v.npy -o out.png --at 3,4", "--at: needs plane="),
+        ("v.npy -o out.png --at plane=99", "--at: needs an integer from -32 to 31, got 99"),
+        ("v.npy -o out.png --at 3,4,99", "--at: needs an integer from -40 to 39"),
+        ("v.npy -o out.png --oblique 1,1,0", "--oblique: needs POINT/NORMAL"),
+        ("v.npy -o out.png --oblique /1,1", "--oblique: needs POINT/NORMAL"),
+        ("v.npy -o out.png --oblique /0,0,0", "--oblique: needs three numbers"),
+        ("v.npy -o out.png --oblique 1,2,900/0,0,1", "does not meet"),
+        ("v.npy -o out.png --cube --at plane=3", "--at and --cube: one of them"),
+        ("v.npy -o out.png --cube --size 9", "--size: needs an integer from 16"),
+        ("v.npy -o out.png --interpolation best", "--interpolation: allowed are linear"),
+        ("v.npy -o out.png --turntable", "--turntable is written to .gif"),
+        ("v.npy -o out.gif --cube", "a picture is not written to .gif"),
+        ("v.npy -o out.jpg --cube", "out.jpg: .jpg cannot hold uint8 with 4 channels"),
+        ("v.npy -o out.tiff --cube --threads 0", "--threads"),
+        ("v.npy -o none/out.png", "there is no folder"),
+        ("w.npy -o out.png", "there is no such file"),
+        ("out.png -o out.png", "out.png"),
+        ("sample:bricks -o out.png", "sample:bricks: is a picture; volumes are particles, stripes, weave_solid"),
+        ("v.npy", "Missing option"),
+    ],
+)
+def test_wrong_requests_get_a_line_and_change_nothing(here, capsys, arguments, says):
+    before = {p.name: p.read_bytes() for p in here.iterdir()}
+    assert main(["slice", *arguments.split()]) == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert says in told.err
+    assert told.err.count("\n") == 1
+    assert {p.name: p.read_bytes() for p in here.iterdir()} == before
+
+
+def test_labels_are_painted(here, capsys):
+    marked = samples.particles((32, 32, 32)).labels
+    io.write_volume("labels.npy", marked)
+    assert main(["slice", "labels.npy", "-o", "a.png", "--labels", "--at", "row=9"]) == 0
+    np.testing.assert_array_equal(iio.imread("a.png"), volume.paint(marked)[:, 9])
+    assert main(["slice", "v.npy", "-o", "b.png", "--labels"]) == 2
+    assert "v.npy: needs integers of shape" in capsys.readouterr().err
+
+
+def test_fields_in_words_and_in_files(here):
+    size = (40, 48, 56)
+    assert read_field("circular:axis=y", size) == fields.circular("y").over(size)
+    frames = np.stack([fields.slant_3d(a, a).constant for a in range(8)]).reshape(2, 2, 2, 3, 3)
+    np.savez("frames.npz", frames)
+    assert read_field("frames.npz", size) == fields.from_array(frames, size)
+    np.savez("two.npz", frames, frames)
+    np.savez("flat.npz", frames * 0)
+    for text, extent, says in (
+        ("round", size, "--field: there is no 'round'"),
+        ("slant_3d", size[:2], "--field: slant_3d is for volumes"),
+        ("two.npz", size, "two.npz: needs a single array of frames, has 2"),
+        ("flat.npz", size, "flat.npz: the frame at"),
+        ("frames.npz", size[:2], "frames.npz: holds frames of 3 axes, 2 are needed"),
+        ("none.npz", size, "none.npz: there is no such file"),
+    ):
+        with pytest.raises(TexrsError) as caught:
+            read_field(text, extent)
+        assert says in str(caught.value)
+
+
+def test_volumes_of_other_dtypes(here, capsys):
+    io.write_volume("f.npy", VOLUME[..., 0] / np.float32(255))
+    assert main(["slice", "f.npy", "-o", "a.png"]) == 2
+    assert "a.png: .png cannot hold float32 with 1 channel; .exr" in capsys.readouterr().err
+    assert main(["slice", "f.npy", "-o", "a.exr", "--at", "row=3"]) == 0
+    assert main(["slice", "f.npy", "-o", "a.png", "--cube", "--size", "32"]) == 0
+    io.write_volume("n.npy", np.full((4, 4, 4), np.nan))
+    assert main(["slice", "n.npy", "-o", "b.png"]) == 2
+    assert "n.npy: 64 of 64 values are NaN" in capsys.readouterr().err
