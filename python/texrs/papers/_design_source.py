@@ -119,10 +119,12 @@ class Source:
         if paper:
             parts, moves = replace(parts, children="none", lattice=None), replace(moves, mirror=False)
         extent = side or patch_side(guide.shape[0], guide.shape[1])
-        if moves.mirror and not paper:
-            along = polarity(guide)
-            moves = replace(moves, axes=(along[0] < POLAR, along[1] < POLAR))
-        flips = [f for f in mirrors(moves.mirror) if all(allowed or not f[a] for a, allowed in enumerate(moves.axes))]
+        flips = mirrors(moves.mirror)
+        if len(flips) > 1:
+            rows, columns, oblique = (value < POLAR for value in polarity(guide))
+            like = {(True, False): rows and oblique, (False, True): columns and oblique, (True, True): rows and columns}
+            flips = [f for f in flips if like.get(f, True)]
+            moves = replace(moves, axes=(like[True, False], like[False, True]))
         if parts.lattice:
             shifts = parts.lattice.shifts(moves.translate * min(guide.shape[:2])) if moves.translate else []
             moves = replace(moves, rotate=0.0, scale=(1.0, 1.0), mirror=False, shifts=tuple(shifts))
@@ -145,7 +147,7 @@ ROTATE, DIRECTED = 60.0, 0.25
 
 
 POLAR = 5.0
-"""How surely, in standard errors, an example differs from its mirror image from which on it is not mirrored along that axis."""
+"""How surely, in standard errors, an example differs from a mirror image of itself from which on it is not mirrored so."""
 
 BACKGROUND_PLACES = 64
 """Places for a patch of pure background from which on holes are filled with background alone."""

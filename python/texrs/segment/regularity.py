@@ -167,39 +167,37 @@ def direction(guide: Floats) -> float:
     return float(max(abs(second.sum()), abs(fourth.sum())) / total)
 
 
-def polarity(guide: Floats) -> tuple[float, float]:
-    """Give how surely an image differs from itself mirrored along rows and along columns, in standard errors.
+def polarity(guide: Floats) -> tuple[float, float, float]:
+    """Give how surely an image differs from its mirror images, in standard errors.
 
-    What is lit from one side grows dark slowly and bright at once, on the way along rows or along columns. So slopes that are
-    weighed by their square, or by that of the other slope, do not sum to 0 as they do where a mirror image is as likely.
+    Three values: by what a mirror along rows turns round, by what one along columns does, and by what either does and both
+    together do not. What is lit from one side grows dark slowly and bright at once, on the way along rows or along columns:
+    slopes weighed by their square, or by that of the other slope, do not sum to 0 as they do where a mirror image is as likely.
+    What is oblique has slopes whose product does not.
     """
     from scipy.ndimage import gaussian_filter
 
     height, width = guide.shape[:2]
     top, left = max(0, height - WINDOW) // 2, max(0, width - WINDOW) // 2
     light = guide[top : top + WINDOW, left : left + WINDOW].mean(axis=-1, dtype=np.float32)
+    along = [0.0, 0.0, 0.0]
     if min(light.shape) < BLOCKS * SHORTEST:
-        return 0.0, 0.0
-    most = [0.0, 0.0]
+        return along[0], along[1], along[2]
     for sigma in FINE:
-        slopes = [gaussian_filter(light, sigma, order=order) for order in ((1, 0), (0, 1))]
-        squares = [slope * slope for slope in slopes]
+        rows, columns = (gaussian_filter(light, sigma, order=order) for order in ((1, 0), (0, 1)))
+        squares = rows * rows, columns * columns
         energy = squares[0] + squares[1]
-        scale = _by_block(energy * np.sqrt(energy))
-        if scale.sum() < 1e-12:
-            continue
-        for axis, slope in enumerate(slopes):
-            for square in squares:
-                sums = _by_block(slope * square)
-                mean = sums.sum() / scale.sum()
-                error = np.sqrt(((sums - mean * scale) ** 2).sum()) / scale.sum()
-                most[axis] = max(most[axis], abs(float(mean)) / max(float(error), 1e-6))
-    return most[0], most[1]
+        cubes = energy * np.sqrt(energy)
+        for axis, slope in enumerate((rows, columns)):
+            along[axis] = max(along[axis], *(_sureness(slope * square, cubes) for square in squares))
+        along[2] = max(along[2], _sureness(rows * columns, energy))
+    return along[0], along[1], along[2]
 
 
-def _by_block(values: Floats) -> NDArray[np.float64]:
-    """Sum over equal parts of an image; what does not divide evenly is left out."""
-    rows, columns = (n // BLOCKS for n in values.shape)
-    parts = values[: BLOCKS * rows, : BLOCKS * columns].reshape(BLOCKS, rows, BLOCKS, columns)
-    sums: NDArray[np.float64] = parts.sum(axis=(1, 3), dtype=np.float64).ravel()
-    return sums
+def _sureness(odd: Floats, scale: Floats) -> float:
+    """Give the mean of values over that of a scale, in standard errors, which equal parts of the image show."""
+    rows, columns = (n // BLOCKS for n in odd.shape)
+    parts = [v[: BLOCKS * rows, : BLOCKS * columns].reshape(BLOCKS, rows, BLOCKS, columns) for v in (odd, scale)]
+    sums, scales = (p.sum(axis=(1, 3), dtype=np.float64).ravel() for p in parts)
+    mean = sums.sum() / max(scales.sum(), 1e-12)
+    return abs(float(sums.sum())) / max(float(np.sqrt(((sums - mean * scales) ** 2).sum())), 1e-12)
