@@ -304,3 +304,11 @@ def test_bad_input_names_the_argument(arguments, options, names):
 def test_a_size_beyond_the_limit_is_refused_at_once():
     with pytest.raises(LimitExceeded, match="^size"):
         texrs.design(PICTURE, (10**9, 10**9))
+
+
+def test_what_needs_more_memory_than_there_is_is_refused_before_anything_is_made():
+    def progress(stage, share):
+        raise AssertionError("work has begun")
+
+    with pytest.raises(LimitExceeded, match=r"^size: needs .* GB of memory"):
+        texrs.design(np.zeros((32, 32, 64)), (16384, 16384), variants=4096, progress=progress)

@@ -1,5 +1,7 @@
 """Which elements are found: against truth, against nonsense, and on lattices."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -257,3 +259,18 @@ def test_further_layers_are_taken_where_they_find_more() -> None:
     assert segment(sample.image).count > 1.3 * segment(sample.image, layers=2).count
     flowers = samples.leaves_and_flowers((192, 192)).image
     assert segment(flowers).count == segment(flowers, layers=2).count
+
+
+def test_progress_rises_and_stops_the_work():
+    image, shares = samples.beans((96, 96)).image, []
+
+    def progress(stage, share):
+        assert stage == "segment"
+        shares.append(share)
+        if len(shares) == 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        segment(image, progress=progress)
+    assert len(shares) == 4
+    assert all(0 < a < b < 1 for a, b in pairwise(shares))

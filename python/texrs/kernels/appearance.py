@@ -249,6 +249,7 @@ class Appearance:
         exhaustive: bool = False,
         sweeps: int = 2,
         hysteresis: float = 2.0,
+        unity: float = 0.0,
         vote: int = 0,
         settled: float = 0.0,
         seed: int = 0,
@@ -274,6 +275,9 @@ class Appearance:
             1 or 2 an iteration; the second looks twice as far.
         hysteresis : float
             How much better than the present a drawn match must be, in units of `spacing`, 0 to 100: what is good enough stays.
+        unity : float
+            What each neighbour costs whose piece of the exemplar is another, in units of `spacing`, 0 to 100: pieces
+            stay whole where several fit equally well.
         vote : int
             Radius within which windows vote on the place of a point, up to `radius`; at 0 each takes its own match.
         settled : float
@@ -313,6 +317,7 @@ class Appearance:
             exhaustive,
             as_int(sweeps, "sweeps", 1, 2),
             as_float(hysteresis, "hysteresis", 0, 100),
+            as_float(unity, "unity", 0, 100),
             as_int(vote, "vote", 0, self.radius),
             as_float(settled, "settled", 0, 1),
             as_seed(seed),

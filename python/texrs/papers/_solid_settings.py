@@ -24,6 +24,7 @@ class Settings:
     contrast: float = 1.0
     continuation: float = 0.3
     hysteresis: float = 2.0
+    unity: float = 0.0
     settled: float = 0.005
     exhaustive: bool = False
 

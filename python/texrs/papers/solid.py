@@ -368,6 +368,7 @@ class Grower:
             exhaustive=step.exhaustive,
             sweeps=step.sweeps,
             hysteresis=self.settings.hysteresis,
+            unity=self.settings.unity,
             vote=min(step.vote, here.radius),
             settled=self.settings.settled,
             # The noise of a level is its own.
