@@ -340,6 +340,7 @@ class Grower:
             candidates=s.candidates,
             contrast=s.contrast,
             continuation=s.continuation,
+            repetition=s.repetition,
             seed=self.seed,
             guide=hold.guide(coarsest, region, self.spacing(0)),
             progress=_stage(progress, "blocks"),
@@ -370,6 +371,7 @@ class Grower:
             exhaustive=step.exhaustive,
             sweeps=step.sweeps,
             hysteresis=self.settings.hysteresis,
+            unity=self.settings.unity,
             vote=min(step.vote, here.radius),
             settled=self.settings.settled,
             # The noise of a level is its own.
