@@ -19,12 +19,12 @@ SOLIDS = {
         fields.slant(30, "xz"),
         fields.slant_3d(30, 30),
     ),
-    "weave_solid": (
+    "wood_solid": (
         None,
-        fields.zigzag(period=64, angle=30, axis="x", plane="xy"),
+        fields.zigzag(period=64, angle=30, axis="y", plane="xy"),
         fields.circular(axis="z"),
-        fields.slant(30, "xy"),
-        fields.scale_ramp(0.7, 1.6),
+        fields.slant(45, "xy"),
+        fields.scale_ramp(0.7, 1.6, axis="x"),
     ),
 }
 """What is shown of each volume: fields under which it is grown."""
@@ -32,7 +32,7 @@ PICTURES = {
     "weave": fields.zigzag(period=160, angle=30, axes=2),
     "scales": fields.circular(axes=2),
     "bark": fields.spiral(35, axes=2),
-    "dots": fields.scale_ramp(0.6, 1.8, axes=2),
+    "grit": fields.scale_ramp(0.6, 1.8, axes=2),
 }
 
 

@@ -48,6 +48,8 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("texrs.demo._pictures.SIDE", 64)
     monkeypatch.setattr("texrs.demo._samples.SIDE", 64)
     monkeypatch.setattr("texrs.demo._samples.EDGE", 32)
+    for name, side in (("EDGE", 32), ("SIZE", 24), ("SIDE", 64), ("WIDTH", 48), ("CUBE", 48)):
+        monkeypatch.setattr(f"texrs.demo._solid.{name}", side)
 
 
 @pytest.mark.usefixtures("small")

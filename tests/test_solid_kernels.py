@@ -57,7 +57,7 @@ def test_an_iteration_is_that_of_the_twin(axes, kind, wrap):
     frames = to_fixed(FIELDS[kind](axes), region)
     twin = Twin(appearance.arrays(), region, frames)
     start = scattered(appearance, region)
-    options = {"first": 5, "sweeps": 2, "hysteresis": 0.5, "vote": 1, "seed": (7 << 40) + 3}
+    options = {"first": 5, "sweeps": 2, "hysteresis": 0.5, "unity": 0.3, "vote": 1, "seed": (7 << 40) + 3}
     found = appearance.correct(start, region, frames, iterations=1, **options)
     wanted = twin.correct(start, **options)
     np.testing.assert_array_equal(found.places.reshape(-1, axes), wanted)

@@ -71,7 +71,7 @@ class Twin:
         scaled = [((s - b) * self.gain + (1 << 31)) >> 32 for s, b in zip(sums, self.bias, strict=True)]
         return np.clip(scaled, -2047, 2047)
 
-    def improve(self, places, p, feature, reach, limit, iteration, seed, exhaustive):
+    def improve(self, places, p, feature, reach, limit, unity, iteration, seed, exhaustive):
         """Give the best of a point's own match, those of its neighbours, and some that are drawn."""
 
         def cost(at):
@@ -87,17 +87,24 @@ class Twin:
                 if cost(tuple(centre.tolist())) < least:
                     best, at = centre * ONE, tuple(centre.tolist())
                     least = cost(at)
+        proposals = []
         for axis in range(self.axes):
             for side in (-reach, reach):
                 step = np.zeros(self.axes, np.int64)
                 step[axis] = side
                 q = self.step(self.points[p], step)
-                if q is None:
-                    continue
-                place = places[q] - self.frames[p] @ step
-                there = self.inside(nearest(place))
-                if there is not None and there != at and cost(there) < least:
-                    best, at, least = place, there, cost(there)
+                place = None if q is None else places[q] - self.frames[p] @ step
+                there = None if q is None else self.inside(nearest(place))
+                if there is not None:
+                    proposals.append((place, there))
+
+        def apart(place):
+            return unity * sum(int(np.abs(other - place).max()) > 3 * ONE // 4 for other, _ in proposals)
+
+        least += apart(best)
+        for place, there in proposals:
+            if there != at and cost(there) + apart(place) < least:
+                best, at, least = place, there, cost(there) + apart(place)
         if least <= limit:
             return best
         key = philox((3, 0x70617274, 0, 0), (seed & MASK, seed >> 32))[:2]
@@ -108,8 +115,8 @@ class Twin:
             shift = [(words[a] * (2 * int(radius[a]) + 1) >> 32) - int(radius[a]) for a in range(self.axes)]
             place = best + np.array(shift) * ONE
             there = self.inside(nearest(place))
-            if there is not None and cost(there) + limit < least:
-                best, least = place, cost(there) + limit
+            if there is not None and cost(there) + apart(place) + limit < least:
+                best, least = place, cost(there) + apart(place) + limit
         return best
 
     def elect(self, matches, p, radius):
@@ -135,17 +142,18 @@ class Twin:
                 best, least = place, cost
         return best
 
-    def correct(self, places, *, first=0, exhaustive=False, sweeps=2, hysteresis=2.0, vote=0, seed=0, held=None):
+    def correct(
+        self, places, *, first=0, exhaustive=False, sweeps=2, hysteresis=2.0, unity=0.0, vote=0, seed=0, held=None
+    ):
         """Give the places after one iteration."""
         before = self.bring_inside(places.astype(np.int64).reshape(-1, self.axes))
         count = range(len(self.points))
         features = [self.window(before, p) for p in count]
-        limit = int(hysteresis * self.spacing)
+        limit, alone = int(hysteresis * self.spacing), int(unity * self.spacing)
         matches = before
         for reach in range(1, sweeps + 1):
-            matches = np.stack(
-                [self.improve(matches, p, features[p], reach, limit, first, seed, exhaustive) for p in count]
-            )
+            options = reach, limit, alone, first, seed, exhaustive
+            matches = np.stack([self.improve(matches, p, features[p], *options) for p in count])
         if vote:
             matches = np.stack([self.elect(matches, p, vote) for p in count])
         if held is not None:

@@ -1,7 +1,8 @@
 """SOLID: textures grown in two and three dimensions under a frame field.
 
-X. Su et al., "Solid texture synthesis from a 3-D exemplar under a 3-D vector field" (appearance vectors,
-similarity sets and a pyramid of corrections after Lefebvre and Hoppe, SIGGRAPH 2005 and 2006). The flow:
+Y.-L. Su, C.-C. Chang, Z.-C. Shih and W.-K. Tai, "Vector-field-based deformations for three-dimensional texture
+synthesis" (appearance vectors, similarity sets and a pyramid of corrections after Lefebvre and Hoppe, SIGGRAPH 2005
+and 2006). The flow:
 
 1. analyse the exemplar: a pyramid, and appearance vectors at each level (section 3.1; `texrs.analysis`);
 2. start at the coarsest level;
@@ -133,7 +134,8 @@ def solid(
 
     References
     ----------
-    .. [1] X. Su et al., "Solid texture synthesis from a 3-D exemplar under a 3-D vector field".
+    .. [1] Y.-L. Su, C.-C. Chang, Z.-C. Shih and W.-K. Tai, "Vector-field-based deformations for three-dimensional
+       texture synthesis".
 
     Examples
     --------
