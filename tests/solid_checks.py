@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from texrs import fields, volume
+from texrs._typing import Interpolation
 from texrs.papers.solid import solid
 from texrs.report import Synthesis
 
@@ -79,9 +80,10 @@ def s1(exemplar: np.ndarray, image: np.ndarray, field: fields.Field) -> Found:
 def s2(exemplar: np.ndarray, made: Synthesis, still: Synthesis | None = None, scale: float = 1.0) -> Found:
     """Features have their size: mean frequency over the exemplar's, and over that of the identity's result.
 
-    Looked up at the nearest samples, for a look-up between them smooths.
+    Looked up at the nearest samples, for a look-up between them smooths; but what is enlarged would get steps.
     """
-    several = [exemplar, *(m.source.render(exemplar, interpolation="nearest") for m in (made, still) if m is not None)]
+    how: Interpolation = "nearest" if scale == 1 else "linear"
+    several = [exemplar, *(m.source.render(exemplar, interpolation=how) for m in (made, still) if m is not None)]
     window = min(64, *(n for i in several for n in i.shape[:3]))
     found = [volume.frequency(volume.lightness(i), window=window, whole=True) for i in several]
     ratio = found[1] / found[0]

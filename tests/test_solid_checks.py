@@ -30,6 +30,7 @@ KNOWN: dict[tuple[str, str, str], str] = {
     ("s5", "stripes", "zigzag"): CURL,
     ("s5", "stripes", "circular"): CURL,
     ("s3", "particles", "circular"): LOST,
+    ("s3b", "particles", "circular"): LOST,
     ("s3b", "particles", "identity"): "of this seed; the mean of three passes",
 }
 """(check, sample, field) that may fail, with the reason."""

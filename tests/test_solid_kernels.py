@@ -116,7 +116,7 @@ def test_blocks_are_pieces_of_the_exemplar(wrap):
     places = appearance.blocks(region, to_fixed(None, region), seed=1).reshape(*region.shape, 3)
     assert (places % ONE == 0).all()
     joined = (places[:, :, 1:] - places[:, :, :-1] == (0, 0, ONE)).all(axis=-1)
-    assert joined.mean() > 0.75  # cells are 6 wide
+    assert joined.mean() > 0.65  # cells are 6 wide
     low, high = (0, appearance.shape) if wrap else (2, np.array(appearance.shape) - 2)
     at = places // ONE
     assert wrap or ((at >= low) & (at < high)).all()
