@@ -22,6 +22,8 @@ Departures, with their reasons:
 - A row vector in Eq. 1 and a column vector in Eq. 3 turn in opposite ways; here J is the inverse of the frame in both.
 - The pyramid is decimated, windows are 5^3 at each level and full colour windows are compared, not eight diagonal
   neighbours, which fall apart into lattices that exchange nothing.
+- Pictures that nothing turns or guides start from patches stitched along minimum cuts, at full resolution (`texrs.quilt`):
+  cuts keep elements whole, where blocks are repaired by windows smaller than an element.
 - Where the exemplar repeats, as measured, its coordinates go around.
 
 ``method="paper"`` leaves the departures out (`texrs.papers._solid_literal`).
@@ -45,6 +47,7 @@ from texrs.kernels.appearance import Corrected
 from texrs.kernels.pyramid import ONE, Region, to_fixed, upsample
 from texrs.papers._solid_hold import Hold
 from texrs.papers._solid_limits import check_memory
+from texrs.papers._solid_patches import stitch
 from texrs.papers._solid_settings import Quality, Settings, settings_of
 from texrs.report import Synthesis
 from texrs.source_map import SourceMap
@@ -302,10 +305,18 @@ class Grower:
         for _ in self.analysis.levels[1:]:
             regions.insert(0, regions[0].parents())
         places: Places | None = None
-        report, stages = [], {}
-        for level, here in enumerate(regions):
+        report: list[dict[str, Any]] = []
+        stages: dict[str, Array] = {}
+        first = 0
+        if self.stitches(region, hold):
+            first = len(regions) - 1
+            places = stitch(self.image, region, self.seed, _stage(progress, "patches"))
+            stages["patches"] = self.picture(places, region, first)
+        for level, here in enumerate(regions[first:], start=first):
             frames = self.frames(level, here)
-            if places is None:
+            if level == first and places is not None:
+                pass
+            elif places is None:
                 places = self.start(here, frames, hold, progress)
                 stages["blocks"] = self.picture(places, here, level)
             else:
@@ -322,6 +333,10 @@ class Grower:
             )
         assert places is not None  # there is at least one level
         return Grown(places, report, stages)
+
+    def stitches(self, region: Region, hold: Hold) -> bool:
+        """Tell whether to start from patches stitched along minimum cuts: in pictures that nothing turns or guides."""
+        return self.settings.stitch and len(region.shape) == 2 and self.field is None and not hold.count
 
     def spacing(self, level: int) -> int:
         """Voxels from one point of a level to the next."""
