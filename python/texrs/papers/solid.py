@@ -336,7 +336,9 @@ class Grower:
 
     def stitches(self, region: Region, hold: Hold) -> bool:
         """Tell whether to start from patches stitched along minimum cuts: in pictures that nothing turns or guides."""
-        return self.settings.stitch and len(region.shape) == 2 and self.field is None and not hold.count
+        free = self.field is None and not hold.count
+        # Of what is thinner there is nothing to cut.
+        return self.settings.stitch and free and len(region.shape) == 2 and min(region.shape) >= COARSEST
 
     def spacing(self, level: int) -> int:
         """Voxels from one point of a level to the next."""
