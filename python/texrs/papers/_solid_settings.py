@@ -59,10 +59,10 @@ OPTIMISE = replace(
     iterations=(20, 8, 3),
     votes=(3, 2, 0),
     radii=(3, 2),
-    contrast=0.8,
     hysteresis=0.1,
     settled=0.0,
     exhaustive=True,
+    stitch=False,
 )
 """Straightens lattices and walls, but washes rare things out: for gated use."""
 
