@@ -18,9 +18,7 @@ PATCH, OVERLAP = 0.45, 0.2
 one piece."""
 
 
-def stitch(
-    image: Array, region: Region, seed: int, progress: Callable[[float], object] | None
-) -> NDArray[np.int32]:
+def stitch(image: Array, region: Region, seed: int, progress: Callable[[float], object] | None) -> NDArray[np.int32]:
     """Give the places of a region, in units of 1/4096 of a sample."""
     shape = (image.shape[0], image.shape[1])
     side = min(shape)
@@ -35,4 +33,4 @@ def stitch(
         seed=seed,
         progress=progress or (lambda _: None),
     )
-    return np.rint(source.coordinates.reshape(-1) * np.float32(ONE)).astype(np.int32)
+    return np.asarray(np.rint(source.coordinates.reshape(-1) * np.float32(ONE)), np.int32)

@@ -45,6 +45,7 @@ from texrs.errors import InvalidInput
 from texrs.fields import Field
 from texrs.kernels.appearance import Corrected
 from texrs.kernels.pyramid import ONE, Region, to_fixed, upsample
+from texrs.papers._solid_gate import Trial, trial_region
 from texrs.papers._solid_hold import Hold
 from texrs.papers._solid_limits import check_memory
 from texrs.papers._solid_patches import stitch
@@ -245,7 +246,11 @@ def _verb(
         raise InvalidInput(f"analysis: needs an Analysis, got {type(analysis).__name__}")
     elif analysis.shape != image.shape[:axes]:
         raise InvalidInput(f"analysis: is of an exemplar of {analysis.shape}, not {image.shape[:axes]}")
-    grown = Grower(image, analysis, checked, settings, seed).grow(region, hold, progress)
+    grower = Grower(image, analysis, checked, settings, seed)
+    trial = None
+    if quality == "optimise":
+        grower, trial = gated(grower, region, labels, repeat, progress)
+    grown = grower.grow(region, hold, progress)
     source = SourceMap(
         (grown.places.reshape(*region.shape, axes) / np.float32(ONE)).astype(np.float32, copy=False),
         np.zeros(region.shape, np.uint16),
@@ -257,7 +262,8 @@ def _verb(
     composite = source.render(exemplar, interpolation=how)
     report = {
         "method": method or "default",
-        "quality": quality,
+        "quality": quality if trial is None or trial.accepted else "preserve",
+        "trial": None if trial is None else trial.report(),
         "seed": seed,
         "field": None if checked is None else checked.describe(),
         "repeats": list(analysis.wrap),
@@ -278,6 +284,26 @@ def as_field(field: object, axes: int) -> Field | None:
         raise InvalidInput(f"field: needs {axes} axes, got one of {field.axes}")
     still = field.constant is not None and np.array_equal(field.constant, np.eye(axes, dtype=np.float32))
     return None if still else field
+
+
+def gated(
+    grower: Grower,
+    region: Region,
+    labels: bool | None,
+    repeat: bool | Sequence[bool] | None,
+    progress: Progress | None,
+) -> tuple[Grower, Trial]:
+    """Try "optimise" on a part of the output, and give the grower that serves: it, or "preserve"."""
+    part = trial_region(region, grower.image)
+    tried = grower.grow(part, Hold(grower.image), None if progress is None else lambda n, s: progress(f"trial: {n}", s))
+    axes = len(part.shape)
+    coordinates = (tried.places.reshape(*part.shape, axes) / np.float32(ONE)).astype(np.float32, copy=False)
+    trial = Trial.of(grower.image, coordinates, grower.field)
+    if trial.accepted:
+        return grower, trial
+    settings = settings_of("preserve")
+    analysis = analyse(grower.image, axes=axes, wrap=repeat, labels=labels, radii=settings.radii)
+    return Grower(grower.image, analysis, grower.field, settings, grower.seed), trial
 
 
 @dataclass(frozen=True, slots=True, eq=False)
