@@ -372,6 +372,20 @@ def test_reports_and_stages_are_saved(result, tmp_path):
     np.testing.assert_array_equal(iio.imread(paths[-2]), flat.image)
 
 
+@pytest.mark.parametrize("size", [20, (3, 17, 40)])
+@pytest.mark.parametrize("name", ["uint8, three channels", "int16, six", "bool", "constant"])
+def test_optimise_says_what_was_done(name, size):
+    exemplar = ARRAYS[name]
+    made = texrs.solid(exemplar, size, quality="optimise", field=TURNING, seed=1)
+    trial = made.report["trial"]
+    assert made.report["quality"] == ("optimise" if trial and trial["accepted"] else "preserve")
+    assert (trial is None) == (size == (3, 17, 40))
+    np.testing.assert_array_equal(rendered(made, exemplar), made.stages["composite"])
+    if made.report["quality"] == "preserve":
+        preserved = texrs.solid(exemplar, size, field=TURNING, seed=1)
+        np.testing.assert_array_equal(made.source.coordinates, preserved.source.coordinates)
+
+
 def test_open_fields_are_set_by_the_size():
     made = texrs.solid(STRIPES, 20, field=fields.circular(axis="x"), quality="fast")
     assert "about (9.5, 9.5, 9.5)" in made.report["field"]

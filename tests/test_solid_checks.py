@@ -134,6 +134,7 @@ def grown(image, size, *, contrast=1.0, hysteresis=2.0, votes=(1, 1, 0), blocks=
             frames,
             iterations=(10, 6, 3)[level],
             hysteresis=hysteresis,
+            unity=0.1,
             vote=votes[level],
             settled=0.005,
             seed=0x9E3779B97F4A7C15 * (level + 1) % 2**64,

@@ -30,7 +30,7 @@ class Twin:
         self.offsets = np.stack(np.meshgrid(*[side] * self.axes, indexing="ij"), axis=-1).reshape(-1, self.axes)
         self.basis = arrays["basis"].astype(np.int64).reshape(KEEP, -1)[:, : len(self.offsets) * self.channels]
         self.bias, self.gain = [int(b) for b in arrays["bias"]], int(arrays["gain"])
-        self.spacing = int(arrays["spacing"])
+        self.spacing = max(int(arrays["spacing"]), 512**2 // 256)
         self.region = region
         points = np.stack(np.meshgrid(*map(np.arange, region.shape), indexing="ij"), axis=-1)
         self.points = points.reshape(-1, self.axes)

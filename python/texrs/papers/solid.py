@@ -234,6 +234,8 @@ def _verb(
     region = Region.whole(as_size(size, axes=axes), as_wrap(wrap, axes=axes))
     if method not in (None, "paper"):
         raise InvalidInput(f"method: None or 'paper' is allowed, got {method!r}")
+    if quality == "optimise" and min(region.shape) < COARSEST:
+        quality = "preserve"  # What is so thin cannot be judged by a trial.
     settings, seed = settings_of(quality), as_seed(seed)
     checked = as_field(field, axes)
     if checked is not None:
