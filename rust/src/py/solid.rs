@@ -215,6 +215,7 @@ impl Appearance {
         candidates: usize,
         contrast: f64,
         continuation: f64,
+        repetition: f64,
         seed: u64,
         guide: Option<GuideIn<'py>>,
         progress: Option<Py<PyAny>>,
@@ -226,6 +227,7 @@ impl Appearance {
             candidates,
             contrast,
             continuation,
+            repetition,
             seed,
         };
         let values = frames.as_slice()?;
