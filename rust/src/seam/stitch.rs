@@ -7,6 +7,9 @@
 //! 3. the others take what makes the sum of the costs of the edges that are cut least ([`super::cost`]); where that
 //!    leaves a choice, as few as possible take B.
 //!
+//! Where what must take B is one core on a plane, and what must keep A lies around it, that is a shortest closed path
+//! ([`super::planar::ring`]); else a maximum flow ([`super::maxflow`]).
+//!
 //! Departures: A, which is there already, wins pixels that touch both; a `penalty` keeps seams off chosen pixels; an old
 //! seam is a pairwise term with one cost a labelling (Kolmogorov and Zabih, *What energy functions can be minimized via
 //! graph cuts?*, PAMI 2004) in place of Kwatra's extra node, which gives the same cuts with fewer nodes.
