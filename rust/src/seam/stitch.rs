@@ -110,6 +110,9 @@ struct Costs {
     ba: f32,
 }
 
+/// Boxes of fewer pixels go to the general solver: for them it is as fast, and it keeps its workspace.
+const SMALL: usize = 64 * 64;
+
 /// A workspace for stitching; cuts after the first one of a size allocate only their result.
 #[derive(Debug)]
 pub struct Stitcher<const D: usize> {
@@ -213,7 +216,7 @@ impl<const D: usize> Stitcher<D> {
         let (&[rows, columns], [along, across]) = (&grid.shape()[..], &self.forward[..]) else {
             return Ok(None);
         };
-        if grid.wrap().contains(&true) || overlap.old.is_some() {
+        if grid.len() < SMALL || grid.wrap().contains(&true) || overlap.old.is_some() {
             return Ok(None);
         }
         let ring = Ring {
