@@ -25,9 +25,10 @@ class Settings:
     continuation: float = 0.15
     repetition: float = 0.3
     hysteresis: float = 2.0
-    unity: float = 0.0
+    unity: float = 0.1
     settled: float = 0.005
     exhaustive: bool = False
+    stitch: bool = True
 
     def at(self, level: int, levels: int) -> Step:
         """Give what is done at a level, counted from the coarsest."""
@@ -50,7 +51,7 @@ class Step:
 PRESERVE = Settings()
 """Keeps what is rare, and copies where a copy is good enough."""
 
-FAST = replace(PRESERVE, iterations=(6, 3, 1), sweeps=(2, 2, 1), rounds=4, candidates=256, settled=0.0)
+FAST = replace(PRESERVE, iterations=(6, 3, 1), sweeps=(2, 2, 1), rounds=4, candidates=256, settled=0.0, stitch=False)
 """Fixed counts: what a point becomes hangs on what is near it alone."""
 
 OPTIMISE = replace(
@@ -58,10 +59,11 @@ OPTIMISE = replace(
     iterations=(20, 8, 3),
     votes=(3, 2, 0),
     radii=(3, 2),
-    contrast=0.8,
     hysteresis=0.1,
+    unity=0.5,
     settled=0.0,
     exhaustive=True,
+    stitch=False,
 )
 """Straightens lattices and walls, but washes rare things out: for gated use."""
 
