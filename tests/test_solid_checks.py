@@ -24,7 +24,7 @@ FIELDS = {
     "circular": fields.circular(axis="x", radial="z"),
 }
 SIDE = {"stripes": 72, "particles": 64, "weave_solid": 64}
-CURL = "circles are no gradient: pieces must break, the more so the nearer to the axis"
+CURL = "where frames differ from place to place, at folds and round an axis, pieces must break"
 LOST = "what is turned within a cell is cut, and what is cut is matched less well"
 KNOWN: dict[tuple[str, str, str], str] = {
     ("s5", "stripes", "zigzag"): CURL,
