@@ -180,6 +180,7 @@ class Appearance:
         candidates: int,
         contrast: float,
         continuation: float,
+        repetition: float,
         seed: int,
         guide: tuple[NDArray[int16], NDArray[int16], NDArray[uint16]] | None,
         progress: Callable[[float], object] | None,

@@ -137,6 +137,8 @@ class Moves:
     chaos: float
     shifts: tuple[tuple[int, int], ...] = ()
     """The only translations allowed, (row, column) in pixels, if there are any: those of a lattice."""
+    axes: Flip = (True, True)
+    """Axes along which elements may be mirrored, if at all."""
 
     def flipped(self, axes: Flip) -> Moves:
         """Give the moves in a mirrored picture: those of its lattice are mirrored too."""
@@ -171,7 +173,7 @@ class Moves:
             _, h2, h3 = next(values), next(values), next(values)
             shift = self.shifts[min(int((h2 + h3 / 256) % 16 / 16 * len(self.shifts)), len(self.shifts) - 1)]
             return [] if any(touches) else [Operation("T", float(n), axis) for axis, n in enumerate(shift) if n]
-        allowed = {"T": True, "R": self.rotate > 0, "M": self.mirror, "S": self.scale != (1.0, 1.0)}
+        allowed = {"T": True, "R": self.rotate > 0, "M": self.mirror and any(self.axes), "S": self.scale != (1.0, 1.0)}
         kinds = [kind for kind, may in allowed.items() if may]
         chosen = []
         for _ in range(self.operations):
@@ -182,6 +184,8 @@ class Moves:
                 continue
             if any(touches):
                 kind, axis = "T", 1 if touches[0] else 0
+            if kind == "M" and not self.axes[axis]:
+                axis = 1 - axis
             low, high = self.scale
             amount = {
                 "T": round(sense * extent * reach * self.translate * side),

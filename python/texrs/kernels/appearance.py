@@ -179,7 +179,8 @@ class Appearance:
         rounds: int = 6,
         candidates: int = 512,
         contrast: float = 1.0,
-        continuation: float = 0.3,
+        continuation: float = 0.15,
+        repetition: float = 0.3,
         seed: int = 0,
         guide: Guide | None = None,
         progress: Report | None = None,
@@ -199,11 +200,13 @@ class Appearance:
         candidates : int
             Places that a cell tries in each, 1 to 65535.
         contrast : float
-            Credit for a piece's own contrast, 0 to 1. At 0 bland pieces are favoured, for they are near everything on
-            average.
+            How far misfits are divided by the contrast of the pieces, 0 to 1. At 0 bland pieces are favoured, for they are
+            near everything on average.
         continuation : float
-            Cost of going on exactly where a neighbour ends, in variances of all windows, 0 to 4. At 0 the exemplar
-            is copied in large pieces.
+            Cost of going on exactly where a neighbour ends, in misfits of unrelated pieces, 0 to 4. At 0 the exemplar is
+            copied in large pieces.
+        repetition : float
+            Cost of showing what one of the cells around shows, in the same units, 0 to 4.
         seed : int
             Chooses the texture. What is drawn belongs to the place in the world, not to the region.
         guide : Guide, optional
@@ -233,6 +236,7 @@ class Appearance:
             as_int(candidates, "candidates", 1, 65535),
             as_float(contrast, "contrast", 0, 1),
             as_float(continuation, "continuation", 0, 4),
+            as_float(repetition, "repetition", 0, 4),
             as_seed(seed),
             guide,
             progress,

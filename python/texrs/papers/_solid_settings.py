@@ -22,7 +22,8 @@ class Settings:
     rounds: int = 6
     candidates: int = 512
     contrast: float = 1.0
-    continuation: float = 0.3
+    continuation: float = 0.15
+    repetition: float = 0.3
     hysteresis: float = 2.0
     unity: float = 0.0
     settled: float = 0.005

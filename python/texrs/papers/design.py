@@ -19,13 +19,13 @@ Departures, with their reasons:
   cores.
 - In a cut, the core of an element is tied to it and a ring of its surroundings is offered with it: otherwise the
   minimum cut makes a wholly overlapped element vanish.
-- Costs of cutting elements in are divided by the local gradient (Kwatra et al., SIGGRAPH 2003); all cuts are dearer
-  inside elements, so seams run between them.
+- Where patches of the large texture meet, cuts are dearer inside elements, so seams run between them.
 - Where elements of one shape lie in a heap they take each other's places, turned and scaled to the shape that they fill; in a
   heap of leaves most rest. If all moved there would be nothing left to lie on. An element brings only background along, not
   pieces of its neighbours.
 - Holes are filled with background alone where the example has enough of it.
-- Nothing is turned where the example has directions of its own (bark, brickwork); where it repeats on a lattice, elements
+- Nothing is mirrored along an axis on which the example plainly differs from its mirror image (light from one side, leaves
+  that hang), nor turned where the example has directions of its own (bark, brickwork); where it repeats on a lattice, elements
   move from place to place of the lattice and nowhere else.
 - A cyclic texture (section 3.5) is stitched on the torus from the start: patches are chosen to fit both sides of the
   wrap, where the paper folds a finished picture that was never chosen to fit.
@@ -136,7 +136,8 @@ def design(  # type: ignore[misc]  # the overloads leave the options to this sig
     scale : (float, float)
         Least and largest scaling, within 0.5 to 2.
     mirror : bool
-        Whether elements, backgrounds and patches may be mirrored; False for lit or lettered textures.
+        Whether elements, backgrounds and patches may be mirrored; False for lettered textures. Where the example plainly
+        differs from its mirror image, as lit from one side, it is not mirrored along that axis in any case.
     x0 : float, optional
         Start of the chaotic sequence (Eq. 2), within (-1, 1); the seed draws one for each element by default.
     chaos : float

@@ -338,6 +338,7 @@ class Grower:
             candidates=s.candidates,
             contrast=s.contrast,
             continuation=s.continuation,
+            repetition=s.repetition,
             seed=self.seed,
             guide=hold.guide(coarsest, region, self.spacing(0)),
             progress=_stage(progress, "blocks"),

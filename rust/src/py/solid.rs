@@ -216,6 +216,7 @@ impl Appearance {
         candidates: usize,
         contrast: f64,
         continuation: f64,
+        repetition: f64,
         seed: u64,
         guide: Option<GuideIn<'py>>,
         progress: Option<Py<PyAny>>,
@@ -227,6 +228,7 @@ impl Appearance {
             candidates,
             contrast,
             continuation,
+            repetition,
             seed,
         };
         let values = frames.as_slice()?;
