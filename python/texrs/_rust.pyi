@@ -1,7 +1,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any, Final, final
 
-from numpy import bool_, float32, int16, int32, int64, uint8, uint16
+from numpy import bool_, float32, int16, int32, int64, uint8, uint16, uint32
 from numpy.typing import NDArray
 
 __all__ = [

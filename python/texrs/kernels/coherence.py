@@ -38,7 +38,7 @@ class Similarity:
     @property
     def k(self) -> int:
         """Samples of a set."""
-        return self.sets.shape[1]
+        return int(self.sets.shape[1])
 
     @property
     def nbytes(self) -> int:
@@ -221,10 +221,10 @@ def jitter(
     return _rust.jitter(places, region.place, most, as_seed(seed), as_int(level, "level", 0, (1 << 32) - 1))
 
 
-def _numbers(numbers: object) -> int:
-    if isinstance(numbers, bool) or numbers not in (8, 24):
+def _numbers(numbers: int) -> int:
+    if numbers not in (8, 24):
         raise InvalidInput(f"numbers: 8 or 24 are allowed, got {numbers!r}")
-    return int(numbers)  # type: ignore[call-overload, no-any-return]
+    return int(numbers)
 
 
 def _check(places: NDArray[np.int32], region: Region) -> None:

@@ -44,6 +44,7 @@ from texrs.kernels.appearance import Corrected
 from texrs.kernels.pyramid import ONE, Region, to_fixed, upsample
 from texrs.papers._solid_hold import Hold
 from texrs.papers._solid_limits import check_memory
+from texrs.papers._solid_literal import grow as grow_literally
 from texrs.papers._solid_settings import Quality, Settings, settings_of
 from texrs.report import Synthesis
 from texrs.source_map import SourceMap
@@ -91,7 +92,8 @@ def solid(
         "preserve" keeps what is rare. "fast" does a third of the work. "optimise" straightens lattices and walls; it is
         checked on a trial, and "preserve" is done instead, and reported, where it would lose anything.
     method : {None, "paper"}
-        "paper": the literal algorithm.
+        "paper": the literal algorithm, kept for comparison. It has no ``quality`` and holds no points; it looks the exemplar
+        up at the nearest sample unless ``interpolation`` says otherwise.
     labels : bool, optional
         Whether values are classes without an order, looked up without interpolation; None asks the exemplar.
     repeat : bool, or one an axis, optional
@@ -145,7 +147,7 @@ def solid(
     ((40, 40, 40, 3), dtype('uint8'))
 
     """
-    options = locals() | {"axes": 3, "interpolation": interpolation or "linear"}
+    options = locals() | {"axes": 3, "interpolation": interpolation or ("nearest" if method == "paper" else "linear")}
     return _verb(**options)
 
 
@@ -200,7 +202,7 @@ def synthesize(
     (96, 128, 3)
 
     """
-    options = locals() | {"axes": 2, "interpolation": interpolation or "cubic"}
+    options = locals() | {"axes": 2, "interpolation": interpolation or ("nearest" if method == "paper" else "cubic")}
     return _verb(**options)
 
 
@@ -228,7 +230,9 @@ def _verb(
     region = Region.whole(as_size(size, axes=axes), as_wrap(wrap, axes=axes))
     if method not in (None, "paper"):
         raise InvalidInput(f"method: None or 'paper' is allowed, got {method!r}")
-    settings, seed = settings_of(quality), as_seed(seed)
+    if method == "paper" and held is not None:
+        raise InvalidInput("held: the paper's method holds no points; leave out held, or method='paper'")
+    settings, seed = settings_of("preserve" if method == "paper" else quality), as_seed(seed)
     checked = as_field(field, axes)
     if checked is not None:
         checked = checked.over(region.shape)
@@ -238,7 +242,11 @@ def _verb(
         analysis = analyse(image, axes=axes, wrap=repeat, labels=labels, radii=settings.radii)
     elif analysis.shape != image.shape[:axes]:
         raise InvalidInput(f"analysis: is of an exemplar of {analysis.shape}, not {image.shape[:axes]}")
-    grown = Grower(image, analysis, checked, settings, seed).grow(region, hold, progress)
+    grower = Grower(image, analysis, checked, settings, seed)
+    if method == "paper":
+        grown = Grown(*grow_literally(analysis, checked, seed, region, grower.picture, progress))
+    else:
+        grown = grower.grow(region, hold, progress)
     source = SourceMap(
         (grown.places.reshape(*region.shape, axes) / np.float32(ONE)).astype(np.float32, copy=False),
         np.zeros(region.shape, np.uint16),
@@ -250,7 +258,7 @@ def _verb(
     composite = source.render(exemplar, interpolation=how)
     report = {
         "method": method or "default",
-        "quality": quality,
+        "quality": None if method == "paper" else quality,
         "seed": seed,
         "field": None if checked is None else checked.describe(),
         "repeats": list(analysis.wrap),
