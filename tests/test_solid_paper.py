@@ -1,12 +1,17 @@
 """SOLID to the letter (``method="paper"``), and what the departures of the default are for."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 import texrs
 from texrs import fields, samples, threads, volume
-from texrs.errors import Cancelled, InvalidInput
-from texrs.kernels.pyramid import ONE, Region
+from texrs.errors import InvalidInput
+from texrs.kernels.appearance import Appearance
+from texrs.kernels.coherence import correct
+from texrs.kernels.pyramid import ONE
+from texrs.papers import _solid_literal
 from texrs.papers._solid_literal import _inside
 
 SIZE = 64
@@ -39,7 +44,9 @@ def test_pictures(field, wrap):
     assert made.image.shape == (70, 51, 3)
     assert made.report["method"] == "paper"
     assert made.report["quality"] is None
-    assert [level["passes"] for level in made.report["levels"]] == [0] * 5 + [2] * 3
+    passes = [level["passes"] for level in made.report["levels"]]
+    assert passes == [0] * (len(passes) - 3) + [2] * 3
+    assert made.report["levels"][0]["shape"] == [1, 1]
     colours = {tuple(c) for c in weave.reshape(-1, 3)}
     assert {tuple(c) for c in made.image.reshape(-1, 3)} <= colours
 
@@ -83,26 +90,75 @@ def stop(_stage, _share):
 
 
 def test_coordinates_that_leave_come_back_on_the_other_side():
-    from texrs.kernels.appearance import Appearance
-
     exemplar = Appearance(np.random.default_rng(0).random((20, 24)), axes=2, wrap=(False, True))
     places = np.array([17, 23, 18, 24, 1, -1, 2, 0], np.int32) * ONE
     assert (_inside(places, exemplar, 0).reshape(4, 2) // ONE).tolist() == [[17, 23], [2, 0], [17, -1 % 24], [2, 0]]
-    assert Region.whole((1, 1)).parents().shape == (1, 1)
 
 
 # --- what it fails, and the default does not -------------------------------------------------------------------------
 
 
+def speckle(image):
+    """Give the share of voxels that both neighbours along an axis differ from, the same way, by a third of the range."""
+    grey = volume.lightness(image)
+    least = (np.quantile(grey, 0.95) - np.quantile(grey, 0.05)) / 3
+    alone = []
+    for axis in range(grey.ndim):
+        line = np.moveaxis(grey, axis, 0)
+        before, after = line[1:-1] - line[:-2], line[1:-1] - line[2:]
+        alone.append(((np.minimum(before, after) > least) | (np.maximum(before, after) < -least)).mean())
+    return float(np.mean(alone))
+
+
 def test_neighbours_hardly_ever_go_on_together(of_stripes):
+    """Eight diagonal neighbours make lattices that exchange nothing, and fractions of a voxel never meet."""
     coherent = {m: volume.cell_reuse(made.source).coherent for m, made in of_stripes.items()}
-    assert coherent["paper"] < 0.1
+    assert coherent["paper"] < 0.03
     assert coherent[None] > 0.65
 
 
 def test_speckle(of_stripes, stripes):
-    grey = volume.lightness(stripes)
-    own = volume.isolated(grey)
-    found = {m: volume.isolated(volume.lightness(made.image)) for m, made in of_stripes.items()}
-    assert found[None] <= 1.5 * own + 1e-3
-    assert found["paper"] > 3 * found[None] + 1e-3
+    found = {m: speckle(made.image) for m, made in of_stripes.items()}
+    assert found["paper"] > 20 * speckle(stripes)
+    assert found["paper"] > 5 * found[None]
+
+
+def test_turned_textures_lie_wrong_and_are_too_fine(stripes):
+    field = fields.slant_3d()
+    normal = volume.texture_normal(volume.lightness(stripes))
+    off, size = {}, {}
+    for method in (None, "paper"):
+        made = grow(stripes, field, method)
+        seen = volume.lightness(made.image)
+        off[method] = np.median(volume.orientation_errors(seen, field.over(seen.shape), normal, margin=6))
+        same = made.source.render(stripes, interpolation="nearest")
+        pair = [volume.frequency(volume.lightness(i), window=48, whole=True) for i in (same, stripes)]
+        size[method] = pair[0] / pair[1]
+    assert off[None] < 8 < 12 < off["paper"]
+    assert 0.9 < size[None] < 1.1 < 1.15 < size["paper"]
+
+
+def test_most_of_which_compensation_cures(stripes, monkeypatch):
+    """Neighbours read where the diagonal leads, not where the lattice makes it end: the paper leaves it out."""
+    field = fields.slant_3d()
+    normal = volume.texture_normal(volume.lightness(stripes))
+    off = []
+    for compensated in (False, True):
+        monkeypatch.setattr(_solid_literal, "correct", partial(_with, compensated))
+        seen = volume.lightness(grow(stripes, field).image)
+        off.append(np.median(volume.orientation_errors(seen, field.over(seen.shape), normal, margin=6)))
+    assert off[1] < 0.8 * off[0]
+
+
+def _with(compensated, *arrays, **options):
+    return correct(*arrays, **(options | {"compensated": compensated}))
+
+
+def test_rare_particles_are_lost():
+    sample = samples.particles((48, 48, 48))
+    rare = {}
+    for method in (None, "paper"):
+        made = grow(sample.image, None, method)
+        there = made.source.render(sample.mask.astype(np.uint8), interpolation="nearest") > 0
+        rare[method] = there.mean() / (sample.mask > 0).mean()
+    assert rare["paper"] < 0.5 < 0.7 < rare[None]

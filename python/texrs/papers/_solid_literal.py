@@ -139,4 +139,7 @@ def _inside(places: Places, exemplar: Appearance, above: int) -> Places:
 
 
 def _stage(progress: Progress | None, name: str) -> Callable[[float], object] | None:
-    return None if progress is None else lambda share: progress(name, share)
+    if progress is None:
+        return None
+    progress(name, 0.0)  # Short work may be done before it is asked how far it is.
+    return lambda share: progress(name, share)
