@@ -28,6 +28,7 @@ class Settings:
     unity: float = 0.0
     settled: float = 0.005
     exhaustive: bool = False
+    stitch: bool = True
 
     def at(self, level: int, levels: int) -> Step:
         """Give what is done at a level, counted from the coarsest."""
@@ -50,7 +51,7 @@ class Step:
 PRESERVE = Settings()
 """Keeps what is rare, and copies where a copy is good enough."""
 
-FAST = replace(PRESERVE, iterations=(6, 3, 1), sweeps=(2, 2, 1), rounds=4, candidates=256, settled=0.0)
+FAST = replace(PRESERVE, iterations=(6, 3, 1), sweeps=(2, 2, 1), rounds=4, candidates=256, settled=0.0, stitch=False)
 """Fixed counts: what a point becomes hangs on what is near it alone."""
 
 OPTIMISE = replace(
@@ -58,10 +59,10 @@ OPTIMISE = replace(
     iterations=(20, 8, 3),
     votes=(3, 2, 0),
     radii=(3, 2),
-    contrast=0.8,
     hysteresis=0.1,
     settled=0.0,
     exhaustive=True,
+    stitch=False,
 )
 """Straightens lattices and walls, but washes rare things out: for gated use."""
 
