@@ -150,8 +150,8 @@ def test_most_of_which_compensation_cures(stripes, monkeypatch):
     assert off[1] < 0.8 * off[0]
 
 
-def _with(compensated, *arrays, **options):
-    return correct(*arrays, **(options | {"compensated": compensated}))
+def _with(wanted, *arrays, **options):
+    return correct(*arrays, **(options | {"compensated": wanted}))
 
 
 def test_rare_particles_are_lost():

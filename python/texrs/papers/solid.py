@@ -238,7 +238,7 @@ def _verb(
         raise InvalidInput("held: the paper's method holds no points; leave out held, or method='paper'")
     settings, seed = settings_of(quality), as_seed(seed)
     if method == "paper":
-        settings = settings_of("preserve")  # the paper's windows
+        settings = settings_of("preserve")  # Windows of 5^D.
     checked = as_field(field, axes)
     if checked is not None:
         checked = checked.over(region.shape)
