@@ -120,6 +120,7 @@ KERNEL_ARROWS = {
     "guide": {"appearance"},
     "blocks": {"appearance", "guide"},
     "optimize": {"appearance", "guide"},
+    "coherence": {"appearance"},
     "pyramid": set(),
     "complete": {"seam", "patch_search"},
 }
