@@ -181,6 +181,7 @@ class Appearance:
         contrast: float,
         continuation: float,
         seed: int,
+        margin: int,
         guide: tuple[NDArray[int16], NDArray[int16], NDArray[uint16]] | None,
         progress: Callable[[float], object] | None,
     ) -> NDArray[int32]: ...

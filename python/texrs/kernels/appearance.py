@@ -181,6 +181,7 @@ class Appearance:
         contrast: float = 1.0,
         continuation: float = 0.3,
         seed: int = 0,
+        margin: int = 0,
         guide: Guide | None = None,
         progress: Report | None = None,
     ) -> NDArray[np.int32]:
@@ -206,6 +207,8 @@ class Appearance:
             is copied in large pieces.
         seed : int
             Chooses the texture. What is drawn belongs to the place in the world, not to the region.
+        margin : int
+            Points along the borders, up to 2^20, that will be cut off: cells that nothing else hangs on are not chosen.
         guide : Guide, optional
             What else is asked.
         progress : callable, optional
@@ -234,6 +237,7 @@ class Appearance:
             as_float(contrast, "contrast", 0, 1),
             as_float(continuation, "continuation", 0, 4),
             as_seed(seed),
+            as_int(margin, "margin", 0, 1 << 20),
             guide,
             progress,
         )

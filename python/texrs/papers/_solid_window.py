@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numbers
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -133,14 +133,7 @@ class _Texture:
             The work was stopped.
 
         """
-        first = (origin,) * self.axes if isinstance(origin, numbers.Integral) else origin
-        if (
-            not isinstance(first, Sequence | np.ndarray)
-            or len(first) != self.axes
-            or not all(isinstance(o, numbers.Integral) and not isinstance(o, bool) and abs(o) <= FAR for o in first)
-        ):
-            raise InvalidInput(f"origin: needs {self.axes} integers within {FAR}, got {origin!r}")
-        start = tuple(int(o) for o in first)
+        start = self._origin(origin)
         region = Region(as_size(size, axes=self.axes), start, (False,) * self.axes)
         self._check(region)
         places = self._world.read(region, progress)
@@ -165,6 +158,14 @@ class _Texture:
         }
         return Synthesis(image, source, {"composite": image}, report)
 
+    def _origin(self, origin: object) -> tuple[int, ...]:
+        values = [origin] * self.axes if isinstance(origin, numbers.Integral) else origin
+        if isinstance(values, Sequence | np.ndarray) and len(values) == self.axes:
+            ends = [_end(v) for v in values]
+            if None not in ends:
+                return tuple(int(v) for v in values)
+        raise InvalidInput(f"origin: needs {self.axes} integers within {FAR}, got {origin!r}")
+
     def _part(self, index: object) -> tuple[Region, list[bool]]:
         """Read what stands between the brackets."""
         parts = index if isinstance(index, tuple) else (index,)
@@ -172,24 +173,24 @@ class _Texture:
             raise InvalidInput(f"texture: needs {self.axes} ranges, {_ORDER[self.axes]}; got {len(parts)}")
         origin, shape, single = [], [], []
         for part in parts:
-            one = isinstance(part, numbers.Integral) and not isinstance(part, bool | np.bool_)
-            if not one and not isinstance(part, slice):
-                raise InvalidInput(f"texture: takes integers and ranges, {_ORDER[self.axes]}; got {part!r}")
+            one = isinstance(part, numbers.Integral) and not isinstance(part, bool)
             if isinstance(part, slice):
                 if part.start is None or part.stop is None:
                     raise InvalidInput(f"texture: has no end, so a range needs both: start:stop; got {_text(part)}")
                 if part.step is not None:
                     raise InvalidInput(f"texture: ranges have no step; got {_text(part)}")
-                start, stop = part.start, part.stop
+                start, stop = _end(part.start), _end(part.stop)
+            elif one:
+                start = _end(part)
+                stop = None if start is None else start + 1
             else:
-                start, stop = part, int(part) + 1  # type: ignore[call-overload]
-            for end in (start, stop):
-                if isinstance(end, bool) or not isinstance(end, numbers.Integral) or abs(int(end)) > FAR:
-                    raise InvalidInput(f"texture: a range needs integers within {FAR}, got {end!r}")
-            if int(stop) <= int(start):
+                raise InvalidInput(f"texture: takes integers and ranges, {_ORDER[self.axes]}; got {part!r}")
+            if start is None or stop is None:
+                raise InvalidInput(f"texture: a range needs integers within {FAR}, got {_text(part)}")
+            if stop <= start:
                 raise InvalidInput(f"texture: the range {_text(part)} is empty")
-            origin.append(int(start))
-            shape.append(int(stop) - int(start))
+            origin.append(start)
+            shape.append(stop - start)
             single.append(one)
         return Region(as_size(tuple(shape), axes=self.axes), tuple(origin), (False,) * self.axes), single
 
@@ -393,6 +394,13 @@ def _numbers(value: object, name: str, shape: tuple[int, ...]) -> NDArray[np.flo
     if given.dtype.kind not in "buif" or given.shape != shape or not np.isfinite(given).all():
         raise InvalidInput(f"{name}: needs finite numbers of shape {shape}, got {value!r}")
     return given.astype(np.float64)
+
+
+def _end(value: object) -> int | None:
+    """Give an integer of the world; none where it is not one."""
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral) or not -FAR <= int(value) <= FAR:
+        return None
+    return int(value)
 
 
 def _text(part: object) -> str:

@@ -35,9 +35,9 @@ __all__ = ["World", "blocks_reach", "window_reach"]
 
 MOST = 1 << 21
 """Points of a box that is made at once: its memory is bounded, and what is seen beyond it is small beside it."""
-_SIDES = {2: (32, 64), 3: (8, 16)}
-"""Sides of the boxes that are kept: of all stages but the last, which are grown most often and a little at a time, and of
-the last one."""
+_SIDES = {2: (8, 64), 3: (4, 16)}
+"""Sides of the cells that are kept: of all stages but the last, about as large as what an iteration can see, for each of
+them rounds up; and of the last one."""
 _STRAY = 0.3
 """How far a cell's centre strays, as a share of the cell: that of `texrs.kernels.appearance.Appearance.blocks`."""
 
@@ -91,6 +91,8 @@ class _Kept:
     def put(self, key: Key, places: Places) -> None:
         if places.nbytes > self.limit:
             return
+        # A view would keep all that it is a part of.
+        places = places.copy()
         with self._lock:
             former = self._boxes.pop(key, None)
             self.used += places.nbytes - (0 if former is None else former.nbytes)
@@ -130,7 +132,9 @@ class World:
             kept.clear()
 
     def reach(self, stage: int, window: int) -> int:
-        """Give how many points away a stage can see in the one before."""
+        """Give how many points away a stage can see in the one before; windows look so far."""
+        if stage == 0:
+            return blocks_reach(self.grower.settings.cell, self.grower.settings.rounds)
         here = self.stages[stage]
         step = self._step(here.level)
         radius = self.grower.analysis.levels[here.level].radius
@@ -142,10 +146,11 @@ class World:
         out = np.empty((*box.shape, self.axes), np.int32)
         side = self.stages[stage].side
         low = [o // side for o in box.origin]
-        wanted = np.ones([(o + n - 1) // side - b + 1 for o, n, b in zip(box.origin, box.shape, low, strict=True)], bool)
-        for part, places in self.parts(low, wanted, box, progress, stage):
-            both = _common(part, box)
-            out[both.inside(box)] = places[both.inside(part)]
+        high = [(o + n - 1) // side + 1 for o, n in zip(box.origin, box.shape, strict=True)]
+        wanted = np.ones([b - a for a, b in zip(low, high, strict=True)], bool)
+        for part, places in self.parts(low, wanted, progress, stage):
+            here, there = _overlap(box, part)
+            out[here] = places[there]
         return out
 
     def pick(self, points: NDArray[np.int64], progress: Progress | None = None) -> Places:
@@ -155,59 +160,54 @@ class World:
         cells = points // side
         low = cells.min(axis=0)
         wanted = np.zeros(tuple((cells.max(axis=0) - low + 1).tolist()), bool)
-        wanted[tuple((cells - low).T)] = True
-        # The points of each cell of the kept lattice, one cell after the other.
         number = np.ravel_multi_index(tuple((cells - low).T), wanted.shape)
+        wanted.reshape(-1)[number] = True
+        # The points of each cell of the kept lattice, one cell after the other.
         order = np.argsort(number, kind="stable")
         first = np.searchsorted(number[order], np.arange(wanted.size + 1))
         out = np.empty((len(points), self.axes), np.int32)
-        for part, places in self.parts(low.tolist(), wanted, None, progress, stage):
-            start = [o // side - b for o, b in zip(part.origin, low.tolist(), strict=True)]
+        for part, places in self.parts(low.tolist(), wanted, progress, stage):
+            start = [o // side - int(b) for o, b in zip(part.origin, low, strict=True)]
             for cell in product(*(range(s, s + n // side) for s, n in zip(start, part.shape, strict=True))):
-                k = np.ravel_multi_index(cell, wanted.shape)
+                k = int(np.ravel_multi_index(cell, wanted.shape))
                 here = order[first[k] : first[k + 1]]
                 if len(here):
                     out[here] = places[tuple((points[here] - part.origin).T)]
         return out
 
     def parts(
-        self, low: Sequence[int], wanted: Bools, box: Region | None, progress: Progress | None, stage: int
+        self, low: Sequence[int], wanted: Bools, progress: Progress | None, stage: int
     ) -> Iterator[tuple[Region, Places]]:
-        """Give boxes of places that together hold what of a box lies in the wanted cells of the kept lattice."""
+        """Give boxes of places that together hold the wanted cells of the kept lattice, counted from a first one."""
         side, kept = self.stages[stage].side, self._kept[stage == len(self.stages) - 1]
         missing = wanted.copy()
-        for at in zip(*np.nonzero(wanted), strict=True):
-            index = tuple(int(i) + b for i, b in zip(at, low, strict=True))
+        for at in np.argwhere(wanted).tolist():
+            index = tuple(i + b for i, b in zip(at, low, strict=True))
             if (places := kept.get((stage, *index))) is not None:
-                missing[at] = False
-                yield self._cell(index, side), places
-        window = self.grower.analysis.levels[self.stages[stage].level].radius
-        margin = self.reach(stage, window) if stage else self._blocks_reach()
-        boxes = list(_boxes(missing, side, margin))
+                missing[tuple(at)] = False
+                yield self._box(index, (1,) * self.axes, side), places
+        radius = self.grower.analysis.levels[self.stages[stage].level].radius
+        boxes = list(_boxes(missing, side, self.reach(stage, radius)))
         if len(boxes) > 1 and self.stages[stage].level:
+            # What the coarsest level sees beyond each box is larger than the box.
             self._prepare(missing, low, stage, progress)
-        last = stage == len(self.stages) - 1
         for start, stop in boxes:
-            whole = Region(
-                tuple((b - a) * side for a, b in zip(start, stop, strict=True)),
-                tuple((a + o) * side for a, o in zip(start, low, strict=True)),
-                (False,) * self.axes,
-            )
-            # Only the last stage is rounded up to what is kept: rounding at each would add up.
-            part = whole if last or box is None else _common(whole, box)
+            first = [a + b for a, b in zip(start, low, strict=True)]
+            counts = [b - a for a, b in zip(start, stop, strict=True)]
+            part = self._box(first, counts, side)
             places = self.make(part, stage, progress)
-            for index in product(*(range(a + o, b + o) for a, b, o in zip(start, stop, low, strict=True))):
-                cell = self._cell(index, side)
-                if _common(cell, part) == cell:
-                    kept.put((stage, *index), places[cell.inside(part)].copy())
+            for step in product(*(range(n) for n in counts)):
+                cell = places[tuple(slice(i * side, (i + 1) * side) for i in step)]
+                kept.put((stage, *(a + i for a, i in zip(first, step, strict=True))), cell)
             yield part, places
 
     def make(self, box: Region, stage: int, progress: Progress | None = None) -> Places:
         """Grow a box of a stage from the one before."""
         here, grower = self.stages[stage], self.grower
         if stage == 0:
-            region = box.grown(self._blocks_reach())
-            places = grower.start(region, grower.frames(0, region), self._hold, progress)
+            margin = self.reach(0, 0)
+            region = box.grown(margin)
+            places = grower.start(region, grower.frames(0, region), self._hold, progress, margin=margin)
         else:
             region, frames = self._seen(box, stage)
             if here.level and here.iteration == 0:
@@ -238,15 +238,10 @@ class World:
             window = needed
 
     def _prepare(self, missing: Bools, low: Sequence[int], stage: int, progress: Progress | None) -> None:
-        """Grow the coarsest level for all boxes together, as what it sees beyond each is larger than the box."""
-        side = self.stages[stage].side
+        """Grow the coarsest level below all that is missing, at once."""
         at = np.argwhere(missing)
         first, last = at.min(axis=0), at.max(axis=0) + 1
-        region = Region(
-            tuple(((last - first) * side).tolist()),
-            tuple(((first + np.array(low)) * side).tolist()),
-            (False,) * self.axes,
-        )
+        region = self._box((first + np.array(low)).tolist(), (last - first).tolist(), self.stages[stage].side)
         while self.stages[stage].level:
             here = self.stages[stage]
             region = region.grown(self.reach(stage, self.grower.analysis.levels[here.level].radius))
@@ -255,18 +250,19 @@ class World:
             stage -= 1
         self.read(region, progress, stage)
 
-    def _blocks_reach(self) -> int:
-        return blocks_reach(self.grower.settings.cell, self.grower.settings.rounds)
-
-    def _cell(self, index: Sequence[int], side: int) -> Region:
-        return Region((side,) * self.axes, tuple(i * side for i in index), (False,) * self.axes)
+    def _box(self, first: Sequence[int], counts: Sequence[int], side: int) -> Region:
+        """Give the region of some cells of the kept lattice."""
+        return Region(tuple(n * side for n in counts), tuple(i * side for i in first), (False,) * self.axes)
 
 
-def _common(a: Region, b: Region) -> Region:
-    """Give what two regions have in common; there must be something."""
+def _overlap(a: Region, b: Region) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
+    """Give what two regions have in common as slices of the one and of the other."""
     starts = [max(o, p) for o, p in zip(a.origin, b.origin, strict=True)]
     stops = [min(o + n, p + m) for o, n, p, m in zip(a.origin, a.shape, b.origin, b.shape, strict=True)]
-    return Region(tuple(t - s for s, t in zip(starts, stops, strict=True)), tuple(starts), a.wrap)
+    here, there = (
+        tuple(slice(s - o, max(s, t) - o) for s, t, o in zip(starts, stops, r.origin, strict=True)) for r in (a, b)
+    )
+    return here, there
 
 
 def _boxes(missing: Bools, side: int, margin: int) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
@@ -303,8 +299,9 @@ def _boxes(missing: Bools, side: int, margin: int) -> Iterator[tuple[tuple[int, 
     for half in halves:
         offset = [s.start for s in half]
         for a, b in _boxes(missing[half], side, margin):
-            yield tuple(x + o for x, o in zip(a, offset, strict=True)), tuple(
-                x + o for x, o in zip(b, offset, strict=True)
+            yield (
+                tuple(x + o for x, o in zip(a, offset, strict=True)),
+                tuple(x + o for x, o in zip(b, offset, strict=True)),
             )
 
 

@@ -216,6 +216,7 @@ impl Appearance {
         contrast: f64,
         continuation: f64,
         seed: u64,
+        margin: usize,
         guide: Option<GuideIn<'py>>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<PlacesOut<'py>> {
@@ -227,6 +228,7 @@ impl Appearance {
             contrast,
             continuation,
             seed,
+            margin,
         };
         let values = frames.as_slice()?;
         let places = run(py, progress, |monitor| {
