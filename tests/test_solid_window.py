@@ -86,17 +86,17 @@ def test_a_stage_sees_as_far_as_it_says(stage: int, field: str, monkeypatch: pyt
     assert not np.array_equal(found[0], found[2])
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(
-    st.tuples(*[st.integers(-20, 12)] * 3),
-    st.tuples(*[st.integers(1, 12)] * 3),
+    st.tuples(*[st.integers(-12, 8)] * 3),
+    st.tuples(*[st.integers(1, 8)] * 3),
     st.sampled_from(["none", "circular"]),
-    st.sampled_from([0, 60_000, 1 << 24]),
+    st.sampled_from([0, 1 << 20, 1 << 24]),
 )
 def test_random_windows(origin: tuple[int, ...], size: tuple[int, ...], field: str, cache: int) -> None:
     whole = _whole(field)
     found = texture(3, field, cache_bytes=cache).window(origin, size)
-    inside = tuple(slice(o + 20, o + 20 + n) for o, n in zip(origin, size, strict=True))
+    inside = tuple(slice(o + 12, o + 12 + n) for o, n in zip(origin, size, strict=True))
     assert np.array_equal(found.image, whole[inside])
     assert np.array_equal(found.source.render(SOLID, interpolation="linear"), found.image)
 
@@ -106,7 +106,7 @@ _KNOWN: dict[str, Array] = {}
 
 def _whole(field: str) -> Array:
     if field not in _KNOWN:
-        _KNOWN[field] = texture(3, field)[box(3, -20, 24)]
+        _KNOWN[field] = texture(3, field)[box(3, -12, 16)]
     return _KNOWN[field]
 
 
@@ -206,7 +206,7 @@ def test_straight_slices_are_planes_of_the_texture() -> None:
 
 
 def test_oblique_slices_carry_places_on() -> None:
-    """Every value of a slice through an exemplar of two values is one of them, or lies on an edge of the exemplar."""
+    """No colour is mixed, and a part of a slice is the same."""
     t = texrs.SolidTexture(SOLID, seed=2, interpolation="nearest")
     cut = t.slice((0.3, 0.1, 9.7), normal=(1, 2, 3), size=(140, 20))
     assert cut.shape == (140, 20, 3)
@@ -249,7 +249,7 @@ def test_classes_stay_classes_and_progress_can_stop() -> None:
 
 
 def test_shares_of_classes_are_those_of_the_exemplar() -> None:
-    exemplar = samples.particles((48, 48, 48)).image
+    exemplar = samples.particles().image
     shares = [
         volume.compare(exemplar, texrs.SolidTexture(exemplar, seed=s)[0:64, 0:64, 0:64]).relative_shares for s in (1, 2)
     ]

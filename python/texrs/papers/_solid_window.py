@@ -337,7 +337,7 @@ class SolidTexture(_Texture):
                 raise InvalidInput("axes: needs two directions that are not parallel")
         sides = as_size(size)
         reach = np.abs(middle) + np.abs(steps).T @ np.array(sides)
-        if reach.max() > FAR:
+        if reach.max() >= FAR:
             raise InvalidInput(f"point, axes, size: the slice must lie within {FAR} of the origin")
         out = np.empty((*sides, *self._image.shape[3:]), self._image.dtype)
         for top in range(0, sides[0], TILE):
