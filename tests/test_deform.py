@@ -1,5 +1,7 @@
 """Elements under moves: by chance, from place to place of a heap, and on a lattice."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -128,6 +130,22 @@ def test_on_a_lattice_elements_move_by_its_shifts_alone():
     # Along an axis that is mirrored a lattice of orthogonal periods is its own mirror.
     times = np.linalg.solve(lattice, np.array(shifts).T)
     assert np.abs(times - np.round(times)).max() < 0.1
+
+
+def test_mirrors_keep_to_the_axes_that_allow_them():
+    kinds = {
+        axes: {
+            (o.kind, o.axis if o.kind == "M" else 0)
+            for e in range(99)
+            for o in replace(FREE, axes=axes).draw(FREE.values(0, 0, e), (False, False), 99)
+        }
+        for axes in ((True, True), (False, True), (True, False), (False, False))
+    }
+    others = {("T", 0), ("R", 0), ("S", 0)}
+    assert kinds[True, True] == others | {("M", 0), ("M", 1)}
+    assert kinds[False, True] == others | {("M", 1)}
+    assert kinds[True, False] == others | {("M", 0)}
+    assert kinds[False, False] == others
 
 
 def test_shifts_are_mirrored_with_the_picture():

@@ -149,6 +149,22 @@ def test_drawn_operations_obey_their_limits():
     assert kinds <= {"T"}
 
 
+def test_what_is_lit_from_one_side_is_not_mirrored():
+    mirrors = {}
+    noise = np.random.default_rng(3).random((192, 192, 3)).astype(np.float32)
+    for name, example in (
+        ("beans", samples.beans((192, 192)).image),
+        ("bark", samples.bark((192, 192)).image),
+        ("noise", noise),
+    ):
+        made = texrs.design(example, 192, seed=2, variants=3)
+        log = [entry for result in made for tile in result.report["operations"] for entry in tile]
+        mirrors[name] = {tuple(entry["mirror"]) for entry in log if "mirror" in entry}
+        assert name == "noise" or not any(o[0] == "M" for entry in log for o in entry.get("operations") or [])
+    assert mirrors["beans"] == mirrors["bark"] == {(False, False)}
+    assert len(mirrors["noise"]) == 4
+
+
 def test_elements_at_the_border_slide_along_it():
     moves = Moves(2, 0.3, 60.0, (0.8, 1.2), True, None, 2.0)
     for element in range(50):
@@ -288,3 +304,11 @@ def test_bad_input_names_the_argument(arguments, options, names):
 def test_a_size_beyond_the_limit_is_refused_at_once():
     with pytest.raises(LimitExceeded, match="^size"):
         texrs.design(PICTURE, (10**9, 10**9))
+
+
+def test_what_needs_more_memory_than_there_is_is_refused_before_anything_is_made():
+    def progress(stage, share):
+        raise AssertionError("work has begun")
+
+    with pytest.raises(LimitExceeded, match=r"^size: needs .* GB of memory"):
+        texrs.design(np.zeros((32, 32, 64)), (16384, 16384), variants=4096, progress=progress)

@@ -278,6 +278,33 @@ def test_bad_input_to_strip(a, options, message):
         seam.cut_strip(a, np.ones_like(a), **options)
 
 
+def test_many_strips_are_cut_as_each_by_itself():
+    strips = []
+    for number, (shape, axis) in enumerate((((9, 14), 1), ((20, 5), 0), ((3, 2), 1))):
+        a, b = noise(number, (*shape, 3)), noise(number + 10, (*shape, 3))
+        strips.append(seam.Strip(a, b, axis, noise(number + 20, shape) if number else None))
+    for strip, found in zip(strips, seam.cut_strips(strips, cost="paper"), strict=True):
+        alone = seam.cut_strip(strip.a, strip.b, axis=strip.axis, penalty=strip.penalty, cost="paper")
+        assert (found.mask == alone.mask).all()
+        assert (found.value, found.edges) == (alone.value, alone.edges)
+    assert seam.cut_strips([]) == []
+
+
+@pytest.mark.parametrize(
+    ("strip", "message"),
+    [
+        (seam.Strip(np.zeros((4, 4)), np.zeros((4, 4)), 1), "strips: need two images"),
+        (seam.Strip(np.zeros((4, 4, 1)), np.zeros((4, 3, 1)), 1), "strips: need two images"),
+        (seam.Strip(np.zeros((4, 4, 1)), np.full((4, 4, 1), np.nan), 1), "not finite"),
+        (seam.Strip(np.zeros((4, 4, 1)), np.zeros((4, 4, 1)), 2), "axis: needs an integer from 0 to 1"),
+        (seam.Strip(np.zeros((4, 4, 1)), np.zeros((4, 4, 1)), 0, np.ones((3, 4))), "penalty: needs shape"),
+    ],
+)
+def test_bad_input_to_strips(strip, message):
+    with pytest.raises(InvalidInput, match=message):
+        seam.cut_strips([strip])
+
+
 @pytest.mark.parametrize(
     ("unary", "pairwise", "message"),
     [

@@ -1,5 +1,7 @@
 """Which elements are found: against truth, against nonsense, and on lattices."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from texrs._rust import set_threads
 from texrs.errors import InvalidInput
 from texrs.segment import segment
 from texrs.segment.elements import Shapes, creases, find, solidity, whole
-from texrs.segment.regularity import direction, lattice
+from texrs.segment.regularity import direction, lattice, polarity
 
 
 def unit(image):
@@ -227,9 +229,48 @@ def test_direction_sees_one_direction_and_two_at_right_angles():
     assert direction(np.zeros((128, 128, 1), np.float32)) == 0
 
 
+@pytest.mark.parametrize(("name", "axes"), [("beans", (0, 1)), ("grit", (0, 1)), ("scales", (0, 1)), ("bark", (1,))])
+def test_what_is_lit_from_one_side_differs_from_its_mirror_image(name, axes):
+    picture = unit(getattr(samples, name)((256, 256)).image)
+    found = polarity(picture)
+    assert all(found[axis] > 10 for axis in axes)
+    # Lit from the other side it differs as much.
+    assert np.allclose(polarity(picture[::-1]), found, rtol=0.05)
+    assert np.allclose(polarity(np.swapaxes(picture, 0, 1)), (found[1], found[0], found[2]), rtol=0.05)
+
+
+def test_what_is_oblique_is_like_itself_turned_round():
+    rows, columns = np.mgrid[:256, :256]
+    noise = np.random.default_rng(2).normal(size=(256, 256))
+    found = polarity((np.sin(0.5 * rows + 0.3 * columns) + 0.5 * noise)[..., None].astype(np.float32))
+    assert max(found[:2]) < 5 < found[2]
+
+
+def test_what_has_no_side_does_not():
+    noise = np.random.default_rng(1).random((256, 256, 3)).astype(np.float32)
+    assert max(polarity(noise)) < 5
+    assert polarity(np.full((128, 128, 1), 0.5, np.float32)) == (0, 0, 0)
+    assert polarity(noise[:16, :16]) == (0, 0, 0)
+
+
 def test_further_layers_are_taken_where_they_find_more() -> None:
     """The stones as dark as the ground are missed by two layers."""
     sample = samples.pebbles((192, 192))
     assert segment(sample.image).count > 1.3 * segment(sample.image, layers=2).count
     flowers = samples.leaves_and_flowers((192, 192)).image
     assert segment(flowers).count == segment(flowers, layers=2).count
+
+
+def test_progress_rises_and_stops_the_work():
+    image, shares = samples.beans((96, 96)).image, []
+
+    def progress(stage, share):
+        assert stage == "segment"
+        shares.append(share)
+        if len(shares) == 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        segment(image, progress=progress)
+    assert len(shares) == 4
+    assert all(0 < a < b < 1 for a, b in pairwise(shares))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numbers
+import os
 from collections.abc import Sequence
 from typing import Any
 
@@ -142,6 +143,23 @@ def as_size(
     if pixels > limit:
         raise LimitExceeded(f"{name}: {result} has {pixels} pixels, more than the limit of {limit}")
     return result
+
+
+def check_memory(needed: int, name: str = "size") -> None:
+    """Refuse what needs more bytes than the machine has.
+
+    Raises
+    ------
+    LimitExceeded
+        More bytes than the machine has, where it tells.
+
+    """
+    try:
+        there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return
+    if needed > there > 0:
+        raise LimitExceeded(f"{name}: needs {needed / 1e9:.1f} GB of memory, this machine has {there / 1e9:.1f} GB")
 
 
 def as_wrap(value: object, name: str = "wrap", *, axes: int = 2) -> tuple[bool, ...]:

@@ -19,7 +19,7 @@ __all__ = [
     "poisson_spread",
     "seam_cut",
     "seam_labels",
-    "seam_strip",
+    "seam_strips",
     "set_threads",
     "uniform",
     "upsample",
@@ -127,14 +127,11 @@ def seam_cut(
     cost: str,
     wrap: Sequence[bool],
 ) -> tuple[NDArray[bool_], float, int]: ...
-def seam_strip(
-    a: NDArray[float32],
-    b: NDArray[float32],
-    axis: int,
+def seam_strips(
+    strips: Sequence[tuple[NDArray[float32], NDArray[float32], int, NDArray[float32] | None]],
     cyclic: bool,
-    penalty: NDArray[float32] | None,
     cost: str,
-) -> tuple[NDArray[bool_], float, int]: ...
+) -> list[tuple[NDArray[bool_], float, int]]: ...
 def seam_labels(
     unary: NDArray[float32],
     forward: Sequence[NDArray[float32]],
@@ -180,6 +177,7 @@ class Appearance:
         candidates: int,
         contrast: float,
         continuation: float,
+        repetition: float,
         seed: int,
         margin: int,
         guide: tuple[NDArray[int16], NDArray[int16], NDArray[uint16]] | None,
@@ -196,6 +194,7 @@ class Appearance:
         exhaustive: bool,
         sweeps: int,
         hysteresis: float,
+        unity: float,
         vote: int,
         settled: float,
         seed: int,

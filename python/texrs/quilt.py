@@ -30,7 +30,7 @@ from texrs._pixels import Pixels
 from texrs._typing import Bools, Floats
 from texrs.kernels.noise import uniform
 from texrs.kernels.patch_search import Match, PatchIndex
-from texrs.kernels.seam import cut_strip
+from texrs.kernels.seam import Strip, cut_strips
 from texrs.source_map import SourceMap
 
 __all__ = ["Picture", "quilt"]
@@ -250,15 +250,20 @@ class Finder:
             pool.append(Match(m.cost, m.exemplar, row, column))
         return pool
 
-    def exact(self, match: Match, colours: Floats, known: Bools) -> Match:
-        """Give the best match within a pixel of one of the pool, in one of all pictures."""
-        rows, columns = (
-            range(max(0, at - 1), min(most, at + 1) + 1)
-            for at, most in zip((match.row, match.column), self.shapes[match.exemplar], strict=True)
-        )
-        near = [(match.exemplar, row, column) for row in rows for column in columns]
-        best = self.whole.best_among(colours, known, candidates=near)[0]
-        return Match(best.cost, self.members[best.exemplar], best.row, best.column)
+    def exact(self, matches: Sequence[Match], colours: Floats, known: Bools) -> list[Match]:
+        """Give the best match within a pixel of each of some of the pool, in one of all pictures."""
+        near = []
+        for m in matches:
+            rows, columns = (
+                range(max(0, at - 1), min(most, at + 1) + 1)
+                for at, most in zip((m.row, m.column), self.shapes[m.exemplar], strict=True)
+            )
+            near.append([(m.exemplar, row, column) for row in rows for column in columns])
+        every = sorted({place for places in near for place in places})
+        scored = self.whole.best_among(colours, known, candidates=every, count=len(every), separation=0)
+        ranks = {(m.exemplar, m.row, m.column): rank for rank, m in enumerate(scored)}
+        best = (scored[min(ranks[place] for place in places)] for places in near)
+        return [Match(b.cost, self.members[b.exemplar], b.row, b.column) for b in best]
 
 
 def halved(image: Floats) -> Floats:
@@ -297,12 +302,14 @@ class Quilt:
             match.column, match.column + window.columns.extent
         )
 
-    def places(self, match: Match, window: Window, step: int = 1) -> NDArray[np.uint32]:
-        """Give the places in the row that a match copies, or of each ``step``-th row and column."""
-        width = self.pictures[match.exemplar].penalty.shape[1]
-        corner = int(self.pixels.first[match.exemplar]) + match.row * width + match.column
+    def places(self, matches: Sequence[Match], window: Window, step: int = 1) -> NDArray[np.uint32]:
+        """Give the places in the row that matches copy, or of each ``step``-th row and column: (matches, rows, columns)."""
+        which = [m.exemplar for m in matches]
         rows, columns = (np.arange(0, n, step) for n in window.shape)
-        return np.asarray(corner + rows[:, np.newaxis] * width + columns, np.uint32)
+        width, first = self.pixels.shapes[which, 1], self.pixels.first[which]
+        corner = first + np.array([m.row for m in matches]) * width + [m.column for m in matches]
+        lines = corner[:, np.newaxis] + np.multiply.outer(width, rows)
+        return np.asarray(lines[..., np.newaxis] + columns, np.uint32)
 
     def first(self, window: Window, match: Match) -> None:
         """Lay the first patch."""
@@ -311,58 +318,66 @@ class Quilt:
     def paste(self, window: Window, finder: Finder) -> None:
         """Cut the most promising matches into what is there, and keep the one that shows and repeats the least."""
         old, known = self.place[window.on(self.size)], window.known()
-        colours = self.all_colours[old]
+        colours = self.all_colours.take(old, axis=0)
         pool = finder.pool(colours, known)
-        matches = [Match(m.cost, finder.members[m.exemplar], m.row, m.column) for m in pool]
+        shown = self.places([Match(m.cost, finder.members[m.exemplar], m.row, m.column) for m in pool], window, CELL)
         usual = float(np.median([m.cost for m in pool])) or 1.0
-        charges = REPETITION * self.repeated(matches, window)
-        continued, mirrored = self.alike(matches, window, old)
+        charges = REPETITION * self.repeated(shown)
+        continued, mirrored = self.alike(shown, known, old)
         charges += CONTINUATION * continued
         free = np.flatnonzero(mirrored <= MIRRORED) if (mirrored <= MIRRORED).any() else np.arange(len(pool))
         best = sorted(free.tolist(), key=lambda k: pool[k].cost / usual + charges[k])[:CANDIDATES]
-        exact = [finder.exact(pool[k], colours, known) for k in best]
-        penalty = self.all_penalties[old]
-        seams = [self.cut(window, colours, penalty, m) for m in exact]
+        exact = finder.exact([pool[k] for k in best], colours, known)
+        seams = self.cut(window, colours, self.all_penalties.take(old), exact)
         usual = float(np.median([value for value, _ in seams])) or 1.0
         chosen = min(range(len(best)), key=lambda i: seams[i][0] / usual + charges[best[i]])
         self._lay(window, exact[chosen], seams[chosen][1])
 
     def _lay(self, window: Window, match: Match, mask: Bools) -> None:
-        at = window.on(self.size)
-        self.place[at] = np.where(mask, self.places(match, window), self.place[at])
+        at, [places] = window.on(self.size), self.places([match], window)
+        self.place[at] = np.where(mask, places, self.place[at])
         self.label[at] = np.where(mask, np.uint32(self.pastes), self.label[at])
-        self.used[np.unique(self.cells[self.places(match, window, CELL)])] += 1
+        self.used[np.unique(self.cells[places[::CELL, ::CELL]])] += 1
         self.pastes += 1
 
-    def cut(self, window: Window, colours: Floats, penalty: Floats, match: Match) -> tuple[float, Bools]:
-        """Cut a match in along one seam for each overlap: what the seams cost, and where it is taken."""
-        picture, box = self.pictures[match.exemplar], self.box(match, window)
-        fresh, dear = picture.colours[box], picture.penalty[box] + penalty
-        taken, value = np.ones(window.shape, bool), 0.0
-        for axis, after, band in window.bands():
-            sides = (colours[band], fresh[band]) if after else (fresh[band], colours[band])
-            seam = cut_strip(*sides, axis=axis, penalty=dear[band], cost="paper")
-            taken[band] &= seam.mask == after
-            value += seam.value
-        return value, taken
+    def cut(
+        self, window: Window, colours: Floats, penalty: Floats, matches: Sequence[Match]
+    ) -> list[tuple[float, Bools]]:
+        """Cut matches in along one seam for each overlap: what the seams cost, and where each match is taken."""
+        bands, strips = window.bands(), []
+        for match in matches:
+            picture, box = self.pictures[match.exemplar], self.box(match, window)
+            fresh, dear = picture.colours[box], picture.penalty[box]
+            for axis, after, band in bands:
+                sides = (colours[band], fresh[band]) if after else (fresh[band], colours[band])
+                strips.append(Strip(*sides, axis, dear[band] + penalty[band]))
+        cuts = iter(cut_strips(strips, cost="paper"))
+        found = []
+        for _ in matches:
+            taken, value = np.ones(window.shape, bool), 0.0
+            for _, after, band in bands:
+                seam = next(cuts)
+                taken[band] &= seam.mask == after
+                value += seam.value
+            found.append((value, taken))
+        return found
 
     def alike(
-        self, matches: Sequence[Match], window: Window, old: NDArray[np.uint32]
+        self, shown: NDArray[np.uint32], known: Bools, old: NDArray[np.uint32]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Give the shares of its overlap on which each match shows what lies there, and the mirror image of it."""
-        known = window.known()[::CELL, ::CELL]
-        there = old[::CELL, ::CELL][known]
-        here = np.stack([self.places(m, window, CELL)[known] for m in matches])
-        apart = np.abs(self.pixels.coordinates[here] - self.pixels.coordinates[there]).max(axis=-1)
-        apart[self.pixels.exemplar[here] != self.pixels.exemplar[there]] = np.inf
+        seen = known[::CELL, ::CELL]
+        there, here = old[::CELL, ::CELL][seen], shown[:, seen]
+        near = self.pixels.exemplar[here] == self.pixels.exemplar[there]
+        for axis in range(2):
+            place = self.pixels.coordinates[:, axis]
+            near &= np.abs(place[here] - place[there]) <= NEAR
         turned = self.all_hands[here] != self.all_hands[there]
-        near = apart <= NEAR
         return (near & ~turned).mean(axis=1), (near & turned).mean(axis=1)
 
-    def repeated(self, matches: Sequence[Match], window: Window) -> NDArray[np.float64]:
+    def repeated(self, shown: NDArray[np.uint32]) -> NDArray[np.float64]:
         """Give how much of each match others show: 0 nothing, 1 what they all do."""
-        shown = np.stack([self.places(m, window, CELL) for m in matches]).reshape(len(matches), -1)
-        shares: NDArray[np.float64] = self.used[self.cells[shown]].mean(axis=1) / self.pastes
+        shares: NDArray[np.float64] = self.used[self.cells[shown]].mean(axis=(1, 2)) / self.pastes
         return shares
 
     def roll(self, axis: int, chance: float) -> None:
@@ -370,11 +385,13 @@ class Quilt:
         lines = np.moveaxis(self.place, axis, 0)
         found = calm(self.all_colours[lines[: CALM + 1]])
         start = found[int(chance * len(found))]
-        self.place, self.label = (np.roll(a, -start, axis) for a in (self.place, self.label))
+        # One after the other, so that no more than one is there twice.
+        self.place = np.roll(self.place, -start, axis)
+        self.label = np.roll(self.label, -start, axis)
 
     def source(self) -> SourceMap:
-        """Give the map into the exemplars."""
-        return SourceMap.pick([p.source for p in self.pictures], self.place, self.label)
+        """Give the map into the exemplars; the quilt is used up."""
+        return SourceMap.pick([p.source for p in self.pictures], self.place, self.label, overwrite=True)
 
 
 def cells(source: SourceMap) -> NDArray[np.int64]:

@@ -242,7 +242,12 @@ class SourceMap:
 
     @classmethod
     def pick(
-        cls, maps: Sequence[SourceMap], place: NDArray[np.unsignedinteger], label: NDArray[np.uint32]
+        cls,
+        maps: Sequence[SourceMap],
+        place: NDArray[np.unsignedinteger],
+        label: NDArray[np.uint32],
+        *,
+        overwrite: bool = False,
     ) -> SourceMap:
         """Give the map of a picture that is put together from single pixels of pictures.
 
@@ -254,6 +259,8 @@ class SourceMap:
             Which pixel: counted row by row, through one picture after the other.
         label : (rows, columns) uint32
             Which patch: pixels of two patches get different labels, also where they are neighbours in a picture.
+        overwrite : bool
+            Write the labels of the map over ``label``, which saves 4 bytes a pixel.
 
         Returns
         -------
@@ -261,7 +268,7 @@ class SourceMap:
             It looks into the exemplars.
 
         """
-        return cls._picked(Pixels.of(maps), place, label, None, None, maps[0].shapes)
+        return cls._picked(Pixels.of(maps), place, label, None, None, maps[0].shapes, label if overwrite else None)
 
     @classmethod
     def _picked(
@@ -272,12 +279,13 @@ class SourceMap:
         frame: NDArray[np.float32] | None,
         rest: NDArray[np.float32] | None,
         shapes: tuple[tuple[int, ...], ...],
+        out: NDArray[np.uint32] | None = None,
     ) -> SourceMap:
-        """Put pixels together: S(p) = inner(q) + J_inner rest, J = J_inner frame."""
+        """Put pixels together: S(p) = inner(q) + J_inner rest, J = J_inner frame; ``out`` for labels may be ``outer``."""
         axes = place.ndim
         exemplar = np.empty(place.shape, np.uint16)
         coordinates = np.empty((*place.shape, axes), np.float32)
-        label = np.empty(place.shape, np.uint32)
+        label = np.empty(place.shape, np.uint32) if out is None else out
         each = inners.framed or (frame is not None and frame.ndim > 3)
         frames = np.empty((*place.shape, axes, axes), np.float32) if each else None
         for band in bands(place.shape):

@@ -3,12 +3,12 @@
 //! The lattice is divided into cells of about `cell` points a side, with centres shifted by noise and each point given
 //! to the nearest centre, so that no seam is straight. A cell's piece is chosen to fit its neighbours: cells of even
 //! and odd parity take turns, each trying many places. The cost of a place counts how the shell just outside the cell
-//! would continue, against what lies there: plain squared differences would favour bland pieces, which are near
-//! everything on average, so the contrast of the piece itself is credited.
+//! would continue, against what lies there. Plain squared differences would favour bland pieces, which are near
+//! everything on average, so they are divided by the contrast of both.
 //!
-//! Everything is a function of the world's coordinates, within `rounds` cells.
+//! Everything is a function of the world's coordinates, within two cells for each of the `rounds`.
 
-use crate::appearance::{Appearance, UNIT, distance};
+use crate::appearance::{Appearance, Feature, KEEP, UNIT, distance};
 use crate::fixed::{Frame, Frames, ONE, Place, add, apply, nearest, sub};
 use crate::grid::{Grid, Region};
 use crate::guide::Guide;
@@ -18,6 +18,8 @@ use crate::{Error, Result};
 
 /// How far a centre strays from the middle of its cell, as a share of the cell.
 const STRAY: f64 = 0.3;
+/// A window without contrast.
+const NOTHING: Feature = [0; KEEP];
 /// Cost of a shell point whose continuation lies outside the exemplar.
 const OUTSIDE: i64 = 4 * UNIT as i64;
 
@@ -30,10 +32,13 @@ pub struct Options {
     pub rounds: usize,
     /// Places a cell tries in a round.
     pub candidates: usize,
-    /// Credit for contrast, 0 to 1.
+    /// How far misfits are divided by the contrast of the pieces, 0 to 1.
     pub contrast: f64,
-    /// Cost of going on exactly where a neighbour ends, as a share of [`UNIT`]: otherwise the exemplar is copied whole.
+    /// Cost of going on exactly where a neighbour ends, in misfits of unrelated pieces: otherwise the exemplar is copied
+    /// whole.
     pub continuation: f64,
+    /// Cost of showing what one of the cells around shows, in the same units.
+    pub repetition: f64,
     /// Chooses the texture.
     pub seed: u64,
     /// Points along borders that are there only for the others to look at: no cell is chosen that these do not hang on.
@@ -94,7 +99,18 @@ pub fn blocks<const D: usize>(
             }
             let chooser = Chooser::new(appearance, &cells, &list, frames, c);
             let asked = chooser.asked(&cells, guide);
-            chooser.choose(&places, origins[c], &asked, &noise, round as u32, options)
+            {
+                let near: Vec<_> = cells.near(c).map(|n| origins[n]).collect();
+                chooser.choose(
+                    &places,
+                    origins[c],
+                    &near,
+                    &asked,
+                    &noise,
+                    round as u32,
+                    options,
+                )
+            }
         });
         monitor.check()?;
         origins = chosen;
@@ -337,21 +353,24 @@ impl<'a, const D: usize> Chooser<'a, D> {
     }
 
     /// The best of the present place and many drawn ones; the first of equals.
-    #[inline(always)]
+    #[allow(clippy::too_many_arguments)] // what lies around, what is asked, and how to choose
     fn choose(
         &self,
         places: &[Place<D>],
         present: Place<D>,
+        near: &[Place<D>],
         asked: &Asked<'_, D>,
         noise: &Noise,
         round: u32,
         options: &Options,
     ) -> Place<D> {
-        let credit = (options.contrast * 256.0) as i64;
-        let continuation = (options.continuation * f64::from(UNIT)) as i64;
         let mut best = present;
-        let cost =
-            |origin| self.cost(places, origin, credit, continuation) + self.obey(origin, asked);
+        let usual = 2.0 * f64::from(UNIT) * self.cell.shell.len().max(1) as f64;
+        let cost = |origin| {
+            self.misfit(places, origin, options)
+                + options.repetition * self.repeated(origin, near, options.cell)
+                + self.obey(origin, asked) as f64 / usual
+        };
         let mut least = cost(present);
         for draw in 0..options.candidates as u32 {
             let origin = self.place(noise, round, draw);
@@ -389,31 +408,66 @@ impl<'a, const D: usize> Chooser<'a, D> {
         sum
     }
 
-    /// Sum over the shell: difference to what lies there, less the credit for the piece's own contrast.
+    /// How badly the piece goes on into what lies around the cell: 0 for a perfect fit, 1 for pieces that have nothing
+    /// to do with each other. Divided by the contrast of both sides, so that a piece is neither favoured for being
+    /// bland, and so near everything on average, nor for being the opposite.
     #[inline(always)]
-    fn cost(&self, places: &[Place<D>], origin: Place<D>, credit: i64, continuation: i64) -> i64 {
-        let mut sum = 0;
+    fn misfit(&self, places: &[Place<D>], origin: Place<D>, options: &Options) -> f64 {
+        let (mut difference, mut contrast, mut same) = (0i64, 0i64, 0usize);
         for &(q, step) in &self.cell.shell {
             let mine = nearest(add(origin, apply(&self.frame, step)));
-            let theirs = nearest(places[q as usize]);
+            let there = self.appearance.clamped(nearest(places[q as usize]));
+            let theirs = self.appearance.feature(there);
             let Some(at) = self.appearance.inside(mine) else {
-                sum += OUTSIDE;
+                difference += OUTSIDE;
                 continue;
             };
-            let there = self.appearance.clamped(theirs);
             let feature = self.appearance.feature(at);
-            let difference = distance(feature, self.appearance.feature(there));
-            let contrast = distance(feature, &[0; crate::appearance::KEEP]);
-            sum += i64::from(difference) - ((i64::from(contrast) * credit) >> 8);
-            if at == there {
-                sum += continuation;
-            }
+            difference += i64::from(distance(feature, theirs));
+            contrast += i64::from(distance(feature, &NOTHING) + distance(theirs, &NOTHING));
+            same += usize::from(at == there);
         }
-        sum
+        let shell = self.cell.shell.len().max(1) as f64;
+        // Twice the variance of windows is what two of them differ by on average.
+        let usual = 2.0 * shell * f64::from(UNIT);
+        let scale = options.contrast * contrast as f64 + (1.0 - options.contrast) * usual;
+        difference as f64 / scale.max(0.05 * usual) + options.continuation * same as f64 / shell
+    }
+
+    /// How much of the piece is shown near by already.
+    #[inline(always)]
+    fn repeated(&self, origin: Place<D>, near: &[Place<D>], cell: usize) -> f64 {
+        let reach = (cell as i32 * ONE / 2).max(ONE);
+        let shared = |other: &Place<D>| {
+            let far = sub(*other, origin)
+                .iter()
+                .map(|d| d.abs())
+                .max()
+                .unwrap_or(0);
+            f64::from((reach - far).max(0)) / f64::from(reach)
+        };
+        near.iter().map(shared).sum()
     }
 }
 
 impl<const D: usize> Cells<D> {
+    /// The cells within two steps of a cell.
+    fn near(&self, c: usize) -> impl Iterator<Item = usize> {
+        let lattice = Region {
+            grid: self.grid,
+            origin: self.first,
+        };
+        let cell = self.grid.point(c);
+        (0..5usize.pow(D as u32)).filter_map(move |mut k| {
+            let step: [i32; D] = std::array::from_fn(|_| {
+                let x = (k % 5) as i32 - 2;
+                k /= 5;
+                x
+            });
+            lattice.step(cell, step).filter(|&other| other != c)
+        })
+    }
+
     /// The frame at a cell's centre, or at the point of the region nearest to it.
     fn frame(&self, frames: Frames<'_, D>, c: usize) -> Frame<D> {
         let grid = &self.region.grid;
@@ -469,7 +523,8 @@ mod tests {
         rounds: 4,
         candidates: 64,
         contrast: 1.0,
-        continuation: 0.3,
+        continuation: 0.15,
+        repetition: 0.3,
         seed: 3,
         margin: 0,
     };

@@ -40,7 +40,12 @@ macro_rules! integer_elements {
         impl sealed::Sealed for $t {}
         impl Element for $t {
             fn to_f64(self) -> f64 { f64::from(self) }
-            fn from_f64(value: f64) -> Self { (value + 0.5).floor() as $t }
+            fn from_f64(value: f64) -> Self {
+                // A cast goes towards zero; `f64::floor` is a call where the CPU is not known to have it.
+                let above = value + 0.5;
+                let cast = above as $t;
+                if f64::from(cast) > above { cast.saturating_sub(1) } else { cast }
+            }
         }
     )*};
 }
@@ -167,12 +172,33 @@ pub fn gather<T: Element, const D: usize>(
     monitor.check()
 }
 
-/// The weighted samples around one coordinate.
-#[derive(Default)]
+/// Samples around one coordinate at most: four along each of three axes.
+const MOST: usize = 64;
+
+/// The places and weights of the samples around one coordinate.
 struct Taps {
-    at: Vec<(usize, f64)>,
+    at: [(usize, f64); MOST],
 }
 
+impl Default for Taps {
+    fn default() -> Self {
+        Self {
+            at: [(0, 0.0); MOST],
+        }
+    }
+}
+
+/// From here on every `f32` is whole.
+const WHOLE: f32 = (1 << 23) as f32;
+
+/// The largest integer that is not above a number; a call of `f64::floor` costs more.
+#[inline(always)]
+fn floor(x: f64) -> isize {
+    let cast = x as isize;
+    cast.saturating_sub(isize::from(x < cast as f64))
+}
+
+#[inline(always)]
 fn look_up<T: Element, const D: usize>(
     exemplar: &Exemplar<'_, T, D>,
     at: [f32; D],
@@ -181,49 +207,74 @@ fn look_up<T: Element, const D: usize>(
     out: &mut [T],
 ) {
     let grid = &exemplar.grid;
-    let whole = at.iter().all(|x| x.fract() == 0.0);
-    if whole || interpolation == Interpolation::Nearest {
+    let whole = |x: &f32| (*x as i32) as f32 == *x || x.abs() >= WHOLE;
+    if interpolation == Interpolation::Nearest || at.iter().all(whole) {
         let mut point = [0; D];
         for axis in 0..D {
-            point[axis] = grid.resolve(axis, (f64::from(at[axis]) + 0.5).floor() as isize);
+            point[axis] = grid.resolve(axis, floor(f64::from(at[axis]) + 0.5));
         }
         out.copy_from_slice(exemplar.pixel(grid.index(point)));
         return;
     }
     let clip = interpolation == Interpolation::Cubic;
     let strides = grid.strides();
-    taps.at.clear();
-    taps.at.push((0, 1.0));
+    let mut count = 1;
+    taps.at[0] = (0, 1.0);
     for axis in 0..D {
-        let base = f64::from(at[axis]).floor();
-        let t = f64::from(at[axis]) - base;
+        let base = floor(f64::from(at[axis]));
+        let t = f64::from(at[axis]) - base as f64;
         let (weights, first): (&[f64], isize) = if clip {
             (&catmull_rom(t), -1)
         } else {
             (&[1.0 - t, t], 0)
         };
-        let before = taps.at.len();
-        for (k, &weight) in weights.iter().enumerate() {
-            let i = grid.resolve(axis, base as isize + first + k as isize) * strides[axis];
-            for tap in 0..before {
+        // From behind, so that what there is is read before it is replaced.
+        for (k, &weight) in weights.iter().enumerate().rev() {
+            let i = grid.resolve(axis, base.saturating_add(first + k as isize)) * strides[axis];
+            for tap in 0..count {
                 let (index, so_far) = taps.at[tap];
-                taps.at.push((index + i, so_far * weight));
+                taps.at[k * count + tap] = (index + i, so_far * weight);
             }
         }
-        taps.at.drain(..before);
+        count *= weights.len();
     }
-    for (channel, value) in out.iter_mut().enumerate() {
-        let (mut sum, mut low, mut high) = (0.0, f64::INFINITY, f64::NEG_INFINITY);
-        for &(index, weight) in &taps.at {
-            // A tap without weight must not spread its infinity.
-            if weight != 0.0 {
-                let sample = exemplar.data[index * exemplar.channels + channel].to_f64();
-                sum += sample * weight;
-                low = low.min(sample);
-                high = high.max(sample);
+    let (taps, n) = (&taps.at[..count], exemplar.channels);
+    match n {
+        3 => weighted::<T, 3>(exemplar.data, n, taps, clip, out),
+        4 => weighted::<T, 4>(exemplar.data, n, taps, clip, out),
+        _ => {
+            for (channel, value) in out.chunks_exact_mut(1).enumerate() {
+                weighted::<T, 1>(&exemplar.data[channel..], n, taps, clip, value);
             }
         }
-        *value = T::from_f64(if clip { sum.clamp(low, high) } else { sum });
+    }
+}
+
+/// Weighted sums of `C` channels of pixels that lie `stride` samples apart.
+#[inline(always)]
+fn weighted<T: Element, const C: usize>(
+    data: &[T],
+    stride: usize,
+    taps: &[(usize, f64)],
+    clip: bool,
+    out: &mut [T],
+) {
+    let (mut sum, mut low, mut high) = ([0.0; C], [f64::INFINITY; C], [f64::NEG_INFINITY; C]);
+    // A tap without weight must not spread its infinity.
+    for &(index, weight) in taps.iter().filter(|tap| tap.1 != 0.0) {
+        for (c, sample) in data[index * stride..][..C].iter().enumerate() {
+            let sample = sample.to_f64();
+            sum[c] += sample * weight;
+            low[c] = if sample < low[c] { sample } else { low[c] };
+            high[c] = if sample > high[c] { sample } else { high[c] };
+        }
+    }
+    for (c, value) in out.iter_mut().enumerate() {
+        *value = T::from_f64(if clip {
+            sum[c].clamp(low[c], high[c])
+        } else {
+            sum[c]
+        });
     }
 }
 

@@ -76,7 +76,10 @@ impl<const D: usize> Grid<D> {
     /// Coordinate `i` brought onto the axis: around it where it wraps, to the nearest end where it does not.
     pub fn resolve(&self, axis: usize, i: isize) -> usize {
         let n = self.shape[axis] as isize;
-        if self.wrap[axis] {
+        if (0..n).contains(&i) {
+            // Nearly always; a remainder costs more than all else here.
+            i as usize
+        } else if self.wrap[axis] {
             i.rem_euclid(n) as usize
         } else {
             i.clamp(0, n - 1) as usize

@@ -179,7 +179,8 @@ class Appearance:
         rounds: int = 6,
         candidates: int = 512,
         contrast: float = 1.0,
-        continuation: float = 0.3,
+        continuation: float = 0.15,
+        repetition: float = 0.3,
         seed: int = 0,
         margin: int = 0,
         guide: Guide | None = None,
@@ -200,11 +201,13 @@ class Appearance:
         candidates : int
             Places that a cell tries in each, 1 to 65535.
         contrast : float
-            Credit for a piece's own contrast, 0 to 1. At 0 bland pieces are favoured, for they are near everything on
-            average.
+            How far misfits are divided by the contrast of the pieces, 0 to 1. At 0 bland pieces are favoured, for they are
+            near everything on average.
         continuation : float
-            Cost of going on exactly where a neighbour ends, in variances of all windows, 0 to 4. At 0 the exemplar
-            is copied in large pieces.
+            Cost of going on exactly where a neighbour ends, in misfits of unrelated pieces, 0 to 4. At 0 the exemplar is
+            copied in large pieces.
+        repetition : float
+            Cost of showing what one of the cells around shows, in the same units, 0 to 4.
         seed : int
             Chooses the texture. What is drawn belongs to the place in the world, not to the region.
         margin : int
@@ -236,6 +239,7 @@ class Appearance:
             as_int(candidates, "candidates", 1, 65535),
             as_float(contrast, "contrast", 0, 1),
             as_float(continuation, "continuation", 0, 4),
+            as_float(repetition, "repetition", 0, 4),
             as_seed(seed),
             as_int(margin, "margin", 0, 1 << 20),
             guide,
@@ -253,6 +257,7 @@ class Appearance:
         exhaustive: bool = False,
         sweeps: int = 2,
         hysteresis: float = 2.0,
+        unity: float = 0.0,
         vote: int = 0,
         settled: float = 0.0,
         seed: int = 0,
@@ -278,6 +283,9 @@ class Appearance:
             1 or 2 an iteration; the second looks twice as far.
         hysteresis : float
             How much better than the present a drawn match must be, in units of `spacing`, 0 to 100: what is good enough stays.
+        unity : float
+            What each neighbour costs whose piece of the exemplar is another, in units of `spacing`, 0 to 100: pieces
+            stay whole where several fit equally well.
         vote : int
             Radius within which windows vote on the place of a point, up to `radius`; at 0 each takes its own match.
         settled : float
@@ -317,6 +325,7 @@ class Appearance:
             exhaustive,
             as_int(sweeps, "sweeps", 1, 2),
             as_float(hysteresis, "hysteresis", 0, 100),
+            as_float(unity, "unity", 0, 100),
             as_int(vote, "vote", 0, self.radius),
             as_float(settled, "settled", 0, 1),
             as_seed(seed),

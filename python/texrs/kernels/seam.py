@@ -14,7 +14,7 @@ from texrs._arrays import as_image, as_int, as_mask, as_wrap, to_unit
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 
-__all__ = ["Cut", "Labels", "OldSeams", "binary_labels", "cut", "cut_strip"]
+__all__ = ["Cut", "Labels", "OldSeams", "Strip", "binary_labels", "cut", "cut_strip", "cut_strips"]
 
 Cost: TypeAlias = Literal["gradient", "paper"]
 
@@ -223,15 +223,66 @@ def cut_strip(
     """
     first, second = _pair(a, b, 2)
     shape = first.shape[:-1]
-    mask, value, edges = _rust.seam_strip(
-        first,
-        second,
-        as_int(axis, "axis", 0, 1),
-        bool(cyclic),
-        None if penalty is None else _floats(penalty, "penalty", shape),
-        _cost(cost),
-    )
+    dear = None if penalty is None else _floats(penalty, "penalty", shape)
+    crossed = as_int(axis, "axis", 0, 1)
+    [(mask, value, edges)] = _rust.seam_strips([(first, second, crossed, dear)], bool(cyclic), _cost(cost))
     return Cut(mask.reshape(shape), value, edges)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Strip:
+    """Two images of one shape that overlap altogether, one of many that `cut_strips` cuts."""
+
+    a: Array
+    """(H, W, C) of numbers about [0, 1]: costs are measured on them as they are."""
+    b: Array
+    axis: int
+    """The axis that the seam crosses."""
+    penalty: Array | None = None
+    """(H, W), as in `cut`."""
+
+
+def cut_strips(strips: Sequence[Strip], *, cyclic: bool = False, cost: Cost = "gradient") -> list[Cut]:
+    """Cut many strips at once, in parallel, each as by `cut_strip`.
+
+    Parameters
+    ----------
+    strips : sequence of Strip
+        Of any shapes.
+    cyclic, cost
+        As in `cut_strip`, for all of them.
+
+    Returns
+    -------
+    list of Cut
+        One a strip.
+
+    Raises
+    ------
+    InvalidInput
+        As `cut_strip`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs.kernels import seam
+    >>> a, b = np.zeros((2, 4, 1)), np.array([[[0.4], [0.1], [0.3], [0.3]]] * 2)
+    >>> [found.mask.astype(int)[0].tolist() for found in seam.cut_strips([seam.Strip(a, b, 1)] * 2, cost="paper")]
+    [[0, 0, 1, 1], [0, 0, 1, 1]]
+
+    """
+    given = []
+    for strip in strips:
+        first, second = (np.ascontiguousarray(image, np.float32) for image in (strip.a, strip.b))
+        if first.ndim != 3 or first.shape != second.shape:
+            raise InvalidInput(f"strips: need two images (rows, columns, channels), got {first.shape}, {second.shape}")
+        dear = None if strip.penalty is None else _floats(strip.penalty, "penalty", first.shape[:2])
+        given.append((first, second, as_int(strip.axis, "axis", 0, 1), dear))
+    found = _rust.seam_strips(given, bool(cyclic), _cost(cost))
+    return [
+        Cut(mask.reshape(one[0].shape[:2]), value, edges)
+        for one, (mask, value, edges) in zip(given, found, strict=True)
+    ]
 
 
 def binary_labels(
@@ -333,7 +384,7 @@ def _floats(value: ArrayLike, name: str, shape: tuple[int, ...]) -> Floats:
         raise InvalidInput(f"{name}: not an array of numbers ({error})") from None
     if array.ndim and array.shape != shape:
         raise InvalidInput(f"{name}: needs shape {shape}, got {array.shape}")
-    return np.ascontiguousarray(np.broadcast_to(array, shape))
+    return np.ascontiguousarray(array if array.ndim else np.broadcast_to(array, shape))
 
 
 def _old(old: OldSeams, shape: tuple[int, ...]) -> list[list[Floats]]:

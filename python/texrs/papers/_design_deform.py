@@ -166,7 +166,9 @@ class Canvas:
         taken = offered
         if (offered & known).any():
             old_core = self.cores[window] & known & ~core
-            taken = cut(self.colours[window], colours, known, offered, core_a=old_core, core_b=core).mask & offered
+            # Divided by the local gradient, costs would lead the seam along strong edges, where what is left of it shows.
+            seam = cut(self.colours[window], colours, known, offered, core_a=old_core, core_b=core, cost="paper")
+            taken = seam.mask & offered
         self.colours[window][taken] = colours[taken]
         self.coordinates[window][taken] = placement.coordinates[taken]
         self.label[window][taken] = len(self.frames)

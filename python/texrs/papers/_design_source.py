@@ -14,7 +14,7 @@ from texrs.deform import Flip, Moves, chaotic_sequence, flip, mirrors
 from texrs.errors import InvalidInput
 from texrs.kernels.patch_search import PatchIndex
 from texrs.segment import Segmentation
-from texrs.segment.regularity import direction
+from texrs.segment.regularity import direction, polarity
 
 __all__ = ["Source", "as_shares", "check_moves", "check_sources", "to_unit_together"]
 
@@ -120,14 +120,20 @@ class Source:
             parts, moves = replace(parts, children="none", lattice=None), replace(moves, mirror=False)
         extent = side or patch_side(guide.shape[0], guide.shape[1])
         flips = mirrors(moves.mirror)
+        if len(flips) > 1:
+            rows, columns, oblique = (value < POLAR for value in polarity(guide))
+            like = {(True, False): rows and oblique, (False, True): columns and oblique, (True, True): rows and columns}
+            flips = [f for f in flips if like.get(f, True)]
+            moves = replace(moves, axes=(like[True, False], like[False, True]))
         if parts.lattice:
             shifts = parts.lattice.shifts(moves.translate * min(guide.shape[:2])) if moves.translate else []
             moves = replace(moves, rotate=0.0, scale=(1.0, 1.0), mirror=False, shifts=tuple(shifts))
         elif automatic and parts.children != "grid" and direction(guide) < DIRECTED:
             moves = replace(moves, rotate=ROTATE)
         if parts.children == "grid":
-            # Cells are no elements: turned or scaled they would show their outline.
-            moves = replace(moves, rotate=0.0, scale=(1.0, 1.0))
+            # Cells are no elements: turned or scaled they would show their outline, and mirrored they would meet the mirror
+            # image of what they show.
+            moves = replace(moves, rotate=0.0, scale=(1.0, 1.0), mirror=False)
         return cls(guide, parts, filling(guide, parts, flips, extent), flips, moves, extent, paper)
 
 
@@ -139,6 +145,9 @@ def patch_side(height: int, width: int) -> int:
 ROTATE, DIRECTED = 60.0, 0.25
 """Largest rotation by default, in degrees, and the directedness from which on nothing is turned."""
 
+
+POLAR = 5.0
+"""How surely, in standard errors, an example differs from a mirror image of itself from which on it is not mirrored so."""
 
 BACKGROUND_PLACES = 64
 """Places for a patch of pure background from which on holes are filled with background alone."""

@@ -22,10 +22,13 @@ class Settings:
     rounds: int = 6
     candidates: int = 512
     contrast: float = 1.0
-    continuation: float = 0.3
+    continuation: float = 0.15
+    repetition: float = 0.3
     hysteresis: float = 2.0
+    unity: float = 0.0
     settled: float = 0.005
     exhaustive: bool = False
+    stitch: bool = True
 
     def at(self, level: int, levels: int) -> Step:
         """Give what is done at a level, counted from the coarsest."""
@@ -48,7 +51,7 @@ class Step:
 PRESERVE = Settings()
 """Keeps what is rare, and copies where a copy is good enough."""
 
-FAST = replace(PRESERVE, iterations=(6, 3, 1), sweeps=(2, 2, 1), rounds=4, candidates=256, settled=0.0)
+FAST = replace(PRESERVE, iterations=(6, 3, 1), sweeps=(2, 2, 1), rounds=4, candidates=256, settled=0.0, stitch=False)
 """Fixed counts: what a point becomes hangs on what is near it alone."""
 
 ON_DEMAND = replace(FAST, iterations=(3, 1, 1), sweeps=(1, 1, 1), rounds=2, candidates=192)
@@ -59,10 +62,10 @@ OPTIMISE = replace(
     iterations=(20, 8, 3),
     votes=(3, 2, 0),
     radii=(3, 2),
-    contrast=0.8,
     hysteresis=0.1,
     settled=0.0,
     exhaustive=True,
+    stitch=False,
 )
 """Straightens lattices and walls, but washes rare things out: for gated use."""
 

@@ -19,13 +19,13 @@ Departures, with their reasons:
   cores.
 - In a cut, the core of an element is tied to it and a ring of its surroundings is offered with it: otherwise the
   minimum cut makes a wholly overlapped element vanish.
-- Costs of cutting elements in are divided by the local gradient (Kwatra et al., SIGGRAPH 2003); all cuts are dearer
-  inside elements, so seams run between them.
+- Where patches of the large texture meet, cuts are dearer inside elements, so seams run between them.
 - Where elements of one shape lie in a heap they take each other's places, turned and scaled to the shape that they fill; in a
   heap of leaves most rest. If all moved there would be nothing left to lie on. An element brings only background along, not
   pieces of its neighbours.
 - Holes are filled with background alone where the example has enough of it.
-- Nothing is turned where the example has directions of its own (bark, brickwork); where it repeats on a lattice, elements
+- Nothing is mirrored along an axis on which the example plainly differs from its mirror image (light from one side, leaves
+  that hang), nor turned where the example has directions of its own (bark, brickwork); where it repeats on a lattice, elements
   move from place to place of the lattice and nowhere else.
 - A cyclic texture (section 3.5) is stitched on the torus from the start: patches are chosen to fit both sides of the
   wrap, where the paper folds a finished picture that was never chosen to fit.
@@ -37,6 +37,7 @@ Departures, with their reasons:
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -45,7 +46,7 @@ from typing import Any, Literal, TypeAlias, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float, as_image, as_int, as_seed, as_size, as_wrap, guidance
+from texrs._arrays import as_float, as_image, as_int, as_seed, as_size, as_wrap, check_memory, guidance
 from texrs._typing import Array, Floats, Progress
 from texrs.blend import SCREENING, blend, visibility
 from texrs.deform import (
@@ -135,7 +136,8 @@ def design(  # type: ignore[misc]  # the overloads leave the options to this sig
     scale : (float, float)
         Least and largest scaling, within 0.5 to 2.
     mirror : bool
-        Whether elements, backgrounds and patches may be mirrored; False for lit or lettered textures.
+        Whether elements, backgrounds and patches may be mirrored; False for lettered textures. Where the example plainly
+        differs from its mirror image, as lit from one side, it is not mirrored along that axis in any case.
     x0 : float, optional
         Start of the chaotic sequence (Eq. 2), within (-1, 1); the seed draws one for each element by default.
     chaos : float
@@ -164,7 +166,13 @@ def design(  # type: ignore[misc]  # the overloads leave the options to this sig
     InvalidInput
         An argument of the wrong type or out of range; a start that the chaotic sequence does not leave.
     LimitExceeded
-        A size of more than 2^28 pixels.
+        A size of more than 2^28 pixels, or that needs more memory than the machine has.
+
+    Notes
+    -----
+    For each pixel of the result 18 bytes are needed, or 14 and twice those of a pixel of the image where that is more,
+    and 0.5 GB beside it: 5.9 GB for 16384 x 16384 pixels of 8-bit RGB. Each further variant adds 14 bytes a pixel and
+    twice those of the image; ``method="paper"`` takes 24 more, a map of ``weights`` 8 for each exemplar.
 
     References
     ----------
@@ -195,6 +203,7 @@ def design(  # type: ignore[misc]  # the overloads leave the options to this sig
         raise InvalidInput(f"method: allowed are default and paper, got {method!r}")
     paper = method == "paper"
     total = 1 if variants is None else as_int(variants, "variants", 1, 4096)
+    check_memory(memory(shape, pixels[0], total, shares, paper=paper))
     watch = progress or (lambda stage, share: None)
 
     watch("segment", 0.0)
@@ -202,7 +211,9 @@ def design(  # type: ignore[misc]  # the overloads leave the options to this sig
     sources = []
     for number, picture in enumerate(unit):
         marked: Any = labels[number] if isinstance(labels, list | tuple) else labels
-        parts = segment(picture, layers=layers, children="none" if paper else children, labels=marked)
+        done = partial(_part, watch, number, len(pixels))
+        kind: Children = "none" if paper else children
+        parts = segment(picture, layers=layers, children=kind, labels=marked, progress=done)
         automatic = rotate is None
         sources.append(Source.of(guidance(picture), parts, moves, automatic=automatic, side=side, paper=paper))
         watch("segment", (number + 1) / len(pixels))
@@ -211,6 +222,21 @@ def design(  # type: ignore[misc]  # the overloads leave the options to this sig
     ]
     watch("done", 1.0)
     return made[0] if variants is None else made
+
+
+def _part(watch: Progress, number: int, count: int, stage: str, share: float) -> None:
+    """Report the share of one of several alike."""
+    watch(stage, (number + share) / count)
+
+
+SPARE = 500_000_000
+"""Bytes that do not grow with the result."""
+
+
+def memory(size: tuple[int, ...], exemplar: Array, variants: int, shares: NDArray[np.float64], *, paper: bool) -> int:
+    """Give the bytes that textures take: the source map is 14 a pixel, 18 while it is made; the picture is kept twice."""
+    kept = 14 + 2 * exemplar.shape[-1] * exemplar.itemsize
+    return int(math.prod(size) * (max(18, kept) + 24 * paper + (variants - 1) * kept) + shares.nbytes + SPARE)
 
 
 def one(
@@ -254,7 +280,7 @@ def one(
         "children": sources[0].parts.children,
         "children_reason": sources[0].parts.reason,
         "rotate": sources[0].moves.rotate,
-        "shares": np.bincount(composite.exemplar.ravel(), minlength=len(sources)).tolist(),
+        "shares": [int(np.count_nonzero(composite.exemplar == which)) for which in range(len(sources))],
         "holes": [v.holes for v in pictures],
         "literal": sources[0].paper,
         "poisson": screening,

@@ -21,6 +21,8 @@ Departures, with their reasons:
 - A row vector in Eq. 1 and a column vector in Eq. 3 turn in opposite ways; here J is the inverse of the frame in both.
 - The pyramid is decimated, windows are 5^3 at each level and full colour windows are compared, not eight diagonal
   neighbours, which fall apart into lattices that exchange nothing.
+- Pictures that nothing turns or guides start from patches stitched along minimum cuts, at full resolution (`texrs.quilt`):
+  cuts keep elements whole, where blocks are repaired by windows smaller than an element.
 - Where the exemplar repeats, as measured, its coordinates go around.
 
 ``method="paper"`` leaves the departures out (`texrs.papers._solid_literal`).
@@ -42,8 +44,10 @@ from texrs.errors import InvalidInput
 from texrs.fields import Field
 from texrs.kernels.appearance import Corrected
 from texrs.kernels.pyramid import ONE, Region, to_fixed, upsample
+from texrs.papers._solid_gate import Trial, trial_region
 from texrs.papers._solid_hold import Hold
 from texrs.papers._solid_limits import check_memory
+from texrs.papers._solid_patches import stitch
 from texrs.papers._solid_settings import Quality, Settings, settings_of
 from texrs.report import Synthesis
 from texrs.source_map import SourceMap
@@ -238,7 +242,11 @@ def _verb(
         analysis = analyse(image, axes=axes, wrap=repeat, labels=labels, radii=settings.radii)
     elif analysis.shape != image.shape[:axes]:
         raise InvalidInput(f"analysis: is of an exemplar of {analysis.shape}, not {image.shape[:axes]}")
-    grown = Grower(image, analysis, checked, settings, seed).grow(region, hold, progress)
+    grower = Grower(image, analysis, checked, settings, seed)
+    trial = None
+    if quality == "optimise":
+        grower, trial = gated(grower, region, labels, repeat, progress)
+    grown = grower.grow(region, hold, progress)
     source = SourceMap(
         (grown.places.reshape(*region.shape, axes) / np.float32(ONE)).astype(np.float32, copy=False),
         np.zeros(region.shape, np.uint16),
@@ -250,7 +258,8 @@ def _verb(
     composite = source.render(exemplar, interpolation=how)
     report = {
         "method": method or "default",
-        "quality": quality,
+        "quality": quality if trial is None or trial.accepted else "preserve",
+        "trial": None if trial is None else trial.report(),
         "seed": seed,
         "field": None if checked is None else checked.describe(),
         "repeats": list(analysis.wrap),
@@ -271,6 +280,26 @@ def as_field(field: object, axes: int) -> Field | None:
         raise InvalidInput(f"field: needs {axes} axes, got one of {field.axes}")
     still = field.constant is not None and np.array_equal(field.constant, np.eye(axes, dtype=np.float32))
     return None if still else field
+
+
+def gated(
+    grower: Grower,
+    region: Region,
+    labels: bool | None,
+    repeat: bool | Sequence[bool] | None,
+    progress: Progress | None,
+) -> tuple[Grower, Trial]:
+    """Try "optimise" on a part of the output, and give the grower that serves: it, or "preserve"."""
+    part = trial_region(region, grower.image)
+    tried = grower.grow(part, Hold(grower.image), None if progress is None else lambda n, s: progress(f"trial: {n}", s))
+    axes = len(part.shape)
+    coordinates = (tried.places.reshape(*part.shape, axes) / np.float32(ONE)).astype(np.float32, copy=False)
+    trial = Trial.of(grower.image, coordinates, grower.field)
+    if trial.accepted:
+        return grower, trial
+    settings = settings_of("preserve")
+    analysis = analyse(grower.image, axes=axes, wrap=repeat, labels=labels, radii=settings.radii)
+    return Grower(grower.image, analysis, grower.field, settings, grower.seed), trial
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -298,10 +327,18 @@ class Grower:
         for _ in self.analysis.levels[1:]:
             regions.insert(0, regions[0].parents())
         places: Places | None = None
-        report, stages = [], {}
-        for level, here in enumerate(regions):
+        report: list[dict[str, Any]] = []
+        stages: dict[str, Array] = {}
+        first = 0
+        if self.stitches(region, hold):
+            first = len(regions) - 1
+            places = stitch(self.image, region, self.seed, _stage(progress, "patches"))
+            stages["patches"] = self.picture(places, region, first)
+        for level, here in enumerate(regions[first:], start=first):
             frames = self.frames(level, here)
-            if places is None:
+            if level == first and places is not None:
+                pass
+            elif places is None:
                 places = self.start(here, frames, hold, progress)
                 stages["blocks"] = self.picture(places, here, level)
             else:
@@ -318,6 +355,10 @@ class Grower:
             )
         assert places is not None  # there is at least one level
         return Grown(places, report, stages)
+
+    def stitches(self, region: Region, hold: Hold) -> bool:
+        """Tell whether to start from patches stitched along minimum cuts: in pictures that nothing turns or guides."""
+        return self.settings.stitch and len(region.shape) == 2 and self.field is None and not hold.count
 
     def spacing(self, level: int) -> int:
         """Voxels from one point of a level to the next."""
@@ -346,6 +387,7 @@ class Grower:
             candidates=s.candidates,
             contrast=s.contrast,
             continuation=s.continuation,
+            repetition=s.repetition,
             seed=self.seed,
             margin=margin,
             guide=hold.guide(coarsest, region, self.spacing(0)),
@@ -377,6 +419,7 @@ class Grower:
             exhaustive=step.exhaustive,
             sweeps=step.sweeps,
             hysteresis=self.settings.hysteresis,
+            unity=self.settings.unity,
             vote=min(step.vote, here.radius),
             settled=self.settings.settled,
             # The noise of a level is its own.

@@ -8,6 +8,7 @@ together speaks for two things.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from heapq import heapify, heappop, heappush
 from typing import Any
 
 import numpy as np
@@ -167,8 +168,13 @@ def _join(parts: Labels, relief: Floats) -> Labels:
     least = np.minimum(perimeter[one], perimeter[other])
     first = parting(one, other, sums / lengths, lengths / least).tolist()
     scores = dict(zip(zip(one.tolist(), other.tolist(), strict=True), first, strict=True))
-    while scores:
-        (p, q), score = min(scores.items(), key=lambda item: (item[1], item[0]))
+    # Entries of pairs that were weighed anew, or are no more, stay behind and are passed over.
+    queue = [(score, pair) for pair, score in scores.items()]
+    heapify(queue)
+    while queue:
+        score, (p, q) = heappop(queue)
+        if scores.get((p, q)) != score:
+            continue
         if score >= PARTED:
             break
         shapes.join(p, q)
@@ -185,12 +191,16 @@ def _join(parts: Labels, relief: Floats) -> Labels:
             totals, borderings = np.array([borders[p][r] for r in near]).T
             least = np.minimum(perimeter[p], perimeter[near])
             again = parting(p, np.array(near), totals / borderings, borderings / least).tolist()
-            scores.update({(min(p, r), max(p, r)): value for r, value in zip(near, again, strict=True)})
+            for r, value in zip(near, again, strict=True):
+                scores[min(p, r), max(p, r)] = value
+                heappush(queue, (value, (min(p, r), max(p, r))))
     return into[parts]
 
 
 TURN = 2 * np.pi / 32
 """Angle between the directions in which shapes are measured: hulls come out at most 2 % too large."""
+BEFORE, AFTER = np.arange(32) - 1, (np.arange(32) + 1) % 32
+"""The directions beside each."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -237,7 +247,8 @@ class Shapes:
 def _hull(reach: NDArray[np.float64]) -> Any:
     """Give the area of the polygon that reaches so far in each direction."""
     finite = np.where(np.isfinite(reach), reach, 0.0)
-    side = (np.roll(finite, 1, -1) + np.roll(finite, -1, -1) - 2 * np.cos(TURN) * finite) / np.sin(TURN)
+    # By index: `np.roll` takes longer than all the rest, and this is called for each pair that is weighed.
+    side = (finite[..., BEFORE] + finite[..., AFTER] - 2 * np.cos(TURN) * finite) / np.sin(TURN)
     return 0.5 * (finite * side).sum(axis=-1)
 
 

@@ -6,6 +6,7 @@ A mean-shift filter (Comaniciu and Meer, IEEE PAMI 2002), the graph-based merge 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,13 +34,15 @@ class Regions:
     """(n, 3): mean CIE Lab colour of each."""
 
     @classmethod
-    def of(cls, rgb: Floats) -> Regions:
-        """Filter an image, and merge what is alike."""
+    def of(cls, rgb: Floats, watch: Callable[[], object] = int) -> Regions:
+        """Filter an image, and merge what is alike; ``watch`` is called along the way."""
         from skimage.color import rgb2lab
         from skimage.segmentation import felzenszwalb
 
-        filtered: Floats = mean_shift(rgb, SPATIAL_RADIUS, RANGE_RADIUS)
+        filtered: Floats = mean_shift(rgb, SPATIAL_RADIUS, RANGE_RADIUS, progress=lambda stage, share: watch())
+        watch()
         region = felzenszwalb(filtered.astype(np.float64), MERGE_SCALE, MERGE_BLUR, MERGE_MINIMUM)
+        watch()
         area = np.bincount(region.ravel()).astype(np.float64)
         lab = rgb2lab(filtered).reshape(-1, 3)
         colour = np.stack([np.bincount(region.ravel(), lab[:, c]) / area for c in range(3)], axis=-1)

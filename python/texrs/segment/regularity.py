@@ -1,4 +1,4 @@
-"""How regular an exemplar is: the lattice that it repeats on, and the directions that it has."""
+"""How regular an exemplar is: the lattice that it repeats on, its directions, and whether its mirror image is like it."""
 
 from __future__ import annotations
 
@@ -23,6 +23,9 @@ REGULAR = 0.3
 """Mean correlation on a lattice from which on it is believed; scattered things have up to 0.2."""
 DIP = 0.75
 """A correlation falls below this share of its peak on the way to it, else it is a stripe and no period."""
+FINE, BLOCKS = (0.7, 1.5), 4
+"""Standard deviations of the Gaussians under which an image is compared with its mirror image; parts of a side that its spread
+is known from."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,3 +165,39 @@ def direction(guide: Floats) -> float:
     second = slope**2
     fourth = second**2 / np.maximum(energy, 1e-300)
     return float(max(abs(second.sum()), abs(fourth.sum())) / total)
+
+
+def polarity(guide: Floats) -> tuple[float, float, float]:
+    """Give how surely an image differs from its mirror images, in standard errors.
+
+    Three values: by what a mirror along rows turns round, by what one along columns does, and by what either does and both
+    together do not. What is lit from one side grows dark slowly and bright at once, on the way along rows or along columns:
+    slopes weighed by their square, or by that of the other slope, do not sum to 0 as they do where a mirror image is as likely.
+    What is oblique has slopes whose product does not.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    height, width = guide.shape[:2]
+    top, left = max(0, height - WINDOW) // 2, max(0, width - WINDOW) // 2
+    light = guide[top : top + WINDOW, left : left + WINDOW].mean(axis=-1, dtype=np.float32)
+    along = [0.0, 0.0, 0.0]
+    if min(light.shape) < BLOCKS * SHORTEST:
+        return along[0], along[1], along[2]
+    for sigma in FINE:
+        rows, columns = (gaussian_filter(light, sigma, order=order) for order in ((1, 0), (0, 1)))
+        squares = rows * rows, columns * columns
+        energy = squares[0] + squares[1]
+        cubes = energy * np.sqrt(energy)
+        for axis, slope in enumerate((rows, columns)):
+            along[axis] = max(along[axis], *(_sureness(slope * square, cubes) for square in squares))
+        along[2] = max(along[2], _sureness(rows * columns, energy))
+    return along[0], along[1], along[2]
+
+
+def _sureness(odd: Floats, scale: Floats) -> float:
+    """Give the mean of values over that of a scale, in standard errors, which equal parts of the image show."""
+    rows, columns = (n // BLOCKS for n in odd.shape)
+    parts = [v[: BLOCKS * rows, : BLOCKS * columns].reshape(BLOCKS, rows, BLOCKS, columns) for v in (odd, scale)]
+    sums, scales = (p.sum(axis=(1, 3), dtype=np.float64).ravel() for p in parts)
+    mean = sums.sum() / max(scales.sum(), 1e-12)
+    return abs(float(sums.sum())) / max(float(np.sqrt(((sums - mean * scales) ** 2).sum())), 1e-12)

@@ -42,6 +42,8 @@ pub struct Options {
     pub sweeps: usize,
     /// How much better a drawn match must be, in units of the exemplar's spacing.
     pub hysteresis: f64,
+    /// What each neighbour costs whose piece of the exemplar is another, in units of the exemplar's spacing.
+    pub unity: f64,
     /// Radius of the vote; 0: each point takes the match of its own window.
     pub vote: usize,
     /// Stop when less than this share of the points changes; 0: never, for results that must not hang on distant ones.
@@ -113,6 +115,7 @@ pub fn correct<const D: usize>(
             noise,
             iteration: options.first + iteration as u32,
             limit,
+            unity: (options.unity * f64::from(appearance.spacing())) as i64,
             exhaustive: options.exhaustive,
         };
         level.matches(

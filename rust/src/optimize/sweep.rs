@@ -4,12 +4,15 @@ use std::ops::Range;
 
 use super::{CHUNK, Level};
 use crate::appearance::{Feature, distance};
-use crate::fixed::{ONE, Place, add, apply, nearest};
+use crate::fixed::{ONE, Place, add, apply, nearest, sub};
 use crate::hash::Noise;
 use crate::par;
 
 /// Matches drawn around the best: within the exemplar, then a half of it, a quarter and so on.
 const DRAWS: u32 = 6;
+
+/// Proposals that differ by less are of one piece of the exemplar: rounding moves them by half a sample.
+const SAME: i32 = ONE * 3 / 4;
 
 /// The noise of one iteration.
 pub(super) struct Draws {
@@ -17,6 +20,8 @@ pub(super) struct Draws {
     pub(super) iteration: u32,
     /// What a drawn match must be better by.
     pub(super) limit: i64,
+    /// What each neighbour costs whose piece of the exemplar is another.
+    pub(super) unity: i64,
     pub(super) exhaustive: bool,
 }
 
@@ -69,6 +74,8 @@ impl<const D: usize> Level<'_, D> {
                 }
             }
         }
+        let mut proposals = [(best, at); 6];
+        let mut count = 0;
         for axis in 0..D {
             for side in [-reach, reach] {
                 let mut step = [0; D];
@@ -78,14 +85,28 @@ impl<const D: usize> Level<'_, D> {
                 };
                 step[axis] = -side;
                 let place = add(from[q], apply(&frame, step));
-                match appearance.inside(nearest(place)) {
-                    Some(there) if there != at => {
-                        let cost = cost_of(there);
-                        if cost < least {
-                            (best, at, least) = (place, there, cost);
-                        }
-                    }
-                    _ => {}
+                if let Some(there) = appearance.inside(nearest(place)) {
+                    proposals[count] = (place, there);
+                    count += 1;
+                }
+            }
+        }
+        let proposals = &proposals[..count];
+        let apart = |place: Place<D>| -> i64 {
+            if draws.unity == 0 {
+                return 0;
+            }
+            let others = proposals
+                .iter()
+                .filter(|(other, _)| sub(*other, place).iter().any(|d| d.abs() > SAME));
+            others.count() as i64 * draws.unity
+        };
+        least += apart(best);
+        for &(place, there) in proposals {
+            if there != at {
+                let cost = cost_of(there) + apart(place);
+                if cost < least {
+                    (best, at, least) = (place, there, cost);
                 }
             }
         }
@@ -105,7 +126,7 @@ impl<const D: usize> Level<'_, D> {
                 place[axis] += shift * ONE;
             }
             if let Some(there) = appearance.inside(nearest(place)) {
-                let cost = cost_of(there) + draws.limit;
+                let cost = cost_of(there) + apart(place) + draws.limit;
                 if cost < least {
                     (best, least) = (place, cost);
                 }

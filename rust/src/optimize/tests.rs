@@ -20,6 +20,7 @@ const OPTIONS: Options = Options {
     exhaustive: false,
     sweeps: 2,
     hysteresis: 2.0,
+    unity: 0.2,
     vote: 1,
     settled: 0.0,
     seed: 1,

@@ -14,8 +14,8 @@ pub(super) struct Prepared {
     patch: Vec<f32>,
     /// A weight for each sample of the patch.
     weight: Vec<f32>,
-    /// Rows with a weight other than zero.
-    weighed: Vec<bool>,
+    /// The samples of each row outside of which all weights are zero, in whole lanes.
+    weighed: Vec<[usize; 2]>,
     /// Distances from the exemplars' mean, in units of the largest, where the weight is not zero.
     centred: Vec<f32>,
     largest_weight: f64,
@@ -72,8 +72,15 @@ impl Prepared {
         }
         let lines = query.weight.chunks_exact(columns);
         self.weighed.clear();
-        self.weighed
-            .extend(lines.map(|line| line.iter().any(|&w| w > 0.0)));
+        self.weighed.extend(lines.map(|line| {
+            let first = line.iter().position(|&w| w > 0.0).unwrap_or(columns);
+            let last = line.iter().rposition(|&w| w > 0.0).map_or(first, |c| c + 1);
+            let end = (last * channels).next_multiple_of(LANES);
+            [
+                first * channels / LANES * LANES,
+                end.min(columns * channels),
+            ]
+        }));
         Ok(())
     }
 
@@ -196,12 +203,14 @@ impl Prepared {
         let rows = self.patch.chunks_exact(width);
         let rows = rows.zip(self.weight.chunks_exact(width)).enumerate();
         for (r, (patch, weight)) in rows {
-            if !self.weighed[r] {
-                // What adds nothing to any lane.
+            // What lies outside adds nothing to any lane.
+            let [first, end] = self.weighed[r];
+            if first >= end {
                 continue;
             }
             let start = ((at[0] + r) * shape[1] + at[1]) * self.channels;
-            let samples = &data[start..][..width];
+            let samples = &data[start..][first..end];
+            let (patch, weight) = (&patch[first..end], &weight[first..end]);
             let (p, p_rest) = patch.as_chunks::<LANES>();
             let (w, w_rest) = weight.as_chunks::<LANES>();
             let (s, s_rest) = samples.as_chunks::<LANES>();

@@ -93,7 +93,7 @@ mod _rust {
     #[pymodule_export]
     use super::poisson::{poisson, poisson_spread};
     #[pymodule_export]
-    use super::seam::{seam_cut, seam_labels, seam_strip};
+    use super::seam::{seam_cut, seam_labels, seam_strips};
     #[pymodule_export]
     use super::set_threads;
     #[pymodule_export]

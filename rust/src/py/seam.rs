@@ -3,6 +3,7 @@ use pyo3::prelude::*;
 
 use super::run;
 use crate::grid::Grid;
+use crate::par;
 use crate::seam::cost::Cost;
 use crate::seam::{labels, stitch, strip};
 use crate::{Error, Result};
@@ -126,29 +127,46 @@ fn grid<const D: usize>(shape: &[usize], wrap: &[bool]) -> Result<Grid<D>> {
     )
 }
 
+/// Each strip: two images (rows, columns, channels), the axis that its seam crosses, a penalty (rows, columns).
+type StripArrays<'py> = (
+    PyReadonlyArray3<'py, f32>,
+    PyReadonlyArray3<'py, f32>,
+    usize,
+    Option<PyReadonlyArrayDyn<'py, f32>>,
+);
+
 #[pyfunction]
-#[allow(clippy::too_many_arguments)] // Python's wrapper names them
-pub(super) fn seam_strip<'py>(
+pub(super) fn seam_strips<'py>(
     py: Python<'py>,
-    a: PyReadonlyArray3<'py, f32>,
-    b: PyReadonlyArray3<'py, f32>,
-    axis: usize,
+    strips: Vec<StripArrays<'py>>,
     cyclic: bool,
-    penalty: Option<PyReadonlyArrayDyn<'py, f32>>,
     cost: &str,
-) -> PyResult<Cut<'py>> {
-    let pasted = strip::Pasted {
-        shape: [a.shape()[0], a.shape()[1]],
-        channels: a.shape()[2],
-        a: a.as_slice()?,
-        b: b.as_slice()?,
-        axis,
-        cyclic,
-        penalty: slice(&penalty)?,
-        cost: self::cost(cost)?,
-    };
-    let cut = run(py, None, |monitor| strip::cut(&pasted, monitor))?;
-    Ok((PyArray1::from_vec(py, cut.b), cut.value, cut.edges))
+) -> PyResult<Vec<Cut<'py>>> {
+    let cost = self::cost(cost)?;
+    let pasted = strips
+        .iter()
+        .map(|(a, b, axis, penalty)| {
+            Ok(strip::Pasted {
+                shape: [a.shape()[0], a.shape()[1]],
+                channels: a.shape()[2],
+                a: a.as_slice()?,
+                b: b.as_slice()?,
+                axis: *axis,
+                cyclic,
+                penalty: slice(penalty)?,
+                cost,
+            })
+        })
+        .collect::<PyResult<Vec<_>>>()?;
+    let cuts = run(py, None, |monitor| {
+        par::map(pasted.len(), |i| strip::cut(&pasted[i], monitor))
+            .into_iter()
+            .collect::<Result<Vec<_>>>()
+    })?;
+    Ok(cuts
+        .into_iter()
+        .map(|cut| (PyArray1::from_vec(py, cut.b), cut.value, cut.edges))
+        .collect())
 }
 
 /// Unary costs (..., 2); pairwise costs one array an axis.
