@@ -164,11 +164,17 @@ impl<const D: usize> Cells<D> {
     /// Whether anything inside the margin hangs on what a cell chooses in a round.
     ///
     /// A point lies within `far` of its cell's centre, as near as to that of the cell it falls into; each round after
-    /// this one looks at the shell, one point further, and at the centres of the cells that own it.
+    /// this one looks at the shell, one point further, and at the centres of the cells that own it; and at those of
+    /// cells two steps away where what they show counts.
     fn counts(&self, cell: usize, options: &Options, round: usize) -> bool {
         let side = options.cell as f64;
         let far = ((0.5 + STRAY) * side).ceil() as usize;
-        let sight = far + (options.rounds - round) * (2 * far + 1);
+        let steps = if options.repetition > 0.0 {
+            (2.0 * (1.0 + STRAY) * side).ceil() as usize
+        } else {
+            0
+        };
+        let sight = far + (options.rounds - round) * steps.max(2 * far + 1);
         let beyond = options.margin as i64 - sight as i64;
         let (shape, wrap) = (self.region.grid.shape(), self.region.grid.wrap());
         (0..D).all(|axis| {

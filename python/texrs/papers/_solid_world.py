@@ -19,7 +19,7 @@ from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
-from math import prod
+from math import ceil, prod
 from typing import TypeAlias
 
 import numpy as np
@@ -44,15 +44,17 @@ _STRAY = 0.3
 Key: TypeAlias = tuple[int, ...]
 
 
-def blocks_reach(cell: int, rounds: int) -> int:
+def blocks_reach(cell: int, rounds: int, repetition: float = 0.0) -> int:
     """Give how many points away the blocks at a point can see.
 
     A point lies within e of the centre of its cell, for it lies so near to that of the cell it falls into. A cell is
     chosen by its shell, e + 1 away from its centre, whose points lie within e of the centres of their own cells; each
-    round does so once more. Of the last cells all points must be there, for they tell where it may lie.
+    round does so once more. Of the last cells all points must be there, for they tell where it may lie. Where
+    repetition has a cost, cells two steps away count too.
     """
-    strays = int((0.5 + _STRAY) * cell + 1e-6), cell - 1 - int((0.5 - _STRAY) * cell - 1e-6)
-    return 2 * max(strays) + rounds * (2 * max(strays) + 1)
+    far = max(int((0.5 + _STRAY) * cell + 1e-6), cell - 1 - int((0.5 - _STRAY) * cell - 1e-6))
+    steps = ceil(2 * (1 + _STRAY) * cell) if repetition else 0
+    return 2 * far + rounds * max(2 * far + 1, steps)
 
 
 def window_reach(frames: NDArray[np.int16], radius: int) -> int:
@@ -134,7 +136,8 @@ class World:
     def reach(self, stage: int, window: int) -> int:
         """Give how many points away a stage can see in the one before; windows look so far."""
         if stage == 0:
-            return blocks_reach(self.grower.settings.cell, self.grower.settings.rounds)
+            settings = self.grower.settings
+            return blocks_reach(settings.cell, settings.rounds, settings.repetition)
         here = self.stages[stage]
         step = self._step(here.level)
         radius = self.grower.analysis.levels[here.level].radius
