@@ -170,6 +170,69 @@ def test_labels_are_the_best_of_all(seed, shape, wrap):
     )
 
 
+def nothing_old(shape):
+    """Old seams that are none: what is given is no other problem, but only the general solver takes it."""
+    zeros = [np.zeros(shape, np.float32)] * len(shape)
+    return seam.OldSeams(kept=zeros, ab=zeros, ba=zeros)
+
+
+def disc(shape, centre, radius):
+    away = [(np.arange(n) - c) ** 2 for n, c in zip(shape, centre, strict=True)]
+    return sum(np.meshgrid(*away, indexing="ij")) <= radius**2
+
+
+@settings(deadline=None, max_examples=100)
+@given(
+    seed=st.integers(0, 2**32),
+    shape=st.tuples(st.integers(50, 120), st.integers(50, 120)),
+    levels=st.sampled_from([2, 4, 256]),
+    cost=st.sampled_from(["gradient", "paper"]),
+    odd=st.sampled_from(["", "two cores", "core at the border", "holes", "cyclic", "penalty"]),
+)
+def test_a_ring_is_the_cut_of_the_general_solver(seed, shape, levels, cost, odd):
+    """The same set of pixels, few levels making many equal cuts, whether the shape is a ring or not."""
+    random = np.random.default_rng(seed)
+    a, b = (random.integers(0, levels, (*shape, 3)) / max(levels - 1, 1) for _ in range(2))
+    middle = [n * x for n, x in zip(shape, random.uniform(0.3, 0.7, 2), strict=True)]
+    mask_a, mask_b = np.ones(shape, bool), disc(shape, middle, min(shape) * random.uniform(0.3, 0.8))
+    core = disc(shape, middle, min(shape) * 0.1) & mask_b
+    if odd == "two cores":
+        core |= np.roll(core, shape[1] // 3, 1) & mask_b
+    elif odd == "core at the border":
+        core[shape[0] // 2, : shape[1] // 2] = mask_b[shape[0] // 2, : shape[1] // 2] = True
+    elif odd == "holes":
+        mask_a &= (random.random(shape) < 0.95) | core
+        mask_b &= (random.random(shape) < 0.98) | core
+    penalty = random.random(shape) * 3 if odd == "penalty" else None
+    given = {"core_b": core, "cost": cost, "wrap": odd == "cyclic", "penalty": penalty}
+    found = seam.cut(a, b, mask_a, mask_b, **given)
+    general = seam.cut(a, b, mask_a, mask_b, old=nothing_old(shape), **given)
+    assert np.array_equal(found.mask, general.mask)
+    assert (found.value, found.edges) == (general.value, general.edges)
+
+
+def test_a_large_ring_is_the_cut_of_the_general_solver():
+    a, b = noise(0, (150, 170, 3)), noise(1, (150, 170, 3))
+    everywhere = np.ones((150, 170), bool)
+    given = {"mask_b": disc((150, 170), (70, 80), 68), "core_b": disc((150, 170), (75, 70), 25)}
+    found = seam.cut(a, b, everywhere, **given)
+    general = seam.cut(a, b, everywhere, old=nothing_old((150, 170)), **given)
+    assert np.array_equal(found.mask, general.mask)
+    assert found.value == general.value
+
+
+def test_a_shell_is_cut_in_three_dimensions():
+    shape = (9, 10, 11)
+    a, b = noise(0, (*shape, 1)), noise(1, (*shape, 1))
+    given = {"mask_b": disc(shape, (4, 5, 5), 4), "core_b": disc(shape, (4, 5, 5), 1)}
+    found = seam.cut(a, b, np.ones(shape, bool), **given)
+    assert found.mask[given["core_b"]].all()
+    assert not found.mask[~given["mask_b"]].any()
+    rim = given["mask_b"] & beside(~given["mask_b"], (False,) * 3)
+    costs = edge_costs(a, b, given["mask_b"], (False,) * 3)
+    assert found.value == pytest.approx(least(costs, rim & ~given["core_b"], given["core_b"]), rel=1e-3)
+
+
 def test_old_seam_is_covered_where_that_is_cheaper():
     """A holds a visible seam between columns 3 and 4, where B is the same on both sides."""
     left, right = np.zeros((6, 8), np.float32), np.ones((6, 8), np.float32)

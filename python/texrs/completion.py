@@ -138,20 +138,23 @@ def complete(
             progress=lambda share: watch("complete", share),
         )
         places, count = pasted(places, filled.label, filled.source, filled.coordinates, flips), len(filled.source)
-    result = places.render(pictures)
+    new = np.nonzero(places.label)
+    # What is kept maps to itself; of the rest every coordinate is whole.
+    result = pictures[0].copy()
+    row, column = places.coordinates[new].astype(np.intp).T
+    result[new] = pictures[-1][row, column]
     watch("done", 1.0)
     known = pictures[0].copy()
-    known[open_] = known[~open_].min() if count and not open_.all() else 0
-    stages = {
-        "known": known,
-        "patches": np.where(places.label > 0, 55 + places.label * 67 % 200, 0).astype(np.uint8),
-        "composite": result,
-    }
+    # The hole is painted over with a known pixel, which does not change the least value.
+    known[open_] = known.min() if count and not open_.all() else 0
+    shades = np.zeros(open_.shape, np.uint8)
+    shades[new] = 55 + places.label[new] * 67 % 200
+    stages = {"known": known, "patches": shades, "composite": result}
     report = {
         "method": method,
         "seed": seed,
         "hole": float(open_.mean()),
-        "replaced_outside": int((~open_ & (places.label > 0)).sum()),
+        "replaced_outside": int(np.count_nonzero(~open_[new])),
         "patch": side,
         "patches": count,
         "mirror": bool(mirror),
@@ -168,7 +171,8 @@ def check_pictures(image: object, hole: object, source: object | None) -> tuple[
         mask = as_mask(hole, "hole", array.shape[:2])
         # What is in the hole must not matter, not even to the range of the values.
         array = array.copy()
-        array[mask] = array[~mask][0] if not mask.all() else 0
+        first = np.unravel_index(mask.argmin(), mask.shape)
+        array[mask] = array[first] if not mask[first] else 0
     pixels = as_image(array, "image", minimum=LEAST)
     mask = as_mask(hole, "hole", pixels.shape[:2]) if mask is None else mask
     if source is None:
@@ -189,6 +193,8 @@ def check_pictures(image: object, hole: object, source: object | None) -> tuple[
 def guides_of(pictures: Sequence[Array]) -> list[Floats]:
     """Give the colours that patches are compared by, brought to [0, 1] together."""
     pixels = [as_image(p) for p in pictures]
+    if len(pixels) == 1:
+        return [guidance(pixels[0])]
     lines = guidance(np.concatenate([p.reshape(1, -1, p.shape[-1]) for p in pixels], axis=1))
     found, start = [], 0
     for p in pixels:
@@ -231,6 +237,8 @@ def corners(free: Bools, side: int) -> Bools:
 
 def grown(mask: Bools, width: int, wrap: Sequence[bool]) -> Bools:
     """Widen a mask by so many pixels, around the edges of axes that wrap."""
+    if not width:
+        return mask
     from scipy.ndimage import maximum_filter1d
 
     for axis, cyclic in enumerate(wrap):
@@ -247,13 +255,14 @@ def pasted(
     flips: Sequence[Flip],
 ) -> SourceMap:
     """Give the map of a picture in which patches are pasted: those of the last exemplar, each in one of its mirrors."""
-    new = label >= 0
+    new = np.nonzero(label >= 0)
     places, exemplar = kept.coordinates.copy(), kept.exemplar.copy()
-    which = np.where(new, origin[label], -1)
+    which, found = origin[label[new]], coordinates[new]
     rows, columns = kept.shapes[-1]
     for number, mirror in enumerate(flips):
         here = which == number
-        places[here] = flip_coordinates(coordinates[here], mirror, (rows, columns))
+        found[here] = flip_coordinates(found[here], mirror, (rows, columns))
+    places[new] = found
     exemplar[new] = len(kept.shapes) - 1
     frames = np.stack([np.eye(2, dtype=np.float32), *(flip_frame(flips[o]) for o in origin)])
     return SourceMap(places, exemplar, (label + 1).astype(np.uint32), frames, kept.shapes)

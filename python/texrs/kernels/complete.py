@@ -121,7 +121,8 @@ def complete(
     if picture.ndim != 3:
         raise InvalidInput(f"colours: needs shape (rows, columns, channels), got {picture.shape}")
     mask = as_mask(known, "known", picture.shape[:2])
-    if not np.isfinite(picture[mask]).all():
+    picture = np.where(mask[..., np.newaxis], picture, np.float32(0))
+    if not np.isfinite(picture).all():
         raise InvalidInput("colours: known pixels must be finite")
     sides = (patch, patch) if isinstance(patch, int | np.integer) else tuple(patch)
     if len(sides) != 2:
@@ -133,7 +134,7 @@ def complete(
         as_float(ratio, "ratio", 1, 1e9),
     )
     filled, label, patches = _rust.complete(
-        np.where(mask[..., np.newaxis], picture, np.float32(0)),
+        picture,
         mask,
         None if keep is None else as_mask(keep, "keep", picture.shape[:2]),
         index._index,
@@ -146,7 +147,8 @@ def complete(
         progress,
     )
     coordinates = np.zeros((*mask.shape, 2), np.float32)
-    at = np.argwhere(label >= 0)
-    of = patches[label[label >= 0]]
-    coordinates[label >= 0] = (at - of[:, 3:5]) % np.array(mask.shape) + of[:, 1:3]
+    new = np.nonzero(label >= 0)
+    of = patches[label[new]]
+    for axis, (at, length) in enumerate(zip(new, mask.shape, strict=True)):
+        coordinates[..., axis][new] = (at - of[:, 3 + axis]) % length + of[:, 1 + axis]
     return Completion(filled, label, patches[:, 0], coordinates)

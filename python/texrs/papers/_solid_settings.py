@@ -25,7 +25,7 @@ class Settings:
     continuation: float = 0.15
     repetition: float = 0.3
     hysteresis: float = 2.0
-    unity: float = 0.0
+    unity: float = 0.1
     settled: float = 0.005
     exhaustive: bool = False
     stitch: bool = True
@@ -63,6 +63,7 @@ OPTIMISE = replace(
     votes=(3, 2, 0),
     radii=(3, 2),
     hysteresis=0.1,
+    unity=0.5,
     settled=0.0,
     exhaustive=True,
     stitch=False,

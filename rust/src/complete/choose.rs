@@ -152,21 +152,35 @@ fn overlap(a: [isize; 2], b: [isize; 2], patch: [usize; 2]) -> f64 {
 
 /// Whether one exemplar is the other one mirrored.
 fn mirrors(one: &Exemplar, other: &Exemplar, channels: usize, flip: [bool; 2]) -> bool {
-    if one.shape != other.shape {
-        return false;
-    }
-    let (rows, width) = (one.shape[0], one.shape[1] * channels);
-    (0..rows).all(|r| {
-        let turned = if flip[0] { rows - 1 - r } else { r };
-        let (a, b) = (
-            &one.data[r * width..][..width],
-            &other.data[turned * width..][..width],
-        );
-        if flip[1] {
-            a.chunks_exact(channels).eq(b.chunks_exact(channels).rev())
-        } else {
-            a == b
+    one.shape == other.shape
+        && match channels {
+            1 => turned::<1>(one, other, channels, flip),
+            3 => turned::<3>(one, other, channels, flip),
+            _ => turned::<0>(one, other, channels, flip),
         }
+}
+
+/// [`mirrors`] for two of the same shape, with `C` channels where that is known, so that pixels are compared at once.
+fn turned<const C: usize>(
+    one: &Exemplar,
+    other: &Exemplar,
+    channels: usize,
+    flip: [bool; 2],
+) -> bool {
+    let n = if C == 0 { channels } else { C };
+    let [rows, columns] = one.shape;
+    let line = |r: usize| r * columns * n..(r + 1) * columns * n;
+    (0..rows).all(|r| {
+        let back = if flip[0] { rows - 1 - r } else { r };
+        let (a, b) = (&one.data[line(r)], &other.data[line(back)]);
+        if !flip[1] {
+            return a == b;
+        }
+        let pairs = a.chunks_exact(n).zip(b.chunks_exact(n).rev());
+        // No early end within a row, nor within a pixel: a mirror has to be seen to its end anyway.
+        pairs.fold(true, |same, (a, b)| {
+            (0..n).fold(same, |same, k| same & (a[k] == b[k]))
+        })
     })
 }
 

@@ -31,8 +31,16 @@ impl Front {
             queue: BinaryHeap::new(),
         };
         let holes = || (0..known.len()).filter(|&at| !known[at]);
+        let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
         for at in holes() {
-            front.count(at, 1);
+            let point = grid.point(at);
+            for axis in 0..2 {
+                low[axis] = low[axis].min(point[axis]);
+                high[axis] = high[axis].max(point[axis]);
+            }
+        }
+        if low[0] <= high[0] {
+            front.recount(low, high, known);
         }
         for at in holes() {
             front.enqueue(at);
@@ -57,31 +65,15 @@ impl Front {
         self.unknown[self.grid.index(to)] as usize
     }
 
-    /// Takes note of pixels of the window at `to` that are no longer unknown.
-    pub(super) fn filled(&mut self, to: [usize; 2], pixels: &[usize], known: &[bool]) {
-        for &at in pixels {
-            self.count(at, -1);
-        }
+    /// Takes note that pixels of the window at `to` are no longer unknown.
+    pub(super) fn filled(&mut self, to: [usize; 2], known: &[bool]) {
+        let last = std::array::from_fn(|axis| to[axis] + self.patch[axis] - 1);
+        self.recount(to, last, known);
         // Windows that reach into this one belong to holes at most a window away.
         let grid = self.grid;
-        let shape = grid.shape();
-        let mut start = [0; 2];
-        let mut extent = [0; 2];
-        for axis in 0..2 {
-            let (low, high) = (
-                to[axis] as isize - self.patch[axis] as isize,
-                (to[axis] + 2 * self.patch[axis]) as isize,
-            );
-            (start[axis], extent[axis]) = if !grid.wrap()[axis] {
-                let low = low.max(0) as usize;
-                (low, (high as usize).min(shape[axis]) - low)
-            } else {
-                (
-                    grid.resolve(axis, low),
-                    (3 * self.patch[axis]).min(shape[axis]),
-                )
-            };
-        }
+        let before: [usize; 2] = std::array::from_fn(|axis| self.patch[axis]);
+        let after = std::array::from_fn(|axis| to[axis] + 2 * self.patch[axis] - 1);
+        let (start, extent) = around(&grid, to, after, before);
         for_each(&grid, start, extent, |_, at| {
             if !known[at] {
                 self.enqueue(at);
@@ -102,28 +94,66 @@ impl Front {
         }
     }
 
-    /// Adds to the counts of all windows that show a pixel.
-    fn count(&mut self, at: usize, add: i32) {
-        let [row, column] = self.grid.point(at);
+    /// Counts anew what is unknown in all windows that show a pixel of the rectangle from `low` to `high`.
+    fn recount(&mut self, low: [usize; 2], high: [usize; 2], known: &[bool]) {
+        let grid = self.grid;
         let [rows, columns] = self.patch;
-        let width = self.grid.shape()[1];
-        let first = (column + 1) as isize - columns as isize;
-        for r in 0..rows {
-            let Some(r) = self.grid.inside(0, row as isize - r as isize) else {
-                break;
-            };
-            let line = &mut self.unknown[r * width..][..width];
-            let mut bump = |range: std::ops::Range<usize>| {
-                for n in &mut line[range] {
-                    *n = n.wrapping_add_signed(add);
-                }
-            };
-            bump(first.max(0) as usize..column + 1);
-            if first < 0 && self.grid.wrap()[1] {
-                bump((width as isize + first) as usize..width);
+        let (start, extent) = around(&grid, low, high, [rows - 1, columns - 1]);
+        // Positions of the pixels that these windows show; none beyond the edges.
+        let [lines, places]: [Vec<Option<usize>>; 2] = std::array::from_fn(|axis| {
+            let end = start[axis] + extent[axis] + self.patch[axis] - 1;
+            (start[axis]..end)
+                .map(|i| grid.inside(axis, i as isize))
+                .collect()
+        });
+        let width = grid.shape()[1];
+        // Unknown pixels of each column within the windows of a row.
+        let mut sums = vec![0u32; places.len()];
+        let add = |sums: &mut [u32], line: Option<usize>, one: u32| {
+            let Some(line) = line else { return };
+            let known = &known[line * width..][..width];
+            for (sum, place) in sums.iter_mut().zip(&places) {
+                let unknown = place.is_some_and(|c| !known[c]);
+                *sum = sum.wrapping_add(one * u32::from(unknown));
             }
+        };
+        for &line in &lines[..rows - 1] {
+            add(&mut sums, line, 1);
+        }
+        for r in 0..extent[0] {
+            add(&mut sums, lines[r + rows - 1], 1);
+            let row = lines[r].map_or(0, |line| line * width);
+            let mut window: u32 = sums[..columns - 1].iter().sum();
+            for c in 0..extent[1] {
+                window += sums[c + columns - 1];
+                self.unknown[row + places[c].unwrap_or(0)] = window;
+                window -= sums[c];
+            }
+            add(&mut sums, lines[r], u32::MAX);
         }
     }
+}
+
+/// The first position and the extent of what is in the rectangle from `low` to `high` or up to `before` before it, as far
+/// as the grid has it.
+fn around(
+    grid: &Grid<2>,
+    low: [usize; 2],
+    high: [usize; 2],
+    before: [usize; 2],
+) -> ([usize; 2], [usize; 2]) {
+    let (mut start, mut extent) = ([0; 2], [0; 2]);
+    for axis in 0..2 {
+        let n = grid.shape()[axis];
+        if grid.wrap()[axis] {
+            start[axis] = grid.resolve(axis, low[axis] as isize - before[axis] as isize);
+            extent[axis] = (high[axis] + 1 - low[axis] + before[axis]).min(n);
+        } else {
+            start[axis] = low[axis].saturating_sub(before[axis]);
+            extent[axis] = (high[axis] + 1).min(n) - start[axis];
+        }
+    }
+    (start, extent)
 }
 
 /// The corner of a window that shows a point at `share` of its sides, as far as the canvas allows.

@@ -182,7 +182,7 @@ pub fn complete(
         let filled = window.paste(canvas, index, &matches[best], &taken, to, &mut result);
         debug_assert!(!filled.is_empty());
         if let Order::Inwards(front) = &mut order {
-            front.filled(to, &filled, canvas.known);
+            front.filled(to, canvas.known);
         }
         monitor.advance(filled.len() as u64)?;
     }

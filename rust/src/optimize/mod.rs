@@ -16,7 +16,7 @@ mod gather;
 mod sweep;
 mod vote;
 
-use crate::appearance::{Appearance, KEEP};
+use crate::appearance::{Appearance, KEEP, UNIT};
 use crate::fixed::{Frames, Place};
 use crate::grid::Region;
 use crate::guide::Guide;
@@ -26,6 +26,8 @@ use crate::{Error, Result};
 
 /// Points that a task takes at a time.
 const CHUNK: usize = 2048;
+/// Distance of windows below which they are the same.
+const FINEST: i32 = UNIT / 256;
 /// Points whose windows are kept at a time.
 const SLAB: usize = 1 << 17;
 
@@ -101,7 +103,9 @@ pub fn correct<const D: usize>(
         still: frames.is_identity(),
     };
     let noise = Noise::new(options.seed).part(3);
-    let limit = (options.hysteresis * f64::from(appearance.spacing())) as i64;
+    // An exemplar that repeats has no spacing, but rounding of colours still leaves some.
+    let spacing = f64::from(appearance.spacing().max(FINEST));
+    let limit = (options.hysteresis * spacing) as i64;
     let slabs = level.slabs();
     monitor.expect((options.iterations * slabs.len()) as u64);
     let mut once = places.clone();
@@ -115,7 +119,7 @@ pub fn correct<const D: usize>(
             noise,
             iteration: options.first + iteration as u32,
             limit,
-            unity: (options.unity * f64::from(appearance.spacing())) as i64,
+            unity: (options.unity * spacing) as i64,
             exhaustive: options.exhaustive,
         };
         level.matches(

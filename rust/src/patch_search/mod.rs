@@ -407,11 +407,10 @@ fn moments(exemplars: &[Exemplar], channels: usize) -> (Vec<f64>, f64) {
     let mut range = vec![[f32::INFINITY, f32::NEG_INFINITY]; channels];
     let mut count = 0;
     for e in exemplars {
-        for pixel in e.data.chunks_exact(channels) {
-            for ((m, r), &x) in mean.iter_mut().zip(&mut range).zip(pixel) {
-                *m += f64::from(x);
-                *r = [r[0].min(x), r[1].max(x)];
-            }
+        match channels {
+            1 => tally::<1>(&e.data, channels, &mut mean, &mut range),
+            3 => tally::<3>(&e.data, channels, &mut mean, &mut range),
+            _ => tally::<0>(&e.data, channels, &mut mean, &mut range),
         }
         count += e.data.len() / channels;
     }
@@ -429,6 +428,20 @@ fn moments(exemplars: &[Exemplar], channels: usize) -> (Vec<f64>, f64) {
     (mean, scale)
 }
 
+/// Adds samples to the sum of each channel, and widens its range; with `C` channels where that is known, so that they are
+/// summed side by side.
+fn tally<const C: usize>(data: &[f32], channels: usize, sum: &mut [f64], range: &mut [[f32; 2]]) {
+    let n = if C == 0 { channels } else { C };
+    let (sum, range) = (&mut sum[..n], &mut range[..n]);
+    for pixel in data.chunks_exact(n) {
+        for k in 0..n {
+            let x = pixel[k];
+            sum[k] += f64::from(x);
+            range[k] = [range[k][0].min(x), range[k][1].max(x)];
+        }
+    }
+}
+
 fn check_exemplar(exemplar: &Exemplar, channels: usize) -> Result<()> {
     let [rows, columns] = exemplar.shape;
     let pixels = rows.checked_mul(columns).filter(|&n| n > 0 && n < LONGEST);
@@ -439,7 +452,10 @@ fn check_exemplar(exemplar: &Exemplar, channels: usize) -> Result<()> {
             got: vec![exemplar.data.len()],
         });
     }
-    if let Some(bad) = exemplar.data.iter().find(|x| !x.is_finite()) {
+    // Block by block, within which nothing has to be decided.
+    let sound = |block: &[f32]| block.iter().fold(true, |all, x| all & x.is_finite());
+    let block = exemplar.data.chunks(4096).find(|block| !sound(block));
+    if let Some(bad) = block.and_then(|block| block.iter().find(|x| !x.is_finite())) {
         return Err(Error::value(
             "exemplars",
             format!("all samples must be finite, got {bad}"),

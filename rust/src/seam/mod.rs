@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`maxflow`] | exact minimum cuts of directed, possibly cyclic grids |
 //! | [`cost`] | how visible a seam between two images is, and capacities made of costs |
-//! | [`planar`] | the same between opposite borders, open or cyclic, as a shortest path on the dual |
+//! | [`planar`] | the same between opposite borders, open or cyclic, or around a core, as a shortest path on the dual |
 //! | [`labels`] | binary labels of least energy |
 //! | [`stitch`] | which of two images each pixel of a canvas takes, for overlaps of any shape |
 //! | [`strip`] | the same for two images that overlap altogether, seam from border to border |

@@ -7,6 +7,9 @@
 //! 3. the others take what makes the sum of the costs of the edges that are cut least ([`super::cost`]); where that
 //!    leaves a choice, as few as possible take B.
 //!
+//! Where what must take B is one core on a plane, and what must keep A lies around it, that is a shortest closed path
+//! ([`super::planar::ring`]); else a maximum flow ([`super::maxflow`]).
+//!
 //! Departures: A, which is there already, wins pixels that touch both; a `penalty` keeps seams off chosen pixels; an old
 //! seam is a pairwise term with one cost a labelling (Kolmogorov and Zabih, *What energy functions can be minimized via
 //! graph cuts?*, PAMI 2004) in place of Kwatra's extra node, which gives the same cuts with fewer nodes.
@@ -14,6 +17,7 @@
 use super::cost::{Cost, Pair, capacity, check_costs, check_len, scale};
 use super::links;
 use super::maxflow::{Graph, Solver};
+use super::planar::ring::{Ring, Side, least_ring};
 use crate::grid::Grid;
 use crate::par::Monitor;
 use crate::{Error, Result};
@@ -106,6 +110,9 @@ struct Costs {
     ba: f32,
 }
 
+/// Boxes of fewer pixels go to the general solver: for them it is as fast, and it keeps its workspace.
+const SMALL: usize = 64 * 64;
+
 /// A workspace for stitching; cuts after the first one of a size allocate only their result.
 #[derive(Debug)]
 pub struct Stitcher<const D: usize> {
@@ -113,6 +120,7 @@ pub struct Stitcher<const D: usize> {
     /// Canvas index of each point of the box.
     canvas: Vec<u32>,
     differences: Vec<f32>,
+    sides: Vec<Side>,
     costs: [Vec<Costs>; D],
     terminal: Vec<i32>,
     forward: [Vec<i32>; D],
@@ -125,20 +133,13 @@ impl<const D: usize> Default for Stitcher<D> {
             solver: Solver::default(),
             canvas: Vec::new(),
             differences: Vec::new(),
+            sides: Vec::new(),
             costs: std::array::from_fn(|_| Vec::new()),
             terminal: Vec::new(),
             forward: std::array::from_fn(|_| Vec::new()),
             backward: std::array::from_fn(|_| Vec::new()),
         }
     }
-}
-
-/// To which image a pixel is tied.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Tie {
-    Free,
-    A,
-    B,
 }
 
 impl<const D: usize> Stitcher<D> {
@@ -168,13 +169,18 @@ impl<const D: usize> Stitcher<D> {
             _ => self.weigh::<0>(overlap, &window),
         }?;
         self.capacities(overlap, &window, scale(largest));
-        let graph = Graph {
-            grid: window.grid,
-            terminal: &self.terminal,
-            forward: std::array::from_fn(|axis| &self.forward[axis][..]),
-            backward: std::array::from_fn(|axis| &self.backward[axis][..]),
+        let sink = match self.ring(overlap, &window.grid, monitor)? {
+            Some(inside) => inside,
+            None => {
+                let graph = Graph {
+                    grid: window.grid,
+                    terminal: &self.terminal,
+                    forward: std::array::from_fn(|axis| &self.forward[axis][..]),
+                    backward: std::array::from_fn(|axis| &self.backward[axis][..]),
+                };
+                self.solver.min_cut(&graph, monitor)?.sink
+            }
         };
-        let sink = self.solver.min_cut(&graph, monitor)?.sink;
         let inside: Vec<bool> = self.differences.iter().map(|d| !d.is_nan()).collect();
         for ((&at, &inside), &sink) in self.canvas.iter().zip(&inside).zip(&sink) {
             if inside {
@@ -197,6 +203,30 @@ impl<const D: usize> Stitcher<D> {
             });
         }
         Ok(Stitched { b, value, edges })
+    }
+
+    /// What takes B, where that is what a least seam is around: on a plane and without old seams, which cost one way more
+    /// than the other.
+    fn ring(
+        &self,
+        overlap: &Overlap<'_, D>,
+        grid: &Grid<D>,
+        monitor: &Monitor,
+    ) -> Result<Option<Vec<bool>>> {
+        let (&[rows, columns], [along, across]) = (&grid.shape()[..], &self.forward[..]) else {
+            return Ok(None);
+        };
+        if grid.len() < SMALL || grid.wrap().contains(&true) || overlap.old.is_some() {
+            return Ok(None);
+        }
+        let ring = Ring {
+            rows,
+            columns,
+            sides: &self.sides,
+            across,
+            along,
+        };
+        least_ring(&ring, monitor)
     }
 
     /// Costs of all edges of the overlap in the window; the largest one.
@@ -304,29 +334,35 @@ impl<const D: usize> Stitcher<D> {
                 around[j] += ab + ba;
             });
         }
+        self.sides.clear();
         for ((terminal, &at), &around) in self.terminal.iter_mut().zip(&self.canvas).zip(&around) {
-            match tie(overlap, at as usize) {
-                Tie::Free => {}
-                Tie::A => *terminal += around + 1,
-                Tie::B => *terminal -= around + 1,
+            let side = tie(overlap, at as usize);
+            self.sides.push(side);
+            match side {
+                Side::Free => {}
+                Side::Outside => *terminal += around + 1,
+                Side::Inside => *terminal -= around + 1,
             }
         }
     }
 }
 
-/// To which image a pixel of the overlap is tied, if to any.
-fn tie<const D: usize>(overlap: &Overlap<'_, D>, at: usize) -> Tie {
-    if !(overlap.mask_a[at] && overlap.mask_b[at]) {
-        return Tie::Free;
+/// Where a pixel must be: outside it keeps A, inside it takes B.
+fn tie<const D: usize>(overlap: &Overlap<'_, D>, at: usize) -> Side {
+    match (overlap.mask_a[at], overlap.mask_b[at]) {
+        (true, true) => {}
+        (true, false) => return Side::Outside,
+        (false, true) => return Side::Inside,
+        (false, false) => return Side::Free,
     }
     if overlap.core_b.is_some_and(|core| core[at]) {
-        return Tie::B;
+        return Side::Inside;
     }
     if overlap.core_a.is_some_and(|core| core[at]) {
-        return Tie::A;
+        return Side::Outside;
     }
     let point = overlap.grid.point(at);
-    let mut found = Tie::Free;
+    let mut found = Side::Free;
     for axis in 0..D {
         for step in [-1, 1] {
             let mut beside = point;
@@ -336,8 +372,8 @@ fn tie<const D: usize>(overlap: &Overlap<'_, D>, at: usize) -> Tie {
             beside[axis] = i;
             let beside = overlap.grid.index(beside);
             match (overlap.mask_a[beside], overlap.mask_b[beside]) {
-                (true, false) => return Tie::A,
-                (false, true) => found = Tie::B,
+                (true, false) => return Side::Outside,
+                (false, true) => found = Side::Inside,
                 _ => {}
             }
         }

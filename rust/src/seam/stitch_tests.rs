@@ -85,9 +85,9 @@ proptest! {
         let cut = cut(&overlap, &Monitor::default()).unwrap();
         let allowed = |labels: &[bool]| (0..9).all(|p| match (mask_a[p], mask_b[p]) {
             (true, true) => match tie(&overlap, p) {
-                Tie::Free => true,
-                Tie::A => !labels[p],
-                Tie::B => labels[p],
+                Side::Free => true,
+                Side::Outside => !labels[p],
+                Side::Inside => labels[p],
             },
             (_, b) => labels[p] == b,
         });

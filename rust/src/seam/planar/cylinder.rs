@@ -2,9 +2,19 @@
 
 use super::dual::{Dual, Face};
 use super::search::Between;
-use super::{EAST, NEVER, NORTH, SOUTH, START, WEST, sides};
+use super::{EAST, NEVER, NORTH, SOUTH, START, WEST, eighths, sides};
 use crate::Result;
 use crate::par::Monitor;
+
+/// A shortest closed path on the dual.
+#[derive(Debug, Default)]
+pub(super) struct Cycle {
+    pub(super) value: u32,
+    /// The pairs of pixels in a row, as `row * width + column`, that it parts.
+    pub(super) crossings: Vec<u32>,
+    /// Its faces, top copies among them, and how far along it they are.
+    pub(super) trail: Vec<(u32, u32)>,
+}
 
 impl Dual {
     /// The shortest path around the cylinder.
@@ -14,7 +24,22 @@ impl Dual {
             self.faces[width + f].odd |= 1 << NORTH;
             self.faces[rows * width + f].odd |= 1 << SOUTH;
         }
-        self.cut_open(monitor)?;
+        let first: Vec<u32> = (1..=rows).map(|l| (l * width) as u32).collect();
+        let last: Vec<u32> = first.iter().map(|f| f + width as u32 - 1).collect();
+        self.lay_path(
+            &first,
+            &last,
+            |f| f % width as u32 == width as u32 - 1,
+            monitor,
+        )?;
+        self.cut_open(eighths(WEST), eighths(EAST));
+        let cycle = self.around(monitor)?;
+        Ok((cycle.value, cycle.crossings))
+    }
+
+    /// The shortest of the paths from the top copy of a face of P to that face; of value `u32::MAX` where there is none.
+    pub(super) fn around(&mut self, monitor: &Monitor) -> Result<Cycle> {
+        let (width, rows) = (self.width, self.rows);
         let top = self.faces.len() - self.path.len();
         // Distances from the bottom lead all searches to come.
         let bottom = self.path.clone();
@@ -27,12 +52,15 @@ impl Dual {
         self.cell = vec![0; rows * (width + 1)];
         let bound: Vec<u32> = self.ahead[top..].to_vec();
         let n = bound.len();
-        let mut best = (u32::MAX, Vec::new());
+        let mut best = Cycle {
+            value: u32::MAX,
+            ..Cycle::default()
+        };
         // The most promising face first, for it prunes the others; then always the middle one.
         let first = (0..n).min_by_key(|&k| bound[k]).unwrap_or(0);
         let mut ranges = vec![(0, n, first, Between::ALL)];
         while let Some((from, to, k, between)) = ranges.pop() {
-            if bound[from..to].iter().all(|&b| b >= best.0) {
+            if bound[from..to].iter().all(|&b| b >= best.value) {
                 continue;
             }
             let (start, goal) = ((top + k) as u32, self.path[k]);
@@ -50,8 +78,12 @@ impl Dual {
                 let crossings = self.crossings(goal);
                 let name = k as u32 + 1;
                 self.split(&crossings, name, between);
-                if value < best.0 {
-                    best = (value, crossings);
+                if value < best.value {
+                    best = Cycle {
+                        value,
+                        crossings,
+                        trail: self.trail(goal),
+                    };
                 }
                 left.right = name;
                 right.left = name;
@@ -63,35 +95,52 @@ impl Dual {
         Ok(best)
     }
 
-    /// Finds P and gives its faces their top copies.
-    fn cut_open(&mut self, monitor: &Monitor) -> Result<()> {
-        let width = self.width as u32;
-        let start: Vec<u32> = (1..=self.rows as u32).map(|l| l * width).collect();
-        let last = width - 1;
+    /// Finds P: the shortest path from one of some faces to one of others.
+    pub(super) fn lay_path(
+        &mut self,
+        from: &[u32],
+        to: &[u32],
+        arrived: impl Fn(u32) -> bool,
+        monitor: &Monitor,
+    ) -> Result<()> {
         self.queue.reset(self.largest, self.mean / 4);
-        self.start(&start);
-        self.search::<false>(|f| f % width == last, NEVER, Between::ALL, monitor)?;
-        let mut at = self.nearest(start.iter().map(|f| f + last));
-        let mut path = vec![at];
-        while !at.is_multiple_of(width) {
-            let step = usize::from(self.faces[at as usize].step);
-            at = self.beside(at, step ^ 2);
-            self.steps.push(step);
-            path.push(at);
+        self.start(from);
+        self.search::<false>(arrived, NEVER, Between::ALL, monitor)?;
+        let mut at = self.nearest(to.iter().copied());
+        self.path.push(at);
+        loop {
+            let step = self.faces[at as usize].step;
+            if step == START {
+                break;
+            }
+            at = self.beside(at, usize::from(step) ^ 2);
+            self.steps.push(usize::from(step));
+            self.path.push(at);
         }
-        path.reverse();
+        self.path.reverse();
         self.steps.reverse();
         self.forget();
+        Ok(())
+    }
+
+    /// Gives the faces of P their top copies. The cut goes on beyond both ends of P, in eighths of a turn clockwise from
+    /// east: from the first face back to the one border, from the last face on to the other.
+    pub(super) fn cut_open(&mut self, back: usize, on: usize) {
+        let path = std::mem::take(&mut self.path);
         self.place = vec![NEVER; self.faces.len()];
         for (k, &p) in path.iter().enumerate() {
             self.place[p as usize] = k as u32;
             // Clockwise from the way on to the way back: what lies to the right of one who walks along P.
-            let on = self.steps.get(k).copied().unwrap_or(EAST);
-            let back = k.checked_sub(1).map_or(WEST, |k| self.steps[k] ^ 2);
-            let between = (1..4)
-                .map(|turn| (on + turn) % 4)
-                .take_while(|&d| d != back);
-            self.down.push(between.fold(0, |bits, d| bits | 1 << d));
+            let on = self.steps.get(k).map_or(on, |&step| eighths(step));
+            let back = k
+                .checked_sub(1)
+                .map_or(back, |k| eighths(self.steps[k] ^ 2));
+            let between = (1..8)
+                .map(|turn| (on + turn) % 8)
+                .take_while(|&angle| angle != back)
+                .filter(|angle| angle % 2 == 0);
+            self.down
+                .push(between.fold(0, |bits, angle| bits | 1 << (angle / 2)));
         }
         for (k, &p) in path.iter().enumerate() {
             for d in (0..4).filter(|d| self.down[k] >> d & 1 == 1) {
@@ -108,7 +157,6 @@ impl Dual {
         };
         self.faces.resize(self.faces.len() + path.len(), copy);
         self.path = path;
-        Ok(())
     }
 
     /// Whether a step parts two pixels of which one at least is between two seams.

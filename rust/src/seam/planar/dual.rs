@@ -197,4 +197,17 @@ impl Dual {
             f = before;
         }
     }
+
+    /// The faces of the path to a face, and their distances.
+    pub(super) fn trail(&self, mut f: u32) -> Vec<(u32, u32)> {
+        let mut trail = Vec::new();
+        loop {
+            let Face { distance, step, .. } = self.faces[f as usize];
+            trail.push((f, distance));
+            if step == START {
+                return trail;
+            }
+            f = self.neighbour(f, usize::from(step) ^ 2).0;
+        }
+    }
 }

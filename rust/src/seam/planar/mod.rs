@@ -16,9 +16,13 @@
 //! Departures: distances from the bottom of the opened strip are computed once. They lead every search (A*) and bound the
 //! seams through each face of P from below, so that faces that cannot do better are never searched: on natural images
 //! that leaves a few searches of the hundreds.
+//!
+//! A seam around a core ([`ring`]) is the same on an annulus, with P from its rim to the core.
 
 mod cylinder;
 mod dual;
+mod innermost;
+pub mod ring;
 mod search;
 
 use crate::par::Monitor;
@@ -62,6 +66,11 @@ const NORTH: usize = 3;
 const START: u8 = 4;
 /// Faces taken between two looks at the monitor.
 const BREATH: usize = 1 << 14;
+
+/// A direction as an angle in eighths of a turn, clockwise from east.
+const fn eighths(direction: usize) -> usize {
+    2 * direction
+}
 
 /// The least seam of a strip.
 ///
