@@ -182,6 +182,7 @@ class Appearance:
         continuation: float,
         repetition: float,
         seed: int,
+        margin: int,
         guide: tuple[NDArray[int16], NDArray[int16], NDArray[uint16]] | None,
         progress: Callable[[float], object] | None,
     ) -> NDArray[int32]: ...

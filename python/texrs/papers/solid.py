@@ -377,8 +377,16 @@ class Grower:
         """Jacobians at the points of a level, of their places in the world: averages of turned frames would shrink."""
         return to_fixed(self.field, region, self.spacing(level))
 
-    def start(self, region: Region, frames: NDArray[np.int16], hold: Hold, progress: Progress | None = None) -> Places:
-        """Step 2: coherent blocks."""
+    def start(
+        self,
+        region: Region,
+        frames: NDArray[np.int16],
+        hold: Hold,
+        progress: Progress | None = None,
+        *,
+        margin: int = 0,
+    ) -> Places:
+        """Step 2: coherent blocks; a margin will be cut off."""
         s, coarsest = self.settings, self.analysis.levels[0]
         places = coarsest.blocks(
             region,
@@ -390,6 +398,7 @@ class Grower:
             continuation=s.continuation,
             repetition=s.repetition,
             seed=self.seed,
+            margin=margin,
             guide=hold.guide(coarsest, region, self.spacing(0)),
             progress=_stage(progress, "blocks"),
         )

@@ -218,6 +218,7 @@ impl Appearance {
         continuation: f64,
         repetition: f64,
         seed: u64,
+        margin: usize,
         guide: Option<GuideIn<'py>>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<PlacesOut<'py>> {
@@ -230,6 +231,7 @@ impl Appearance {
             continuation,
             repetition,
             seed,
+            margin,
         };
         let values = frames.as_slice()?;
         let places = run(py, progress, |monitor| {
