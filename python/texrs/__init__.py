@@ -9,6 +9,7 @@ from texrs import analysis, errors, fields, io, kernels, samples, volume
 from texrs._rust import VERSION as __version__
 from texrs.completion import complete
 from texrs.cyclic import tile
+from texrs.papers._solid_window import PlaneTexture, SolidTexture
 from texrs.papers.design import design
 from texrs.papers.solid import solid, synthesize
 from texrs.report import Synthesis
@@ -16,7 +17,9 @@ from texrs.source_map import Reuse, SourceMap
 from texrs.threads import threads
 
 __all__ = [
+    "PlaneTexture",
     "Reuse",
+    "SolidTexture",
     "SourceMap",
     "Synthesis",
     "__version__",

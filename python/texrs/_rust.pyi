@@ -1,18 +1,20 @@
 from collections.abc import Callable, Sequence
 from typing import Any, Final, final
 
-from numpy import bool_, float32, int16, int32, int64, uint8, uint16
+from numpy import bool_, float32, int16, int32, int64, uint8, uint16, uint32
 from numpy.typing import NDArray
 
 __all__ = [
     "VERSION",
     "Appearance",
     "PatchIndex",
+    "cohere",
     "complete",
     "decode_image",
     "encode_image",
     "exif_orientation",
     "gather",
+    "jitter",
     "mean_shift",
     "philox",
     "poisson",
@@ -21,6 +23,7 @@ __all__ = [
     "seam_labels",
     "seam_strips",
     "set_threads",
+    "similar",
     "uniform",
     "upsample",
 ]
@@ -179,6 +182,7 @@ class Appearance:
         continuation: float,
         repetition: float,
         seed: int,
+        margin: int,
         guide: tuple[NDArray[int16], NDArray[int16], NDArray[uint16]] | None,
         progress: Callable[[float], object] | None,
     ) -> NDArray[int32]: ...
@@ -206,4 +210,27 @@ def upsample(
     from_: tuple[Sequence[int], Sequence[int], Sequence[bool]],
     to: tuple[Sequence[int], Sequence[int], Sequence[bool]],
     frames: NDArray[int16],
+) -> NDArray[int32]: ...
+def similar(
+    appearance: Appearance, k: int, n: int, numbers: int, progress: Callable[[float], object] | None
+) -> NDArray[uint32]: ...
+def cohere(
+    appearance: Appearance,
+    sets: NDArray[uint32],
+    k: int,
+    places: NDArray[int32],
+    place: tuple[Sequence[int], Sequence[int], Sequence[bool]],
+    frames: NDArray[int16],
+    held: NDArray[bool_],
+    passes: int,
+    numbers: int,
+    compensated: bool,
+    progress: Callable[[float], object] | None,
+) -> NDArray[int32]: ...
+def jitter(
+    places: NDArray[int32],
+    place: tuple[Sequence[int], Sequence[int], Sequence[bool]],
+    reach: int,
+    seed: int,
+    level: int,
 ) -> NDArray[int32]: ...

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import log2
 from pathlib import Path as FilePath
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -16,9 +17,10 @@ from texrs._arrays import as_image, as_int, as_wrap, to_unit
 from texrs._typing import Array, Floats, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.kernels.appearance import Appearance
+from texrs.kernels.coherence import Similarity, similar
 from texrs.kernels.pyramid import halve
 
-__all__ = ["Analysis", "analyse", "are_labels", "colours", "repeats"]
+__all__ = ["Analysis", "analyse", "are_labels", "colours", "repeats", "similarity"]
 
 FORMAT = 1
 COARSEST = 16
@@ -26,7 +28,7 @@ COARSEST = 16
 SIMILAR = 1.25
 """An exemplar repeats along an axis if its ends differ by at most this much more than neighbours within it."""
 CACHED = 256 << 20
-"""Bytes of analyses that are kept in memory."""
+"""Bytes of analyses that are kept in memory, and of similarity sets."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -254,14 +256,67 @@ def repeats(exemplar: object, *, axes: int, levels: int = 1) -> tuple[bool, ...]
     return tuple(found)
 
 
-class _Kept:
-    """Recent analyses, the oldest dropped first."""
+def similarity(
+    analysis: Analysis,
+    level: int,
+    *,
+    k: int = 3,
+    n: int = 7,
+    numbers: int = 8,
+    progress: Callable[[float], object] | None = None,
+) -> Similarity:
+    """Give the similarity sets of a level, made when first asked for and kept in memory by the analysis' key.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        Of the exemplar.
+    level : int
+        From 0, the coarsest.
+    k, n, numbers, progress
+        As of `texrs.kernels.coherence.similar`.
+
+    Returns
+    -------
+    Similarity
+
+    Raises
+    ------
+    InvalidInput
+        A level that is not there, or no ``k`` samples so far apart.
+    Cancelled
+        The work was stopped.
+
+    Examples
+    --------
+    >>> from texrs import samples
+    >>> found = analyse(samples.load("weave").image, axes=2)
+    >>> similarity(found, 0, k=2).sets.shape == (found.levels[0].shape[0] * found.levels[0].shape[1], 2)
+    True
+
+    """
+    here = analysis.levels[as_int(level, "level", 0, len(analysis.levels) - 1)]
+    return _SIMILAR.get(
+        (analysis.key, level, k, n, numbers), lambda: similar(here, k=k, n=n, numbers=numbers, progress=progress)
+    )
+
+
+class _Sized(Protocol):
+    @property
+    def nbytes(self) -> int: ...
+
+
+_T = TypeVar("_T", bound=_Sized)
+
+
+class _Kept(Generic[_T]):
+    """What was made lately, the oldest dropped first."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._kept: OrderedDict[str, Analysis] = OrderedDict()
+        self._kept: OrderedDict[object, _T] = OrderedDict()
 
-    def get(self, key: str, make: Callable[[], Analysis]) -> Analysis:
+    def get(self, key: object, make: Callable[[], _T]) -> _T:
         with self._lock:
             if key in self._kept:
                 self._kept.move_to_end(key)
@@ -274,4 +329,5 @@ class _Kept:
         return made
 
 
-_KEPT = _Kept()
+_KEPT: _Kept[Analysis] = _Kept()
+_SIMILAR: _Kept[Similarity] = _Kept()

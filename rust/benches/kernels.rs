@@ -1,5 +1,6 @@
 //! One criterion root; a group a kernel, sizes and pools as ids.
 
+mod coherence;
 mod complete;
 mod mean_shift;
 mod patch_search;
@@ -55,6 +56,7 @@ fn bench_gather(c: &mut Criterion) {
 criterion_group!(
     benches,
     bench_gather,
+    coherence::bench,
     complete::bench,
     mean_shift::bench,
     patch_search::bench,

@@ -41,6 +41,8 @@ pub struct Options {
     pub repetition: f64,
     /// Chooses the texture.
     pub seed: u64,
+    /// Points along borders that are there only for the others to look at: no cell is chosen that these do not hang on.
+    pub margin: usize,
 }
 
 /// The cells of a region.
@@ -91,7 +93,8 @@ pub fn blocks<const D: usize>(
     for round in 1..=options.rounds {
         let even = round % 2 == 0;
         let chosen = par::map(list.len(), |c| {
-            if list[c].even != even || list[c].points.is_empty() || monitor.advance(1).is_err() {
+            let idle = list[c].even != even || list[c].points.is_empty();
+            if idle || !cells.counts(c, options, round) || monitor.advance(1).is_err() {
                 return origins[c];
             }
             let chooser = Chooser::new(appearance, &cells, &list, frames, c);
@@ -156,6 +159,28 @@ impl<const D: usize> Cells<D> {
             sides,
             centres,
         }
+    }
+
+    /// Whether anything inside the margin hangs on what a cell chooses in a round.
+    ///
+    /// A point lies within `far` of its cell's centre, as near as to that of the cell it falls into; each round after
+    /// this one looks at the shell, one point further, and at the centres of the cells that own it; and at those of
+    /// cells two steps away where what they show counts.
+    fn counts(&self, cell: usize, options: &Options, round: usize) -> bool {
+        let side = options.cell as f64;
+        let far = ((0.5 + STRAY) * side).ceil() as usize;
+        let steps = if options.repetition > 0.0 {
+            (2.0 * (1.0 + STRAY) * side).ceil() as usize
+        } else {
+            0
+        };
+        let sight = far + (options.rounds - round) * steps.max(2 * far + 1);
+        let beyond = options.margin as i64 - sight as i64;
+        let (shape, wrap) = (self.region.grid.shape(), self.region.grid.wrap());
+        (0..D).all(|axis| {
+            let at = i64::from(self.centres[cell][axis]) - i64::from(self.region.origin[axis]);
+            wrap[axis] || (beyond..shape[axis] as i64 - beyond).contains(&at)
+        })
     }
 
     /// The step from a cell's centre to a point of the world: the short way around where the output repeats.
@@ -507,6 +532,7 @@ mod tests {
         continuation: 0.15,
         repetition: 0.3,
         seed: 3,
+        margin: 0,
     };
 
     fn run(
@@ -562,6 +588,22 @@ mod tests {
                 .collect::<Vec<_>>()
         });
         assert_eq!(a, b);
+    }
+
+    #[test]
+    fn cells_that_do_not_count_are_not_missed() {
+        let exemplar = exemplar(false);
+        let pad = 2 * 4 + OPTIONS.rounds * (2 * 4 + 1);
+        let side = 20 + 2 * pad;
+        let margin = Options {
+            margin: pad,
+            ..OPTIONS
+        };
+        let [all, needed] =
+            [OPTIONS, margin].map(|options| run(&exemplar, [-7; 2], side, &options));
+        let same = |y: usize, x: usize| all[y * side + x] == needed[y * side + x];
+        assert!((pad..pad + 20).all(|y| (pad..pad + 20).all(|x| same(y, x))));
+        assert!(!(0..side).all(|x| same(0, x)));
     }
 
     #[test]

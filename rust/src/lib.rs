@@ -15,6 +15,7 @@
 //! | [`blocks`] | a coherent start: cells filled by pieces that fit |
 //! | [`pyramid`] | from one resolution to the next |
 //! | [`optimize`] | coordinates corrected until every window is like one of the exemplar |
+//! | [`coherence`] | samples that look alike, and points that choose among those their neighbours know |
 //! | [`gather`] | an exemplar of any type looked up through coordinates |
 //! | [`seam`] | minimum cuts on grids: max-flow, planar strips, binary labels |
 //! | [`mean_shift`] | joint spatial and range filtering |
@@ -37,6 +38,7 @@ pub mod pca;
 
 pub mod appearance;
 pub mod blocks;
+pub mod coherence;
 pub mod complete;
 pub mod gather;
 pub mod guide;

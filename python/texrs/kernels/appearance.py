@@ -182,6 +182,7 @@ class Appearance:
         continuation: float = 0.15,
         repetition: float = 0.3,
         seed: int = 0,
+        margin: int = 0,
         guide: Guide | None = None,
         progress: Report | None = None,
     ) -> NDArray[np.int32]:
@@ -209,6 +210,8 @@ class Appearance:
             Cost of showing what one of the cells around shows, in the same units, 0 to 4.
         seed : int
             Chooses the texture. What is drawn belongs to the place in the world, not to the region.
+        margin : int
+            Points along the borders, up to 2^20, that will be cut off: cells that nothing else hangs on are not chosen.
         guide : Guide, optional
             What else is asked.
         progress : callable, optional
@@ -238,6 +241,7 @@ class Appearance:
             as_float(continuation, "continuation", 0, 4),
             as_float(repetition, "repetition", 0, 4),
             as_seed(seed),
+            as_int(margin, "margin", 0, 1 << 20),
             guide,
             progress,
         )

@@ -54,6 +54,9 @@ PRESERVE = Settings()
 FAST = replace(PRESERVE, iterations=(6, 3, 1), sweeps=(2, 2, 1), rounds=4, candidates=256, settled=0.0, stitch=False)
 """Fixed counts: what a point becomes hangs on what is near it alone."""
 
+ON_DEMAND = replace(FAST, iterations=(3, 1, 1), sweeps=(1, 1, 1), rounds=2, candidates=192, repetition=0.0)
+"""What a point can see of its surroundings is paid for at the border of every window: it sees little."""
+
 OPTIMISE = replace(
     PRESERVE,
     iterations=(20, 8, 3),

@@ -48,6 +48,7 @@ from texrs.kernels.pyramid import ONE, Region, to_fixed, upsample
 from texrs.papers._solid_gate import Trial, trial_region
 from texrs.papers._solid_hold import Hold
 from texrs.papers._solid_limits import check_memory
+from texrs.papers._solid_literal import grow as grow_literally
 from texrs.papers._solid_patches import stitch
 from texrs.papers._solid_settings import Quality, Settings, settings_of
 from texrs.report import Synthesis
@@ -96,7 +97,8 @@ def solid(
         "preserve" keeps what is rare. "fast" does a third of the work. "optimise" straightens lattices and walls; it is
         checked on a trial, and "preserve" is done instead, and reported, where it would lose anything.
     method : {None, "paper"}
-        "paper": the literal algorithm.
+        "paper": the literal algorithm, kept for comparison. It has no ``quality`` and holds no points; it looks the exemplar
+        up at the nearest sample unless ``interpolation`` says otherwise.
     labels : bool, optional
         Whether values are classes without an order, looked up without interpolation; None asks the exemplar.
     repeat : bool, or one an axis, optional
@@ -151,7 +153,7 @@ def solid(
     ((40, 40, 40, 3), dtype('uint8'))
 
     """
-    options = locals() | {"axes": 3, "interpolation": interpolation or "linear"}
+    options = locals() | {"axes": 3, "interpolation": interpolation or ("nearest" if method == "paper" else "linear")}
     return _verb(**options)
 
 
@@ -206,7 +208,7 @@ def synthesize(
     (96, 128, 3)
 
     """
-    options = locals() | {"axes": 2, "interpolation": interpolation or "cubic"}
+    options = locals() | {"axes": 2, "interpolation": interpolation or ("nearest" if method == "paper" else "cubic")}
     return _verb(**options)
 
 
@@ -236,7 +238,11 @@ def _verb(
         raise InvalidInput(f"method: None or 'paper' is allowed, got {method!r}")
     if quality == "optimise" and min(region.shape) < COARSEST:
         quality = "preserve"  # What is so thin cannot be judged by a trial.
+    if method == "paper" and held is not None:
+        raise InvalidInput("held: the paper's method holds no points; leave out held, or method='paper'")
     settings, seed = settings_of(quality), as_seed(seed)
+    if method == "paper":
+        settings = settings_of("preserve")  # Windows of 5^D.
     checked = as_field(field, axes)
     if checked is not None:
         checked = checked.over(region.shape)
@@ -250,9 +256,12 @@ def _verb(
         raise InvalidInput(f"analysis: is of an exemplar of {analysis.shape}, not {image.shape[:axes]}")
     grower = Grower(image, analysis, checked, settings, seed)
     trial = None
-    if quality == "optimise":
-        grower, trial = gated(grower, region, labels, repeat, progress)
-    grown = grower.grow(region, hold, progress)
+    if method == "paper":
+        grown = Grown(*grow_literally(analysis, checked, seed, region, grower.picture, progress))
+    else:
+        if quality == "optimise":
+            grower, trial = gated(grower, region, labels, repeat, progress)
+        grown = grower.grow(region, hold, progress)
     source = SourceMap(
         (grown.places.reshape(*region.shape, axes) / np.float32(ONE)).astype(np.float32, copy=False),
         np.zeros(region.shape, np.uint16),
@@ -264,7 +273,7 @@ def _verb(
     composite = source.render(exemplar, interpolation=how)
     report = {
         "method": method or "default",
-        "quality": quality if trial is None or trial.accepted else "preserve",
+        "quality": None if method else quality if trial is None or trial.accepted else "preserve",
         "trial": None if trial is None else trial.report(),
         "seed": seed,
         "field": None if checked is None else checked.describe(),
@@ -376,8 +385,16 @@ class Grower:
         """Jacobians at the points of a level, of their places in the world: averages of turned frames would shrink."""
         return to_fixed(self.field, region, self.spacing(level))
 
-    def start(self, region: Region, frames: NDArray[np.int16], hold: Hold, progress: Progress | None = None) -> Places:
-        """Step 2: coherent blocks."""
+    def start(
+        self,
+        region: Region,
+        frames: NDArray[np.int16],
+        hold: Hold,
+        progress: Progress | None = None,
+        *,
+        margin: int = 0,
+    ) -> Places:
+        """Step 2: coherent blocks; a margin will be cut off."""
         s, coarsest = self.settings, self.analysis.levels[0]
         places = coarsest.blocks(
             region,
@@ -389,6 +406,7 @@ class Grower:
             continuation=s.continuation,
             repetition=s.repetition,
             seed=self.seed,
+            margin=margin,
             guide=hold.guide(coarsest, region, self.spacing(0)),
             progress=_stage(progress, "blocks"),
         )

@@ -1,6 +1,7 @@
 //! The door: the only place that names pyo3 and numpy. A function here checks nothing but types, lets go of the
 //! interpreter, and calls a kernel.
 
+mod coherence;
 mod complete;
 mod gather;
 mod hash;
@@ -78,6 +79,8 @@ fn set_threads(threads: usize) -> usize {
 /// Kernels of texrs. Private: use `texrs.kernels`.
 #[pymodule(gil_used = false)]
 mod _rust {
+    #[pymodule_export]
+    use super::coherence::{cohere, jitter, similar};
     #[pymodule_export]
     use super::complete::complete;
     #[pymodule_export]

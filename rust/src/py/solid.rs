@@ -10,9 +10,9 @@ use crate::{Error, Result, appearance, blocks, optimize, pyramid};
 
 /// An exemplar at one resolution, analysed.
 #[pyclass(frozen)]
-pub(super) struct Appearance(Analysis);
+pub(super) struct Appearance(pub(super) Analysis);
 
-enum Analysis {
+pub(super) enum Analysis {
     Two(appearance::Appearance<2>),
     Three(appearance::Appearance<3>),
 }
@@ -34,10 +34,11 @@ macro_rules! either {
         }
     };
 }
+pub(super) use either;
 
 /// Shape, origin and cyclic axes of a region.
-type Where = (Vec<usize>, Vec<i32>, Vec<bool>);
-type PlacesOut<'py> = Bound<'py, PyArray1<i32>>;
+pub(super) type Where = (Vec<usize>, Vec<i32>, Vec<bool>);
+pub(super) type PlacesOut<'py> = Bound<'py, PyArray1<i32>>;
 /// Colours, vectors, basis, bias, gain and spacing.
 type PartsOut<'py> = (
     Bound<'py, PyArray1<i16>>,
@@ -56,7 +57,7 @@ fn fixed<T: Copy, const D: usize>(argument: &'static str, values: &[T]) -> Resul
     })
 }
 
-fn region<const D: usize>((shape, origin, wrap): &Where) -> Result<Region<D>> {
+pub(super) fn region<const D: usize>((shape, origin, wrap): &Where) -> Result<Region<D>> {
     Ok(Region {
         grid: Grid::new(fixed("shape", shape)?, fixed("wrap", wrap)?)?,
         origin: fixed("origin", origin)?,
@@ -64,7 +65,7 @@ fn region<const D: usize>((shape, origin, wrap): &Where) -> Result<Region<D>> {
 }
 
 /// One frame, or one a point.
-fn frames<const D: usize>(values: &[i16], points: usize) -> Result<Frames<'_, D>> {
+pub(super) fn frames<const D: usize>(values: &[i16], points: usize) -> Result<Frames<'_, D>> {
     let frames: &[Frame<D>] = values.as_chunks().0.as_chunks().0;
     match frames {
         [one] => Ok(Frames::Constant(*one)),
@@ -217,6 +218,7 @@ impl Appearance {
         continuation: f64,
         repetition: f64,
         seed: u64,
+        margin: usize,
         guide: Option<GuideIn<'py>>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<PlacesOut<'py>> {
@@ -229,6 +231,7 @@ impl Appearance {
             continuation,
             repetition,
             seed,
+            margin,
         };
         let values = frames.as_slice()?;
         let places = run(py, progress, |monitor| {

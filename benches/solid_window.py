@@ -1,0 +1,66 @@
+"""Windows of unbounded textures: time and memory.
+
+Run ``python benches/solid_window.py [--volume N]``. Processor seconds are those of all threads together; a machine that does
+nothing else needs them divided by its cores. ``--volume`` also writes a volume of N voxels a side to disk, slab by slab.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import texrs
+from texrs import fields, io, samples
+from texrs.analysis import analyse
+
+
+def measured(name: str, work: Callable[[], object]) -> None:
+    """Print how long something takes."""
+    began, processor = time.perf_counter(), time.process_time()
+    work()
+    print(
+        f"{name:44s} {time.perf_counter() - began:7.2f} s  {time.process_time() - processor:7.2f} processor s",
+        flush=True,
+    )
+
+
+def peak() -> str:
+    """Give the most memory that was held so far."""
+    return f"{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB at most"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--volume", type=int, default=0)
+    asked = parser.parse_args()
+    exemplar, picture = samples.particles().image, samples.load("weave").image
+    analyse(exemplar, axes=3)
+    analyse(picture, axes=2)
+    for field in (None, fields.circular(), fields.zigzag()):
+        texture = texrs.SolidTexture(exemplar, field=field, seed=1)
+        name = "none" if field is None else field.describe().split(",")[0].split(" of")[0]
+        measured(f"64^3, field {name}, cold", lambda t=texture: t[0:64, 0:64, 0:64])
+        measured(f"64^3, field {name}, its neighbour", lambda t=texture: t[0:64, 0:64, 64:128])
+        measured(f"64^3, field {name}, again", lambda t=texture: t[0:64, 0:64, 32:96])
+    texture = texrs.SolidTexture(exemplar, seed=1)
+    measured("slice of 256^2 across (1, 1, 1), cold", lambda: texture.slice((0, 0, 0), (1, 1, 1), size=256))
+    plane = texrs.PlaneTexture(picture, seed=1)
+    measured("256^2, cold", lambda: plane[0:256, 0:256])
+    measured("256^2, its neighbour", lambda: plane[0:256, 256:512])
+    measured("2048^2, cold", lambda: plane[5000:7048, 0:2048])
+    print(peak())
+    if side := asked.volume:
+        texture = texrs.SolidTexture(exemplar, seed=1)
+        slabs = (texture[z : min(z + 32, side), 0:side, 0:side] for z in range(0, side, 32))
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder, "large.npy")
+            measured(f"{side}^3 to disk", lambda: io.write_slabs(path, slabs, (side, side, side, 3)))
+        print(peak())
+
+
+if __name__ == "__main__":
+    main()

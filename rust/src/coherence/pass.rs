@@ -1,0 +1,292 @@
+//! One point chooses among what its diagonal neighbours' samples are like.
+
+use super::{CHUNK, FEW, LARGEST, Similarity, Table, apart};
+use crate::appearance::{Appearance, KEEP};
+use crate::fixed::{Frame, Frames, ONE, Place, add, apply, inverse, nearest, sub};
+use crate::grid::Region;
+use crate::par::{self, Monitor};
+use crate::{Error, Result};
+
+/// Diagonal neighbours, at most.
+const CORNERS: usize = 8;
+
+/// What [`correct`] is asked for.
+#[derive(Debug, Clone, Copy)]
+pub struct Options {
+    /// Passes over the region.
+    pub passes: usize,
+    /// Numbers of the appearance vectors that are compared: [`FEW`] or all.
+    pub numbers: usize,
+    /// Read neighbours where the diagonal itself leads, not only where the lattice makes it end: x(q) + D - J q.
+    pub compensated: bool,
+}
+
+/// Corrects `places`, one a point of `region`; points that are `held` keep theirs.
+///
+/// A pass goes over 2^D classes of points, those of the same parity along each axis, in fixed order. Points of a class
+/// are corrected all at once, from the places as the class found them.
+#[allow(clippy::too_many_arguments)] // the exemplar, the region, and what is known of both
+pub fn correct<const D: usize>(
+    appearance: &Appearance<D>,
+    similarity: &Similarity,
+    region: &Region<D>,
+    frames: Frames<'_, D>,
+    held: &[bool],
+    places: &mut Vec<Place<D>>,
+    options: &Options,
+    monitor: &Monitor,
+) -> Result<()> {
+    let points = region.grid.len();
+    let samples = appearance.grid().len();
+    for (argument, length, wanted) in [
+        ("places", places.len(), points),
+        ("held", held.len(), if held.is_empty() { 0 } else { points }),
+        ("similarity", similarity.sets.len(), samples * similarity.k),
+    ] {
+        if length != wanted {
+            return Err(Error::Shape {
+                argument,
+                expected: vec![wanted],
+                got: vec![length],
+            });
+        }
+    }
+    let inside = |&s: &u32| {
+        (s as usize) < samples && {
+            let sample = appearance.grid().point(s as usize).map(|x| x as i32);
+            appearance.inside(sample).is_some()
+        }
+    };
+    let own = |(i, s): (usize, &u32)| inside(s) || *s as usize == i / similarity.k;
+    if !(1..=LARGEST).contains(&similarity.k) || !similarity.sets.iter().enumerate().all(own) {
+        return Err(Error::value(
+            "similarity",
+            format!(
+                "needs sets of 1 to {LARGEST} of the exemplar's {samples} samples whose windows lie inside"
+            ),
+        ));
+    }
+    par::chunks_mut(places, CHUNK, |_, places| {
+        for place in places {
+            *place = appearance.bring_inside(*place);
+        }
+    });
+    match options.numbers {
+        FEW => Level::<D, FEW>::new(appearance, similarity, region, frames, held, options)
+            .run(places, monitor),
+        KEEP => Level::<D, KEEP>::new(appearance, similarity, region, frames, held, options)
+            .run(places, monitor),
+        other => Err(Error::value(
+            "numbers",
+            format!("{FEW} or {KEEP} are allowed, got {other}"),
+        )),
+    }
+}
+
+/// A diagonal neighbour, warped: where it lies on the output's lattice, what that is in the exemplar, and what a place
+/// there lacks of the diagonal.
+#[derive(Clone, Copy)]
+struct Corner<const D: usize> {
+    step: [i32; D],
+    moved: Place<D>,
+    lacking: Place<D>,
+}
+
+struct Level<'a, const D: usize, const N: usize> {
+    appearance: &'a Appearance<D>,
+    similarity: &'a Similarity,
+    region: &'a Region<D>,
+    frames: Frames<'a, D>,
+    held: &'a [bool],
+    options: &'a Options,
+    table: Table<D, N>,
+    /// The diagonals, and how far they lead in the table.
+    diagonals: Vec<[i32; D]>,
+    beside: Vec<i32>,
+}
+
+impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
+    fn new(
+        appearance: &'a Appearance<D>,
+        similarity: &'a Similarity,
+        region: &'a Region<D>,
+        frames: Frames<'a, D>,
+        held: &'a [bool],
+        options: &'a Options,
+    ) -> Self {
+        let table = Table::new(appearance);
+        let diagonals: Vec<[i32; D]> = (0..1 << D)
+            .map(|corner| std::array::from_fn(|axis| 2 * bit::<D>(corner, axis) - 1))
+            .collect();
+        let beside = diagonals.iter().map(|&d| table.step(d)).collect();
+        Self {
+            appearance,
+            similarity,
+            region,
+            frames,
+            held,
+            options,
+            table,
+            diagonals,
+            beside,
+        }
+    }
+
+    fn run(&self, places: &mut Vec<Place<D>>, monitor: &Monitor) -> Result<()> {
+        let constant = match self.frames {
+            Frames::Constant(frame) => Some(self.corners(&frame)),
+            Frames::Dense(_) => None,
+        };
+        let mut scratch = places.clone();
+        monitor.expect((self.options.passes << D) as u64);
+        for turn in 0..self.options.passes << D {
+            let class = turn % (1 << D);
+            par::chunks_mut(&mut scratch, CHUNK, |chunk, scratch| {
+                for (i, place) in scratch.iter_mut().enumerate() {
+                    let p = chunk * CHUNK + i;
+                    let point = self.region.grid.point(p);
+                    let world = self.region.world(point);
+                    let mine = (0..D).all(|axis| world[axis] & 1 == bit::<D>(class, axis));
+                    *place = if mine && !self.held.get(p).is_some_and(|&h| h) {
+                        let corners = constant.unwrap_or_else(|| self.corners(&self.frames.at(p)));
+                        self.choose(places, p, point, &corners)
+                    } else {
+                        places[p]
+                    };
+                }
+            });
+            std::mem::swap(places, &mut scratch);
+            monitor.advance(1)?;
+        }
+        Ok(())
+    }
+
+    /// The neighbours phi / |phi|, phi = F d, on the lattice, for a frame J = F^-1.
+    fn corners(&self, frame: &Frame<D>) -> [Corner<D>; CORNERS] {
+        let turned = inverse(frame);
+        let mut corners = [Corner {
+            step: [0; D],
+            moved: [0; D],
+            lacking: [0; D],
+        }; CORNERS];
+        for (corner, &diagonal) in corners.iter_mut().zip(&self.diagonals) {
+            let phi: [i64; D] = std::array::from_fn(|i| {
+                (0..D)
+                    .map(|j| i64::from(turned[i][j]) * i64::from(diagonal[j]))
+                    .sum()
+            });
+            let square: i64 = phi.iter().map(|x| x * x).sum();
+            // The nearest whole number of x / |phi|, at most 1: 1 from a half on.
+            corner.step = phi.map(|x| {
+                if 4 * x * x >= square {
+                    x.signum() as i32
+                } else {
+                    0
+                }
+            });
+            corner.moved = apply(frame, corner.step);
+            if self.options.compensated {
+                corner.lacking = sub(diagonal.map(|x| x * ONE), corner.moved);
+            }
+        }
+        corners
+    }
+
+    #[inline(always)]
+    fn choose(
+        &self,
+        places: &[Place<D>],
+        p: usize,
+        point: [usize; D],
+        corners: &[Corner<D>; CORNERS],
+    ) -> Place<D> {
+        // Eq. 3: what is seen around the point, by its diagonal neighbours that the region has.
+        let mut seen = [([0i16; N], 0i32); CORNERS];
+        let mut from = [([0; D], [0; D]); CORNERS];
+        let mut count = 0;
+        for (k, corner) in corners[..1 << D].iter().enumerate() {
+            let Some(q) = self.region.step(point, corner.step) else {
+                continue;
+            };
+            let place = self.appearance.bring_inside(add(places[q], corner.lacking));
+            let at = self.table.at(self.settle(nearest(place)));
+            seen[count] = (self.table.vectors[at as usize], self.beside[k]);
+            from[count] = (places[q], corner.moved);
+            count += 1;
+        }
+        let seen = &seen[..count];
+        let mut tried = [i32::MIN; CORNERS * LARGEST];
+        let mut attempts = 0;
+        let (mut best, mut least) = (places[p], i64::MAX);
+        for &(place, moved) in &from[..count] {
+            let sample = nearest(place);
+            let at = self.appearance.clamped(sample);
+            let fraction = sub(place, sample.map(|x| x * ONE));
+            let rest = sub(fraction, moved);
+            for &similar in &self.similarity.sets[at * self.similarity.k..][..self.similarity.k] {
+                let candidate = add(self.sample(similar).map(|x| x * ONE), rest);
+                let there = nearest(candidate);
+                if self.appearance.inside(there).is_none() {
+                    continue;
+                }
+                let centre = self.table.at(self.settle(there));
+                // What looks at the same sample costs the same, and the first one wins.
+                if tried[..attempts].contains(&centre) {
+                    continue;
+                }
+                tried[attempts] = centre;
+                attempts += 1;
+                let mut cost = 0;
+                for (vector, beside) in seen {
+                    cost += i64::from(apart(
+                        vector,
+                        &self.table.vectors[(centre + beside) as usize],
+                    ));
+                    if cost >= least {
+                        break;
+                    }
+                }
+                if cost < least {
+                    (best, least) = (candidate, cost);
+                }
+            }
+        }
+        self.appearance.bring_inside(best)
+    }
+
+    /// A sample that `inside` allows, brought around cyclic axes.
+    #[inline(always)]
+    fn settle(&self, mut sample: [i32; D]) -> [i32; D] {
+        let (shape, wrap) = (
+            self.appearance.grid().shape(),
+            self.appearance.grid().wrap(),
+        );
+        for axis in 0..D {
+            let n = shape[axis] as i32;
+            if wrap[axis] && !(0..n).contains(&sample[axis]) {
+                sample[axis] = sample[axis].rem_euclid(n);
+            }
+        }
+        sample
+    }
+
+    /// The sample at a row-major position.
+    #[inline(always)]
+    fn sample(&self, mut at: u32) -> [i32; D] {
+        let shape = self.appearance.grid().shape();
+        let mut sample = [0; D];
+        for axis in (1..D).rev() {
+            let n = shape[axis] as u32;
+            sample[axis] = (at % n) as i32;
+            at /= n;
+        }
+        sample[0] = at as i32;
+        sample
+    }
+}
+
+/// Which side of an axis the `corner`-th of 2^D corners lies on: the last axis alternates fastest.
+#[inline(always)]
+fn bit<const D: usize>(corner: usize, axis: usize) -> i32 {
+    (corner >> (D - 1 - axis) & 1) as i32
+}

@@ -1,0 +1,115 @@
+"""k-coherence against its slow twin, exactly; bad arguments; the cache of similarity sets."""
+
+import numpy as np
+import pytest
+
+from reference import coherence as twin
+from texrs import analysis, fields, samples, threads
+from texrs.errors import InvalidInput
+from texrs.kernels.appearance import Appearance
+from texrs.kernels.coherence import correct, jitter, similar
+from texrs.kernels.pyramid import ONE, Region, to_fixed
+
+
+def exemplar(axes, wrap=False):
+    image = samples.pebbles((64, 64)).image[:26, :24] if axes == 2 else samples.stripes().image[:13, :12, 20:33]
+    return Appearance(image / np.float32(255), axes=axes, wrap=wrap)
+
+
+def start(appearance, region, seed=1):
+    axes = len(appearance.shape)
+    return jitter(np.full(region.points * axes, 10 * ONE, np.int32), region, 12, seed=seed)
+
+
+@pytest.mark.parametrize("numbers", [8, 24])
+@pytest.mark.parametrize("wrap", [False, True])
+@pytest.mark.parametrize(("axes", "n"), [(2, 7), (3, 5)])
+def test_similarity_sets(axes, n, wrap, numbers):
+    appearance = exemplar(axes, wrap)
+    found = similar(appearance, k=3, n=n, numbers=numbers).sets
+    np.testing.assert_array_equal(found, twin.similar(appearance, 3, n, numbers))
+
+
+@pytest.mark.parametrize("level", [0, 5])
+def test_jitter(level):
+    for region in (Region((9, 8), (-4, 1 << 20), (False, False)), Region.whole((5, 4, 3), True)):
+        zero = np.zeros(region.points * len(region.shape), np.int32)
+        found = jitter(zero, region, 0.7, seed=(1 << 40) + 3, level=level)
+        np.testing.assert_array_equal(found, twin.jitter(zero, region, 0.7, (1 << 40) + 3, level))
+
+
+@pytest.mark.parametrize("compensated", [False, True])
+@pytest.mark.parametrize("wrap", [False, True])
+@pytest.mark.parametrize(("axes", "shape"), [(2, (17, 14)), (3, (7, 6, 5))])
+def test_correction(axes, shape, wrap, compensated):
+    appearance = exemplar(axes, wrap)
+    found = similar(appearance, k=3, n=5)
+    region = Region(shape, (-3,) * axes, (wrap,) * axes)
+    for field in (None, fields.circular(axes=axes, **({} if axes == 2 else {"axis": "z"})).over(shape)):
+        frames = to_fixed(field, region)
+        places = start(appearance, region)
+        options = {"passes": 2, "compensated": compensated}
+        mine = correct(appearance, found, places, region, frames, **options)
+        np.testing.assert_array_equal(
+            mine, twin.correct(appearance, found.sets, places, region, frames, **options), err_msg=str(field)
+        )
+
+
+def test_threads_and_held_points():
+    appearance = exemplar(2)
+    region = Region.whole((70, 90))
+    places, found, frames = start(appearance, region), similar(appearance), to_fixed(None, region)
+    results = []
+    for count in (1, 2, 7):
+        with threads(count):
+            results.append(correct(appearance, found, places, region, frames))
+    assert all((r == results[0]).all() for r in results)
+    held = np.zeros(region.points, bool)
+    held[::3] = True
+    kept = correct(appearance, found, results[0], region, frames, held=held, passes=1)
+    assert (kept.reshape(-1, 2)[held] == results[0].reshape(-1, 2)[held]).all()
+
+
+def test_flat_exemplars_take_no_time():
+    flat = Appearance(np.zeros((40, 40, 40), np.float32), axes=3)
+    assert similar(flat).sets[40 * 40 * 20 + 40 * 20 + 20].tolist() == [32820, 3282, 3286]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"k": 0}, "k: needs an integer from 1 to 16"),
+        ({"k": 17}, "k: needs an integer from 1 to 16"),
+        ({"n": 6}, "n: needs an odd number"),
+        ({"n": 51}, "n: an exemplar of .* has no 3 samples 51 apart"),
+        ({"k": 16, "n": 11}, "n: an exemplar of .* has no 16 samples 11 apart"),
+        ({"numbers": 9}, "numbers: 8 or 24"),
+    ],
+)
+def test_what_leaves_no_candidates(options, words):
+    with pytest.raises(InvalidInput, match=words):
+        similar(exemplar(2), **options)
+
+
+def test_arrays_that_do_not_belong_together():
+    appearance, region = exemplar(2), Region.whole((9, 9))
+    frames, places = to_fixed(None, region), np.zeros(162, np.int32)
+    other = similar(exemplar(2, True))
+    with pytest.raises(InvalidInput, match="similarity"):
+        correct(appearance, other, places, region, frames)
+    with pytest.raises(InvalidInput, match="places"):
+        correct(appearance, similar(appearance), places[:-1], region, frames)
+    with pytest.raises(InvalidInput, match="region"):
+        correct(appearance, similar(appearance), np.zeros(24, np.int32), Region.whole((2, 2, 2)), frames)
+    with pytest.raises(InvalidInput, match="held"):
+        correct(appearance, similar(appearance), places, region, frames, held=np.zeros(80, bool))
+    with pytest.raises(InvalidInput, match="reach"):
+        jitter(places, region, -1)
+
+
+def test_sets_are_kept_with_the_analysis():
+    found = analysis.analyse(samples.weave((64, 64)).image, axes=2)
+    assert analysis.similarity(found, 0) is analysis.similarity(found, 0)
+    assert analysis.similarity(found, 0) is not analysis.similarity(found, 0, n=5)
+    with pytest.raises(InvalidInput, match="level"):
+        analysis.similarity(found, 9)

@@ -1,0 +1,263 @@
+"""Unbounded textures: every part the same however it is asked for."""
+
+import threading
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import texrs
+from texrs import fields, samples, volume
+from texrs._typing import Array
+from texrs.analysis import analyse
+from texrs.errors import InvalidInput, LimitExceeded
+from texrs.kernels.pyramid import Region, to_fixed
+from texrs.papers import _solid_world as world
+from texrs.papers._solid_settings import ON_DEMAND
+
+SOLID = samples.particles((32, 32, 32)).image
+PLANE = samples.weave((64, 64)).image
+FIELDS: dict[str, Callable[[int], fields.Field | None]] = {
+    "none": lambda axes: None,
+    "circular": lambda axes: fields.circular(centre=(4,) * axes, axes=axes),
+    "zigzag": lambda axes: fields.zigzag(24, 35, axes=axes),
+    "ramp": lambda axes: fields.scale_ramp(0.6, 1.8, length=60, axes=axes),
+}
+
+
+def texture(axes: int = 3, field: str = "none", **options: object) -> texrs.SolidTexture | texrs.PlaneTexture:
+    kind, exemplar = (texrs.SolidTexture, SOLID) if axes == 3 else (texrs.PlaneTexture, PLANE)
+    return kind(exemplar, field=FIELDS[field](axes), **({"seed": 5} | options))  # type: ignore[arg-type]
+
+
+def box(axes: int, start: int, stop: int) -> tuple[slice, ...]:
+    return (slice(start, stop),) * axes
+
+
+@pytest.mark.parametrize(
+    ("axes", "field"), [(2, "none"), (2, "circular"), (2, "zigzag"), (2, "ramp"), (3, "circular"), (3, "zigzag")]
+)
+def test_a_window_is_the_same_wherever_it_is_seen_from(axes: int, field: str) -> None:
+    side = 24 if axes == 2 else 16
+    wanted = texture(axes, field)[box(axes, 0, side)]
+    other = texture(axes, field)
+    larger = other[box(axes, -9, side + 5)]
+    assert np.array_equal(larger[box(axes, 9, 9 + side)], wanted)
+    assert np.array_equal(other[box(axes, 0, side)], wanted)  # out of what is kept
+    with texrs.threads(7):
+        forgetful = texture(axes, field, cache_bytes=0)
+        assert np.array_equal(forgetful[box(axes, 0, side)], wanted)
+        assert forgetful.cached == 0
+    chunks = texture(axes, field, cache_bytes=1_000_000)
+    with texrs.threads(1):
+        for start in (8, 0, 4):
+            part = (slice(start, start + 4), *box(axes - 1, 0, side))
+            assert np.array_equal(chunks[part], wanted[start : start + 4])
+
+
+def test_the_same_without_a_field() -> None:
+    wanted = texture()[box(3, 0, 24)]
+    other = texture(cache_bytes=400_000)
+    with texrs.threads(2):
+        assert np.array_equal(other[13:24, 5:40, -3:24][:, :19, 3:], wanted[13:24, 5:24, 0:24])
+        assert np.array_equal(other[box(3, 0, 24)], wanted)
+
+
+@pytest.mark.parametrize("field", ["none", "circular"])
+@pytest.mark.parametrize("stage", range(5))
+def test_a_stage_sees_as_far_as_it_says(stage: int, field: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A region that is larger changes nothing, and one that is too small does: the other tests can fail."""
+    here = Region((16, 16), (-8, 4), (False, False))
+    plane = texrs.PlaneTexture(samples.load("pebbles").image[:64, :64], field=FIELDS[field](2), seed=3)
+    assert len(plane._world.stages) > stage
+    found = []
+    honest = world.World.reach
+    for more in (0, 7, -100):
+
+        def reach(self: world.World, at: int, window: int, more: int = more) -> int:
+            return max(0, honest(self, at, window) + (more if at == stage else 0))
+
+        monkeypatch.setattr(world.World, "reach", reach)
+        plane.clear()
+        found.append(plane._world.make(here, stage))
+    assert np.array_equal(found[0], found[1])
+    assert not np.array_equal(found[0], found[2])
+
+
+@settings(max_examples=5, deadline=None)
+@given(
+    st.tuples(*[st.integers(-12, 8)] * 3),
+    st.tuples(*[st.integers(1, 8)] * 3),
+    st.sampled_from(["none", "circular"]),
+    st.sampled_from([0, 1 << 20, 1 << 24]),
+)
+def test_random_windows(origin: tuple[int, ...], size: tuple[int, ...], field: str, cache: int) -> None:
+    whole = _whole(field)
+    found = texture(3, field, cache_bytes=cache).window(origin, size)
+    inside = tuple(slice(o + 12, o + 12 + n) for o, n in zip(origin, size, strict=True))
+    assert np.array_equal(found.image, whole[inside])
+    assert np.array_equal(found.source.render(SOLID, interpolation="linear"), found.image)
+
+
+_KNOWN: dict[str, Array] = {}
+
+
+def _whole(field: str) -> Array:
+    if field not in _KNOWN:
+        _KNOWN[field] = texture(3, field)[box(3, -12, 16)]
+    return _KNOWN[field]
+
+
+@pytest.mark.parametrize("axes", [2, 3])
+def test_far_from_the_origin_and_across_it(axes: int) -> None:
+    for start in (-(10**9), 10**9 - 20):
+        a = texture(axes)[box(axes, start, start + 20)]
+        b = texture(axes)[box(axes, start + 5, start + 15)]
+        assert np.array_equal(a[box(axes, 5, 15)], b)
+
+
+def test_another_seed_is_another_texture() -> None:
+    a, b = (texture(seed=seed).window(0, 32).source.coordinates for seed in (1, 2))
+    assert (a != b).any(axis=-1).mean() > 0.9
+
+
+def test_what_is_kept_is_bounded_and_forgotten() -> None:
+    small = texture(cache_bytes=200_000)
+    for start in range(0, 36, 12):
+        small[0:12, 0:12, start : start + 12]
+        assert 0 < small.cached <= 200_000
+    small.clear()
+    assert small.cached == 0
+
+
+def test_many_threads_share_a_texture() -> None:
+    shared, found = texture(), {}
+
+    def work(start: int) -> None:
+        found[start] = shared[0:12, 0:12, start : start + 12]
+
+    workers = [threading.Thread(target=work, args=(12 * i,)) for i in range(4)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    assert np.array_equal(np.concatenate([found[12 * i] for i in range(4)], axis=2), texture()[0:12, 0:12, 0:48])
+
+
+def test_a_single_index_selects_a_plane() -> None:
+    t = texture()
+    assert np.array_equal(t[3, -4:8, 0:9], t[3:4, -4:8, 0:9][0])
+    assert t[3, -4, np.int64(0)].shape == (3,)
+    grey = texrs.PlaneTexture(PLANE[..., 0])
+    assert grey[0:5, 7].shape == (5,)
+
+
+@pytest.mark.parametrize(
+    ("index", "says"),
+    [
+        ((slice(0, 4),), "needs 3 ranges"),
+        ((slice(None, 4), slice(0, 4), slice(0, 4)), "start:stop; got :4"),
+        ((slice(0, None), slice(0, 4), slice(0, 4)), "start:stop; got 0:"),
+        ((slice(0, 4, 2), slice(0, 4), slice(0, 4)), "no step; got 0:4:2"),
+        ((slice(4, 4), slice(0, 4), slice(0, 4)), "4:4 is empty"),
+        ((slice(0, 4.5), slice(0, 4), slice(0, 4)), "integers"),
+        ((slice(0, 4), slice(0, 4), 10**10), "within 1000000000"),
+        ((slice(0, 4), slice(0, 4), "x"), "integers and ranges"),
+        ((slice(0, 4), slice(0, 4), ...), "integers and ranges"),
+        ((slice(0, 4), slice(0, 4), True), "integers and ranges"),
+    ],
+)
+def test_bad_indices(index: tuple[object, ...], says: str) -> None:
+    with pytest.raises(InvalidInput, match=says):
+        texture()[index]
+
+
+def test_bad_options() -> None:
+    for options, says in (
+        ({"field": fields.circular(axes=2)}, "field: needs 3 axes"),
+        ({"cache_bytes": -1}, "cache_bytes"),
+        ({"interpolation": "best"}, "interpolation"),
+        ({"analysis": analyse(PLANE, axes=2)}, "analysis"),
+        ({"analysis": 3}, "analysis"),
+        ({"seed": -1}, "seed"),
+    ):
+        with pytest.raises(InvalidInput, match=says):
+            texrs.SolidTexture(SOLID, **options)  # type: ignore[arg-type]
+    with pytest.raises(InvalidInput, match="origin"):
+        texture().window((0, 0), 8)
+    with pytest.raises(LimitExceeded):
+        texture(memory_limit=200 << 20)[box(3, 0, 300)]
+    with pytest.raises(LimitExceeded):
+        texture()[box(3, 0, 10**6)]
+    singular = fields.from_function(lambda p: np.eye(3) * (1000.0 - p[:, :1, None]), 3)
+    with pytest.raises(InvalidInput, match="field"):
+        texrs.SolidTexture(SOLID, field=singular)[1000:1008, 0:8, 0:8]
+
+
+def test_straight_slices_are_planes_of_the_texture() -> None:
+    for field in ("none", "circular"):
+        t = texture(3, field)
+        cut = t.slice((7, 2, 3), axes=[(0, 1, 0), (0, 0, 1)], size=(21, 31))
+        assert np.array_equal(cut, t[7, -8:13, -12:19])
+        again = texture(3, field, cache_bytes=0).slice((7, 2, 3), normal=(1, 0, 0), size=(21, 31))
+        assert np.array_equal(cut, again)
+
+
+def test_oblique_slices_carry_places_on() -> None:
+    """No colour is mixed, and a part of a slice is the same."""
+    t = texrs.SolidTexture(SOLID, seed=2, interpolation="nearest")
+    cut = t.slice((0.3, 0.1, 9.7), normal=(1, 2, 3), size=(140, 20))
+    assert cut.shape == (140, 20, 3)
+    known = {tuple(c) for c in SOLID.reshape(-1, 3).tolist()}
+    assert {tuple(c) for c in cut.reshape(-1, 3).tolist()} <= known
+    middle = texrs.SolidTexture(SOLID, seed=2, interpolation="nearest").slice((0.3, 0.1, 9.7), (1, 2, 3), size=(30, 20))
+    assert np.array_equal(cut[55:85], middle)
+    for bad in ({"normal": (0, 0, 0)}, {"axes": [(1, 0, 0), (2, 0, 0)]}, {}, {"normal": (1, 0)}):
+        with pytest.raises(InvalidInput):
+            t.slice((0, 0, 0), size=8, **bad)  # type: ignore[arg-type]
+    with pytest.raises(InvalidInput, match="within"):
+        t.slice((1e9, 0, 0), (1, 0, 0), size=8)
+
+
+def test_windows_look_as_far_as_their_frames() -> None:
+    here = Region.whole((4, 4))
+    assert world.window_reach(to_fixed(None, here), 2) == 2
+    assert world.window_reach(to_fixed(fields.slant(45, axes=2), here), 2) == 3
+    assert world.window_reach(to_fixed(fields.constant([[3, 0], [0, 1]]), here), 2) == 6
+    assert world.blocks_reach(6, 2) == 26
+
+
+def test_the_source_map_knows_the_field_where_the_window_lies() -> None:
+    field = fields.circular(centre=(0, 0), axes=2)
+    found = texrs.PlaneTexture(PLANE, field=field).window((40, -50), (8, 9))
+    assert np.array_equal(found.source.frames(), field.lattice((8, 9), origin=(40, -50)))
+    assert found.report["origin"] == [40, -50]
+
+
+def test_classes_stay_classes_and_progress_can_stop() -> None:
+    labels = (SOLID[..., 0] > 100).astype(np.uint8) + (SOLID[..., 0] > 180)
+    t = texrs.SolidTexture(labels)
+    assert set(np.unique(t[0:16, 0:16, 0:16])) <= {0, 1, 2}
+
+    def stop(stage: str, share: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        texrs.SolidTexture(SOLID, seed=77).window(0, 96, progress=stop)
+
+
+def test_shares_of_classes_are_those_of_the_exemplar() -> None:
+    exemplar = samples.particles().image
+    shares = [
+        volume.compare(exemplar, texrs.SolidTexture(exemplar, seed=s)[0:64, 0:64, 0:64]).relative_shares for s in (1, 2)
+    ]
+    assert (np.abs(np.mean(shares, axis=0) - 1) < 0.25).all()
+
+
+def test_counts_are_fixed() -> None:
+    """Work that stops when little changes hangs on all of the window."""
+    assert ON_DEMAND.settled == 0
+    assert not ON_DEMAND.exhaustive
+    assert min(ON_DEMAND.iterations) > 0
