@@ -57,7 +57,7 @@ def test_what_comes_in_is_what_comes_out(name):
     assert made.image.shape == (24, 24, 24, *exemplar.shape[3:])
     np.testing.assert_array_equal(rendered(made, exemplar), made.stages["composite"])
     np.testing.assert_array_equal(made.image, made.stages["composite"])
-    assert made.image.min() >= exemplar.min() - 1e-3  # the linear look-up stays within
+    assert made.image.min() >= exemplar.min() - 1e-3  # the look-up stays within
     assert made.image.max() <= exemplar.max() + 1e-3
 
 
@@ -88,7 +88,7 @@ def test_labels_are_classes_without_an_order():
     codes = colours(marked[..., None])
     assert all(len(np.unique(codes[marked == k], axis=0)) == 1 for k in range(5))
     assert texrs.solid(renamed[marked], 32, field=TURNING, quality="fast").image.shape == made.image.shape
-    assert texrs.solid(marked, 20, labels=False, quality="fast").report["interpolation"] == "linear"
+    assert texrs.solid(marked, 20, labels=False, quality="fast").report["interpolation"] == "cubic"
     sparse = (marked * 40).astype(np.int32)
     assert set(np.unique(texrs.solid(sparse, 20, labels=True, quality="fast").image)) <= set(np.unique(sparse))
 
@@ -99,7 +99,7 @@ def test_every_map_in_register_follows(result):
     np.testing.assert_array_equal(at, np.floor(result.source.coordinates + np.float32(0.5)))
     nearest = result.source.render(STRIPES, interpolation="nearest")
     np.testing.assert_array_equal(nearest, STRIPES[tuple(np.moveaxis(at, -1, 0))])
-    sixteen = result.source.render(STRIPES.astype(np.uint16) * 257, interpolation="linear")
+    sixteen = result.source.render(STRIPES.astype(np.uint16) * 257, interpolation="cubic")
     assert sixteen.dtype == np.uint16
     assert np.abs(sixteen / 257 - result.image).max() <= 0.51
 
@@ -348,7 +348,7 @@ def test_damaged_analyses_are_refused(tmp_path):
 def test_a_map_with_a_varying_field_is_kept(result, tmp_path):
     result.source.save(tmp_path / "map.npz")
     again = texrs.SourceMap.load(tmp_path / "map.npz")
-    np.testing.assert_array_equal(again.render(STRIPES, interpolation="linear"), result.image)
+    np.testing.assert_array_equal(again.render(STRIPES, interpolation="cubic"), result.image)
     np.testing.assert_allclose(again.frames(), result.source.frames(), atol=1e-6)
     whole = volume.compare(STRIPES, result.image, result.source, TURNING)
     loaded = volume.compare(STRIPES, result.image, again, TURNING)

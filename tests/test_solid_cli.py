@@ -64,7 +64,7 @@ def test_solid_writes_what_the_function_makes(here: Path, capsys: Capture) -> No
     assert not list(here.glob(".texrs*"))
     # Another map of the example goes the same way.
     io.write_volume("height.npy", VOLUME[..., 0].astype(np.float32))
-    assert main(["apply", "map.npz", "height.npy", "-o", "height.tif", "--interpolation", "linear", "-q"]) == 0
+    assert main(["apply", "map.npz", "height.npy", "-o", "height.tif", "--interpolation", "cubic", "-q"]) == 0
     assert io.read_volume("height.tif").shape == (20, 24, 18)
     assert main(["info", "map.npz"]) == 0
     assert "20 x 24 x 18, made from 32 x 32 x 32" in capsys.readouterr().out

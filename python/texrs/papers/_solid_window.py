@@ -281,7 +281,7 @@ class SolidTexture(_Texture):
     """
 
     axes = 3
-    _smooth = "linear"
+    _smooth = "cubic"
 
     def slice(
         self,

@@ -110,7 +110,7 @@ def solid(
     coordinates : (size, 3) array, optional
         Where held voxels look in the exemplar.
     interpolation : {"nearest", "linear", "cubic"}, optional
-        Between the exemplar's samples; None is "nearest" for labels, else "linear".
+        Between the exemplar's samples; None is "nearest" for labels, else "cubic".
     analysis : Analysis, optional
         Of the same exemplar (`texrs.analysis.analyse`); None makes it, or takes it from memory.
     memory_limit : int, optional
@@ -153,7 +153,7 @@ def solid(
     ((40, 40, 40, 3), dtype('uint8'))
 
     """
-    options = locals() | {"axes": 3, "interpolation": interpolation or ("nearest" if method == "paper" else "linear")}
+    options = locals() | {"axes": 3, "interpolation": interpolation or ("nearest" if method == "paper" else "cubic")}
     return _verb(**options)
 
 
