@@ -99,18 +99,9 @@ pub fn blocks<const D: usize>(
             }
             let chooser = Chooser::new(appearance, &cells, &list, frames, c);
             let asked = chooser.asked(&cells, guide);
-            {
-                let near: Vec<_> = cells.near(c).map(|n| origins[n]).collect();
-                chooser.choose(
-                    &places,
-                    origins[c],
-                    &near,
-                    &asked,
-                    &noise,
-                    round as u32,
-                    options,
-                )
-            }
+            let near: Vec<_> = cells.near(c).map(|n| origins[n]).collect();
+            let round = round as u32;
+            chooser.choose(&places, origins[c], &near, &asked, &noise, round, options)
         });
         monitor.check()?;
         origins = chosen;
