@@ -26,7 +26,7 @@ pub const CHANNELS: usize = 4;
 /// Squared distance that equals the variance of all windows.
 pub const UNIT: i32 = SCALE * SCALE;
 
-/// An appearance vector, in units of the windows' standard deviation / [`SCALE`].
+/// An appearance vector, in units of the windows' standard deviation / 512.
 pub type Feature = [i16; KEEP];
 /// A colour, scaled so that the exemplar fills 12 bits.
 pub type Colour = [i16; CHANNELS];

@@ -3,10 +3,10 @@
 //! Kwatra et al., *Texture optimization for example-based synthesis*, SIGGRAPH 2005, on coordinates instead of colours:
 //! the last word of every step is a copy. One iteration is
 //!
-//! 1. [`gather`]: the window around each point, in the exemplar's axes, through the coordinates as they are;
-//! 2. [`sweep`]: each point looks for a better match among those of its neighbours (Barnes et al., *PatchMatch*, SIGGRAPH
+//! 1. gather: the window around each point, in the exemplar's axes, through the coordinates as they are;
+//! 2. sweep: each point looks for a better match among those of its neighbours (Barnes et al., *PatchMatch*, SIGGRAPH
 //!    2009; all points at once, so that their order does not matter) and a few drawn around the best;
-//! 3. [`vote`]: each point takes one of the coordinates that the windows around it propose.
+//! 3. vote: each point takes one of the coordinates that the windows around it propose.
 //!
 //! Departures: a drawn match must be better by some of the exemplar's own spacing (hysteresis), so that what is good
 //! enough stays and sparse features are not washed out. Coordinates are displaced by the frame's Jacobian
