@@ -10,7 +10,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "python" / "texrs"
 
 # Each room may import the rooms of the lines above its own, and those named behind the arrow in its own line.
-FOUNDATION = {"errors", "_typing", "_arrays", "threads", "samples"}
+FOUNDATION = {"errors", "_typing", "_arrays", "_progress", "threads", "samples"}
 KERNELS = {"kernels"}
 NOUNS = {
     "analysis": {"io"},

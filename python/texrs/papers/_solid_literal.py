@@ -23,6 +23,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._progress import stage
 from texrs._typing import Array, Progress
 from texrs.analysis import Analysis, similarity
 from texrs.fields import Field
@@ -117,13 +118,13 @@ def _correct(
     of = f"level {level + 1} of {len(analysis.levels)}"
     return correct(
         analysis.levels[level],
-        similarity(analysis, level, k=K, n=N, numbers=NUMBERS, progress=_stage(progress, f"similarity sets, {of}")),
+        similarity(analysis, level, k=K, n=N, numbers=NUMBERS, progress=stage(progress, f"similarity sets, {of}")),
         places,
         region,
         frames,
         passes=PASSES,
         compensated=False,
-        progress=_stage(progress, of),
+        progress=stage(progress, of),
     )
 
 
@@ -136,10 +137,3 @@ def _inside(places: Places, exemplar: Appearance, above: int) -> Places:
         low = ((border * ONE) >> above) - ONE // 2
         out[:, axis] = low + (out[:, axis] - low) % max(1, ((n - 2 * border) * ONE) >> above)
     return out.reshape(-1)
-
-
-def _stage(progress: Progress | None, name: str) -> Callable[[float], object] | None:
-    if progress is None:
-        return None
-    progress(name, 0.0)  # Short work may be done before it is asked how far it is.
-    return lambda share: progress(name, share)

@@ -31,7 +31,7 @@ Departures, with their reasons:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
@@ -39,6 +39,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_image, as_seed, as_size, as_wrap
+from texrs._progress import stage
 from texrs._typing import Array, Interpolation, Progress
 from texrs.analysis import COARSEST, Analysis, analyse, are_labels
 from texrs.errors import InvalidInput
@@ -347,7 +348,7 @@ class Grower:
         first = 0
         if self.stitches(region, hold):
             first = len(regions) - 1
-            places = stitch(self.image, region, self.seed, _stage(progress, "patches"))
+            places = stitch(self.image, region, self.seed, stage(progress, "patches"))
             stages["patches"] = self.picture(places, region, first)
         for level, here in enumerate(regions[first:], start=first):
             frames = self.frames(level, here)
@@ -408,7 +409,7 @@ class Grower:
             seed=self.seed,
             margin=margin,
             guide=hold.guide(coarsest, region, self.spacing(0)),
-            progress=_stage(progress, "blocks"),
+            progress=stage(progress, "blocks"),
         )
         return hold.place(places, region, self.spacing(0))
 
@@ -443,7 +444,7 @@ class Grower:
             seed=(self.seed + 0x9E3779B97F4A7C15 * (level + 1)) % (1 << 64),
             held=hold.fixed(region, self.spacing(level)),
             guide=hold.guide(here, region, self.spacing(level)),
-            progress=_stage(progress, f"level {level + 1} of {len(self.analysis.levels)}"),
+            progress=stage(progress, f"level {level + 1} of {len(self.analysis.levels)}"),
         )
 
     def picture(self, places: Places, region: Region, level: int) -> Array:
@@ -455,10 +456,3 @@ class Grower:
         fine = (np.rint(shown / np.float32(ONE)) + 0.5) * self.spacing(level) - 0.5
         at = tuple(np.clip(np.rint(fine[..., a]).astype(np.intp), 0, self.image.shape[a] - 1) for a in range(axes))
         return self.image[at]
-
-
-def _stage(progress: Progress | None, name: str) -> Callable[[float], object] | None:
-    if progress is None:
-        return None
-    progress(name, 0.0)  # Short work may be done before it is asked how far it is.
-    return lambda share: progress(name, share)

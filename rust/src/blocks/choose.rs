@@ -1,0 +1,185 @@
+//! The piece of the exemplar for one cell: the one that fits what lies around it.
+
+use super::Options;
+use super::cells::{Cell, Cells};
+use crate::appearance::{Appearance, Feature, KEEP, UNIT, distance};
+use crate::fixed::{Frame, Frames, ONE, Place, add, apply, nearest, sub};
+use crate::guide::Guide;
+use crate::hash::Noise;
+
+/// A window without contrast.
+const NOTHING: Feature = [0; KEEP];
+/// Cost of a shell point whose continuation lies outside the exemplar.
+const OUTSIDE: i64 = 4 * UNIT as i64;
+
+/// The points of a cell of which a guide asks something, with the steps from its centre.
+pub(super) struct Asked<'a, const D: usize> {
+    guide: Option<Guide<'a>>,
+    points: Vec<(usize, [i32; D])>,
+}
+
+/// The places that one cell may take, and what they cost.
+pub(super) struct Chooser<'a, const D: usize> {
+    appearance: &'a Appearance<D>,
+    cell: &'a Cell<D>,
+    index: usize,
+    /// World index of the cell.
+    world: [i32; D],
+    frame: Frame<D>,
+    /// Places of the centre for which all points of the cell lie inside the exemplar, in whole samples.
+    range: [[i32; 2]; D],
+}
+
+impl<'a, const D: usize> Chooser<'a, D> {
+    pub(super) fn new(
+        appearance: &'a Appearance<D>,
+        cells: &Cells<D>,
+        list: &'a [Cell<D>],
+        frames: Frames<'_, D>,
+        c: usize,
+    ) -> Self {
+        let cell = &list[c];
+        let index = cells.grid.point(c);
+        let frame = cells.frame(frames, c);
+        let (mut low, mut high) = ([0; D], [0; D]);
+        for &p in &cell.points {
+            let world = cells.region.world(cells.region.grid.point(p as usize));
+            let moved = apply(&frame, cells.step_from_centre(c, world));
+            for axis in 0..D {
+                low[axis] = low[axis].min(moved[axis]);
+                high[axis] = high[axis].max(moved[axis]);
+            }
+        }
+        let range = std::array::from_fn(|axis| {
+            let [first, last] = appearance.range(axis);
+            if appearance.grid().wrap()[axis] {
+                return [first, last];
+            }
+            let [least, most] = [
+                first - low[axis].div_euclid(ONE),
+                last - (high[axis] + ONE - 1).div_euclid(ONE),
+            ];
+            // A cell as large as the exemplar has one place, in the middle.
+            if least <= most {
+                [least, most]
+            } else {
+                [(least + most).div_euclid(2); 2]
+            }
+        });
+        Self {
+            appearance,
+            cell,
+            index: c,
+            world: std::array::from_fn(|axis| cells.first[axis] + index[axis] as i32),
+            frame,
+            range,
+        }
+    }
+
+    /// A place drawn for the cell's centre.
+    pub(super) fn place(&self, noise: &Noise, round: u32, draw: u32) -> Place<D> {
+        let words = noise.at(self.world, round << 16 | draw);
+        std::array::from_fn(|axis| {
+            let [low, high] = self.range[axis];
+            let n = (high - low + 1) as u64;
+            (low + ((u64::from(words[axis]) * n) >> 32) as i32) * ONE
+        })
+    }
+
+    /// The best of the present place and many drawn ones; the first of equals.
+    #[allow(clippy::too_many_arguments)] // what lies around, what is asked, and how to choose
+    pub(super) fn choose(
+        &self,
+        places: &[Place<D>],
+        present: Place<D>,
+        near: &[Place<D>],
+        asked: &Asked<'_, D>,
+        noise: &Noise,
+        round: u32,
+        options: &Options,
+    ) -> Place<D> {
+        let mut best = present;
+        let usual = 2.0 * f64::from(UNIT) * self.cell.shell.len().max(1) as f64;
+        let cost = |origin| {
+            self.misfit(places, origin, options)
+                + options.repetition * self.repeated(origin, near, options.cell)
+                + self.obey(origin, asked) as f64 / usual
+        };
+        let mut least = cost(present);
+        for draw in 0..options.candidates as u32 {
+            let origin = self.place(noise, round, draw);
+            let sum = cost(origin);
+            if sum < least {
+                (best, least) = (origin, sum);
+            }
+        }
+        best
+    }
+
+    /// The points of the cell of which something is asked.
+    pub(super) fn asked<'g>(&self, cells: &Cells<D>, guide: Option<Guide<'g>>) -> Asked<'g, D> {
+        let mut points = Vec::new();
+        if let Some(guide) = guide {
+            for &p in self.cell.points.iter().filter(|&&p| guide.asks(p as usize)) {
+                let world = cells.region.world(cells.region.grid.point(p as usize));
+                points.push((p as usize, cells.step_from_centre(self.index, world)));
+            }
+        }
+        Asked { guide, points }
+    }
+
+    /// What a place costs by the guide.
+    #[inline(always)]
+    fn obey(&self, origin: Place<D>, asked: &Asked<'_, D>) -> i64 {
+        let Some(guide) = &asked.guide else {
+            return 0;
+        };
+        let mut sum = 0;
+        for &(p, step) in &asked.points {
+            let sample = nearest(add(origin, apply(&self.frame, step)));
+            sum += guide.cost(p, self.appearance.clamped(sample));
+        }
+        sum
+    }
+
+    /// How badly the piece goes on into what lies around the cell: 0 for a perfect fit, 1 for pieces that have nothing
+    /// to do with each other. Divided by the contrast of both sides, so that a piece is neither favoured for being
+    /// bland, and so near everything on average, nor for being the opposite.
+    #[inline(always)]
+    fn misfit(&self, places: &[Place<D>], origin: Place<D>, options: &Options) -> f64 {
+        let (mut difference, mut contrast, mut same) = (0i64, 0i64, 0usize);
+        for &(q, step) in &self.cell.shell {
+            let mine = nearest(add(origin, apply(&self.frame, step)));
+            let there = self.appearance.clamped(nearest(places[q as usize]));
+            let theirs = self.appearance.feature(there);
+            let Some(at) = self.appearance.inside(mine) else {
+                difference += OUTSIDE;
+                continue;
+            };
+            let feature = self.appearance.feature(at);
+            difference += i64::from(distance(feature, theirs));
+            contrast += i64::from(distance(feature, &NOTHING) + distance(theirs, &NOTHING));
+            same += usize::from(at == there);
+        }
+        let shell = self.cell.shell.len().max(1) as f64;
+        // Twice the variance of windows is what two of them differ by on average.
+        let usual = 2.0 * shell * f64::from(UNIT);
+        let scale = options.contrast * contrast as f64 + (1.0 - options.contrast) * usual;
+        difference as f64 / scale.max(0.05 * usual) + options.continuation * same as f64 / shell
+    }
+
+    /// How much of the piece is shown near by already.
+    #[inline(always)]
+    fn repeated(&self, origin: Place<D>, near: &[Place<D>], cell: usize) -> f64 {
+        let reach = (cell as i32 * ONE / 2).max(ONE);
+        let shared = |other: &Place<D>| {
+            let far = sub(*other, origin)
+                .iter()
+                .map(|d| d.abs())
+                .max()
+                .unwrap_or(0);
+            f64::from((reach - far).max(0)) / f64::from(reach)
+        };
+        near.iter().map(shared).sum()
+    }
+}

@@ -1,0 +1,113 @@
+//! A coherent start: the output divided into cells, each filled by one piece of the exemplar.
+//!
+//! The lattice is divided into cells of about `cell` points a side, with centres shifted by noise and each point given
+//! to the nearest centre, so that no seam is straight. A cell's piece is chosen to fit its neighbours: cells of even
+//! and odd parity take turns, each trying many places. The cost of a place counts how the shell just outside the cell
+//! would continue, against what lies there. Plain squared differences would favour bland pieces, which are near
+//! everything on average, so they are divided by the contrast of both.
+//!
+//! Everything is a function of the world's coordinates, within two cells for each of the `rounds`.
+
+mod cells;
+mod choose;
+
+use crate::appearance::Appearance;
+use crate::fixed::{Frames, Place, add, apply};
+use crate::grid::Region;
+use crate::guide::Guide;
+use crate::hash::Noise;
+use crate::par::{self, Monitor};
+use crate::{Error, Result};
+
+use cells::{Cell, Cells};
+use choose::Chooser;
+
+/// What [`blocks`] is asked for.
+#[derive(Debug, Clone, Copy)]
+pub struct Options {
+    /// Side of a cell, in points.
+    pub cell: usize,
+    /// Half-rounds of choosing; the even and the odd cells take turns, and the first places the even ones anywhere.
+    pub rounds: usize,
+    /// Places a cell tries in a round.
+    pub candidates: usize,
+    /// How far misfits are divided by the contrast of the pieces, 0 to 1.
+    pub contrast: f64,
+    /// Cost of going on exactly where a neighbour ends, in misfits of unrelated pieces: otherwise the exemplar is copied
+    /// whole.
+    pub continuation: f64,
+    /// Cost of showing what one of the cells around shows, in the same units.
+    pub repetition: f64,
+    /// Chooses the texture.
+    pub seed: u64,
+    /// Points along borders that are there only for the others to look at: no cell is chosen that these do not hang on.
+    pub margin: usize,
+}
+
+/// Gives every point of `region` a place in the exemplar.
+pub fn blocks<const D: usize>(
+    appearance: &Appearance<D>,
+    region: &Region<D>,
+    frames: Frames<'_, D>,
+    guide: Option<Guide<'_>>,
+    options: &Options,
+    monitor: &Monitor,
+) -> Result<Vec<Place<D>>> {
+    if options.cell < 2 || options.candidates == 0 || options.rounds == 0 {
+        return Err(Error::value(
+            "cell",
+            format!("needs at least 2 points a cell, 1 candidate and 1 round, got {options:?}"),
+        ));
+    }
+    let cells = Cells::new(region, options);
+    let noise = Noise::new(options.seed).part(1);
+    let owners = cells.owners();
+    let list = cells.list(&owners);
+    let mut origins: Vec<Place<D>> = par::map(list.len(), |c| {
+        let chooser = Chooser::new(appearance, &cells, &list, frames, c);
+        chooser.place(&noise, 0, 0)
+    });
+    monitor.expect((options.rounds * list.len()) as u64);
+    let mut places = vec![[0; D]; region.grid.len()];
+    spread(appearance, &cells, &list, frames, &origins, &mut places);
+    for round in 1..=options.rounds {
+        let even = round % 2 == 0;
+        let chosen = par::map(list.len(), |c| {
+            let idle = list[c].even != even || list[c].points.is_empty();
+            if idle || !cells.counts(c, options, round) || monitor.advance(1).is_err() {
+                return origins[c];
+            }
+            let chooser = Chooser::new(appearance, &cells, &list, frames, c);
+            let asked = chooser.asked(&cells, guide);
+            let near: Vec<_> = cells.near(c).map(|n| origins[n]).collect();
+            let round = round as u32;
+            chooser.choose(&places, origins[c], &near, &asked, &noise, round, options)
+        });
+        monitor.check()?;
+        origins = chosen;
+        spread(appearance, &cells, &list, frames, &origins, &mut places);
+    }
+    Ok(places)
+}
+
+/// Gives each point the place that its cell's piece has for it, brought inside the exemplar.
+fn spread<const D: usize>(
+    appearance: &Appearance<D>,
+    cells: &Cells<D>,
+    list: &[Cell<D>],
+    frames: Frames<'_, D>,
+    origins: &[Place<D>],
+    places: &mut [Place<D>],
+) {
+    for (c, cell) in list.iter().enumerate() {
+        let frame = cells.frame(frames, c);
+        for &p in &cell.points {
+            let world = cells.region.world(cells.region.grid.point(p as usize));
+            let place = add(origins[c], apply(&frame, cells.step_from_centre(c, world)));
+            places[p as usize] = appearance.bring_inside(place);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
