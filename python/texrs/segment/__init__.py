@@ -19,7 +19,7 @@ from texrs._typing import Array, Floats, Labels, Progress
 from texrs.errors import InvalidInput
 from texrs.kernels.noise import uniform
 from texrs.segment import elements as _elements
-from texrs.segment.layers import Regions
+from texrs.segment.layers import Regions, smooth_on_grain
 from texrs.segment.regularity import Lattice, lattice
 
 __all__ = ["Children", "Segmentation", "segment"]
@@ -105,7 +105,8 @@ def segment(
         The exemplar, any dtype; the first three channels count, or the first one when there are two.
     layers : int, optional
         Number of colour layers, 1 to 16. Fewer are made where the image has fewer colours. By default two, or three or
-        four where these find clearly more elements of the same size that lie apart.
+        four where these find clearly more elements of the same size that lie apart; where the ground is of fine grain,
+        what is smooth belongs to the layer above it.
     children : {"auto", "components", "grid", "none"}
         "components": connected pieces of the layers above the background. "grid": jittered cells of 1/6 of the side,
         for images without separate elements. "none": whole layers. "auto": components, or the grid where nothing
@@ -153,6 +154,8 @@ def segment(
         found, elements, trouble = _best_background(found, rgb, watch)
         if layers is None:
             found, elements, trouble = _more_layers(regions, rgb, found, elements, trouble, watch)
+            if not trouble and (elements > 0).mean() <= APART:
+                found, elements = _smooth_too(rgb, found, elements)
         if children == "components" or not trouble:
             return Segmentation(found, _elements.whole(elements), "components", "; ".join(reasons), regular)
         reasons.insert(0, trouble)
@@ -235,6 +238,20 @@ def _more_layers(
             break
         layers, elements, trouble = more
     return layers, elements, trouble
+
+
+def _smooth_too(rgb: Floats, layers: Labels, elements: Labels) -> tuple[Labels, Labels]:
+    """Add what is smooth on a ground of fine grain, if it finds clearly more: stones as dark as the sand that they lie on."""
+    smooth = smooth_on_grain(rgb)
+    if smooth is None:
+        return layers, elements
+    more = (smooth | (layers > 0)).astype(np.int32)
+    crease = _elements.creases(rgb)
+    found = _elements.find(more, crease)
+    trouble = _trouble(_elements.evidence(found, crease, _elements.contrast(rgb)))
+    if trouble or (found > 0).sum() < CLEARLY * (elements > 0).sum():
+        return layers, elements
+    return more, found
 
 
 def _trouble(evidence: _elements.Evidence) -> str:
