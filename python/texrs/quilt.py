@@ -37,9 +37,10 @@ __all__ = ["Picture", "quilt"]
 
 POOL, CANDIDATES = 48, 3
 """Matches that are looked at for what they repeat; those of them that are cut in."""
-REPETITION, ON_LATTICE, GOOD = 10.0, 3.0, 0.1
-"""Charge for showing what all other patches show, and on a lattice, where all patches are much alike and must meet exactly; in
-units of a match that is better than all but this share: where few places fit, others would tear what they are put on."""
+REPETITION, GOOD, ON_LATTICE = 10.0, 0.1, 1.5
+"""Charge for showing what all other patches show, in units of a match that is better than all but this share: where few
+places fit, as between things on plain ground, others would tear what they are put on. And on a lattice, where all places are
+much alike and must meet exactly, in units of a typical match."""
 CONTINUATION = 2.0
 """Charge for going on with the piece of the exemplar that lies there already, in units of a typical match."""
 CELL = 8
@@ -327,8 +328,8 @@ class Quilt:
         shown = self.places([Match(m.cost, finder.members[m.exemplar], m.row, m.column) for m in pool], window, CELL)
         good, usual = np.quantile([m.cost for m in pool], (GOOD, 0.5)).tolist()
         usual = usual or 1.0
-        repetition = ON_LATTICE if self.pictures[finder.members[0]].regular else REPETITION
-        charges = repetition * (good or usual) / usual * self.repeated(shown)
+        regular = self.pictures[finder.members[0]].regular
+        charges = (ON_LATTICE if regular else REPETITION * (good or usual) / usual) * self.repeated(shown)
         continued, mirrored = self.alike(shown, known, old)
         charges += CONTINUATION * continued
         free = np.flatnonzero(mirrored <= MIRRORED) if (mirrored <= MIRRORED).any() else np.arange(len(pool))

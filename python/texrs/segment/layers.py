@@ -25,7 +25,7 @@ MERGE_SCALE, MERGE_BLUR, MERGE_MINIMUM = 60, 0.4, 24
 FINE, AROUND = 1.0, 2.0
 """Standard deviations in pixels of the Gaussians below which changes are grain, and over which its amount is averaged."""
 TWO_KINDS = 0.75
-"""Share of the variance of the amount of grain that is between two classes, from which on there are two: a bell curve has 0.64."""
+"""Share of the variance of the amount of grain that is between two classes, from which on there are two; a bell has 0.64."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
