@@ -151,11 +151,14 @@ def segment(
     regular = lattice(rgb)
     reasons = [f"elements keep to {regular}"] if regular else []
     if children != "grid":
-        found, elements, trouble = _best_background(found, rgb, watch)
+        seen = _Seen.of(rgb)
+        found, elements, trouble = _best_background(found, seen, watch)
         if layers is None:
-            found, elements, trouble = _more_layers(regions, rgb, found, elements, trouble, watch)
-            if not trouble and (elements > 0).mean() <= APART:
-                found, elements = _smooth_too(rgb, found, elements)
+            smooth = None if trouble or (elements > 0).mean() > APART else _smooth_too(rgb, seen, found, elements)
+            if smooth is not None:
+                found, elements = smooth
+            else:
+                found, elements, trouble = _more_layers(regions, seen, found, elements, trouble, watch)
         if children == "components" or not trouble:
             return Segmentation(found, _elements.whole(elements), "components", "; ".join(reasons), regular)
         reasons.insert(0, trouble)
@@ -193,19 +196,35 @@ def _colours(unit: Floats) -> Floats:
     return np.ascontiguousarray(chosen)
 
 
-def _best_background(layers: Labels, rgb: Floats, watch: Callable[[], object]) -> tuple[Labels, Labels, str]:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Seen:
+    """What elements are found by, beside their layers."""
+
+    crease: Floats
+    contrast: Floats
+
+    @classmethod
+    def of(cls, rgb: Floats) -> _Seen:
+        lab = _elements.lightness_and_colour(rgb)
+        return cls(_elements.creases(lab), _elements.contrast(lab))
+
+    def elements(self, layers: Labels) -> tuple[Labels, _elements.Evidence]:
+        """Find the elements of the layers above 0, and what speaks for them."""
+        found = _elements.find(layers, self.crease)
+        return found, _elements.evidence(found, self.crease, self.contrast)
+
+
+def _best_background(layers: Labels, seen: _Seen, watch: Callable[[], object]) -> tuple[Labels, Labels, str]:
     """Take as the background the layer that leaves the most convincing elements; put it first.
 
     Gives the layers, the elements and why they cannot be trusted, which is empty if they can.
     """
-    crease, contrasts = _elements.creases(rgb), _elements.contrast(rgb)
     best: tuple[float, Labels, Labels, str] | None = None
     for background in range(int(layers.max()) + 1):
         swapped = np.where(layers == background, 0, np.where(layers < background, layers + 1, layers)).astype(np.int32)
         watch()
-        elements = _elements.find(swapped, crease)
+        elements, evidence = seen.elements(swapped)
         watch()
-        evidence = _elements.evidence(elements, crease, contrasts)
         trouble = _trouble(evidence)
         score = evidence.solidity - 0.05 * background - (1.0 if trouble else 0.0)
         if best is None or score > best[0] + 1e-9:
@@ -218,7 +237,7 @@ def _best_background(layers: Labels, rgb: Floats, watch: Callable[[], object]) -
 
 def _more_layers(
     regions: Regions,
-    rgb: Floats,
+    seen: _Seen,
     layers: Labels,
     elements: Labels,
     trouble: str,
@@ -231,7 +250,7 @@ def _more_layers(
     for count in range(USUAL_LAYERS + 1, MOST_LAYERS + 1):
         if trouble or (elements > 0).mean() > APART:
             break
-        more = _best_background(regions.layers(count), rgb, watch)
+        more = _best_background(regions.layers(count), seen, watch)
         area, before = (np.bincount(e.ravel())[1:] for e in (more[1], elements))
         alike = len(area) > 0 and SAME_SIZE <= np.median(area) / np.median(before) <= 1 / SAME_SIZE
         if more[2] or area.sum() > APART * elements.size or not alike or area.sum() < CLEARLY * before.sum():
@@ -240,17 +259,15 @@ def _more_layers(
     return layers, elements, trouble
 
 
-def _smooth_too(rgb: Floats, layers: Labels, elements: Labels) -> tuple[Labels, Labels]:
-    """Add what is smooth on a ground of fine grain, if it finds clearly more: stones as dark as the sand that they lie on."""
+def _smooth_too(rgb: Floats, seen: _Seen, layers: Labels, elements: Labels) -> tuple[Labels, Labels] | None:
+    """Add what is smooth on a ground of fine grain, as stones as dark as their sand; None where that is not clearly more."""
     smooth = smooth_on_grain(rgb)
     if smooth is None:
-        return layers, elements
+        return None
     more = (smooth | (layers > 0)).astype(np.int32)
-    crease = _elements.creases(rgb)
-    found = _elements.find(more, crease)
-    trouble = _trouble(_elements.evidence(found, crease, _elements.contrast(rgb)))
-    if trouble or (found > 0).sum() < CLEARLY * (elements > 0).sum():
-        return layers, elements
+    found, evidence = seen.elements(more)
+    if _trouble(evidence) or (found > 0).sum() < CLEARLY * (elements > 0).sum():
+        return None
     return more, found
 
 
