@@ -38,6 +38,8 @@ USUAL_LAYERS, MOST_LAYERS = 2, 4
 APART, CLEARLY, SAME_SIZE = 0.45, 1.15, 0.6
 """Share of the image that elements which lie apart cover at most; how many times more of it further layers must bring; least
 ratio of median areas of elements that are of the same size."""
+SMOOTH_GROUND = 0.6
+"""Share of the ground that may be smooth where the ground is taken to be of fine grain."""
 GRID_SHARE = 1 / 6
 """Side of a grid cell, as a share of the exemplar's shorter side."""
 
@@ -262,7 +264,8 @@ def _more_layers(
 def _smooth_too(rgb: Floats, seen: _Seen, layers: Labels, elements: Labels) -> tuple[Labels, Labels] | None:
     """Add what is smooth on a ground of fine grain, as stones as dark as their sand; None where that is not clearly more."""
     smooth = smooth_on_grain(rgb)
-    if smooth is None:
+    # Where there is no grain at all, only outlines are not smooth.
+    if smooth is None or smooth[layers == 0].mean() > SMOOTH_GROUND:
         return None
     more = (smooth | (layers > 0)).astype(np.int32)
     found, evidence = seen.elements(more)
