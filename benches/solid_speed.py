@@ -39,7 +39,7 @@ def products(report: dict[str, Any], channels: int) -> float:
     """Give the multiplications of the windows' projections: each window of each iteration of each level."""
     axes = len(report["levels"][0]["shape"])
     each = KEEP * channels * WINDOW**axes
-    return sum(float(prod(level["shape"])) * level["iterations"] * each for level in report["levels"])
+    return sum(float(prod(level["shape"])) * level["passes"] / 2 * each for level in report["levels"])
 
 
 def rate() -> float:
