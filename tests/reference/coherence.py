@@ -55,7 +55,10 @@ class Exemplar:
     def bring(self, place):
         out = []
         for x, n, w, b in zip(place, self.shape, self.wrap, self.border, strict=True):
-            out.append(x % (n * ONE) if w else min(max(x, b * ONE), (n - 1 - b) * ONE))
+            near = (x + ONE // 2) // ONE
+            # Only from where the nearest sample is outside: fractions are kept.
+            held = x if b <= near < n - b else min(max(near, b), n - 1 - b) * ONE
+            out.append(x % (n * ONE) if w else held)
         return tuple(out)
 
     def vector(self, sample):
