@@ -1,12 +1,13 @@
 from collections.abc import Callable, Sequence
 from typing import Any, Final, final
 
-from numpy import bool_, float32, int16, int32, int64, uint8, uint16, uint32
+from numpy import bool_, float32, float64, int16, int32, int64, uint8, uint16, uint32
 from numpy.typing import NDArray
 
 __all__ = [
     "VERSION",
     "Appearance",
+    "Cholesky",
     "PatchIndex",
     "cohere",
     "complete",
@@ -26,6 +27,8 @@ __all__ = [
     "similar",
     "uniform",
     "upsample",
+    "warp_mesh",
+    "warp_points",
 ]
 
 VERSION: Final[str]
@@ -222,6 +225,7 @@ def cohere(
     place: tuple[Sequence[int], Sequence[int], Sequence[bool]],
     frames: NDArray[int16],
     held: NDArray[bool_],
+    kinds: tuple[NDArray[uint8], NDArray[uint8]],
     passes: int,
     numbers: int,
     compensated: bool,
@@ -234,3 +238,25 @@ def jitter(
     seed: int,
     level: int,
 ) -> NDArray[int32]: ...
+
+@final
+class Cholesky:
+    def __new__(
+        cls, starts: NDArray[uint32], rows: NDArray[uint32], values: NDArray[float64], limit: int
+    ) -> Cholesky: ...
+    @property
+    def size(self) -> int: ...
+    @property
+    def entries(self) -> int: ...
+    def solve(self, sides: NDArray[float64]) -> NDArray[float64]: ...
+
+def warp_mesh(
+    source: tuple[int, int],
+    target: NDArray[float64],
+    weight: NDArray[uint8],
+    shape: tuple[int, int],
+    progress: Callable[[float], object] | None,
+) -> tuple[NDArray[float32], NDArray[uint32], tuple[int, int, int]]: ...
+def warp_points(
+    source: NDArray[float64], target: NDArray[float64], shape: tuple[int, int]
+) -> tuple[tuple[NDArray[float32], NDArray[uint32], tuple[int, int, int]], NDArray[uint32]]: ...

@@ -10,6 +10,7 @@
 //! | [`hash`] | counter-based noise: randomness belongs to the position, never to a stream |
 //! | [`fixed`] | coordinates and frames in fixed point |
 //! | [`pca`] | principal components |
+//! | [`sparse`] | symmetric positive definite systems: factored once, solved many times |
 //! | [`appearance`] | what the surroundings of each sample of an exemplar look like |
 //! | [`guide`] | what an output is asked to show beside looking like the exemplar |
 //! | [`blocks`] | a coherent start: cells filled by pieces that fit |
@@ -22,6 +23,7 @@
 //! | [`patch_search`] | exact best matches of a masked patch |
 //! | [`poisson`] | images from their differences, near given values |
 //! | [`complete`] | filling holes by example |
+//! | [`warp`] | where each pixel comes from, of pictures warped by moved points |
 //! | [`image_io`] | 8/16-bit and float image files, with limits |
 //!
 //! `py` is the door to Python; nothing here imports it.
@@ -35,6 +37,7 @@ pub mod hash;
 pub mod image_io;
 pub mod par;
 pub mod pca;
+pub mod sparse;
 
 pub mod appearance;
 pub mod blocks;
@@ -48,6 +51,7 @@ pub mod patch_search;
 pub mod poisson;
 pub mod pyramid;
 pub mod seam;
+pub mod warp;
 
 #[cfg(feature = "python")]
 mod py;

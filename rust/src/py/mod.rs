@@ -11,6 +11,8 @@ mod patch_search;
 mod poisson;
 mod seam;
 mod solid;
+mod sparse;
+mod warp;
 
 use std::cell::Cell;
 use std::time::Duration;
@@ -101,6 +103,10 @@ mod _rust {
     use super::set_threads;
     #[pymodule_export]
     use super::solid::{Appearance, upsample};
+    #[pymodule_export]
+    use super::sparse::Cholesky;
+    #[pymodule_export]
+    use super::warp::{warp_mesh, warp_points};
 
     #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");

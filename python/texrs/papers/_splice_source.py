@@ -1,0 +1,228 @@
+"""The texture that gives the texels, going on beyond its borders, for `texrs.papers.splice`.
+
+Whatever is spliced must bring texels from outside of the picture: the layout that it takes may be denser, and its own rim
+is moved into the output. The picture goes on around its ends where it wraps, and is reflected where it does not. Then
+texels of disjoint foregrounds are turned back, so that none is mirrored, and those that the border cuts are left out.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Bools, Labels
+from texrs.errors import InvalidInput
+from texrs.matching import Fold, Layout
+from texrs.texels import Texels
+
+__all__ = ["Extended", "Parts", "extend", "parts_of"]
+
+Points = NDArray[np.float64]
+Places = NDArray[np.int32]
+
+RIM = 2
+"""Pixels around a texel that move with it: its antialiased rim and shadow."""
+SMALLEST = 0.25
+"""Foreground without a texel of its own is one if it has so much of the median texel's area."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Parts:
+    """The foreground of a texture, texel by texel.
+
+    Attributes
+    ----------
+    points : (n, 2) float64
+        Centres; of foreground that no texel claims too, after those of the entry.
+    region : (H, W) int32
+        The texel of each foreground pixel, counted from 1; 0 elsewhere.
+    core : (H, W) int32
+        The same without the rim.
+    whole : (n) bool
+        Whether the border leaves a texel whole.
+
+    """
+
+    points: Points
+    region: Labels
+    core: Labels
+    whole: Bools
+
+
+_PARTS: OrderedDict[int, tuple[Texels, Parts]] = OrderedDict()
+
+
+def parts_of(entry: Texels) -> Parts:
+    """Tell the texels of a disjoint foreground apart: by component, and within one by the nearest texel."""
+    kept = _PARTS.get(id(entry))
+    if kept is not None and kept[0] is entry:
+        return kept[1]
+    made = _parts(entry)
+    _PARTS[id(entry)] = (entry, made)
+    while len(_PARTS) > 8:
+        _PARTS.popitem(last=False)
+    return made
+
+
+def _parts(entry: Texels) -> Parts:
+    from scipy.ndimage import center_of_mass, distance_transform_edt, label
+    from skimage.segmentation import expand_labels, watershed
+
+    mask, points = np.asarray(entry.mask, bool), np.asarray(entry.points, np.float64)
+    shape = np.array(mask.shape)
+    component, count = label(mask)
+    at = np.clip(np.rint(points).astype(np.intp), 0, shape - 1)
+    owner = component[at[:, 0], at[:, 1]]
+    claims = np.bincount(owner, minlength=count + 1)
+    area = np.bincount(component.ravel(), minlength=count + 1)
+    usual = float(np.median(area[1:][claims[1:] > 0])) if (claims[1:] > 0).any() else float(mask.sum() / len(points))
+    orphans = [c for c in range(1, count + 1) if claims[c] == 0 and area[c] >= SMALLEST * usual]
+    if orphans:
+        points = np.concatenate([points, np.array(center_of_mass(mask, component, orphans))])
+        owner = np.concatenate([owner, orphans])
+        claims[orphans] = 1
+    # One texel, one component: nothing to divide.
+    number = np.zeros(count + 1, np.int32)
+    number[owner[claims[owner] == 1]] = np.flatnonzero(claims[owner] == 1) + 1
+    number[0] = 0
+    core = number[component]
+    shared = (claims[component] > 1) & mask
+    if shared.any():
+        markers = np.zeros(mask.shape, np.int32)
+        several = np.flatnonzero((claims[owner] > 1) & (owner > 0))
+        spots = np.clip(np.rint(points[several]).astype(np.intp), 0, shape - 1)
+        markers[spots[:, 0], spots[:, 1]] = several + 1
+        core = np.where(shared, watershed(-distance_transform_edt(mask), markers, mask=shared), core)
+    core = _parted(core.astype(np.int32))
+    region = _parted(expand_labels(core, RIM).astype(np.int32))
+    edges = [core[0], core[-1]] if not entry.wrap[0] else []
+    edges += [core[:, 0], core[:, -1]] if not entry.wrap[1] else []
+    cut = np.unique(np.concatenate(edges)) if edges else np.zeros(0, np.int32)
+    whole = np.bincount(core.ravel(), minlength=len(points) + 1)[1:] > 0
+    whole[cut[cut > 0] - 1] = False
+    return Parts(points, region, core, whole)
+
+
+def _parted(region: Labels) -> Labels:
+    """Open a gap of a pixel between regions that touch."""
+    gap = np.zeros(region.shape, bool)
+    for axis in range(2):
+        a, b = (np.moveaxis(x, axis, 0) for x in (region, gap))
+        b[:-1] |= (a[:-1] != a[1:]) & (a[:-1] > 0) & (a[1:] > 0)
+    return np.where(gap, 0, region)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Extended:
+    """A texture that goes on beyond its borders.
+
+    Attributes
+    ----------
+    origin : (int, int)
+        Row and column of its first pixel in the output.
+    table : (H, W, 2) int32
+        The pixel of the texture that each one shows.
+    mask : (H, W) bool
+        The foreground.
+    points : (n, 2) float64
+        Texels that may be moved, in the output.
+    of : (n) int
+        Which texel of the texture each one is.
+    instance : (H, W) int32
+        Of a disjoint foreground: the one of ``points`` that a pixel moves with, counted from 1; 0 elsewhere.
+    stray : (H, W) bool
+        Foreground that moves with none: cut by the border, or left over where a texel was turned back.
+    mirrored : (H, W, 2) bool
+        Along which axes what a pixel shows is mirrored.
+
+    """
+
+    origin: tuple[int, int]
+    table: Places
+    mask: Bools
+    points: Points
+    of: NDArray[np.intp]
+    instance: Labels
+    stray: Bools
+    mirrored: Bools
+
+
+def extend(entry: Texels, size: tuple[int, int], margin: int) -> Extended:
+    """Let a texture go on so far beyond an output that is centred on it."""
+    shape = np.array(entry.mask.shape)
+    offset = (np.array(size) - shape) // 2  # Of the picture in the output.
+    disjoint = entry.tag == "F=d"
+    points = parts_of(entry).points if disjoint else np.asarray(entry.points, np.float64)
+    if disjoint:
+        # What the border cuts is left out, so every pixel may be kept.
+        ends = [(-0.5, n - 0.5) if w else (0.0, n - 1.0) for n, w in zip(shape, entry.wrap, strict=True)]
+        folds = [Fold(*e, w) for e, w in zip(ends, entry.wrap, strict=True)]
+        layout = Layout(points, (folds[0], folds[1]), 0.0)
+    else:
+        layout = Layout.of(points, entry.mask.shape, entry.wrap, beyond=False)
+    first = np.minimum(-margin, offset)
+    last = np.maximum(np.array(size) + margin, offset + shape)
+    along = [layout.folds[a].apply(np.arange(first[a], last[a]) - float(offset[a])) for a in range(2)]
+    rows, columns = (np.rint(x).astype(np.int32) for x, _ in along)
+    table = np.stack(np.broadcast_arrays(rows[:, None], columns[None]), axis=-1)
+    mirrored = np.stack(np.broadcast_arrays(along[0][1][:, None], along[1][1][None]), axis=-1)
+    mask = entry.mask[rows[:, None], columns[None]]
+    low, high = (first - offset).astype(float), (last - 1 - offset).astype(float)
+    places, of, flips = layout.within(low, high)
+    places += offset - first
+    if not disjoint:
+        none = np.zeros(mask.shape, np.int32)
+        return Extended((int(first[0]), int(first[1])), table, mask, places + first, of, none, none > 0, mirrored)
+    return _stamp(entry, table.copy(), mask, mirrored, places, of, flips, first)
+
+
+def _stamp(
+    entry: Texels,
+    table: Places,
+    mask: Bools,
+    mirrored: Bools,
+    places: Points,
+    of: NDArray[np.intp],
+    flips: Bools,
+    first: NDArray[np.intp],
+) -> Extended:
+    """Put every whole texel where the extended picture has it, the right way round."""
+    parts = parts_of(entry)
+    shape = np.array(entry.mask.shape)
+    known = parts.region[table[..., 0], table[..., 1]] > 0
+    turned = mirrored.any(axis=-1) & known
+    # Mirrored texels make room for those that are turned back.
+    instance = np.zeros(mask.shape, np.int32)
+    order = np.argsort(parts.region, axis=None, kind="stable")
+    begin = np.searchsorted(parts.region.ravel()[order], np.arange(len(parts.points) + 2))
+    limits = np.array(mask.shape)
+    kept = []
+    for k in np.flatnonzero(parts.whole[of]):
+        i = int(of[k])
+        flat = order[begin[i + 1] : begin[i + 2]]
+        pixels = np.stack(np.divmod(flat, shape[1]), axis=-1)
+        centre = parts.points[i]
+        away = pixels - np.rint(centre).astype(np.intp)
+        away -= np.where(entry.wrap, np.rint(away / shape).astype(np.intp) * shape, 0)
+        there = np.rint(places[k]).astype(np.intp) + away
+        if (there < 0).any() or (there >= limits).any():
+            continue
+        y, x = there.T
+        free = instance[y, x] == 0
+        if np.count_nonzero(free) < 0.9 * len(free):
+            continue
+        kept.append(k)
+        instance[y[free], x[free]] = len(kept)
+        if flips[k].any():
+            table[y[free], x[free]] = pixels[free]
+    stray = (turned | known | mask) & (instance == 0)
+    if not kept:
+        raise InvalidInput("a: the border cuts every texel; splicing needs some that are whole")
+    chosen = np.array(kept)
+    shown = entry.mask[table[..., 0], table[..., 1]]
+    return Extended(
+        (int(first[0]), int(first[1])), table, shown, places[chosen] + first, of[chosen], instance, stray, mirrored
+    )

@@ -1,0 +1,197 @@
+"""The deformation of `texrs.papers.splice`: section 4.2, Eq. 5, Table 1 and Figure 5.
+
+Displacements are those of least energy, the one along an axis apart from the other. The matrix of the energy depends on
+what is rigid and on which points are pinned, not on where they go, so its factor is kept for the next splice.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from collections import OrderedDict
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Bools, Labels
+from texrs.errors import InvalidInput
+from texrs.kernels.sparse import Cholesky
+
+__all__ = ["carried", "energy", "stretched"]
+
+Points = NDArray[np.float64]
+
+GOAL, RIGID = 1e4, 1e2
+"""lambda_G and lambda_R (section 4.2)."""
+LOOSE = 1e-2
+"""Weight of the equations of what is not rigid: without them it would have none, and nothing would move."""
+KEPT = 1 << 29
+"""Bytes of factors that are kept."""
+
+_FACTORS: OrderedDict[bytes, Cholesky] = OrderedDict()
+_LOCK = threading.Lock()
+
+
+def factor(key: bytes, matrix: Callable[[], Any]) -> Cholesky:
+    """Give the factor of a matrix, kept by what it is made from."""
+    with _LOCK:
+        if key in _FACTORS:
+            _FACTORS.move_to_end(key)
+            return _FACTORS[key]
+    made = Cholesky(matrix())
+    with _LOCK:
+        _FACTORS[key] = made
+        while len(_FACTORS) > 1 and sum(f.nbytes for f in _FACTORS.values()) > KEPT:
+            _FACTORS.popitem(last=False)
+    return made
+
+
+def _key(*parts: object) -> bytes:
+    digest = hashlib.blake2b(digest_size=16, person=b"texrs.splice")
+    for part in parts:
+        if isinstance(part, np.ndarray):
+            digest.update(repr((part.shape, part.dtype.str)).encode())
+            digest.update(np.ascontiguousarray(part).data)
+        else:
+            digest.update(repr(part).encode())
+    return digest.digest()
+
+
+# --- disjoint foreground: texels move whole --------------------------------------------------------------------------
+
+
+def carried(instance: Labels, shift: Points) -> NDArray[np.float64]:
+    """Give the displacement of every pixel where texels move whole, and the ground between them goes along smoothly.
+
+    The limit of Eq. 5 for lambda_G and lambda_R without bound and epsilon = 0: each texel moves by its own pin alone. What
+    is left is the ground, whose displacement is harmonic: no pixel moves further than the texels around it.
+
+    Parameters
+    ----------
+    instance : (H, W) int32
+        The texel of each pixel, counted from 1; 0 on the ground.
+    shift : (n, 2) float64
+        How far each texel moves.
+
+    Returns
+    -------
+    (H, W, 2) float64
+
+    """
+    shape = instance.shape
+    free = instance == 0
+    out = np.zeros((*shape, 2))
+    out[~free] = shift[instance[~free] - 1]
+    if not free.any():
+        return out
+    number = np.full(shape, -1, np.int64)
+    number[free] = np.arange(np.count_nonzero(free))
+    solver = factor(_key("carried", np.packbits(free), shape), lambda: _laplacian(free, number))
+    flow = np.zeros((*shape, 2))
+    for axis in range(2):
+        o, f, i = (np.moveaxis(a, axis, 0) for a in (flow, free, out))
+        # What a texel's pixel hands to the ground beside it.
+        o[:-1] += np.where((f[:-1] & ~f[1:])[..., None], i[1:], 0.0)
+        o[1:] += np.where((f[1:] & ~f[:-1])[..., None], i[:-1], 0.0)
+    out[free] = solver.solve(flow[free])
+    return out
+
+
+def _laplacian(free: Bools, number: NDArray[np.int64]) -> Any:
+    from scipy.sparse import coo_array
+
+    count = int(np.count_nonzero(free))
+    degree = np.zeros(free.shape)
+    rows, columns = [], []
+    for axis in range(2):
+        d, f, n = (np.moveaxis(a, axis, 0) for a in (degree, free, number))
+        d[:-1] += 1
+        d[1:] += 1
+        both = f[:-1] & f[1:]
+        columns.append(n[:-1][both])
+        rows.append(n[1:][both])
+    below, left = np.concatenate(rows), np.concatenate(columns)
+    own = np.arange(count)
+    values = np.concatenate([degree[free], np.full(len(below), -1.0)])
+    at = (np.concatenate([own, np.maximum(below, left)]), np.concatenate([own, np.minimum(below, left)]))
+    return coo_array((values, at), shape=(count, count)).tocsc()
+
+
+# --- connected figures: the energy itself ----------------------------------------------------------------------------
+
+
+def stretched(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upright: bool, method: str = "") -> NDArray[np.float64]:
+    """Give the displacement of every pixel that minimises Eq. 5.
+
+    Parameters
+    ----------
+    rigid : (H, W) bool
+        M of Table 1: the foreground of ``F=c`` and ``F=d``, the background of ``B=c``.
+    pins : (n, 2) int
+        The pixels of C_A.
+    shift : (n, 2) float64
+        How far each goes.
+    upright : bool
+        Table 1's last row, lambda_P = 0 and epsilon = 1: upright and level parts are decoupled, so that joints neither lean
+        nor change their width. Else lambda_P = 1 and epsilon = 1e-3.
+    method : str
+        Distinguishes matrices in the cache.
+
+    Returns
+    -------
+    (H, W, 2) float64
+
+    """
+    if not len(pins):
+        raise InvalidInput("a: has no texel in the picture to move")
+    shape = rigid.shape
+    at = pins[:, 0] * shape[1] + pins[:, 1]
+    out = np.empty((*shape, 2))
+    keys = [_key("stretched", np.packbits(rigid), shape, at, upright and axis, upright) for axis in (0, 1)]
+    for axis in (0, 1):
+        solver = factor(keys[axis], lambda axis=axis: energy(rigid, at, axis, upright=upright))  # type: ignore[misc]
+        right = np.zeros(rigid.size)
+        np.add.at(right, at, GOAL * shift[:, axis])
+        out[..., axis] = solver.solve(right).reshape(shape)
+    return out
+
+
+def energy(rigid: Bools, pins: NDArray[np.intp], axis: int, *, upright: bool, loose: float = LOOSE) -> Any:
+    """Give the matrix of Eq. 5 for the displacement along an axis: lambda_G P + lambda_R (1 - U)^T w (1 - U)."""
+    from scipy.sparse import dia_array
+
+    coupling, small = (0.0, 1.0) if upright else (1.0, 1e-3)
+    size, columns = rigid.size, rigid.shape[1]
+    u = weights(rigid, axis, coupling, small)
+    u /= u.sum(axis=0)
+    root = np.sqrt(RIGID * np.where(rigid, 1.0, loose))
+    steps = (-columns, columns, -1, 1)
+    # A diagonal is stored by its columns.
+    bands = [root.ravel(), *(np.roll(-(root * b).ravel(), step) for b, step in zip(u, steps, strict=True))]
+    equations = dia_array((np.array(bands), [0, *steps]), shape=(size, size)).tocsr()
+    goal = dia_array((np.bincount(pins, minlength=size)[None] * GOAL, [0]), shape=(size, size))
+    return (equations.T @ equations + goal).tocsc()
+
+
+def weights(rigid: Bools, axis: int, coupling: float, small: float) -> NDArray[np.float64]:
+    """Give u_pq of each pixel p and its neighbours q above, below, left and right; 0 where there is none.
+
+    Table 1 and Figure 5 are worded for the displacement along columns; along rows the axes change places.
+    """
+    m = rigid if axis == 1 else rigid.T
+    h, w = m.shape
+    # Outside counts as rigid for Figure 5.
+    left = np.pad(m, ((0, 0), (1, 0)), constant_values=True)[:, :-1]
+    right = np.pad(m, ((0, 0), (0, 1)), constant_values=True)[:, 1:]
+    value = m + small
+    u = np.zeros((4, h, w))
+    u[2, :, 1:] = value[:, :-1]
+    u[3, :, :-1] = value[:, 1:]
+    top, bottom = m[:-1], m[1:]
+    edge = top & bottom & ((~left[:-1] & ~left[1:]) | (~right[:-1] & ~right[1:]))
+    together = np.where(edge | (~top & ~bottom), 1.0, coupling)
+    u[0, 1:] = together * value[:-1]
+    u[1, :-1] = together * value[1:]
+    return u if axis == 1 else np.ascontiguousarray(u.transpose(0, 2, 1)[[2, 3, 0, 1]])
