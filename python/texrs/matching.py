@@ -24,8 +24,12 @@ NEIGHBOURS = 5
 """k of the scale normalisation: the paper says between 4 and 6."""
 MERGE = 0.6
 """Points nearer than this, in spacings, that meet where a point set is folded are one."""
-PEAK = 1.5
-"""How far a direction must stand out from the median one."""
+PEAK, CLEAR = 1.3, 6.0
+"""How far a direction must stand out: from the median one, and in spreads of all directions."""
+FINE, COARSE = 0.15, 0.8
+"""Widths, in spacings, of the Gaussians that points are drawn as: lines show at the first, outlines at both."""
+WIDE_BINS = 64
+"""Room at the ends for the wider ones."""
 
 
 def nearest(points: Points, count: int, among: Points | None = None) -> Points:
@@ -85,20 +89,22 @@ def directions(points: Points, *, most: int = 3) -> tuple[float, ...]:
     step = 0.05 * scale
     angles = np.radians(np.arange(180))
     across = disc @ np.stack([np.cos(angles), -np.sin(angles)])
-    bins = np.rint((across - across.min()) / step).astype(np.intp)
-    width = int(bins.max()) + 1
+    bins = np.rint((across - across.min()) / step).astype(np.intp) + WIDE_BINS
+    width = int(bins.max()) + 1 + WIDE_BINS
     counts = np.bincount((bins + np.arange(180) * width).ravel(), minlength=180 * width).reshape(180, width)
-    seen = gaussian_filter1d(counts.astype(np.float64), 0.15 * scale / step, axis=1, mode="constant")
-    reach = max(2.0, float(np.hypot(*disc.T).max()) / step)
-    # What a round cloud without lines would give is not structure.
-    smooth = gaussian_filter1d(seen, min(1.5 * scale / step, reach), axis=1, mode="constant")
-    power = ((seen - smooth) ** 2).sum(axis=1)
-    floor = float(np.median(power))
+    fine, coarse = (
+        s * (gaussian_filter1d(counts.astype(np.float64), s / 0.05, axis=1, mode="constant") ** 2).sum(axis=1)
+        for s in (FINE, COARSE)
+    )
+    # Against the outline of the whole: a cloud without lines varies as much at both widths.
+    power = fine / coarse
+    usual = float(np.median(power))
+    spread = 1.4826 * float(np.median(np.abs(power - usual)))
     found: list[tuple[float, float]] = []
     for k in range(180):
-        around = power[np.arange(k - 4, k + 5) % 180]
-        if power[k] >= around.max() and power[k] > PEAK * floor:
-            found.append((-float(power[k]), float(k)))
+        around = power[np.arange(k - 6, k + 7) % 180]
+        if power[k] >= around.max() and power[k] > max(PEAK * usual, usual + CLEAR * spread):
+            found.append((-round(float(power[k]), 9), float(k)))
     return tuple(angle for _, angle in sorted(found)[:most])
 
 

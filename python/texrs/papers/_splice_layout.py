@@ -29,6 +29,8 @@ MARGIN = 2.0
 """The texture goes on for so many of its spacings beyond the output, or for more."""
 SPARE = 1.2
 """Texels there should be for each target."""
+TURN = 0.85
+"""A turn must cost so much less than a smaller one: lattices have several that cost nearly the same."""
 ROOM = 1.08
 """Least distance of texels in their diameters."""
 
@@ -134,8 +136,7 @@ def matched(a: Texels, b: Texels, size: tuple[int, int], *, align: bool, packed:
                 "take a smaller size or a larger picture"
             )
         of, cost = match(source.points, wanted)
-        # Of turns that cost nearly the same the smallest is taken.
-        if best is None or cost < 0.98 * best.cost:
+        if best is None or cost < TURN * best.cost:
             best = Match(wanted, source, of, scale * gain, angle, gain, cost)
     assert best is not None  # the first turn is always tried
     if best.source is not source:

@@ -6,12 +6,12 @@ the texture that it shows, and those that may change take what fits their neighb
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import guidance
+from texrs._arrays import as_image, guidance
 from texrs._progress import stage
 from texrs._typing import Bools, Progress
 from texrs.analysis import COARSEST, Analysis, analyse, similarity
@@ -51,6 +51,8 @@ class Draft:
         Of the texture's pixels: what may take the place of what. Ground is 0.
     wanted : (H, W) uint8
         The kind that each pixel is to show.
+    mirrored : (H, W, 2) bool
+        Along which axes the texture is mirrored there.
 
     """
 
@@ -59,6 +61,7 @@ class Draft:
     fixed: Bools
     kinds: Kinds
     wanted: Kinds
+    mirrored: Bools
 
 
 def fill(image: NDArray[np.generic], draft: Draft, scale: float, seed: int, progress: Progress | None) -> Draft:
@@ -72,7 +75,7 @@ def fill(image: NDArray[np.generic], draft: Draft, scale: float, seed: int, prog
     if holes.all():
         ground = np.argwhere(draft.kinds == 0)
         places[...] = ground[np.random.default_rng(seed).integers(len(ground), size=holes.shape)]
-        return Draft(places, holes, draft.fixed, draft.kinds, draft.wanted)
+        return replace(draft, places=places, known=holes, mirrored=np.zeros_like(draft.mirrored))
     depth, near = distance_transform_edt(holes, return_indices=True)
     ground = draft.kinds == 0
     if float(depth.max()) > 0.5 * WIDE * scale:
@@ -91,14 +94,14 @@ def fill(image: NDArray[np.generic], draft: Draft, scale: float, seed: int, prog
     if len(choices):
         there[~sound] = choices[np.random.default_rng(seed).integers(len(choices), size=np.count_nonzero(~sound))]
     places[holes] = np.clip(there, 0, limits - 1)
-    return Draft(places, np.ones_like(holes), draft.fixed, draft.kinds, draft.wanted)
+    return replace(draft, places=places, known=np.ones_like(holes), mirrored=draft.mirrored & ~holes[..., None])
 
 
 def _patches(
     image: NDArray[np.generic], draft: Draft, ground: Bools, scale: float, seed: int, progress: Progress | None
 ) -> Draft | None:
     """Fill the holes with patches of the ground alone, or give nothing where it has no place for a patch."""
-    guide = guidance(image)
+    guide = guidance(as_image(image))
     for side in range(int(np.clip(scale / 2, 6, 24)), 3, -1):
         allowed = corners(ground, side)
         if np.count_nonzero(allowed) >= 32:
@@ -119,7 +122,7 @@ def _patches(
     places = draft.places.copy()
     new = ~draft.known
     places[new] = np.rint(found.coordinates[new]).astype(np.int32)
-    return Draft(places, np.ones_like(new), draft.fixed, draft.kinds, draft.wanted)
+    return replace(draft, places=places, known=np.ones_like(new), mirrored=draft.mirrored & draft.known[..., None])
 
 
 def analysed(image: NDArray[np.generic], wrap: tuple[bool, bool]) -> Analysis:
@@ -159,13 +162,11 @@ def refine(
         half = (places[pick] - ONE // 2) // 2
         kinds = _halved(draft.kinds)
         half = _corrected(
-            analysis, 0, half, coarse, draft.fixed[pick], kinds, draft.wanted[pick], reach / 2, passes, seed, progress
+            analysis, 0, half, coarse, sampled(draft, pick, kinds), reach / 2, passes, seed, progress
         )
-        grown = upsample(half.reshape(-1), coarse, fine, to_fixed(None, fine)).reshape(*size, 2)
+        grown = upsample(half.reshape(-1), coarse, fine, frames(draft.mirrored)).reshape(*size, 2)
         places = np.where(draft.fixed[..., None], places, grown)
-    found = _corrected(
-        analysis, 1, places, fine, draft.fixed, draft.kinds, draft.wanted, reach / 2, passes, seed, progress
-    )
+    found = _corrected(analysis, 1, places, fine, draft, reach / 2, passes, seed, progress)
     result = (found + ONE // 2) // ONE
     limits = np.array(image.shape[:2])
     result = np.where(wrap, result % limits, np.clip(result, 0, limits - 1)).astype(np.int32)
@@ -181,14 +182,29 @@ def _halved(kinds: Kinds) -> Kinds:
     return found
 
 
+def sampled(draft: Draft, pick: tuple[slice, ...], kinds: Kinds) -> Draft:
+    """Give what is asked of every other pixel."""
+    return Draft(
+        draft.places[pick], draft.known[pick], draft.fixed[pick], kinds, draft.wanted[pick], draft.mirrored[pick]
+    )
+
+
+def frames(mirrored: Bools) -> NDArray[np.int16]:
+    """Give the Jacobian of each pixel: 1 or -1 along each axis."""
+    if not mirrored.any():
+        return np.asarray(np.eye(2)[None] * ONE, np.int16)
+    out = np.zeros((mirrored.shape[0] * mirrored.shape[1], 2, 2), np.int16)
+    for axis in range(2):
+        out[:, axis, axis] = np.where(mirrored[..., axis].ravel(), -ONE, ONE)
+    return out
+
+
 def _corrected(
     analysis: Analysis,
     level: int,
     places: Places,
     region: Region,
-    fixed: Bools,
-    kinds: Kinds,
-    wanted: Kinds,
+    draft: Draft,
     reach: float,
     passes: int,
     seed: int,
@@ -201,17 +217,17 @@ def _corrected(
     sets = similarity(analysis, number, k=K, n=max(3, apart))
     flat = places.reshape(-1).astype(np.int32)
     moved = jitter(flat, region, reach, seed=seed, level=level)
-    free = np.repeat(~fixed.ravel() & (wanted.ravel() == 0), 2)
+    free = np.repeat(~draft.fixed.ravel() & (draft.wanted.ravel() != 1), 2)
     flat = np.where(free, moved, flat)
     found = correct(
         here,
         sets,
         flat,
         region,
-        to_fixed(None, region),
+        frames(draft.mirrored),
         passes=passes,
-        held=fixed.ravel(),
-        kinds=(np.ascontiguousarray(kinds).ravel(), np.ascontiguousarray(wanted).ravel()),
+        held=draft.fixed.ravel(),
+        kinds=(draft.kinds, draft.wanted),
         progress=stage(progress, f"refine {level + 1} of 2"),
     )
     return found.reshape(*region.shape, 2)

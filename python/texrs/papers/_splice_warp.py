@@ -27,6 +27,8 @@ GOAL, RIGID = 1e4, 1e2
 """lambda_G and lambda_R (section 4.2)."""
 LOOSE = 1e-2
 """Weight of the equations of what is not rigid: without them it would have none, and nothing would move."""
+TIE = 1e-3
+"""Weight of equal displacements of neighbours: long joints that nothing else holds do not slide freely."""
 KEPT = 1 << 29
 """Bytes of factors that are kept."""
 
@@ -171,8 +173,24 @@ def energy(rigid: Bools, pins: NDArray[np.intp], axis: int, *, upright: bool, lo
     # A diagonal is stored by its columns.
     bands = [root.ravel(), *(np.roll(-(root * b).ravel(), step) for b, step in zip(u, steps, strict=True))]
     equations = dia_array((np.array(bands), [0, *steps]), shape=(size, size)).tocsr()
-    goal = dia_array((np.bincount(pins, minlength=size)[None] * GOAL, [0]), shape=(size, size))
-    return (equations.T @ equations + goal).tocsc()
+    goal = np.bincount(pins, minlength=size) * GOAL
+    return (equations.T @ equations + dia_array(ties(rigid.shape, goal), shape=(size, size))).tocsc()
+
+
+def ties(shape: tuple[int, ...], goal: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[int]]:
+    """Give the diagonals of lambda_G P, and of the weak ties between all neighbours."""
+    diagonal = goal.reshape(shape).copy()
+    below, right = np.zeros(shape), np.zeros(shape)
+    below[1:], right[:, 1:] = -TIE, -TIE
+    for axis in range(2):
+        d = np.moveaxis(diagonal, axis, 0)
+        d[:-1] += TIE
+        d[1:] += TIE
+    # Diagonals are stored by their columns; the matrix is symmetric.
+    upper = [below.ravel(), right.ravel()]
+    steps = [shape[1], 1]
+    lower = [np.roll(b, -s) for b, s in zip(upper, steps, strict=True)]
+    return np.array([diagonal.ravel(), *upper, *lower]), [0, *steps, *(-s for s in steps)]
 
 
 def weights(rigid: Bools, axis: int, coupling: float, small: float) -> NDArray[np.float64]:

@@ -237,11 +237,11 @@ def drafted(a: Texels, deformed: Deformed, warp: Warp) -> tuple[Draft, NDArray[n
         goal[deformed.moved.of + 1] = np.arange(1, len(deformed.moved.of) + 1)
         label = np.where(known, goal[source.instance[y, x]], 0).astype(np.uint32)
         kinds = ground_kinds(a)
-        return Draft(places, known, label > 0, kinds, np.zeros(known.shape, np.uint8)), label
+        return Draft(places, known, label > 0, kinds, np.zeros(known.shape, np.uint8), source.mirrored[y, x]), label
     rigid = np.asarray(a.mask if a.tag == "F=c" else ~a.mask)
     kinds = rigid.astype(np.uint8)
     wanted = np.where(known, kinds[places[..., 0], places[..., 1]], 255).astype(np.uint8)
-    return Draft(places, known, np.zeros(known.shape, bool), kinds, wanted), label
+    return Draft(places, known, known & (wanted == 1), kinds, wanted, source.mirrored[y, x]), label
 
 
 def ground_kinds(a: Texels) -> NDArray[np.uint8]:
