@@ -7,6 +7,7 @@ matched with texels of A.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,10 +17,11 @@ from numpy.typing import NDArray
 from texrs._typing import Bools
 from texrs.errors import InvalidInput
 from texrs.matching import Layout, directions, match, nearest, spacing
+from texrs.papers._splice_edit import Step, edited
 from texrs.papers._splice_source import Extended, extend, parts_of
 from texrs.texels import Texels
 
-__all__ = ["Match", "apart", "aligned", "matched", "packing", "targets"]
+__all__ = ["Match", "apart", "edited_match", "matched", "snapped", "void_of"]
 
 Points = NDArray[np.float64]
 
@@ -181,6 +183,34 @@ def apart(a: Texels, found: Match, *, rounds: int = 12, room: float = 1.0) -> Ma
     return replace(found, targets=at)
 
 
+def edited_match(a: Texels, steps: Sequence[Step]) -> tuple[Match, bool]:
+    """Match a texture with its own layout, edited; also tell whether the edit only lists moved points."""
+    points = parts_of(a).points if a.tag == "F=d" else np.asarray(a.points, np.float64)
+    trial = edited(points, len(points), steps)
+    shrink = math.prod(min(1.0, float(np.min(s.get("factor", 1.0)))) for s in steps if s["op"] == "scale")
+    far = float(np.abs(trial.points - points).max()) / shrink
+    size = (a.mask.shape[0], a.mask.shape[1])
+    if far > 4 * max(size):
+        raise InvalidInput(f"edit: moves texels by up to {far:.0f} pixels, four times the picture's size is allowed")
+    source = extend(a, size, math.ceil(MARGIN * spacing(points) + far), whole=False)
+    found = edited(source.points, source.own, steps)
+    kept = found.kept.copy()
+    if a.tag == "F=d":
+        shift = found.points - source.points
+        cut = parts_of(a).cut[source.of]
+        # The straight edge of a texel that the border cuts must not come into the picture.
+        # But where all goes one way the picture is moved as it is.
+        together = bool((np.ptp(shift, axis=0) < 1e-9).all())
+        inwards = (cut[:, :, 0] & (shift > 0.5)) | (cut[:, :, 1] & (shift < -0.5))
+        kept[: source.own] &= together | ~inwards[: source.own].any(axis=1)
+    of = np.flatnonzero(kept)
+    if not len(of):
+        raise InvalidInput("edit: leaves no texel")
+    moved = found.points[of]
+    cost = float(((moved - source.points[of]) ** 2).sum(axis=1).mean())
+    return Match(moved, source, of, 1.0, 0.0, 1.0, cost), found.listed
+
+
 def snapped(points: Points, reach: float) -> Points:
     """Bring points to common rows: those whose rows follow each other more closely than ``reach``."""
     order = np.argsort(points[:, 0], kind="stable")
@@ -198,6 +228,8 @@ def void_of(source: Extended, of: NDArray[np.intp], grown: int = 3) -> Bools:
 
     used = np.zeros(len(source.points) + 1, bool)
     used[of + 1] = True
-    gone = source.stray | ((source.instance > 0) & ~used[source.instance])
+    idle = (source.instance > 0) & ~used[source.instance]
+    # Of a picture that stays itself only what is taken out leaves a rim.
+    gone = idle if source.own else idle | source.stray
     wide = maximum_filter(gone.astype(np.uint8), 2 * grown + 1) > 0
-    return np.asarray(wide & ~used[source.instance])
+    return np.asarray((wide | source.stray) & ~used[source.instance])

@@ -41,15 +41,24 @@ class Parts:
         The texel of each foreground pixel, counted from 1; 0 elsewhere.
     core : (H, W) int32
         The same without the rim.
-    whole : (n) bool
-        Whether the border leaves a texel whole.
+    cut : (n, 2, 2) bool
+        Whether the border cuts a texel at the first or the last end of an axis.
+    there : (n) bool
+        Whether a texel has any foreground.
 
     """
 
     points: Points
     region: Labels
     core: Labels
-    whole: Bools
+    cut: Bools
+    there: Bools
+
+    @property
+    def whole(self) -> Bools:
+        """Whether the border leaves a texel whole."""
+        whole: Bools = self.there & ~self.cut.any(axis=(1, 2))
+        return whole
 
 
 _PARTS: OrderedDict[int, tuple[Texels, Parts]] = OrderedDict()
@@ -98,12 +107,13 @@ def _parts(entry: Texels) -> Parts:
         core = np.where(shared, watershed(-distance_transform_edt(mask), markers, mask=shared), core)
     core = _parted(core.astype(np.int32))
     region = _parted(expand_labels(core, RIM).astype(np.int32))
-    edges = [core[0], core[-1]] if not entry.wrap[0] else []
-    edges += [core[:, 0], core[:, -1]] if not entry.wrap[1] else []
-    cut = np.unique(np.concatenate(edges)) if edges else np.zeros(0, np.int32)
-    whole = np.bincount(core.ravel(), minlength=len(points) + 1)[1:] > 0
-    whole[cut[cut > 0] - 1] = False
-    return Parts(points, region, core, whole)
+    cut = np.zeros((len(points), 2, 2), bool)
+    for axis, side in np.ndindex(2, 2):
+        if not entry.wrap[axis]:
+            found = np.unique(np.take(core, -side, axis=axis))
+            cut[found[found > 0] - 1, axis, side] = True
+    there = np.bincount(core.ravel(), minlength=len(points) + 1)[1:] > 0
+    return Parts(points, region, core, cut, there)
 
 
 def _parted(region: Labels) -> Labels:
@@ -137,6 +147,8 @@ class Extended:
         Foreground that moves with none: cut by the border, or left over where a texel was turned back.
     mirrored : (H, W, 2) bool
         Along which axes what a pixel shows is mirrored.
+    own : int
+        How many of the points are of the picture itself, in its order; they come first. 0 where that was not asked for.
 
     """
 
@@ -148,16 +160,20 @@ class Extended:
     instance: Labels
     stray: Bools
     mirrored: Bools
+    own: int = 0
 
 
-def extend(entry: Texels, size: tuple[int, int], margin: int) -> Extended:
-    """Let a texture go on so far beyond an output that is centred on it."""
+def extend(entry: Texels, size: tuple[int, int], margin: int, *, whole: bool = True) -> Extended:
+    """Let a texture go on so far beyond an output that is centred on it.
+
+    With ``whole=False`` every pixel and every texel of the picture itself is kept, also those that the border cuts.
+    """
     shape = np.array(entry.mask.shape)
     offset = (np.array(size) - shape) // 2  # Of the picture in the output.
     disjoint = entry.tag == "F=d"
     points = parts_of(entry).points if disjoint else np.asarray(entry.points, np.float64)
-    if disjoint:
-        # What the border cuts is left out, so every pixel may be kept.
+    if disjoint or not whole:
+        # Cut texels are left out, or wanted, so every pixel may be kept.
         ends = [(-0.5, n - 0.5) if w else (0.0, n - 1.0) for n, w in zip(shape, entry.wrap, strict=True)]
         folds = [Fold(*e, w) for e, w in zip(ends, entry.wrap, strict=True)]
         layout = Layout(points, (folds[0], folds[1]), 0.0)
@@ -172,11 +188,17 @@ def extend(entry: Texels, size: tuple[int, int], margin: int) -> Extended:
     mask = entry.mask[rows[:, None], columns[None]]
     low, high = (first - offset).astype(float), (last - 1 - offset).astype(float)
     places, of, flips = layout.within(low, high)
-    places += offset - first
+    inside = ((places >= -0.5) & (places <= shape - 0.5)).all(axis=1) & ~flips.any(axis=1)
+    if not whole:
+        # Those of the picture, in its order.
+        order = np.lexsort((np.arange(len(of)), np.where(inside, of, 0), ~inside))
+        places, of, flips, inside = places[order], of[order], flips[order], inside[order]
+    own = 0 if whole else int(np.count_nonzero(inside))
+    places = places + (offset - first)
     if not disjoint:
         none = np.zeros(mask.shape, np.int32)
-        return Extended((int(first[0]), int(first[1])), table, mask, places + first, of, none, none > 0, mirrored)
-    return _stamp(entry, table.copy(), mask, mirrored, places, of, flips, first)
+        return Extended((int(first[0]), int(first[1])), table, mask, places + first, of, none, none > 0, mirrored, own)
+    return _stamp(entry, table.copy(), mask, mirrored, (places, of, flips), first, own)
 
 
 def _stamp(
@@ -184,12 +206,12 @@ def _stamp(
     table: Places,
     mask: Bools,
     mirrored: Bools,
-    places: Points,
-    of: NDArray[np.intp],
-    flips: Bools,
+    copies: tuple[Points, NDArray[np.intp], Bools],
     first: NDArray[np.intp],
+    own: int,
 ) -> Extended:
-    """Put every whole texel where the extended picture has it, the right way round."""
+    """Put every whole texel where the extended picture has it, the right way round; the first ``own`` ones in any case."""
+    places, of, flips = copies
     parts = parts_of(entry)
     shape = np.array(entry.mask.shape)
     known = parts.region[table[..., 0], table[..., 1]] > 0
@@ -200,7 +222,9 @@ def _stamp(
     begin = np.searchsorted(parts.region.ravel()[order], np.arange(len(parts.points) + 2))
     limits = np.array(mask.shape)
     kept = []
-    for k in np.flatnonzero(parts.whole[of]):
+    wanted = parts.whole[of]
+    wanted[:own] = True
+    for k in np.flatnonzero(wanted):
         i = int(of[k])
         flat = order[begin[i + 1] : begin[i + 2]]
         pixels = np.stack(np.divmod(flat, shape[1]), axis=-1)
@@ -208,21 +232,24 @@ def _stamp(
         away = pixels - np.rint(centre).astype(np.intp)
         away -= np.where(entry.wrap, np.rint(away / shape).astype(np.intp) * shape, 0)
         there = np.rint(places[k]).astype(np.intp) + away
-        if (there < 0).any() or (there >= limits).any():
+        if k >= own and ((there < 0).any() or (there >= limits).any()):
             continue
         y, x = there.T
         free = instance[y, x] == 0
-        if np.count_nonzero(free) < 0.9 * len(free):
+        if k >= own and np.count_nonzero(free) < 0.9 * len(free):
             continue
         kept.append(k)
         instance[y[free], x[free]] = len(kept)
         if flips[k].any():
             table[y[free], x[free]] = pixels[free]
     stray = (turned | known | mask) & (instance == 0)
+    if own:
+        # What no texel claims belongs to the picture as it is.
+        inside = tuple(slice(-int(f), -int(f) + int(n)) for f, n in zip(first, shape, strict=True))
+        stray[inside] = False
     if not kept:
         raise InvalidInput("a: the border cuts every texel; splicing needs some that are whole")
     chosen = np.array(kept)
     shown = entry.mask[table[..., 0], table[..., 1]]
-    return Extended(
-        (int(first[0]), int(first[1])), table, shown, places[chosen] + first, of[chosen], instance, stray, mirrored
-    )
+    origin = (int(first[0]), int(first[1]))
+    return Extended(origin, table, shown, places[chosen] + first, of[chosen], instance, stray, mirrored, own)

@@ -30,8 +30,8 @@ Departures, with their reasons:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -41,20 +41,23 @@ from texrs._arrays import as_seed, as_size
 from texrs._progress import stage
 from texrs._typing import Array, Bools, Progress
 from texrs.errors import InvalidInput
-from texrs.kernels.warp import Warp, mesh
+from texrs.kernels.warp import from_points, mesh
+from texrs.matching import spacing
+from texrs.papers._splice_edit import as_steps
 from texrs.papers._splice_entry import as_texels
-from texrs.papers._splice_layout import Match, apart, matched, snapped, void_of
+from texrs.papers._splice_layout import Match, apart, edited_match, matched, snapped, void_of
 from texrs.papers._splice_pictures import Stages
 from texrs.papers._splice_refine import Draft, fill, refine
-from texrs.papers._splice_source import Extended
+from texrs.papers._splice_source import parts_of
 from texrs.papers._splice_warp import carried, stretched
 from texrs.report import Synthesis
 from texrs.source_map import SourceMap
 from texrs.texels import Texels
 
-__all__ = ["splice"]
+__all__ = ["self_splice", "splice"]
 
 Method: TypeAlias = Literal["paper", "preview"] | None
+Edit: TypeAlias = str | Mapping[str, Any] | Sequence[Mapping[str, Any]]
 
 
 def splice(
@@ -128,84 +131,160 @@ def splice(
     watch = progress or (lambda stage, share: None)
     mine, theirs = as_texels(a, "a", watch), as_texels(b, "b", watch)
     shape = as_size(size if size is not None else mine.mask.shape, minimum=16)
+    number = as_seed(seed)
     watch("match", 0.0)
     found = matched(mine, theirs, (shape[0], shape[1]), align=bool(align))
     if mine.tag == "F=d":
         found = apart(mine, found)
     elif snap_rows:
-        found = Match(snapped(found.targets, 0.25 * found.scale), *(getattr(found, f) for f in _REST))
+        found = replace(found, targets=snapped(found.targets, 0.25 * spacing(found.targets)))
     watch("match", 1.0)
-    return made(mine, found, (shape[0], shape[1]), as_seed(seed), refined=bool(refine), watch=watch, theirs=theirs)
+    return made(mine, found, (shape[0], shape[1]), number, method=method, refined=bool(refine), watch=watch, theirs=theirs)
 
 
-_REST = ("source", "of", "scale", "angle", "gain", "cost")
+def self_splice(
+    a: Texels | Array,
+    edit: Edit,
+    *,
+    seed: int = 0,
+    method: Literal["preview"] | None = None,
+    refine: bool = True,
+    progress: Progress | None = None,
+) -> Synthesis:
+    """Edit the layout of a texture's own texels (Figure 9).
 
+    Parameters
+    ----------
+    a : Texels, or (H, W) or (H, W, C) array
+        The texture; a picture is analysed by `texrs.texels.analyse`.
+    edit : str, mapping, or sequence of mappings
+        What is done, step by step, in plain JSON types: ``{"op": "scale", "factor": 1.2}`` or ``[1.2, 1]`` (the layout, not the
+        texels), ``{"op": "shift", "by": [4, 0]}``, ``{"op": "rows", "by": 6}`` (every other row to the right, those between to
+        the left), ``{"op": "randomise", "amount": 0.25, "least": 0.7}`` (Gaussian, in spacings; the share of the least usual
+        distance that is kept), ``{"op": "regularise", "amount": 1}`` (to the lattice that fits best), ``{"op": "move",
+        "texel": 3, "by": [0, 8]}`` or ``"to"``, ``{"op": "remove", "texel": 3}``, ``{"op": "points", "points": [[row, column],
+        ...]}``. A name alone is a step with its defaults. The report's "edit" replays.
+    seed : int
+        Chooses random steps, what fills holes, and the noise of the refinement.
+    method : {None, "preview"}
+        "preview": triangles between the texels, drawn where these go; nothing is kept rigid or filled.
+    refine : bool
+        Whether to refine what is deformed.
+    progress : callable, optional
+        Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Deformed:
-    """The texture deformed: where its pixels go, what is rigid, and what is not drawn."""
+    Returns
+    -------
+    Synthesis
+        As of `splice`. Where nothing is moved the picture is the texture, exactly.
 
-    target: NDArray[np.float64]
-    rigid: Bools
-    void: Bools
-    moved: Match
+    Raises
+    ------
+    InvalidInput
+        A step that is not known, lacks something, or names a texel that is not there.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import texrs
+    >>> from texrs.texels import Texels
+    >>> dots = texrs.samples.dots((96, 96))
+    >>> entry = Texels(dots.image, dots.centres, dots.mask, (21, 21), "F=d", np.ones(len(dots.centres)))
+    >>> same = texrs.self_splice(entry, {"op": "move", "texel": 0, "by": [0, 0]})
+    >>> bool((same.image == dots.image).all())
+    True
+    >>> texrs.self_splice(entry, "randomise", seed=5).report["edit"]
+    [{'op': 'randomise', 'seed': 5}]
+
+    """
+    if method not in (None, "preview"):
+        raise InvalidInput(f"method: allowed are None and 'preview', got {method!r}")
+    watch = progress or (lambda stage, share: None)
+    mine, number = as_texels(a, "a", watch), as_seed(seed)
+    steps = as_steps(edit, number)
+    found, listed = edited_match(mine, steps)
+    size = (mine.mask.shape[0], mine.mask.shape[1])
+    result = made(
+        mine, found, size, number, method=method, refined=bool(refine), watch=watch, theirs=None, listed=listed
+    )
+    return replace(result, report={**result.report, "method": "self-splice", "edit": steps})
 
 
 def made(
-    a: Texels, found: Match, size: tuple[int, int], seed: int, *, refined: bool, watch: Progress, theirs: Texels | None
+    a: Texels,
+    found: Match,
+    size: tuple[int, int],
+    seed: int,
+    *,
+    method: Method,
+    refined: bool,
+    watch: Progress,
+    theirs: Texels | None,
+    listed: bool = False,
 ) -> Synthesis:
     """Make the picture of a matching: sections 4.2 and 4.3."""
-    watch("deform", 0.0)
-    deformed = deform(a, found)
-    watch("deform", 1.0)
-    warp = mesh(
-        deformed.target, deformed.rigid, void=deformed.void, size=size, progress=stage(watch, "warp")
-    )
-    draft, label = drafted(a, deformed, warp)
-    full = fill(a.image, draft, found.scale, seed, watch)
-    places = full.places
-    if refined:
-        places = refine(a.image, a.wrap, full, seed, watch)
-    source = SourceMap(
-        places.astype(np.float32), np.zeros(size, np.uint16), label, None, ((a.mask.shape[0], a.mask.shape[1]),)
-    )
+    if method == "preview":
+        warped = previewed(found, size)
+    elif listed and a.tag == "F=d":
+        warped = scattered(a, found, size)
+    else:
+        watch("deform", 0.0)
+        field = deform(a, found)
+        watch("deform", 1.0)
+        warped = drawn(field, size, stage(watch, "warp"))
+    draft, label = drafted(a, found, warped)
+    full, places = draft, draft.places
+    if method != "preview":
+        full = fill(a.image, draft, spacing(np.asarray(a.points, np.float64)), seed, watch)
+        places = refine(a.image, a.wrap, full, seed, watch) if refined else full.places
+    shape = (a.mask.shape[0], a.mask.shape[1])
+    source = SourceMap(places.astype(np.float32), np.zeros(size, np.uint16), label, None, (shape,))
     image = source.render(a.image, interpolation="nearest")
-    holes = warp.source.label == 0
     report: dict[str, Any] = {
         "method": "splice",
         "seed": seed,
         "size": list(size),
         "tag": a.tag,
-        **deformed.moved.report(),
-        "holes": float(holes.mean()),
-        "triangles": warp.triangles,
-        "flipped": warp.flipped / max(warp.triangles, 1),
-        "flipped_rigid": warp.flipped_heavy / max(warp.triangles, 1),
-        "system": list(deformed.rigid.shape),
-        "matches": matches(a, deformed.moved),
+        **found.report(),
+        "holes": float(1 - warped.known.mean()),
+        "triangles": warped.triangles,
+        "flipped": warped.flipped / max(warped.triangles, 1),
+        "flipped_rigid": warped.flipped_rigid / max(warped.triangles, 1),
+        "system": list(found.source.mask.shape),
+        "matches": matches(a, found),
     }
     watch("done", 1.0)
-    stages = Stages(a, theirs, deformed.moved, deformed.target, draft, full, image)
-    return Synthesis(image, source, stages, report)
+    return Synthesis(image, source, Stages(a, theirs, found, warped.target, draft, full, image), report)
 
 
-def deform(a: Texels, found: Match) -> Deformed:
-    """Move every pixel of the texture: section 4.2, as its tag says."""
+# --- the deformation: section 4.2 ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Field:
+    """The texture deformed: where its pixels go, what is rigid, and what is not drawn."""
+
+    target: NDArray[np.float64]
+    rigid: Bools
+    void: Bools
+
+
+def deform(a: Texels, found: Match) -> Field:
+    """Move every pixel of the texture, as its tag says."""
     source = found.source
-    origin = np.array(source.origin)
-    shape = source.mask.shape
+    shape, origin = source.mask.shape, np.array(source.origin)
     grid = np.moveaxis(np.indices(shape), 0, -1) + origin
     if a.tag == "F=d":
-        shift, moved = whole_shifts(found)
-        delta = carried(source.instance, shift)
-        return Deformed(grid + delta, source.instance > 0, void_of(source, found.of), moved)
+        delta = carried(source.instance, whole_shifts(found))
+        return Field(grid + delta, source.instance > 0, void_of(source, found.of))
     rigid = source.mask if a.tag == "F=c" else ~source.mask
-    pins = np.clip(np.rint(source.points[found.of]).astype(np.intp) - origin, 0, np.array(shape) - 1)
-    delta = stretched(rigid, pins, found.shift, upright=a.tag == "B=c")
-    return Deformed(grid + delta, rigid, np.zeros(shape, bool), found)
+    pins = np.rint(source.points[found.of]).astype(np.intp) - origin
+    inside = ((pins >= 0) & (pins < np.array(shape))).all(axis=1)
+    delta = stretched(rigid, pins[inside], found.shift[inside], upright=a.tag == "B=c")
+    return Field(grid + delta, rigid, np.zeros(shape, bool))
 
 
-def whole_shifts(found: Match) -> tuple[NDArray[np.float64], Match]:
+def whole_shifts(found: Match) -> NDArray[np.float64]:
     """Give the whole pixels that every texel moves by; those that go nowhere go along with the ones around them."""
     from scipy.spatial import cKDTree
 
@@ -220,41 +299,108 @@ def whole_shifts(found: Match) -> tuple[NDArray[np.float64], Match]:
         weight = 1 / (far**2 + 1e-6)
         mean = (weight[..., None] * shift[found.of][near]).sum(axis=1) / weight.sum(axis=1)[:, None]
         shift[idle] = np.rint(mean)
-    return shift, found
+    return shift
 
 
-def drafted(a: Texels, deformed: Deformed, warp: Warp) -> tuple[Draft, NDArray[np.uint32]]:
-    """Read the warp as pixels of the texture: T_AB0, what of it is rigid, and the target of each rigid pixel."""
-    source: Extended = deformed.moved.source
-    known = warp.source.label > 0
-    limits = np.array(source.mask.shape) - 1
-    there = np.clip(np.rint(warp.source.coordinates).astype(np.intp), 0, limits)
-    y, x = there[..., 0], there[..., 1]
-    places = source.table[y, x]
+# --- the backward warp: Figure 6 -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Warped:
+    """W_BA: the pixel of the extended texture behind each one of the output, and where there is one."""
+
+    there: NDArray[np.intp]
+    known: Bools
+    target: NDArray[np.float64]
+    triangles: int
+    flipped: int
+    flipped_rigid: int
+
+
+def drawn(field: Field, size: tuple[int, int], progress: Callable[[float], object] | None) -> Warped:
+    """Draw the dense mesh."""
+    found = mesh(field.target, field.rigid, void=field.void, size=size, progress=progress)
+    there = _pixels(found.source, field.rigid.shape)
+    return Warped(
+        there, found.source.label > 0, field.target, found.triangles, found.flipped, found.flipped_heavy
+    )
+
+
+def previewed(found: Match, size: tuple[int, int]) -> Warped:
+    """Draw triangles between the matched texels."""
+    source = found.source
+    origin = np.array(source.origin)
+    loose = from_points(source.points[found.of] - origin, found.targets, source.mask.shape, size=size)
+    target = np.moveaxis(np.indices(source.mask.shape), 0, -1) + origin * 1.0
+    return Warped(_pixels(loose, source.mask.shape), loose.label > 0, target, 0, 0, 0)
+
+
+def scattered(a: Texels, found: Match, size: tuple[int, int]) -> Warped:
+    """Draw the ground as triangles between the texels, and these whole above it: a moved texel stirs its neighbourhood alone."""
+    source = found.source
+    shape, origin = np.array(source.mask.shape), np.array(source.origin)
+    shift = whole_shifts(found)
+    rim = np.array([[y, x] for y in (0, shape[0] - 1) for x in (0, shape[1] - 1)], float)
+    start = np.concatenate([source.points - origin, rim])
+    end = np.concatenate([source.points + shift, rim + origin])
+    loose = from_points(start, end, (int(shape[0]), int(shape[1])), size=size)
+    below = _pixels(loose, source.mask.shape)
+    void = void_of(source, found.of)
+    ground = (source.instance == 0) & ~void
+    known = (loose.label > 0) & ground[below[..., 0], below[..., 1]]
+    moved = np.zeros((len(shift) + 1, 2))
+    moved[1:] = shift
+    target = np.moveaxis(np.indices(source.mask.shape), 0, -1) + origin + moved[source.instance]
+    above = mesh(target, source.instance > 0, void=(source.instance == 0) | void, size=size)
+    seen = above.source.label > 0
+    there = np.where(seen[..., None], _pixels(above.source, source.mask.shape), below)
+    return Warped(there, seen | known, target, above.triangles, above.flipped, above.flipped_heavy)
+
+
+def _pixels(found: SourceMap, shape: tuple[int, ...]) -> NDArray[np.intp]:
+    """Give the nearest pixels, which lie inside."""
+    places = np.floor(found.coordinates + np.float32(0.5)).astype(np.intp)
+    return np.clip(places, 0, np.array(shape[:2]) - 1)
+
+
+def drafted(a: Texels, found: Match, warped: Warped) -> tuple[Draft, NDArray[np.uint32]]:
+    """Read the warp as pixels of the texture: T_AB0, what of it stays, and the target of each rigid pixel."""
+    source, known = found.source, warped.known
+    y, x = warped.there[..., 0], warped.there[..., 1]
+    places, mirrored = source.table[y, x], source.mirrored[y, x]
+    whole = copied(places, mirrored, known)
     label = np.zeros(known.shape, np.uint32)
     if a.tag == "F=d":
         goal = np.zeros(len(source.points) + 1, np.uint32)
-        goal[deformed.moved.of + 1] = np.arange(1, len(deformed.moved.of) + 1)
+        goal[found.of + 1] = np.arange(1, len(found.of) + 1)
         label = np.where(known, goal[source.instance[y, x]], 0).astype(np.uint32)
-        kinds = ground_kinds(a)
-        return Draft(places, known, label > 0, kinds, np.zeros(known.shape, np.uint8), source.mirrored[y, x]), label
-    rigid = np.asarray(a.mask if a.tag == "F=c" else ~a.mask)
-    kinds = rigid.astype(np.uint8)
+        kinds = ((parts_of(a).region > 0) | a.mask).astype(np.uint8)
+        return Draft(places, known, whole | (label > 0), kinds, np.zeros(known.shape, np.uint8), mirrored), label
+    kinds = np.asarray(a.mask if a.tag == "F=c" else ~a.mask).astype(np.uint8)
     wanted = np.where(known, kinds[places[..., 0], places[..., 1]], 255).astype(np.uint8)
-    return Draft(places, known, known & (wanted == 1), kinds, wanted, source.mirrored[y, x]), label
+    return Draft(places, known, whole | (known & (wanted == 1)), kinds, wanted, mirrored), label
 
 
-def ground_kinds(a: Texels) -> NDArray[np.uint8]:
-    """Give 0 for the ground of disjoint texels and 1 for these and their rim."""
-    from texrs.papers._splice_source import parts_of
+def copied(places: NDArray[np.int32], mirrored: Bools, known: Bools) -> Bools:
+    """Mark what the warp copies whole: there is nothing to refine."""
+    from scipy.ndimage import maximum_filter
 
-    return ((parts_of(a).region > 0) | a.mask).astype(np.uint8)
+    broken = ~known
+    for axis in range(2):
+        step = np.diff(places, axis=axis)
+        first, second = (np.delete(mirrored, end, axis=axis)[..., axis] for end in (-1, 0))
+        forth = np.zeros(2, np.int32)
+        forth[axis] = 1
+        joined = ((step == forth).all(-1) & ~(first & second)) | ((step == -forth).all(-1) & (first | second))
+        for end in (slice(None, -1), slice(1, None)):
+            b = np.moveaxis(broken, axis, 0)[end]
+            b |= np.moveaxis(~joined, axis, 0)
+    rough = maximum_filter(broken.astype(np.uint8), 3) > 0
+    return np.asarray(~rough)
 
 
 def matches(a: Texels, found: Match) -> list[dict[str, Any]]:
     """Say which texel goes where."""
-    from texrs.papers._splice_source import parts_of
-
     points = parts_of(a).points if a.tag == "F=d" else np.asarray(a.points, float)
     return [
         {
