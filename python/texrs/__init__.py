@@ -1,7 +1,7 @@
 """Make new textures from one example.
 
-The verbs: `design` (many natural textures from one example), `solid` and `synthesize` (volumes and pictures grown
-under a frame field), `tile` (any picture made cyclic) and `complete` (holes filled by example). Each gives a
+The verbs: `design` (many natural textures from one example), `splice` (the texels of one texture in the arrangement of
+another) and `self_splice` (in an edited one), `solid` and `synthesize` (volumes and pictures grown under a frame field), `tile` (any picture made cyclic) and `complete` (holes filled by example). Each gives a
 `Synthesis`, whose `SourceMap` looks anything that is in register with the exemplar up in the same way.
 """
 
@@ -12,6 +12,7 @@ from texrs.cyclic import tile
 from texrs.papers._solid_window import PlaneTexture, SolidTexture
 from texrs.papers.design import design
 from texrs.papers.solid import solid, synthesize
+from texrs.papers.splice import self_splice, splice
 from texrs.report import Synthesis
 from texrs.source_map import Reuse, SourceMap
 from texrs.threads import threads
@@ -31,7 +32,9 @@ __all__ = [
     "io",
     "kernels",
     "samples",
+    "self_splice",
     "solid",
+    "splice",
     "synthesize",
     "threads",
     "tile",

@@ -76,7 +76,7 @@ def as_steps(edit: object, seed: int) -> list[dict[str, Any]]:
     return found
 
 
-def edited(points: Points, own: int, steps: Sequence[Step]) -> Edited:
+def edited(points: Points, own: int, steps: Sequence[Step], named: int | None = None) -> Edited:
     """Apply the steps to a layout.
 
     Parameters
@@ -87,6 +87,8 @@ def edited(points: Points, own: int, steps: Sequence[Step]) -> Edited:
         How many are of the picture. Copies follow where a step is a rule of places, and stay where it names texels.
     steps : sequence
         As `as_steps` gives them.
+    named : int, optional
+        How many of those of the picture a step may name; all by default.
 
     """
     at, kept = points.copy(), np.ones(len(points), bool)
@@ -101,7 +103,8 @@ def edited(points: Points, own: int, steps: Sequence[Step]) -> Edited:
         "points": _points,
     }
     for step in steps:
-        at = acts[step["op"]](step, at, own, kept)
+        by_name = named is not None and step["op"] in ("move", "remove", "points")
+        at = acts[step["op"]](step, at, named if by_name and named is not None else own, kept)
     if not np.isfinite(at).all() or np.abs(at).max() > 1e6:
         raise InvalidInput("edit: moves texels further than 10^6 pixels")
     return Edited(at, kept, all(step["op"] in ("move", "points") for step in steps))

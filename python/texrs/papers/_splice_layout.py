@@ -186,14 +186,14 @@ def apart(a: Texels, found: Match, *, rounds: int = 12, room: float = 1.0) -> Ma
 def edited_match(a: Texels, steps: Sequence[Step]) -> tuple[Match, bool]:
     """Match a texture with its own layout, edited; also tell whether the edit only lists moved points."""
     points = parts_of(a).points if a.tag == "F=d" else np.asarray(a.points, np.float64)
-    trial = edited(points, len(points), steps)
+    trial = edited(points, len(points), steps, len(a.points))
     shrink = math.prod(min(1.0, float(np.min(s.get("factor", 1.0)))) for s in steps if s["op"] == "scale")
     far = float(np.abs(trial.points - points).max()) / shrink
     size = (a.mask.shape[0], a.mask.shape[1])
     if far > 4 * max(size):
         raise InvalidInput(f"edit: moves texels by up to {far:.0f} pixels, four times the picture's size is allowed")
-    source = extend(a, size, math.ceil(MARGIN * spacing(points) + far), whole=False)
-    found = edited(source.points, source.own, steps)
+    source = extend(a, size, math.ceil(MARGIN * spacing(points) + far), whole=False, exact=shrink == 1)
+    found = edited(source.points, source.own, steps, len(a.points))
     kept = found.kept.copy()
     if a.tag == "F=d":
         shift = found.points - source.points

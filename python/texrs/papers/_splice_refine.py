@@ -21,7 +21,7 @@ from texrs.kernels.complete import complete
 from texrs.kernels.patch_search import PatchIndex
 from texrs.kernels.pyramid import ONE, Region, to_fixed, upsample
 
-__all__ = ["Draft", "fill", "refine"]
+__all__ = ["Draft", "fill", "refined_places"]
 
 Places = NDArray[np.int32]
 Kinds = NDArray[np.uint8]
@@ -131,7 +131,7 @@ def analysed(image: NDArray[np.generic], wrap: tuple[bool, bool]) -> Analysis:
     return analyse(image, axes=2, wrap=wrap, labels=False, coarsest=least)
 
 
-def refine(
+def refined_places(
     image: NDArray[np.generic],
     wrap: tuple[bool, bool],
     draft: Draft,

@@ -163,17 +163,20 @@ class Extended:
     own: int = 0
 
 
-def extend(entry: Texels, size: tuple[int, int], margin: int, *, whole: bool = True) -> Extended:
+def extend(
+    entry: Texels, size: tuple[int, int], margin: int, *, whole: bool = True, exact: bool = False
+) -> Extended:
     """Let a texture go on so far beyond an output that is centred on it.
 
-    With ``whole=False`` every pixel and every texel of the picture itself is kept, also those that the border cuts.
+    With ``whole=False`` every texel of the picture itself is kept, also those that the border cuts; with ``exact`` every
+    pixel is.
     """
     shape = np.array(entry.mask.shape)
     offset = (np.array(size) - shape) // 2  # Of the picture in the output.
     disjoint = entry.tag == "F=d"
     points = parts_of(entry).points if disjoint else np.asarray(entry.points, np.float64)
-    if disjoint or not whole:
-        # Cut texels are left out, or wanted, so every pixel may be kept.
+    if disjoint or exact:
+        # The texels that the border cuts are left out, or wanted: no pixel is in the way.
         ends = [(-0.5, n - 0.5) if w else (0.0, n - 1.0) for n, w in zip(shape, entry.wrap, strict=True)]
         folds = [Fold(*e, w) for e, w in zip(ends, entry.wrap, strict=True)]
         layout = Layout(points, (folds[0], folds[1]), 0.0)
@@ -218,6 +221,9 @@ def _stamp(
     turned = mirrored.any(axis=-1) & known
     # Mirrored texels make room for those that are turned back.
     instance = np.zeros(mask.shape, np.int32)
+    inside = np.zeros(mask.shape, bool)
+    if own:
+        inside[tuple(slice(-int(f), -int(f) + int(n)) for f, n in zip(first, shape, strict=True))] = True
     order = np.argsort(parts.region, axis=None, kind="stable")
     begin = np.searchsorted(parts.region.ravel()[order], np.arange(len(parts.points) + 2))
     limits = np.array(mask.shape)
@@ -236,17 +242,17 @@ def _stamp(
             continue
         y, x = there.T
         free = instance[y, x] == 0
-        if k >= own and np.count_nonzero(free) < 0.9 * len(free):
+        if k >= own and (np.count_nonzero(free) < 0.9 * len(free) or inside[y, x].any()):
             continue
         kept.append(k)
+        # Where its centre is in whole pixels from the texture's own.
+        places[k] = np.rint(places[k]) - np.rint(centre) + centre
         instance[y[free], x[free]] = len(kept)
         if flips[k].any():
             table[y[free], x[free]] = pixels[free]
     stray = (turned | known | mask) & (instance == 0)
-    if own:
-        # What no texel claims belongs to the picture as it is.
-        inside = tuple(slice(-int(f), -int(f) + int(n)) for f, n in zip(first, shape, strict=True))
-        stray[inside] = False
+    # What no texel claims belongs to the picture as it is.
+    stray &= ~inside
     if not kept:
         raise InvalidInput("a: the border cuts every texel; splicing needs some that are whole")
     chosen = np.array(kept)

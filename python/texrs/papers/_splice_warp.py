@@ -27,7 +27,7 @@ GOAL, RIGID = 1e4, 1e2
 """lambda_G and lambda_R (section 4.2)."""
 LOOSE = 1e-2
 """Weight of the equations of what is not rigid: without them it would have none, and nothing would move."""
-TIE = 1e-3
+TIE = 1e-6
 """Weight of equal displacements of neighbours: long joints that nothing else holds do not slide freely."""
 KEPT = 1 << 29
 """Bytes of factors that are kept."""

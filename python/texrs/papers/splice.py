@@ -47,7 +47,8 @@ from texrs.papers._splice_edit import as_steps
 from texrs.papers._splice_entry import as_texels
 from texrs.papers._splice_layout import Match, apart, edited_match, matched, snapped, void_of
 from texrs.papers._splice_pictures import Stages
-from texrs.papers._splice_refine import Draft, fill, refine
+from texrs.papers._splice_literal import literal_field, literal_fill, literal_match
+from texrs.papers._splice_refine import Draft, fill, refined_places
 from texrs.papers._splice_source import parts_of
 from texrs.papers._splice_warp import carried, stretched
 from texrs.report import Synthesis
@@ -133,8 +134,11 @@ def splice(
     shape = as_size(size if size is not None else mine.mask.shape, minimum=16)
     number = as_seed(seed)
     watch("match", 0.0)
-    found = matched(mine, theirs, (shape[0], shape[1]), align=bool(align))
-    if mine.tag == "F=d":
+    if method == "paper":
+        found = literal_match(mine, theirs, (shape[0], shape[1]), align=bool(align))
+    else:
+        found = matched(mine, theirs, (shape[0], shape[1]), align=bool(align))
+    if method != "paper" and mine.tag == "F=d":
         found = apart(mine, found)
     elif snap_rows:
         found = replace(found, targets=snapped(found.targets, 0.25 * spacing(found.targets)))
@@ -225,6 +229,8 @@ def made(
     """Make the picture of a matching: sections 4.2 and 4.3."""
     if method == "preview":
         warped = previewed(found, size)
+    elif method == "paper":
+        warped = drawn(Field(*literal_field(a, found)), size, stage(watch, "warp"))
     elif listed and a.tag == "F=d":
         warped = scattered(a, found, size)
     else:
@@ -234,9 +240,12 @@ def made(
         warped = drawn(field, size, stage(watch, "warp"))
     draft, label = drafted(a, found, warped)
     full, places = draft, draft.places
-    if method != "preview":
+    if method == "paper":
+        full = literal_fill(draft, seed)
+        places = refined_places(a.image, a.wrap, full, seed, watch) if refined else full.places
+    elif method != "preview":
         full = fill(a.image, draft, spacing(np.asarray(a.points, np.float64)), seed, watch)
-        places = refine(a.image, a.wrap, full, seed, watch) if refined else full.places
+        places = refined_places(a.image, a.wrap, full, seed, watch) if refined else full.places
     shape = (a.mask.shape[0], a.mask.shape[1])
     source = SourceMap(places.astype(np.float32), np.zeros(size, np.uint16), label, None, (shape,))
     image = source.render(a.image, interpolation="nearest")
@@ -348,13 +357,18 @@ def scattered(a: Texels, found: Match, size: tuple[int, int]) -> Warped:
     void = void_of(source, found.of)
     ground = (source.instance == 0) & ~void
     known = (loose.label > 0) & ground[below[..., 0], below[..., 1]]
-    moved = np.zeros((len(shift) + 1, 2))
+    moved = np.zeros((len(shift) + 1, 2), np.intp)
     moved[1:] = shift
-    target = np.moveaxis(np.indices(source.mask.shape), 0, -1) + origin + moved[source.instance]
-    above = mesh(target, source.instance > 0, void=(source.instance == 0) | void, size=size)
-    seen = above.source.label > 0
-    there = np.where(seen[..., None], _pixels(above.source, source.mask.shape), below)
-    return Warped(there, seen | known, target, above.triangles, above.flipped, above.flipped_heavy)
+    used = np.zeros(len(moved), bool)
+    used[found.of + 1] = True
+    pixels = np.argwhere(used[source.instance])
+    goal = pixels + origin + moved[source.instance[tuple(pixels.T)]]
+    seen = ((goal >= 0) & (goal < np.array(size))).all(axis=1)
+    there = below.copy()
+    there[tuple(goal[seen].T)] = pixels[seen]
+    known[tuple(goal[seen].T)] = True
+    target = np.moveaxis(np.indices(source.mask.shape), 0, -1) + origin + moved[source.instance] * 1.0
+    return Warped(there, known, target, 0, 0, 0)
 
 
 def _pixels(found: SourceMap, shape: tuple[int, ...]) -> NDArray[np.intp]:
@@ -373,7 +387,15 @@ def drafted(a: Texels, found: Match, warped: Warped) -> tuple[Draft, NDArray[np.
     if a.tag == "F=d":
         goal = np.zeros(len(source.points) + 1, np.uint32)
         goal[found.of + 1] = np.arange(1, len(found.of) + 1)
-        label = np.where(known, goal[source.instance[y, x]], 0).astype(np.uint32)
+        number = source.instance[y, x]
+        label = np.where(known, goal[number], 0).astype(np.uint32)
+        # Rims that the mesh draws out are no texels: what is rigid lies exactly where its texel goes.
+        shift = np.zeros((len(goal), 2), np.intp)
+        shift[1:] = whole_shifts(found)
+        away = warped.there + np.array(source.origin) + shift[number] - np.moveaxis(np.indices(known.shape), 0, -1)
+        drawn_out = (number > 0) & (away != 0).any(axis=-1)
+        label[drawn_out] = 0
+        known = known & ~drawn_out
         kinds = ((parts_of(a).region > 0) | a.mask).astype(np.uint8)
         return Draft(places, known, whole | (label > 0), kinds, np.zeros(known.shape, np.uint8), mirrored), label
     kinds = np.asarray(a.mask if a.tag == "F=c" else ~a.mask).astype(np.uint8)
@@ -385,18 +407,20 @@ def copied(places: NDArray[np.int32], mirrored: Bools, known: Bools) -> Bools:
     """Mark what the warp copies whole: there is nothing to refine."""
     from scipy.ndimage import maximum_filter
 
-    broken = ~known
+    broken = np.zeros(known.shape, bool)
     for axis in range(2):
         step = np.diff(places, axis=axis)
         first, second = (np.delete(mirrored, end, axis=axis)[..., axis] for end in (-1, 0))
         forth = np.zeros(2, np.int32)
         forth[axis] = 1
         joined = ((step == forth).all(-1) & ~(first & second)) | ((step == -forth).all(-1) & (first | second))
-        for end in (slice(None, -1), slice(1, None)):
+        ends = (slice(None, -1), slice(1, None))
+        apart, there = np.moveaxis(~joined, axis, 0), np.moveaxis(known, axis, 0)
+        for end in ends:
             b = np.moveaxis(broken, axis, 0)[end]
-            b |= np.moveaxis(~joined, axis, 0)
+            b |= apart & there[ends[0]] & there[ends[1]]
     rough = maximum_filter(broken.astype(np.uint8), 3) > 0
-    return np.asarray(~rough)
+    return np.asarray(known & ~rough)
 
 
 def matches(a: Texels, found: Match) -> list[dict[str, Any]]:
