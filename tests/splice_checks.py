@@ -57,7 +57,7 @@ def presence(a: Texels, result: Synthesis) -> tuple[float, float]:
         best, place = -1.0, (0, 0)
         for dy in range(-3, 4):
             for dx in range(-3, 4):
-                ty, tx = target.astype(int) + (dy, dx)
+                ty, tx = (*target.astype(int), dy, dx)
                 value = correlation(template, other[ty - h : ty + h + 1, tx - w : tx + w + 1])
                 if value > best:
                     best, place = value, (dy, dx)
@@ -170,9 +170,16 @@ def layout(result: Synthesis, a: Texels, b: Texels) -> dict[str, float]:
         "away": float(np.hypot(*(found - goal).T).mean()),
         "own": float(cKDTree(np.asarray(a.points)).query(found)[0].mean() / np.median(neighbours(goal, 1))),
         "colour": float(
-            np.mean([wasserstein_distance(x.ravel(), y.ravel()) for x, y in
-                     zip(np.moveaxis(colours(result.image), -1, 0), np.moveaxis(colours(b.image), -1, 0), strict=False)])
-        ) / 255,
+            np.mean(
+                [
+                    wasserstein_distance(x.ravel(), y.ravel())
+                    for x, y in zip(
+                        np.moveaxis(colours(result.image), -1, 0), np.moveaxis(colours(b.image), -1, 0), strict=False
+                    )
+                ]
+            )
+        )
+        / 255,
     }
 
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-import splice_checks as checks
 from scipy.ndimage import find_objects
 
+import splice_checks as checks
 import texrs
 from texrs import samples
 from texrs.errors import InvalidInput
@@ -123,7 +123,7 @@ def joints(sample: samples.Sample) -> list[np.ndarray[Any, np.dtype[np.intp]]]:
             top, bottom = max(one[0].start, other[0].start), min(one[0].stop, other[0].stop)
             gap = other[1].start - one[1].stop
             height = one[0].stop - one[0].start
-            if bottom - top > 0.8 * height and 0 <= gap < 16 and 8 < top and bottom < labels.shape[0] - 8:
+            if bottom - top > 0.8 * height and 0 <= gap < 16 and top > 8 and bottom < labels.shape[0] - 8:
                 column = (one[1].stop + other[1].start) // 2
                 found.append(np.array([[y, column] for y in range(top + 3, bottom - 3)]))
     return found

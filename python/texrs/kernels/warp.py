@@ -105,7 +105,9 @@ def mesh(
     return Warp(_map(found, (triangle > 0).astype(np.uint32), out, shape, None), drawn, flipped, heavy)
 
 
-def from_points(source: Array, target: Array, shape: Sequence[int], *, size: int | Sequence[int] | None = None) -> SourceMap:
+def from_points(
+    source: Array, target: Array, shape: Sequence[int], *, size: int | Sequence[int] | None = None
+) -> SourceMap:
     """Warp a picture by points that move.
 
     The Delaunay triangles of the source points are drawn where their corners go.

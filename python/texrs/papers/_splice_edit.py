@@ -118,7 +118,7 @@ def _pair(step: Step, name: str, default: object = None) -> NDArray[np.float64]:
         array = np.zeros(0)
     if array.shape not in ((), (2,)) or not np.isfinite(array).all():
         raise InvalidInput(f"edit: {step['op']} needs {name} as a number or [rows, columns], got {value!r}")
-    return np.broadcast_to(array, 2).astype(np.float64)
+    return np.array(np.broadcast_to(array, 2), np.float64)
 
 
 def _texel(step: Step, own: int) -> int:
@@ -130,7 +130,7 @@ def _scale(step: Step, at: Points, own: int, kept: NDArray[np.bool_]) -> Points:
     if (factor < 0.1).any() or (factor > 10).any():
         raise InvalidInput(f"edit: factor of scale must lie within 0.1 and 10, got {factor.tolist()}")
     centre = at[:own].mean(axis=0)
-    return (at - centre) * factor + centre
+    return np.asarray((at - centre) * factor + centre, np.float64)
 
 
 def _shift(step: Step, at: Points, own: int, kept: NDArray[np.bool_]) -> Points:

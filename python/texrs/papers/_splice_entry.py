@@ -54,9 +54,7 @@ def checked(entry: Texels, name: str) -> Texels:
         )
     inside = ((points >= -0.5) & (points <= np.array(shape) - 0.5)).all(axis=1)
     if not inside.all():
-        raise InvalidInput(
-            f"{name}.points: all must lie in the picture of {shape}, got {points[~inside][0].tolist()}"
-        )
+        raise InvalidInput(f"{name}.points: all must lie in the picture of {shape}, got {points[~inside][0].tolist()}")
     if len(np.unique(points, axis=0)) < len(points):
         raise InvalidInput(f"{name}.points: two texels lie at the same place")
     if float(np.ptp(points, axis=0).max()) == 0:

@@ -27,7 +27,7 @@ Points = NDArray[np.float64]
 
 BEYOND = 0.6
 """Targets lie up to so many spacings outside of the output."""
-MARGIN = 2.0
+MARGIN = 1.4
 """The texture goes on for so many of its spacings beyond the output, or for more."""
 SPARE = 1.2
 """Texels there should be for each target."""
@@ -101,7 +101,7 @@ def targets(layout: Layout, scale: float, angle: float, size: tuple[int, int], b
     back = (box - middle) @ np.linalg.inv(matrix).T + centre
     found = layout.within(back.min(axis=0), back.max(axis=0))[0]
     moved = (found - centre) @ matrix.T + middle
-    return moved[((moved >= low) & (moved <= high)).all(axis=1)]
+    return np.asarray(moved[((moved >= low) & (moved <= high)).all(axis=1)], np.float64)
 
 
 def aligned(a: Texels, b: Texels) -> list[float]:

@@ -19,7 +19,7 @@ from texrs.completion import corners
 from texrs.kernels.coherence import correct, jitter
 from texrs.kernels.complete import complete
 from texrs.kernels.patch_search import PatchIndex
-from texrs.kernels.pyramid import ONE, Region, to_fixed, upsample
+from texrs.kernels.pyramid import ONE, Region, upsample
 
 __all__ = ["Draft", "fill", "refined_places"]
 
@@ -161,9 +161,7 @@ def refined_places(
         # The coarse sample that lies between this pixel and the next, at (S + 1/2) / 2 - 1/2.
         half = (places[pick] - ONE // 2) // 2
         kinds = _halved(draft.kinds)
-        half = _corrected(
-            analysis, 0, half, coarse, sampled(draft, pick, kinds), reach / 2, passes, seed, progress
-        )
+        half = _corrected(analysis, 0, half, coarse, sampled(draft, pick, kinds), reach / 2, passes, seed, progress)
         grown = upsample(half.reshape(-1), coarse, fine, frames(draft.mirrored)).reshape(*size, 2)
         places = np.where(draft.fixed[..., None], places, grown)
     found = _corrected(analysis, 1, places, fine, draft, reach / 2, passes, seed, progress)

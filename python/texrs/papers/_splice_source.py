@@ -163,9 +163,7 @@ class Extended:
     own: int = 0
 
 
-def extend(
-    entry: Texels, size: tuple[int, int], margin: int, *, whole: bool = True, exact: bool = False
-) -> Extended:
+def extend(entry: Texels, size: tuple[int, int], margin: int, *, whole: bool = True, exact: bool = False) -> Extended:
     """Let a texture go on so far beyond an output that is centred on it.
 
     With ``whole=False`` every texel of the picture itself is kept, also those that the border cuts; with ``exact`` every
@@ -185,13 +183,13 @@ def extend(
     first = np.minimum(-margin, offset)
     last = np.maximum(np.array(size) + margin, offset + shape)
     along = [layout.folds[a].apply(np.arange(first[a], last[a]) - float(offset[a])) for a in range(2)]
-    rows, columns = (np.rint(x).astype(np.int32) for x, _ in along)
+    rows, columns = (np.asarray(np.rint(x), np.int32) for x, _ in along)
     table = np.stack(np.broadcast_arrays(rows[:, None], columns[None]), axis=-1)
     mirrored = np.stack(np.broadcast_arrays(along[0][1][:, None], along[1][1][None]), axis=-1)
-    mask = entry.mask[rows[:, None], columns[None]]
+    mask: Bools = entry.mask[rows[:, None], columns[None]]
     low, high = (first - offset).astype(float), (last - 1 - offset).astype(float)
     places, of, flips = layout.within(low, high)
-    inside = ((places >= -0.5) & (places <= shape - 0.5)).all(axis=1) & ~flips.any(axis=1)
+    inside: Bools = ((places >= -0.5) & (places <= shape - 0.5)).all(axis=1) & ~flips.any(axis=1)
     if not whole:
         # Those of the picture, in its order.
         order = np.lexsort((np.arange(len(of)), np.where(inside, of, 0), ~inside))

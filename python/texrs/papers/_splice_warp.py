@@ -27,9 +27,9 @@ GOAL, RIGID = 1e4, 1e2
 """lambda_G and lambda_R (section 4.2)."""
 LOOSE = 1e-2
 """Weight of the equations of what is not rigid: without them it would have none, and nothing would move."""
-TIE = 1e-6
+TIE = 1e-5
 """Weight of equal displacements of neighbours: long joints that nothing else holds do not slide freely."""
-KEPT = 1 << 29
+KEPT = 1 << 30
 """Bytes of factors that are kept."""
 
 _FACTORS: OrderedDict[bytes, Cholesky] = OrderedDict()
@@ -93,7 +93,8 @@ def carried(instance: Labels, shift: Points) -> NDArray[np.float64]:
     solver = factor(_key("carried", np.packbits(free), shape), lambda: _laplacian(free, number))
     flow = np.zeros((*shape, 2))
     for axis in range(2):
-        o, f, i = (np.moveaxis(a, axis, 0) for a in (flow, free, out))
+        o, i = (np.moveaxis(a, axis, 0) for a in (flow, out))
+        f: Bools = np.moveaxis(free, axis, 0)
         # What a texel's pixel hands to the ground beside it.
         o[:-1] += np.where((f[:-1] & ~f[1:])[..., None], i[1:], 0.0)
         o[1:] += np.where((f[1:] & ~f[:-1])[..., None], i[:-1], 0.0)
@@ -108,7 +109,8 @@ def _laplacian(free: Bools, number: NDArray[np.int64]) -> Any:
     degree = np.zeros(free.shape)
     rows, columns = [], []
     for axis in range(2):
-        d, f, n = (np.moveaxis(a, axis, 0) for a in (degree, free, number))
+        d, n = (np.moveaxis(a, axis, 0) for a in (degree, number))
+        f: Bools = np.moveaxis(free, axis, 0)
         d[:-1] += 1
         d[1:] += 1
         both = f[:-1] & f[1:]
@@ -124,7 +126,9 @@ def _laplacian(free: Bools, number: NDArray[np.int64]) -> Any:
 # --- connected figures: the energy itself ----------------------------------------------------------------------------
 
 
-def stretched(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upright: bool, method: str = "") -> NDArray[np.float64]:
+def stretched(
+    rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upright: bool, method: str = ""
+) -> NDArray[np.float64]:
     """Give the displacement of every pixel that minimises Eq. 5.
 
     Parameters
@@ -173,7 +177,7 @@ def energy(rigid: Bools, pins: NDArray[np.intp], axis: int, *, upright: bool, lo
     # A diagonal is stored by its columns.
     bands = [root.ravel(), *(np.roll(-(root * b).ravel(), step) for b, step in zip(u, steps, strict=True))]
     equations = dia_array((np.array(bands), [0, *steps]), shape=(size, size)).tocsr()
-    goal = np.bincount(pins, minlength=size) * GOAL
+    goal = np.asarray(np.bincount(pins, minlength=size) * GOAL, np.float64)
     return (equations.T @ equations + dia_array(ties(rigid.shape, goal), shape=(size, size))).tocsc()
 
 

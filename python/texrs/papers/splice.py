@@ -46,8 +46,8 @@ from texrs.matching import spacing
 from texrs.papers._splice_edit import as_steps
 from texrs.papers._splice_entry import as_texels
 from texrs.papers._splice_layout import Match, apart, edited_match, matched, snapped, void_of
-from texrs.papers._splice_pictures import Stages
 from texrs.papers._splice_literal import literal_field, literal_fill, literal_match
+from texrs.papers._splice_pictures import Stages
 from texrs.papers._splice_refine import Draft, fill, refined_places
 from texrs.papers._splice_source import parts_of
 from texrs.papers._splice_warp import carried, stretched
@@ -143,7 +143,9 @@ def splice(
     elif snap_rows:
         found = replace(found, targets=snapped(found.targets, 0.25 * spacing(found.targets)))
     watch("match", 1.0)
-    return made(mine, found, (shape[0], shape[1]), number, method=method, refined=bool(refine), watch=watch, theirs=theirs)
+    return made(
+        mine, found, (shape[0], shape[1]), number, method=method, refined=bool(refine), watch=watch, theirs=theirs
+    )
 
 
 def self_splice(
@@ -330,9 +332,7 @@ def drawn(field: Field, size: tuple[int, int], progress: Callable[[float], objec
     """Draw the dense mesh."""
     found = mesh(field.target, field.rigid, void=field.void, size=size, progress=progress)
     there = _pixels(found.source, field.rigid.shape)
-    return Warped(
-        there, found.source.label > 0, field.target, found.triangles, found.flipped, found.flipped_heavy
-    )
+    return Warped(there, found.source.label > 0, field.target, found.triangles, found.flipped, found.flipped_heavy)
 
 
 def previewed(found: Match, size: tuple[int, int]) -> Warped:
@@ -345,7 +345,7 @@ def previewed(found: Match, size: tuple[int, int]) -> Warped:
 
 
 def scattered(a: Texels, found: Match, size: tuple[int, int]) -> Warped:
-    """Draw the ground as triangles between the texels, and these whole above it: a moved texel stirs its neighbourhood alone."""
+    """Draw the ground as triangles between the texels, and these whole above it: what moves stirs its neighbourhood alone."""
     source = found.source
     shape, origin = np.array(source.mask.shape), np.array(source.origin)
     shift = whole_shifts(found)
@@ -374,7 +374,7 @@ def scattered(a: Texels, found: Match, size: tuple[int, int]) -> Warped:
 def _pixels(found: SourceMap, shape: tuple[int, ...]) -> NDArray[np.intp]:
     """Give the nearest pixels, which lie inside."""
     places = np.floor(found.coordinates + np.float32(0.5)).astype(np.intp)
-    return np.clip(places, 0, np.array(shape[:2]) - 1)
+    return np.asarray(np.clip(places, 0, np.array(shape[:2]) - 1), np.intp)
 
 
 def drafted(a: Texels, found: Match, warped: Warped) -> tuple[Draft, NDArray[np.uint32]]:

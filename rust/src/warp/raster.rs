@@ -9,6 +9,8 @@ use crate::{Error, Result};
 const BAND: usize = 32;
 /// A pixel that lies so little outside of a triangle belongs to it: neighbours leave no gap.
 const SLACK: f64 = -1e-9;
+/// How far beyond its bounds a triangle is looked for.
+const REACH: f64 = 1e-6;
 /// Triangles of less area, doubled, are not drawn.
 const FLAT: f64 = 1e-9;
 
@@ -72,35 +74,36 @@ impl Band<'_> {
     /// Draws a triangle, the `number`-th, where nothing heavier was drawn.
     #[inline(always)]
     pub(super) fn draw(&mut self, number: u32, t: &Triangle) {
+        let [a, b, c] = t.target;
+        let low = |axis: usize| a[axis].min(b[axis]).min(c[axis]) - REACH;
+        let high = |axis: usize| a[axis].max(b[axis]).max(c[axis]) + REACH;
+        // Most triangles hold no centre of a pixel, and are done with here.
+        let y = pixels(
+            low(0),
+            high(0),
+            self.first,
+            self.triangle.len() / self.columns,
+        );
+        let x = pixels(low(1), high(1), 0, self.columns);
+        if y.is_empty() || x.is_empty() {
+            return;
+        }
         let (after, before) = t.areas();
-        if after.abs() < FLAT || !after.is_finite() {
+        if after.abs() < FLAT || after.is_nan() {
             return;
         }
         let rank = 1 + 2 * t.weight + u32::from((after > 0.0) == (before > 0.0));
-        let [low, high] = self.rows();
-        let bounds = |axis: usize| {
-            let [a, b, c] = t.target.map(|p| p[axis]);
-            (a.min(b).min(c), a.max(b).max(c))
-        };
-        let ((top, bottom), (left, right)) = (bounds(0), bounds(1));
-        // The casts saturate, and what is not finite was left out above.
-        let y0 = (top - 1e-6).ceil().max(low) as i64;
-        let y1 = (bottom + 1e-6).floor().min(high) as i64;
-        let x0 = (left - 1e-6).ceil().max(0.0) as i64;
-        let x1 = (right + 1e-6).floor().min(self.columns as f64 - 1.0) as i64;
-        let [a, b, c] = t.target;
         let scale = 1.0 / after;
-        for y in y0..=y1 {
-            let row = (y as usize - self.first) * self.columns;
-            for x in x0..=x1 {
-                let (py, px) = (y as f64, x as f64);
-                let u = ((py - a[0]) * (c[1] - a[1]) - (px - a[1]) * (c[0] - a[0])) * scale;
-                let v = ((b[0] - a[0]) * (px - a[1]) - (b[1] - a[1]) * (py - a[0])) * scale;
+        for y in y {
+            for x in x.clone() {
+                let (py, px) = ((y + self.first) as f64 - a[0], x as f64 - a[1]);
+                let u = (py * (c[1] - a[1]) - px * (c[0] - a[0])) * scale;
+                let v = ((b[0] - a[0]) * px - (b[1] - a[1]) * py) * scale;
                 let w = 1.0 - u - v;
                 if u < SLACK || v < SLACK || w < SLACK {
                     continue;
                 }
-                let at = row + x as usize;
+                let at = y * self.columns + x;
                 if rank > self.best[at] {
                     self.best[at] = rank;
                     self.triangle[at] = number;
@@ -112,6 +115,76 @@ impl Band<'_> {
             }
         }
     }
+}
+
+impl Band<'_> {
+    /// Draws both triangles of a cell, of the numbers `number` and the next, whose first corner is at `corner`.
+    #[inline(always)]
+    fn draw_cell(&mut self, number: u32, corner: [usize; 2], cell: &Cell) {
+        let [a, b, c, d] = cell.target;
+        let low = |axis: usize| a[axis].min(b[axis]).min(c[axis].min(d[axis])) - REACH;
+        let high = |axis: usize| a[axis].max(b[axis]).max(c[axis].max(d[axis])) + REACH;
+        let ys = pixels(
+            low(0),
+            high(0),
+            self.first,
+            self.triangle.len() / self.columns,
+        );
+        let xs = pixels(low(1), high(1), 0, self.columns);
+        if ys.is_empty() || xs.is_empty() {
+            return;
+        }
+        for (k, (corners, weight)) in cell.triangles().into_iter().enumerate() {
+            let Some(weight) = weight else { continue };
+            let [a, b, c] = corners;
+            let area = doubled(&corners);
+            if area.abs() < FLAT || area.is_nan() {
+                continue;
+            }
+            let rank = 1 + 2 * weight + u32::from(area < 0.0);
+            let scale = 1.0 / area;
+            let (b0, b1, c0, c1) = (b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]);
+            for y in ys.clone() {
+                for x in xs.clone() {
+                    let (py, px) = ((y + self.first) as f64 - a[0], x as f64 - a[1]);
+                    let u = (py * c1 - px * c0) * scale;
+                    let v = (b0 * px - b1 * py) * scale;
+                    let w = 1.0 - u - v;
+                    if u.min(v).min(w) < SLACK {
+                        continue;
+                    }
+                    let at = y * self.columns + x;
+                    if rank > self.best[at] {
+                        self.best[at] = rank;
+                        self.triangle[at] = number + k as u32;
+                        let [y, x] = corner.map(|i| i as f64);
+                        self.places[at] = if k == 0 {
+                            [(y + v) as f32, (x + u) as f32]
+                        } else {
+                            [(y + u + v) as f32, (x + 1.0 - v) as f32]
+                        };
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The whole numbers in [low, high], less `first`, that are below `count`. Casts only: rounding functions are calls.
+#[inline(always)]
+fn pixels(low: f64, high: f64, first: usize, count: usize) -> std::ops::Range<usize> {
+    let (low, high) = (low - first as f64, high - first as f64);
+    // Also where they are not numbers.
+    if high < 0.0 || low > count as f64 || high.is_nan() || low.is_nan() {
+        return 0..0;
+    }
+    let start = if low <= 0.0 {
+        0
+    } else {
+        let whole = low as i32;
+        (whole + i32::from(f64::from(whole) < low)) as usize
+    };
+    start..(high.min(count as f64) as i32 as usize + 1).min(count)
 }
 
 /// Draws an output: `draw` gets each band, and draws what reaches its rows in the order of the triangles.
@@ -171,15 +244,19 @@ pub fn mesh(source: &Mesh<'_>, shape: [usize; 2], monitor: &Monitor) -> Result<W
                 [low.min(p[0]), high.max(p[0])]
             })
     });
-    let cell = |y: usize, x: usize| cell(source, y, x);
     let counts = par::map(rows - 1, |y| {
         let mut counts = [0usize; 3];
         for x in 0..columns - 1 {
-            for t in cell(y, x).into_iter().flatten() {
-                let turned = t.turned();
-                counts[0] += 1;
-                counts[1] += usize::from(turned);
-                counts[2] += usize::from(turned && t.weight == 3);
+            let cell = Cell::of(source, y, x);
+            for (corners, weight) in cell.triangles() {
+                if let Some(weight) = weight {
+                    // Whether the warp turns it over, or leaves nothing of it: at rest areas are negative.
+                    let area = doubled(&corners);
+                    let turned = area > -FLAT || area.is_nan();
+                    counts[0] += 1;
+                    counts[1] += usize::from(turned);
+                    counts[2] += usize::from(turned && weight == 3);
+                }
             }
         }
         counts
@@ -196,11 +273,7 @@ pub fn mesh(source: &Mesh<'_>, shape: [usize; 2], monitor: &Monitor) -> Result<W
             }
             for x in 0..columns - 1 {
                 let number = 2 * (y * (columns - 1) + x) as u32 + 1;
-                for (k, t) in cell(y, x).iter().enumerate() {
-                    if let Some(t) = t {
-                        band.draw(number + k as u32, t);
-                    }
-                }
+                band.draw_cell(number, [y, x], &Cell::of(source, y, x));
             }
         }
     })?;
@@ -214,21 +287,40 @@ pub fn mesh(source: &Mesh<'_>, shape: [usize; 2], monitor: &Monitor) -> Result<W
     })
 }
 
-/// The two triangles of a cell, those of them that are drawn.
-#[inline(always)]
-fn cell(source: &Mesh<'_>, y: usize, x: usize) -> [Option<Triangle>; 2] {
-    let columns = source.shape[1];
-    let corners = [[y, x], [y, x + 1], [y + 1, x], [y + 1, x + 1]];
-    [[0, 1, 2], [1, 3, 2]].map(|three: [usize; 3]| {
-        let at = three.map(|k| corners[k][0] * columns + corners[k][1]);
-        let weights = at.map(|i| source.weight[i]);
-        if weights.contains(&Mesh::VOID) {
-            return None;
+/// A cell of the mesh: where its corners go, row by row, and what they weigh.
+struct Cell {
+    target: [Point; 4],
+    weight: [u8; 4],
+}
+
+/// Corners of the two triangles of a cell; neighbours share a diagonal.
+const HALVES: [[usize; 3]; 2] = [[0, 1, 2], [1, 3, 2]];
+
+impl Cell {
+    #[inline(always)]
+    fn of(source: &Mesh<'_>, y: usize, x: usize) -> Self {
+        let columns = source.shape[1];
+        let at = y * columns + x;
+        let (t, w) = (
+            &source.target[at..at + columns + 2],
+            &source.weight[at..at + columns + 2],
+        );
+        Self {
+            target: [t[0], t[1], t[columns], t[columns + 1]],
+            weight: [w[0], w[1], w[columns], w[columns + 1]],
         }
-        Some(Triangle {
-            target: at.map(|i| source.target[i]),
-            source: three.map(|k| corners[k].map(|i| i as f64)),
-            weight: weights.iter().map(|&w| u32::from(w)).sum(),
+    }
+
+    /// Both triangles, with their weights where they are drawn.
+    #[inline(always)]
+    fn triangles(&self) -> [([Point; 3], Option<u32>); 2] {
+        HALVES.map(|half| {
+            let weights = half.map(|k| self.weight[k]);
+            let drawn = !weights.contains(&Mesh::VOID);
+            (
+                half.map(|k| self.target[k]),
+                drawn.then(|| weights.iter().map(|&w| u32::from(w)).sum()),
+            )
         })
-    })
+    }
 }
