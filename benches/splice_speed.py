@@ -19,7 +19,7 @@ import texrs
 from texrs import samples
 from texrs.kernels.sparse import Cholesky
 from texrs.kernels.warp import mesh
-from texrs.papers import _splice_source, _splice_warp
+from texrs.papers import _splice_layout, _splice_source, _splice_warp
 from texrs.papers._splice_warp import energy
 from texrs.texels import Texels
 
@@ -48,6 +48,9 @@ def best(work: Callable[[], object], before: Callable[[], object] = lambda: None
 def forget() -> None:
     _splice_warp._FACTORS.clear()
     _splice_source._PARTS.clear()
+    _splice_source._EXTENDED.clear()
+    _splice_layout._DIRECTIONS.clear()
+    _splice_layout._LAYOUTS.clear()
 
 
 def splices(sides: list[int]) -> None:

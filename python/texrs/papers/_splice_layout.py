@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from texrs._typing import Bools
 from texrs.errors import InvalidInput
 from texrs.matching import Layout, directions, match, nearest, spacing
 from texrs.papers._splice_edit import Step, edited
-from texrs.papers._splice_source import Extended, extend, parts_of
+from texrs.papers._splice_source import Extended, Memory, extend, parts_of
 from texrs.texels import Texels
 
 __all__ = ["Match", "apart", "edited_match", "matched", "snapped", "void_of"]
@@ -35,6 +36,10 @@ TURN = 0.85
 """A turn must cost so much less than a smaller one: lattices have several that cost nearly the same."""
 ROOM = 1.08
 """Least distance of texels in their diameters."""
+
+
+_DIRECTIONS: Memory[tuple[float, ...]] = Memory(64)
+_LAYOUTS: Memory[Layout] = Memory(64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,7 +111,9 @@ def targets(layout: Layout, scale: float, angle: float, size: tuple[int, int], b
 
 def aligned(a: Texels, b: Texels) -> list[float]:
     """Give the turns, in degrees, that bring a direction in which B's points line up to one of A's; none is the first."""
-    mine, theirs = (t.peaks or directions(np.asarray(t.points, float)) for t in (a, b))
+    mine, theirs = (
+        t.peaks or _DIRECTIONS.get(t, None, partial(directions, np.asarray(t.points, float))) for t in (a, b)
+    )
     # Lines have no sense of direction: angles are those within a quarter turn.
     turns = {round((p - q + 90) % 180 - 90, 6) for p in mine[:3] for q in theirs[:3]}
     return [0.0, *sorted(turns - {0.0}, key=lambda t: (abs(t), t))]
@@ -115,7 +122,7 @@ def aligned(a: Texels, b: Texels) -> list[float]:
 def matched(a: Texels, b: Texels, size: tuple[int, int], *, align: bool, packed: bool = True) -> Match:
     """Match the texels of A with B's layout (section 4.1)."""
     mine = spacing(np.asarray(a.points, np.float64))
-    layout = Layout.of(np.asarray(b.points, np.float64), b.mask.shape, b.wrap, beyond=True)
+    layout = _LAYOUTS.get(b, None, lambda: Layout.of(np.asarray(b.points, float), b.mask.shape, b.wrap, beyond=True))
     scale = mine / layout.scale
     gain = 1.0
     if packed and a.tag == "F=d":

@@ -7,8 +7,12 @@ texels of disjoint foregrounds are turned back, so that none is mirrored, and th
 
 from __future__ import annotations
 
+import hashlib
+import threading
 from collections import OrderedDict
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +22,11 @@ from texrs.errors import InvalidInput
 from texrs.matching import Fold, Layout
 from texrs.texels import Texels
 
-__all__ = ["Extended", "Parts", "extend", "parts_of"]
+__all__ = ["Extended", "Memory", "Parts", "extend", "parts_of"]
 
 Points = NDArray[np.float64]
 Places = NDArray[np.int32]
+T = TypeVar("T")
 
 RIM = 2
 """Pixels around a texel that move with it: its antialiased rim and shadow."""
@@ -61,19 +66,41 @@ class Parts:
         return whole
 
 
-_PARTS: OrderedDict[int, tuple[Texels, Parts]] = OrderedDict()
+class Memory(Generic[T]):
+    """What was made lately of an entry's mask, points, tag and wrap; the oldest goes first."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._lock = threading.Lock()
+        self._kept: OrderedDict[bytes, T] = OrderedDict()
+
+    def get(self, entry: Texels, rest: object, make: Callable[[], T]) -> T:
+        """Give what is kept, or make it."""
+        digest = hashlib.blake2b(digest_size=16, person=b"texrs.texels")
+        digest.update(repr((entry.mask.shape, len(entry.points), entry.tag, entry.wrap, rest)).encode())
+        digest.update(np.packbits(entry.mask).data)
+        digest.update(np.ascontiguousarray(entry.points, np.float64).data)
+        key = digest.digest()
+        with self._lock:
+            if key in self._kept:
+                self._kept.move_to_end(key)
+                return self._kept[key]
+        made = make()
+        with self._lock:
+            self._kept[key] = made
+            while len(self._kept) > self._most:
+                self._kept.popitem(last=False)
+        return made
+
+    def clear(self) -> None:
+        """Forget everything."""
+        with self._lock:
+            self._kept.clear()
 
 
 def parts_of(entry: Texels) -> Parts:
     """Tell the texels of a disjoint foreground apart: by component, and within one by the nearest texel."""
-    kept = _PARTS.get(id(entry))
-    if kept is not None and kept[0] is entry:
-        return kept[1]
-    made = _parts(entry)
-    _PARTS[id(entry)] = (entry, made)
-    while len(_PARTS) > 8:
-        _PARTS.popitem(last=False)
-    return made
+    return _PARTS.get(entry, None, lambda: _parts(entry))
 
 
 def _parts(entry: Texels) -> Parts:
@@ -169,6 +196,11 @@ def extend(entry: Texels, size: tuple[int, int], margin: int, *, whole: bool = T
     With ``whole=False`` every texel of the picture itself is kept, also those that the border cuts; with ``exact`` every
     pixel is.
     """
+    rest = (size, margin, whole, exact)
+    return _EXTENDED.get(entry, rest, lambda: _extend(entry, size, margin, whole=whole, exact=exact))
+
+
+def _extend(entry: Texels, size: tuple[int, int], margin: int, *, whole: bool, exact: bool) -> Extended:
     shape = np.array(entry.mask.shape)
     offset = (np.array(size) - shape) // 2  # Of the picture in the output.
     disjoint = entry.tag == "F=d"
@@ -189,7 +221,7 @@ def extend(entry: Texels, size: tuple[int, int], margin: int, *, whole: bool = T
     mask: Bools = entry.mask[rows[:, None], columns[None]]
     low, high = (first - offset).astype(float), (last - 1 - offset).astype(float)
     places, of, flips = layout.within(low, high)
-    inside: Bools = ((places >= -0.5) & (places <= shape - 0.5)).all(axis=1) & ~flips.any(axis=1)
+    inside = np.asarray(((places >= -0.5) & (places <= shape - 0.5)).all(axis=1) & ~flips.any(axis=1))
     if not whole:
         # Those of the picture, in its order.
         order = np.lexsort((np.arange(len(of)), np.where(inside, of, 0), ~inside))
@@ -257,3 +289,7 @@ def _stamp(
     shown = entry.mask[table[..., 0], table[..., 1]]
     origin = (int(first[0]), int(first[1]))
     return Extended(origin, table, shown, places[chosen] + first, of[chosen], instance, stray, mirrored, own)
+
+
+_PARTS: Memory[Parts] = Memory(16)
+_EXTENDED: Memory[Extended] = Memory(4)
