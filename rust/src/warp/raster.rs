@@ -138,19 +138,26 @@ impl Band<'_> {
             let Some(weight) = weight else { continue };
             let [a, b, c] = corners;
             let area = doubled(&corners);
-            if area.abs() < FLAT || area.is_nan() {
+            if area.abs() < FLAT || !area.is_finite() {
                 continue;
             }
             let rank = 1 + 2 * weight + u32::from(area < 0.0);
             let scale = 1.0 / area;
             let (b0, b1, c0, c1) = (b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]);
+            // Steps along a row; exact where the cell moves by whole pixels.
+            let (along_u, along_v) = (-c0 * scale, b0 * scale);
+            let px = f64::from(xs.start as i32) - a[1];
+            let mut py = f64::from((ys.start + self.first) as i32) - a[0];
             for y in ys.clone() {
+                let mut u = (py * c1 - px * c0) * scale;
+                let mut v = (b0 * px - b1 * py) * scale;
+                py += 1.0;
                 for x in xs.clone() {
-                    let (py, px) = ((y + self.first) as f64 - a[0], x as f64 - a[1]);
-                    let u = (py * c1 - px * c0) * scale;
-                    let v = (b0 * px - b1 * py) * scale;
-                    let w = 1.0 - u - v;
-                    if u.min(v).min(w) < SLACK {
+                    let (here_u, here_v) = (u, v);
+                    u += along_u;
+                    v += along_v;
+                    let (u, v) = (here_u, here_v);
+                    if (u < SLACK) | (v < SLACK) | (u + v > 1.0 - SLACK) {
                         continue;
                     }
                     let at = y * self.columns + x;
