@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from texrs._typing import Bools, Floats
 from texrs.kernels.noise import uniform
 from texrs.kernels.seam import binary_labels
+from texrs.texels._entry import Tag
 from texrs.texels._mixture import Mixture
 
 __all__ = ["Model", "cut", "disc", "ellipse", "lab", "stamp", "tidy"]
@@ -20,16 +21,20 @@ Wrap: TypeAlias = tuple[bool, bool]
 
 SMOOTH = 2.0
 """Cost of parting neighbours of the same colour."""
-NATS = 12.0
-"""Most that a pixel's colour may speak for one side."""
+NATS, PRIOR = 12.0, 6.0
+"""Most that a pixel's colour may speak for one side, and what lying in the middle of a texel does."""
 RADIUS = 4
 """Of what a point of the background stands for, in pixels."""
 SAMPLES = 4000
 """Colours of each side that a model is made from."""
 HOLE, SPECK = 0.1, 0.25
 """Largest hole that is filled, as a share of its component, and smallest component that is kept, of the chosen texel."""
-ALIKE = 0.5
-"""Share of the box, those colours least like the background, that foreground is learnt from where it is a net."""
+CORE, MESH, RIM, FAR = 0.8, 0.6, 0.9, 1.3
+"""Of the box: the middle, that of a mesh, what lies around it, and from where on a picture of separate texels is background."""
+WHOLE = 0.35
+"""Distance from the border, as a share of the box, from which on what was found is taken as an example."""
+ALIKE = 0.3
+"""Share of what may be a net, those colours least like the background, that it is learnt from."""
 
 
 def lab(guide: Floats) -> Floats:
@@ -72,11 +77,11 @@ def stamp(mask: Bools, points: NDArray[Any], shape: Bools, wrap: Wrap) -> None:
 def cut(
     colours: Floats,
     centres: NDArray[Any],
-    shape: Bools,
+    box: tuple[int, int],
     background: Bools,
     *,
-    net: bool,
-    given: bool = False,
+    tag: Tag,
+    shape: Bools | None = None,
     wrap: Wrap = (False, False),
     seed: int = 0,
     model: Model = "mixture",
@@ -89,46 +94,81 @@ def cut(
         Lab / 100.
     centres : (n, 2)
         The texels, the chosen one first.
-    shape : bool
-        What of the chosen one's box is foreground, as far as is known.
+    box : tuple of int
+        Of a texel.
     background : (H, W) bool
         Known background.
-    net : bool
-        Whether the foreground is connected: then what it looks like is what in the boxes looks least like background.
-    given : bool
-        Whether ``shape`` is certain.
+    tag : Tag
+        Texels that are no net fill the middles of their boxes.
+    shape : bool, optional
+        What of the chosen one's box is foreground, where it is certain.
     """
     size = background.shape
+    if tag == "B=c" and model == "mixture":
+        colours = level(colours, max(box), wrap)
     flat = colours.reshape(-1, 3).astype(np.float64)
-    back = _some(flat[background.ravel()], seed)
-    likely = np.zeros(size, bool)
-    stamp(likely, centres, np.ones_like(shape) if net and not given else shape, wrap)
-    likely &= ~background
-    cost = [np.zeros(0)] * 2
-    if model == "nearest":
-        cost = [_nearest(flat, samples) for samples in (back, _some(flat[likely.ravel()], seed + 1))]
-    else:
-        cost[0] = -Mixture.fit(back, seed=seed).log(flat)
-        fore = flat[likely.ravel()]
-        if net and not given:
-            unlike = cost[0][likely.ravel()]
-            fore = fore[unlike >= np.quantile(unlike, 1 - ALIKE)]
-        cost[1] = -Mixture.fit(_some(fore, seed + 1), seed=seed + 1).log(flat)
-    difference = np.clip(cost[1] - cost[0], -NATS, NATS).reshape(size)
+
+    def around(places: NDArray[Any], part: Bools) -> Bools:
+        marked = np.zeros(size, bool)
+        stamp(marked, places, part, wrap)
+        return marked
+
+    def cost(mine: Sequence[NDArray[np.float64]], number: int) -> NDArray[np.float64]:
+        samples = np.concatenate([_some(m, SAMPLES // len(mine), seed + number) for m in mine if len(m)])
+        if model == "nearest":
+            return _nearest(flat, samples)
+        return -Mixture.fit(samples, seed=seed + number).log(flat)
+
+    half = WHOLE * np.array(box)
+    whole = ((centres >= half) & (centres <= np.array(size) - 1 - half)) | np.array(wrap)
+    whole[0] = True
+    # Where the border cuts a texel, it may as well be none.
+    centres = centres[whole.all(axis=1)]
+    known = flat[background.ravel()]
+    core = shape if shape is not None else ellipse(box, CORE)
+    sure = around(centres[:1], core) & ~background
+    fore, back = around(centres, core) & ~background, np.zeros(size, bool)
+    away, mesh = cost([known], 0), False
+    if tag == "F=c" and shape is None:
+        sure[:] = False
+        rim = around(centres, ~ellipse(box, RIM)) & ~background
+        mesh = bool(np.median(away[fore.ravel()]) < np.median(away[rim.ravel()]))
+        if mesh:
+            # The box holds a mesh of the net, whose middle is background.
+            fore, back = rim & ~fore, around(centres, ellipse(box, MESH)) & ~rim
+        unlike = away[fore.ravel()]
+        fore.ravel()[np.flatnonzero(fore.ravel())[unlike < np.quantile(unlike, 1 - ALIKE)]] = False
+    elif tag == "F=d" and model == "mixture":
+        back = ~around(centres, np.ones((odd(box[0] * FAR), odd(box[1] * FAR)), bool))
+    costs = [cost([known, flat[(back & ~background).ravel()]], 0), cost([flat[fore.ravel()]], 1)]
+    difference = np.clip(costs[1] - costs[0], -NATS, NATS).reshape(size)
+    if model == "mixture" and (tag != "F=c" or mesh):
+        difference += np.where(around(centres, ellipse(box, MESH)), PRIOR if mesh else -PRIOR, 0)
     unary = np.stack([np.maximum(-difference, 0), np.maximum(difference, 0)], axis=-1).astype(np.float32)
-    if not net or given:
-        sure = np.zeros(size, bool)
-        stamp(sure, centres[:1], shape, wrap)
-        unary[sure & ~background, 0] = np.inf
+    unary[sure, 0] = np.inf
     unary[background, 1] = np.inf
     return binary_labels(unary, _smoothness(colours, wrap, model), wrap=wrap).mask
 
 
-def _some(samples: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
-    """Take at most `SAMPLES`, at even steps from a hashed start."""
-    if len(samples) <= SAMPLES:
+def level(colours: Floats, reach: float, wrap: Wrap) -> Floats:
+    """Take away what changes slowly: the light, where texels lie everywhere alike."""
+    from scipy.ndimage import gaussian_filter
+
+    mode = ["wrap" if w else "nearest" for w in wrap]
+    slow = np.stack([gaussian_filter(colours[..., c], reach, mode=mode) for c in range(3)], axis=-1)
+    return colours - slow + slow.mean(axis=(0, 1))
+
+
+def odd(length: float) -> int:
+    """Give the odd number nearest to a length, at least 3."""
+    return max(3, 2 * int(np.floor(length / 2)) + 1)
+
+
+def _some(samples: NDArray[np.float64], most: int, seed: int) -> NDArray[np.float64]:
+    """Take at most so many, at even steps from a hashed start."""
+    if len(samples) <= most:
         return samples
-    at = (np.arange(SAMPLES) + uniform(seed, 1 << 20)) * (len(samples) / SAMPLES)
+    at = (np.arange(most) + uniform(seed, 1 << 20)) * (len(samples) / most)
     return samples[np.minimum(at.astype(np.intp), len(samples) - 1)]
 
 
@@ -150,8 +190,11 @@ def _smoothness(colours: Floats, wrap: Wrap, model: Model) -> Sequence[Any]:
     return [(strength * np.exp(-s * scale)).astype(np.float32) for s in squares]
 
 
-def tidy(mask: Bools, area: float) -> Bools:
-    """Fill small holes, smooth the outline by a pixel, and drop specks; ``area`` is the chosen texel's."""
+def tidy(mask: Bools, area: float, *, net: bool = False) -> Bools:
+    """Fill small holes, smooth the outline by a pixel, and drop specks; ``area`` is the chosen texel's.
+
+    Of a net small specks alone are dropped: thin lines are what it is made of.
+    """
     from scipy import ndimage
 
     pieces, count = ndimage.label(mask)
@@ -163,9 +206,11 @@ def tidy(mask: Bools, area: float) -> Bools:
     areas = np.bincount(pieces.ravel(), minlength=count + 1)
     fill = (above > 0) & (size[: len(first)] < HOLE * np.minimum(areas[above], 4 * area))
     fill[0] = False
-    opened = ndimage.binary_opening(np.pad(mask | fill[holes], 1, mode="edge"))[1:-1, 1:-1]
+    opened = mask | fill[holes]
+    if not net:
+        opened = ndimage.binary_opening(np.pad(opened, 1, mode="edge"))[1:-1, 1:-1]
     pieces, count = ndimage.label(opened)
-    kept = np.bincount(pieces.ravel(), minlength=count + 1) >= SPECK * area
+    kept = np.bincount(pieces.ravel(), minlength=count + 1) >= (SPECK / 5 if net else SPECK) * area
     kept[0] = False
     cleaned: Bools = kept[pieces]
     return cleaned

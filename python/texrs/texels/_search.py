@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from texrs._typing import Floats
 from texrs.kernels.appearance import Appearance
 from texrs.kernels.ncc import Correlation
+from texrs.texels._mask import odd
 
 __all__ = ["Channel", "Found", "Template", "otsu", "search", "suppress", "vectors"]
 
@@ -64,6 +65,8 @@ class Found:
         Least score; -1 where nothing was cut.
     channel : int or None
         The channel that was used; None for all by weight.
+    templates : list of Template
+        The bank, the texel itself first.
     """
 
     pixels: NDArray[np.intp]
@@ -73,6 +76,7 @@ class Found:
     map: Floats
     threshold: float
     channel: int | None
+    templates: Sequence[Template] = (Template((3, 3), (3, 3)),)
 
 
 def pad(array: NDArray[Any], margin: tuple[int, int], wrap: Wrap) -> NDArray[Any]:
@@ -119,11 +123,6 @@ def bank(box: tuple[int, int], rotations: int, scales: Sequence[float]) -> list[
             inner = (odd(sides[0] * scale), odd(sides[1] * scale))
             found.append(Template((odd(inner[0] * CONTEXT), odd(inner[1] * CONTEXT)), inner, angle, float(scale)))
     return found
-
-
-def odd(length: float) -> int:
-    """Give the odd number nearest to a length, at least 3."""
-    return max(3, 2 * int(np.floor(length / 2)) + 1)
 
 
 def cut_out(colours: Floats, centre: tuple[int, int], template: Template, wrap: Wrap) -> Floats:
@@ -205,7 +204,7 @@ def search(
         least = otsu(scores[1:])
     pixels, scores = pixels[scores >= least], scores[scores >= least]
     points = pixels + subpixel(best, pixels, wrap)
-    return Found(pixels, points, scores, which[tuple(pixels.T)], best, least, chosen)
+    return Found(pixels, points, scores, which[tuple(pixels.T)], best, least, chosen, templates)
 
 
 def least_entropy(maps: Floats) -> int:
