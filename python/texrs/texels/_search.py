@@ -28,6 +28,8 @@ COVERED = 0.95
 CONTEXT = 1.3
 """Sides of what is compared over those of the box: what a texel stands out from belongs to its looks, and inside a tile or a
 coin there may be nothing but noise."""
+APART = 1.3
+"""Sides of what is removed around a texel over those of its box: boxes of neighbours overlap, but seldom that much."""
 RANGE = 0.25
 """Least spread of the candidates' scores for a cut to mean anything."""
 BINS = 64
@@ -202,6 +204,10 @@ def search(
         least = threshold
     elif cut and len(scores) and scores[1:].max(initial=-1) - scores[-1] > RANGE:
         least = otsu(scores[1:])
+    if cut:
+        # The cut needs to see what lies between texels; afterwards nothing is one that overlaps a better one.
+        apart = suppress(best, [t.inner for t in templates], which, wrap, share=APART)
+        pixels, scores = apart, best[tuple(apart.T)].astype(np.float64)
     pixels, scores = pixels[scores >= least], scores[scores >= least]
     points = pixels + subpixel(best, pixels, wrap)
     return Found(pixels, points, scores, which[tuple(pixels.T)], best, least, chosen, templates)
