@@ -120,6 +120,7 @@ KERNEL_ARROWS = {
     "seam": set(),
     "patch_search": set(),
     "mean_shift": set(),
+    "ncc": set(),
     "poisson": set(),
     "appearance": set(),
     "guide": {"appearance"},

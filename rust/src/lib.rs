@@ -20,6 +20,7 @@
 //! | [`gather`] | an exemplar of any type looked up through coordinates |
 //! | [`seam`] | minimum cuts on grids: max-flow, planar strips, binary labels |
 //! | [`mean_shift`] | joint spatial and range filtering |
+//! | [`ncc`] | how alike a template and each window of an image are |
 //! | [`patch_search`] | exact best matches of a masked patch |
 //! | [`poisson`] | images from their differences, near given values |
 //! | [`complete`] | filling holes by example |
@@ -46,6 +47,7 @@ pub mod complete;
 pub mod gather;
 pub mod guide;
 pub mod mean_shift;
+pub mod ncc;
 pub mod optimize;
 pub mod patch_search;
 pub mod poisson;

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from texrs.texels._analyse import analyse
 from texrs.texels._entry import Tag, Texels
 
-__all__ = ["Tag", "Texels"]
+__all__ = ["Tag", "Texels", "analyse"]

@@ -35,7 +35,11 @@ class Texels:
     wrap : tuple of bool
         Whether the texture repeats without a seam along rows and columns.
     report : dict
-        What the analysis found and decided.
+        What the analysis found and decided; text, numbers and lists alone.
+    angles : ndarray of shape (n,), float64, optional
+        Degrees by which each texel is turned against the chosen one, as far as was looked for.
+    scales : ndarray of shape (n,), float64, optional
+        How many times larger each texel is, as far as was looked for.
     """
 
     image: NDArray[Any]
@@ -47,3 +51,5 @@ class Texels:
     peaks: tuple[float, ...] = ()
     wrap: tuple[bool, bool] = (False, False)
     report: dict[str, Any] = field(default_factory=dict)
+    angles: NDArray[np.float64] | None = None
+    scales: NDArray[np.float64] | None = None

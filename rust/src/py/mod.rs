@@ -7,6 +7,7 @@ mod gather;
 mod hash;
 mod image_io;
 mod mean_shift;
+mod ncc;
 mod patch_search;
 mod poisson;
 mod seam;
@@ -93,6 +94,8 @@ mod _rust {
     use super::image_io::{decode_image, encode_image, exif_orientation};
     #[pymodule_export]
     use super::mean_shift::mean_shift;
+    #[pymodule_export]
+    use super::ncc::Correlation;
     #[pymodule_export]
     use super::patch_search::PatchIndex;
     #[pymodule_export]

@@ -1,0 +1,120 @@
+"""Detections and mask made to agree, for separate texels (section 3.3, and what it leaves open)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Bools, Floats, Labels
+from texrs.texels._mask import Wrap, ellipse, stamp
+
+__all__ = ["Cleaned", "clean", "components"]
+
+ADDED = 0.25
+"""Least area of a component that is taken for a texel that was not found, as a share of the usual one's."""
+SOLID, ROUND = 0.8, 0.9
+"""Share of its convex hull that a texel fills at least, and from which on several detections are of one texel."""
+SWOLLEN, ONE = 2.5, 3.5
+"""How many times the usual area a component has at most for each detection in it, and for several to be of one texel."""
+TRUSTED = 0.7
+"""Share of the detections that must lie in such components, else the mask is at fault."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cleaned:
+    """Points, their scores, which detection each was (-1 for none), and the mask."""
+
+    points: NDArray[np.float64]
+    scores: NDArray[np.float64]
+    origin: NDArray[np.intp]
+    mask: Bools
+    source: str
+    """Where the mask is from: "cut", or "texels", copies of the chosen one."""
+
+
+def components(mask: Bools, wrap: Wrap) -> tuple[Labels, int]:
+    """Number the pieces of a mask, around cyclic axes too."""
+    from scipy.ndimage import label
+
+    pieces, count = label(mask)
+    into = np.arange(count + 1)
+    for axis in range(2):
+        if wrap[axis]:
+            ends = np.take(pieces, 0, axis), np.take(pieces, -1, axis)
+            for a, b in sorted(set(zip(*(e.tolist() for e in ends), strict=True))):
+                if a and b:
+                    low, high = sorted((int(into[a]), int(into[b])))
+                    into[into == high] = low
+    names, dense = np.unique(into, return_inverse=True)
+    return dense[pieces].astype(np.int32), len(names) - 1
+
+
+def clean(
+    mask: Bools,
+    points: NDArray[np.float64],
+    scores: NDArray[np.float64],
+    map: Floats,
+    shape: Bools,
+    wrap: Wrap,
+    *,
+    certain: bool = False,
+) -> Cleaned:
+    """Move detections into the middle of their components, add and drop some, or make the mask of copies.
+
+    ``shape`` is the chosen texel's foreground within its box. A mask that is ``certain`` is never replaced.
+    """
+    from skimage.measure import regionprops
+
+    pieces, count = components(mask, wrap)
+    at = np.clip(np.rint(points).astype(np.intp), 0, np.array(mask.shape) - 1)
+    owner = pieces[tuple(at.T)]
+    regions = {r.label: r for r in regionprops(pieces)}
+    area, solid = np.zeros(count + 1), np.zeros(count + 1)
+    for number, region in regions.items():
+        area[number], solid[number] = region.area, region.solidity
+    inside = np.bincount(owner, minlength=count + 1)
+    inside[0] = 0
+    usual = float(np.median(area[inside == 1])) if (inside == 1).any() else float(shape.sum())
+    usual = float(np.clip(usual, shape.sum() / 4, shape.size * 1.5))
+    good = (area >= ADDED * usual) & (area <= SWOLLEN * usual * np.maximum(inside, 1)) & (solid >= SOLID)
+    good[0] = False
+    several = (inside > 1) & (area <= SWOLLEN * usual * inside) & (area >= ADDED * usual)
+    share = float((good | several)[owner].mean()) if len(points) else 0.0
+    if share < TRUSTED and not certain:
+        copies = np.zeros(mask.shape, bool)
+        stamp(copies, points, shape if shape.any() else ellipse((shape.shape[0], shape.shape[1])), wrap)
+        return Cleaned(points, scores, np.arange(len(points)), copies, "texels")
+    kept: list[tuple[float, float, float, int]] = []
+    for number, region in regions.items():
+        mine = np.flatnonzero(owner == number)
+        centre = _centre(region.coords, mask.shape, wrap)
+        whole = solid[number] >= ROUND and area[number] <= ONE * usual
+        if len(mine) > 1 and not whole:
+            kept.extend((*points[i], scores[i], int(i)) for i in mine)
+        elif len(mine):
+            best = int(mine[np.argmax(scores[mine])])
+            # What is much larger than a texel, or ragged, has no middle to speak of.
+            place = centre if good[number] or whole else points[best]
+            kept.append((*place, scores[best], best))
+        elif good[number] or certain:
+            place = np.clip(np.rint(centre).astype(np.intp), 0, np.array(mask.shape) - 1)
+            kept.append((*centre, float(map[tuple(place)]), -1))
+    kept.sort(key=lambda p: (-p[2], p[0], p[1]))
+    table = np.array(kept, np.float64).reshape(-1, 4)
+    names = {int(pieces[tuple(np.clip(np.rint(p[:2]).astype(int), 0, np.array(mask.shape) - 1))]) for p in table}
+    used = np.isin(pieces, sorted((set(np.unique(owner)) | names) - {0}))
+    left: Bools = mask & used
+    return Cleaned(table[:, :2].copy(), table[:, 2].copy(), table[:, 3].astype(np.intp), left, "cut")
+
+
+def _centre(pixels: NDArray[np.intp], shape: tuple[int, ...], wrap: Wrap) -> NDArray[np.float64]:
+    """Give the centroid of pixels, around cyclic axes that of their angles."""
+    centre = pixels.mean(axis=0)
+    for axis in range(2):
+        side = shape[axis]
+        if wrap[axis] and np.ptp(pixels[:, axis]) == side - 1:
+            turn = 2 * np.pi * pixels[:, axis] / side
+            centre[axis] = np.arctan2(np.sin(turn).mean(), np.cos(turn).mean()) % (2 * np.pi) * side / (2 * np.pi)
+    return np.asarray(centre, np.float64)
