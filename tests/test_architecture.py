@@ -26,7 +26,7 @@ NOUNS = {
     "blend": {"source_map"},
     "cyclic": {"source_map", "report"},
     "completion": {"source_map", "report", "deform"},
-    "texels": {"analysis", "io"},
+    "texels": {"analysis", "io", "segment"},
     "matching": set(),
 }
 TOP = {"papers": set(NOUNS), "cli": {"papers", "demo", *NOUNS}, "demo": {"papers", *NOUNS}}

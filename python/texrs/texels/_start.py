@@ -154,7 +154,9 @@ def _reduced(guide: Floats, step: int) -> Floats:
     """Average squares of pixels."""
     rows, columns = (n // step for n in guide.shape[:2])
     cut = guide[: rows * step, : columns * step]
-    return np.ascontiguousarray(cut.reshape(rows, step, columns, step, -1).mean(axis=(1, 3), dtype=np.float64), np.float32)
+    return np.ascontiguousarray(
+        cut.reshape(rows, step, columns, step, -1).mean(axis=(1, 3), dtype=np.float64), np.float32
+    )
 
 
 def _boxes(small: Floats) -> list[Box]:
@@ -204,9 +206,7 @@ def _pieces(small: Floats) -> list[tuple[float, float, float, float]]:
     elements = segment(small, children="components").elements
     rows, columns = elements.shape
     inner = [
-        r
-        for r in regionprops(elements)
-        if r.bbox[0] > 0 and r.bbox[1] > 0 and r.bbox[2] < rows and r.bbox[3] < columns
+        r for r in regionprops(elements) if r.bbox[0] > 0 and r.bbox[1] > 0 and r.bbox[2] < rows and r.bbox[3] < columns
     ]
     if len(inner) < 3:
         return []
@@ -365,9 +365,7 @@ def _distance(
     return np.asarray(found.reshape(size), np.float32)
 
 
-def _tag(
-    guide: Floats, away: Floats, points: NDArray[np.float64], box: Box, mask: Bools | None
-) -> tuple[str, float]:
+def _tag(guide: Floats, away: Floats, points: NDArray[np.float64], box: Box, mask: Bools | None) -> tuple[str, float]:
     """Choose a tag, and say how far the choice is from the other ones."""
     from scipy.spatial import cKDTree
 
