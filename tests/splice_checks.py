@@ -57,7 +57,7 @@ def presence(a: Texels, result: Synthesis) -> tuple[float, float]:
         best, place = -1.0, (0, 0)
         for dy in range(-3, 4):
             for dx in range(-3, 4):
-                ty, tx = (*target.astype(int), dy, dx)
+                ty, tx = int(target[0]) + dy, int(target[1]) + dx
                 value = correlation(template, other[ty - h : ty + h + 1, tx - w : tx + w + 1])
                 if value > best:
                     best, place = value, (dy, dx)

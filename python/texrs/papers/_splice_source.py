@@ -265,9 +265,9 @@ def _stamp(
         flat = order[begin[i + 1] : begin[i + 2]]
         pixels = np.stack(np.divmod(flat, shape[1]), axis=-1)
         centre = parts.points[i]
-        away = pixels - np.rint(centre).astype(np.intp)
+        away = pixels - _nearest(centre)
         away -= np.where(entry.wrap, np.rint(away / shape).astype(np.intp) * shape, 0)
-        there = np.rint(places[k]).astype(np.intp) + away
+        there = _nearest(places[k]) + away
         if k >= own and ((there < 0).any() or (there >= limits).any()):
             continue
         y, x = there.T
@@ -276,7 +276,7 @@ def _stamp(
             continue
         kept.append(k)
         # Where its centre is in whole pixels from the texture's own.
-        places[k] = np.rint(places[k]) - np.rint(centre) + centre
+        places[k] = _nearest(places[k]) - _nearest(centre) + centre
         instance[y[free], x[free]] = len(kept)
         if flips[k].any():
             table[y[free], x[free]] = pixels[free]
@@ -289,6 +289,11 @@ def _stamp(
     shown = entry.mask[table[..., 0], table[..., 1]]
     origin = (int(first[0]), int(first[1]))
     return Extended(origin, table, shown, places[chosen] + first, of[chosen], instance, stray, mirrored, own)
+
+
+def _nearest(place: Points) -> NDArray[np.intp]:
+    """Give the nearest pixel; half-way the higher one, so that whole steps stay whole."""
+    return np.asarray(np.floor(place + 0.5), np.intp)
 
 
 _PARTS: Memory[Parts] = Memory(16)
