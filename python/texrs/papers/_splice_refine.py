@@ -28,7 +28,7 @@ Kinds = NDArray[np.uint8]
 
 JITTER = 2.0
 """Pixels that places of what is not rigid are displaced by before they are corrected."""
-PASSES = 3
+PASSES = 2
 WIDE = 0.5
 """A hole wider than so many spacings is filled with patches; less is grown over from its rim."""
 K, APART = 3, 0.05
