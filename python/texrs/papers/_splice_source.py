@@ -17,6 +17,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import check_memory
 from texrs._typing import Bools, Labels
 from texrs.errors import InvalidInput
 from texrs.matching import Fold, Layout
@@ -30,6 +31,8 @@ T = TypeVar("T")
 
 RIM = 2
 """Pixels around a texel that move with it: its antialiased rim and shadow."""
+EACH = 600
+"""Bytes that a pixel of the texture and its surroundings takes, without the factor, which has a limit of its own."""
 SMALLEST = 0.25
 """Foreground without a texel of its own is one if it has so much of the median texel's area."""
 
@@ -214,6 +217,7 @@ def _extend(entry: Texels, size: tuple[int, int], margin: int, *, whole: bool, e
         layout = Layout.of(points, entry.mask.shape, entry.wrap, beyond=False)
     first = np.minimum(-margin, offset)
     last = np.maximum(np.array(size) + margin, offset + shape)
+    check_memory(int(np.prod(last - first)) * EACH)
     along = [layout.folds[a].apply(np.arange(first[a], last[a]) - float(offset[a])) for a in range(2)]
     rows, columns = (np.asarray(np.rint(x), np.int32) for x, _ in along)
     table = np.stack(np.broadcast_arrays(rows[:, None], columns[None]), axis=-1)

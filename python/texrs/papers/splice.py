@@ -240,7 +240,7 @@ def made(
         field = deform(a, found)
         watch("deform", 1.0)
         warped = drawn(field, size, stage(watch, "warp"))
-    draft, label = drafted(a, found, warped)
+    draft, label = drafted(a, found, warped, whole=method is None)
     full, places = draft, draft.places
     if method == "paper":
         full = literal_fill(draft, seed)
@@ -377,14 +377,14 @@ def _pixels(found: SourceMap, shape: tuple[int, ...]) -> NDArray[np.intp]:
     return np.asarray(np.clip(places, 0, np.array(shape[:2]) - 1), np.intp)
 
 
-def drafted(a: Texels, found: Match, warped: Warped) -> tuple[Draft, NDArray[np.uint32]]:
-    """Read the warp as pixels of the texture: T_AB0, what of it stays, and the target of each rigid pixel."""
+def drafted(a: Texels, found: Match, warped: Warped, *, whole: bool) -> tuple[Draft, NDArray[np.uint32]]:
+    """Read the warp as pixels of the texture: T_AB0, what of it stays, and the target of each pixel that moved ``whole``."""
     source, known = found.source, warped.known
     y, x = warped.there[..., 0], warped.there[..., 1]
     places, mirrored = source.table[y, x], source.mirrored[y, x]
-    whole = copied(places, mirrored, known)
+    stays = copied(places, mirrored, known)
     label = np.zeros(known.shape, np.uint32)
-    if a.tag == "F=d":
+    if whole and a.tag == "F=d":
         goal = np.zeros(len(source.points) + 1, np.uint32)
         goal[found.of + 1] = np.arange(1, len(found.of) + 1)
         number = source.instance[y, x]
@@ -397,10 +397,10 @@ def drafted(a: Texels, found: Match, warped: Warped) -> tuple[Draft, NDArray[np.
         label[drawn_out] = 0
         known = known & ~drawn_out
         kinds = ((parts_of(a).region > 0) | a.mask).astype(np.uint8)
-        return Draft(places, known, whole | (label > 0), kinds, np.zeros(known.shape, np.uint8), mirrored), label
-    kinds = np.asarray(a.mask if a.tag == "F=c" else ~a.mask).astype(np.uint8)
+        return Draft(places, known, stays | (label > 0), kinds, np.zeros(known.shape, np.uint8), mirrored), label
+    kinds = np.asarray(~a.mask if a.tag == "B=c" else a.mask).astype(np.uint8)
     wanted = np.where(known, kinds[places[..., 0], places[..., 1]], 255).astype(np.uint8)
-    return Draft(places, known, whole | (known & (wanted == 1)), kinds, wanted, mirrored), label
+    return Draft(places, known, stays | (known & (wanted == 1)), kinds, wanted, mirrored), label
 
 
 def copied(places: NDArray[np.int32], mirrored: Bools, known: Bools) -> Bools:
