@@ -5,15 +5,17 @@ under a frame field), `tile` (any picture made cyclic) and `complete` (holes fil
 `Synthesis`, whose `SourceMap` looks anything that is in register with the exemplar up in the same way.
 """
 
-from texrs import analysis, errors, fields, io, kernels, samples, volume
+from texrs import analysis, errors, fields, io, kernels, samples, texels, volume
 from texrs._rust import VERSION as __version__
 from texrs.completion import complete
 from texrs.cyclic import tile
+from texrs.database import TextureDatabase
 from texrs.papers._solid_window import PlaneTexture, SolidTexture
 from texrs.papers.design import design
 from texrs.papers.solid import solid, synthesize
 from texrs.report import Synthesis
 from texrs.source_map import Reuse, SourceMap
+from texrs.texels import Texels
 from texrs.threads import threads
 
 __all__ = [
@@ -22,6 +24,8 @@ __all__ = [
     "SolidTexture",
     "SourceMap",
     "Synthesis",
+    "Texels",
+    "TextureDatabase",
     "__version__",
     "analysis",
     "complete",
@@ -33,6 +37,7 @@ __all__ = [
     "samples",
     "solid",
     "synthesize",
+    "texels",
     "threads",
     "tile",
     "volume",

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 __all__ = [
     "VERSION",
     "Appearance",
+    "Correlation",
     "PatchIndex",
     "cohere",
     "complete",
@@ -40,6 +41,11 @@ def gather(
     coordinates: NDArray[float32],
     interpolation: str,
 ) -> NDArray[Any]: ...
+
+@final
+class Correlation:
+    def __new__(cls, image: NDArray[float32]) -> Correlation: ...
+    def maps(self, template: NDArray[float32]) -> NDArray[float32]: ...
 
 @final
 class PatchIndex:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_image, as_int, as_mask, as_seed, as_wrap, guidance
-from texrs._typing import Bools, Floats, Progress
+from texrs._typing import Bools, Progress
 from texrs.errors import InvalidInput
 from texrs.texels import _given, _mask, _start
 from texrs.texels._clean import Cleaned, clean, components
@@ -259,7 +259,9 @@ def _shape(mask: Bools | None, box: Box, wrap: tuple[bool, bool]) -> tuple[Bools
     alone = not (mask & ~inside).any() or (count == 1 and not len(crossing))
     corner = [box.centre[a] - box.size[a] // 2 for a in range(2)]
     window = [np.arange(corner[a], corner[a] + box.size[a]) for a in range(2)]
-    own: Bools = mask[np.ix_(*(w % n if c else np.clip(w, 0, n - 1) for w, n, c in zip(window, mask.shape, wrap, strict=True)))]
+    own: Bools = mask[
+        np.ix_(*(w % n if c else np.clip(w, 0, n - 1) for w, n, c in zip(window, mask.shape, wrap, strict=True)))
+    ]
     if not own.any():
         raise InvalidInput("mask: has no foreground in the box")
     return own, None if alone else mask

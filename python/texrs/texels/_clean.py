@@ -35,7 +35,7 @@ class Cleaned:
 
 
 def components(mask: Bools, wrap: Wrap) -> tuple[Labels, int]:
-    """Number the pieces of a mask, around cyclic axes too."""
+    """Give numbers to the pieces of a mask, around cyclic axes too."""
     from scipy.ndimage import label
 
     pieces, count = label(mask)
