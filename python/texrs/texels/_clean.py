@@ -18,6 +18,8 @@ SOLID, ROUND = 0.8, 0.9
 """Share of its convex hull that a texel fills at least, and from which on several detections are of one texel."""
 SWOLLEN, ONE = 2.5, 3.5
 """How many times the usual area a component has at most for each detection in it, and for several to be of one texel."""
+HEAP = 0.3
+"""Largest share of the detections that may lie in one component."""
 TRUSTED = 0.7
 """Share of the detections that must lie in such components, else the mask is at fault."""
 
@@ -81,6 +83,9 @@ def clean(
     good = (area >= ADDED * usual) & (area <= SWOLLEN * usual * np.maximum(inside, 1)) & (solid >= SOLID)
     good[0] = False
     several = (inside > 1) & (area <= SWOLLEN * usual * inside) & (area >= ADDED * usual)
+    # A piece that holds much of the texture is no heap of texels.
+    several &= inside <= max(4, HEAP * len(points))
+    good &= inside <= max(4, HEAP * len(points))
     share = float((good | several)[owner].mean()) if len(points) else 0.0
     if share < TRUSTED and not certain:
         copies = np.zeros(mask.shape, bool)

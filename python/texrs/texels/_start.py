@@ -48,8 +48,9 @@ OUT = 1.1
 """Distance from a texel, in halves of its box, from which on a pixel is taken for background."""
 PLACES = 12
 """Places of the background that are proposed."""
-JOINTS = 1.3
-"""How much stronger thin lines half-way between texels are than elsewhere where these are joints or a net."""
+JOINTS, NONE = 1.3, 0.8
+"""How much stronger thin lines half-way between texels are than elsewhere where these are joints or a net, and where
+there are none for sure."""
 OPEN = 0.3
 """Share of the image beyond that distance from which on texels are taken to be separate."""
 SCATTERED = 0.5
@@ -382,7 +383,7 @@ def _tag(guide: Floats, away: Floats, points: NDArray[np.float64], box: Box, mas
         return "F=d", 0.1
     joints = _joints(lab(guide)[..., 0], points, box.size)
     ground = float((away > OUT).mean())
-    if ground > SCATTERED or (joints < JOINTS and ground > OPEN):
+    if ground > SCATTERED or joints < NONE or (joints < JOINTS and ground > OPEN):
         return "F=d", float(min(0.9, 0.5 + max(0.0, JOINTS - joints) / JOINTS))
     near = cKDTree(points).query(points, k=2)[0][:, 1]
     spread = float(near.std() / max(float(near.mean()), 1e-9))
