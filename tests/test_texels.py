@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -126,7 +127,7 @@ def test_rotations_find_turned_texels() -> None:
         image[(abs(along) <= 12) & (abs(across) <= 4)] += 0.4
         centres.append(centre)
         angles.append(turn)
-    given = dict(box=(20, 20, 11, 27), background=[(40, 40), (80, 80), (120, 40)], tag="F=d", threshold=0.5)
+    given = {"box": (20, 20, 11, 27), "background": [(40, 40), (80, 80), (120, 40)], "tag": "F=d", "threshold": 0.5}
     found = analyse(image, rotations=4, **given)
     assert score(found.points, np.array(centres, float), (20, 20), image.shape).recall == 1
     assert found.angles is not None
@@ -213,7 +214,7 @@ def test_a_mixture_knows_its_colours() -> None:
 
 # --- bad input -------------------------------------------------------------------------------------------------------
 
-GOOD = dict(box=BOX, background=GROUND, tag="F=d")
+GOOD = {"box": BOX, "background": GROUND, "tag": "F=d"}
 HALF = np.zeros(MASK.shape, bool)
 HALF[:, :40] = True
 
@@ -222,36 +223,36 @@ HALF[:, :40] = True
     ("change", "message"),
     [
         (
-            dict(box=(300, 50, 20, 20)),
+            {"box": (300, 50, 20, 20)},
             "box: reaches from 290 to 310 along the rows, outside of the image, which has 160",
         ),
-        (dict(box=(80, 96, 20)), "box: needs \\(row, column, height, width\\)"),
-        (dict(box=(80, np.nan, 20, 20)), "box: needs"),
-        (dict(box=(80, 96, 1, 20)), "box: sides of at least 3"),
-        (dict(box="here"), "box: needs"),
-        (dict(background=[]), "background: marks nothing"),
-        (dict(background=[(5, 900)]), "background: point 0, .* outside of the image"),
-        (dict(background=[(5, 5), (np.nan, 3)]), "background: must be finite, but point 1"),
-        (dict(background=[(5, 5), (5, 5)]), "background: point 1, .* is there twice"),
-        (dict(background=[BOX[:2]]), "background: contradicts the box"),
-        (dict(mask=MASK, background=[tuple(CENTRES[3])]), "background: contradicts the mask"),
-        (dict(tag="F=x"), "tag: allowed are F=d"),
-        (dict(mask=HALF, box=None, background=None), "box: is needed with this mask"),
-        (dict(mask=HALF, box=(80, 30, 30, 30), background=None), "tag: contradicts the mask: F=d means separate"),
-        (dict(mask=MASK, background=None, tag="F=c"), "tag: contradicts the mask: F=c means a connected"),
-        (dict(mask=MASK[:5]), "mask: needs shape"),
-        (dict(mask=np.ones_like(MASK)), "mask: is all foreground"),
-        (dict(points=[(10, 10), (20, np.inf)]), "points: must be finite, but point 1"),
-        (dict(points=[(10, 10), (20, 10), (10, 10)]), "points: point 2, .* is there twice"),
-        (dict(points=[(10, 10), (20, 400)]), "points: point 1, .* outside"),
-        (dict(points=[(10, 10, 3)]), "points: needs points \\(row, column\\)"),
-        (dict(rotations=0), "rotations: needs an integer from 1 to 72"),
-        (dict(scales=[]), "scales: needs 1 to 16 numbers"),
-        (dict(scales=[9.0]), "scales\\[0\\]: needs a number"),
-        (dict(threshold=3), "threshold: needs a number from -1 to 1"),
-        (dict(channel="third"), "channel: allowed are"),
-        (dict(model="forest"), "model: allowed are"),
-        (dict(method="letter"), "method: allowed are"),
+        ({"box": (80, 96, 20)}, "box: needs \\(row, column, height, width\\)"),
+        ({"box": (80, np.nan, 20, 20)}, "box: needs"),
+        ({"box": (80, 96, 1, 20)}, "box: sides of at least 3"),
+        ({"box": "here"}, "box: needs"),
+        ({"background": []}, "background: marks nothing"),
+        ({"background": [(5, 900)]}, "background: point 0, .* outside of the image"),
+        ({"background": [(5, 5), (np.nan, 3)]}, "background: must be finite, but point 1"),
+        ({"background": [(5, 5), (5, 5)]}, "background: point 1, .* is there twice"),
+        ({"background": [BOX[:2]]}, "background: contradicts the box"),
+        ({"mask": MASK, "background": [tuple(CENTRES[3])]}, "background: contradicts the mask"),
+        ({"tag": "F=x"}, "tag: allowed are F=d"),
+        ({"mask": HALF, "box": None, "background": None}, "box: is needed with this mask"),
+        ({"mask": HALF, "box": (80, 30, 30, 30), "background": None}, "tag: contradicts the mask: F=d means separate"),
+        ({"mask": MASK, "background": None, "tag": "F=c"}, "tag: contradicts the mask: F=c means a connected"),
+        ({"mask": MASK[:5]}, "mask: needs shape"),
+        ({"mask": np.ones_like(MASK)}, "mask: is all foreground"),
+        ({"points": [(10, 10), (20, np.inf)]}, "points: must be finite, but point 1"),
+        ({"points": [(10, 10), (20, 10), (10, 10)]}, "points: point 2, .* is there twice"),
+        ({"points": [(10, 10), (20, 400)]}, "points: point 1, .* outside"),
+        ({"points": [(10, 10, 3)]}, "points: needs points \\(row, column\\)"),
+        ({"rotations": 0}, "rotations: needs an integer from 1 to 72"),
+        ({"scales": []}, "scales: needs 1 to 16 numbers"),
+        ({"scales": [9.0]}, "scales\\[0\\]: needs a number"),
+        ({"threshold": 3}, "threshold: needs a number from -1 to 1"),
+        ({"channel": "third"}, "channel: allowed are"),
+        ({"model": "forest"}, "model: allowed are"),
+        ({"method": "letter"}, "method: allowed are"),
     ],
 )
 def test_bad_input_gets_a_sentence(change: dict, message: str) -> None:
@@ -276,12 +277,8 @@ def test_too_few_texels() -> None:
 )
 def test_nothing_to_be_found(image: np.ndarray) -> None:
     """Whatever comes of it: an entry, or a sentence."""
-    try:
-        found = analyse(image.astype(np.float32))
-    except TexrsError as error:
-        assert ":" in str(error)
-    else:
-        assert len(found.points) >= 3
+    with suppress(TexrsError):
+        assert len(analyse(image.astype(np.float32)).points) >= 3
 
 
 # --- files -----------------------------------------------------------------------------------------------------------
@@ -322,8 +319,8 @@ def test_entries_that_cannot_be_read(tmp_path: Path, entry: Texels) -> None:
         texels.load(written(points=parts["points"][:, :1]))
     with pytest.raises(FileError, match="damaged .*tag"):
         texels.load(written(tag=np.frombuffer(b"F=x", np.uint8)))
+    np.savez(path, other=np.zeros(3))
     with pytest.raises(FileError, match="is no entry"):
-        np.savez(path, other=np.zeros(3))
         texels.load(path)
     for length in (0, 10, len(whole) // 2, len(whole) - 30):
         path.write_bytes(whole[:length])
