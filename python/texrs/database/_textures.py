@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import os
-import re
-import time
-import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -19,17 +14,12 @@ from numpy.typing import NDArray
 from texrs import io
 from texrs._arrays import as_image, as_int, guidance
 from texrs._typing import Array, Path, Progress
+from texrs.database._folder import NAME, Folder, Record, given_again
 from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.texels import FORMAT, Texels, analyse, digest, load
 
-__all__ = ["Matrix", "Record", "TextureDatabase"]
+__all__ = ["Matrix", "TextureDatabase"]
 
-MANIFEST, LOCK = "manifest.json", ".lock"
-LAYOUT = 1
-"""Of the manifest."""
-NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
-PATIENCE, PAUSE = 60.0, 0.05
-"""Seconds that another process may keep the manifest, and between two looks."""
 GAP = 4
 """Pixels between the pictures of a sheet."""
 OPTIONS = {"box", "mask", "background", "tag", "points", "rotations", "scales", "threshold", "channel", "model"} | {
@@ -38,24 +28,6 @@ OPTIONS = {"box", "mask", "background", "tag", "points", "rotations", "scales", 
     "seed",
 }
 """What `texrs.texels.analyse` takes, and an entry is remade with."""
-
-
-@dataclass(frozen=True, slots=True)
-class Record:
-    """What the manifest says of a texture."""
-
-    name: str
-    file: str
-    """Of the entry, in the folder."""
-    source: str
-    """Of the image: in the folder, or elsewhere."""
-    hash: str
-    version: int
-    tag: str
-    box: tuple[int, ...]
-    texels: int
-    options: Mapping[str, Any] = field(repr=False)
-    """With which it was analysed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,24 +81,20 @@ class TextureDatabase:
         if not isinstance(path, str | os.PathLike) or not isinstance(os.fspath(path), str):
             raise InvalidInput(f"path: needs a str or a pathlib.Path, got {type(path).__name__}")
         self.path = FilePath(path)
-        self._say = say
-        try:
-            self.path.mkdir(exist_ok=True)
-        except (OSError, ValueError) as error:
-            raise FileError(f"{self.path}: no folder can be made there ({error})") from None
-        self._read()
+        self._folder = Folder(self.path, say)
+        self._folder.read()
 
     def __repr__(self) -> str:
         return f"TextureDatabase({str(self.path)!r}, {len(self)} textures)"
 
     def __len__(self) -> int:
-        return len(self._read())
+        return len(self._folder.read())
 
     def __iter__(self) -> Iterator[str]:
-        return iter(sorted(self._read()))
+        return iter(sorted(self._folder.read()))
 
     def __contains__(self, name: object) -> bool:
-        return name in self._read()
+        return name in self._folder.read()
 
     def __getitem__(self, name: str) -> Texels:
         """Give an entry, remade if it has to be."""
@@ -134,7 +102,7 @@ class TextureDatabase:
 
     def list(self) -> list[Record]:
         """Give what the manifest says of all textures, by name."""
-        found = self._read()
+        found = self._folder.read()
         return [found[name] for name in sorted(found)]
 
     def add(
@@ -187,7 +155,7 @@ class TextureDatabase:
         if not isinstance(name, str) or not NAME.fullmatch(name):
             raise InvalidInput(f"name: letters, digits, '.', '_' and '-' are allowed, up to 100; got {name!r}")
         pixels = as_image(image) if file is None else io.read(file)
-        before = self._read().get(name)
+        before = self._folder.read().get(name)
         if before is not None and before.hash != digest(pixels) and not replace:
             raise InvalidInput(f"name: {name} is there already, of another image; replace=True replaces it")
         entry = analyse(pixels, progress=progress, **options)
@@ -196,7 +164,7 @@ class TextureDatabase:
         source = f"{name}.npy" if file is None else file
         if file is None:
             io.write(self.path / source, pixels)
-        return self._keep(name, entry, source, {**options, "similarity": similarity} if similarity else options)
+        return self._folder.keep(name, entry, source, {**options, "similarity": similarity} if similarity else options)
 
     def analyse(self, name: str, *, progress: Progress | None = None) -> Texels:
         """Give an entry, made anew if its image or the version is another one, or if it is damaged.
@@ -226,11 +194,11 @@ class TextureDatabase:
             return entry
         if entry is not None and digest(image) == digest(entry.image):
             return entry
-        self._tell(f"{name}: made anew, for the entry {reason or 'is of another image'}")
-        options = {k: _back(v) for k, v in record.options.items()}
+        self._folder.tell(f"{name}: made anew, for the entry {reason or 'is of another image'}")
+        options = {k: given_again(v) for k, v in record.options.items()}
         similar = bool(options.pop("similarity", False))
         entry = analyse(image, progress=progress, **options)
-        return self._keep(name, entry.prepared() if similar else entry, record.source, record.options)
+        return self._folder.keep(name, entry.prepared() if similar else entry, record.source, record.options)
 
     def splice(self, a: str, b: str, size: Sequence[int] | None = None, **options: Any) -> Any:
         """Splice two textures: the texels of ``a`` in the arrangement of ``b``; see `texrs.splice`."""
@@ -301,7 +269,7 @@ class TextureDatabase:
     # --- the folder ----------------------------------------------------------------------------------------------
 
     def _record(self, name: str) -> Record:
-        found = self._read()
+        found = self._folder.read()
         if name not in found:
             there = ", ".join(sorted(found)[:8]) or "none"
             raise InvalidInput(f"name: there is no texture {name!r} in {self.path}; there are {there}")
@@ -313,170 +281,12 @@ class TextureDatabase:
         except TexrsError:
             return None
 
-    def _keep(self, name: str, entry: Texels, source: str, options: Mapping[str, Any]) -> Texels:
-        plain = {k: _plain(v) for k, v in options.items()}
-        # With all that the manifest needs, should that be lost.
-        entry = replace(entry, report={**entry.report, "database": {"source": source, "options": plain}})
-        file = f"{name}.npz"
-        record = _of(name, file, entry)
-        with self._locked():
-            entry.save(self.path / file)
-            found = self._parse()
-            found = self._found() if found is None else found
-            found[name] = record
-            self._write(found)
-        return entry
-
-    def _read(self) -> dict[str, Record]:
-        """Read the manifest; remake it from the entries where it is damaged."""
-        found = self._parse()
-        if found is None:
-            with self._locked():
-                found = self._parse()
-                if found is None:
-                    found = self._found()
-                    self._tell(f"{self.path / MANIFEST}: damaged; made anew from {len(found)} entries")
-                    self._write(found)
-        return found
-
-    def _parse(self) -> dict[str, Record] | None:
-        try:
-            text = (self.path / MANIFEST).read_text(encoding="utf-8")
-        except FileNotFoundError:
-            # With entries it was lost; without, nobody has written it yet.
-            return None if any(self.path.glob("*.npz")) else {}
-        except (OSError, UnicodeDecodeError):
-            return None
-        try:
-            table = json.loads(text)
-            if int(table["layout"]) > LAYOUT:
-                raise FileError(
-                    f"{self.path / MANIFEST}: has layout {table['layout']}, this texrs reads up to {LAYOUT}"
-                )
-            return {name: _record(name, item) for name, item in table["textures"].items()}
-        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-            return None
-
-    def _found(self) -> dict[str, Record]:
-        found = {}
-        for file in sorted(self.path.glob("*.npz")):
-            with suppress(TexrsError):
-                if NAME.fullmatch(file.stem):
-                    found[file.stem] = _of(file.stem, file.name, load(file))
-        return found
-
-    def _write(self, found: Mapping[str, Record]) -> None:
-        table = {
-            "layout": LAYOUT,
-            "textures": {
-                name: {
-                    "file": r.file,
-                    "source": r.source,
-                    "hash": r.hash,
-                    "version": r.version,
-                    "tag": r.tag,
-                    "box": list(r.box),
-                    "texels": r.texels,
-                    "options": dict(r.options),
-                }
-                for name, r in sorted(found.items())
-            },
-        }
-        with io.atomic(self.path / MANIFEST) as temporary:
-            temporary.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
-
-    @contextmanager
-    def _locked(self) -> Iterator[None]:
-        """Keep other processes, and threads, from changing the manifest."""
-        try:
-            number = os.open(self.path / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
-        except OSError as error:
-            raise FileError(f"{self.path}: cannot be written to ({error.strerror})") from None
-        try:
-            end = time.monotonic() + PATIENCE
-            while not _lock(number):
-                if time.monotonic() > end:
-                    raise FileError(f"{self.path}: another process has kept it locked for {PATIENCE:g} s")
-                time.sleep(PAUSE)
-            yield
-        finally:
-            os.close(number)
-
-    def _tell(self, sentence: str) -> None:
-        if self._say is not None:
-            self._say(sentence)
-        else:
-            warnings.warn(sentence, stacklevel=4)
-
-
-def _lock(number: int) -> bool:
-    """Lock a file until it is closed, which the system does for a process that dies."""
-    try:
-        try:
-            import fcntl
-        except ImportError:  # Windows
-            import msvcrt
-
-            locking: Any = msvcrt
-            locking.locking(number, locking.LK_NBLCK, 1)
-        else:
-            fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True
-
 
 def _splice(a: Texels, b: Texels, size: Sequence[int] | None, options: Mapping[str, Any]) -> Any:
     import texrs
 
     verb: Any = vars(texrs)["splice"]
     return verb(a, b, **options) if size is None else verb(a, b, size, **options)
-
-
-def _of(name: str, file: str, entry: Texels) -> Record:
-    kept = entry.report.get("database", {})
-    box = tuple(int(n) for n in entry.report.get("box", (0, 0, *entry.box)))
-    source, options = str(kept.get("source", "")), dict(kept.get("options", {}))
-    return Record(name, file, source, digest(entry.image), FORMAT, entry.tag, box, len(entry.points), options)
-
-
-def _record(name: str, item: Mapping[str, Any]) -> Record:
-    if not NAME.fullmatch(name) or FilePath(item["file"]).name != item["file"]:
-        raise ValueError(name)
-    return Record(
-        name,
-        str(item["file"]),
-        str(item["source"]),
-        str(item["hash"]),
-        int(item["version"]),
-        str(item["tag"]),
-        tuple(int(n) for n in item["box"]),
-        int(item["texels"]),
-        dict(item["options"]),
-    )
-
-
-def _plain(value: Any) -> Any:
-    """Write an option as text and numbers; a mask by its runs."""
-    if isinstance(value, np.ndarray) and value.dtype.kind in "b" and value.ndim == 2:
-        changes = np.flatnonzero(np.diff(value.ravel().astype(np.int8), prepend=0))
-        return {"shape": list(value.shape), "changes": changes.tolist()}
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, Sequence) and not isinstance(value, str | bytes):
-        return [_plain(v) for v in value]
-    return value
-
-
-def _back(value: Any) -> Any:
-    if isinstance(value, dict):
-        rows, columns = (int(n) for n in value["shape"])
-        steps = np.zeros(rows * columns, np.int8)
-        steps[value["changes"]] = 1
-        return (np.cumsum(steps) % 2).astype(bool).reshape(rows, columns)
-    return value
 
 
 def thumbnail(image: Array, side: int) -> NDArray[np.uint8]:
