@@ -19,6 +19,7 @@ NOUNS = {
     "io": set(),
     "report": {"source_map", "io", "volume"},
     "segment": set(),
+    "texels": {"analysis", "io", "segment"},
     "fields": set(),
     "volume": {"io", "fields", "source_map"},
     "deform": set(),
@@ -29,7 +30,12 @@ NOUNS = {
     "texels": {"analysis", "io", "segment"},
     "matching": set(),
 }
-TOP = {"papers": set(NOUNS), "cli": {"papers", "demo", *NOUNS}, "demo": {"papers", *NOUNS}}
+TOP = {
+    "papers": set(NOUNS),
+    "database": {"io", "texels"},
+    "cli": {"papers", "demo", "database", *NOUNS},
+    "demo": {"papers", *NOUNS},
+}
 
 
 def imports(path: Path) -> set[str]:

@@ -6,16 +6,18 @@ another) and `self_splice` (in an edited one), `solid` and `synthesize` (volumes
 looks anything that is in register with the exemplar up in the same way.
 """
 
-from texrs import analysis, errors, fields, io, kernels, samples, volume
+from texrs import analysis, errors, fields, io, kernels, samples, texels, volume
 from texrs._rust import VERSION as __version__
 from texrs.completion import complete
 from texrs.cyclic import tile
+from texrs.database import TextureDatabase
 from texrs.papers._solid_window import PlaneTexture, SolidTexture
 from texrs.papers.design import design
 from texrs.papers.solid import solid, synthesize
 from texrs.papers.splice import self_splice, splice
 from texrs.report import Synthesis
 from texrs.source_map import Reuse, SourceMap
+from texrs.texels import Texels
 from texrs.threads import threads
 
 __all__ = [
@@ -24,6 +26,8 @@ __all__ = [
     "SolidTexture",
     "SourceMap",
     "Synthesis",
+    "Texels",
+    "TextureDatabase",
     "__version__",
     "analysis",
     "complete",
@@ -37,6 +41,7 @@ __all__ = [
     "solid",
     "splice",
     "synthesize",
+    "texels",
     "threads",
     "tile",
     "volume",

@@ -8,6 +8,7 @@ __all__ = [
     "VERSION",
     "Appearance",
     "Cholesky",
+    "Correlation",
     "PatchIndex",
     "cohere",
     "complete",
@@ -43,6 +44,11 @@ def gather(
     coordinates: NDArray[float32],
     interpolation: str,
 ) -> NDArray[Any]: ...
+
+@final
+class Correlation:
+    def __new__(cls, image: NDArray[float32]) -> Correlation: ...
+    def maps(self, template: NDArray[float32]) -> NDArray[float32]: ...
 
 @final
 class PatchIndex:

@@ -3,6 +3,7 @@
 mod coherence;
 mod complete;
 mod mean_shift;
+mod ncc;
 mod patch_search;
 mod poisson;
 mod seam;
@@ -59,6 +60,7 @@ criterion_group!(
     coherence::bench,
     complete::bench,
     mean_shift::bench,
+    ncc::bench,
     patch_search::bench,
     poisson::bench,
     seam::bench

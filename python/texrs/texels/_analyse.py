@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_image, as_int, as_mask, as_seed, as_wrap, guidance
-from texrs._typing import Bools, Floats, Progress
+from texrs._typing import Bools, Progress
 from texrs.errors import InvalidInput
 from texrs.texels import _given, _mask, _start
-from texrs.texels._clean import Cleaned, clean, components
+from texrs.texels._clean import Cleaned, add_missing, clean, components
 from texrs.texels._entry import Tag, Texels
 from texrs.texels._given import Box
 from texrs.texels._points import peaks, spacing
@@ -195,6 +195,10 @@ def analyse(
     if said == "F=d" and not literal:
         own = shape if shape is not None else _mask.ellipse(given.size)
         result = clean(cut, found.points, found.scores, found.map, own, around, certain=whole is not None)
+    elif not literal and listed is None and len(result.points):
+        at = np.clip(np.rint(result.points).astype(np.intp), 0, np.array(size) - 1)
+        if said == "B=c" or result.mask[tuple(at.T)].mean() < 0.5:
+            result = add_missing(result, found.map, around, joints=said == "B=c")
     if len(result.points) < FEWEST:
         raise InvalidInput(
             f"image: {len(result.points)} texels were found, at least {FEWEST} are needed; try another box, more "

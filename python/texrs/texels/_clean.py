@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from texrs._typing import Bools, Floats, Labels
 from texrs.texels._mask import Wrap, ellipse, stamp
 
-__all__ = ["Cleaned", "clean", "components"]
+__all__ = ["Cleaned", "add_missing", "clean", "components"]
 
 ADDED = 0.25
 """Least area of a component that is taken for a texel that was not found, as a share of the usual one's."""
@@ -18,6 +18,10 @@ SOLID, ROUND = 0.8, 0.9
 """Share of its convex hull that a texel fills at least, and from which on several detections are of one texel."""
 SWOLLEN, ONE = 2.5, 3.5
 """How many times the usual area a component has at most for each detection in it, and for several to be of one texel."""
+HEAP = 0.3
+"""Largest share of the detections that may lie in one component."""
+JOINED, MESHED = 0.5, 0.25
+"""Least share of the usual area of a piece that is taken for a texel between joints, and for a mesh of a net."""
 TRUSTED = 0.7
 """Share of the detections that must lie in such components, else the mask is at fault."""
 
@@ -35,7 +39,7 @@ class Cleaned:
 
 
 def components(mask: Bools, wrap: Wrap) -> tuple[Labels, int]:
-    """Number the pieces of a mask, around cyclic axes too."""
+    """Give numbers to the pieces of a mask, around cyclic axes too."""
     from scipy.ndimage import label
 
     pieces, count = label(mask)
@@ -81,6 +85,9 @@ def clean(
     good = (area >= ADDED * usual) & (area <= SWOLLEN * usual * np.maximum(inside, 1)) & (solid >= SOLID)
     good[0] = False
     several = (inside > 1) & (area <= SWOLLEN * usual * inside) & (area >= ADDED * usual)
+    # A piece that holds much of the texture is no heap of texels.
+    several &= inside <= max(4, HEAP * len(points))
+    good &= inside <= max(4, HEAP * len(points))
     share = float((good | several)[owner].mean()) if len(points) else 0.0
     if share < TRUSTED and not certain:
         copies = np.zeros(mask.shape, bool)
@@ -107,6 +114,52 @@ def clean(
     used = np.isin(pieces, sorted((set(np.unique(owner)) | names) - {0}))
     left: Bools = mask & used
     return Cleaned(table[:, :2].copy(), table[:, 2].copy(), table[:, 3].astype(np.intp), left, "cut")
+
+
+def add_missing(found: Cleaned, map: Floats, wrap: Wrap, *, joints: bool) -> Cleaned:
+    """Add the texels between joints, or the meshes of a net, that look like those that were found.
+
+    A piece counts that is whole, as solid as a texel, and of about the usual area. Of detections between joints those
+    are dropped that lie on what is far too small.
+    """
+    from skimage.measure import regionprops
+
+    size, least = found.mask.shape, JOINED if joints else MESHED
+    pieces, count = components(found.mask if joints else ~found.mask, wrap)
+    at = np.clip(np.rint(found.points).astype(np.intp), 0, np.array(size) - 1)
+    inside = np.bincount(pieces[tuple(at.T)], minlength=count + 1)
+    inside[0] = 0
+    areas = np.bincount(pieces.ravel(), minlength=count + 1)
+    if not (inside == 1).any():
+        return found
+    usual = float(np.median(areas[inside == 1]))
+    if joints:
+        found = _without_bits(found, pieces, areas, usual)
+    new = []
+    for region in regionprops(pieces):
+        cut = any(not wrap[a] and (region.bbox[a] == 0 or region.bbox[a + 2] == size[a]) for a in range(2))
+        fits = least * usual <= region.area <= SWOLLEN * usual
+        if inside[region.label] or cut or not fits or region.solidity < SOLID:
+            continue
+        centre = _centre(region.coords, size, wrap)
+        place = np.clip(np.rint(centre).astype(np.intp), 0, np.array(size) - 1)
+        new.append((*centre, float(map[tuple(place)]), -1.0))
+    if not new:
+        return found
+    table = np.concatenate([np.column_stack([found.points, found.scores, found.origin]), np.array(new)])
+    table = table[np.lexsort((table[:, 1], table[:, 0], -table[:, 2]))]
+    origin = table[:, 3].astype(np.intp)
+    return Cleaned(table[:, :2].copy(), table[:, 2].copy(), origin, found.mask, found.source)
+
+
+def _without_bits(found: Cleaned, pieces: Labels, areas: NDArray[np.intp], usual: float) -> Cleaned:
+    at = np.clip(np.rint(found.points).astype(np.intp), 0, np.array(pieces.shape) - 1)
+    owner = pieces[tuple(at.T)]
+    bits = (owner > 0) & (areas[owner] < ADDED * usual)
+    if not bits.any() or bits.mean() > 1 - TRUSTED:
+        return found
+    mask = found.mask & ~np.isin(pieces, owner[bits])
+    return Cleaned(found.points[~bits], found.scores[~bits], found.origin[~bits], mask, found.source)
 
 
 def _centre(pixels: NDArray[np.intp], shape: tuple[int, ...], wrap: Wrap) -> NDArray[np.float64]:

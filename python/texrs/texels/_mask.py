@@ -156,7 +156,7 @@ def level(colours: Floats, reach: float, wrap: Wrap) -> Floats:
 
     mode = ["wrap" if w else "nearest" for w in wrap]
     slow = np.stack([gaussian_filter(colours[..., c], reach, mode=mode) for c in range(3)], axis=-1)
-    return colours - slow + slow.mean(axis=(0, 1))
+    return np.asarray(colours - slow + slow.mean(axis=(0, 1)), np.float32)
 
 
 def odd(length: float) -> int:

@@ -20,6 +20,7 @@ from texrs.errors import InvalidInput
 from texrs.segment import segment
 from texrs.segment.regularity import lattice
 from texrs.texels._clean import components
+from texrs.texels._entry import Tag
 from texrs.texels._given import LEAST, Box, as_box
 from texrs.texels._mask import disc, lab, odd
 from texrs.texels._points import spacing
@@ -47,8 +48,9 @@ OUT = 1.1
 """Distance from a texel, in halves of its box, from which on a pixel is taken for background."""
 PLACES = 12
 """Places of the background that are proposed."""
-JOINTS = 1.3
-"""How much stronger thin lines half-way between texels are than elsewhere where these are joints or a net."""
+JOINTS, NONE = 1.3, 0.8
+"""How much stronger thin lines half-way between texels are than elsewhere where these are joints or a net, and where
+there are none for sure."""
 OPEN = 0.3
 """Share of the image beyond that distance from which on texels are taken to be separate."""
 SCATTERED = 0.5
@@ -63,7 +65,7 @@ class Proposal:
 
     box: Box
     background: Bools
-    tag: str
+    tag: Tag
     confidence: dict[str, float] = field(default_factory=dict)
 
 
@@ -73,7 +75,7 @@ def propose(
     box: Box | None,
     background: Bools | None,
     mask: Bools | None,
-    tag: str | None,
+    tag: Tag | None,
     points: NDArray[np.float64] | None,
     progress: Callable[[float], object],
 ) -> Proposal:
@@ -256,8 +258,10 @@ def _resized(box: Box, size: tuple[int, ...]) -> list[Box]:
 
 
 def _worth(light: Floats, found: Found, box: Box) -> float:
-    """Say how well copies of a box explain a picture: how alike they are, how clearly they stand out, how much they cover,
-    and how much what they have in common is one thing in the middle of the box.
+    """Say how well copies of a box explain a picture.
+
+    They do so by how alike they are, how clearly they stand out, how much they cover, and how much what they have in
+    common is one thing in the middle of the box.
     """
     if len(found.scores) < 4:
         return 0.0
@@ -318,7 +322,7 @@ def _centred(light: Floats, found: Found, box: Box) -> Box | None:
     for row in np.linspace(-0.55, 0.55, 9) * box.size[0]:
         for column in np.linspace(-0.55, 0.55, 9) * box.size[1]:
             half = [int(WIDE * s / 2) for s in box.size]
-            at = [int(round(m + d)) for m, d in zip((np.array(window.shape) - 1) / 2, (row, column), strict=True)]
+            at = [round((n - 1) / 2 + d) for n, d in zip(window.shape, (float(row), float(column)), strict=True)]
             low = [max(0, a - h) for a, h in zip(at, half, strict=True)]
             part = window[low[0] : at[0] + half[0] + 1, low[1] : at[1] + half[1] + 1]
             offset = np.array([a - lo - (n - 1) / 2 for a, lo, n in zip(at, low, part.shape, strict=True)])
@@ -360,12 +364,12 @@ def _distance(
             move = np.zeros(2)
             move[axis] = size[axis]
             copies = [c + k * move for c in copies for k in (-1, 0, 1)]
-    grid = np.stack(np.mgrid[: size[0], : size[1]], axis=-1).reshape(-1, 2)
+    grid = np.indices(size).reshape(2, -1).T
     found = cKDTree(np.concatenate(copies) / half).query(grid / half)[0]
     return np.asarray(found.reshape(size), np.float32)
 
 
-def _tag(guide: Floats, away: Floats, points: NDArray[np.float64], box: Box, mask: Bools | None) -> tuple[str, float]:
+def _tag(guide: Floats, away: Floats, points: NDArray[np.float64], box: Box, mask: Bools | None) -> tuple[Tag, float]:
     """Choose a tag, and say how far the choice is from the other ones."""
     from scipy.spatial import cKDTree
 
@@ -379,11 +383,11 @@ def _tag(guide: Floats, away: Floats, points: NDArray[np.float64], box: Box, mas
         return "F=d", 0.1
     joints = _joints(lab(guide)[..., 0], points, box.size)
     ground = float((away > OUT).mean())
-    if ground > SCATTERED or (joints < JOINTS and ground > OPEN):
+    if ground > SCATTERED or joints < NONE or (joints < JOINTS and ground > OPEN):
         return "F=d", float(min(0.9, 0.5 + max(0.0, JOINTS - joints) / JOINTS))
     near = cKDTree(points).query(points, k=2)[0][:, 1]
     spread = float(near.std() / max(float(near.mean()), 1e-9))
-    tag = "B=c" if spread < EVEN else "F=c"
+    tag: Tag = "B=c" if spread < EVEN else "F=c"
     return tag, float(min(0.6, 0.3 + abs(spread - EVEN)))
 
 
@@ -396,7 +400,7 @@ def _joints(light: Floats, points: NDArray[np.float64], box: tuple[int, int]) ->
     rows, columns, mixed = (gaussian_filter(light, max(1.0, 0.06 * unit), order=o) for o in ((2, 0), (0, 2), (1, 1)))
     mean, apart = (rows + columns) / 2, np.hypot((rows - columns) / 2, mixed)
     half = np.array(box) / 2
-    grid = np.stack(np.mgrid[: light.shape[0], : light.shape[1]], axis=-1).reshape(-1, 2)
+    grid = np.indices(light.shape).reshape(2, -1).T
     found = cKDTree(points / half).query(grid / half, k=2)[0]
     between = ((found[:, 1] - found[:, 0] < 0.12) & (found[:, 0] < 2.5)).reshape(light.shape)
     if not between.any():
