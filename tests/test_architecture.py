@@ -27,7 +27,6 @@ NOUNS = {
     "blend": {"source_map"},
     "cyclic": {"source_map", "report"},
     "completion": {"source_map", "report", "deform"},
-    "texels": {"analysis", "io", "segment"},
     "matching": set(),
 }
 TOP = {

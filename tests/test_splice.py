@@ -217,6 +217,32 @@ def test_any_dtype_and_channels() -> None:
     assert texrs.splice(floats, ENTRIES["pebbles"], 64).image.dtype == np.float32
 
 
+def test_pictures_are_analysed() -> None:
+    mine = ENTRIES["dots"]
+    assert texrs.splice(mine.image, ENTRIES["pebbles"], 64).image.shape == (64, 64, 3)
+    assert texrs.splice(mine.image[..., 1], ENTRIES["pebbles"], 64).image.shape == (64, 64)
+    with pytest.raises(InvalidInput, match="^a: "):
+        texrs.splice(np.zeros((40, 40)), ENTRIES["pebbles"])
+
+
+def test_maps_in_register_come_out_in_register() -> None:
+    mine = ENTRIES["bricks"]
+    result = texrs.splice(mine, ENTRIES["pebbles"], 128, seed=1)
+    height = np.linspace(0, 1, mine.mask.size, dtype=np.float32).reshape(mine.mask.shape)
+    rows, columns = np.moveaxis(result.source.coordinates.astype(int), -1, 0)
+    assert (result.source.render(height) == height[rows, columns]).all()
+    # Where the wall goes on as its mirror image, so do the directions on it.
+    frames = result.source.frames()
+    assert set(np.unique(frames)) <= {-1.0, 0.0, 1.0}
+    across = np.full((*mine.mask.shape, 3), (0.6, 0.0, 0.8), np.float32)
+    across[0, 0] = (-0.6, 0, 0.8)
+    turned = result.source.render(across, kind="normal")
+    mirrored = frames[..., 1, 1] < 0
+    usual = ~((rows == 0) & (columns == 0))
+    assert (turned[mirrored & usual][:, 0] < 0).all()
+    assert (turned[~mirrored & usual][:, 0] > 0).all()
+
+
 def test_progress_and_stopping() -> None:
     seen: list[str] = []
     texrs.splice(ENTRIES["dots"], ENTRIES["pebbles"], 96, progress=lambda name, share: seen.append(name))

@@ -17,7 +17,7 @@ from texrs.cli._files import describe, named
 from texrs.errors import FileError, InvalidInput
 from texrs.papers.splice import self_splice, splice
 from texrs.report import Synthesis
-from texrs.texels import Texels
+from texrs.texels import Texels, load
 from texrs.threads import threads
 
 __all__ = ["self_splice_command", "splice_command"]
@@ -129,11 +129,7 @@ def read_texels(text: str) -> Texels | Array:
     """Read an entry, or a picture, which is analysed by whoever takes it."""
     if not text.lower().endswith(".npz"):
         return _files.read_exemplar(text)
-    from texrs import texels
-
-    load: Any = texels.load  # type: ignore[attr-defined]
-    found: Texels = load(text)
-    return found
+    return load(text)
 
 
 def read_edit(text: str) -> Any:

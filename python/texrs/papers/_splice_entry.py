@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
 from texrs._arrays import as_image, as_wrap
 from texrs._typing import Progress
 from texrs.errors import InvalidInput
-from texrs.texels import Texels
+from texrs.texels import Texels, analyse
 
 __all__ = ["as_texels"]
 
@@ -20,14 +20,13 @@ SHORTEST = 16
 def as_texels(value: object, name: str, progress: Progress) -> Texels:
     """Check an entry, or analyse a picture."""
     if not isinstance(value, Texels):
-        from texrs import texels
-
-        image = as_image(value, name, minimum=SHORTEST)
-        analyse: Any = texels.analyse  # type: ignore[attr-defined]
-        found = analyse(image, progress=progress)
-        if not isinstance(found, Texels):
-            raise InvalidInput(f"{name}: its analysis gave {type(found).__name__}, not Texels")
-        return checked(found, name)
+        as_image(value, name, minimum=SHORTEST)
+        try:
+            found = analyse(value, progress=progress)
+            # In the shape that it came in.
+            return checked(replace(found, image=np.asarray(value)), name)
+        except InvalidInput as error:
+            raise InvalidInput(f"{name}: {error}; texrs.texels.analyse takes a box, points and a mask") from None
     return checked(value, name)
 
 

@@ -235,7 +235,7 @@ def _extend(entry: Texels, size: tuple[int, int], margin: int, *, whole: bool, e
     if not disjoint:
         none = np.zeros(mask.shape, np.int32)
         return Extended((int(first[0]), int(first[1])), table, mask, places + first, of, none, none > 0, mirrored, own)
-    return _stamp(entry, table.copy(), mask, mirrored, (places, of, flips), first, own)
+    return _stamp(entry, table.copy(), mask, mirrored.copy(), (places, of, flips), first, own)
 
 
 def _stamp(
@@ -284,6 +284,7 @@ def _stamp(
         instance[y[free], x[free]] = len(kept)
         if flips[k].any():
             table[y[free], x[free]] = pixels[free]
+            mirrored[y[free], x[free]] = False
     stray = (turned | known | mask) & (instance == 0)
     # What no texel claims belongs to the picture as it is.
     stray &= ~inside

@@ -249,7 +249,8 @@ def made(
         full = fill(a.image, draft, spacing(np.asarray(a.points, np.float64)), seed, watch)
         places = refined_places(a.image, a.wrap, full, seed, watch) if refined else full.places
     shape = (a.mask.shape[0], a.mask.shape[1])
-    source = SourceMap(places.astype(np.float32), np.zeros(size, np.uint16), label, None, (shape,))
+    frame = frames_of(full.mirrored)
+    source = SourceMap(places.astype(np.float32), np.zeros(size, np.uint16), label, frame, (shape,))
     image = source.render(a.image, interpolation="nearest")
     report: dict[str, Any] = {
         "method": "splice",
@@ -266,6 +267,16 @@ def made(
     }
     watch("done", 1.0)
     return Synthesis(image, source, Stages(a, theirs, found, warped.target, draft, full, image), report)
+
+
+def frames_of(mirrored: Bools) -> NDArray[np.float32] | None:
+    """Give the Jacobians of pixels, some of which show the texture mirrored; none where none does."""
+    if not mirrored.any():
+        return None
+    frame = np.zeros((*mirrored.shape, 2), np.float32)
+    for axis in range(2):
+        frame[..., axis, axis] = np.where(mirrored[..., axis], -1, 1)
+    return frame
 
 
 # --- the deformation: section 4.2 ------------------------------------------------------------------------------------
