@@ -37,7 +37,11 @@ pub fn scattered(
         });
     }
     for (argument, points) in [("source", source), ("target", target)] {
-        if let Some(p) = points.iter().flatten().find(|x| x.is_nan() || x.abs() > FAR) {
+        if let Some(p) = points
+            .iter()
+            .flatten()
+            .find(|x| x.is_nan() || x.abs() > FAR)
+        {
             return Err(Error::value(
                 argument,
                 format!("coordinates must be finite and within 10^7, got {p}"),
