@@ -7,6 +7,8 @@ mod ncc;
 mod patch_search;
 mod poisson;
 mod seam;
+mod sparse;
+mod warp;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use texrs::gather::{Exemplar, Interpolation, gather};
@@ -63,6 +65,8 @@ criterion_group!(
     ncc::bench,
     patch_search::bench,
     poisson::bench,
-    seam::bench
+    seam::bench,
+    sparse::bench,
+    warp::bench
 );
 criterion_main!(benches);
