@@ -132,6 +132,17 @@ def test_factors_agree_with_scipy() -> None:
             assert np.abs(found - spsolve(matrix, right)).max() < 1e-4 * np.abs(found).max()
 
 
+def test_several_factors_are_each_what_one_is() -> None:
+    from scipy.sparse import diags_array
+
+    matrices = [diags_array([-1.0, x, -1.0], offsets=[-1, 0, 1], shape=(40, 40)) for x in (2.5, 3.0, 4.0)]
+    right = np.arange(40.0)
+    for matrix, factor in zip(matrices, Cholesky.several(matrices), strict=True):
+        assert (factor.solve(right) == Cholesky(matrix).solve(right)).all()
+    with pytest.raises(InvalidInput, match="positive definite"):
+        Cholesky.several([matrices[0], -matrices[1]])
+
+
 def test_energy_is_that_of_the_paper() -> None:
     """Eq. 5, Table 1 and Figure 5 pixel by pixel, for the displacement along columns."""
     from texrs.papers._splice_warp import weights

@@ -250,6 +250,10 @@ class Cholesky:
     def __new__(
         cls, starts: NDArray[uint32], rows: NDArray[uint32], values: NDArray[float64], limit: int
     ) -> Cholesky: ...
+    @staticmethod
+    def several(
+        matrices: Sequence[tuple[NDArray[uint32], NDArray[uint32], NDArray[float64]]], limit: int
+    ) -> list[Cholesky]: ...
     @property
     def size(self) -> int: ...
     @property

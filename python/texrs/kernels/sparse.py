@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -50,20 +51,31 @@ class Cholesky:
     """
 
     def __init__(self, matrix: Any, *, limit: int = LIMIT) -> None:
-        from scipy.sparse import csc_array, tril
+        self._inner = _rust.Cholesky(*_entries(matrix), as_int(limit, "limit", 1, 1 << 62))
 
-        if getattr(matrix, "ndim", 0) != 2 or matrix.shape[0] != matrix.shape[1]:
-            raise InvalidInput(f"matrix: needs shape (n, n), got {getattr(matrix, 'shape', type(matrix).__name__)}")
-        lower = csc_array(tril(matrix, format="csc"))
-        lower.sum_duplicates()
-        if lower.nnz >= 1 << 31:
-            raise InvalidInput(f"matrix: up to 2^31 entries are allowed, got {lower.nnz}")
-        self._inner = _rust.Cholesky(
-            lower.indptr.astype(np.uint32),
-            lower.indices.astype(np.uint32),
-            np.ascontiguousarray(lower.data, np.float64),
-            as_int(limit, "limit", 1, 1 << 62),
-        )
+    @classmethod
+    def several(cls, matrices: Sequence[Any], *, limit: int = LIMIT) -> list[Cholesky]:
+        """Factor several matrices side by side; each factor is what it would be by itself.
+
+        Parameters
+        ----------
+        matrices : sequence of scipy.sparse matrices or arrays
+            As of the class.
+        limit : int
+            Bytes that each factor and the work on it may take.
+
+        Raises
+        ------
+        InvalidInput, LimitExceeded
+            As of the class.
+
+        """
+        made = []
+        for inner in _rust.Cholesky.several([_entries(m) for m in matrices], as_int(limit, "limit", 1, 1 << 62)):
+            factor = cls.__new__(cls)
+            factor._inner = inner
+            made.append(factor)
+        return made
 
     @property
     def size(self) -> int:
@@ -89,3 +101,20 @@ class Cholesky:
             raise InvalidInput(f"sides: needs shape ({self.size},) or ({self.size}, k), got {array.shape}")
         found = self._inner.solve(np.ascontiguousarray(array.T).reshape(-1))
         return np.ascontiguousarray(found.reshape(array.shape[::-1]).T)
+
+
+def _entries(matrix: Any) -> tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float64]]:
+    """Give the lower triangle, column by column."""
+    from scipy.sparse import csc_array, tril
+
+    if getattr(matrix, "ndim", 0) != 2 or matrix.shape[0] != matrix.shape[1]:
+        raise InvalidInput(f"matrix: needs shape (n, n), got {getattr(matrix, 'shape', type(matrix).__name__)}")
+    lower = csc_array(tril(matrix, format="csc"))
+    lower.sum_duplicates()
+    if lower.nnz >= 1 << 31:
+        raise InvalidInput(f"matrix: up to 2^31 entries are allowed, got {lower.nnz}")
+    return (
+        lower.indptr.astype(np.uint32),
+        lower.indices.astype(np.uint32),
+        np.ascontiguousarray(lower.data, np.float64),
+    )

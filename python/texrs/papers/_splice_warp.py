@@ -9,7 +9,8 @@ from __future__ import annotations
 import hashlib
 import threading
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -36,18 +37,19 @@ _FACTORS: OrderedDict[bytes, Cholesky] = OrderedDict()
 _LOCK = threading.Lock()
 
 
-def factor(key: bytes, matrix: Callable[[], Any]) -> Cholesky:
-    """Give the factor of a matrix, kept by what it is made from."""
+def factors(wanted: Mapping[bytes, Callable[[], Any]]) -> dict[bytes, Cholesky]:
+    """Give the factors of matrices, kept by what they are made from; those that lack are made side by side."""
     with _LOCK:
-        if key in _FACTORS:
+        found = {key: _FACTORS[key] for key in wanted if key in _FACTORS}
+    lacking = [key for key in wanted if key not in found]
+    found |= zip(lacking, Cholesky.several([wanted[key]() for key in lacking]), strict=True) if lacking else {}
+    with _LOCK:
+        for key, made in found.items():
+            _FACTORS[key] = made
             _FACTORS.move_to_end(key)
-            return _FACTORS[key]
-    made = Cholesky(matrix())
-    with _LOCK:
-        _FACTORS[key] = made
-        while len(_FACTORS) > 1 and sum(f.nbytes for f in _FACTORS.values()) > KEPT:
+        while len(_FACTORS) > len(found) and sum(f.nbytes for f in _FACTORS.values()) > KEPT:
             _FACTORS.popitem(last=False)
-    return made
+    return found
 
 
 def _key(*parts: object) -> bytes:
@@ -90,7 +92,8 @@ def carried(instance: Labels, shift: Points) -> NDArray[np.float64]:
         return out
     number = np.full(shape, -1, np.int64)
     number[free] = np.arange(np.count_nonzero(free))
-    solver = factor(_key("carried", np.packbits(free), shape), lambda: _laplacian(free, number))
+    key = _key("carried", np.packbits(free), shape)
+    solver = factors({key: lambda: _laplacian(free, number)})[key]
     flow = np.zeros((*shape, 2))
     for axis in range(2):
         o, i = (np.moveaxis(a, axis, 0) for a in (flow, out))
@@ -126,9 +129,7 @@ def _laplacian(free: Bools, number: NDArray[np.int64]) -> Any:
 # --- connected figures: the energy itself ----------------------------------------------------------------------------
 
 
-def stretched(
-    rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upright: bool, method: str = ""
-) -> NDArray[np.float64]:
+def stretched(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upright: bool) -> NDArray[np.float64]:
     """Give the displacement of every pixel that minimises Eq. 5.
 
     Parameters
@@ -142,8 +143,6 @@ def stretched(
     upright : bool
         Table 1's last row, lambda_P = 0 and epsilon = 1: upright and level parts are decoupled, so that joints neither lean
         nor change their width. Else lambda_P = 1 and epsilon = 1e-3.
-    method : str
-        Distinguishes matrices in the cache.
 
     Returns
     -------
@@ -156,11 +155,12 @@ def stretched(
     at = pins[:, 0] * shape[1] + pins[:, 1]
     out = np.empty((*shape, 2))
     keys = [_key("stretched", np.packbits(rigid), shape, at, upright and axis, upright) for axis in (0, 1)]
+    # Without the decoupling both axes have one matrix.
+    made = factors({keys[axis]: partial(energy, rigid, at, axis, upright=upright) for axis in (0, 1)})
     for axis in (0, 1):
-        solver = factor(keys[axis], lambda axis=axis: energy(rigid, at, axis, upright=upright))  # type: ignore[misc]
         right = np.zeros(rigid.size)
         np.add.at(right, at, GOAL * shift[:, axis])
-        out[..., axis] = solver.solve(right).reshape(shape)
+        out[..., axis] = made[keys[axis]].solve(right).reshape(shape)
     return out
 
 

@@ -2,7 +2,15 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 
 use super::run;
+use crate::par;
 use crate::sparse::{self, Lower};
+
+/// Where columns begin, rows and values of a lower triangle.
+type Entries<'py> = (
+    PyReadonlyArray1<'py, u32>,
+    PyReadonlyArray1<'py, u32>,
+    PyReadonlyArray1<'py, f64>,
+);
 
 /// The factor of a symmetric positive definite matrix.
 #[pyclass(frozen, module = "texrs._rust")]
@@ -27,6 +35,28 @@ impl Cholesky {
             sparse::Cholesky::new(&matrix, limit, monitor)
         })
         .map(Self)
+    }
+
+    /// Several at once, side by side: each as by itself.
+    #[staticmethod]
+    fn several(py: Python<'_>, matrices: Vec<Entries<'_>>, limit: usize) -> PyResult<Vec<Self>> {
+        let lower = matrices
+            .iter()
+            .map(|(starts, rows, values)| {
+                Ok(Lower {
+                    starts: starts.as_slice()?,
+                    rows: rows.as_slice()?,
+                    values: values.as_slice()?,
+                })
+            })
+            .collect::<PyResult<Vec<_>>>()?;
+        run(py, None, |monitor| {
+            par::map(lower.len(), |i| {
+                sparse::Cholesky::new(&lower[i], limit, monitor).map(Self)
+            })
+            .into_iter()
+            .collect()
+        })
     }
 
     #[getter]
