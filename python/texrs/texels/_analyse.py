@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -24,6 +26,8 @@ FEWEST = 3
 """Texels without which there is no layout."""
 SHORTEST = 16
 """Least side of an image."""
+AGAIN = 0.8
+"""Share of the texels of a proposed box that those of a better one must be."""
 LITTLE, MUCH = 0.02, 0.95
 """Shares of foreground outside of which a mask cannot be right."""
 
@@ -210,6 +214,27 @@ def analyse(
             report["doubts"].append(doubt)
     if not LITTLE <= result.mask.mean() <= MUCH:
         report["doubts"].append(f"{result.mask.mean():.0%} of the image is foreground")
+    if "box" in report["proposed"] and said == "F=d" and result.source == "cut" and not literal and listed is None:
+        pieces = components(result.mask, around)[0]
+        with suppress(InvalidInput):
+            middle = _given.chosen(result.mask, None, said, pieces)
+            # What was proposed may lie beside the middle of a texel; its piece of the mask does not.
+            again = analyse(
+                pixels,
+                box=(*middle.centre, *middle.size),
+                background=known,
+                tag=said,
+                rotations=turns,
+                scales=sizes,
+                threshold=least,
+                channel=channel,
+                model=model,
+                wrap=around,
+                seed=chance,
+            )
+            if len(again.points) >= AGAIN * len(result.points):
+                kept = {name: report[name] for name in ("proposed", "confidence")}
+                return replace(again, report=again.report | kept)
     templates = found.templates
     picked = [templates[found.which[i]] if i >= 0 else templates[0] for i in result.origin]
     report |= {
