@@ -45,8 +45,9 @@ error (exemplar's own + 3, + 6); S2 mean frequency over the exemplar's (0.90 to 
 (+-0.06), at the nearest samples; S3 share of each class of colour over the exemplar's, dark to light (+-20 %, under a
 field +-30 %); S3b particles (sample "particles"): count, mean and median size over the exemplar's (+-20, 25, 20 %, under a
 field +-35 %); S5 coherent neighbours (>= 0.65 identity, 0.55, 0.4 circular), largest patch (<= 6 % or four cells), most
-used cell over the mean (<= 15); S6 change at planes of 8, 16, 24, 32 over the mean (0.8 to 1.25), isolated voxels in per
-cent; S9 a field of right angles against the turned exemplar: shares, frequency, distance of autocorrelations (<= 0.08).
+used cell over the mean (<= 15); S6 change at planes of 8, 16, 24, 32 over the mean (0.8 to 1.25), where it is more than
+at all others so far apart, isolated voxels in per cent; S9 a field of right angles against the turned exemplar: shares,
+frequency, distance of autocorrelations (<= 0.08).
 Figures are means over the seeds; **bold** fails; "-" where a check does not apply.
 """
 

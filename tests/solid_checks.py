@@ -145,13 +145,14 @@ def s5(made: Synthesis, least: float = 0.65) -> Found:
 def s6(exemplar: np.ndarray, image: np.ndarray) -> Found:
     """No planes of the algorithm's own lattices show, and no speckle."""
     seen = volume.lightness(image)
-    worst = 1.0
+    worst, beyond = 1.0, 0.0
     for change in volume.seam_planes(seen):
         for period in (8, 16, 24, 32):
-            at = np.arange(period, len(change), period) - 1
-            if len(at):
-                over = float(change[at].mean() / change.mean())
-                worst = max(worst, over, 1 / worst, key=lambda x: abs(np.log(x))) if over else 0.0
+            # A lattice of the algorithm begins at its own planes; one of the texture itself, anywhere.
+            combs = [change[first::period] for first in range(period)]
+            over = [abs(float(np.log(max(comb.mean(), 1e-9) / change.mean()))) for comb in combs if len(comb)]
+            if len(over) == period and over[-1] - max(over[:-1]) > beyond:
+                worst, beyond = float(np.exp(over[-1])), over[-1] - max(over[:-1])
     speckle = volume.isolated(seen)
     return Found(
         {

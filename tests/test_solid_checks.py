@@ -24,14 +24,8 @@ FIELDS = {
     "circular": fields.circular(axis="x", radial="z"),
 }
 SIDE = {"stripes": 72, "particles": 64, "weave_solid": 64}
-CURL = "where frames differ from place to place, at folds and round an axis, pieces must break"
-LOST = "what is turned within a cell is cut, and what is cut is matched less well"
 KNOWN: dict[tuple[str, str, str], str] = {
-    ("s5", "stripes", "zigzag"): CURL,
-    ("s5", "stripes", "circular"): CURL,
-    ("s3", "particles", "circular"): LOST,
-    ("s3b", "particles", "circular"): LOST,
-    ("s3b", "particles", "identity"): "of this seed; the mean of three passes",
+    ("s3b", "particles", "identity"): "of pieces of particles there are some, and the median is just below",
 }
 """(check, sample, field) that may fail, with the reason."""
 
@@ -51,8 +45,16 @@ def known(*key):
     return [pytest.mark.xfail(reason=KNOWN[key], strict=False)] if key in KNOWN else []
 
 
+# Rare things are few in a small volume: what is counted is the mean of several.
+SEEDS = {"s3": (0, 1, 2), "s3b": (0, 1, 2)}
+
+
 def measure(check, name, kind):
-    sample, result = exemplar(name), made(name, kind)
+    return checks.mean([measured(check, name, kind, seed) for seed in SEEDS.get(check, (0,))])
+
+
+def measured(check, name, kind, seed):
+    sample, result = exemplar(name), made(name, kind, seed)
     match check:
         case "s1":
             return checks.s1(sample.image, result.image, FIELDS[kind])
@@ -112,7 +114,7 @@ def test_turned_exemplars_are_what_the_frame_says():
 # --- what must fail --------------------------------------------------------------------------------------------------
 
 
-def grown(image, size, *, contrast=1.0, hysteresis=2.0, votes=(1, 1, 0), blocks=True, field=None):
+def grown(image, size, *, contrast=1.0, hysteresis=2.0, votes=(0, 0, 0), blocks=True, field=None):
     """Grow a volume by the kernels alone: the default, or without a part of it."""
     analysis = analyse(image, axes=3)
     regions = [Region.whole((size,) * 3)]
@@ -132,9 +134,9 @@ def grown(image, size, *, contrast=1.0, hysteresis=2.0, votes=(1, 1, 0), blocks=
             places,
             region,
             frames,
-            iterations=(10, 6, 3)[level],
+            passes=(8, 6, 3)[level],
             hysteresis=hysteresis,
-            unity=0.1,
+            unity=0.2,
             vote=votes[level],
             settled=0.005,
             seed=0x9E3779B97F4A7C15 * (level + 1) % 2**64,

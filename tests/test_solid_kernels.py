@@ -52,27 +52,27 @@ FIELDS = {
 @pytest.mark.parametrize("axes", [2, 3])
 @pytest.mark.parametrize("kind", FIELDS)
 @pytest.mark.parametrize("wrap", [False, True])
-def test_an_iteration_is_that_of_the_twin(axes, kind, wrap):
+def test_passes_are_those_of_the_twin(axes, kind, wrap):
     appearance, region = exemplar(axes, wrap=kind == "sheared"), region_of(axes, wrap)
     frames = to_fixed(FIELDS[kind](axes), region)
     twin = Twin(appearance.arrays(), region, frames)
     start = scattered(appearance, region)
-    options = {"first": 5, "sweeps": 2, "hysteresis": 0.5, "unity": 0.3, "vote": 1, "seed": (7 << 40) + 3}
-    found = appearance.correct(start, region, frames, iterations=1, **options)
-    wanted = twin.correct(start, **options)
-    np.testing.assert_array_equal(found.places.reshape(-1, axes), wanted)
-    changed = (wanted != twin.bring_inside(start.astype(np.int64).reshape(-1, axes))).any(axis=1)
-    assert found.iterations == 1
-    assert found.changed == pytest.approx(changed.mean())
+    options = {"passes": 2, "first": 5, "reach": 2, "hysteresis": 0.5, "unity": 0.3, "vote": 1, "seed": (7 << 40) + 3}
+    found = appearance.correct(start, region, frames, **options)
+    before, between, after = twin.correct(start, **options)
+    np.testing.assert_array_equal(found.places.reshape(-1, axes), after)
+    changed = [(a != b).any(axis=1).mean() for a, b in ((before, between), (between, after))]
+    assert found.passes == 2
+    assert found.changed == pytest.approx(sum(changed))
 
 
 @pytest.mark.parametrize(
     "options",
     [
-        {"sweeps": 1, "vote": 0},
-        {"sweeps": 2, "vote": 0, "hysteresis": 0.0},
-        {"sweeps": 1, "vote": 2, "hysteresis": 100.0},
-        {"sweeps": 2, "vote": 1, "exhaustive": True},
+        {"reach": 1, "vote": 0},
+        {"reach": 2, "vote": 0, "hysteresis": 0.0},
+        {"reach": 1, "vote": 2, "hysteresis": 100.0},
+        {"reach": 2, "vote": 1, "exhaustive": True},
     ],
 )
 @pytest.mark.parametrize("axes", [2, 3])
@@ -81,20 +81,19 @@ def test_each_option_is_that_of_the_twin(axes, options):
     frames = to_fixed(fields.slant(-20, axes=axes), region)
     held = np.arange(region.points) % 5 == 0
     start = scattered(appearance, region, seed=1)
-    found = appearance.correct(start, region, frames, iterations=1, held=held, **options)
-    wanted = Twin(appearance.arrays(), region, frames).correct(start, held=held, **options)
+    found = appearance.correct(start, region, frames, passes=2, held=held, **options)
+    wanted = Twin(appearance.arrays(), region, frames).correct(start, held=held, **options)[-1]
     np.testing.assert_array_equal(found.places.reshape(-1, axes), wanted)
 
 
 def test_work_in_parts_is_the_work():
     appearance, region = exemplar(2), region_of(2)
     frames = to_fixed(None, region)
-    # Fractions at the exemplar's border would be brought inside between the parts.
-    start = scattered(appearance, region) // ONE * ONE
-    whole = appearance.correct(start, region, frames, iterations=3, seed=2).places
+    start = scattered(appearance, region)
+    whole = appearance.correct(start, region, frames, passes=3, seed=2).places
     part = start
     for first in range(3):
-        part = appearance.correct(part, region, frames, iterations=1, first=first, seed=2).places
+        part = appearance.correct(part, region, frames, passes=1, first=first, seed=2).places
     np.testing.assert_array_equal(part, whole)
 
 
@@ -151,7 +150,7 @@ def test_wrong_arrays_get_a_sentence():
         (lambda: appearance.correct(good, region, frames[:, :1]), "frames"),
         (lambda: appearance.correct(good, region, np.repeat(frames, 3, axis=0)), "frames"),
         (lambda: appearance.correct(good, region, frames, held=np.zeros(3, bool)), "places"),
-        (lambda: appearance.correct(good, region, frames, sweeps=3), "sweeps: needs an integer from 1 to 2"),
+        (lambda: appearance.correct(good, region, frames, reach=3), "reach: needs an integer from 1 to 2"),
         (lambda: appearance.correct(good, region, frames, vote=3), "vote: needs an integer from 0 to 2"),
         (lambda: appearance.correct(good, region_of(3), frames), "region: the exemplar has 2 axes"),
         (lambda: appearance.blocks(region, frames, cell=1), "cell: needs an integer from 2"),

@@ -1,6 +1,8 @@
-"""Slow, obvious twin of one iteration of the correction of coordinates: windows, matches, votes."""
+"""Slow, obvious twin of the correction of coordinates, pass by pass: windows, matches, votes."""
 
 from __future__ import annotations
+
+from itertools import product
 
 import numpy as np
 
@@ -54,8 +56,25 @@ class Twin:
 
     def bring_inside(self, places):
         near = np.where(self.wrap, 0, self.radius)
-        held = np.clip(places, near * ONE, (self.shape - 1 - near) * ONE)
-        return np.where(self.wrap, places % (self.shape * ONE), held)
+        sample = nearest(places)
+        held = np.clip(sample, near, self.shape - 1 - near)
+        kept = np.where(sample == held, places, held * ONE)
+        return np.where(self.wrap, places % (self.shape * ONE), kept)
+
+    def same(self, a, b):
+        """Tell whether two places for one point are of one piece."""
+        d = np.abs(a - b)
+        around = d % (self.shape * ONE)
+        d = np.where(self.wrap, np.minimum(around, self.shape * ONE - around), d)
+        return bool((d <= 3 * ONE // 4).all())
+
+    def meet(self, places, p):
+        """Tell whether pieces meet beside a point."""
+        for step in product((-1, 0, 1), repeat=self.axes):
+            q = self.step(self.points[p], np.array(step))
+            if q is not None and not self.same(places[p] + self.frames[p] @ np.array(step), places[q]):
+                return True
+        return False
 
     def window(self, places, p):
         """Give the appearance vector of the window round a point: what is at F o belongs at o."""
@@ -71,8 +90,9 @@ class Twin:
         scaled = [((s - b) * self.gain + (1 << 31)) >> 32 for s, b in zip(sums, self.bias, strict=True)]
         return np.clip(scaled, -2047, 2047)
 
-    def improve(self, places, p, feature, reach, limit, unity, iteration, seed, exhaustive):
+    def improve(self, places, p, reach, limit, unity, number, seed, exhaustive):
         """Give the best of a point's own match, those of its neighbours, and some that are drawn."""
+        feature = self.window(places, p)
 
         def cost(at):
             return int(((feature - self.features[at]) ** 2).sum())
@@ -80,7 +100,7 @@ class Twin:
         best = places[p]
         at = self.clamped(nearest(best))
         least = cost(at)
-        if exhaustive and reach == 1:
+        if exhaustive:
             near = np.where(self.wrap, 0, self.radius)
             for there in np.ndindex(*(self.shape - 2 * near)):
                 centre = np.array(there) + near
@@ -88,32 +108,34 @@ class Twin:
                     best, at = centre * ONE, tuple(centre.tolist())
                     least = cost(at)
         proposals = []
-        for axis in range(self.axes):
-            for side in (-reach, reach):
-                step = np.zeros(self.axes, np.int64)
-                step[axis] = side
-                q = self.step(self.points[p], step)
-                place = None if q is None else places[q] - self.frames[p] @ step
-                there = None if q is None else self.inside(nearest(place))
-                if there is not None:
-                    proposals.append((place, there))
+        for far in range(1, reach + 1):
+            for axis in range(self.axes):
+                for side in (-far, far):
+                    step = np.zeros(self.axes, np.int64)
+                    step[axis] = side
+                    q = self.step(self.points[p], step)
+                    place = None if q is None else places[q] - self.frames[p] @ step
+                    there = None if q is None else self.inside(nearest(place))
+                    if there is not None:
+                        proposals.append((far, place, there))
 
         def apart(place):
-            return unity * sum(int(np.abs(other - place).max()) > 3 * ONE // 4 for other, _ in proposals)
+            return unity * sum(not self.same(other, place) for far, other, _ in proposals if far == 1)
 
         least += apart(best)
-        for place, there in proposals:
+        for _, place, there in proposals:
             if there != at and cost(there) + apart(place) < least:
                 best, at, least = place, there, cost(there) + apart(place)
-        if least <= limit:
+        if least <= limit + limit // 2:
             return best
         key = philox((3, 0x70617274, 0, 0), (seed & MASK, seed >> 32))[:2]
         world = [int(w) & MASK for w in self.points[p] + self.region.origin] + [0]
+        centre = best
         for draw in range(6):
-            words = philox((*world[:3], iteration << 8 | reach << 4 | draw), key)
+            words = philox((*world[:3], number << 8 | draw), key)
             radius = self.shape >> draw
             shift = [(words[a] * (2 * int(radius[a]) + 1) >> 32) - int(radius[a]) for a in range(self.axes)]
-            place = best + np.array(shift) * ONE
+            place = centre + np.array(shift) * ONE
             there = self.inside(nearest(place))
             if there is not None and cost(there) + apart(place) + limit < least:
                 best, least = place, cost(there) + apart(place) + limit
@@ -143,22 +165,40 @@ class Twin:
         return best
 
     def correct(
-        self, places, *, first=0, exhaustive=False, sweeps=2, hysteresis=2.0, unity=0.0, vote=0, seed=0, held=None
+        self,
+        places,
+        *,
+        passes=2,
+        first=0,
+        exhaustive=False,
+        reach=2,
+        hysteresis=2.0,
+        unity=0.0,
+        vote=0,
+        seed=0,
+        held=None,
     ):
-        """Give the places after one iteration."""
-        before = self.bring_inside(places.astype(np.int64).reshape(-1, self.axes))
-        count = range(len(self.points))
-        features = [self.window(before, p) for p in count]
+        """Give the places after each pass."""
+        now = self.bring_inside(places.astype(np.int64).reshape(-1, self.axes))
         limit, alone = int(hysteresis * self.spacing), int(unity * self.spacing)
-        matches = before
-        for reach in range(1, sweeps + 1):
-            options = reach, limit, alone, first, seed, exhaustive
-            matches = np.stack([self.improve(matches, p, features[p], *options) for p in count])
-        if vote:
-            matches = np.stack([self.elect(matches, p, vote) for p in count])
-        if held is not None:
-            matches = np.where(held[:, None], before, matches)
-        return matches
+        done = [now]
+        for number in range(first, first + passes):
+            mine = [
+                p
+                for p, point in enumerate(self.points)
+                if (point + self.region.origin).sum() % 2 == number % 2
+                and not (held is not None and held[p])
+                and (exhaustive or self.meet(now, p))
+            ]
+            matches = now.copy()
+            for p in mine:
+                matches[p] = self.bring_inside(self.improve(now, p, reach, limit, alone, number, seed, exhaustive))
+            elected = matches.copy()
+            for p in mine if vote else ():
+                elected[p] = self.bring_inside(self.elect(matches, p, vote))
+            now = elected
+            done.append(now)
+        return done
 
 
 def nearest(place):

@@ -48,15 +48,15 @@ class Corrected(NamedTuple):
     ----------
     places : (points * A) int32
         In units of 1/4096 of a sample.
-    iterations : int
+    passes : int
         How many were made.
     changed : float
-        Share of the points that the last one changed.
+        Share of the points that the last two changed.
 
     """
 
     places: NDArray[np.int32]
-    iterations: int
+    passes: int
     changed: float
 
 
@@ -252,10 +252,10 @@ class Appearance:
         region: Region,
         frames: NDArray[np.int16],
         *,
-        iterations: int = 3,
+        passes: int = 6,
         first: int = 0,
         exhaustive: bool = False,
-        sweeps: int = 2,
+        reach: int = 2,
         hysteresis: float = 2.0,
         unity: float = 0.0,
         vote: int = 0,
@@ -273,14 +273,14 @@ class Appearance:
             In units of 1/4096 of a sample.
         region, frames
             As of `blocks`.
-        iterations : int
-            At most so many, up to 1000.
+        passes : int
+            At most so many, up to 1000; each corrects every other point, as on a chess board.
         first : int
             Number of the first one, for work that is done in parts.
         exhaustive : bool
-            Whether to compare each window with all of the exemplar's in each iteration: for small exemplars.
-        sweeps : int
-            1 or 2 an iteration; the second looks twice as far.
+            Whether to compare each window with all of the exemplar's in each pass: for small exemplars.
+        reach : int
+            How far the neighbours are whose matches are tried, 1 or 2.
         hysteresis : float
             How much better than the present a drawn match must be, in units of `spacing`, 0 to 100: what is good enough stays.
         unity : float
@@ -289,7 +289,7 @@ class Appearance:
         vote : int
             Radius within which windows vote on the place of a point, up to `radius`; at 0 each takes its own match.
         settled : float
-            Stop when less than this share of the points changes. The result then hangs on the whole region.
+            Stop when two passes change less than this share of the points. The result then hangs on the whole region.
         seed : int
             Chooses what is drawn.
         held : (points) bool, optional
@@ -320,10 +320,10 @@ class Appearance:
             region.place,
             frames,
             np.zeros(0, np.bool_) if held is None else np.ascontiguousarray(held.reshape(-1)),
-            as_int(iterations, "iterations", 0, 1000),
+            as_int(passes, "passes", 0, 1000),
             as_int(first, "first", 0, 1 << 20),
             exhaustive,
-            as_int(sweeps, "sweeps", 1, 2),
+            as_int(reach, "reach", 1, 2),
             as_float(hysteresis, "hysteresis", 0, 100),
             as_float(unity, "unity", 0, 100),
             as_int(vote, "vote", 0, self.radius),

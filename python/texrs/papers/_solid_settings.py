@@ -14,9 +14,9 @@ Quality: TypeAlias = Literal["preserve", "fast", "optimise"]
 class Settings:
     """The numbers of one quality. Sequences are for the coarsest level, those between, and the finest."""
 
-    iterations: tuple[int, int, int] = (10, 6, 3)
-    sweeps: tuple[int, int, int] = (2, 2, 2)
-    votes: tuple[int, int, int] = (1, 1, 0)
+    passes: tuple[int, int, int] = (8, 6, 3)
+    reaches: tuple[int, int, int] = (2, 2, 2)
+    votes: tuple[int, int, int] = (0, 0, 0)
     radii: tuple[int, ...] = (2,)
     cell: int = 6
     rounds: int = 6
@@ -25,7 +25,7 @@ class Settings:
     continuation: float = 0.15
     repetition: float = 0.3
     hysteresis: float = 2.0
-    unity: float = 0.1
+    unity: float = 0.2
     settled: float = 0.005
     exhaustive: bool = False
     stitch: bool = True
@@ -34,7 +34,7 @@ class Settings:
         """Give what is done at a level, counted from the coarsest."""
         which = 2 if level == levels - 1 else 1 if level else 0
         return Step(
-            self.iterations[which], self.sweeps[which], self.votes[which], self.exhaustive and level == 0 and levels > 1
+            self.passes[which], self.reaches[which], self.votes[which], self.exhaustive and level == 0 and levels > 1
         )
 
 
@@ -42,8 +42,8 @@ class Settings:
 class Step:
     """What is done at one level."""
 
-    iterations: int
-    sweeps: int
+    passes: int
+    reach: int
     vote: int
     exhaustive: bool
 
@@ -51,15 +51,15 @@ class Step:
 PRESERVE = Settings()
 """Keeps what is rare, and copies where a copy is good enough."""
 
-FAST = replace(PRESERVE, iterations=(6, 3, 1), sweeps=(2, 2, 1), rounds=4, candidates=256, settled=0.0, stitch=False)
+FAST = replace(PRESERVE, passes=(4, 2, 2), reaches=(2, 2, 1), rounds=4, candidates=256, settled=0.0, stitch=False)
 """Fixed counts: what a point becomes hangs on what is near it alone."""
 
-ON_DEMAND = replace(FAST, iterations=(3, 1, 1), sweeps=(1, 1, 1), rounds=2, candidates=192, repetition=0.0)
+ON_DEMAND = replace(FAST, passes=(4, 2, 2), reaches=(1, 1, 1), rounds=2, candidates=192, repetition=0.0)
 """What a point can see of its surroundings is paid for at the border of every window: it sees little."""
 
 OPTIMISE = replace(
     PRESERVE,
-    iterations=(20, 8, 3),
+    passes=(24, 10, 4),
     votes=(3, 2, 0),
     radii=(3, 2),
     hysteresis=0.1,

@@ -1,12 +1,12 @@
 """Unbounded textures, of which any part can be had.
 
 What a point becomes hangs only on what is near it, so a texture without borders can be grown where it is looked at. The
-work is a chain of stages: the blocks, then one iteration of the correction after the other, each on the lattice of its
+work is a chain of stages: the blocks, then one pass of the correction after the other, each on the lattice of its
 level. A box of a stage is made from a box of the stage before that is larger by what one point can see, its reach:
 
     blocks      2 e + rounds (2 e + 1), where e is the farthest that a point lies from the centre of its cell
-    iteration   vote + (2 if there are two sweeps) + max(1, w), where w = max_i [ r sum_j |F_ij| + 1/2 ]: how far a
-                window of radius r looks along an axis of the output, over all frames F in sight
+    pass        vote + max(n, w), where n is how far the neighbours are that propose, and w = max_i [ r sum_j |F_ij| + 1/2 ]
+                how far a window of radius r looks along an axis of the output, over all frames F in sight
 
 Places within the reach of a box's border are wrong and are cut off; those that are left are the same in whatever box they
 were made. Finished parts of every stage are kept in a bounded memory, so that a neighbour of what has been seen is cheap.
@@ -36,7 +36,7 @@ __all__ = ["World", "blocks_reach", "window_reach"]
 MOST = 1 << 21
 """Points of a box that is made at once: its memory is bounded, and what is seen beyond it is small beside it."""
 _SIDES = {2: (8, 64), 3: (4, 16)}
-"""Sides of the cells that are kept: of all stages but the last, about as large as what an iteration can see, for each of
+"""Sides of the cells that are kept: of all stages but the last, about as large as what a pass can see, for each of
 them rounds up; and of the last one."""
 _STRAY = 0.3
 """How far a cell's centre strays, as a share of the cell: that of `texrs.kernels.appearance.Appearance.blocks`."""
@@ -68,10 +68,10 @@ def window_reach(frames: NDArray[np.int16], radius: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class _Stage:
-    """One of the chain: an iteration of a level, or the blocks (iteration -1)."""
+    """One of the chain: a pass of a level, or the blocks (pass -1)."""
 
     level: int
-    iteration: int
+    number: int
     side: int
 
 
@@ -116,7 +116,7 @@ class World:
         self.axes = len(grower.analysis.shape)
         levels = range(len(grower.analysis.levels))
         small, large = _SIDES[self.axes]
-        chain = [(0, -1)] + [(v, i) for v in levels for i in range(self._step(v).iterations)]
+        chain = [(0, -1)] + [(v, i) for v in levels for i in range(self._step(v).passes)]
         self.stages = [_Stage(*s, large if s == chain[-1] else small) for s in chain]
         # The stages before the last are small and dear: the last one must not crowd them out.
         self._kept = _Kept(cache_bytes // 2), _Kept(cache_bytes // 2)
@@ -141,7 +141,7 @@ class World:
         here = self.stages[stage]
         step = self._step(here.level)
         radius = self.grower.analysis.levels[here.level].radius
-        return min(step.vote, radius) + 2 * (step.sweeps - 1) + max(1, window)
+        return min(step.vote, radius) + max(step.reach, window)
 
     def read(self, box: Region, progress: Progress | None = None, stage: int = -1) -> Places:
         """Give the places of a box, (..., A) int32."""
@@ -213,14 +213,14 @@ class World:
             places = grower.start(region, grower.frames(0, region), self._hold, progress, margin=margin)
         else:
             region, frames = self._seen(box, stage)
-            if here.level and here.iteration == 0:
+            if here.level and here.number == 0:
                 parents = region.parents()
                 below = self.read(parents, progress, stage - 1).reshape(-1)
                 places = upsample(below, parents, region, frames)
             else:
                 places = self.read(region, progress, stage - 1).reshape(-1)
             places = grower.correct(
-                places, here.level, region, frames, self._hold, progress, first=here.iteration, iterations=1
+                places, here.level, region, frames, self._hold, progress, first=here.number, passes=1
             ).places
         return places.reshape(*region.shape, self.axes)[box.inside(region)]
 
@@ -248,7 +248,7 @@ class World:
         while self.stages[stage].level:
             here = self.stages[stage]
             region = region.grown(self.reach(stage, self.grower.analysis.levels[here.level].radius))
-            if here.iteration == 0:
+            if here.number == 0:
                 region = region.parents()
             stage -= 1
         self.read(region, progress, stage)

@@ -8,16 +8,18 @@
 //! Distances are divided by the variance of all windows, so they mean the same for every exemplar; [`UNIT`] is
 //! the distance of two windows that have nothing to do with each other, halved.
 
+mod apron;
 mod projection;
 mod table;
 
-use crate::fixed::{ONE, Place};
+use crate::fixed::{BITS, ONE, Place};
 use crate::grid::Grid;
 use crate::hash::Noise;
 use crate::par;
 use crate::pca::principal;
 use crate::{Error, Result};
 
+pub use apron::Apron;
 use projection::Projection;
 pub use table::Parts;
 
@@ -30,6 +32,10 @@ pub const UNIT: i32 = SCALE * SCALE;
 
 /// An appearance vector, in units of the windows' standard deviation / 512.
 pub type Feature = [i16; KEEP];
+/// A vector that fills a line of the cache: what is read at random costs one access.
+#[repr(align(64))]
+#[derive(Debug, Clone, Copy)]
+struct Line(Feature);
 /// A colour, scaled so that the exemplar fills 12 bits.
 pub type Colour = [i16; CHANNELS];
 
@@ -45,6 +51,8 @@ const FLAT: f64 = 1e-3;
 const LONGEST: usize = 2048;
 /// Numbers that fill a register.
 const LANES: usize = 16;
+/// Places that differ by less are of one piece of the exemplar: rounding moves them by half a sample.
+const SAME: i32 = ONE * 3 / 4;
 /// Points a task takes at a time.
 const CHUNK: usize = 1024;
 
@@ -55,9 +63,10 @@ pub struct Appearance<const D: usize> {
     radius: usize,
     channels: usize,
     colours: Vec<Colour>,
+    apron: Apron<D>,
     offsets: Vec<[i32; D]>,
     projection: Projection,
-    features: Vec<Feature>,
+    features: Vec<Line>,
     /// Median distance from a window to the nearest other one: what is near enough to be the same.
     spacing: i32,
 }
@@ -104,6 +113,7 @@ impl<const D: usize> Appearance<D> {
             grid,
             radius,
             channels,
+            apron: Apron::new(&colours, &grid, radius + 1),
             colours,
             offsets: window(radius),
             projection: Projection::empty(),
@@ -217,10 +227,34 @@ impl<const D: usize> Appearance<D> {
             if self.grid.wrap()[axis] {
                 place[axis] = place[axis].rem_euclid((high + 1) * ONE);
             } else {
-                place[axis] = place[axis].clamp(low * ONE, high * ONE);
+                // Only from where the nearest sample is outside: fractions are kept.
+                let sample = (place[axis] + ONE / 2) >> BITS;
+                if !(low..=high).contains(&sample) {
+                    place[axis] = sample.clamp(low, high) * ONE;
+                }
             }
         }
         place
+    }
+
+    /// Whether two places for one point are of one piece of the exemplar.
+    #[inline(always)]
+    pub fn same(&self, a: Place<D>, b: Place<D>) -> bool {
+        (0..D).all(|axis| {
+            let d = (a[axis] - b[axis]).abs();
+            d <= SAME
+                || self.grid.wrap()[axis] && {
+                    let n = self.grid.shape()[axis] as i32 * ONE;
+                    let d = d % n;
+                    d.min(n - d) <= SAME
+                }
+        })
+    }
+
+    /// The colours with a rim of one sample more than windows reach.
+    #[inline(always)]
+    pub fn apron(&self) -> &Apron<D> {
+        &self.apron
     }
 
     /// The colour at a row-major position.
@@ -232,7 +266,7 @@ impl<const D: usize> Appearance<D> {
     /// The appearance vector at a row-major position; zero where the window does not lie inside the exemplar.
     #[inline(always)]
     pub fn feature(&self, at: usize) -> &Feature {
-        &self.features[at]
+        &self.features[at].0
     }
 
     /// Room for the numbers of one window.
@@ -298,15 +332,15 @@ impl<const D: usize> Appearance<D> {
         }
     }
 
-    fn describe_all(&self) -> Vec<Feature> {
-        let mut features = vec![[0; KEEP]; self.grid.len()];
+    fn describe_all(&self) -> Vec<Line> {
+        let mut features = vec![Line([0; KEEP]); self.grid.len()];
         par::chunks_mut(&mut features, CHUNK, |chunk, features| {
             let mut window = self.scratch();
             for (i, feature) in features.iter_mut().enumerate() {
                 let centre = self.grid.point(chunk * CHUNK + i).map(|x| x as i32);
                 if self.inside(centre).is_some() {
                     self.cut(centre, &mut window);
-                    *feature = self.project(&mut window);
+                    feature.0 = self.project(&mut window);
                 }
             }
         });
@@ -338,7 +372,7 @@ impl<const D: usize> Appearance<D> {
     #[inline(always)]
     fn nearest_other(&self, me: [i32; D], apart: i32) -> i32 {
         let (shape, wrap) = (self.grid.shape(), self.grid.wrap());
-        let mine = self.features[self.clamped(me)];
+        let mine = self.features[self.clamped(me)].0;
         let columns = self.range(D - 1);
         let lines = self.grid.len() / shape[D - 1];
         let mut best = i32::MAX;
@@ -359,7 +393,7 @@ impl<const D: usize> Appearance<D> {
                 if near && gap(x, me[D - 1], shape[D - 1] as i32, wrap[D - 1]) <= apart {
                     continue;
                 }
-                let other = &self.features[line * shape[D - 1] + x as usize];
+                let other = &self.features[line * shape[D - 1] + x as usize].0;
                 best = best.min(distance(&mine, other));
             }
         }

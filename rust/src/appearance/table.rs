@@ -1,6 +1,6 @@
 //! An analysis taken apart into plain arrays, to be kept, and put together again.
 
-use super::{Appearance, CHANNELS, Colour, Feature, KEEP, LANES, Projection, window};
+use super::{Appearance, Apron, CHANNELS, Colour, Feature, KEEP, LANES, Line, Projection, window};
 use crate::grid::Grid;
 use crate::{Error, Result};
 
@@ -35,7 +35,7 @@ impl<const D: usize> Appearance<D> {
             radius: self.radius,
             channels: self.channels,
             colours: self.colours.clone(),
-            features: self.features.clone(),
+            features: self.features.iter().map(|line| line.0).collect(),
             basis: self.projection.basis.clone(),
             bias: self.projection.bias,
             gain: self.projection.gain,
@@ -79,6 +79,7 @@ impl<const D: usize> Appearance<D> {
             grid: parts.grid,
             radius: parts.radius,
             channels: parts.channels,
+            apron: Apron::new(&parts.colours, &parts.grid, parts.radius + 1),
             colours: parts.colours,
             offsets: window(parts.radius),
             projection: Projection {
@@ -88,7 +89,7 @@ impl<const D: usize> Appearance<D> {
                 bias: parts.bias,
                 gain: parts.gain,
             },
-            features: parts.features,
+            features: parts.features.into_iter().map(Line).collect(),
             spacing: parts.spacing,
         })
     }

@@ -1,9 +1,8 @@
 //! One coordinate for each point, out of those that the windows around it propose.
 
-use super::{CHUNK, Level};
+use super::Level;
 use crate::appearance::{CHANNELS, Colour, UNIT};
 use crate::fixed::{Place, add, apply, nearest};
-use crate::par;
 
 /// Standard deviation of a proposal's weight over the distance of its window, in points.
 const SIGMA: f64 = 2.0;
@@ -18,17 +17,21 @@ struct Voter<const D: usize> {
 }
 
 impl<const D: usize> Level<'_, D> {
-    /// Takes, for each point, the proposal nearest in colour to the weighted mean of all of them: a copy, never an average.
-    pub(super) fn vote(&self, matches: &[Place<D>], to: &mut [Place<D>], radius: usize) {
-        let voters = self.voters(radius as i32);
+    /// Takes, for each point that a pass corrects, the proposal nearest in colour to the weighted mean of all of them: a
+    /// copy, never an average.
+    pub(super) fn vote(
+        &self,
+        places: &[Place<D>],
+        matches: &[Place<D>],
+        to: &mut [Place<D>],
+        number: u32,
+    ) {
+        let voters = self.voters(self.options.vote as i32);
         // From the units of vectors to those of colours.
         let unit = (256.0 * self.appearance.colour_variance() / f64::from(UNIT)) as i64;
-        par::chunks_mut(to, CHUNK, |chunk, to| {
-            let mut proposals = Vec::with_capacity(voters.len());
-            for (i, place) in to.iter_mut().enumerate() {
-                let p = chunk * CHUNK + i;
-                *place = self.elect(matches, &voters, unit, p, &mut proposals);
-            }
+        let all = 0..places.len();
+        self.pass(places, all, to, number, Vec::new, |proposals, p| {
+            self.elect(matches, &voters, unit, p, proposals)
         });
     }
 

@@ -246,7 +246,7 @@ impl Appearance {
         Ok(PyArray1::from_vec(py, places))
     }
 
-    /// Corrected places, the number of iterations and the share of points that the last one changed.
+    /// Corrected places, the number of passes and the share of points that the last two changed.
     #[allow(clippy::too_many_arguments)] // the options of the kernel
     fn correct<'py>(
         &self,
@@ -255,10 +255,10 @@ impl Appearance {
         place: Where,
         frames: PyReadonlyArray3<'py, i16>,
         held: PyReadonlyArray1<'py, bool>,
-        iterations: usize,
+        passes: usize,
         first: u32,
         exhaustive: bool,
-        sweeps: usize,
+        reach: i32,
         hysteresis: f64,
         unity: f64,
         vote: usize,
@@ -269,10 +269,10 @@ impl Appearance {
     ) -> PyResult<(PlacesOut<'py>, usize, f64)> {
         let guide = slices(&guide)?;
         let options = optimize::Options {
-            iterations,
+            passes,
             first,
             exhaustive,
-            sweeps,
+            reach,
             hysteresis,
             unity,
             vote,
