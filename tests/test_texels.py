@@ -103,7 +103,15 @@ def test_a_mask_of_one_is_a_start() -> None:
     one = MASK & (np.hypot(rows - CENTRES[8][0], columns - CENTRES[8][1]) < DISC + 2)
     found = analyse(IMAGE, mask=one, background=GROUND, tag="F=d")
     assert found.report["box"][:2] == CENTRES[8].astype(int).tolist()
+    assert analyse(IMAGE, mask=one, tag="F=d").report["proposed"] == ["background"]
     assert score(found.points, CENTRES, BOX[2:], IMAGE.shape).recall == 1
+
+
+def test_points_that_are_listed_stay() -> None:
+    listed = CENTRES[:7] + 0.25
+    found = analyse(IMAGE, points=listed, background=GROUND, tag="F=d")
+    np.testing.assert_array_equal(found.points, listed)
+    assert found.mask[tuple(np.rint(listed).astype(int).T)].all()
 
 
 def test_texels_that_look_like_the_ground_are_copies_of_the_box() -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float, as_image, as_int, as_mask, as_seed, as_wrap, guidance
-from texrs._typing import Bools, Progress
+from texrs._arrays import as_float, as_image, as_int, as_mask, as_seed, as_wrap, check_memory, guidance
+from texrs._typing import Array, Bools, Floats, Progress
 from texrs.errors import InvalidInput
 from texrs.texels import _given, _mask, _start
 from texrs.texels._clean import Cleaned, add_missing, clean, components
@@ -24,6 +25,10 @@ FEWEST = 3
 """Texels without which there is no layout."""
 SHORTEST = 16
 """Least side of an image."""
+AGAIN = 0.8
+"""Share of the texels of a proposed box that those of a better one must be."""
+BYTES = 500
+"""Of memory for a pixel, at the most: vectors, spectra and running sums of eight channels, and colour models."""
 LITTLE, MUCH = 0.02, 0.95
 """Shares of foreground outside of which a mask cannot be right."""
 
@@ -111,107 +116,67 @@ def analyse(
     """
     pixels = as_image(image, "image", minimum=SHORTEST)
     size = (pixels.shape[0], pixels.shape[1])
-    closed = as_wrap(wrap)
-    around = (closed[0], closed[1])
-    if method not in ("default", "paper"):
-        raise InvalidInput(f"method: allowed are default and paper; got {method!r}")
-    literal = method == "paper"
-    channel = ("min-entropy" if literal else "weighted") if channel is None else channel
-    model = ("nearest" if literal else "mixture") if model is None else model
-    if channel not in ("weighted", "min-entropy"):
-        raise InvalidInput(f"channel: allowed are weighted and min-entropy; got {channel!r}")
-    if model not in ("mixture", "nearest"):
-        raise InvalidInput(f"model: allowed are mixture and nearest; got {model!r}")
-    turns, chance = as_int(rotations, "rotations", 1, 72), as_seed(seed)
-    if isinstance(scales, str | bytes) or not 1 <= len(scales) <= 16:
-        raise InvalidInput(f"scales: needs 1 to 16 numbers, got {scales!r}")
-    sizes = [as_float(s, f"scales[{i}]", 0.25, 4.0) for i, s in enumerate(scales)]
-    least = None if threshold is None else as_float(threshold, "threshold", -1, 1)
+    check_memory(BYTES * size[0] * size[1], "image")
+    rows, columns = as_wrap(wrap)
+    how = _How.of(method, channel, model, rotations, scales, threshold, (rows, columns), seed)
     given = None if box is None else _given.as_box(box, size)
     known, said = _given.as_background(background, size), _given.as_tag(tag)
     marked = None if mask is None else as_mask(mask, "mask", size)
     listed = None if points is None else _given.as_points(points, size, "points")
     watch = _Watch(progress)
-
     guide = guidance(pixels)
     if guide.shape[-1] == 2:
         guide = np.concatenate([guide, guide[..., :1]], axis=-1)
-    report: dict[str, Any] = {"proposed": [], "doubts": []}
+
+    # 1. The texel, the background and the tag: as said, or proposed.
+    shape: Bools | None = None
+    whole: Bools | None = None
     if marked is not None:
         if not marked.any() or marked.all():
             raise InvalidInput(f"mask: is {'all' if marked.any() else 'no'} foreground")
-        given = _given.chosen(marked, given, said, components(marked, around)[0])
-    if given is None or (known is None and marked is None) or said is None:
-        proposal = _start.propose(guide, around, given, known, marked, said, listed, watch.part("propose"))
+        given = _given.chosen(marked, given, said, components(marked, how.wrap)[0])
+        shape, whole = _shape(marked, given, how.wrap)
+    report: dict[str, Any] = {"proposed": [], "doubts": []}
+    blind = known is None and whole is None
+    if given is None or blind or said is None:
+        proposal = _start.propose(guide, how.wrap, given, known, whole, said, listed, watch.part("propose"))
         report["proposed"] = [
-            name
-            for name, old in (("box", given), ("background", known if marked is None else 1), ("tag", said))
-            if old is None
+            name for name, missing in (("box", given is None), ("background", blind), ("tag", said is None)) if missing
         ]
         report["confidence"] = proposal.confidence
         given, said = proposal.box, proposal.tag
-        known = proposal.background if known is None and marked is None else known
+        if blind:
+            known = proposal.background & ~marked if marked is not None else proposal.background
     _given.check_agreement(marked, known, given, said)
-    shape, whole = _shape(marked, given, around)
     if whole is not None:
-        _agree(whole, said, around)
+        _agree(whole, said, how.wrap)
 
-    if listed is None:
-        found = search(
-            guide,
-            given.centre,
-            given.size,
-            wrap=around,
-            rotations=turns,
-            scales=sizes,
-            channel=channel,
-            threshold=least,
-            cut=not literal,
-            progress=watch.part("search"),
-        )
-    else:
-        found = _listed(listed, guide.shape[:2])
+    # 2. Where the texture looks like it.
+    found = _listed(listed, size) if listed is not None else how.search(guide, given, watch.part("search"))
     watch("separate", 0.0)
-    if whole is not None:
-        cut = whole
-    else:
-        assert known is not None
-        centres = np.concatenate([[given.centre], found.pixels])
-        colours = _mask.lab(guide)
-        cut = _mask.cut(
-            colours,
-            centres,
-            given.size,
-            known,
-            tag=said,
-            shape=shape,
-            wrap=around,
-            seed=chance,
-            model=model,
-        )
-        if not literal:
-            cut = _mask.tidy(cut, float(_mask.ellipse(given.size).sum()), net=said != "F=d")
-    result = Cleaned(found.points, found.scores, np.arange(len(found.points)), cut, "cut")
-    if said == "F=d" and not literal:
-        own = shape if shape is not None else _mask.ellipse(given.size)
-        result = clean(cut, found.points, found.scores, found.map, own, around, certain=whole is not None)
-    elif not literal and listed is None and len(result.points):
-        at = np.clip(np.rint(result.points).astype(np.intp), 0, np.array(size) - 1)
-        if said == "B=c" or result.mask[tuple(at.T)].mean() < 0.5:
-            result = add_missing(result, found.map, around, joints=said == "B=c")
+
+    # 3. What belongs to the texels.
+    cut = whole if whole is not None else how.cut(guide, given, found, known, said, shape)
+    result = _agreed(cut, found, given, said, shape, how, listed=listed is not None, certain=whole is not None)
     if len(result.points) < FEWEST:
         raise InvalidInput(
             f"image: {len(result.points)} texels were found, at least {FEWEST} are needed; try another box, more "
             f"rotations or scales, a lower threshold (it was {found.threshold:.2f}), or give the points"
         )
+    if "box" in report["proposed"] and said == "F=d" and result.source == "cut" and not how.literal and listed is None:
+        again = _centred(pixels, result, known, how)
+        if again is not None:
+            return replace(
+                again, report={**again.report, "proposed": report["proposed"], "confidence": proposal.confidence}
+            )
     if whole is None:
-        doubt = _given.disagreement(result.mask, said, components(result.mask, around)[0], _ground(result.mask, around))
+        doubt = _given.disagreement(
+            result.mask, said, components(result.mask, how.wrap)[0], _ground(result.mask, how.wrap)
+        )
         if doubt:
             report["doubts"].append(doubt)
     if not LITTLE <= result.mask.mean() <= MUCH:
         report["doubts"].append(f"{result.mask.mean():.0%} of the image is foreground")
-    templates = found.templates
-    picked = [templates[found.which[i]] if i >= 0 else templates[0] for i in result.origin]
     report |= {
         "box": [*given.centre, *given.size],
         "background": [] if known is None else _some_points(known),
@@ -224,6 +189,7 @@ def analyse(
         "foreground": float(result.mask.mean()),
         "spacing": spacing(result.points),
     }
+    picked = [found.templates[found.which[i] if i >= 0 else 0] for i in result.origin]
     watch("separate", 1.0)
     return Texels(
         pixels,
@@ -233,11 +199,131 @@ def analyse(
         said,
         result.scores,
         peaks(result.points),
-        around,
+        how.wrap,
         report,
         np.array([t.angle for t in picked]),
         np.array([t.scale for t in picked]),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _How:
+    """How to look, checked."""
+
+    literal: bool
+    channel: Channel
+    model: _mask.Model
+    rotations: int
+    scales: Sequence[float]
+    threshold: float | None
+    wrap: tuple[bool, bool]
+    seed: int
+
+    @classmethod
+    def of(
+        cls,
+        method: str,
+        channel: Channel | None,
+        model: _mask.Model | None,
+        rotations: int,
+        scales: Sequence[float],
+        threshold: float | None,
+        wrap: tuple[bool, bool],
+        seed: int,
+    ) -> _How:
+        if method not in ("default", "paper"):
+            raise InvalidInput(f"method: allowed are default and paper; got {method!r}")
+        literal = method == "paper"
+        channel = ("min-entropy" if literal else "weighted") if channel is None else channel
+        model = ("nearest" if literal else "mixture") if model is None else model
+        if channel not in ("weighted", "min-entropy"):
+            raise InvalidInput(f"channel: allowed are weighted and min-entropy; got {channel!r}")
+        if model not in ("mixture", "nearest"):
+            raise InvalidInput(f"model: allowed are mixture and nearest; got {model!r}")
+        turns, chance = as_int(rotations, "rotations", 1, 72), as_seed(seed)
+        if (
+            isinstance(scales, str | bytes)
+            or not isinstance(scales, Sequence | np.ndarray)
+            or not 1 <= len(scales) <= 16
+        ):
+            raise InvalidInput(f"scales: needs 1 to 16 numbers, got {scales!r}")
+        sizes = [as_float(s, f"scales[{i}]", 0.25, 4.0) for i, s in enumerate(scales)]
+        least = None if threshold is None else as_float(threshold, "threshold", -1, 1)
+        return cls(literal, channel, model, turns, sizes, least, wrap, chance)
+
+    def search(self, guide: Floats, box: Box, progress: Any) -> Found:
+        return search(
+            guide,
+            box.centre,
+            box.size,
+            wrap=self.wrap,
+            rotations=self.rotations,
+            scales=self.scales,
+            channel=self.channel,
+            threshold=self.threshold,
+            cut=not self.literal,
+            progress=progress,
+        )
+
+    def cut(
+        self, guide: Floats, box: Box, found: Found, background: Bools | None, tag: Tag, shape: Bools | None
+    ) -> Bools:
+        centres = np.concatenate([[box.centre], found.pixels])
+        ground = np.zeros(guide.shape[:2], bool) if background is None else background
+        mask = _mask.cut(
+            _mask.lab(guide),
+            centres,
+            box.size,
+            ground,
+            tag=tag,
+            shape=shape,
+            wrap=self.wrap,
+            seed=self.seed,
+            model=self.model,
+        )
+        if self.literal:
+            return mask
+        return _mask.tidy(mask, float(_mask.ellipse(box.size).sum()), net=tag != "F=d")
+
+
+def _agreed(
+    cut: Bools, found: Found, box: Box, tag: Tag, shape: Bools | None, how: _How, *, listed: bool, certain: bool
+) -> Cleaned:
+    """Make detections and mask agree, as far as the tag says how."""
+    plain = Cleaned(found.points, found.scores, np.arange(len(found.points)), cut, "cut")
+    if how.literal or not len(found.points):
+        return plain
+    if tag == "F=d":
+        own = shape if shape is not None else _mask.ellipse(box.size)
+        cleaned = clean(cut, found.points, found.scores, found.map, own, how.wrap, certain=certain)
+        # What a user lists stays as it is; the mask alone follows.
+        return replace(plain, mask=cleaned.mask, source=cleaned.source) if listed else cleaned
+    at = np.clip(np.rint(found.points).astype(np.intp), 0, np.array(cut.shape) - 1)
+    if not listed and (tag == "B=c" or cut[tuple(at.T)].mean() < 0.5):
+        return add_missing(plain, found.map, how.wrap, joints=tag == "B=c")
+    return plain
+
+
+def _centred(pixels: Array, result: Cleaned, known: Bools | None, how: _How) -> Texels | None:
+    """Analyse again from the box of a usual piece of the mask: what was proposed may lie beside the middle of a texel."""
+    try:
+        middle = _given.chosen(result.mask, None, "F=d", components(result.mask, how.wrap)[0])
+        again = analyse(
+            pixels,
+            box=(*middle.centre, *middle.size),
+            background=known,
+            tag="F=d",
+            rotations=how.rotations,
+            scales=how.scales,
+            threshold=how.threshold,
+            channel=how.channel,
+            model=how.model,
+            wrap=how.wrap,
+            seed=how.seed,
+        )
+    except InvalidInput:
+        return None
+    return again if len(again.points) >= AGAIN * len(result.points) else None
 
 
 class _Watch:

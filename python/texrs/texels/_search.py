@@ -157,12 +157,18 @@ def search(
     channel: Channel = "weighted",
     threshold: float | None = None,
     cut: bool = True,
+    features: Floats | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Found:
-    """Find the places that look like the box around ``centre``."""
+    """Find the places that look like the box around ``centre``.
+
+    Who looks for many boxes gives the ``features``, what `vectors` makes of the image alone.
+    """
     templates = bank(box, rotations, scales)
     turned = [t for t in templates if t.angle or t.scale != 1.0]
-    features, patches = vectors(colours, wrap, [cut_out(colours, centre, t, wrap) for t in turned])
+    patches: list[Floats] = []
+    if features is None or turned:
+        features, patches = vectors(colours, wrap, [cut_out(colours, centre, t, wrap) for t in turned])
     margin = tuple(max(t.box[axis] for t in templates) // 2 for axis in range(2))
     around = pad(features, (margin[0], margin[1]), wrap)
     variance = features.reshape(-1, CHANNELS).var(axis=0, dtype=np.float64)

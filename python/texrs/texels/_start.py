@@ -24,7 +24,7 @@ from texrs.texels._entry import Tag
 from texrs.texels._given import LEAST, Box, as_box
 from texrs.texels._mask import disc, lab, odd
 from texrs.texels._points import spacing
-from texrs.texels._search import Found, search
+from texrs.texels._search import Found, search, vectors
 
 __all__ = ["Proposal", "propose"]
 
@@ -110,7 +110,7 @@ def _best(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[float], ob
     boxes = _boxes(small)
     if not boxes:
         raise InvalidInput("box: none could be proposed for this image; give one, or the points")
-    light = lab(small)[..., 0]
+    light, features = lab(small)[..., 0], vectors(small, wrap)[0]
     best: tuple[float, Box] | None = None
     tried: list[tuple[float, Box, Found]] = []
 
@@ -119,7 +119,7 @@ def _best(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[float], ob
         known = [value for value, other, _ in tried if other == box]
         if known:
             return known[0]
-        found = search(small, box.centre, box.size, wrap=wrap)
+        found = search(small, box.centre, box.size, wrap=wrap, features=features)
         value = _worth(light, found, box)
         tried.append((value, box, found))
         if best is None or value > best[0] + 1e-6:
