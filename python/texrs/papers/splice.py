@@ -20,10 +20,13 @@ Departures, with their reasons:
 - Disjoint texels move whole, by whole pixels: Eq. 5 in the limit of its weights. The soft energy stretches components that
   hold two pins by dozens of pixels. The ground between them is harmonic, so nothing of it moves further than its texels.
 - Eq. 5 sums over rigid pixels only, so the others have no equation and the system is singular, or, for brick walls,
-  moves nothing but its pins: here they count a hundredth.
+  moves nothing but its pins: here they count a hundredth. Long joints, which the decoupling of Table 1 leaves free to slide,
+  are tied to their neighbours by a hair.
 - Texels that reflection mirrors are turned back, and those that the border cuts are left out.
 - Wide holes are filled with patches of the ground; random pixels come out as noise there.
-- Refinement leaves rigid texels as they are, and elsewhere lets what is rigid come only from what is.
+- Refinement leaves what is rigid as it is, and so whatever the warp copied whole: there is nothing to mend. In its
+  place nothing comes that is not ground itself.
+- Triangles between texels carry previews, and edits that list moved points: what moves then stirs its neighbours alone.
 
 ``method="paper"`` leaves out what can be left out (`texrs.papers._splice_literal`).
 """
