@@ -95,6 +95,9 @@ def to_unit(array: Array) -> Floats:
         return array.astype(np.float32)
     if array.dtype.kind in "ui":
         info = np.iinfo(array.dtype)
+        if array.dtype.kind == "u" and array.itemsize <= 2:
+            # Exact in float32, so that one rounding gives what float64 does.
+            return np.divide(array, np.float32(info.max), dtype=np.float32)
         return ((array.astype(np.float64) - min(info.min, 0)) / (float(info.max) - min(info.min, 0))).astype(np.float32)
     low, high = float(array.min()), float(array.max())
     if low >= 0 and high <= 1:

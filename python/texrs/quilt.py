@@ -37,16 +37,19 @@ __all__ = ["Picture", "quilt"]
 
 POOL, CANDIDATES = 48, 3
 """Matches that are looked at for what they repeat; those of them that are cut in."""
-REPETITION = 1.5
-"""Charge for showing what all other patches show, in units of a typical match."""
+REPETITION, GOOD, ON_LATTICE = 10.0, 0.1, 1.5
+"""Charge for showing what all other patches show, in units of a match that is better than all but this share: where few
+places fit, as between things on plain ground, others would tear what they are put on. And on a lattice, where all places are
+much alike and must meet exactly, in units of a typical match."""
 CONTINUATION = 2.0
-"""Charge for going on with the piece of the exemplar that lies there already, in the same units."""
+"""Charge for going on with the piece of the exemplar that lies there already, in units of a typical match."""
 CELL = 8
 """Use is counted in cells of so many pixels a side, and overlaps are compared on as many rows and columns."""
 CALM, RUN = 64, 9
 """Lines that are looked at for a calm one; pixels of a line that make a visible piece of an edge."""
-MIRRORED, NEAR = 0.02, 6.0
-"""Share of its overlap on which a patch may show the mirror image of what lies there, within so many pixels."""
+MIRRORED, NEAR = 0.02, 8.0
+"""Share of its overlap on which a patch may show the mirror image of what lies there, within so many pixels: a cell, or the
+axis of a mirror could lie between two lines that are compared."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,6 +61,8 @@ class Picture:
     source: SourceMap
     penalty: Floats
     """(h, w): how much dearer a seam is at a pixel; its cost is multiplied by one more than this."""
+    regular: bool = False
+    """Whether it repeats on a lattice."""
 
     @property
     def kind(self) -> int:
@@ -321,8 +326,10 @@ class Quilt:
         colours = self.all_colours.take(old, axis=0)
         pool = finder.pool(colours, known)
         shown = self.places([Match(m.cost, finder.members[m.exemplar], m.row, m.column) for m in pool], window, CELL)
-        usual = float(np.median([m.cost for m in pool])) or 1.0
-        charges = REPETITION * self.repeated(shown)
+        good, usual = np.quantile([m.cost for m in pool], (GOOD, 0.5)).tolist()
+        usual = usual or 1.0
+        regular = self.pictures[finder.members[0]].regular
+        charges = (ON_LATTICE if regular else REPETITION * (good or usual) / usual) * self.repeated(shown)
         continued, mirrored = self.alike(shown, known, old)
         charges += CONTINUATION * continued
         free = np.flatnonzero(mirrored <= MIRRORED) if (mirrored <= MIRRORED).any() else np.arange(len(pool))

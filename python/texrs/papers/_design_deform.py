@@ -77,7 +77,7 @@ AGREEMENT = 0.6
 DENSE, RAGGED = 0.42, 0.825
 """Share of the image that elements cover from which on they lie in a heap, and the solidity below which few of them have the
 shape of another one: leaves and flowers, which move as if they lay apart."""
-MOVED, MOVED_RAGGED = 0.7, 0.25
+MOVED, MOVED_RAGGED = 0.7, 0.12
 """Share of places that others may take, and share of a heap of leaves that moves."""
 
 Arrangement: TypeAlias = Literal["apart", "layers", "leaves", "heap", "full"]

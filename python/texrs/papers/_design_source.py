@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -121,8 +122,10 @@ class Source:
         extent = side or patch_side(guide.shape[0], guide.shape[1])
         flips = mirrors(moves.mirror)
         if len(flips) > 1:
-            rows, columns, oblique = (value < POLAR for value in polarity(guide))
-            like = {(True, False): rows and oblique, (False, True): columns and oblique, (True, True): rows and columns}
+            rows, columns, oblique = polarity(guide)
+            # Each mirror turns two of the three round, which are evidence apart from each other.
+            odd = {(True, False): (rows, oblique), (False, True): (columns, oblique), (True, True): (rows, columns)}
+            like = {f: math.hypot(*sure) < POLAR for f, sure in odd.items()}
             flips = [f for f in flips if like.get(f, True)]
             moves = replace(moves, axes=(like[True, False], like[False, True]))
         if parts.lattice:

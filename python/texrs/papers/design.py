@@ -380,8 +380,9 @@ def large(
     side = min(min(i.shape) for i in inside)
     pictures = []
     for v in variants:
-        penalty = gather(inside[int(v.source.exemplar[0, 0])], v.source.coordinates, interpolation="nearest")
-        pictures.append(Picture(v.colours, v.source, penalty))
+        which = int(v.source.exemplar[0, 0])
+        penalty = gather(inside[which], v.source.coordinates, interpolation="nearest")
+        pictures.append(Picture(v.colours, v.source, penalty, sources[which].parts.lattice is not None))
     return quilt(
         pictures,
         (size[0], size[1]),

@@ -19,7 +19,7 @@ from texrs._typing import Array, Floats, Labels, Progress
 from texrs.errors import InvalidInput
 from texrs.kernels.noise import uniform
 from texrs.segment import elements as _elements
-from texrs.segment.layers import Regions
+from texrs.segment.layers import Regions, smooth_on_grain
 from texrs.segment.regularity import Lattice, lattice
 
 __all__ = ["Children", "Segmentation", "segment"]
@@ -38,6 +38,8 @@ USUAL_LAYERS, MOST_LAYERS = 2, 4
 APART, CLEARLY, SAME_SIZE = 0.45, 1.15, 0.6
 """Share of the image that elements which lie apart cover at most; how many times more of it further layers must bring; least
 ratio of median areas of elements that are of the same size."""
+SMOOTH_GROUND = 0.6
+"""Share of the ground that may be smooth where the ground is taken to be of fine grain."""
 GRID_SHARE = 1 / 6
 """Side of a grid cell, as a share of the exemplar's shorter side."""
 
@@ -105,7 +107,8 @@ def segment(
         The exemplar, any dtype; the first three channels count, or the first one when there are two.
     layers : int, optional
         Number of colour layers, 1 to 16. Fewer are made where the image has fewer colours. By default two, or three or
-        four where these find clearly more elements of the same size that lie apart.
+        four where these find clearly more elements of the same size that lie apart; where the ground is of fine grain,
+        what is smooth belongs to the layer above it.
     children : {"auto", "components", "grid", "none"}
         "components": connected pieces of the layers above the background. "grid": jittered cells of 1/6 of the side,
         for images without separate elements. "none": whole layers. "auto": components, or the grid where nothing
@@ -150,9 +153,14 @@ def segment(
     regular = lattice(rgb)
     reasons = [f"elements keep to {regular}"] if regular else []
     if children != "grid":
-        found, elements, trouble = _best_background(found, rgb, watch)
+        seen = _Seen.of(rgb)
+        found, elements, trouble = _best_background(found, seen, watch)
         if layers is None:
-            found, elements, trouble = _more_layers(regions, rgb, found, elements, trouble, watch)
+            smooth = None if trouble or (elements > 0).mean() > APART else _smooth_too(rgb, seen, found, elements)
+            if smooth is not None:
+                found, elements = smooth
+            else:
+                found, elements, trouble = _more_layers(regions, seen, found, elements, trouble, watch)
         if children == "components" or not trouble:
             return Segmentation(found, _elements.whole(elements), "components", "; ".join(reasons), regular)
         reasons.insert(0, trouble)
@@ -190,19 +198,35 @@ def _colours(unit: Floats) -> Floats:
     return np.ascontiguousarray(chosen)
 
 
-def _best_background(layers: Labels, rgb: Floats, watch: Callable[[], object]) -> tuple[Labels, Labels, str]:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Seen:
+    """What elements are found by, beside their layers."""
+
+    crease: Floats
+    contrast: Floats
+
+    @classmethod
+    def of(cls, rgb: Floats) -> _Seen:
+        lab = _elements.lightness_and_colour(rgb)
+        return cls(_elements.creases(lab), _elements.contrast(lab))
+
+    def elements(self, layers: Labels) -> tuple[Labels, _elements.Evidence]:
+        """Find the elements of the layers above 0, and what speaks for them."""
+        found = _elements.find(layers, self.crease)
+        return found, _elements.evidence(found, self.crease, self.contrast)
+
+
+def _best_background(layers: Labels, seen: _Seen, watch: Callable[[], object]) -> tuple[Labels, Labels, str]:
     """Take as the background the layer that leaves the most convincing elements; put it first.
 
     Gives the layers, the elements and why they cannot be trusted, which is empty if they can.
     """
-    crease, contrasts = _elements.creases(rgb), _elements.contrast(rgb)
     best: tuple[float, Labels, Labels, str] | None = None
     for background in range(int(layers.max()) + 1):
         swapped = np.where(layers == background, 0, np.where(layers < background, layers + 1, layers)).astype(np.int32)
         watch()
-        elements = _elements.find(swapped, crease)
+        elements, evidence = seen.elements(swapped)
         watch()
-        evidence = _elements.evidence(elements, crease, contrasts)
         trouble = _trouble(evidence)
         score = evidence.solidity - 0.05 * background - (1.0 if trouble else 0.0)
         if best is None or score > best[0] + 1e-9:
@@ -215,7 +239,7 @@ def _best_background(layers: Labels, rgb: Floats, watch: Callable[[], object]) -
 
 def _more_layers(
     regions: Regions,
-    rgb: Floats,
+    seen: _Seen,
     layers: Labels,
     elements: Labels,
     trouble: str,
@@ -228,13 +252,26 @@ def _more_layers(
     for count in range(USUAL_LAYERS + 1, MOST_LAYERS + 1):
         if trouble or (elements > 0).mean() > APART:
             break
-        more = _best_background(regions.layers(count), rgb, watch)
+        more = _best_background(regions.layers(count), seen, watch)
         area, before = (np.bincount(e.ravel())[1:] for e in (more[1], elements))
         alike = len(area) > 0 and SAME_SIZE <= np.median(area) / np.median(before) <= 1 / SAME_SIZE
         if more[2] or area.sum() > APART * elements.size or not alike or area.sum() < CLEARLY * before.sum():
             break
         layers, elements, trouble = more
     return layers, elements, trouble
+
+
+def _smooth_too(rgb: Floats, seen: _Seen, layers: Labels, elements: Labels) -> tuple[Labels, Labels] | None:
+    """Add what is smooth on a ground of fine grain, as stones as dark as their sand; None where that is not clearly more."""
+    smooth = smooth_on_grain(rgb)
+    # Where there is no grain at all, only outlines are not smooth.
+    if smooth is None or smooth[layers == 0].mean() > SMOOTH_GROUND:
+        return None
+    more = (smooth | (layers > 0)).astype(np.int32)
+    found, evidence = seen.elements(more)
+    if _trouble(evidence) or (found > 0).sum() < CLEARLY * (elements > 0).sum():
+        return None
+    return more, found
 
 
 def _trouble(evidence: _elements.Evidence) -> str:

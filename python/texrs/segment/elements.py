@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from texrs._typing import Bools, Floats, Labels
 
-__all__ = ["Evidence", "contrast", "creases", "evidence", "find", "solidity", "whole"]
+__all__ = ["Evidence", "contrast", "creases", "evidence", "find", "lightness_and_colour", "solidity", "whole"]
 
 CREASE = 1.5
 """Standard deviation in pixels of the Gaussian under which creases are looked for."""
@@ -43,12 +43,18 @@ LEAST_AREA, LEAST_SHARE = 20.0, 0.0015
 SQUARE = np.ones((3, 3), bool)
 
 
-def creases(rgb: Floats) -> Floats:
-    """Give how deep a dark line each pixel lies on: the larger curvature of the lightness, where it is positive."""
-    from scipy.ndimage import gaussian_filter
+def lightness_and_colour(rgb: Floats) -> Floats:
+    """Give CIE Lab, its lightness in 0..1."""
     from skimage.color import rgb2lab
 
-    light = rgb2lab(rgb)[..., 0].astype(np.float32) / 100
+    return np.asarray(rgb2lab(rgb), np.float32) / np.float32(100)
+
+
+def creases(lab: Floats) -> Floats:
+    """Give how deep a dark line each pixel lies on: the larger curvature of the lightness, where it is positive."""
+    from scipy.ndimage import gaussian_filter
+
+    light = lab[..., 0]
     rows, columns, mixed = (gaussian_filter(light, CREASE, order=o) for o in ((2, 0), (0, 2), (1, 1)))
     largest = (rows + columns) / 2 + np.hypot((rows - columns) / 2, mixed)
     return np.asarray(np.maximum(largest, 0) * CREASE**2, np.float32)
@@ -317,13 +323,11 @@ class Evidence:
     """How many times stronger contrasts are along outlines than in the background."""
 
 
-def contrast(rgb: Floats) -> Floats:
+def contrast(lab: Floats) -> Floats:
     """Give how much colours change at each pixel, in Lab."""
     from scipy.ndimage import gaussian_filter
-    from skimage.color import rgb2lab
 
-    lab = rgb2lab(rgb).astype(np.float32) / 100
-    square = np.zeros(rgb.shape[:2], np.float32)
+    square = np.zeros(lab.shape[:2], np.float32)
     for channel in range(3):
         for axis in range(2):
             order = [int(axis == a) for a in range(2)]

@@ -12,15 +12,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._typing import Floats, Labels
+from texrs._typing import Bools, Floats, Labels
 from texrs.kernels.mean_shift import mean_shift
 
-__all__ = ["Regions"]
+__all__ = ["Regions", "smooth_on_grain"]
 
 SPATIAL_RADIUS, RANGE_RADIUS = 6, 14 / 255
 """Of the mean-shift filter: pixels, and colour units of [0, 1]."""
 MERGE_SCALE, MERGE_BLUR, MERGE_MINIMUM = 60, 0.4, 24
 """k, sigma and least area in pixels of the graph-based merge, colours in 0..255."""
+
+FINE, AROUND = 1.0, 2.0
+"""Standard deviations in pixels of the Gaussians below which changes are grain, and over which its amount is averaged."""
+TWO_KINDS = 0.75
+"""Share of the variance of the amount of grain that is between two classes, from which on there are two; a bell has 0.64."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,3 +83,25 @@ def _weighted_k_means(points: NDArray[np.float64], weight: NDArray[np.float64], 
             if mine.any():
                 centres[k] = np.average(points[mine], axis=0, weights=weight[mine])
     return np.unique(nearest, return_inverse=True)[1]
+
+
+def smooth_on_grain(rgb: Floats) -> Bools | None:
+    """Mark what is smooth where the rest is of fine grain, as stones are on sand; None where there are no two such kinds.
+
+    The amount of grain is relative to the lightness: of one material in light and in shade it is the same.
+    """
+    from scipy.ndimage import binary_dilation, gaussian_filter
+    from skimage.filters import threshold_otsu
+
+    light = rgb.mean(axis=-1)
+    fine = np.abs(light - gaussian_filter(light, FINE))
+    amount = np.log((gaussian_filter(fine, AROUND) + 1e-3) / (gaussian_filter(light, AROUND) + 0.02))
+    if np.ptp(amount) < 1e-6:
+        return None
+    smooth = amount < threshold_otsu(amount)
+    share = float(smooth.mean())
+    between = share * (1 - share) * float(amount[smooth].mean() - amount[~smooth].mean()) ** 2
+    if between < TWO_KINDS * float(amount.var()):
+        return None
+    # Grain is averaged beyond outlines, so what is smooth comes out smaller.
+    return np.asarray(binary_dilation(smooth, np.ones((3, 3), bool)), bool)

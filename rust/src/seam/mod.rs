@@ -12,6 +12,7 @@
 pub mod cost;
 pub mod labels;
 pub mod maxflow;
+mod overlap;
 pub mod planar;
 mod queue;
 pub mod stitch;

@@ -14,77 +14,15 @@
 //! seam is a pairwise term with one cost a labelling (Kolmogorov and Zabih, *What energy functions can be minimized via
 //! graph cuts?*, PAMI 2004) in place of Kwatra's extra node, which gives the same cuts with fewer nodes.
 
-use super::cost::{Cost, Pair, capacity, check_costs, check_len, scale};
+use super::cost::{Pair, capacity, scale};
 use super::links;
 use super::maxflow::{Graph, Solver};
+use super::overlap::Window;
+pub use super::overlap::{OldSeams, Overlap};
 use super::planar::ring::{Ring, Side, least_ring};
 use crate::grid::Grid;
 use crate::par::Monitor;
 use crate::{Error, Result};
-
-/// Seams that A already contains. Entries belong to the pair of a point and the next one along the axis.
-#[derive(Debug, Clone, Copy)]
-pub struct OldSeams<'a, const D: usize> {
-    /// Cost of the seam that is there, paid where both points keep A; 0 where there is none.
-    pub kept: [&'a [f32]; D],
-    /// Cost where the first point keeps A and the next takes B: the first one's old source against B.
-    pub ab: [&'a [f32]; D],
-    /// Cost where the first point takes B and the next keeps A.
-    pub ba: [&'a [f32]; D],
-}
-
-/// What is to be stitched. Arrays are in row-major order over `grid`, images with their channels last.
-#[derive(Debug, Clone, Copy)]
-pub struct Overlap<'a, const D: usize> {
-    /// The canvas, and which of its axes are cyclic.
-    pub grid: Grid<D>,
-    /// Channels of both images.
-    pub channels: usize,
-    /// The image that is there. Values where it does not cover the canvas are never read.
-    pub a: &'a [f32],
-    /// The image that is added.
-    pub b: &'a [f32],
-    /// Where A covers the canvas.
-    pub mask_a: &'a [bool],
-    /// Where B covers the canvas.
-    pub mask_b: &'a [bool],
-    /// Pixels of the overlap that must keep A.
-    pub core_a: Option<&'a [bool]>,
-    /// Pixels of the overlap that must take B.
-    pub core_b: Option<&'a [bool]>,
-    /// Costs of edges are multiplied by one plus the mean of this at their ends.
-    pub penalty: Option<&'a [f32]>,
-    /// Seams that A already contains; they bear the penalty too.
-    pub old: Option<OldSeams<'a, D>>,
-    /// How visible a seam is.
-    pub cost: Cost,
-}
-
-impl<'a, const D: usize> Overlap<'a, D> {
-    /// An overlap without cores, penalty or old seams, at the gradient cost.
-    pub fn new(
-        grid: Grid<D>,
-        channels: usize,
-        a: &'a [f32],
-        b: &'a [f32],
-        mask_a: &'a [bool],
-        mask_b: &'a [bool],
-    ) -> Self {
-        Self {
-            grid,
-            channels,
-            a,
-            b,
-            mask_a,
-            mask_b,
-            core_a: None,
-            core_b: None,
-            penalty: None,
-            old: None,
-            cost: Cost::Gradient,
-        }
-    }
-}
 
 /// Which image each pixel takes.
 #[derive(Debug, Clone, PartialEq)]
@@ -149,14 +87,14 @@ impl<const D: usize> Stitcher<D> {
     /// Arrays that do not fit the grid, a penalty or costs of old seams that are negative or not finite, cores that lie
     /// outside the overlap's images or contradict each other, values that are not finite in the overlap.
     pub fn cut(&mut self, overlap: &Overlap<'_, D>, monitor: &Monitor) -> Result<Stitched> {
-        check(overlap)?;
+        overlap.check()?;
         let mut b: Vec<bool> = overlap
             .mask_b
             .iter()
             .zip(overlap.mask_a)
             .map(|(&b, &a)| b && !a)
             .collect();
-        let Some(window) = bounds(overlap)? else {
+        let Some(window) = overlap.window()? else {
             return Ok(Stitched {
                 b,
                 value: 0.0,
@@ -336,7 +274,7 @@ impl<const D: usize> Stitcher<D> {
         }
         self.sides.clear();
         for ((terminal, &at), &around) in self.terminal.iter_mut().zip(&self.canvas).zip(&around) {
-            let side = tie(overlap, at as usize);
+            let side = overlap.tie(at as usize);
             self.sides.push(side);
             match side {
                 Side::Free => {}
@@ -345,143 +283,6 @@ impl<const D: usize> Stitcher<D> {
             }
         }
     }
-}
-
-/// Where a pixel must be: outside it keeps A, inside it takes B.
-fn tie<const D: usize>(overlap: &Overlap<'_, D>, at: usize) -> Side {
-    match (overlap.mask_a[at], overlap.mask_b[at]) {
-        (true, true) => {}
-        (true, false) => return Side::Outside,
-        (false, true) => return Side::Inside,
-        (false, false) => return Side::Free,
-    }
-    if overlap.core_b.is_some_and(|core| core[at]) {
-        return Side::Inside;
-    }
-    if overlap.core_a.is_some_and(|core| core[at]) {
-        return Side::Outside;
-    }
-    let point = overlap.grid.point(at);
-    let mut found = Side::Free;
-    for axis in 0..D {
-        for step in [-1, 1] {
-            let mut beside = point;
-            let Some(i) = overlap.grid.inside(axis, point[axis] as isize + step) else {
-                continue;
-            };
-            beside[axis] = i;
-            let beside = overlap.grid.index(beside);
-            match (overlap.mask_a[beside], overlap.mask_b[beside]) {
-                (true, false) => return Side::Outside,
-                (false, true) => found = Side::Inside,
-                _ => {}
-            }
-        }
-    }
-    found
-}
-
-fn check<const D: usize>(overlap: &Overlap<'_, D>) -> Result<()> {
-    let n = overlap.grid.len();
-    if n > i32::MAX as usize {
-        return Err(Error::Limit {
-            what: "a canvas to stitch on".into(),
-            needed: format!("{n} pixels"),
-            limit: format!("{} pixels", i32::MAX),
-        });
-    }
-    let samples = n.saturating_mul(overlap.channels);
-    check_len("a", samples, overlap.a.len())?;
-    check_len("b", samples, overlap.b.len())?;
-    check_len("mask_a", n, overlap.mask_a.len())?;
-    check_len("mask_b", n, overlap.mask_b.len())?;
-    for (argument, core, mask) in [
-        ("core_a", overlap.core_a, overlap.mask_a),
-        ("core_b", overlap.core_b, overlap.mask_b),
-    ] {
-        if let Some(core) = core {
-            check_len(argument, n, core.len())?;
-            if let Some(at) = (0..n).find(|&i| core[i] && !mask[i]) {
-                return Err(Error::value(
-                    argument,
-                    format!(
-                        "holds {:?}, which its image does not cover",
-                        overlap.grid.point(at)
-                    ),
-                ));
-            }
-        }
-    }
-    if let (Some(core_a), Some(core_b)) = (overlap.core_a, overlap.core_b)
-        && let Some(at) = (0..n).find(|&i| core_a[i] && core_b[i])
-    {
-        return Err(Error::value(
-            "core_a, core_b",
-            format!(
-                "both hold {:?}; a pixel can be tied to one image only",
-                overlap.grid.point(at)
-            ),
-        ));
-    }
-    if let Some(penalty) = overlap.penalty {
-        check_len("penalty", n, penalty.len())?;
-        check_costs("penalty", penalty)?;
-    }
-    if let Some(old) = overlap.old {
-        for costs in old.kept.iter().chain(&old.ab).chain(&old.ba) {
-            check_len("old", n, costs.len())?;
-            check_costs("old", costs)?;
-        }
-    }
-    Ok(())
-}
-
-/// The part of the canvas that the overlap lies in. A cyclic axis along which it meets both ends is taken whole.
-struct Window<const D: usize> {
-    grid: Grid<D>,
-    from: [usize; D],
-}
-
-impl<const D: usize> Window<D> {
-    fn canvas(&self, i: usize, grid: &Grid<D>) -> u32 {
-        let mut point = self.grid.point(i);
-        for (p, from) in point.iter_mut().zip(self.from) {
-            *p += from;
-        }
-        grid.index(point) as u32
-    }
-}
-
-fn bounds<const D: usize>(overlap: &Overlap<'_, D>) -> Result<Option<Window<D>>> {
-    let (shape, wrap) = (overlap.grid.shape(), overlap.grid.wrap());
-    let (mut low, mut high) = ([usize::MAX; D], [0; D]);
-    let row = shape[D - 1];
-    for (r, (a, b)) in overlap
-        .mask_a
-        .chunks_exact(row)
-        .zip(overlap.mask_b.chunks_exact(row))
-        .enumerate()
-    {
-        let both = |i: &usize| a[*i] && b[*i];
-        if let Some(first) = (0..row).find(both) {
-            let last = (0..row).rfind(both).unwrap_or(first);
-            let mut point = overlap.grid.point(r * row);
-            for end in [first, last] {
-                point[D - 1] = end;
-                for axis in 0..D {
-                    low[axis] = low[axis].min(point[axis]);
-                    high[axis] = high[axis].max(point[axis] + 1);
-                }
-            }
-        }
-    }
-    if low[0] == usize::MAX {
-        return Ok(None);
-    }
-    let whole: [bool; D] =
-        std::array::from_fn(|axis| wrap[axis] && low[axis] == 0 && high[axis] == shape[axis]);
-    let grid = Grid::new(std::array::from_fn(|axis| high[axis] - low[axis]), whole)?;
-    Ok(Some(Window { grid, from: low }))
 }
 
 #[cfg(test)]

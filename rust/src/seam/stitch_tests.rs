@@ -1,3 +1,4 @@
+use super::super::cost::Cost;
 use super::*;
 use proptest::prelude::*;
 
@@ -84,7 +85,7 @@ proptest! {
         };
         let cut = cut(&overlap, &Monitor::default()).unwrap();
         let allowed = |labels: &[bool]| (0..9).all(|p| match (mask_a[p], mask_b[p]) {
-            (true, true) => match tie(&overlap, p) {
+            (true, true) => match overlap.tie(p) {
                 Side::Free => true,
                 Side::Outside => !labels[p],
                 Side::Inside => labels[p],
