@@ -99,7 +99,7 @@ def clean(
     for number, region in regions.items():
         mine = np.flatnonzero(owner == number)
         centre = _centre(region.coords, mask.shape, wrap)
-        if not certain and _is_strip(region.bbox, region.area, shape.shape):
+        if not certain and not any(wrap) and _is_strip(region.bbox, region.area, shape.shape):
             continue
         whole = solid[number] >= ROUND and area[number] <= ONE * usual
         if len(mine) > 1 and not whole:
@@ -122,8 +122,8 @@ def clean(
 
 def _is_strip(bounds: tuple[int, ...], area: float, box: tuple[int, ...]) -> bool:
     """Tell whether a component is much longer than a texel and much thinner: a rim along the border, mostly."""
-    sides = [bounds[axis + 2] - bounds[axis] for axis in range(2)]
-    return any(side > LONG * box[axis] and area / side < THIN * box[1 - axis] for axis, side in enumerate(sides))
+    side = max(bounds[axis + 2] - bounds[axis] for axis in range(2))
+    return side > LONG * max(box) and area / side < THIN * min(box)
 
 
 def add_missing(found: Cleaned, map: Floats, wrap: Wrap, *, joints: bool) -> Cleaned:
