@@ -54,7 +54,7 @@ PRESERVE = Settings()
 FAST = replace(PRESERVE, passes=(4, 2, 2), reaches=(2, 2, 1), rounds=4, candidates=256, settled=0.0, stitch=False)
 """Fixed counts: what a point becomes hangs on what is near it alone."""
 
-ON_DEMAND = replace(FAST, passes=(4, 2, 2), reaches=(1, 1, 1), rounds=2, candidates=192, repetition=0.0)
+ON_DEMAND = replace(FAST, passes=(2, 1, 2), reaches=(1, 1, 1), rounds=2, candidates=192, repetition=0.0)
 """What a point can see of its surroundings is paid for at the border of every window: it sees little."""
 
 OPTIMISE = replace(

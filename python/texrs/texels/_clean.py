@@ -18,6 +18,8 @@ SOLID, ROUND = 0.8, 0.9
 """Share of its convex hull that a texel fills at least, and from which on several detections are of one texel."""
 SWOLLEN, ONE = 2.5, 3.5
 """How many times the usual area a component has at most for each detection in it, and for several to be of one texel."""
+LONG, THIN = 2.2, 0.6
+"""Length and mean thickness of a component, over the sides of the box, beyond which it is no texel."""
 HEAP = 0.3
 """Largest share of the detections that may lie in one component."""
 JOINED, MESHED = 0.5, 0.25
@@ -97,6 +99,8 @@ def clean(
     for number, region in regions.items():
         mine = np.flatnonzero(owner == number)
         centre = _centre(region.coords, mask.shape, wrap)
+        if not certain and not any(wrap) and _is_strip(region.bbox, region.area, shape.shape):
+            continue
         whole = solid[number] >= ROUND and area[number] <= ONE * usual
         if len(mine) > 1 and not whole:
             kept.extend((*points[i], scores[i], int(i)) for i in mine)
@@ -111,9 +115,15 @@ def clean(
     kept.sort(key=lambda p: (-p[2], p[0], p[1]))
     table = np.array(kept, np.float64).reshape(-1, 4)
     names = {int(pieces[tuple(np.clip(np.rint(p[:2]).astype(int), 0, np.array(mask.shape) - 1))]) for p in table}
-    used = np.isin(pieces, sorted((set(np.unique(owner)) | names) - {0}))
+    used = np.isin(pieces, sorted(names - {0}))
     left: Bools = mask & used
     return Cleaned(table[:, :2].copy(), table[:, 2].copy(), table[:, 3].astype(np.intp), left, "cut")
+
+
+def _is_strip(bounds: tuple[int, ...], area: float, box: tuple[int, ...]) -> bool:
+    """Tell whether a component is much longer than a texel and much thinner: a rim along the border, mostly."""
+    side = max(bounds[axis + 2] - bounds[axis] for axis in range(2))
+    return side > LONG * max(box) and area / side < THIN * min(box)
 
 
 def add_missing(found: Cleaned, map: Floats, wrap: Wrap, *, joints: bool) -> Cleaned:
