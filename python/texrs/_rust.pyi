@@ -1,12 +1,14 @@
 from collections.abc import Callable, Sequence
 from typing import Any, Final, final
 
-from numpy import bool_, float32, int16, int32, int64, uint8, uint16, uint32
+from numpy import bool_, float32, float64, int16, int32, int64, uint8, uint16, uint32
 from numpy.typing import NDArray
 
 __all__ = [
     "VERSION",
     "Appearance",
+    "Cholesky",
+    "Correlation",
     "PatchIndex",
     "cohere",
     "complete",
@@ -26,6 +28,8 @@ __all__ = [
     "similar",
     "uniform",
     "upsample",
+    "warp_mesh",
+    "warp_points",
 ]
 
 VERSION: Final[str]
@@ -40,6 +44,11 @@ def gather(
     coordinates: NDArray[float32],
     interpolation: str,
 ) -> NDArray[Any]: ...
+
+@final
+class Correlation:
+    def __new__(cls, image: NDArray[float32]) -> Correlation: ...
+    def maps(self, template: NDArray[float32]) -> NDArray[float32]: ...
 
 @final
 class PatchIndex:
@@ -222,6 +231,7 @@ def cohere(
     place: tuple[Sequence[int], Sequence[int], Sequence[bool]],
     frames: NDArray[int16],
     held: NDArray[bool_],
+    kinds: tuple[NDArray[uint8], NDArray[uint8]],
     passes: int,
     numbers: int,
     compensated: bool,
@@ -234,3 +244,29 @@ def jitter(
     seed: int,
     level: int,
 ) -> NDArray[int32]: ...
+
+@final
+class Cholesky:
+    def __new__(
+        cls, starts: NDArray[uint32], rows: NDArray[uint32], values: NDArray[float64], limit: int
+    ) -> Cholesky: ...
+    @staticmethod
+    def several(
+        matrices: Sequence[tuple[NDArray[uint32], NDArray[uint32], NDArray[float64]]], limit: int
+    ) -> list[Cholesky]: ...
+    @property
+    def size(self) -> int: ...
+    @property
+    def entries(self) -> int: ...
+    def solve(self, sides: NDArray[float64]) -> NDArray[float64]: ...
+
+def warp_mesh(
+    source: tuple[int, int],
+    target: NDArray[float64],
+    weight: NDArray[uint8],
+    shape: tuple[int, int],
+    progress: Callable[[float], object] | None,
+) -> tuple[NDArray[float32], NDArray[uint32], tuple[int, int, int]]: ...
+def warp_points(
+    source: NDArray[float64], target: NDArray[float64], shape: tuple[int, int]
+) -> tuple[tuple[NDArray[float32], NDArray[uint32], tuple[int, int, int]], NDArray[uint32]]: ...

@@ -2,7 +2,7 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput};
 use texrs::appearance::Appearance;
-use texrs::coherence::{FEW, Options, correct, jitter, similar};
+use texrs::coherence::{FEW, Kinds, Options, correct, jitter, similar};
 use texrs::fixed::{Frames, ONE, Place, identity};
 use texrs::grid::{Grid, Region};
 use texrs::hash::Noise;
@@ -55,6 +55,7 @@ fn sides<const D: usize>(c: &mut Criterion, side: usize) {
                         &region,
                         frames,
                         &[],
+                        Kinds::default(),
                         &mut places,
                         &options,
                         &monitor,

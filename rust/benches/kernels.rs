@@ -3,9 +3,12 @@
 mod coherence;
 mod complete;
 mod mean_shift;
+mod ncc;
 mod patch_search;
 mod poisson;
 mod seam;
+mod sparse;
+mod warp;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use texrs::gather::{Exemplar, Interpolation, gather};
@@ -59,8 +62,11 @@ criterion_group!(
     coherence::bench,
     complete::bench,
     mean_shift::bench,
+    ncc::bench,
     patch_search::bench,
     poisson::bench,
-    seam::bench
+    seam::bench,
+    sparse::bench,
+    warp::bench
 );
 criterion_main!(benches);

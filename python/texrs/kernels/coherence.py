@@ -108,6 +108,7 @@ def correct(
     passes: int = 2,
     compensated: bool = True,
     held: NDArray[np.bool_] | None = None,
+    kinds: tuple[NDArray[np.uint8], NDArray[np.uint8]] | None = None,
     progress: Report | None = None,
 ) -> NDArray[np.int32]:
     """Correct places by k-coherence: each point takes what makes its diagonal neighbours look right.
@@ -135,6 +136,9 @@ def correct(
         only where the lattice makes it end.
     held : (points) bool, optional
         Points that keep their places.
+    kinds : (samples) uint8 and (points) uint8, optional
+        The kind of each sample, and the kind that each point takes; 255 takes any. A point that is offered none keeps
+        its place.
     progress : callable, optional
         Called with the share that is done; raising stops the work.
 
@@ -175,6 +179,7 @@ def correct(
         region.place,
         frames,
         np.zeros(0, np.bool_) if held is None else np.ascontiguousarray(held.reshape(-1)),
+        _kinds(kinds),
         as_int(passes, "passes", 0, 1000),
         _numbers(similarity.numbers),
         compensated,
@@ -225,6 +230,15 @@ def _numbers(numbers: int) -> int:
     if numbers not in (8, 24):
         raise InvalidInput(f"numbers: 8 or 24 are allowed, got {numbers!r}")
     return int(numbers)
+
+
+def _kinds(
+    kinds: tuple[NDArray[np.uint8], NDArray[np.uint8]] | None,
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    if kinds is None:
+        return np.zeros(0, np.uint8), np.zeros(0, np.uint8)
+    samples, points = (np.ascontiguousarray(k, np.uint8).reshape(-1) for k in kinds)
+    return samples, points
 
 
 def _check(places: NDArray[np.int32], region: Region) -> None:

@@ -15,7 +15,7 @@ mod pass;
 mod similar;
 mod tree;
 
-pub use pass::{Options, correct};
+pub use pass::{Kinds, Options, correct};
 pub use similar::{Similarity, similar};
 
 use crate::Result;

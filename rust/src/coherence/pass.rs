@@ -21,7 +21,22 @@ pub struct Options {
     pub compensated: bool,
 }
 
-/// Corrects `places`, one a point of `region`; points that are `held` keep theirs.
+/// What may lie where: points take candidates of the kind they want. Empty: anything anywhere.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Kinds<'a> {
+    /// Kind of each of the exemplar's samples.
+    pub samples: &'a [u8],
+    /// Kind that each point wants; [`Kinds::ANY`] takes any.
+    pub points: &'a [u8],
+}
+
+impl Kinds<'_> {
+    /// What a point wants that does not care.
+    pub const ANY: u8 = 255;
+}
+
+/// Corrects `places`, one a point of `region`; points that are `held` keep theirs, and so do those that are offered
+/// nothing of the kind they want.
 ///
 /// A pass goes over 2^D classes of points, those of the same parity along each axis, in fixed order. Points of a class
 /// are corrected all at once, from the places as the class found them.
@@ -32,6 +47,7 @@ pub fn correct<const D: usize>(
     region: &Region<D>,
     frames: Frames<'_, D>,
     held: &[bool],
+    kinds: Kinds<'_>,
     places: &mut Vec<Place<D>>,
     options: &Options,
     monitor: &Monitor,
@@ -42,6 +58,16 @@ pub fn correct<const D: usize>(
         ("places", places.len(), points),
         ("held", held.len(), if held.is_empty() { 0 } else { points }),
         ("similarity", similarity.sets.len(), samples * similarity.k),
+        (
+            "kinds",
+            kinds.samples.len(),
+            if kinds.points.is_empty() { 0 } else { samples },
+        ),
+        (
+            "wanted",
+            kinds.points.len(),
+            if kinds.samples.is_empty() { 0 } else { points },
+        ),
     ] {
         if length != wanted {
             return Err(Error::Shape {
@@ -72,9 +98,9 @@ pub fn correct<const D: usize>(
         }
     });
     match options.numbers {
-        FEW => Level::<D, FEW>::new(appearance, similarity, region, frames, held, options)
+        FEW => Level::<D, FEW>::new(appearance, similarity, region, frames, held, kinds, options)
             .run(places, monitor),
-        KEEP => Level::<D, KEEP>::new(appearance, similarity, region, frames, held, options)
+        KEEP => Level::<D, KEEP>::new(appearance, similarity, region, frames, held, kinds, options)
             .run(places, monitor),
         other => Err(Error::value(
             "numbers",
@@ -98,6 +124,7 @@ struct Level<'a, const D: usize, const N: usize> {
     region: &'a Region<D>,
     frames: Frames<'a, D>,
     held: &'a [bool],
+    kinds: Kinds<'a>,
     options: &'a Options,
     table: Table<D, N>,
     /// The diagonals, and how far they lead in the table.
@@ -112,6 +139,7 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
         region: &'a Region<D>,
         frames: Frames<'a, D>,
         held: &'a [bool],
+        kinds: Kinds<'a>,
         options: &'a Options,
     ) -> Self {
         let table = Table::new(appearance);
@@ -125,6 +153,7 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
             region,
             frames,
             held,
+            kinds,
             options,
             table,
             diagonals,
@@ -215,6 +244,10 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
             count += 1;
         }
         let seen = &seen[..count];
+        let wanted = match self.kinds.points.get(p) {
+            Some(&Kinds::ANY) | None => None,
+            Some(&kind) => Some(kind),
+        };
         let mut tried = [i32::MIN; CORNERS * LARGEST];
         let mut attempts = 0;
         let (mut best, mut least) = (places[p], i64::MAX);
@@ -226,7 +259,10 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
             for &similar in &self.similarity.sets[at * self.similarity.k..][..self.similarity.k] {
                 let candidate = add(self.sample(similar).map(|x| x * ONE), rest);
                 let there = nearest(candidate);
-                if self.appearance.inside(there).is_none() {
+                let Some(number) = self.appearance.inside(there) else {
+                    continue;
+                };
+                if wanted.is_some_and(|kind| self.kinds.samples[number] != kind) {
                     continue;
                 }
                 let centre = self.table.at(self.settle(there));

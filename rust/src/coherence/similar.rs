@@ -1,7 +1,7 @@
 //! Similarity sets: the samples of an exemplar that look most like each one, far from it and from each other.
 
-use super::tree::{Nearest, Tree};
-use super::{CHUNK, FEW, LARGEST, Table};
+use super::tree::{Place, Tree};
+use super::{FEW, LARGEST, first};
 use crate::appearance::{Appearance, KEEP};
 use crate::par::{self, Monitor};
 use crate::{Error, Result};
@@ -18,8 +18,7 @@ pub struct Similarity {
 /// The similarity set of each sample: C_1 is the sample, and each further C_j the nearest in the first `numbers` of the
 /// appearance vectors ([`FEW`] or all) of those more than (n - 1) / 2 away, along some axis, from every earlier one.
 ///
-/// The whole exemplar is searched; of equally near samples the first one is taken. A neighbour's answer, moved along,
-/// is often a sample's own, so it bounds the search.
+/// The whole exemplar is searched; of equally near samples the first one is taken.
 pub fn similar<const D: usize>(
     appearance: &Appearance<D>,
     k: usize,
@@ -59,70 +58,58 @@ fn search<const D: usize, const N: usize>(
     monitor: &Monitor,
 ) -> Result<Vec<u32>> {
     let grid = appearance.grid();
-    let table = Table::<D, N>::new(appearance);
-    let vector = |sample| &table.vectors[table.at(sample) as usize];
     let samples = (0..grid.len()).filter_map(|number| {
         let sample = grid.point(number).map(|x| x as i32);
         appearance.inside(sample)?;
-        Some((*vector(sample), number as u32, sample))
+        Some(Place {
+            vector: first(appearance.feature(number)),
+            number: number as u32,
+            sample,
+        })
     });
-    let tree = Tree::new(samples.collect());
+    let tree = Tree::<D, N>::new(samples.collect());
     let far = |a: [i32; D], b: [i32; D]| far(appearance, a, b, (n / 2) as i32);
 
-    let mut sets = vec![0; grid.len() * k];
-    monitor.expect(grid.len().div_ceil(CHUNK) as u64);
-    let failed = std::sync::atomic::AtomicBool::new(false);
-    par::chunks_mut(&mut sets, CHUNK * k, |chunk, sets| {
-        if monitor.check().is_err() {
-            return;
-        }
+    monitor.expect(tree.leaves() as u64);
+    // Leaf by leaf: what was looked at for one vector is at hand for the next.
+    let found = par::map(tree.leaves(), |leaf| {
+        monitor.check()?;
+        let mut sets = Vec::with_capacity(tree.places(leaf).len() * k);
         let mut chosen: Vec<[i32; D]> = Vec::with_capacity(k);
-        let mut before: Vec<[i32; D]> = Vec::with_capacity(k);
-        for (i, set) in sets.chunks_exact_mut(k).enumerate() {
-            let number = chunk * CHUNK + i;
-            set.fill(number as u32);
-            let sample = grid.point(number).map(|x| x as i32);
-            if appearance.inside(sample).is_none() {
-                before.clear();
-                continue;
-            }
+        for place in tree.places(leaf).iter().flatten() {
+            sets.push(place.number);
             chosen.clear();
-            chosen.push(sample);
-            for j in 1..k {
+            chosen.push(place.sample);
+            for _ in 1..k {
                 let allowed = |other| chosen.iter().all(|&one| far(one, other));
-                let mut best: Nearest = (i32::MAX, u32::MAX);
-                if let Some(mut moved) = before.get(j).copied() {
-                    moved[D - 1] += 1;
-                    if let Some(at) = appearance.inside(moved) {
-                        let moved = grid.point(at).map(|x| x as i32);
-                        if allowed(moved) {
-                            best = (super::apart(vector(sample), vector(moved)), at as u32);
-                        }
-                    }
+                let (_, number) = tree.nearest(&place.vector, leaf, allowed);
+                if number == u32::MAX {
+                    return Ok(None);
                 }
-                best = tree.nearest(vector(sample), allowed, best);
-                if best.1 == u32::MAX {
-                    failed.store(true, std::sync::atomic::Ordering::Relaxed);
-                    return;
-                }
-                set[j] = best.1;
-                chosen.push(grid.point(best.1 as usize).map(|x| x as i32));
+                sets.push(number);
+                chosen.push(grid.point(number as usize).map(|x| x as i32));
             }
-            std::mem::swap(&mut chosen, &mut before);
         }
-        // Whether to stop is asked at the beginning of each chunk.
-        let _ = monitor.advance(1);
+        monitor.advance(1)?;
+        Ok(Some(sets))
     });
-    monitor.check()?;
-    if failed.into_inner() {
-        return Err(Error::value(
-            "n",
-            format!(
-                "an exemplar of {:?} has no {k} samples {n} apart for windows of radius {}: fewer, nearer ones, or a larger exemplar are needed",
-                grid.shape(),
-                appearance.radius()
-            ),
-        ));
+    let mut sets: Vec<u32> = (0..grid.len() as u32)
+        .flat_map(|number| std::iter::repeat_n(number, k))
+        .collect();
+    for leaf in found {
+        let Some(leaf) = leaf? else {
+            return Err(Error::value(
+                "n",
+                format!(
+                    "an exemplar of {:?} has no {k} samples {n} apart for windows of radius {}: fewer, nearer ones, or a larger exemplar are needed",
+                    grid.shape(),
+                    appearance.radius()
+                ),
+            ));
+        };
+        for set in leaf.chunks_exact(k) {
+            sets[set[0] as usize * k..][..k].copy_from_slice(set);
+        }
     }
     Ok(sets)
 }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::fixed::{Frames, ONE, identity};
+use crate::fixed::{Frames, ONE, identity, nearest};
 use crate::grid::Grid;
 use crate::par::Monitor;
 
@@ -119,6 +119,7 @@ fn a_copy_stays_and_threads_change_nothing() {
                     &region,
                     frames,
                     &[],
+                    Kinds::default(),
                     &mut places,
                     &OPTIONS,
                     &Monitor::default(),
@@ -163,6 +164,7 @@ fn held_points_and_bad_sets() {
         &region,
         frames,
         &held,
+        Kinds::default(),
         &mut places,
         &options,
         &monitor,
@@ -175,14 +177,92 @@ fn held_points_and_bad_sets() {
     let mut again = start.clone();
     let frames = Frames::Dense(&dense);
     correct(
-        &exemplar, &sets, &region, frames, &held, &mut again, &options, &monitor,
+        &exemplar,
+        &sets,
+        &region,
+        frames,
+        &held,
+        Kinds::default(),
+        &mut again,
+        &options,
+        &monitor,
     )
     .unwrap();
     assert_eq!(places, again);
     sets.sets[7] = 24 * 24;
     assert!(
         correct(
-            &exemplar, &sets, &region, frames, &held, &mut again, &options, &monitor
+            &exemplar,
+            &sets,
+            &region,
+            frames,
+            &held,
+            Kinds::default(),
+            &mut again,
+            &options,
+            &monitor
+        )
+        .is_err()
+    );
+}
+
+#[test]
+fn points_take_only_the_kind_they_want() {
+    let exemplar = exemplar::<2>(24, true);
+    let region = region::<2>(20, false);
+    let sets = similar(&exemplar, 3, 7, FEW, &Monitor::default()).unwrap();
+    let kind = |sample: [i32; 2]| u8::from(sample[1].rem_euclid(24) < 12);
+    let samples: Vec<u8> = (0..576).map(|i| kind([i / 24, i % 24])).collect();
+    // Each half of the output starts from the half of the exemplar that it wants.
+    let points: Vec<u8> = (0..400).map(|p| u8::from(p % 20 < 10)).collect();
+    let mut places: Vec<Place<2>> = (0..400)
+        .map(|p| {
+            [
+                p / 20 * ONE,
+                (p % 20 + if p % 20 < 10 { 1 } else { 3 }) * ONE,
+            ]
+        })
+        .collect();
+    let kinds = Kinds {
+        samples: &samples,
+        points: &points,
+    };
+    let frames = Frames::Constant(identity());
+    let monitor = Monitor::default();
+    let options = Options {
+        passes: 4,
+        ..OPTIONS
+    };
+    correct(
+        &exemplar,
+        &sets,
+        &region,
+        frames,
+        &[],
+        kinds,
+        &mut places,
+        &options,
+        &monitor,
+    )
+    .unwrap();
+    for (place, &wanted) in places.iter().zip(&points) {
+        assert_eq!(kind(nearest(*place)), wanted);
+    }
+    let short = Kinds {
+        samples: &samples[1..],
+        points: &points,
+    };
+    assert!(
+        correct(
+            &exemplar,
+            &sets,
+            &region,
+            frames,
+            &[],
+            short,
+            &mut places,
+            &options,
+            &monitor
         )
         .is_err()
     );

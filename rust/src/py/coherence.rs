@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use super::run;
 use super::solid::{Analysis, Appearance, PlacesOut, Where, either, frames, region};
 use crate::Result;
-use crate::coherence::{self, Options, Similarity};
+use crate::coherence::{self, Kinds, Options, Similarity};
 use crate::fixed::Place;
 
 /// Similarity sets: `k` samples for each of the exemplar's.
@@ -39,6 +39,7 @@ pub(super) fn cohere<'py>(
     place: Where,
     frames: PyReadonlyArray3<'py, i16>,
     held: PyReadonlyArray1<'py, bool>,
+    kinds: (PyReadonlyArray1<'py, u8>, PyReadonlyArray1<'py, u8>),
     passes: usize,
     numbers: usize,
     compensated: bool,
@@ -54,6 +55,10 @@ pub(super) fn cohere<'py>(
         compensated,
     };
     let (values, held, places) = (frames.as_slice()?, held.as_slice()?, places.as_slice()?);
+    let kinds = Kinds {
+        samples: kinds.0.as_slice()?,
+        points: kinds.1.as_slice()?,
+    };
     let places = run(py, progress, |monitor| {
         either!(&appearance.0, a, {
             let region = region::<D>(&place)?;
@@ -65,6 +70,7 @@ pub(super) fn cohere<'py>(
                 &region,
                 frames,
                 held,
+                kinds,
                 &mut places,
                 &options,
                 monitor,

@@ -7,10 +7,13 @@ mod gather;
 mod hash;
 mod image_io;
 mod mean_shift;
+mod ncc;
 mod patch_search;
 mod poisson;
 mod seam;
 mod solid;
+mod sparse;
+mod warp;
 
 use std::cell::Cell;
 use std::time::Duration;
@@ -92,6 +95,8 @@ mod _rust {
     #[pymodule_export]
     use super::mean_shift::mean_shift;
     #[pymodule_export]
+    use super::ncc::Correlation;
+    #[pymodule_export]
     use super::patch_search::PatchIndex;
     #[pymodule_export]
     use super::poisson::{poisson, poisson_spread};
@@ -101,6 +106,10 @@ mod _rust {
     use super::set_threads;
     #[pymodule_export]
     use super::solid::{Appearance, upsample};
+    #[pymodule_export]
+    use super::sparse::Cholesky;
+    #[pymodule_export]
+    use super::warp::{warp_mesh, warp_points};
 
     #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");

@@ -1,0 +1,219 @@
+"""The folder of a database: its manifest, changed by one process at a time, and entries that say all of it again."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import time
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from texrs import io
+from texrs.errors import FileError, TexrsError
+from texrs.texels import FORMAT, Texels, digest, load
+
+__all__ = ["NAME", "Folder", "Record", "given_again"]
+
+MANIFEST, LOCK = "manifest.json", ".lock"
+LAYOUT = 1
+"""Of the manifest."""
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
+PATIENCE, PAUSE = 60.0, 0.05
+"""Seconds that another process may keep the manifest, and between two looks."""
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """What the manifest says of a texture."""
+
+    name: str
+    file: str
+    """Of the entry, in the folder."""
+    source: str
+    """Of the image: in the folder, or elsewhere."""
+    hash: str
+    version: int
+    tag: str
+    box: tuple[int, ...]
+    texels: int
+    options: Mapping[str, Any] = field(repr=False)
+    """With which it was analysed."""
+
+
+class Folder:
+    """The manifest of a folder, and how entries get into it."""
+
+    def __init__(self, path: FilePath, say: Callable[[str], object] | None) -> None:
+        self.path, self._say = path, say
+        try:
+            self.path.mkdir(exist_ok=True)
+        except (OSError, ValueError) as error:
+            raise FileError(f"{self.path}: no folder can be made there ({error})") from None
+
+    def keep(self, name: str, entry: Texels, source: str, options: Mapping[str, Any]) -> Texels:
+        """Write an entry and what the manifest says of it."""
+        plain = {k: _plain(v) for k, v in options.items()}
+        # With all that the manifest needs, should that be lost.
+        entry = replace(entry, report={**entry.report, "database": {"source": source, "options": plain}})
+        file = f"{name}.npz"
+        record = _of(name, file, entry)
+        with self._locked():
+            entry.save(self.path / file)
+            found = self._parse()
+            found = self._found() if found is None else found
+            found[name] = record
+            self._write(found)
+        return entry
+
+    def read(self) -> dict[str, Record]:
+        """Read the manifest; remake it from the entries where it is damaged."""
+        found = self._parse()
+        if found is None:
+            with self._locked():
+                found = self._parse()
+                if found is None:
+                    found = self._found()
+                    self.tell(f"{self.path / MANIFEST}: damaged; made anew from {len(found)} entries")
+                    self._write(found)
+        return found
+
+    def _parse(self) -> dict[str, Record] | None:
+        try:
+            text = (self.path / MANIFEST).read_text(encoding="utf-8")
+        except FileNotFoundError:
+            # With entries it was lost; without, nobody has written it yet.
+            return None if any(self.path.glob("*.npz")) else {}
+        except (OSError, UnicodeDecodeError):
+            return None
+        try:
+            table = json.loads(text)
+            if int(table["layout"]) > LAYOUT:
+                raise FileError(
+                    f"{self.path / MANIFEST}: has layout {table['layout']}, this texrs reads up to {LAYOUT}"
+                )
+            return {name: _record(name, item) for name, item in table["textures"].items()}
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+            return None
+
+    def _found(self) -> dict[str, Record]:
+        found = {}
+        for file in sorted(self.path.glob("*.npz")):
+            with suppress(TexrsError):
+                if NAME.fullmatch(file.stem):
+                    found[file.stem] = _of(file.stem, file.name, load(file))
+        return found
+
+    def _write(self, found: Mapping[str, Record]) -> None:
+        table = {
+            "layout": LAYOUT,
+            "textures": {
+                name: {
+                    "file": r.file,
+                    "source": r.source,
+                    "hash": r.hash,
+                    "version": r.version,
+                    "tag": r.tag,
+                    "box": list(r.box),
+                    "texels": r.texels,
+                    "options": dict(r.options),
+                }
+                for name, r in sorted(found.items())
+            },
+        }
+        with io.atomic(self.path / MANIFEST) as temporary:
+            temporary.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
+
+    @contextmanager
+    def _locked(self) -> Iterator[None]:
+        """Keep other processes, and threads, from changing the manifest."""
+        try:
+            number = os.open(self.path / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
+        except OSError as error:
+            raise FileError(f"{self.path}: cannot be written to ({error.strerror})") from None
+        try:
+            end = time.monotonic() + PATIENCE
+            while not _lock(number):
+                if time.monotonic() > end:
+                    raise FileError(f"{self.path}: another process has kept it locked for {PATIENCE:g} s")
+                time.sleep(PAUSE)
+            yield
+        finally:
+            os.close(number)
+
+    def tell(self, sentence: str) -> None:
+        """Say what had to be remade."""
+        if self._say is not None:
+            self._say(sentence)
+        else:
+            warnings.warn(sentence, stacklevel=5)
+
+
+def _lock(number: int) -> bool:
+    """Lock a file until it is closed, which the system does for a process that dies."""
+    try:
+        try:
+            import fcntl
+        except ImportError:  # Windows
+            import msvcrt
+
+            locking: Any = msvcrt
+            locking.locking(number, locking.LK_NBLCK, 1)
+        else:
+            fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
+def _of(name: str, file: str, entry: Texels) -> Record:
+    kept = entry.report.get("database", {})
+    box = tuple(int(n) for n in entry.report.get("box", (0, 0, *entry.box)))
+    source, options = str(kept.get("source", "")), dict(kept.get("options", {}))
+    return Record(name, file, source, digest(entry.image), FORMAT, entry.tag, box, len(entry.points), options)
+
+
+def _record(name: str, item: Mapping[str, Any]) -> Record:
+    if not NAME.fullmatch(name) or FilePath(item["file"]).name != item["file"]:
+        raise ValueError(name)
+    return Record(
+        name,
+        str(item["file"]),
+        str(item["source"]),
+        str(item["hash"]),
+        int(item["version"]),
+        str(item["tag"]),
+        tuple(int(n) for n in item["box"]),
+        int(item["texels"]),
+        dict(item["options"]),
+    )
+
+
+def _plain(value: Any) -> Any:
+    """Write an option as text and numbers; a mask by its runs."""
+    if isinstance(value, np.ndarray) and value.dtype.kind in "b" and value.ndim == 2:
+        changes = np.flatnonzero(np.diff(value.ravel().astype(np.int8), prepend=0))
+        return {"shape": list(value.shape), "changes": changes.tolist()}
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, Sequence) and not isinstance(value, str | bytes):
+        return [_plain(v) for v in value]
+    return value
+
+
+def given_again(value: Any) -> Any:
+    """Give an option as it was before it was written."""
+    if isinstance(value, dict):
+        rows, columns = (int(n) for n in value["shape"])
+        steps = np.zeros(rows * columns, np.int8)
+        steps[value["changes"]] = 1
+        return (np.cumsum(steps) % 2).astype(bool).reshape(rows, columns)
+    return value

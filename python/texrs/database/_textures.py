@@ -1,0 +1,301 @@
+"""A folder of analysed textures, and what can be spliced from it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs import io
+from texrs._arrays import as_image, as_int, guidance
+from texrs._typing import Array, Path, Progress
+from texrs.database._folder import NAME, Folder, Record, given_again
+from texrs.errors import FileError, InvalidInput, TexrsError
+from texrs.texels import FORMAT, Texels, analyse, digest, load
+
+__all__ = ["Matrix", "TextureDatabase"]
+
+GAP = 4
+"""Pixels between the pictures of a sheet."""
+OPTIONS = {"box", "mask", "background", "tag", "points", "rotations", "scales", "threshold", "channel", "model"} | {
+    "method",
+    "wrap",
+    "seed",
+}
+"""What `texrs.texels.analyse` takes, and an entry is remade with."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Matrix:
+    """Splices of several textures with each other."""
+
+    rows: tuple[str, ...]
+    """Those that give their texels."""
+    columns: tuple[str, ...]
+    """Those that give their arrangement."""
+    results: Mapping[tuple[str, str], Any]
+    sheet: NDArray[np.uint8]
+    """All of them in a picture, the textures themselves along its left and its upper edge."""
+    failed: Mapping[tuple[str, str], str]
+    """Why some could not be made; their places on the sheet are grey."""
+
+
+class TextureDatabase:
+    """A folder with a manifest and one file a texture.
+
+    An entry is remade when its image has changed, when it is of another version, and when it is damaged, which is said.
+    Several processes may use a folder at once: files take their names when they are whole, and the manifest is
+    changed by one process at a time.
+
+    Parameters
+    ----------
+    path : path_like
+        The folder; made if it is not there, in a folder that is.
+    say : callable, optional
+        Called with a sentence when something had to be remade; by default a warning is given.
+
+    Raises
+    ------
+    FileError
+        It is no folder and cannot be made, or is of a later version.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from texrs import TextureDatabase, samples
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     textures = TextureDatabase(folder)
+    ...     dots = samples.load("dots", size=(96, 96))
+    ...     _ = textures.add(dots.image, "dots", mask=dots.mask, tag="F=d")
+    ...     [(record.name, record.tag) for record in textures.list()]
+    [('dots', 'F=d')]
+
+    """
+
+    def __init__(self, path: Path, *, say: Callable[[str], object] | None = None) -> None:
+        if not isinstance(path, str | os.PathLike) or not isinstance(os.fspath(path), str):
+            raise InvalidInput(f"path: needs a str or a pathlib.Path, got {type(path).__name__}")
+        self.path = FilePath(path)
+        self._folder = Folder(self.path, say)
+        self._folder.read()
+
+    def __repr__(self) -> str:
+        return f"TextureDatabase({str(self.path)!r}, {len(self)} textures)"
+
+    def __len__(self) -> int:
+        return len(self._folder.read())
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(sorted(self._folder.read()))
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._folder.read()
+
+    def __getitem__(self, name: str) -> Texels:
+        """Give an entry, remade if it has to be."""
+        return self.analyse(name)
+
+    def list(self) -> list[Record]:
+        """Give what the manifest says of all textures, by name."""
+        found = self._folder.read()
+        return [found[name] for name in sorted(found)]
+
+    def add(
+        self,
+        image: object,
+        name: str | None = None,
+        *,
+        replace: bool = False,
+        similarity: bool = False,
+        progress: Progress | None = None,
+        **options: Any,
+    ) -> Texels:
+        """Analyse a texture and keep it.
+
+        Parameters
+        ----------
+        image : path_like or array
+            A file, which stays where it is, or pixels, of which a copy is kept.
+        name : str, optional
+            Letters, digits, ``.``, ``_`` and ``-``; by default that of the file.
+        replace : bool
+            Whether another texture of that name may be replaced.
+        similarity : bool
+            Whether the similarity sets are made now and kept too: refinements then need not make them.
+        progress : callable, optional
+            Called as ``progress(stage, share)``; raising stops the work.
+        **options
+            As of `texrs.texels.analyse`.
+
+        Returns
+        -------
+        Texels
+
+        Raises
+        ------
+        InvalidInput
+            A name that is taken or cannot be that of a file, or what `texrs.texels.analyse` refuses.
+        FileError
+            The file cannot be read, or the entry not written.
+
+        """
+        unknown = sorted(set(options) - OPTIONS)
+        if unknown:
+            raise InvalidInput(f"{unknown[0]}: is no option; allowed are {', '.join(sorted(OPTIONS))}")
+        file = os.path.abspath(os.fspath(image)) if isinstance(image, str | os.PathLike) else None
+        if name is None:
+            if file is None:
+                raise InvalidInput("name: is needed for an array")
+            name = FilePath(file).stem
+        if not isinstance(name, str) or not NAME.fullmatch(name):
+            raise InvalidInput(f"name: letters, digits, '.', '_' and '-' are allowed, up to 100; got {name!r}")
+        pixels = as_image(image) if file is None else io.read(file)
+        before = self._folder.read().get(name)
+        if before is not None and before.hash != digest(pixels) and not replace:
+            raise InvalidInput(f"name: {name} is there already, of another image; replace=True replaces it")
+        entry = analyse(pixels, progress=progress, **options)
+        if similarity:
+            entry = entry.prepared()
+        source = f"{name}.npy" if file is None else file
+        if file is None:
+            io.write(self.path / source, pixels)
+        return self._folder.keep(name, entry, source, {**options, "similarity": similarity} if similarity else options)
+
+    def analyse(self, name: str, *, progress: Progress | None = None) -> Texels:
+        """Give an entry, made anew if its image or the version is another one, or if it is damaged.
+
+        Raises
+        ------
+        InvalidInput
+            There is no such texture.
+        FileError
+            The entry cannot be made anew either, because its image is gone.
+
+        """
+        record = self._record(name)
+        entry: Texels | None = None
+        reason = ""
+        if record.version != FORMAT:
+            reason = f"is of version {record.version}, this is {FORMAT}"
+        else:
+            try:
+                entry = load(self.path / record.file)
+            except TexrsError as error:
+                reason = str(error).removeprefix(f"{self.path / record.file}: ")
+        image = self._image(record)
+        if image is None:
+            if entry is None:
+                raise FileError(f"{self.path / record.file}: {reason}, and its image {record.source} is gone")
+            return entry
+        if entry is not None and digest(image) == digest(entry.image):
+            return entry
+        self._folder.tell(f"{name}: made anew, for the entry {reason or 'is of another image'}")
+        options = {k: given_again(v) for k, v in record.options.items()}
+        similar = bool(options.pop("similarity", False))
+        entry = analyse(image, progress=progress, **options)
+        return self._folder.keep(name, entry.prepared() if similar else entry, record.source, record.options)
+
+    def splice(self, a: str, b: str, size: Sequence[int] | None = None, **options: Any) -> Any:
+        """Splice two textures: the texels of ``a`` in the arrangement of ``b``; see `texrs.splice`."""
+        return _splice(self.analyse(a), self.analyse(b), size, options)
+
+    def matrix(
+        self,
+        rows: Sequence[str] | None = None,
+        columns: Sequence[str] | None = None,
+        *,
+        size: Sequence[int] | None = None,
+        cell: int = 160,
+        progress: Progress | None = None,
+        **options: Any,
+    ) -> Matrix:
+        """Splice textures with each other, as figure 8 of the paper shows it.
+
+        Parameters
+        ----------
+        rows, columns : sequence of str, optional
+            Names of those that give texels, and of those that give arrangements; by default all.
+        size : (rows, columns), optional
+            Of each result.
+        cell : int
+            Side of a picture on the sheet, 16 to 1024.
+        progress : callable, optional
+            Called as ``progress("matrix", share)``; raising stops the work.
+        **options
+            As of `texrs.splice`.
+
+        Returns
+        -------
+        Matrix
+            What could not be spliced is named with the reason, and grey on the sheet.
+
+        """
+        side = as_int(cell, "cell", 16, 1024)
+        down, across = (tuple(self) if names is None else tuple(names) for names in (rows, columns))
+        if not down or not across:
+            raise InvalidInput("rows, columns: no textures to splice")
+        entries = {name: self.analyse(name) for name in dict.fromkeys(down + across)}
+        results: dict[tuple[str, str], Any] = {}
+        failed: dict[tuple[str, str], str] = {}
+        for i, a in enumerate(down):
+            for j, b in enumerate(across):
+                if progress is not None:
+                    progress("matrix", (i * len(across) + j) / (len(down) * len(across)))
+                try:
+                    results[a, b] = _splice(entries[a], entries[b], size, options)
+                except InvalidInput as error:
+                    failed[a, b] = str(error)
+        step = side + GAP
+        sheet = np.full(((len(down) + 1) * step, (len(across) + 1) * step, 3), 255, np.uint8)
+
+        def put(row: int, column: int, image: Array | None) -> None:
+            small = np.full((side, side, 3), 128, np.uint8) if image is None else thumbnail(image, side)
+            top, left = row * step, column * step
+            sheet[top : top + small.shape[0], left : left + small.shape[1]] = small
+
+        for j, b in enumerate(across, start=1):
+            put(0, j, entries[b].image)
+        for i, a in enumerate(down, start=1):
+            put(i, 0, entries[a].image)
+            for j, b in enumerate(across, start=1):
+                put(i, j, results[a, b].image if (a, b) in results else None)
+        return Matrix(down, across, results, sheet, failed)
+
+    # --- the folder ----------------------------------------------------------------------------------------------
+
+    def _record(self, name: str) -> Record:
+        found = self._folder.read()
+        if name not in found:
+            there = ", ".join(sorted(found)[:8]) or "none"
+            raise InvalidInput(f"name: there is no texture {name!r} in {self.path}; there are {there}")
+        return found[name]
+
+    def _image(self, record: Record) -> Array | None:
+        try:
+            return as_image(io.read(self.path / record.source))
+        except TexrsError:
+            return None
+
+
+def _splice(a: Texels, b: Texels, size: Sequence[int] | None, options: Mapping[str, Any]) -> Any:
+    import texrs
+
+    verb: Any = vars(texrs)["splice"]
+    return verb(a, b, **options) if size is None else verb(a, b, size, **options)
+
+
+def thumbnail(image: Array, side: int) -> NDArray[np.uint8]:
+    """Give a small picture of an image, for people."""
+    from skimage.transform import resize
+
+    guide = guidance(as_image(image))
+    guide = guide if guide.shape[-1] == 3 else np.repeat(guide[..., :1], 3, axis=-1)
+    share = side / max(guide.shape[:2])
+    size = [max(1, round(n * share)) for n in guide.shape[:2]]
+    small = resize(guide, size, anti_aliasing=share < 1)
+    return np.asarray(np.rint(np.clip(small, 0, 1) * 255), np.uint8)

@@ -1,0 +1,243 @@
+"""Where the texels go in `texrs.papers.splice`: section 4.1.
+
+The layout of B is brought to the spacing of A, turned so that lines of points agree, let go on to cover the output, and
+matched with texels of A.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Bools
+from texrs.errors import InvalidInput
+from texrs.matching import Layout, directions, match, nearest, spacing
+from texrs.papers._splice_edit import Step, edited
+from texrs.papers._splice_source import Extended, Memory, extend, parts_of
+from texrs.texels import Texels
+
+__all__ = ["Match", "apart", "edited_match", "matched", "snapped", "void_of"]
+
+Points = NDArray[np.float64]
+
+BEYOND = 0.6
+"""Targets lie up to so many spacings outside of the output."""
+MARGIN = 1.4
+"""The texture goes on for so many of its spacings beyond the output, or for more."""
+SPARE = 1.2
+"""Texels there should be for each target."""
+TURN = 0.75
+"""A turn must cost so much less than a smaller one: lattices have several that cost nearly the same."""
+ROOM = 1.08
+"""Least distance of texels in their diameters."""
+
+
+_DIRECTIONS: Memory[tuple[float, ...]] = Memory(64)
+_LAYOUTS: Memory[Layout] = Memory(64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Match:
+    """Which texel goes where.
+
+    Attributes
+    ----------
+    targets : (n, 2) float64
+        Where texels are to be, in the output, and around it.
+    source : Extended
+        The texture beyond its borders.
+    of : (n) int
+        Which of the source's points goes to each target.
+    scale, angle, gain : float
+        What B's layout was scaled and turned (degrees) by; the part of the scale that gives texels room.
+    cost : float
+        Mean squared distance of a texel from its target.
+
+    """
+
+    targets: Points
+    source: Extended
+    of: NDArray[np.intp]
+    scale: float
+    angle: float
+    gain: float
+    cost: float
+
+    @property
+    def shift(self) -> Points:
+        """How far each matched texel goes."""
+        return self.targets - self.source.points[self.of]
+
+    def report(self) -> dict[str, Any]:
+        """Give what was decided, in JSON types."""
+        return {
+            "scale": round(self.scale, 6),
+            "angle": round(self.angle, 6),
+            "gain": round(self.gain, 6),
+            "targets": len(self.targets),
+            "sources": len(self.source.points),
+            "cost": round(self.cost, 6),
+        }
+
+
+def packing(a: Texels, distances: Points) -> float:
+    """Give what a layout must grow by so that disjoint texels have room; ``distances``: to the nearest, at A's spacing."""
+    parts = parts_of(a)
+    area = np.bincount(parts.core.ravel(), minlength=len(parts.points) + 1)[1:][parts.whole]
+    if not len(area):
+        return 1.0
+    # Not the largest and the nearest: the few that still collide are pushed apart, and the rest stay dense.
+    diameter = 2 * math.sqrt(float(np.percentile(area, 75)) / math.pi)
+    return max(1.0, ROOM * diameter / max(float(np.percentile(distances, 25)), 1e-9))
+
+
+def targets(layout: Layout, scale: float, angle: float, size: tuple[int, int], beyond: float) -> Points:
+    """Scale and turn a layout about its centroid into the middle of an output, and cover that and a margin."""
+    turn = math.radians(angle)
+    matrix = scale * np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
+    centre, middle = layout.points.mean(axis=0), (np.array(size) - 1) / 2
+    low, high = np.full(2, -beyond), np.array(size) - 1 + beyond
+    box = np.array([[y, x] for y in (low[0], high[0]) for x in (low[1], high[1])])
+    back = (box - middle) @ np.linalg.inv(matrix).T + centre
+    found = layout.within(back.min(axis=0), back.max(axis=0))[0]
+    moved = (found - centre) @ matrix.T + middle
+    return np.asarray(moved[((moved >= low) & (moved <= high)).all(axis=1)], np.float64)
+
+
+def aligned(a: Texels, b: Texels) -> list[float]:
+    """Give the turns, in degrees, that bring a direction in which B's points line up to one of A's; none is the first."""
+    mine, theirs = (
+        t.peaks or _DIRECTIONS.get(t, None, partial(directions, np.asarray(t.points, float))) for t in (a, b)
+    )
+    # Lines have no sense of direction: angles are those within a quarter turn.
+    turns = {round((p - q + 90) % 180 - 90, 6) for p in mine[:3] for q in theirs[:3]}
+    return [0.0, *sorted(turns - {0.0}, key=lambda t: (abs(t), t))]
+
+
+def matched(a: Texels, b: Texels, size: tuple[int, int], *, align: bool, packed: bool = True) -> Match:
+    """Match the texels of A with B's layout (section 4.1)."""
+    mine = spacing(np.asarray(a.points, np.float64))
+    layout = _LAYOUTS.get(b, None, lambda: Layout.of(np.asarray(b.points, float), b.mask.shape, b.wrap, beyond=True))
+    scale = mine / layout.scale
+    gain = 1.0
+    if packed and a.tag == "F=d":
+        gain = packing(a, scale * nearest(layout.points, 1)[:, 0])
+    beyond = BEYOND * mine
+    turns = aligned(a, b) if align else [0.0]
+    best: Match | None = None
+    margin = MARGIN
+    source = extend(a, size, math.ceil(margin * mine))
+    for angle in turns:
+        wanted = targets(layout, scale * gain, angle, size, beyond)
+        if not len(wanted):
+            raise InvalidInput("b: its layout has no point within the output")
+        while len(source.points) < SPARE * len(wanted) and margin < 8:
+            margin *= 1.4
+            source = extend(a, size, math.ceil(margin * mine))
+        if len(source.points) < len(wanted):
+            raise InvalidInput(
+                f"a: {len(source.points)} of its texels lie within reach, {len(wanted)} are needed; "
+                "take a smaller size or a larger picture"
+            )
+        of, cost = match(source.points, wanted)
+        if best is None or cost < TURN * best.cost:
+            best = Match(wanted, source, of, scale * gain, angle, gain, cost)
+    assert best is not None  # the first turn is always tried
+    if best.source is not source:
+        best = replace(best, of=match(source.points, best.targets)[0], source=source)
+    return best
+
+
+def apart(a: Texels, found: Match, *, rounds: int = 12, room: float = 1.0) -> Match:
+    """Push targets apart where the disjoint texels that go there would lie over each other.
+
+    Texels are seen as convex: each pair is pushed along the line between its targets.
+    """
+    from scipy.spatial import cKDTree
+
+    parts = parts_of(a)
+    angles = 2 * math.pi * np.arange(32) / 32
+    rays = np.stack([np.sin(angles), np.cos(angles)], axis=-1)
+    reach = np.zeros((len(parts.points), 32))
+    pixels = np.argwhere(parts.core > 0)
+    owner = parts.core[pixels[:, 0], pixels[:, 1]] - 1
+    for k, ray in enumerate(rays):
+        np.maximum.at(reach[:, k], owner, (pixels - np.rint(parts.points[owner])) @ ray + 0.5)
+    mine = reach[found.source.of[found.of]]
+    at = found.targets.copy()
+    far = 2 * float(mine.max()) + room
+    for _ in range(rounds):
+        pairs = cKDTree(at).query_pairs(far, output_type="ndarray")
+        if not len(pairs):
+            break
+        pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+        first, second = pairs.T
+        away = at[second] - at[first]
+        length = np.maximum(np.hypot(*away.T), 1e-9)
+        ray = np.rint(np.arctan2(away[:, 0], away[:, 1]) / (2 * math.pi) * 32).astype(np.intp) % 32
+        lack = mine[first, ray] + mine[second, (ray + 16) % 32] + room - length
+        close = lack > 0.5
+        if not close.any():
+            break
+        push = (0.5 * lack[close] / length[close])[:, None] * away[close]
+        np.add.at(at, first[close], -push)
+        np.add.at(at, second[close], push)
+    return replace(found, targets=at)
+
+
+def edited_match(a: Texels, steps: Sequence[Step]) -> tuple[Match, bool]:
+    """Match a texture with its own layout, edited; also tell whether the edit only lists moved points."""
+    points = parts_of(a).points if a.tag == "F=d" else np.asarray(a.points, np.float64)
+    trial = edited(points, len(points), steps, len(a.points))
+    shrink = math.prod(min(1.0, float(np.min(s.get("factor", 1.0)))) for s in steps if s["op"] == "scale")
+    far = float(np.abs(trial.points - points).max()) / shrink
+    size = (a.mask.shape[0], a.mask.shape[1])
+    if far > 4 * max(size):
+        raise InvalidInput(f"edit: moves texels by up to {far:.0f} pixels, four times the picture's size is allowed")
+    source = extend(a, size, math.ceil(MARGIN * spacing(points) + far), whole=False, exact=shrink == 1)
+    found = edited(source.points, source.own, steps, len(a.points))
+    kept = found.kept.copy()
+    if a.tag == "F=d":
+        shift = found.points - source.points
+        cut = parts_of(a).cut[source.of]
+        # The straight edge of a texel that the border cuts must not come into the picture.
+        # But where all goes one way the picture is moved as it is.
+        together = bool((np.ptp(shift, axis=0) < 1e-9).all())
+        inwards = (cut[:, :, 0] & (shift > 0.5)) | (cut[:, :, 1] & (shift < -0.5))
+        kept[: source.own] &= together | ~inwards[: source.own].any(axis=1)
+    of = np.flatnonzero(kept)
+    if not len(of):
+        raise InvalidInput("edit: leaves no texel")
+    moved = found.points[of]
+    cost = float(((moved - source.points[of]) ** 2).sum(axis=1).mean())
+    return Match(moved, source, of, 1.0, 0.0, 1.0, cost), found.listed
+
+
+def snapped(points: Points, reach: float) -> Points:
+    """Bring points to common rows: those whose rows follow each other more closely than ``reach``."""
+    order = np.argsort(points[:, 0], kind="stable")
+    rows = points[order, 0]
+    group = np.concatenate([[0], np.cumsum(np.diff(rows) > reach)])
+    mean = np.bincount(group, rows) / np.bincount(group)
+    out = points.copy()
+    out[order, 0] = mean[group]
+    return out
+
+
+def void_of(source: Extended, of: NDArray[np.intp], grown: int = 3) -> Bools:
+    """Mark what is erased: texels that go nowhere, and strays, with the pixels around them."""
+    from scipy.ndimage import maximum_filter
+
+    used = np.zeros(len(source.points) + 1, bool)
+    used[of + 1] = True
+    idle = (source.instance > 0) & ~used[source.instance]
+    # Of a picture that stays itself only what is taken out leaves a rim.
+    gone = idle if source.own else idle | source.stray
+    wide = maximum_filter(gone.astype(np.uint8), 2 * grown + 1) > 0
+    return np.asarray((wide | source.stray) & ~used[source.instance])

@@ -1,0 +1,219 @@
+"""The deformation of `texrs.papers.splice`: section 4.2, Eq. 5, Table 1 and Figure 5.
+
+Displacements are those of least energy, the one along an axis apart from the other. The matrix of the energy depends on
+what is rigid and on which points are pinned, not on where they go, so its factor is kept for the next splice.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Bools, Labels
+from texrs.errors import InvalidInput
+from texrs.kernels.sparse import Cholesky
+
+__all__ = ["carried", "energy", "stretched"]
+
+Points = NDArray[np.float64]
+
+GOAL, RIGID = 1e4, 1e2
+"""lambda_G and lambda_R (section 4.2)."""
+LOOSE = 1e-2
+"""Weight of the equations of what is not rigid: without them it would have none, and nothing would move."""
+TIE = 1e-5
+"""Weight of equal displacements of neighbours: long joints that nothing else holds do not slide freely."""
+KEPT = 1 << 30
+"""Bytes of factors that are kept."""
+
+_FACTORS: OrderedDict[bytes, Cholesky] = OrderedDict()
+_LOCK = threading.Lock()
+
+
+def factors(wanted: Mapping[bytes, Callable[[], Any]]) -> dict[bytes, Cholesky]:
+    """Give the factors of matrices, kept by what they are made from; those that lack are made side by side."""
+    with _LOCK:
+        found = {key: _FACTORS[key] for key in wanted if key in _FACTORS}
+    lacking = [key for key in wanted if key not in found]
+    found |= zip(lacking, Cholesky.several([wanted[key]() for key in lacking]), strict=True) if lacking else {}
+    with _LOCK:
+        for key, made in found.items():
+            _FACTORS[key] = made
+            _FACTORS.move_to_end(key)
+        while len(_FACTORS) > len(found) and sum(f.nbytes for f in _FACTORS.values()) > KEPT:
+            _FACTORS.popitem(last=False)
+    return found
+
+
+def _key(*parts: object) -> bytes:
+    digest = hashlib.blake2b(digest_size=16, person=b"texrs.splice")
+    for part in parts:
+        if isinstance(part, np.ndarray):
+            digest.update(repr((part.shape, part.dtype.str)).encode())
+            digest.update(np.ascontiguousarray(part).data)
+        else:
+            digest.update(repr(part).encode())
+    return digest.digest()
+
+
+# --- disjoint foreground: texels move whole --------------------------------------------------------------------------
+
+
+def carried(instance: Labels, shift: Points) -> NDArray[np.float64]:
+    """Give the displacement of every pixel where texels move whole, and the ground between them goes along smoothly.
+
+    The limit of Eq. 5 for lambda_G and lambda_R without bound and epsilon = 0: each texel moves by its own pin alone. What
+    is left is the ground, whose displacement is harmonic: no pixel moves further than the texels around it.
+
+    Parameters
+    ----------
+    instance : (H, W) int32
+        The texel of each pixel, counted from 1; 0 on the ground.
+    shift : (n, 2) float64
+        How far each texel moves.
+
+    Returns
+    -------
+    (H, W, 2) float64
+
+    """
+    shape = instance.shape
+    free = instance == 0
+    out = np.zeros((*shape, 2))
+    out[~free] = shift[instance[~free] - 1]
+    if not free.any():
+        return out
+    number = np.full(shape, -1, np.int64)
+    number[free] = np.arange(np.count_nonzero(free))
+    key = _key("carried", np.packbits(free), shape)
+    solver = factors({key: lambda: _laplacian(free, number)})[key]
+    flow = np.zeros((*shape, 2))
+    for axis in range(2):
+        o, i = (np.moveaxis(a, axis, 0) for a in (flow, out))
+        f: Bools = np.moveaxis(free, axis, 0)
+        # What a texel's pixel hands to the ground beside it.
+        o[:-1] += np.where((f[:-1] & ~f[1:])[..., None], i[1:], 0.0)
+        o[1:] += np.where((f[1:] & ~f[:-1])[..., None], i[:-1], 0.0)
+    out[free] = solver.solve(flow[free])
+    return out
+
+
+def _laplacian(free: Bools, number: NDArray[np.int64]) -> Any:
+    from scipy.sparse import coo_array
+
+    count = int(np.count_nonzero(free))
+    degree = np.zeros(free.shape)
+    rows, columns = [], []
+    for axis in range(2):
+        d, n = (np.moveaxis(a, axis, 0) for a in (degree, number))
+        f: Bools = np.moveaxis(free, axis, 0)
+        d[:-1] += 1
+        d[1:] += 1
+        both = f[:-1] & f[1:]
+        columns.append(n[:-1][both])
+        rows.append(n[1:][both])
+    below, left = np.concatenate(rows), np.concatenate(columns)
+    own = np.arange(count)
+    values = np.concatenate([degree[free], np.full(len(below), -1.0)])
+    at = (np.concatenate([own, np.maximum(below, left)]), np.concatenate([own, np.minimum(below, left)]))
+    return coo_array((values, at), shape=(count, count)).tocsc()
+
+
+# --- connected figures: the energy itself ----------------------------------------------------------------------------
+
+
+def stretched(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upright: bool) -> NDArray[np.float64]:
+    """Give the displacement of every pixel that minimises Eq. 5.
+
+    Parameters
+    ----------
+    rigid : (H, W) bool
+        M of Table 1: the foreground of ``F=c`` and ``F=d``, the background of ``B=c``.
+    pins : (n, 2) int
+        The pixels of C_A.
+    shift : (n, 2) float64
+        How far each goes.
+    upright : bool
+        Table 1's last row, lambda_P = 0 and epsilon = 1: upright and level parts are decoupled, so that joints neither lean
+        nor change their width. Else lambda_P = 1 and epsilon = 1e-3.
+
+    Returns
+    -------
+    (H, W, 2) float64
+
+    """
+    if not len(pins):
+        raise InvalidInput("a: has no texel in the picture to move")
+    shape = rigid.shape
+    at = pins[:, 0] * shape[1] + pins[:, 1]
+    out = np.empty((*shape, 2))
+    keys = [_key("stretched", np.packbits(rigid), shape, at, upright and axis, upright) for axis in (0, 1)]
+    # Without the decoupling both axes have one matrix.
+    made = factors({keys[axis]: partial(energy, rigid, at, axis, upright=upright) for axis in (0, 1)})
+    for axis in (0, 1):
+        right = np.zeros(rigid.size)
+        np.add.at(right, at, GOAL * shift[:, axis])
+        out[..., axis] = made[keys[axis]].solve(right).reshape(shape)
+    return out
+
+
+def energy(rigid: Bools, pins: NDArray[np.intp], axis: int, *, upright: bool, loose: float = LOOSE) -> Any:
+    """Give the matrix of Eq. 5 for the displacement along an axis: lambda_G P + lambda_R (1 - U)^T w (1 - U)."""
+    from scipy.sparse import dia_array
+
+    coupling, small = (0.0, 1.0) if upright else (1.0, 1e-3)
+    size, columns = rigid.size, rigid.shape[1]
+    u = weights(rigid, axis, coupling, small)
+    u /= u.sum(axis=0)
+    root = np.sqrt(RIGID * np.where(rigid, 1.0, loose))
+    steps = (-columns, columns, -1, 1)
+    # A diagonal is stored by its columns.
+    bands = [root.ravel(), *(np.roll(-(root * b).ravel(), step) for b, step in zip(u, steps, strict=True))]
+    equations = dia_array((np.array(bands), [0, *steps]), shape=(size, size)).tocsr()
+    goal = np.asarray(np.bincount(pins, minlength=size) * GOAL, np.float64)
+    return (equations.T @ equations + dia_array(ties(rigid.shape, goal), shape=(size, size))).tocsc()
+
+
+def ties(shape: tuple[int, ...], goal: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[int]]:
+    """Give the diagonals of lambda_G P, and of the weak ties between all neighbours."""
+    diagonal = goal.reshape(shape).copy()
+    below, right = np.zeros(shape), np.zeros(shape)
+    below[1:], right[:, 1:] = -TIE, -TIE
+    for axis in range(2):
+        d = np.moveaxis(diagonal, axis, 0)
+        d[:-1] += TIE
+        d[1:] += TIE
+    # Diagonals are stored by their columns; the matrix is symmetric.
+    upper = [below.ravel(), right.ravel()]
+    steps = [shape[1], 1]
+    lower = [np.roll(b, -s) for b, s in zip(upper, steps, strict=True)]
+    return np.array([diagonal.ravel(), *upper, *lower]), [0, *steps, *(-s for s in steps)]
+
+
+def weights(rigid: Bools, axis: int, coupling: float, small: float) -> NDArray[np.float64]:
+    """Give u_pq of each pixel p and its neighbours q above, below, left and right; 0 where there is none.
+
+    Table 1 and Figure 5 are worded for the displacement along columns; along rows the axes change places.
+    """
+    m = rigid if axis == 1 else rigid.T
+    h, w = m.shape
+    # Outside counts as rigid for Figure 5.
+    left = np.pad(m, ((0, 0), (1, 0)), constant_values=True)[:, :-1]
+    right = np.pad(m, ((0, 0), (0, 1)), constant_values=True)[:, 1:]
+    value = m + small
+    u = np.zeros((4, h, w))
+    u[2, :, 1:] = value[:, :-1]
+    u[3, :, :-1] = value[:, 1:]
+    top, bottom = m[:-1], m[1:]
+    edge = top & bottom & ((~left[:-1] & ~left[1:]) | (~right[:-1] & ~right[1:]))
+    together = np.where(edge | (~top & ~bottom), 1.0, coupling)
+    u[0, 1:] = together * value[:-1]
+    u[1, :-1] = together * value[1:]
+    return u if axis == 1 else np.ascontiguousarray(u.transpose(0, 2, 1)[[2, 3, 0, 1]])

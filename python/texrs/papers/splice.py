@@ -1,0 +1,450 @@
+"""SPLICE: the texels of one texture in the arrangement of another.
+
+Y. Liu, J. Wang, S. Xue, X. Tong, S. B. Kang and B. Guo, "Texture splicing", Computer Graphics Forum 28(7), 2009. Its texton
+is our texel. The flow, in the paper's order:
+
+1. bring B's layout to the spacing and the orientation of A's and match the points one to one (section 4.1, Eq. 4);
+2. deform A so that its texels go there, and what is rigid keeps its shape (section 4.2, Eq. 5, Table 1, Figure 5);
+3. draw the deformed mesh backwards: where each pixel of the output comes from (Figure 6);
+4. fill the holes and refine what is not rigid by texture synthesis (section 4.3).
+
+Texels are analysed beforehand (section 3; `texrs.texels`).
+
+Departures, with their reasons:
+
+- Both point sets go on beyond their pictures, by reflection at the lines where the layout goes on as it is: otherwise
+  a third of the output is empty, and texels at its rim are missing.
+- There are more texels than targets; those that go nowhere are erased. As printed, point sets must have equal size.
+- Layouts grow until disjoint texels have room, and those that still collide are pushed apart: spacing alone makes chains.
+- Distances are squared in Eq. 4: the best matching then has no crossings.
+- Disjoint texels move whole, by whole pixels: Eq. 5 in the limit of its weights. The soft energy stretches components that
+  hold two pins by dozens of pixels. The ground between them is harmonic, so nothing of it moves further than its texels.
+- Eq. 5 sums over rigid pixels only, so the others have no equation and the system is singular, or, for brick walls,
+  moves nothing but its pins: here they count a hundredth. Long joints, which the decoupling of Table 1 leaves free to slide,
+  are tied to their neighbours by a hair.
+- Texels that reflection mirrors are turned back, and those that the border cuts are left out.
+- Wide holes are filled with patches of the ground; random pixels come out as noise there.
+- Refinement leaves what is rigid as it is, and so whatever the warp copied whole: there is nothing to mend. In its
+  place nothing comes that is not ground itself.
+- Triangles between texels carry previews, and edits that list moved points: what moves then stirs its neighbours alone.
+
+``method="paper"`` leaves out what can be left out (`texrs.papers._splice_literal`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_seed, as_size
+from texrs._progress import stage
+from texrs._typing import Array, Bools, Progress
+from texrs.errors import InvalidInput
+from texrs.kernels.warp import from_points, mesh
+from texrs.matching import spacing
+from texrs.papers._splice_edit import as_steps
+from texrs.papers._splice_entry import as_texels
+from texrs.papers._splice_layout import Match, apart, edited_match, matched, snapped, void_of
+from texrs.papers._splice_literal import literal_field, literal_fill, literal_match
+from texrs.papers._splice_pictures import Stages
+from texrs.papers._splice_refine import Draft, fill, refined_places
+from texrs.papers._splice_source import parts_of
+from texrs.papers._splice_warp import carried, stretched
+from texrs.report import Synthesis
+from texrs.source_map import SourceMap
+from texrs.texels import Texels
+
+__all__ = ["self_splice", "splice"]
+
+Method: TypeAlias = Literal["paper", "preview"] | None
+Edit: TypeAlias = str | Mapping[str, Any] | Sequence[Mapping[str, Any]]
+
+
+def splice(
+    a: Texels | Array,
+    b: Texels | Array,
+    size: int | Sequence[int] | None = None,
+    *,
+    seed: int = 0,
+    method: Method = None,
+    align: bool = True,
+    snap_rows: bool = False,
+    refine: bool = True,
+    progress: Progress | None = None,
+) -> Synthesis:
+    """Arrange the texels of one texture as those of another are.
+
+    Parameters
+    ----------
+    a : Texels, or (H, W) or (H, W, C) array
+        The texture whose texels are shown; a picture is analysed by `texrs.texels.analyse`.
+    b : Texels, or array
+        The texture whose layout they take.
+    size : int or (rows, columns), optional
+        Size of the result, in pixels; that of ``a`` by default.
+    seed : int
+        Chooses what fills holes, and the noise of the refinement.
+    method : {None, "paper", "preview"}
+        "paper": the algorithm as printed, with only its misprints repaired. "preview": triangles between the texels,
+        drawn where these go; nothing is kept rigid or filled.
+    align : bool
+        Whether to turn the layout so that lines of its points agree with those of ``a``.
+    snap_rows : bool
+        Whether to bring targets of about one row to one row: for walls, whose long joints then stay straight.
+    refine : bool
+        Whether to refine what is not rigid.
+    progress : callable, optional
+        Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
+
+    Returns
+    -------
+    Synthesis
+        The picture; a source map of whole pixels of ``a``, whose label is the target (counted from 1, as in the report)
+        that a rigid pixel belongs to, or 0; pictures of the stages, drawn when they are looked at; and a report.
+
+    Raises
+    ------
+    InvalidInput
+        Entries or options that cannot be spliced; the message says why.
+
+    References
+    ----------
+    .. [1] Y. Liu et al., "Texture splicing", Computer Graphics Forum 28(7), 2009. :doi:`10.1111/j.1467-8659.2009.01569.x`
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import texrs
+    >>> from texrs.texels import Texels
+    >>> def entry(sample, side):
+    ...     count = len(sample.centres)
+    ...     return Texels(sample.image, sample.centres, sample.mask, (side, side), sample.tag, np.ones(count))
+    >>> buttons = entry(texrs.samples.dots((128, 128)), 21)
+    >>> stones = entry(texrs.samples.pebbles((128, 128)), 21)
+    >>> result = texrs.splice(buttons, stones, seed=1)
+    >>> result.image.shape, bool((result.source.render(buttons.image) == result.image).all())
+    ((128, 128, 3), True)
+
+    """
+    if method not in (None, "paper", "preview"):
+        raise InvalidInput(f"method: allowed are None, 'paper' and 'preview', got {method!r}")
+    watch = progress or (lambda stage, share: None)
+    mine, theirs = as_texels(a, "a", watch), as_texels(b, "b", watch)
+    shape = as_size(size if size is not None else mine.mask.shape, minimum=16)
+    number = as_seed(seed)
+    watch("match", 0.0)
+    if method == "paper":
+        found = literal_match(mine, theirs, (shape[0], shape[1]), align=bool(align))
+    else:
+        found = matched(mine, theirs, (shape[0], shape[1]), align=bool(align))
+    if method != "paper" and mine.tag == "F=d":
+        found = apart(mine, found)
+    elif snap_rows:
+        found = replace(found, targets=snapped(found.targets, 0.25 * spacing(found.targets)))
+    watch("match", 1.0)
+    return made(
+        mine, found, (shape[0], shape[1]), number, method=method, refined=bool(refine), watch=watch, theirs=theirs
+    )
+
+
+def self_splice(
+    a: Texels | Array,
+    edit: Edit,
+    *,
+    seed: int = 0,
+    method: Literal["preview"] | None = None,
+    refine: bool = True,
+    progress: Progress | None = None,
+) -> Synthesis:
+    """Edit the layout of a texture's own texels (Figure 9).
+
+    Parameters
+    ----------
+    a : Texels, or (H, W) or (H, W, C) array
+        The texture; a picture is analysed by `texrs.texels.analyse`.
+    edit : str, mapping, or sequence of mappings
+        What is done, step by step, in plain JSON types: ``{"op": "scale", "factor": 1.2}`` or ``[1.2, 1]`` (the layout, not the
+        texels), ``{"op": "shift", "by": [4, 0]}``, ``{"op": "rows", "by": 6}`` (every other row to the right, those between to
+        the left), ``{"op": "randomise", "amount": 0.25, "least": 0.7}`` (Gaussian, in spacings; the share of the least usual
+        distance that is kept), ``{"op": "regularise", "amount": 1}`` (to the lattice that fits best), ``{"op": "move",
+        "texel": 3, "by": [0, 8]}`` or ``"to"``, ``{"op": "remove", "texel": 3}``, ``{"op": "points", "points": [[row, column],
+        ...]}``. A name alone is a step with its defaults. The report's "edit" replays.
+    seed : int
+        Chooses random steps, what fills holes, and the noise of the refinement.
+    method : {None, "preview"}
+        "preview": triangles between the texels, drawn where these go; nothing is kept rigid or filled.
+    refine : bool
+        Whether to refine what is deformed.
+    progress : callable, optional
+        Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
+
+    Returns
+    -------
+    Synthesis
+        As of `splice`. Where nothing is moved the picture is the texture, exactly.
+
+    Raises
+    ------
+    InvalidInput
+        A step that is not known, lacks something, or names a texel that is not there.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import texrs
+    >>> from texrs.texels import Texels
+    >>> dots = texrs.samples.dots((96, 96))
+    >>> entry = Texels(dots.image, dots.centres, dots.mask, (21, 21), "F=d", np.ones(len(dots.centres)))
+    >>> same = texrs.self_splice(entry, {"op": "move", "texel": 0, "by": [0, 0]})
+    >>> bool((same.image == dots.image).all())
+    True
+    >>> texrs.self_splice(entry, "randomise", seed=5).report["edit"]
+    [{'op': 'randomise', 'seed': 5}]
+
+    """
+    if method not in (None, "preview"):
+        raise InvalidInput(f"method: allowed are None and 'preview', got {method!r}")
+    watch = progress or (lambda stage, share: None)
+    mine, number = as_texels(a, "a", watch), as_seed(seed)
+    steps = as_steps(edit, number)
+    found, listed = edited_match(mine, steps)
+    size = (mine.mask.shape[0], mine.mask.shape[1])
+    result = made(
+        mine, found, size, number, method=method, refined=bool(refine), watch=watch, theirs=None, listed=listed
+    )
+    return replace(result, report={**result.report, "method": "self-splice", "edit": steps})
+
+
+def made(
+    a: Texels,
+    found: Match,
+    size: tuple[int, int],
+    seed: int,
+    *,
+    method: Method,
+    refined: bool,
+    watch: Progress,
+    theirs: Texels | None,
+    listed: bool = False,
+) -> Synthesis:
+    """Make the picture of a matching: sections 4.2 and 4.3."""
+    if method == "preview":
+        warped = previewed(found, size)
+    elif method == "paper":
+        warped = drawn(Field(*literal_field(a, found)), size, stage(watch, "warp"))
+    elif listed and a.tag == "F=d":
+        warped = scattered(a, found, size)
+    else:
+        watch("deform", 0.0)
+        field = deform(a, found)
+        watch("deform", 1.0)
+        warped = drawn(field, size, stage(watch, "warp"))
+    draft, label = drafted(a, found, warped, whole=method is None)
+    full, places = draft, draft.places
+    if method == "paper":
+        full = literal_fill(draft, seed)
+        places = refined_places(a.image, a.wrap, full, seed, watch) if refined else full.places
+    elif method != "preview":
+        full = fill(a.image, draft, spacing(np.asarray(a.points, np.float64)), seed, watch)
+        places = refined_places(a.image, a.wrap, full, seed, watch) if refined else full.places
+    shape = (a.mask.shape[0], a.mask.shape[1])
+    frame = frames_of(full.mirrored)
+    source = SourceMap(places.astype(np.float32), np.zeros(size, np.uint16), label, frame, (shape,))
+    image = source.render(a.image, interpolation="nearest")
+    report: dict[str, Any] = {
+        "method": "splice",
+        "seed": seed,
+        "size": list(size),
+        "tag": a.tag,
+        **found.report(),
+        "holes": float(1 - warped.known.mean()),
+        "triangles": warped.triangles,
+        "flipped": warped.flipped / max(warped.triangles, 1),
+        "flipped_rigid": warped.flipped_rigid / max(warped.triangles, 1),
+        "system": list(found.source.mask.shape),
+        "matches": matches(a, found),
+    }
+    watch("done", 1.0)
+    return Synthesis(image, source, Stages(a, theirs, found, warped.target, draft, full, image), report)
+
+
+def frames_of(mirrored: Bools) -> NDArray[np.float32] | None:
+    """Give the Jacobians of pixels, some of which show the texture mirrored; none where none does."""
+    if not mirrored.any():
+        return None
+    frame = np.zeros((*mirrored.shape, 2), np.float32)
+    for axis in range(2):
+        frame[..., axis, axis] = np.where(mirrored[..., axis], -1, 1)
+    return frame
+
+
+# --- the deformation: section 4.2 ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Field:
+    """The texture deformed: where its pixels go, what is rigid, and what is not drawn."""
+
+    target: NDArray[np.float64]
+    rigid: Bools
+    void: Bools
+
+
+def deform(a: Texels, found: Match) -> Field:
+    """Move every pixel of the texture, as its tag says."""
+    source = found.source
+    shape, origin = source.mask.shape, np.array(source.origin)
+    grid = np.moveaxis(np.indices(shape), 0, -1) + origin
+    if a.tag == "F=d":
+        delta = carried(source.instance, whole_shifts(found))
+        return Field(grid + delta, source.instance > 0, void_of(source, found.of))
+    rigid = source.mask if a.tag == "F=c" else ~source.mask
+    pins = np.rint(source.points[found.of]).astype(np.intp) - origin
+    inside = ((pins >= 0) & (pins < np.array(shape))).all(axis=1)
+    delta = stretched(rigid, pins[inside], found.shift[inside], upright=a.tag == "B=c")
+    return Field(grid + delta, rigid, np.zeros(shape, bool))
+
+
+def whole_shifts(found: Match) -> NDArray[np.float64]:
+    """Give the whole pixels that every texel moves by; those that go nowhere go along with the ones around them."""
+    from scipy.spatial import cKDTree
+
+    source = found.source
+    shift = np.zeros((len(source.points), 2))
+    shift[found.of] = np.rint(found.shift)
+    idle = np.ones(len(shift), bool)
+    idle[found.of] = False
+    if idle.any():
+        count = min(4, len(found.of))
+        far, near = cKDTree(source.points[found.of]).query(source.points[idle], k=[*range(1, count + 1)])
+        weight = 1 / (far**2 + 1e-6)
+        mean = (weight[..., None] * shift[found.of][near]).sum(axis=1) / weight.sum(axis=1)[:, None]
+        shift[idle] = np.rint(mean)
+    return shift
+
+
+# --- the backward warp: Figure 6 -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Warped:
+    """W_BA: the pixel of the extended texture behind each one of the output, and where there is one."""
+
+    there: NDArray[np.intp]
+    known: Bools
+    target: NDArray[np.float64]
+    triangles: int
+    flipped: int
+    flipped_rigid: int
+
+
+def drawn(field: Field, size: tuple[int, int], progress: Callable[[float], object] | None) -> Warped:
+    """Draw the dense mesh."""
+    found = mesh(field.target, field.rigid, void=field.void, size=size, progress=progress)
+    there = _pixels(found.source, field.rigid.shape)
+    return Warped(there, found.source.label > 0, field.target, found.triangles, found.flipped, found.flipped_heavy)
+
+
+def previewed(found: Match, size: tuple[int, int]) -> Warped:
+    """Draw triangles between the matched texels."""
+    source = found.source
+    origin = np.array(source.origin)
+    loose = from_points(source.points[found.of] - origin, found.targets, source.mask.shape, size=size)
+    target = np.moveaxis(np.indices(source.mask.shape), 0, -1) + origin * 1.0
+    return Warped(_pixels(loose, source.mask.shape), loose.label > 0, target, 0, 0, 0)
+
+
+def scattered(a: Texels, found: Match, size: tuple[int, int]) -> Warped:
+    """Draw the ground as triangles between the texels, and these whole above it: what moves stirs its neighbourhood alone."""
+    source = found.source
+    shape, origin = np.array(source.mask.shape), np.array(source.origin)
+    shift = whole_shifts(found)
+    rim = np.array([[y, x] for y in (0, shape[0] - 1) for x in (0, shape[1] - 1)], float)
+    start = np.concatenate([source.points - origin, rim])
+    end = np.concatenate([source.points + shift, rim + origin])
+    loose = from_points(start, end, (int(shape[0]), int(shape[1])), size=size)
+    below = _pixels(loose, source.mask.shape)
+    void = void_of(source, found.of)
+    ground = (source.instance == 0) & ~void
+    known = (loose.label > 0) & ground[below[..., 0], below[..., 1]]
+    moved = np.zeros((len(shift) + 1, 2), np.intp)
+    moved[1:] = shift
+    used = np.zeros(len(moved), bool)
+    used[found.of + 1] = True
+    pixels = np.argwhere(used[source.instance])
+    goal = pixels + origin + moved[source.instance[tuple(pixels.T)]]
+    seen = ((goal >= 0) & (goal < np.array(size))).all(axis=1)
+    there = below.copy()
+    there[tuple(goal[seen].T)] = pixels[seen]
+    known[tuple(goal[seen].T)] = True
+    target = np.moveaxis(np.indices(source.mask.shape), 0, -1) + origin + moved[source.instance] * 1.0
+    return Warped(there, known, target, 0, 0, 0)
+
+
+def _pixels(found: SourceMap, shape: tuple[int, ...]) -> NDArray[np.intp]:
+    """Give the nearest pixels, which lie inside."""
+    places = np.floor(found.coordinates + np.float32(0.5)).astype(np.intp)
+    return np.asarray(np.clip(places, 0, np.array(shape[:2]) - 1), np.intp)
+
+
+def drafted(a: Texels, found: Match, warped: Warped, *, whole: bool) -> tuple[Draft, NDArray[np.uint32]]:
+    """Read the warp as pixels of the texture: T_AB0, what of it stays, and the target of each pixel that moved ``whole``."""
+    source, known = found.source, warped.known
+    y, x = warped.there[..., 0], warped.there[..., 1]
+    places, mirrored = source.table[y, x], source.mirrored[y, x]
+    stays = copied(places, mirrored, known)
+    label = np.zeros(known.shape, np.uint32)
+    if whole and a.tag == "F=d":
+        goal = np.zeros(len(source.points) + 1, np.uint32)
+        goal[found.of + 1] = np.arange(1, len(found.of) + 1)
+        number = source.instance[y, x]
+        label = np.where(known, goal[number], 0).astype(np.uint32)
+        # Rims that the mesh draws out are no texels: what is rigid lies exactly where its texel goes.
+        shift = np.zeros((len(goal), 2), np.intp)
+        shift[1:] = whole_shifts(found)
+        away = warped.there + np.array(source.origin) + shift[number] - np.moveaxis(np.indices(known.shape), 0, -1)
+        drawn_out = (number > 0) & (away != 0).any(axis=-1)
+        label[drawn_out] = 0
+        known = known & ~drawn_out
+        kinds = ((parts_of(a).region > 0) | a.mask).astype(np.uint8)
+        return Draft(places, known, stays | (label > 0), kinds, np.zeros(known.shape, np.uint8), mirrored), label
+    kinds = np.asarray(~a.mask if a.tag == "B=c" else a.mask).astype(np.uint8)
+    wanted = np.where(known, kinds[places[..., 0], places[..., 1]], 255).astype(np.uint8)
+    return Draft(places, known, stays | (known & (wanted == 1)), kinds, wanted, mirrored), label
+
+
+def copied(places: NDArray[np.int32], mirrored: Bools, known: Bools) -> Bools:
+    """Mark what the warp copies whole: there is nothing to refine."""
+    from scipy.ndimage import maximum_filter
+
+    broken = np.zeros(known.shape, bool)
+    for axis in range(2):
+        step = np.diff(places, axis=axis)
+        first, second = (np.delete(mirrored, end, axis=axis)[..., axis] for end in (-1, 0))
+        forth = np.zeros(2, np.int32)
+        forth[axis] = 1
+        joined = ((step == forth).all(-1) & ~(first & second)) | ((step == -forth).all(-1) & (first | second))
+        ends = (slice(None, -1), slice(1, None))
+        apart, there = np.moveaxis(~joined, axis, 0), np.moveaxis(known, axis, 0)
+        for end in ends:
+            b = np.moveaxis(broken, axis, 0)[end]
+            b |= apart & there[ends[0]] & there[ends[1]]
+    rough = maximum_filter(broken.astype(np.uint8), 3) > 0
+    return np.asarray(known & ~rough)
+
+
+def matches(a: Texels, found: Match) -> list[dict[str, Any]]:
+    """Say which texel goes where."""
+    points = parts_of(a).points if a.tag == "F=d" else np.asarray(a.points, float)
+    return [
+        {
+            "target": [round(float(v), 3) for v in goal],
+            "texel": int(texel),
+            "source": [round(float(v), 3) for v in points[texel]],
+        }
+        for goal, texel in zip(found.targets, found.source.of[found.of], strict=True)
+    ]

@@ -1,0 +1,433 @@
+"""A start without a user: which texel, which background, which tag, and how sure that is.
+
+1. sizes: blobs of every scale, pieces of a colour segmentation, and the periods of the autocorrelation propose boxes;
+2. the texel: each box is searched for in a small picture, and the one that the texture repeats best is taken;
+3. the background: what lies farthest from all that was found, of the colours that most of it has;
+4. the tag: texels that leave much ground between them are separate; those that leave joints lie in a connected
+   background where they are all of one size, and else are the meshes of a net.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Bools, Floats
+from texrs.errors import InvalidInput
+from texrs.segment import segment
+from texrs.segment.regularity import lattice
+from texrs.texels._clean import components
+from texrs.texels._entry import Tag
+from texrs.texels._given import LEAST, Box, as_box
+from texrs.texels._mask import disc, lab, odd
+from texrs.texels._points import spacing
+from texrs.texels._search import Found, search, vectors
+
+__all__ = ["Proposal", "propose"]
+
+SMALL = 224
+"""Longest side of the picture in which boxes are compared."""
+SIGMAS = (2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)
+"""Standard deviations under which blobs are looked for there, in pixels."""
+A_KIND, PIECES = 3, 6
+"""Boxes tried for each size of blobs, and of pieces."""
+BLOB = 2.6
+"""Side of the box around a blob over the standard deviation of its Gaussian; a disc's diameter is 2.83 of it."""
+GROWN, STEPS = 3, 5
+"""Boxes whose sides are changed as long as that makes them better, and how often."""
+AGAIN = 6
+"""Boxes that are moved to where they hold one thing, and tried again."""
+WIDE = 1.3
+"""Sides of what is looked at for that, over those of the box."""
+LARGEST = 0.34
+"""Longest side of a box as a share of the image's: three must fit."""
+OUT = 1.1
+"""Distance from a texel, in halves of its box, from which on a pixel is taken for background."""
+PLACES = 12
+"""Places of the background that are proposed."""
+JOINTS, NONE = 1.3, 0.8
+"""How much stronger thin lines half-way between texels are than elsewhere where these are joints or a net, and where
+there are none for sure."""
+OPEN = 0.3
+"""Share of the image beyond that distance from which on texels are taken to be separate."""
+SCATTERED = 0.5
+"""The same, whatever lies between them."""
+EVEN = 0.22
+"""Spread of the distances to the nearest texel, over their mean, from which on texels are of no one size."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Proposal:
+    """A start, and how sure each part of it is, 0 to 1."""
+
+    box: Box
+    background: Bools
+    tag: Tag
+    confidence: dict[str, float] = field(default_factory=dict)
+
+
+def propose(
+    guide: Floats,
+    wrap: tuple[bool, bool],
+    box: Box | None,
+    background: Bools | None,
+    mask: Bools | None,
+    tag: Tag | None,
+    points: NDArray[np.float64] | None,
+    progress: Callable[[float], object],
+) -> Proposal:
+    """Propose what is not given."""
+    size = (guide.shape[0], guide.shape[1])
+    sure: dict[str, float] = {}
+    if box is None:
+        if points is not None and len(points) > 2:
+            box = _around(points, size)
+            sure["box"] = 0.5
+        else:
+            box, sure["box"] = _best(guide, wrap, progress)
+    if points is None:
+        found = search(guide, box.centre, box.size, wrap=wrap)
+        points = found.points
+    progress(0.9)
+    away = _distance(size, points, box.size, wrap)
+    if tag is None:
+        tag, sure["tag"] = _tag(guide, away, points, box, mask)
+    if background is None and mask is None:
+        background, sure["background"] = _background(guide, away, box)
+    return Proposal(box, np.zeros(size, bool) if background is None else background, tag, sure)
+
+
+# --- the texel -------------------------------------------------------------------------------------------------------
+
+
+def _best(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[float], object]) -> tuple[Box, float]:
+    """Try boxes in a small picture and take the one that explains most of it."""
+    step = max(1, -(-max(guide.shape[:2]) // SMALL))
+    small = _reduced(guide, step)
+    boxes = _boxes(small)
+    if not boxes:
+        raise InvalidInput("box: none could be proposed for this image; give one, or the points")
+    light, features = lab(small)[..., 0], vectors(small, wrap)[0]
+    best: tuple[float, Box] | None = None
+    tried: list[tuple[float, Box, Found]] = []
+
+    def attempt(box: Box) -> float:
+        nonlocal best
+        known = [value for value, other, _ in tried if other == box]
+        if known:
+            return known[0]
+        found = search(small, box.centre, box.size, wrap=wrap, features=features)
+        value = _worth(light, found, box)
+        tried.append((value, box, found))
+        if best is None or value > best[0] + 1e-6:
+            best = (value, box)
+        return value
+
+    for number, box in enumerate(boxes):
+        attempt(box)
+        progress(0.5 * (number + 1) / len(boxes))
+    for _, box, found in sorted(tried, key=lambda t: -t[0])[:AGAIN]:
+        moved = _centred(light, found, box)
+        if moved is not None:
+            attempt(moved)
+    for number, (value, box, _) in enumerate(sorted(tried, key=lambda t: -t[0])[:GROWN]):
+        for _ in range(STEPS):
+            better = [(attempt(b), b) for b in _resized(box, small.shape[:2])]
+            top = max(better, key=lambda t: t[0], default=(0.0, box))
+            if top[0] <= value:
+                break
+            value, box = top
+        progress(0.5 + 0.3 * (number + 1) / GROWN)
+    assert best is not None
+    sure = _sure(light, best[1], next(f for _, b, f in tried if b == best[1]))
+    row, column = (float(c * step + (step - 1) / 2) for c in best[1].centre)
+    height, width = (float(s * step) for s in best[1].size)
+    whole = (guide.shape[0], guide.shape[1])
+    height, width = min(height, whole[0] - 1.0), min(width, whole[1] - 1.0)
+    row = float(np.clip(row, height / 2 - 0.5, whole[0] - 0.5 - height / 2))
+    column = float(np.clip(column, width / 2 - 0.5, whole[1] - 0.5 - width / 2))
+    return as_box((row, column, height, width), whole), sure
+
+
+def _reduced(guide: Floats, step: int) -> Floats:
+    """Average squares of pixels."""
+    rows, columns = (n // step for n in guide.shape[:2])
+    cut = guide[: rows * step, : columns * step]
+    return np.ascontiguousarray(
+        cut.reshape(rows, step, columns, step, -1).mean(axis=(1, 3), dtype=np.float64), np.float32
+    )
+
+
+def _boxes(small: Floats) -> list[Box]:
+    """List boxes worth trying, none twice."""
+    size = (small.shape[0], small.shape[1])
+    found: list[tuple[float, float, float, float]] = [*_blobs(small), *_pieces(small), *_periods(small)]
+    kept: dict[tuple[int, ...], Box] = {}
+    for row, column, height, width in found:
+        if min(height, width) < LEAST + 2 or height > LARGEST * size[0] or width > LARGEST * size[1]:
+            continue
+        centre = (int(np.floor(row + 0.5)), int(np.floor(column + 0.5)))
+        sides = (odd(height), odd(width))
+        if all(sides[a] // 2 <= centre[a] < size[a] - sides[a] // 2 for a in range(2)):
+            kept[(*centre, *sides)] = Box(centre, sides)
+    return list(kept.values())
+
+
+def _blobs(small: Floats) -> list[tuple[float, float, float, float]]:
+    """Find round things: tops of the normalised Laplacian in scale and space (Lindeberg 1998)."""
+    from scipy.ndimage import gaussian_laplace, maximum_filter
+
+    light = lab(small)[..., 0]
+    stack = np.stack([-(s * s) * gaussian_laplace(light, s, mode="nearest") for s in SIGMAS])
+    found = []
+    for sign in (1.0, -1.0):
+        signed = sign * stack
+        for k, sigma in enumerate(SIGMAS):
+            near = signed[max(0, k - 1) : k + 2].max(axis=0)
+            margin = int(BLOB * sigma / 2) + 1
+            top = (maximum_filter(near, 2 * int(sigma) + 1) == signed[k]) & (signed[k] > 0.01)
+            inner = np.zeros_like(top)
+            inner[margin:-margin, margin:-margin] = True
+            places = np.argwhere(top & inner)
+            if len(places) < 3:
+                continue
+            values = signed[k][tuple(places.T)]
+            # Those of usual strength: the strongest are often something else.
+            order = np.lexsort((places[:, 1], places[:, 0], np.abs(values - np.quantile(values, 0.7))))
+            found += [(float(r), float(c), BLOB * sigma, BLOB * sigma) for r, c in places[order[:A_KIND]]]
+    return found
+
+
+def _pieces(small: Floats) -> list[tuple[float, float, float, float]]:
+    """Take pieces of a segmentation by colour, of the usual size."""
+    from skimage.measure import regionprops
+
+    elements = segment(small, children="components").elements
+    rows, columns = elements.shape
+    inner = [
+        r for r in regionprops(elements) if r.bbox[0] > 0 and r.bbox[1] > 0 and r.bbox[2] < rows and r.bbox[3] < columns
+    ]
+    if len(inner) < 3:
+        return []
+    usual = float(np.median([r.area for r in inner]))
+    inner.sort(key=lambda r: (abs(float(np.log(r.area / usual))), r.label))
+    sides = [np.median([r.bbox[a + 2] - r.bbox[a] for r in inner[: max(3, len(inner) // 2)]]) for a in range(2)]
+    found = []
+    for r in inner[:PIECES]:
+        middle = [(r.bbox[a] + r.bbox[a + 2] - 1) / 2 for a in range(2)]
+        found.append((middle[0], middle[1], float(r.bbox[2] - r.bbox[0]), float(r.bbox[3] - r.bbox[1])))
+        found.append((middle[0], middle[1], float(sides[0]), float(sides[1])))
+    return found
+
+
+def _periods(small: Floats) -> list[tuple[float, float, float, float]]:
+    """Take the cell of the lattice that the image repeats on, at its evenest places."""
+    from scipy.ndimage import gaussian_gradient_magnitude, uniform_filter
+
+    regular = lattice(small)
+    if regular is None:
+        return []
+    sides = [max(abs(regular.a[axis]), abs(regular.b[axis])) * 0.8 for axis in range(2)]
+    edges = gaussian_gradient_magnitude(small.mean(axis=-1), 1.0)
+    found = []
+    for share in (1.0, 0.5):
+        height, width = (max(5.0, share * s) for s in sides)
+        even = uniform_filter(edges, (odd(height * 0.7), odd(width * 0.7)))
+        rows, columns = (int(s / 2) + 1 for s in (height, width))
+        inner = even[rows:-rows, columns:-columns]
+        if not inner.size:
+            continue
+        for place in np.argsort(inner, axis=None, kind="stable")[:: max(1, inner.size // 3)][:2]:
+            row, column = np.unravel_index(int(place), inner.shape)
+            found.append((float(row + rows), float(column + columns), height, width))
+    return found
+
+
+def _resized(box: Box, size: tuple[int, ...]) -> list[Box]:
+    """List the boxes with one side a third longer or shorter, or both, that fit."""
+    found = []
+    for tall, wide in ((1.35, 1), (1, 1.35), (0.74, 1), (1, 0.74), (1.35, 1.35), (0.74, 0.74)):
+        sides = (odd(box.size[0] * tall + 0.5), odd(box.size[1] * wide + 0.5))
+        fits = all(sides[a] // 2 <= box.centre[a] < size[a] - sides[a] // 2 for a in range(2))
+        if fits and min(sides) >= LEAST + 2 and all(sides[a] <= LARGEST * size[a] for a in range(2)):
+            found.append(Box(box.centre, sides))
+    return found
+
+
+def _worth(light: Floats, found: Found, box: Box) -> float:
+    """Say how well copies of a box explain a picture.
+
+    They do so by how alike they are, how clearly they stand out, how much they cover, and how much what they have in
+    common is one thing in the middle of the box.
+    """
+    if len(found.scores) < 4:
+        return 0.0
+    inner = found.scores[1:]
+    alike = float(inner.mean())
+    cover = min(1.0, len(found.scores) * box.size[0] * box.size[1] / float(light.size))
+    clear = float(inner.mean() - np.median(found.map))
+    window = _common(light, found, box, WIDE)
+    if window is None:
+        return 0.0
+    # What is alike by chance is so less often the more there is of it (Fisher's z grows with the root of the area).
+    large = float(np.sqrt(box.size[0] * box.size[1] / light.size))
+    return large * alike * float(np.sqrt(cover)) * max(0.0, clear) * _closed(window, np.zeros(2), box.size) ** 2
+
+
+def _sure(light: Floats, box: Box, found: Found) -> float:
+    """Say how sure a box is: how alike its copies are, and how much it holds one thing."""
+    window = _common(light, found, box, WIDE)
+    if window is None or len(found.scores) < 4:
+        return 0.1
+    return float(np.clip(found.scores[1:].mean() * _closed(window, np.zeros(2), box.size) * 1.5, 0.05, 0.95))
+
+
+def _common(light: Floats, found: Found, box: Box, wide: float) -> Floats | None:
+    """Average what lies around the places that were found, where it is inside the picture."""
+    half = [odd(wide * s) // 2 for s in box.size]
+    sides = light.shape
+    whole = [p for p in found.pixels.tolist() if all(half[a] <= p[a] < sides[a] - half[a] for a in range(2))]
+    if not whole:
+        return None
+    cuts = [light[r - half[0] : r + half[0] + 1, c - half[1] : c + half[1] + 1] for r, c in whole[:64]]
+    return np.asarray(np.mean(cuts, axis=0, dtype=np.float64), np.float32)
+
+
+def _closed(window: Floats, centre: NDArray[np.float64], size: tuple[int, int]) -> float:
+    """Say how much of what changes in a window does so outwards from a centre, 0 to 1: the outline of one thing does."""
+    rows, columns = np.gradient(window)
+    middle = (np.array(window.shape) - 1) / 2 + centre
+    out = [np.arange(n) - m for n, m in zip(window.shape, middle, strict=True)]
+    y, x = (o / (s / 2) for o, s in zip(out, size, strict=True))
+    away = np.maximum(np.hypot(y[:, np.newaxis], x), 1e-6)
+    # In units of the box, in which an oblong thing is round.
+    slope = rows * size[0], columns * size[1]
+    total = np.hypot(*slope) * (away < WIDE)
+    outward = (slope[0] * y[:, np.newaxis] + slope[1] * x) / away * (away < WIDE)
+    change = float(total.sum())
+    if change < 1e-9:
+        return 0.0
+    return float(0.5 * np.abs(outward).sum() + 0.5 * abs(outward.sum())) / change
+
+
+def _centred(light: Floats, found: Found, box: Box) -> Box | None:
+    """Move a box, within half of it, to where what it has in common with its copies is one thing in its middle."""
+    window = _common(light, found, box, 2.2)
+    if window is None:
+        return None
+    best, move = 0.0, np.zeros(2)
+    for row in np.linspace(-0.55, 0.55, 9) * box.size[0]:
+        for column in np.linspace(-0.55, 0.55, 9) * box.size[1]:
+            half = [int(WIDE * s / 2) for s in box.size]
+            at = [round((n - 1) / 2 + d) for n, d in zip(window.shape, (float(row), float(column)), strict=True)]
+            low = [max(0, a - h) for a, h in zip(at, half, strict=True)]
+            part = window[low[0] : at[0] + half[0] + 1, low[1] : at[1] + half[1] + 1]
+            offset = np.array([a - lo - (n - 1) / 2 for a, lo, n in zip(at, low, part.shape, strict=True)])
+            value = _closed(part, offset, box.size)
+            if value > best + 1e-6:
+                best, move = value, np.array([row, column])
+    half_box = np.array(box.size) // 2
+    for place in found.pixels:
+        centre = np.floor(place + move + 0.5).astype(int)
+        if ((centre >= half_box) & (centre < np.array(light.shape) - half_box)).all():
+            return Box((int(centre[0]), int(centre[1])), box.size)
+    return None
+
+
+def _around(points: NDArray[np.float64], size: tuple[int, int]) -> Box:
+    """Give a box of three quarters of the spacing around the point that lies farthest inside."""
+    side = max(float(LEAST), 0.75 * spacing(points))
+    side = min(side, min(size) - 1.0)
+    depth = np.minimum(points, np.array(size) - 1 - points).min(axis=1)
+    centre = np.clip(points[int(depth.argmax())], side / 2 - 0.5, np.array(size) - 0.5 - side / 2)
+    return as_box((*centre.tolist(), side, side), size)
+
+
+# --- background and tag ----------------------------------------------------------------------------------------------
+
+
+def _distance(
+    size: tuple[int, int], points: NDArray[np.float64], box: tuple[int, int], wrap: tuple[bool, bool]
+) -> Floats:
+    """Give the distance of each pixel to the nearest texel, in halves of its box."""
+    from scipy.spatial import cKDTree
+
+    if not len(points):
+        return np.full(size, 9.0, np.float32)
+    half = np.array(box) / 2
+    copies = [points]
+    for axis in range(2):
+        if wrap[axis]:
+            move = np.zeros(2)
+            move[axis] = size[axis]
+            copies = [c + k * move for c in copies for k in (-1, 0, 1)]
+    grid = np.indices(size).reshape(2, -1).T
+    found = cKDTree(np.concatenate(copies) / half).query(grid / half)[0]
+    return np.asarray(found.reshape(size), np.float32)
+
+
+def _tag(guide: Floats, away: Floats, points: NDArray[np.float64], box: Box, mask: Bools | None) -> tuple[Tag, float]:
+    """Choose a tag, and say how far the choice is from the other ones."""
+    from scipy.spatial import cKDTree
+
+    if mask is not None:
+        pieces, count = components(mask, (False, False))
+        main = float(np.bincount(pieces.ravel())[1:].max(initial=0)) / max(float(mask.sum()), 1.0)
+        if main > 0.5 or count < 3:
+            return "F=c", min(1.0, main)
+        return ("F=d", 0.7) if float((~mask).mean()) > OPEN else ("B=c", 0.6)
+    if len(points) < 3:
+        return "F=d", 0.1
+    joints = _joints(lab(guide)[..., 0], points, box.size)
+    ground = float((away > OUT).mean())
+    if ground > SCATTERED or joints < NONE or (joints < JOINTS and ground > OPEN):
+        return "F=d", float(min(0.9, 0.5 + max(0.0, JOINTS - joints) / JOINTS))
+    near = cKDTree(points).query(points, k=2)[0][:, 1]
+    spread = float(near.std() / max(float(near.mean()), 1e-9))
+    tag: Tag = "B=c" if spread < EVEN else "F=c"
+    return tag, float(min(0.6, 0.3 + abs(spread - EVEN)))
+
+
+def _joints(light: Floats, points: NDArray[np.float64], box: tuple[int, int]) -> float:
+    """Say how much more often thin lines lie half-way between texels than elsewhere: joints and nets do."""
+    from scipy.ndimage import gaussian_filter, maximum_filter
+    from scipy.spatial import cKDTree
+
+    unit = max(spacing(points), 4.0)
+    rows, columns, mixed = (gaussian_filter(light, max(1.0, 0.06 * unit), order=o) for o in ((2, 0), (0, 2), (1, 1)))
+    mean, apart = (rows + columns) / 2, np.hypot((rows - columns) / 2, mixed)
+    half = np.array(box) / 2
+    grid = np.indices(light.shape).reshape(2, -1).T
+    found = cKDTree(points / half).query(grid / half, k=2)[0]
+    between = ((found[:, 1] - found[:, 0] < 0.12) & (found[:, 0] < 2.5)).reshape(light.shape)
+    if not between.any():
+        return 0.0
+    ratios = []
+    for line in (np.maximum(mean + apart, 0), np.maximum(apart - mean, 0)):
+        near = maximum_filter(line, 2 * max(2, int(0.08 * unit)) + 1)
+        usual = float(np.median(near)) + 0.1 * float(np.quantile(near, 0.95))
+        ratios.append(float(np.median(near[between])) / max(usual, 1e-9))
+    return max(ratios)
+
+
+def _background(guide: Floats, away: Floats, box: Box) -> tuple[Bools, float]:
+    """Take the places farthest from all texels, of the colour that most of them have."""
+    from scipy.ndimage import gaussian_filter, maximum_filter
+
+    colours = lab(guide)
+    reach = odd(min(box.size) / 2)
+    top = maximum_filter(away, reach) == away
+    places = np.argwhere(top)
+    order = np.lexsort((places[:, 1], places[:, 0], -away[tuple(places.T)]))
+    places = places[order[: 3 * PLACES]]
+    smooth = np.stack([gaussian_filter(colours[..., c], 1.0) for c in range(3)], axis=-1)
+    shown = smooth[tuple(places.T)]
+    usual = np.median(shown, axis=0)
+    apart = np.sqrt(((shown - usual) ** 2).sum(axis=1))
+    kept = places[np.argsort(apart, kind="stable")[: max(3, min(PLACES, len(places) // 2 + 1))]]
+    radius = int(np.clip(min(box.size) // 12, 1, 4))
+    sure = float(np.clip((float(np.median(away[tuple(kept.T)])) - 0.9) / 0.6, 0.1, 0.9))
+    return disc((away.shape[0], away.shape[1]), kept.astype(np.float64), radius), sure

@@ -1,0 +1,180 @@
+"""The database of textures: kept, remade when damaged or out of date, written by two processes, spliced by a stub."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+
+import texrs
+from texrs import TextureDatabase, samples
+from texrs.errors import FileError, InvalidInput
+
+DOTS = samples.load("dots", size=(96, 96))
+GIVEN = {"mask": DOTS.mask, "tag": "F=d"}
+
+
+@pytest.fixture
+def said() -> list[str]:
+    return []
+
+
+@pytest.fixture
+def textures(tmp_path: Path, said: list[str]) -> TextureDatabase:
+    made = TextureDatabase(tmp_path / "db", say=said.append)
+    made.add(DOTS.image, "dots", similarity=True, **GIVEN)
+    return made
+
+
+def test_what_is_added_is_kept(textures: TextureDatabase, said: list[str]) -> None:
+    again = TextureDatabase(textures.path, say=said.append)
+    assert list(again) == ["dots"]
+    assert "dots" in again
+    assert len(again) == 1
+    record = again.list()[0]
+    assert (record.tag, record.source, record.texels) == ("F=d", "dots.npy", len(again["dots"].points))
+    assert again["dots"].sets is not None
+    assert not said
+
+
+def test_files_stay_where_they_are(tmp_path: Path, textures: TextureDatabase, said: list[str]) -> None:
+    file = tmp_path / "buttons.png"
+    iio.imwrite(file, DOTS.image)
+    before = textures.add(file, **GIVEN)
+    assert textures.list()[0].source == str(file)
+    assert not said
+    iio.imwrite(file, DOTS.image[::-1])
+    with pytest.raises(InvalidInput, match="contradicts|mask"):  # The mask of the old picture is not that of this one.
+        textures.add(file, "buttons", replace=True, mask=~DOTS.mask, tag="F=d")
+    changed = textures["buttons"]
+    assert said == ["buttons: made anew, for the entry is of another image"]
+    assert (changed.image == DOTS.image[::-1]).all()
+    assert (before.image == DOTS.image).all()
+    file.unlink()
+    assert (textures["buttons"].image == changed.image).all()
+
+
+@pytest.mark.parametrize("harm", ["cut", "gone", "version", "text"])
+def test_a_damaged_entry_is_said_and_remade(textures: TextureDatabase, said: list[str], harm: str) -> None:
+    path, before = textures.path / "dots.npz", textures["dots"]
+    if harm == "cut":
+        path.write_bytes(path.read_bytes()[:300])
+    elif harm == "gone":
+        path.unlink()
+    elif harm == "text":
+        path.write_text("no entry")
+    else:
+        parts = dict(np.load(path))
+        np.savez(path, **{**parts, "texrs_texels": np.array(0)})
+    after = textures["dots"]
+    assert len(said) == 1
+    assert said[0].startswith("dots: made anew")
+    np.testing.assert_array_equal(after.points, before.points)
+    np.testing.assert_array_equal(after.mask, before.mask)
+    assert after.sets is not None
+    textures.analyse("dots")
+    assert len(said) == 1
+
+
+def test_an_entry_of_another_version_is_remade(textures: TextureDatabase, said: list[str]) -> None:
+    manifest = textures.path / "manifest.json"
+    table = json.loads(manifest.read_text())
+    table["textures"]["dots"]["version"] = 0
+    manifest.write_text(json.dumps(table))
+    assert len(textures["dots"].points) > 3
+    assert "is of version 0" in said[0]
+    assert textures.list()[0].version == texrs.texels.FORMAT
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"layout": 1}', '{"layout": 1, "textures": {"../x": {}}}', None])
+def test_a_damaged_manifest_is_remade_from_the_entries(
+    textures: TextureDatabase, said: list[str], text: str | None
+) -> None:
+    manifest = textures.path / "manifest.json"
+    before = manifest.read_text()
+    manifest.unlink() if text is None else manifest.write_text(text)
+    assert list(textures) == ["dots"]
+    assert "made anew from 1 entries" in said[0]
+    assert manifest.read_text() == before
+
+
+def test_a_warning_where_nobody_listens(textures: TextureDatabase) -> None:
+    (textures.path / "dots.npz").write_bytes(b"")
+    with pytest.warns(UserWarning, match="dots: made anew"):
+        TextureDatabase(textures.path)["dots"]
+
+
+def test_two_processes_may_write_at_once(tmp_path: Path) -> None:
+    code = (
+        "import sys, texrs; from texrs import samples\n"
+        "dots = samples.load('dots', size=(64, 64)); db = texrs.TextureDatabase(sys.argv[1])\n"
+        "for i in range(4): db.add(dots.image, f'{sys.argv[2]}{i}', mask=dots.mask, tag='F=d')\n"
+    )
+    folder = str(tmp_path / "db")
+    work = [subprocess.Popen([sys.executable, "-c", code, folder, name]) for name in "ab"]
+    assert [process.wait(120) for process in work] == [0, 0]
+    textures = TextureDatabase(folder)
+    assert list(textures) == sorted(f"{name}{i}" for name in "ab" for i in range(4))
+    assert all(len(textures[name].points) >= 3 for name in textures)
+    assert not list(Path(folder).glob(".texrs-*"))
+
+
+def test_splices_and_their_matrix(textures: TextureDatabase, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = []
+
+    def splice(a, b, size=None, **options):
+        calls.append((len(a.points), len(b.points), size, options))
+        if a is b and options.get("seed") == 1:
+            raise InvalidInput("a: is b")
+        return SimpleNamespace(image=a.image[: (size or (96, 96))[0]])
+
+    monkeypatch.setattr(texrs, "splice", splice, raising=False)
+    textures.add(DOTS.image[:, ::-1].copy(), "other", mask=DOTS.mask[:, ::-1], tag="F=d")
+    assert textures.splice("dots", "other", (40, 40), seed=3).image.shape == (40, 96, 3)
+    assert calls[0][2:] == ((40, 40), {"seed": 3})
+    made = textures.matrix(cell=32)
+    assert made.rows == made.columns == ("dots", "other")
+    assert len(made.results) == 4
+    assert made.sheet.shape == (108, 108, 3)
+    failing = textures.matrix(["dots"], ["dots", "other"], cell=32, seed=1)
+    assert failing.failed == {("dots", "dots"): "a: is b"}
+    assert (failing.sheet[40:60, 40:60] == 128).all()
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda db: db.add(DOTS.image), "name: is needed for an array"),
+        (lambda db: db.add(DOTS.image, "../up", **GIVEN), "name: letters, digits"),
+        (lambda db: db.add(DOTS.image[::-1], "dots", mask=DOTS.mask[::-1], tag="F=d"), "name: dots is there already"),
+        (lambda db: db.add(DOTS.image, "x", boxes=3), "boxes: is no option"),
+        (lambda db: db["nobody"], "name: there is no texture 'nobody'"),
+        (lambda db: db.matrix(cell=3), "cell: needs an integer"),
+        (lambda db: db.matrix([], []), "rows, columns: no textures"),
+    ],
+)
+def test_bad_input(textures: TextureDatabase, call, message: str) -> None:
+    with pytest.raises(InvalidInput, match=message):
+        call(textures)
+
+
+def test_folders_that_are_none(tmp_path: Path, textures: TextureDatabase) -> None:
+    (tmp_path / "file").write_text("x")
+    for path in (tmp_path / "file", tmp_path / "no" / "such"):
+        with pytest.raises(FileError):
+            TextureDatabase(path)
+    with pytest.raises(InvalidInput):
+        TextureDatabase(3)  # type: ignore[arg-type]
+    (textures.path / "dots.npz").write_bytes(b"")
+    (textures.path / "dots.npy").unlink()
+    with pytest.raises(FileError, match="its image dots.npy is gone"):
+        textures["dots"]
+    (textures.path / "manifest.json").write_text('{"layout": 9, "textures": {}}')
+    with pytest.raises(FileError, match="has layout 9"):
+        textures.list()

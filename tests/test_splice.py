@@ -1,0 +1,341 @@
+"""Splicing: the checks of the specification on samples whose texels are known, and what a user may do wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.ndimage import find_objects
+
+import splice_checks as checks
+import texrs
+from texrs import samples
+from texrs.errors import InvalidInput
+from texrs.papers import _splice_warp as warp
+from texrs.texels import Texels
+
+SIZE = (192, 192)
+
+
+def entry(name: str, seed: int = 0, size: tuple[int, int] = SIZE) -> Texels:
+    sample = samples.load(name, size=size, seed=seed)
+    assert sample.centres is not None
+    assert sample.labels is not None
+    boxes = [b for b in find_objects(sample.labels) if b]
+    box = tuple(int(np.median([b[axis].stop - b[axis].start for b in boxes])) | 1 for axis in (0, 1))
+    mask = sample.mask if sample.mask is not None else sample.labels > 0
+    return Texels(
+        sample.image, sample.centres, mask, (box[0], box[1]), sample.tag or "F=d", np.ones(len(sample.centres))
+    )
+
+
+ENTRIES = {name: entry(name) for name in ("dots", "pebbles", "leaves_and_flowers", "net", "bricks")}
+PAIRS = [("dots", "pebbles"), ("dots", "bricks"), ("pebbles", "dots"), ("leaves_and_flowers", "pebbles")]
+
+
+@pytest.fixture(scope="module")
+def spliced() -> Callable[[str, str], texrs.Synthesis]:
+    made: dict[tuple[str, str], texrs.Synthesis] = {}
+
+    def get(a: str, b: str) -> texrs.Synthesis:
+        if (a, b) not in made:
+            made[a, b] = texrs.splice(ENTRIES[a], ENTRIES[b], seed=1)
+        return made[a, b]
+
+    return get
+
+
+@pytest.mark.parametrize(("a", "b"), PAIRS)
+def test_every_texel_is_there_whole_and_in_its_place(a: str, b: str, spliced: Any) -> None:
+    mine, result = ENTRIES[a], spliced(a, b)
+    found, away = checks.presence(mine, result)
+    irregular = a == "pebbles"
+    assert found >= (0.8 if irregular else 0.95), "S2"
+    assert away <= 0.5, "S3"
+    low, middle = checks.shapes(mine, result)
+    assert low >= 0.9, "S4"
+    assert middle >= 0.97, "S4"
+    assert checks.doubled(mine, result) <= 1.6, "S12"
+    assert 0.75 <= checks.share(mine, result) <= 1.25, "S13"
+
+
+@pytest.mark.parametrize(("a", "b"), [*PAIRS, ("net", "pebbles"), ("bricks", "dots")])
+def test_all_colours_are_the_texture_s(a: str, b: str, spliced: Any) -> None:
+    mine, result = ENTRIES[a], spliced(a, b)
+    colours, matched = checks.copied(mine, result)
+    assert colours == 1.0, "S5"
+    assert matched >= 0.99, "S5"
+    assert (result.source.render(mine.image) == result.image).all()
+    if mine.tag == "F=d":
+        assert result.report["flipped_rigid"] <= 0.002, "S6"
+        assert result.report["flipped"] <= 0.12, "S6"
+    # Between stones that touch there is no ground to bring along.
+    assert result.report["holes"] <= (0.6 if a == "pebbles" else 0.16), "S7"
+
+
+@pytest.mark.parametrize(("a", "b"), PAIRS)
+def test_the_ground_is_like_the_texture_s(a: str, b: str, spliced: Any) -> None:
+    ratio, distance = checks.coherence(ENTRIES[a], spliced(a, b))
+    assert ratio <= 1.3 or distance <= 0.08, "S8"
+
+
+@pytest.mark.parametrize(("a", "b"), PAIRS)
+def test_the_arrangement_is_the_other_one_s(a: str, b: str, spliced: Any) -> None:
+    found = checks.layout(spliced(a, b), ENTRIES[a], ENTRIES[b])
+    assert found["spacing"] <= 0.05, "S10"
+    assert found["nearest"] <= 0.05, "S10"
+    assert found["away"] <= 0.5, "S3"
+    assert found["own"] > 0.3 or a == "pebbles", "S10"
+    assert found["colour"] > 0.03, "S10"
+
+
+@pytest.mark.parametrize("name", ["dots", "pebbles", "net", "bricks"])
+def test_nothing_moved_nothing_changed(name: str) -> None:
+    mine = ENTRIES[name]
+    for edit in ({"op": "move", "texel": 1, "by": 0}, {"op": "shift", "by": 0}, {"op": "scale", "factor": 1}):
+        assert (texrs.self_splice(mine, edit).image == mine.image).all(), "S9"
+
+
+@pytest.mark.parametrize("name", ["dots", "pebbles", "net", "bricks"])
+def test_moving_all_moves_the_picture(name: str) -> None:
+    mine = ENTRIES[name]
+    image = texrs.self_splice(mine, {"op": "shift", "by": [5, -3]}).image
+    # At the rim the ground goes on beyond the picture.
+    assert (image[7:, :-5] == mine.image[2:-5, 3:-2]).all(), "S9"
+
+
+# --- brick walls: S11 ------------------------------------------------------------------------------------------------
+
+
+def joints(sample: samples.Sample) -> list[np.ndarray[Any, np.dtype[np.intp]]]:
+    """The whole vertical joints: their middle pixels, (rows, 2)."""
+    labels = sample.labels
+    assert labels is not None
+    found = []
+    boxes = find_objects(labels)
+    for i, one in enumerate(boxes):
+        for j, other in enumerate(boxes):
+            if one is None or other is None or i == j:
+                continue
+            top, bottom = max(one[0].start, other[0].start), min(one[0].stop, other[0].stop)
+            gap = other[1].start - one[1].stop
+            height = one[0].stop - one[0].start
+            if bottom - top > 0.8 * height and 0 <= gap < 16 and top > 8 and bottom < labels.shape[0] - 8:
+                column = (one[1].stop + other[1].start) // 2
+                found.append(np.array([[y, column] for y in range(top + 3, bottom - 3)]))
+    return found
+
+
+@pytest.mark.parametrize("edit", ["jitter", "rows", "stretch"])
+def test_joints_stay_upright(edit: str) -> None:
+    sample = samples.bricks()
+    wall = entry("bricks", size=sample.image.shape[:2])
+    rigid = ~wall.mask
+    pins = np.rint(wall.points).astype(int)
+    shift = np.zeros((len(pins), 2))
+    if edit == "jitter":
+        shift = np.random.default_rng(0).uniform(-4, 4, shift.shape)
+    elif edit == "rows":
+        shift[:, 1] = np.where(np.argsort(np.argsort(np.rint(pins[:, 0] / 18))) % 2, 6, -6)
+        row = np.cumsum(np.concatenate([[0], np.diff(np.sort(pins[:, 0])) > 9]))
+        shift[np.argsort(pins[:, 0], kind="stable"), 1] = np.where(row % 2, 6, -6)
+    else:
+        shift[:, 1] = 0.3 * (pins[:, 1] - pins[:, 1].mean())
+    found = joints(sample)
+    assert len(found) >= 15
+    leans = {}
+    for upright in (True, False):
+        delta = warp.stretched(rigid, pins, shift, upright=upright)[..., 1]
+        leans[upright] = np.array([abs(delta[tuple(j[0])] - delta[tuple(j[-1])]) for j in found])
+        if upright:
+            width = [abs(delta[y, x + 2] - delta[y, x - 2]) for j in found for y, x in j[len(j) // 2 :][:1]]
+            assert np.mean(width) <= 0.5
+    assert leans[True].mean() <= 0.3
+    assert leans[True].max() <= 1.0
+    assert leans[True].mean() < leans[False].mean()
+
+
+# --- two warps, and what serves them ---------------------------------------------------------------------------------
+
+
+def test_a_listed_edit_stirs_its_neighbourhood_alone() -> None:
+    """Moved points are carried by triangles between them, anything else by the mesh: each reaches its own pixels."""
+    mine = ENTRIES["dots"]
+    listed = texrs.self_splice(mine, {"op": "move", "texel": 12, "by": [6, 4]})
+    changed = np.argwhere((listed.image != mine.image).any(axis=-1))
+    assert len(changed)
+    assert np.abs(changed - mine.points[12]).max() < 70
+    points = mine.points.copy()
+    points[12] += (6, 4)
+    again = texrs.self_splice(mine, {"op": "points", "points": points.tolist()})
+    assert (again.image == listed.image).all()
+    meshed = texrs.self_splice(mine, [{"op": "move", "texel": 12, "by": [6, 4]}, {"op": "shift", "by": 0}])
+    for result in (listed, meshed):
+        moved = [m["target"] for m in result.report["matches"] if m["texel"] == 12]
+        assert np.allclose(moved[0], points[12], atol=1e-3)
+        rigid = np.argwhere(result.source.label == 1 + [m["texel"] for m in result.report["matches"]].index(12))
+        assert len(rigid) > 100
+
+
+def test_previews_are_drawn_at_once() -> None:
+    result = texrs.splice(ENTRIES["dots"], ENTRIES["pebbles"], method="preview")
+    assert result.image.shape == (*SIZE, 3)
+    plain = texrs.self_splice(ENTRIES["dots"], {"op": "shift", "by": 0}, method="preview")
+    assert (plain.image[20:-20, 20:-20] == ENTRIES["dots"].image[20:-20, 20:-20]).all()
+
+
+@pytest.mark.parametrize("name", ["dots", "net", "bricks"])
+def test_the_literal_method(name: str) -> None:
+    result = texrs.splice(ENTRIES[name], ENTRIES["pebbles"], method="paper", seed=2)
+    assert checks.copied(ENTRIES[name], result)[0] == 1.0
+
+
+# --- promises of the house -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("a", "b"), [("dots", "pebbles"), ("net", "dots"), ("bricks", "net")])
+def test_threads_do_not_matter(a: str, b: str) -> None:
+    found = []
+    for count in (1, 2, 7):
+        warp._FACTORS.clear()
+        with texrs.threads(count):
+            found.append(texrs.splice(ENTRIES[a], ENTRIES[b], (96, 112), seed=3).image.tobytes())
+    assert found[0] == found[1] == found[2]
+
+
+def test_any_dtype_and_channels() -> None:
+    mine = ENTRIES["dots"]
+    usual = texrs.splice(mine, ENTRIES["pebbles"], 96).image
+    wide = replace(mine, image=mine.image.astype(np.uint16) * 257)
+    assert (texrs.splice(wide, ENTRIES["pebbles"], 96).image == usual.astype(np.uint16) * 257).all()
+    grey = replace(mine, image=mine.image[..., 0])
+    assert texrs.splice(grey, ENTRIES["pebbles"], (64, 96)).image.shape == (64, 96)
+    floats = replace(mine, image=mine.image.astype(np.float32) * 4 - 2)
+    assert texrs.splice(floats, ENTRIES["pebbles"], 64).image.dtype == np.float32
+
+
+def test_pictures_are_analysed() -> None:
+    mine = ENTRIES["dots"]
+    assert texrs.splice(mine.image, ENTRIES["pebbles"], 64).image.shape == (64, 64, 3)
+    assert texrs.splice(mine.image[..., 1], ENTRIES["pebbles"], 64).image.shape == (64, 64)
+    with pytest.raises(InvalidInput, match="^a: "):
+        texrs.splice(np.zeros((40, 40)), ENTRIES["pebbles"])
+
+
+def test_maps_in_register_come_out_in_register() -> None:
+    mine = ENTRIES["bricks"]
+    result = texrs.splice(mine, ENTRIES["pebbles"], 128, seed=1)
+    height = np.linspace(0, 1, mine.mask.size, dtype=np.float32).reshape(mine.mask.shape)
+    rows, columns = np.moveaxis(result.source.coordinates.astype(int), -1, 0)
+    assert (result.source.render(height) == height[rows, columns]).all()
+    # Where the wall goes on as its mirror image, so do the directions on it.
+    frames = result.source.frames()
+    assert set(np.unique(frames)) <= {-1.0, 0.0, 1.0}
+    across = np.full((*mine.mask.shape, 3), (0.6, 0.0, 0.8), np.float32)
+    across[0, 0] = (-0.6, 0, 0.8)
+    turned = result.source.render(across, kind="normal")
+    mirrored = frames[..., 1, 1] < 0
+    usual = ~((rows == 0) & (columns == 0))
+    assert (turned[mirrored & usual][:, 0] < 0).all()
+    assert (turned[~mirrored & usual][:, 0] > 0).all()
+
+
+def test_progress_and_stopping() -> None:
+    seen: list[str] = []
+    texrs.splice(ENTRIES["dots"], ENTRIES["pebbles"], 96, progress=lambda name, share: seen.append(name))
+    assert list(dict.fromkeys(seen))[:3] == ["match", "deform", "warp"]
+    assert seen[-1] == "done"
+
+    def stop(name: str, share: float) -> None:
+        if name == "deform":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        texrs.splice(ENTRIES["dots"], ENTRIES["pebbles"], 96, progress=stop)
+
+
+def test_stages_are_pictures(tmp_path: Any) -> None:
+    result = texrs.splice(ENTRIES["dots"], ENTRIES["pebbles"], 96)
+    assert {"points of a", "points of b", "mask", "matching", "warped mesh", "before refinement", "composite"} <= set(
+        result.stages
+    )
+    assert len(result.save_stages(tmp_path)) == len(result.stages) + 1
+
+
+def test_edits_replay() -> None:
+    first = texrs.self_splice(ENTRIES["dots"], [{"op": "regularise", "amount": 0.5}, "randomise"], seed=7)
+    again = texrs.self_splice(ENTRIES["dots"], first.report["edit"], seed=7)
+    assert (first.image == again.image).all()
+
+
+def test_regular_layouts() -> None:
+    from texrs.papers._splice_edit import edited, lattice
+
+    skew = np.array([[20.0, 4.0], [3.0, 25.0]])
+    index = np.argwhere(np.ones((6, 6)))
+    noise = np.random.default_rng(0).normal(0, 0.5, (36, 2))
+    _, basis = lattice(index @ skew + noise)
+    assert abs(abs(np.linalg.det(basis)) / np.linalg.det(skew) - 1) < 0.02
+    found = edited(index @ skew + noise, 36, [{"op": "regularise"}]).points
+    away = (found - found[0]) @ np.linalg.inv(basis)
+    assert np.abs(away - np.rint(away)).max() < 1e-6
+    assert len(np.unique(np.rint(away), axis=0)) == 36
+
+
+# --- bad input -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"points": np.zeros((0, 2))}, "three or more"),
+        ({"points": np.array([[5.0, 5], [9, 9]])}, "2 texels are too few"),
+        ({"points": np.array([[5.0, 5], [5, 5], [9, 9], [7, 20]])}, "same place"),
+        ({"points": np.array([[5.0, 5], [np.nan, 5], [9, 9]])}, "NaN"),
+        ({"points": np.array([[5.0, 5], [500, 5], [9, 9]])}, "must lie in the picture"),
+        ({"mask": np.zeros((5, 5), bool)}, "mask: needs bool of shape"),
+        ({"mask": np.ones(SIZE, bool)}, "all foreground"),
+        ({"mask": np.zeros(SIZE, bool)}, "no foreground"),
+        ({"tag": "F=e"}, "allowed are F=d, F=c and B=c"),
+        ({"image": np.zeros((8, 8))}, "at least 16"),
+    ],
+)
+def test_bad_entries(change: dict[str, Any], words: str) -> None:
+    with pytest.raises(InvalidInput, match=words):
+        texrs.splice(replace(ENTRIES["dots"], **change), ENTRIES["pebbles"])
+
+
+@pytest.mark.parametrize(
+    ("edit", "words"),
+    [
+        ("melt", "needs an 'op'"),
+        (3, "needs a name, a step or a list"),
+        ({"op": "move", "texel": 900, "by": 1}, "texel of move"),
+        ({"op": "move", "texel": 1}, "one of 'by' and 'to'"),
+        ({"op": "scale", "factor": 0}, "factor of scale"),
+        ({"op": "scale", "factor": "big"}, "needs factor"),
+        ({"op": "shift", "by": [1e9, 0]}, "further than|four times"),
+        ({"op": "shift", "up": 3}, "knows no up"),
+        ({"op": "points", "points": [[1, 2], [1, 2]]}, "twice"),
+        ({"op": "points", "points": [[float("nan"), 2]]}, "finite"),
+        ({"op": "randomise", "amount": -1}, "amount of randomise"),
+    ],
+)
+def test_bad_edits(edit: Any, words: str) -> None:
+    with pytest.raises(InvalidInput, match=words):
+        texrs.self_splice(ENTRIES["dots"], edit)
+
+
+def test_bad_options() -> None:
+    a, b = ENTRIES["dots"], ENTRIES["pebbles"]
+    with pytest.raises(InvalidInput, match="method"):
+        texrs.splice(a, b, method="fast")  # type: ignore[arg-type]
+    with pytest.raises(InvalidInput, match="size"):
+        texrs.splice(a, b, 4)
+    with pytest.raises(InvalidInput, match="seed"):
+        texrs.splice(a, b, seed=-1)
+    with pytest.raises(InvalidInput, match="wrap"):
+        texrs.splice(replace(a, wrap=(1, 2, 3)), b)  # type: ignore[arg-type]
