@@ -16,11 +16,12 @@ from texrs.demo._maps import MAPS
 from texrs.demo._pictures import COMPLETE, TILE
 from texrs.demo._samples import SAMPLES
 from texrs.demo._solid import SOLID
+from texrs.demo._splice import SPLICE
 from texrs.demo._workshop import Section, Workshop
 
 __all__ = ["SECTIONS", "Section", "Workshop", "page"]
 
-SECTIONS: tuple[Section, ...] = (RESULTS, STAGES, MAPS, SEEDS, TILE, COMPLETE, SOLID, SAMPLES)
+SECTIONS: tuple[Section, ...] = (RESULTS, STAGES, MAPS, SEEDS, TILE, COMPLETE, SPLICE, SOLID, SAMPLES)
 
 
 def page(sections: Sequence[Section] = SECTIONS, *, progress: Progress | None = None) -> str:

@@ -1,0 +1,62 @@
+"""Texels of one texture in the layout of another, on the page."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from texrs.demo._html import code, figure, grid
+from texrs.demo._workshop import Section, Workshop, exemplar
+from texrs.papers.splice import self_splice, splice
+from texrs.texels import Texels, spacing
+
+__all__ = ["SPLICE"]
+
+SIDE = 192
+SPLICES = (("dots", "net"), ("dots", "bricks"), ("pebbles", "dots"))
+EDITS: tuple[tuple[str, dict[str, Any], str], ...] = (
+    ("dots", {"op": "regularise"}, "--edit regularise"),
+    ("dots", {"op": "scale", "factor": 1.25}, "the layout, not the texels, 1.25 times as large"),
+    ("bricks", {"op": "rows", "by": 8}, "rows shifted by 8 pixels; the joints stay upright"),
+)
+
+
+def _entry(name: str) -> Texels:
+    """Give a sample with the texels that it is known to have."""
+    sample = exemplar(name, SIDE)
+    assert sample.centres is not None
+    assert sample.mask is not None
+    assert sample.tag is not None
+    side = int(spacing(sample.centres)) // 2 * 2 + 1
+    return Texels(sample.image, sample.centres, sample.mask, (side, side), sample.tag, np.ones(len(sample.centres)))
+
+
+def _splice(workshop: Workshop) -> str:
+    total = len(SPLICES) + len(EDITS)
+    spliced, edited = [], []
+    for i, (a, b) in enumerate(SPLICES):
+        workshop.watch(i / total)
+        texels, layout = _entry(a), _entry(b)
+        made = splice(texels, layout, seed=1)
+        spliced += [figure(texels.image, a), figure(layout.image, b), figure(made.image, f"{a} laid out as {b}")]
+    for i, (a, edit, note) in enumerate(EDITS, start=len(SPLICES)):
+        workshop.watch(i / total)
+        texels = _entry(a)
+        made = self_splice(texels, edit, seed=1)
+        edited += [figure(texels.image, a), figure(made.image, str(edit["op"]), note=note)]
+    return (
+        code("texrs splice sample:dots sample:net -o result.png --seed 1")
+        + grid(spliced, least=180)
+        + code("texrs self-splice sample:dots --edit regularise -o result.png --seed 1")
+        + grid(edited, least=180)
+    )
+
+
+SPLICE = Section(
+    "splice",
+    "The texels of one texture in the layout of another",
+    "What is rigid is copied pixel by pixel; the ground between is warped, filled and refined by example. The same with the "
+    "texture's own layout, edited.",
+    _splice,
+)
