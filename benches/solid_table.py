@@ -31,7 +31,8 @@ CROP = 64
 HEAD = ("S1", "S2", "S3", "S3b", "S5", "S6", "S9")
 FIELDS = {
     "identity": fields.identity(),
-    "zigzag": fields.zigzag(period=64, angle=30, plane="xz"),
+    # Its folds must not lie on planes at which S6 looks for traces of the algorithm.
+    "zigzag": fields.zigzag(period=60, angle=30, plane="xz"),
     "circular": fields.circular(axis="x", radial="z"),
     "slant": fields.slant(30, "xz"),
     "slant_3d": fields.slant_3d(30, 30),

@@ -512,3 +512,34 @@ def test_bad_input_of_pictures():
 def test_places_are_exact_in_fixed_point(result):
     steps = result.source.coordinates.astype(np.float64) * ONE
     np.testing.assert_array_equal(steps, np.rint(steps))
+
+
+@pytest.mark.parametrize("axes", [2, 3])
+def test_a_map_is_followed(axes):
+    """What grows brighter downwards, grown with the trend the other way."""
+    side, size = (64, 96) if axes == 2 else (32, 40)
+    column = (-1, *[1] * (axes - 1))
+    ramp, wanted = np.linspace(0, 1, side).reshape(column), np.linspace(1, 0, size).reshape(column)
+    image = (np.random.default_rng(0).random((side,) * axes) * 0.3 + ramp).astype(np.float32)
+    verb = texrs.synthesize if axes == 2 else texrs.solid
+    made = verb(image, size, seed=1, guide=(ramp, wanted))
+    assert made.report["guided"]
+    assert np.corrcoef(made.image.reshape(size, -1).mean(axis=1), wanted.reshape(-1))[0, 1] > 0.95
+    free = verb(image, size, seed=1)
+    assert not free.report["guided"]
+    assert np.corrcoef(free.image.reshape(size, -1).mean(axis=1), wanted.reshape(-1))[0, 1] < 0.8
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        ({"guide": np.zeros((2, 40, 40))[0]}, "guide: needs two maps"),
+        ({"guide": (np.zeros((7, 1)), np.zeros((40, 40)))}, r"guide: the map of the exemplar needs finite numbers"),
+        ({"guide": (np.zeros((64, 64)), np.full((40, 40), np.nan))}, "guide: the map of the output"),
+        ({"guide": (0.0, 0.0), "guide_weight": -1}, "guide_weight"),
+        ({"guide": (0.0, 0.0), "method": "paper"}, "guide: the paper's method"),
+    ],
+)
+def test_wrong_maps_get_a_sentence(more, says):
+    with pytest.raises(InvalidInput, match=says):
+        texrs.synthesize(np.random.default_rng(0).random((64, 64)), 40, **more)

@@ -105,6 +105,20 @@ def test_held_values_come_from_files(here: Path) -> None:
     np.testing.assert_array_equal(iio.imread("out.png")[mask > 0], PICTURE[mask > 0])
 
 
+def test_maps_to_follow_come_from_files(here: Path, capsys: Capture) -> None:
+    ramp = np.linspace(0, 1, 64, dtype=np.float32)[:, np.newaxis].repeat(64, 1)
+    io.write("mine.tif", ramp)
+    io.write("theirs.tif", ramp[::-1, :48])
+    arguments = "--size 64x48 --guide mine.tif theirs.tif --guide-weight 2 --quality fast -q"
+    assert main(["synthesize", "in.png", "-o", "out.png", *arguments.split()]) == 0
+    expected = texrs.synthesize(PICTURE, (64, 48), guide=(ramp, ramp[::-1, :48]), guide_weight=2, quality="fast")
+    np.testing.assert_array_equal(iio.imread("out.png"), expected.image)
+    assert (
+        main(["synthesize", "in.png", "-o", "no.png", "--size", "32", "--guide", "mine.tif", "theirs.tif", "-q"]) == 2
+    )
+    assert "--guide mine.tif theirs.tif: the map of the output needs" in capsys.readouterr().err
+
+
 def test_frames_come_from_a_file_and_sizes_from_the_example(here: Path) -> None:
     frames = np.stack([fields.slant(a, "xy", axes=2).constant for a in range(4)]).reshape(2, 2, 2, 2)
     np.savez("frames.npz", frames)
@@ -120,7 +134,18 @@ def test_defaults_are_those_of_the_functions(command: str, verb: object) -> None
     ours = {p.name: p.default for p in typer.main.get_command(app).commands[command].params}  # type: ignore[attr-defined]
     theirs = {n: p.default for n, p in inspect.signature(verb).parameters.items()}  # type: ignore[arg-type]
     words = {"wrap": ("none", False), "method": ("default", None)}
-    for name in ("field", "seed", "quality", "held", "values", "labels", "interpolation", "memory_limit"):
+    for name in (
+        "field",
+        "seed",
+        "quality",
+        "held",
+        "values",
+        "labels",
+        "interpolation",
+        "memory_limit",
+        "guide",
+        "guide_weight",
+    ):
         assert ours[name] == theirs[name], name
     for name, (said, meant) in words.items():
         assert (ours[name], theirs[name]) == (said, meant)

@@ -77,7 +77,7 @@ def test_labels_thin_volumes_and_other_channels():
 
 def test_what_it_does_not_do():
     weave = samples.weave((64, 64)).image
-    with pytest.raises(InvalidInput, match="held: the paper's method holds no points"):
+    with pytest.raises(InvalidInput, match="held: the paper's method knows none"):
         texrs.synthesize(weave, 32, method="paper", held=np.ones((32, 32), bool), values=weave[:32, :32])
     with pytest.raises(InvalidInput, match="method: None or 'paper'"):
         texrs.synthesize(weave, 32, method="su")

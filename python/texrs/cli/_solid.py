@@ -47,6 +47,15 @@ Values = Annotated[
     str | None,
     typer.Option(metavar="FILE", help="What is held, in the example's dtype and channels.", show_default=False),
 ]
+Guided = Annotated[
+    tuple[str, str] | None,
+    typer.Option(
+        metavar="MAP MAP",
+        help="Two maps of one channel, of the example and of the result: where the one shows what the other says is looked.",
+        show_default=False,
+    ),
+]
+Weight = Annotated[float, typer.Option(help="How much --guide counts beside looking like the example, 0 to 100.")]
 Labels = Annotated[
     bool | None,
     typer.Option(
@@ -95,6 +104,8 @@ def solid_command(
     quality: Quality = "preserve",
     held: Held = None,
     values: Values = None,
+    guide: Guided = None,
+    guide_weight: Weight = 1.0,
     labels: Labels = None,
     interpolation: Between = None,
     method: Method = "default",
@@ -127,6 +138,8 @@ def synthesize_command(
     quality: Quality = "preserve",
     held: Held = None,
     values: Values = None,
+    guide: Guided = None,
+    guide_weight: Weight = 1.0,
     labels: Labels = None,
     interpolation: Between = None,
     method: Method = "default",
@@ -152,6 +165,7 @@ def _grow(
     wrap: str,
     held: str | None,
     values: str | None,
+    guide: tuple[str, str] | None,
     interpolation: str | None,
     method: str,
     memory_limit: str | None,
@@ -177,7 +191,8 @@ def _grow(
     _files.check_output(out, example, sides)
     frames = None if field is None else read_field(field, sides)
     names = {"exemplar": name, "held": str(held), "values": str(values)}
-    names |= {"count": "--threads", "memory_limit": "--memory-limit"}
+    names |= {"count": "--threads", "memory_limit": "--memory-limit", "guide_weight": "--guide-weight"}
+    names |= {"guide": "--guide " + " ".join(guide or ())}
     with named(**names), threads(count), watching(quiet=quiet) as progress:
         result = verb(
             example,
@@ -186,6 +201,7 @@ def _grow(
             wrap=cyclic,
             held=None if held is None else _read_mask(held, axes),
             values=None if values is None else _read_like(values, example, axes),
+            guide=None if guide is None else (_read_map(guide[0], axes), _read_map(guide[1], axes)),
             interpolation=cast(Interpolation | None, interpolation),
             method=cast(Literal["paper"] | None, None if method == "default" else method),
             memory_limit=limit,
@@ -210,6 +226,12 @@ def _read_like(path: str, example: Array, axes: int) -> Array:
     given: Array = io.read_volume(path) if axes == 3 else io.read(path)
     # Of one channel a file may keep the axis or not.
     return given[..., np.newaxis] if given.ndim < example.ndim else given
+
+
+def _read_map(path: str, axes: int) -> Array:
+    """Read a map of numbers: one channel, or the mean of several."""
+    given: Array = io.read_volume(path) if axes == 3 else io.read(path)
+    return given if given.ndim == axes else np.asarray(given.mean(axis=-1))
 
 
 def parse_bytes(text: str) -> int:

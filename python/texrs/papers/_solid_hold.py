@@ -1,13 +1,13 @@
-"""Hard data: points of the output whose values or places are given."""
+"""What is asked of an output beside the texture: points whose values or places are given, and a map to follow."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_mask
+from texrs._arrays import as_float, as_mask
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.kernels.appearance import Appearance, Guide
@@ -19,16 +19,20 @@ __all__ = ["Hold"]
 WEIGHT = 1500
 """Cost of another colour than the given one, in 1/256: a tenth of the range costs about as much as windows that have
 nothing to do with each other."""
+FOLLOW = 150
+"""The same of a map that is followed: there a third of the range costs as much."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hold:
-    """What is held, over the whole output; nothing where ``mask`` is none."""
+    """What is held, over the whole output; nothing where ``mask`` is none. And the two maps that are followed, 0 to 1."""
 
     image: Array
     mask: Bools | None = None
     values: Array | None = None
     coordinates: Floats | None = None
+    followed: tuple[Floats, Floats] | None = None
+    weight: int = 0
 
     @classmethod
     def of(cls, image: Array, shape: tuple[int, ...], held: object, values: object, coordinates: object) -> Hold:
@@ -63,6 +67,24 @@ class Hold:
             raise InvalidInput("values: those of held points must be finite")
         return cls(image, mask, np.where(mask[..., np.newaxis], given, np.zeros((), given.dtype)))
 
+    def following(self, guide: object, strength: float, shape: tuple[int, ...]) -> Hold:
+        """Add maps of the exemplar and of the output, of which the one is to show what the other says."""
+        weight = round(FOLLOW * as_float(strength, "guide_weight", 0, 100))
+        if guide is None:
+            return self
+        if self.values is not None and self.coordinates is None:
+            raise InvalidInput("guide: cannot be followed where values are held; give coordinates, or leave one out")
+        if not isinstance(guide, tuple | list) or len(guide) != 2:
+            raise InvalidInput("guide: needs two maps, of the exemplar and of the output")
+        axes = len(shape)
+        maps = [
+            _followed(g, name, s)
+            for g, name, s in zip(guide, ("exemplar", "output"), (self.image.shape[:axes], shape), strict=True)
+        ]
+        low, span = maps[0].min(), float(np.ptp(maps[0])) or 1.0
+        mine, theirs = (np.asarray(np.clip((m - low) / span, 0, 1)[..., np.newaxis], np.float32) for m in maps)
+        return replace(self, followed=(mine, theirs), weight=weight)
+
     @property
     def count(self) -> int:
         """Number of held points."""
@@ -78,6 +100,12 @@ class Hold:
 
     def guide(self, appearance: Appearance, region: Region, spacing: int) -> Guide | None:
         """Ask for the held values at a level: the mean of those that a point of the level stands for."""
+        if self.followed is not None and self.weight:
+            mine, theirs = self.followed
+            points = _pooled(np.ones((*theirs.shape[:-1], 1), np.float32), region, spacing)
+            wished = np.asarray(_pooled(theirs, region, spacing) / np.maximum(points, 1), np.float32)
+            everywhere = np.full(region.points, self.weight, np.uint16)
+            return Guide(_coded(_shrunk(mine, appearance.shape, spacing)), _coded(wished), everywhere)
         if self.mask is None or self.values is None or not self.mask.any():
             return None
         exemplar = _channels(self.image, self.image)
@@ -108,6 +136,21 @@ class Hold:
         index = np.ravel_multi_index(tuple(np.minimum(at // spacing, np.array(region.shape) - 1).T), region.shape)
         out[index] = np.rint(((held + 0.5) / spacing - 0.5) * ONE).astype(np.int32)
         return out.reshape(-1)
+
+
+def _followed(given: object, name: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Check a map: finite numbers that broadcast to a shape."""
+    values = np.asarray(given)
+    try:
+        whole = np.broadcast_to(values, shape)
+    except ValueError:
+        whole = None
+    if whole is None or values.dtype.kind not in "biuf" or not np.isfinite(values).all():
+        raise InvalidInput(
+            f"guide: the map of the {name} needs finite numbers that broadcast to {shape}, "
+            f"got {values.dtype} {values.shape}"
+        )
+    return whole.astype(np.float64)
 
 
 def _channels(values: Array, image: Array) -> Floats:

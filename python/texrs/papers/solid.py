@@ -39,7 +39,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from texrs._arrays import as_image, as_seed, as_size, as_wrap
 from texrs._progress import stage
@@ -78,6 +78,8 @@ def solid(
     held: Array | None = None,
     values: Array | None = None,
     coordinates: Array | None = None,
+    guide: tuple[ArrayLike, ArrayLike] | None = None,
+    guide_weight: float = 1.0,
     interpolation: Interpolation | None = None,
     analysis: Analysis | None = None,
     memory_limit: int | None = None,
@@ -113,6 +115,12 @@ def solid(
         What held voxels show, exactly, in the exemplar's dtype; other voxels are ignored.
     coordinates : (size, 3) array, optional
         Where held voxels look in the exemplar.
+    guide : (array_like, array_like), optional
+        Two maps of finite numbers that broadcast to the exemplar's axes and to ``size``: each voxel looks for a place where the
+        exemplar's map says about what the output's does. For exemplars with a trend, such as grains that grow downwards.
+    guide_weight : float
+        How much that counts beside looking like the exemplar, 0 to 100: at 1 a third of the range of the exemplar's map costs
+        as much as surroundings that have nothing to do with each other.
     interpolation : {"nearest", "linear", "cubic"}, optional
         Between the exemplar's samples; None is "nearest" for labels, else "cubic".
     analysis : Analysis, optional
@@ -175,6 +183,8 @@ def synthesize(
     held: Array | None = None,
     values: Array | None = None,
     coordinates: Array | None = None,
+    guide: tuple[ArrayLike, ArrayLike] | None = None,
+    guide_weight: float = 1.0,
     interpolation: Interpolation | None = None,
     analysis: Analysis | None = None,
     memory_limit: int | None = None,
@@ -190,8 +200,10 @@ def synthesize(
         Rows and columns of the result.
     interpolation : {"nearest", "linear", "cubic"}, optional
         Between the exemplar's samples; None is "nearest" for labels, else "cubic".
-    field, seed, wrap, quality, method, labels, repeat, held, values, coordinates, analysis, memory_limit, progress
+    field, seed, wrap, quality, method, labels, repeat, analysis, memory_limit, progress
         As of `solid`, with two axes for three.
+    held, values, coordinates, guide, guide_weight
+        Likewise.
 
     Returns
     -------
@@ -231,6 +243,8 @@ def _verb(
     held: Array | None,
     values: Array | None,
     coordinates: Array | None,
+    guide: tuple[ArrayLike, ArrayLike] | None,
+    guide_weight: float,
     interpolation: Interpolation,
     analysis: Analysis | None,
     memory_limit: int | None,
@@ -242,8 +256,9 @@ def _verb(
         raise InvalidInput(f"method: None or 'paper' is allowed, got {method!r}")
     if quality == "optimise" and min(region.shape) < COARSEST:
         quality = "preserve"  # What is so thin cannot be judged by a trial.
-    if method == "paper" and held is not None:
-        raise InvalidInput("held: the paper's method holds no points; leave out held, or method='paper'")
+    if method == "paper" and (held is not None or guide is not None):
+        what = "held" if held is not None else "guide"
+        raise InvalidInput(f"{what}: the paper's method knows none; leave out {what}, or method='paper'")
     settings, seed = settings_of(quality), as_seed(seed)
     if method == "paper":
         settings = settings_of("preserve")  # Windows of 5^D.
@@ -251,7 +266,7 @@ def _verb(
     if checked is not None:
         checked = checked.over(region.shape)
     check_memory(image, region, checked, memory_limit)
-    hold = Hold.of(image, region.shape, held, values, coordinates)
+    hold = Hold.of(image, region.shape, held, values, coordinates).following(guide, guide_weight, region.shape)
     if analysis is None:
         analysis = analyse(image, axes=axes, wrap=repeat, labels=labels, radii=settings.radii)
     elif not isinstance(analysis, Analysis):
@@ -284,6 +299,7 @@ def _verb(
         "repeats": list(analysis.wrap),
         "interpolation": how,
         "held": hold.count,
+        "guided": hold.followed is not None,
         "levels": grown.report,
     }
     return Synthesis(hold.shown(composite), source, grown.stages | {"composite": composite}, report)
@@ -377,7 +393,7 @@ class Grower:
 
     def stitches(self, region: Region, hold: Hold) -> bool:
         """Tell whether to start from patches stitched along minimum cuts: in pictures that nothing turns or guides."""
-        free = self.field is None and not hold.count
+        free = self.field is None and not hold.count and hold.followed is None
         # Of what is thinner there is nothing to cut.
         return self.settings.stitch and free and len(region.shape) == 2 and min(region.shape) >= COARSEST
 
