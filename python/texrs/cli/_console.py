@@ -20,8 +20,21 @@ import typer
 from texrs._typing import Progress
 from texrs.errors import TexrsError
 
-__all__ = ["Quiet", "Stopped", "Threads", "complain", "note", "run", "say", "watching"]
+__all__ = ["Out", "Quiet", "Source", "Stages", "Stopped", "Threads", "complain", "note", "run", "say", "watching"]
 
+Out = Annotated[
+    str, typer.Option("--out", "-o", metavar="OUT", help="File to write; its name says the format.", show_default=False)
+]
+Stages = Annotated[
+    str | None,
+    typer.Option(metavar="DIR", help="Folder for pictures of the stages and report.json.", show_default=False),
+]
+Source = Annotated[
+    str | None,
+    typer.Option(
+        "--source", "--map", metavar="FILE.npz", help="File for the source map, for texrs apply.", show_default=False
+    ),
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no progress.")]
 Threads = Annotated[
     int | None,

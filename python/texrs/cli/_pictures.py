@@ -9,7 +9,7 @@ import numpy as np
 import typer
 
 from texrs.cli import _files
-from texrs.cli._console import Quiet, Threads, note, watching
+from texrs.cli._console import Out, Quiet, Source, Stages, Threads, note, watching
 from texrs.cli._files import describe, named
 from texrs.completion import complete
 from texrs.cyclic import tile
@@ -19,15 +19,6 @@ __all__ = ["complete_command", "tile_command"]
 
 Picture = Annotated[
     str, typer.Argument(metavar="IN", help="The picture: an image file, or sample:NAME.", show_default=False)
-]
-Out = Annotated[str, typer.Option("--out", "-o", metavar="OUT", help="Image file to write.", show_default=False)]
-Stages = Annotated[
-    str | None,
-    typer.Option(metavar="DIR", help="Folder for pictures of the stages and report.json.", show_default=False),
-]
-Source = Annotated[
-    str | None,
-    typer.Option(metavar="FILE.npz", help="File for the source map, for texrs apply.", show_default=False),
 ]
 
 

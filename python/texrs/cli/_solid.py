@@ -13,7 +13,7 @@ import typer
 from texrs import io
 from texrs._typing import Array, Interpolation
 from texrs.cli import _files
-from texrs.cli._console import Quiet, Threads, note, watching
+from texrs.cli._console import Out, Quiet, Source, Stages, Threads, note, watching
 from texrs.cli._files import describe, named
 from texrs.cli._volumes import read_field, read_volume
 from texrs.errors import InvalidInput
@@ -23,9 +23,6 @@ from texrs.threads import threads
 
 __all__ = ["solid_command", "synthesize_command"]
 
-Out = Annotated[
-    str, typer.Option("--out", "-o", metavar="OUT", help="File to write; its name says the format.", show_default=False)
-]
 FieldText = Annotated[
     str | None,
     typer.Option(
@@ -69,16 +66,6 @@ Method = Annotated[str, typer.Option(help="default, or paper: the published algo
 Memory = Annotated[
     str | None,
     typer.Option(metavar="BYTES", help="Most memory that the work may take, as in 900M or 16G.", show_default="8G"),
-]
-Stages = Annotated[
-    str | None,
-    typer.Option(metavar="DIR", help="Folder for pictures of the stages and report.json.", show_default=False),
-]
-Source = Annotated[
-    str | None,
-    typer.Option(
-        "--source", "--map", metavar="FILE.npz", help="File for the source map, for texrs apply.", show_default=False
-    ),
 ]
 
 

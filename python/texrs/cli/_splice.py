@@ -12,7 +12,7 @@ import typer
 
 from texrs._typing import Array
 from texrs.cli import _files
-from texrs.cli._console import Quiet, Threads, note, watching
+from texrs.cli._console import Out, Quiet, Source, Stages, Threads, note, watching
 from texrs.cli._files import describe, named
 from texrs.errors import FileError, InvalidInput
 from texrs.papers.splice import self_splice, splice
@@ -22,21 +22,8 @@ from texrs.threads import threads
 
 __all__ = ["self_splice_command", "splice_command"]
 
-Out = Annotated[
-    str, typer.Option("--out", "-o", metavar="OUT", help="File to write; its name says the format.", show_default=False)
-]
 Seed = Annotated[int, typer.Option(help="Chooses what is random; the same seed gives the same bytes.")]
 Refine = Annotated[bool, typer.Option("--refine/--no-refine", help="Whether to refine what is not rigid.")]
-Stages = Annotated[
-    str | None,
-    typer.Option(metavar="DIR", help="Folder for pictures of the stages and report.json.", show_default=False),
-]
-Source = Annotated[
-    str | None,
-    typer.Option(
-        "--source", "--map", metavar="FILE.npz", help="File for the source map, for texrs apply.", show_default=False
-    ),
-]
 ENTRY = "An image file, sample:NAME, or an entry that texrs analyse wrote (.npz)."
 
 
