@@ -5,10 +5,13 @@ twice as large. Only ratios count, so maps that are measured have a geometric me
 and gives new ones; nothing is changed in place.
 
 ===================  ==========================================================================
+`from_mask`          the map measured from a mask of features
+`auto_mask`          a mask of features, found in the picture
 `from_angles`        the map of a plane seen aslant
 `slant_for_ratio`    the slant at which near texels are so many times as large as far ones
 `resample`           a map for another size: stretched, continued, drawn or by angles
 `extend`             a map continued into what is not known
+`edit`               a map changed by a list of edits
 `encode` `decode`    8-bit pictures of maps, for other programs
 `picture`            false colours with a scale bar, to look at
 ===================  ==========================================================================
@@ -25,19 +28,29 @@ References
 """
 
 from texrs.scale_maps._angles import STEEPEST, from_angles, slant_for_ratio
+from texrs.scale_maps._auto import auto_mask
+from texrs.scale_maps._edit import edit
 from texrs.scale_maps._extend import extend
 from texrs.scale_maps._maps import LARGEST, LEAST
-from texrs.scale_maps._pictures import decode, encode, picture
+from texrs.scale_maps._mask import Measure, from_mask
+from texrs.scale_maps._pictures import Encoding, decode, encode, picture
 from texrs.scale_maps._resample import resample
+from texrs.scale_maps._trend import Trend
 
 __all__ = [
     "LARGEST",
     "LEAST",
     "STEEPEST",
+    "Encoding",
+    "Measure",
+    "Trend",
+    "auto_mask",
     "decode",
+    "edit",
     "encode",
     "extend",
     "from_angles",
+    "from_mask",
     "picture",
     "resample",
     "slant_for_ratio",

@@ -14,7 +14,7 @@ from texrs.scale_maps._trend import Trend, as_trend, follow
 __all__ = ["extend"]
 
 
-def extend(scale: object, known: object, *, trend: Trend = "linear") -> Floats:
+def extend(scale: object, known: object, *, trend: Trend = "plane") -> Floats:
     """Continue a scale map into holes, and beyond what is known of it.
 
     The trend of the known part says how scales go on; by how much the map differs from it at the rim is spread over
@@ -26,9 +26,9 @@ def extend(scale: object, known: object, *, trend: Trend = "linear") -> Floats:
         Shape (H, W). What it holds where it is not known does not matter, not even NaN.
     known : array_like of bool
         Shape (H, W): where the map holds. Known pixels come back as they are.
-    trend : {"linear", "plane", "quadratic", "none"}
-        ``"linear"``: S is a plane, as that of every flat surface is. ``"plane"`` and ``"quadratic"`` are surfaces of
-        log S, for what is curved. ``"none"``: the membrane alone.
+    trend : {"plane", "linear", "quadratic", "none"}
+        ``"plane"``: a flat surface in perspective, whose S is linear in the picture. ``"linear"`` and ``"quadratic"``:
+        log S is, for what is curved. ``"none"``: the membrane alone.
 
     Returns
     -------

@@ -13,7 +13,8 @@ from texrs.scale_maps._maps import as_choice
 __all__ = ["TRENDS", "Trend", "as_trend", "follow"]
 
 Trend: TypeAlias = Literal["none", "plane", "linear", "quadratic"]
-"""What a map is brought to: itself, a plane or a quadratic of log S, or a plane of S."""
+"""What a map is brought to: itself; a flat surface in perspective, whose S is linear in the picture; or a linear or a
+quadratic function for log S."""
 
 TRENDS = ("none", "plane", "linear", "quadratic")
 _POINTS = 2**14
@@ -31,7 +32,7 @@ def as_trend(value: object) -> str:
 def follow(logs: Floats, trend: str, known: Bools | None = None) -> Floats:
     """Give the logarithms of a trend that is fitted robustly where the map is known, at every pixel.
 
-    A perspective view of a plane is linear in S. What a fit of it would continue below a quarter of the least scale,
+    What the fit of a plane would continue below a quarter of the least scale,
     or above four times the largest, is held there: nearer to the horizon nothing can be seen.
     """
     size = logs.shape
@@ -42,7 +43,7 @@ def follow(logs: Floats, trend: str, known: Bools | None = None) -> Floats:
     if trend == "none":
         return np.full(size, np.median(values), np.float32)
     basis = _basis(index // size[1], index % size[1], size, trend)
-    if trend == "linear":
+    if trend == "plane":
         # Noise is that of the logarithm, so large scales have more of it.
         weights = np.exp(-values)
         found = _robust(basis * weights[:, np.newaxis], np.ones_like(values))
@@ -51,7 +52,7 @@ def follow(logs: Floats, trend: str, known: Bools | None = None) -> Floats:
     rows, columns = np.ogrid[: size[0], : size[1]]
     surface: NDArray[Any] = _evaluate(found, rows, columns, size, trend)
     low, high = values.min() - np.log(4), values.max() + np.log(4)
-    if trend == "linear":
+    if trend == "plane":
         surface = np.asarray(np.log(np.maximum(surface, np.exp(low))), np.float64)
     return np.asarray(np.clip(surface, low, high), np.float32)
 
