@@ -81,7 +81,9 @@ def edit(scale: object, edits: Sequence[Mapping[str, Any]] | str) -> Floats:
     True
 
     """
-    logs = np.log(as_map(scale))
+    given = as_map(scale)
+    before = np.log(given)
+    logs = before
     for number, (operation, options) in enumerate(_read_all(edits), start=1):
         try:
             changed = _OPERATIONS[operation].change(logs, **options)
@@ -90,7 +92,8 @@ def edit(scale: object, edits: Sequence[Mapping[str, Any]] | str) -> Floats:
         # What was beyond the limits already may stay there.
         low, high = np.minimum(logs, np.log(np.float32(_LEAST))), np.maximum(logs, np.log(np.float32(_LARGEST)))
         logs = np.clip(changed, low, high).astype(np.float32)
-    return np.exp(logs)
+    # What no edit reached is what it was, to the last bit.
+    return np.where(logs == before, given, np.exp(logs))
 
 
 def _read_all(edits: object) -> list[tuple[str, dict[str, Any]]]:
