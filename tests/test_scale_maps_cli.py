@@ -55,6 +55,10 @@ KNOWN[30:60, 40:80] = False
             "--auto --hole hole.png --trend linear",
             lambda: scale_maps.from_mask(scale_maps.auto_mask(FLOOR.image, known=KNOWN), known=KNOWN, trend="linear"),
         ),
+        (
+            "--slant 30 --edit magnify,magnify",
+            lambda: scale_maps.edit(scale_maps.from_angles((96, 128), 30, 90), ["magnify"] * 2),
+        ),
         ("--slant 30 --edit edits.json", lambda: scale_maps.edit(scale_maps.from_angles((96, 128), 30, 90), EDITS)),
         (
             "--slant 30 --size 120x150 --mode extend",
@@ -89,10 +93,17 @@ def test_stages_are_pictures_to_look_at(here: Path, capsys: Capture) -> None:
     more = ["--edit", "edits.json", "--size", "64x64", "--stages", "stages", "--quiet"]
     assert main(["scale-map", "in.png", "-o", "out.png", "--mask", "mask.png", *more]) == 0
     names = sorted(p.name for p in Path("stages").iterdir())
-    assert names == ["01-mask.png", "02-scale.png", "03-edited.png", "04-resampled.png"]
+    assert names == ["01-mask.png", "02-scale.png", "03-edited.png", "04-resampled.png", "report.json"]
     assert (iio.imread("stages/01-mask.png") == iio.imread("mask.png")).all()
     assert (iio.imread("stages/02-scale.png") == scale_maps.picture(scale_maps.from_mask(FLOOR.mask))).all()
     assert capsys.readouterr().err == ""
+    report = json.loads(Path("stages/report.json").read_text(encoding="utf-8"))
+    assert report["edit"] == EDITS
+    assert report["size"] == [64, 64]
+    # What was done is done again.
+    again = ["scale-map", "in.png", "-o", "again.png", "--mask", "mask.png", "--edit", "stages/report.json", "-q"]
+    assert main([*again, "--size", "64x64"]) == 0
+    assert Path("again.png").read_bytes() == Path("out.png").read_bytes()
 
 
 @pytest.mark.parametrize(
@@ -110,9 +121,10 @@ def test_stages_are_pictures_to_look_at(here: Path, capsys: Capture) -> None:
         ("--mask mask.png --measure area2", "--measure: allowed are boundary, skeleton, count and area"),
         ("--mask mask.png --trend up", "--trend: allowed are none, plane, linear and quadratic; got 'up'"),
         ("--mask hole.png", "hole.png: holds too few features"),
-        ("--slant 3 --edit bad.json", "bad.json: number 1: op needs one of magnify"),
-        ("--slant 3 --edit none.json", "none.json: no such file or directory"),
-        ("--slant 3 --edit mask.png", "mask.png: is not a text file"),
+        ("--slant 3 --edit bad.json", "--edit: step 1 needs an 'op' among magnify"),
+        ("--slant 3 --edit none.json", "none.json: "),
+        ("--slant 3 --edit mask.png", "--edit: step 1 needs an 'op' among magnify"),
+        ("--slant 3 --edit [", "--edit: is not JSON ("),
         ("--slant 3 --mode user", "--mode: allowed are stretch and extend; got 'user'"),
         ("--slant 3 --encoding log", "--encoding: allowed are log2 and paper; got 'log'"),
         ("--slant 3 --size 0x5", "--size: each side must be at least 1"),

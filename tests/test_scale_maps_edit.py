@@ -136,6 +136,7 @@ def test_a_list_is_saved_and_replayed_and_undone_by_replay() -> None:
         assert np.allclose(scale_maps.edit(FLOOR, ALL[:count]), step_by_step, rtol=1e-5)
         step_by_step = scale_maps.edit(step_by_step, ALL[count : count + 1])
     assert np.allclose(done, step_by_step, rtol=1e-5)
+    assert (scale_maps.edit(FLOOR, ["magnify"]) == one("magnify", FLOOR)).all()
     assert (scale_maps.edit(FLOOR, []) == FLOOR).all()
     assert (one("magnify", FLOOR, region=[0, 0, 20, 20], feather=0)[20:] == FLOOR[20:]).all()
 
@@ -152,16 +153,17 @@ def test_any_list_gives_a_map_of_any_size(edits: list, rows: int, columns: int) 
 @pytest.mark.parametrize(
     ("edits", "message"),
     [
-        ("[{", r"^edits: not JSON \("),
-        ("{}", r"^edits: needs a list of edits, got dict$"),
-        (5, r"^edits: needs a list of edits, got int$"),
-        (["magnify"], r"^edits: number 1 needs a mapping such as"),
-        ([{}], r"^edits: number 1: op needs one of magnify, minify, set, .*, got None$"),
-        ([{"op": "erase"}], r"^edits: number 1: op needs one of .*, got 'erase'$"),
-        ([{"op": ["set"]}], r"^edits: number 1: op needs one of .*, got \['set'\]$"),
-        ([ALL[0], {"op": "set"}], r"^edits: number 2 \(set\): needs 'value'$"),
-        ([{"op": "set", "value": 1, "fog": 2}], r"^edits: number 1 \(set\): there is no 'fog'; allowed are value, region"),
-        ([{"op": "set", "value": 0}], r"^edits: number 1 \(set\): value needs a number from 0.125 to 8, got 0$"),
+        ("[{", r"^steps: not JSON \("),
+        ("{}", r"^steps: needs a list of steps, got dict$"),
+        (5, r"^steps: needs a list of steps, got int$"),
+        (["set"], r"^steps: step 1, set, needs value$"),
+        ([3], r"^steps: step 1 needs an 'op' among magnify, .*; got 3$"),
+        ([{}], r"^steps: step 1 needs an 'op' among magnify, minify, set, .*; got {}$"),
+        ([{"op": "erase"}], r"^steps: step 1 needs an 'op' among .*'erase'}$"),
+        ([{"op": ["set"]}], r"^steps: step 1 needs an 'op' among .*\['set'\]}$"),
+        ([ALL[0], {"op": "set"}], r"^steps: step 2, set, needs value$"),
+        ([{"op": "set", "value": 1, "fog": 2}], r"^steps: step 1, set, knows no fog; allowed are value, region"),
+        ([{"op": "set", "value": 0}], r"^steps: step 1, set: value needs a number from 0.125 to 8, got 0$"),
         ([{"op": "magnify", "factor": 0.5}], r"factor needs a number from 1 to 8, got 0.5$"),
         ('[{"op": "magnify", "factor": NaN}]', r"factor needs a number from 1 to 8, got nan$"),
         ([{"op": "magnify", "factor": True}], r"factor needs a number from 1 to 8, got True$"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import time
 from pathlib import Path
@@ -13,9 +14,10 @@ import typer
 from texrs import io, scale_maps
 from texrs._typing import Array, Floats
 from texrs.cli import _files
-from texrs.cli._console import Out, Quiet, Threads, note
+from texrs.cli._console import Out, Quiet, Stages, Threads, note
 from texrs.cli._files import named
-from texrs.errors import FileError, InvalidInput
+from texrs.cli._splice import read_edit
+from texrs.errors import InvalidInput
 from texrs.report import preview
 from texrs.threads import threads
 
@@ -23,8 +25,6 @@ __all__ = ["read_scale", "scale_map_command"]
 
 FLOATS = (".npy", ".npz", ".tif", ".tiff", ".exr")
 """Formats that keep the scales themselves; pictures of 8 bits keep them encoded."""
-LONGEST_EDITS = 2**24
-"""Bytes of a file of edits."""
 
 
 def scale_map_command(
@@ -91,7 +91,11 @@ def scale_map_command(
     ] = None,
     edit: Annotated[
         str | None,
-        typer.Option(metavar="EDITS.json", help="Edits of the map, one after the other.", show_default=False),
+        typer.Option(
+            metavar="WORDS|JSON|FILE.json",
+            help="What is done to the map: a list of steps, as the report's edit has it.",
+            show_default=False,
+        ),
     ] = None,
     size: Annotated[
         str | None, typer.Option(metavar="ROWSxCOLS", help="Size of the map.", show_default="that of the image")
@@ -107,34 +111,38 @@ def scale_map_command(
             show_default="log2 for formats without floats",
         ),
     ] = None,
-    stages: Annotated[
-        str | None,
-        typer.Option(
-            metavar="DIR", help="Folder for pictures of the mask and of the map in false colours.", show_default=False
-        ),
-    ] = None,
+    stages: Stages = None,
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
     """Make a scale map: how large the texels of a picture are at each place."""
     start = time.monotonic()
     sides = _files.parse_size(size)
-    given = {"mask": mask, "auto": auto or None, "slant": slant, "scale": scale}
-    _check_source(
-        given, {"tilt": tilt, "fov": fov}, {"measure": measure, "window": window, "trend": trend, "hole": hole}
-    )
-    if mode not in ("stretch", "extend"):
-        raise InvalidInput(f"--mode: allowed are stretch and extend; got {mode!r}")
-    if encoding not in (None, "log2", "paper"):
-        raise InvalidInput(f"--encoding: allowed are log2 and paper; got {encoding!r}")
+    sources = {"mask": mask, "auto": auto or None, "slant": slant, "scale": scale}
+    of_angles = {"tilt": tilt, "fov": fov}
+    of_masks = {"measure": measure, "window": window, "trend": trend, "hole": hole}
+    _check_source(sources, of_angles, of_masks)
+    for name, value, allowed in (
+        ("mode", mode, ("stretch", "extend")),
+        ("encoding", encoding, (None, "log2", "paper")),
+    ):
+        if value not in allowed:
+            raise InvalidInput(f"--{name}: allowed are {allowed[-2]} and {allowed[-1]}; got {value!r}")
     if stages is not None:
         _files.check_folder(stages)
-    edits = None if edit is None else _read_edits(edit)
+    steps = None if edit is None else read_edit(edit)
     pixels = _files.read_exemplar(image)
     levels = encoding or ("log2" if Path(out).suffix.lower() not in FLOATS else None)
     _files.check_output(out, np.ones(1, np.uint8 if levels else np.float32)[0], sides or pixels.shape[:2])
     shown: dict[str, Array] = {}
-    names = {"image": image, "mask": mask or image, "scale": scale, "known": hole, "edits": edit, "count": "--threads"}
+    names = {
+        "image": image,
+        "mask": mask or image,
+        "scale": scale,
+        "known": hole,
+        "steps": "--edit",
+        "count": "--threads",
+    }
     with named(**{key: str(name) for key, name in names.items()}), threads(count):
         if scale is not None:
             made = read_scale(scale, encoding or "log2")
@@ -147,21 +155,21 @@ def scale_map_command(
             made = scale_maps.from_mask(drawn, known=known, **options)
             shown["mask"] = drawn != 0
         shown["scale"] = scale_maps.picture(made)
-        if edits is not None:
-            made = scale_maps.edit(made, edits)
+        if steps is not None:
+            made = scale_maps.edit(made, steps)
             shown["edited"] = scale_maps.picture(made)
         if sides is not None:
             made = scale_maps.resample(made, sides, cast(Literal["stretch", "extend"], mode))
             shown["resampled"] = scale_maps.picture(made)
+    least, largest = float(made.min()), float(made.max())
     with _files.output(out) as temporary:
         io.write(temporary, made if levels is None else scale_maps.encode(made, cast(scale_maps.Encoding, levels)))
         if stages is not None:
-            _save(shown, stages)
-    extent = " x ".join(map(str, made.shape))
-    note(
-        f"wrote {out}: {extent}, scales {made.min():.3g} to {made.max():.3g}, in {time.monotonic() - start:.1f} s",
-        quiet=quiet,
-    )
+            asked = {**sources, **of_angles, **of_masks, "edit": steps, "mode": mode, "encoding": levels}
+            report = {name: value for name, value in asked.items() if value is not None}
+            _save(shown, {**report, "size": made.shape, "least": least, "largest": largest}, stages)
+    extent, seconds = " x ".join(map(str, made.shape)), time.monotonic() - start
+    note(f"wrote {out}: {extent}, scales {least:.3g} to {largest:.3g}, in {seconds:.1f} s", quiet=quiet)
 
 
 def read_scale(path: str, encoding: str = "log2") -> Floats:
@@ -198,19 +206,9 @@ def _same_size(mask: Array, pixels: Array, option: str) -> Array:
     return mask
 
 
-def _read_edits(path: str) -> str:
-    try:
-        if os.path.getsize(path) > LONGEST_EDITS:
-            raise InvalidInput(f"{path}: is longer than {LONGEST_EDITS} bytes; these are no edits")
-        return Path(path).read_text(encoding="utf-8")
-    except (OSError, ValueError) as error:
-        if isinstance(error, InvalidInput):
-            raise
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else "is not a text file"
-        raise FileError(f"{path}: {reason.lower()}") from None
-
-
-def _save(shown: dict[str, Array], folder: str) -> None:
+def _save(shown: dict[str, Array], report: dict[str, Any], folder: str) -> None:
     Path(folder).mkdir(parents=True, exist_ok=True)
     for number, (name, picture) in enumerate(shown.items(), start=1):
         io.write(os.path.join(folder, f"{number:02d}-{name}.png"), preview(picture))
+    with io.atomic(os.path.join(folder, "report.json")) as temporary:
+        temporary.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
