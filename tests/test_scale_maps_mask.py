@@ -235,6 +235,15 @@ def test_colours_of_one_lightness_are_told_apart() -> None:
     assert max((mask == TILES.mask).mean(), (mask != TILES.mask).mean()) > 0.95
 
 
+def test_large_pictures_are_looked_at_in_cells() -> None:
+    larger = np.repeat(np.repeat(TILES.image, 4, axis=0), 4, axis=1)[:-2, :-1]
+    known = np.ones(larger.shape[:2], bool)
+    known[400:600, 300:700] = False
+    mask = scale_maps.auto_mask(larger, detail=4)
+    assert (mask[1::4, 1::4] == scale_maps.auto_mask(TILES.image)).mean() > 0.97
+    assert (scale_maps.auto_mask(larger, detail=4, known=known)[known] == mask[known]).mean() > 0.97
+
+
 def test_every_dtype_gives_the_same_mask() -> None:
     grey = TILES.image[..., 1]
     mask = scale_maps.auto_mask(grey)
