@@ -14,7 +14,7 @@ from hypothesis.extra import numpy as arrays
 import scale_checks as checks
 from texrs import samples, scale_maps
 from texrs.errors import InvalidInput
-from texrs.scale_maps._mask import _outlines
+from texrs.scale_maps._mask import _middles, _outlines
 from texrs.scale_maps._windows import Lattice
 from texrs.threads import threads
 
@@ -181,6 +181,21 @@ def test_outlines_are_counted_once_and_for_both_sides() -> None:
     known[:, 9:] = False
     # The right side, and what of the two long ones is not known.
     assert _outlines(mask, known).sum() == 4 + 2 * 7
+
+
+def test_features_are_counted_at_their_middles_and_cut_ones_by_half() -> None:
+    mask = np.zeros((40, 40), bool)
+    mask[10:13, 20:25] = mask[30, 5] = True
+    mask[0:5, 30:33] = True
+    count = _middles(mask, None)
+    assert {tuple(at): int(count[tuple(at)]) for at in np.argwhere(count)} == {(11, 22): 2, (30, 5): 2, (2, 31): 1}
+    known = np.ones_like(mask)
+    known[10:13, 25:] = False
+    assert _middles(mask, known)[11, 22] == 1
+    # A ring and what is in its middle are two.
+    rows, columns = np.indices((41, 41)) - 20
+    ring = (np.hypot(rows, columns) > 8) & (np.hypot(rows, columns) < 11) | (np.hypot(rows, columns) < 3)
+    assert _middles(ring, None)[20, 20] == 4
 
 
 def test_borders_see_one_side_alone_and_are_corrected() -> None:
