@@ -10,7 +10,6 @@ middle 64 a side. With `--evaluator`, a module that has `compare_volumes` and `f
 from __future__ import annotations
 
 import argparse
-import importlib.util
 import os
 import sys
 import time
@@ -25,6 +24,7 @@ from texrs import fields, samples, volume
 from texrs.errors import TexrsError
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
+import evaluators
 import solid_checks as checks
 
 CROP = 64
@@ -47,8 +47,8 @@ error (exemplar's own + 3, + 6); S2 mean frequency over the exemplar's (0.90 to 
 field +-30 %); S3b particles (sample "particles"): count, mean and median size over the exemplar's (+-20, 25, 20 %, under a
 field +-35 %); S5 coherent neighbours (>= 0.65 identity, 0.55, 0.4 circular), largest patch (<= 6 % or four cells), most
 used cell over the mean (<= 15); S6 change at planes of 8, 16, 24, 32 over the mean (0.8 to 1.25), where it is more than
-at all others so far apart, isolated voxels in per cent; S9 a field of right angles against the turned exemplar: shares,
-frequency, distance of autocorrelations (<= 0.08).
+at all others so far apart, and by more than they differ; isolated voxels in per cent; S9 a field of right angles against
+the turned exemplar: shares, frequency, distance of autocorrelations (<= 0.08).
 Figures are means over the seeds; **bold** fails; "-" where a check does not apply.
 """
 
@@ -102,21 +102,12 @@ def cell(record: Any) -> str:
     return record.figures if record.passed else f"**{record.figures}**"
 
 
-def load_evaluator(path: Path | None) -> Any:
-    if path is None:
-        return None
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[path.stem] = module
-    spec.loader.exec_module(module)
-    return module
-
-
 def judged(evaluator: Any, image: np.ndarray, made: np.ndarray) -> str:
     """Give what the evaluator says of a volume: its figures, and which fail."""
-    scores = evaluator.compare_volumes(image, made)
+    try:
+        scores = evaluator.compare_volumes(image, made)
+    except ValueError as problem:
+        return f"not judged: {problem}"
     failed = evaluator.failures(scores)
     return ", ".join(f"**{k} {v:.2f}**" if k in failed else f"{k} {v:.2f}" for k, v in scores.items())
 
@@ -131,7 +122,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="file for the table; it is printed in any case")
     parser.add_argument("--pictures", type=Path, help="folder for slices of exemplar and results")
     options = parser.parse_args()
-    evaluator = load_evaluator(options.evaluator)
+    evaluator = evaluators.load(options.evaluator) if options.evaluator else None
     head = ["texture", "field", *HEAD, "verdict", "seconds"] + ["evaluator"] * (evaluator is not None)
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     print(*lines, sep="\n", flush=True)

@@ -151,8 +151,12 @@ def s6(exemplar: np.ndarray, image: np.ndarray) -> Found:
             # A lattice of the algorithm begins at its own planes; one of the texture itself, anywhere.
             combs = [change[first::period] for first in range(period)]
             over = [abs(float(np.log(max(comb.mean(), 1e-9) / change.mean()))) for comb in combs if len(comb)]
-            if len(over) == period and over[-1] - max(over[:-1]) > beyond:
-                worst, beyond = float(np.exp(over[-1])), over[-1] - max(over[:-1])
+            if len(over) < period:
+                continue
+            # Where the others differ much among themselves, one of them is always the largest.
+            more = over[-1] - max(over[:-1]) - float(np.std(over[:-1]))
+            if more > beyond:
+                worst, beyond = float(np.exp(over[-1])), more
     speckle = volume.isolated(seen)
     return Found(
         {

@@ -169,7 +169,7 @@ class Moves:
         ``reach`` is the share of their extents that translations and rotations may have. ``touches`` says on which axes
         the exemplar's border cuts the element: it then only slides along that border.
         """
-        if self.shifts:
+        if self.shifts and self.operations:
             _, h2, h3 = next(values), next(values), next(values)
             shift = self.shifts[min(int((h2 + h3 / 256) % 16 / 16 * len(self.shifts)), len(self.shifts) - 1)]
             return [] if any(touches) else [Operation("T", float(n), axis) for axis, n in enumerate(shift) if n]
