@@ -75,7 +75,7 @@ def measure(check, name, seed):
             return checks.d12(result.source)
         case "d13":
             return checks.d13(result.source)
-    return checks.d8(example, result.image, result.source, truth(name))
+    return checks.d8(example, result.image, result.source, truth(name), result.report)
 
 
 def known(*key):
@@ -385,6 +385,49 @@ def test_d8_fails_for_elements_lost_and_for_elements_shrunk(known_labels):
     # The whole picture at half the size, four times.
     source, image = a_map(dots.image, (cycle(dots.image, 160, 160) * 2) % 160)
     assert not checks.d8(dots.image, image, source, labels).passed
+
+
+def test_d8_counts_on_a_lattice_what_the_eye_counts():
+    """Halves of two threads that meet are one thread; half of the picture without threads fails all the same."""
+    weave = samples.load("weave", size=(160, 160), seed=3)
+    lattice = {"children": "components", "children_reason": "a lattice", "elements": 50}
+    # Every other thread is cut in two: its right half is that of its neighbour two threads away.
+    where = cycle(weave.image, 160, 160).copy()
+    middles = {k: np.argwhere(weave.labels == k).mean(axis=0) for k in np.unique(weave.labels)}
+    halves = [(weave.labels == k) & (where[..., 1] > middles[k][1]) for k in middles if k % 2]
+    where[np.any(halves, axis=0), 1] += 32
+    where %= 160
+    source, image = a_map(weave.image, where)
+    assert not checks.d8(weave.image, image, source, weave.labels).passed
+    found = checks.d8(weave.image, image, source, weave.labels, lattice)
+    assert found.passed, found
+    where[:, 80:] = np.argwhere(weave.labels == weave.labels.flat[0])[0]
+    source, image = a_map(weave.image, where)
+    assert not checks.d8(weave.image, image, source, weave.labels, lattice).passed
+
+
+def test_d8_knows_a_median_as_well_as_its_elements_say():
+    """A heap of few leaves of many sizes: the halves of a photograph differ by more than the limits of the median."""
+    sizes = np.random.default_rng(0).lognormal(6, 0.9, 30)
+    many = np.random.default_rng(1).lognormal(6, 0.9, 120)
+    found = checks.census(sizes, 100, many * 1.5 * np.median(sizes) / np.median(many), 400)
+    assert found.area == pytest.approx(1.5, abs=0.1)
+    assert found.passed, found
+    for wrong in (0.3, 2.5):
+        assert not checks.census(sizes, 100, many * wrong * np.median(sizes) / np.median(many), 400).passed
+    # Where all are alike the median is known.
+    alike = np.full(30, 400.0)
+    assert not checks.census(alike, 100, np.full(120, 600.0), 400).passed
+
+
+def test_d8_applies_where_elements_were_found(pebbles, noise, copy):
+    none = {"children": "grid", "children_reason": "components cover 1 %", "elements": 18}
+    assert not checks.d8(pebbles, noise, copy[0], report=none).applies
+    few = {"children": "components", "children_reason": "", "elements": 3}
+    assert not checks.d8(pebbles, noise, copy[0], report=few).applies
+    some = {**few, "elements": 30}
+    assert not checks.d8(pebbles, noise, copy[0], report=some).passed
+    assert checks.d8(pebbles, noise, copy[0], report=some).applies
 
 
 def test_d8_fails_for_noise(pebbles, noise, copy):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -180,13 +180,16 @@ class D8:
     elements: int
     """Elements that were counted in the exemplar."""
     applies: bool
+    sure: tuple[float, float] = (1.0, 1.0)
+    """Between which shares of it the median of the exemplar's elements is known: few of many sizes say little."""
     count_range: tuple[float, float] = (0.6, 1.5)
     area_range: tuple[float, float] = (0.6, 1.4)
 
     @property
     def passed(self) -> bool:
         in_count = self.count_range[0] <= self.count <= self.count_range[1]
-        return self.applies and in_count and self.area_range[0] <= self.area <= self.area_range[1]
+        low, high = self.area_range[0] * self.sure[0], self.area_range[1] * self.sure[1]
+        return self.applies and in_count and low <= self.area <= high
 
     @property
     def figures(self) -> str:
@@ -197,12 +200,24 @@ FEWEST = 6
 """Elements below which a census says nothing."""
 
 
-def d8(exemplar: np.ndarray, image: np.ndarray, source: Any, labels: np.ndarray | None = None) -> D8:
+def d8(
+    exemplar: np.ndarray,
+    image: np.ndarray,
+    source: Any,
+    labels: np.ndarray | None = None,
+    report: Mapping[str, Any] | None = None,
+) -> D8:
     """Count elements: by their true labels, looked up through the source map, or by a classifier of two colours.
 
     The classifier is fitted to the exemplar and applied to both pictures alike, so that what it does badly it does
-    badly to both.
+    badly to both. The report of the result says where there is nothing to count, which is where it found no elements of
+    its own; and where elements lie on a lattice: there the half of one and the half of another make one, whole to the
+    eye, but two to the labels.
     """
+    if report and "lattice" in report["children_reason"]:
+        labels = None
+    elif report and labels is None and (report["children"] == "grid" or report["elements"] < FEWEST):
+        return D8(np.nan, np.nan, 0, False)
     if labels is not None:
         where = np.clip(np.rint(source.coordinates).astype(int), 0, np.array(labels.shape) - 1)
         there = labels[where[..., 0], where[..., 1]]
@@ -232,7 +247,10 @@ def census(before: np.ndarray, size_before: int, after: np.ndarray, size_after: 
         return D8(np.nan, np.nan, len(before), False)
     per_area = (len(after) / size_after) / (len(before) / size_before)
     median = float(np.median(after) / np.median(before)) if len(after) else 0.0
-    return D8(per_area, median, len(before), True)
+    # Draws with return: between which values 2 of 3 other samples of as many elements would have their median.
+    draws = np.random.default_rng(0).choice(before, (400, len(before)))
+    sure = np.quantile(np.median(draws, axis=1), (1 / 6, 5 / 6)) / np.median(before)
+    return D8(per_area, median, len(before), True, (min(1.0, 1 / float(sure[1])), max(1.0, 1 / float(sure[0]))))
 
 
 def instances(labels: np.ndarray) -> np.ndarray:
