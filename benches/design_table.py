@@ -100,7 +100,7 @@ def measure(
         found["D12"].append(checks.d12(r.source))
         found["D13"].append(checks.d13(r.source))
     records = {name: worst(records) for name, records in found.items()}
-    records["D5"] = checks.d5(image, [r.image for r in results])
+    records["D5"] = checks.d5(image, [r.image for r in results], results[0].report)
     return records, results, float(np.median(seconds))
 
 

@@ -350,6 +350,19 @@ def test_d5_fails_for_seeds_that_agree(pebbles):
     assert not checks.d5(pebbles, [first, barely]).passed
 
 
+def test_d5_knows_how_much_textures_on_one_lattice_differ_at_most():
+    weave, *others = (samples.load("weave", size=(192, 192), seed=seed).image for seed in (3, 4, 5))
+    lattice = {"children_reason": "elements keep to a lattice"}
+    assert not checks.d5(weave, others).passed
+    found = checks.d5(weave, others, lattice)
+    assert 0.2 < found.own < 0.5
+    assert found.passed, found
+    barely = others[0].copy()
+    barely[:40] = others[1][:40]
+    for same in (others[0], barely):
+        assert not checks.d5(weave, [others[0], same], lattice).passed
+
+
 def test_d6_fails_for_a_blur_and_for_a_drift_of_colour(pebbles, blur):
     result = made("pebbles", 0)
     composite = result.stages["composite"]
