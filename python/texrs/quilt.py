@@ -37,7 +37,7 @@ __all__ = ["Picture", "quilt"]
 
 POOL, CANDIDATES = 48, 3
 """Matches that are looked at for what they repeat; those of them that are cut in."""
-REPETITION, GOOD, ON_LATTICE = 20.0, 0.1, 3.0
+REPETITION, GOOD, ON_LATTICE = 10.0, 0.1, 1.5
 """Charge for showing what all other patches show, in units of a match that is better than all but this share: where few
 places fit, as between things on plain ground, others would tear what they are put on. And on a lattice, where all places are
 much alike and must meet exactly, in units of a typical match."""
@@ -112,7 +112,7 @@ def quilt(
     shape = (rows[0].extent, columns[0].extent)
     members = [[i for i, p in enumerate(pictures) if p.kind == kind] for kind in range(shares.shape[-1])]
     finders = [Finder(pictures, mine, shape) for mine in members]
-    canvas = Quilt(pictures, size, overlap)
+    canvas = Quilt(pictures, size)
     windows = [Window(r, c) for r in rows for c in columns]
     wanted = deal(windows, size, shares, seed)
     for number, window in enumerate(windows):
@@ -287,11 +287,10 @@ class Quilt:
     The pixels of all pictures stand in one row; what a texture shows at a pixel is a place in that row.
     """
 
-    def __init__(self, pictures: Sequence[Picture], size: tuple[int, int], overlap: int) -> None:
+    def __init__(self, pictures: Sequence[Picture], size: tuple[int, int]) -> None:
         channels = pictures[0].colours.shape[2]
         self.pictures = pictures
         self.size = size
-        self.margin = overlap // (2 * CELL)
         self.place = np.zeros(size, np.uint32)
         self.label = np.zeros(size, np.uint32)
         self.pastes = 0
@@ -345,8 +344,7 @@ class Quilt:
         at, [places] = window.on(self.size), self.places([match], window)
         self.place[at] = np.where(mask, places, self.place[at])
         self.label[at] = np.where(mask, np.uint32(self.pastes), self.label[at])
-        seen = self.heart(self.cells[places[::CELL, ::CELL]])
-        self.used += np.bincount(seen.ravel(), minlength=len(self.used))
+        self.used[np.unique(self.cells[places[::CELL, ::CELL]])] += 1
         self.pastes += 1
 
     def cut(
@@ -385,17 +383,9 @@ class Quilt:
         return (near & ~turned).mean(axis=1), (near & turned).mean(axis=1)
 
     def repeated(self, shown: NDArray[np.uint32]) -> NDArray[np.float64]:
-        """Give how much of each match others show: 0 nothing, 1 what they all do once."""
-        shares: NDArray[np.float64] = self.used[self.heart(self.cells[shown])].mean(axis=(1, 2)) / self.pastes
+        """Give how much of each match others show: 0 nothing, 1 what they all do."""
+        shares: NDArray[np.float64] = self.used[self.cells[shown]].mean(axis=(1, 2)) / self.pastes
         return shares
-
-    def heart(self, patches: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Give what neighbours leave of patches of cells, (..., rows, columns): a seam takes about half of each overlap.
-
-        Were the rest counted, what lies near the border of an exemplar would seem used, and be shown even less.
-        """
-        rows, columns = (min(self.margin, (n - 1) // 2) for n in patches.shape[-2:])
-        return patches[..., rows : patches.shape[-2] - rows, columns : patches.shape[-1] - columns]
 
     def roll(self, axis: int, chance: float) -> None:
         """Let a cyclic axis begin at one of the calm lines, so that the border of the texture does not follow an edge."""
