@@ -105,6 +105,14 @@ def test_seeds_differ_from_each_other_and_from_the_exemplar(name):
     assert found.passed, found
 
 
+def test_seams_of_brickwork_run_through_bricks_and_not_along_joints():
+    """Joints go on across every seam, so that a seam which keeps to them shows: 1.5 times the usual gradient and more."""
+    for seed in SEEDS:
+        result = made("brick", seed)
+        assert "lattice" in result.report["children_reason"]
+        assert checks.d2(exemplar("brick"), result.image, result.source).mean <= 0.9
+
+
 def operations(result):
     return [o for log in result.report["operations"] for entry in log for o in entry.get("operations") or []]
 
