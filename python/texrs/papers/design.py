@@ -359,7 +359,7 @@ def deform_layers(source: Source, which: int, seed: int, number: int) -> tuple[L
 
 PATCH, OVERLAP = 0.6, 0.25
 """Side of a patch and overlap of two, as shares of the exemplar's shorter side."""
-WHOLENESS, JOINTED = 8.0, 1.0
+WHOLENESS, JOINTED = 8.0, 2.0
 """How many times dearer a seam is inside an element than between elements. And where elements of a lattice lie close, as bricks
 do: the joints between them go on across every seam, and one that kept to them would show."""
 CLOSE = 0.5
