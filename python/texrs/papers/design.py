@@ -49,11 +49,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_float, as_image, as_int, as_seed, as_size, as_wrap, check_memory, guidance
 from texrs._typing import Array, Floats, Progress
 from texrs.blend import SCREENING, blend, visibility
-from texrs.deform import (
-    Flip,
-    flip_coordinates,
-    flip_frame,
-)
+from texrs.deform import Flip, flip_coordinates, flip_frame
 from texrs.errors import InvalidInput
 from texrs.kernels.complete import complete
 from texrs.kernels.gather import gather
