@@ -96,11 +96,11 @@ def measure(
         found["D4"].append(checks.d4(image, r.image))
         found["D6"].append(checks.d6(image, before, r.image, r.source))
         found["D7"].append(checks.d7(image, r.image))
-        found["D8"].append(checks.d8(image, r.image, r.source, labels))
+        found["D8"].append(checks.d8(image, r.image, r.source, labels, r.report))
         found["D12"].append(checks.d12(r.source))
         found["D13"].append(checks.d13(r.source))
     records = {name: worst(records) for name, records in found.items()}
-    records["D5"] = checks.d5(image, [r.image for r in results])
+    records["D5"] = checks.d5(image, [r.image for r in results], results[0].report)
     return records, results, float(np.median(seconds))
 
 

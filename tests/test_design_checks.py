@@ -75,7 +75,7 @@ def measure(check, name, seed):
             return checks.d12(result.source)
         case "d13":
             return checks.d13(result.source)
-    return checks.d8(example, result.image, result.source, truth(name))
+    return checks.d8(example, result.image, result.source, truth(name), result.report)
 
 
 def known(*key):
@@ -101,8 +101,16 @@ def test_results_pass(check, name):
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=known("d5", n)) for n in NAMES])
 def test_seeds_differ_from_each_other_and_from_the_exemplar(name):
-    found = checks.d5(exemplar(name), [made(name, seed).image for seed in SEEDS])
+    found = checks.d5(exemplar(name), [made(name, seed).image for seed in SEEDS], made(name, 0).report)
     assert found.passed, found
+
+
+def test_seams_of_brickwork_run_through_bricks_and_not_along_joints():
+    """Joints go on across every seam, so that a seam which keeps to them shows: 1.5 times the usual gradient and more."""
+    for seed in SEEDS:
+        result = made("brick", seed)
+        assert "lattice" in result.report["children_reason"]
+        assert checks.d2(exemplar("brick"), result.image, result.source).mean <= 1.2
 
 
 def operations(result):
@@ -350,6 +358,19 @@ def test_d5_fails_for_seeds_that_agree(pebbles):
     assert not checks.d5(pebbles, [first, barely]).passed
 
 
+def test_d5_knows_how_much_textures_on_one_lattice_differ_at_most():
+    weave, *others = (samples.load("weave", size=(192, 192), seed=seed).image for seed in (3, 4, 5))
+    lattice = {"children_reason": "elements keep to a lattice"}
+    assert not checks.d5(weave, others).passed
+    found = checks.d5(weave, others, lattice)
+    assert 0.2 < found.own < 0.5
+    assert found.passed, found
+    barely = others[0].copy()
+    barely[:40] = others[1][:40]
+    for same in (others[0], barely):
+        assert not checks.d5(weave, [others[0], same], lattice).passed
+
+
 def test_d6_fails_for_a_blur_and_for_a_drift_of_colour(pebbles, blur):
     result = made("pebbles", 0)
     composite = result.stages["composite"]
@@ -385,6 +406,49 @@ def test_d8_fails_for_elements_lost_and_for_elements_shrunk(known_labels):
     # The whole picture at half the size, four times.
     source, image = a_map(dots.image, (cycle(dots.image, 160, 160) * 2) % 160)
     assert not checks.d8(dots.image, image, source, labels).passed
+
+
+def test_d8_counts_on_a_lattice_what_the_eye_counts():
+    """Halves of two threads that meet are one thread; half of the picture without threads fails all the same."""
+    weave = samples.load("weave", size=(160, 160), seed=3)
+    lattice = {"children": "components", "children_reason": "a lattice", "elements": 50}
+    # Every other thread is cut in two: its right half is that of its neighbour two threads away.
+    where = cycle(weave.image, 160, 160).copy()
+    middles = {k: np.argwhere(weave.labels == k).mean(axis=0) for k in np.unique(weave.labels)}
+    halves = [(weave.labels == k) & (where[..., 1] > middles[k][1]) for k in middles if k % 2]
+    where[np.any(halves, axis=0), 1] += 32
+    where %= 160
+    source, image = a_map(weave.image, where)
+    assert not checks.d8(weave.image, image, source, weave.labels).passed
+    found = checks.d8(weave.image, image, source, weave.labels, lattice)
+    assert found.passed, found
+    where[:, 80:] = np.argwhere(weave.labels == weave.labels.flat[0])[0]
+    source, image = a_map(weave.image, where)
+    assert not checks.d8(weave.image, image, source, weave.labels, lattice).passed
+
+
+def test_d8_knows_a_median_as_well_as_its_elements_say():
+    """A heap of few leaves of many sizes: the halves of a photograph differ by more than the limits of the median."""
+    sizes = np.random.default_rng(0).lognormal(6, 0.9, 30)
+    many = np.random.default_rng(1).lognormal(6, 0.9, 120)
+    found = checks.census(sizes, 100, many * 1.5 * np.median(sizes) / np.median(many), 400)
+    assert found.area == pytest.approx(1.5, abs=0.1)
+    assert found.passed, found
+    for wrong in (0.3, 2.5):
+        assert not checks.census(sizes, 100, many * wrong * np.median(sizes) / np.median(many), 400).passed
+    # Where all are alike the median is known.
+    alike = np.full(30, 400.0)
+    assert not checks.census(alike, 100, np.full(120, 600.0), 400).passed
+
+
+def test_d8_applies_where_elements_were_found(pebbles, noise, copy):
+    none = {"children": "grid", "children_reason": "components cover 1 %", "elements": 18}
+    assert not checks.d8(pebbles, noise, copy[0], report=none).applies
+    few = {"children": "components", "children_reason": "", "elements": 3}
+    assert not checks.d8(pebbles, noise, copy[0], report=few).applies
+    some = {**few, "elements": 30}
+    assert not checks.d8(pebbles, noise, copy[0], report=some).passed
+    assert checks.d8(pebbles, noise, copy[0], report=some).applies
 
 
 def test_d8_fails_for_noise(pebbles, noise, copy):

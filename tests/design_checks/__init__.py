@@ -9,7 +9,7 @@ Conventions: images are compared as floats in [0, 1], colour channels only; grad
 of the channels over an edge between neighbours; figures called "of 255" are multiplied by that.
 """
 
-from ._content import D5, D6, D7, D8, d5, d6, d7, d8
+from ._content import D5, D6, D7, D8, census, d5, d6, d7, d8
 from ._ground import MIRRORS, corners, nearest_patches, seams, unit
 from ._means import D9, D10, D11, D12, D13, d9, d10, d11, d12, d13, logistic
 from ._seams import D1, D2, D3, D4, D2b, D3b, d1, d2, d2b, d3, d3b, d4
@@ -31,6 +31,7 @@ __all__ = [
     "MIRRORS",
     "D2b",
     "D3b",
+    "census",
     "corners",
     "d1",
     "d2",

@@ -49,11 +49,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_float, as_image, as_int, as_seed, as_size, as_wrap, check_memory, guidance
 from texrs._typing import Array, Floats, Progress
 from texrs.blend import SCREENING, blend, visibility
-from texrs.deform import (
-    Flip,
-    flip_coordinates,
-    flip_frame,
-)
+from texrs.deform import Flip, flip_coordinates, flip_frame
 from texrs.errors import InvalidInput
 from texrs.kernels.complete import complete
 from texrs.kernels.gather import gather
@@ -359,8 +355,11 @@ def deform_layers(source: Source, which: int, seed: int, number: int) -> tuple[L
 
 PATCH, OVERLAP = 0.6, 0.25
 """Side of a patch and overlap of two, as shares of the exemplar's shorter side."""
-WHOLENESS = 8.0
-"""How many times dearer a seam is inside an element than between elements."""
+WHOLENESS, JOINTED = 8.0, 2.0
+"""How many times dearer a seam is inside an element than between elements. And where elements of a lattice lie close, as bricks
+do: the joints between them go on across every seam, and one that kept to them would show."""
+CLOSE = 0.5
+"""Share of the exemplar that elements cover from which on they lie close."""
 
 
 def large(
@@ -375,8 +374,11 @@ def large(
     """Stitch patches of the variants into a texture of any size, on the torus where it wraps."""
     inside = []
     for source in sources:
-        whole = source.parts.children in ("components", "labels")
-        inside.append(WHOLENESS * source.parts.depth(3) if whole else np.zeros(source.guide.shape[:2], np.float32))
+        parts = source.parts
+        whole = parts.children in ("components", "labels")
+        jointed = parts.lattice is not None and (parts.elements > 0).mean() > CLOSE
+        dearer = JOINTED if jointed else WHOLENESS
+        inside.append(dearer * parts.depth(3) if whole else np.zeros(source.guide.shape[:2], np.float32))
     side = min(min(i.shape) for i in inside)
     pictures = []
     for v in variants:
