@@ -23,7 +23,7 @@ from texrs.errors import InvalidInput
 from texrs.matching import Fold, Layout
 from texrs.texels import Texels
 
-__all__ = ["Extended", "Memory", "Parts", "extend", "parts_of"]
+__all__ = ["Extended", "Memory", "Parts", "available", "extend", "parts_of"]
 
 Points = NDArray[np.float64]
 Places = NDArray[np.int32]
@@ -203,28 +203,45 @@ def extend(entry: Texels, size: tuple[int, int], margin: int, *, whole: bool = T
     return _EXTENDED.get(entry, rest, lambda: _extend(entry, size, margin, whole=whole, exact=exact))
 
 
-def _extend(entry: Texels, size: tuple[int, int], margin: int, *, whole: bool, exact: bool) -> Extended:
+def available(entry: Texels, size: tuple[int, int], margin: int) -> int:
+    """Count the texels that `extend` would find; of disjoint ones a few may lie over others."""
+    layout, first, last = _bounds(entry, size, margin, exact=False)
+    of = layout.within(first.astype(float), last - 1.0)[1]
+    return int(np.count_nonzero(parts_of(entry).whole[of])) if entry.tag == "F=d" else len(of)
+
+
+def _bounds(
+    entry: Texels, size: tuple[int, int], margin: int, *, exact: bool
+) -> tuple[Layout, NDArray[np.intp], NDArray[np.intp]]:
+    """Give the layout of a texture as its pixels go on, and the first pixel and the one after the last, in its own."""
     shape = np.array(entry.mask.shape)
     offset = (np.array(size) - shape) // 2  # Of the picture in the output.
-    disjoint = entry.tag == "F=d"
-    points = parts_of(entry).points if disjoint else np.asarray(entry.points, np.float64)
-    if disjoint or exact:
+    if entry.tag == "F=d" or exact:
         # The texels that the border cuts are left out, or wanted: no pixel is in the way.
+        points = parts_of(entry).points if entry.tag == "F=d" else np.asarray(entry.points, np.float64)
         ends = [(-0.5, n - 0.5) if w else (0.0, n - 1.0) for n, w in zip(shape, entry.wrap, strict=True)]
         folds = [Fold(*e, w) for e, w in zip(ends, entry.wrap, strict=True)]
         layout = Layout(points, (folds[0], folds[1]), 0.0)
     else:
-        layout = Layout.of(points, entry.mask.shape, entry.wrap, beyond=False)
-    first = np.minimum(-margin, offset)
-    last = np.maximum(np.array(size) + margin, offset + shape)
+        layout = _FOLDED.get(
+            entry, None, lambda: Layout.of(np.asarray(entry.points, float), entry.mask.shape, entry.wrap, beyond=False)
+        )
+    return layout, np.minimum(-margin - offset, 0), np.maximum(np.array(size) + margin - offset, shape)
+
+
+def _extend(entry: Texels, size: tuple[int, int], margin: int, *, whole: bool, exact: bool) -> Extended:
+    layout, low, high = _bounds(entry, size, margin, exact=exact)
+    shape = np.array(entry.mask.shape)
+    offset = (np.array(size) - shape) // 2
+    disjoint = entry.tag == "F=d"
+    first, last = low + offset, high + offset
     check_memory(int(np.prod(last - first)) * EACH)
-    along = [layout.folds[a].apply(np.arange(first[a], last[a]) - float(offset[a])) for a in range(2)]
+    along = [layout.folds[a].apply(np.arange(low[a], high[a], dtype=float)) for a in range(2)]
     rows, columns = (np.asarray(np.rint(x), np.int32) for x, _ in along)
     table = np.stack(np.broadcast_arrays(rows[:, None], columns[None]), axis=-1)
     mirrored = np.stack(np.broadcast_arrays(along[0][1][:, None], along[1][1][None]), axis=-1)
     mask: Bools = entry.mask[rows[:, None], columns[None]]
-    low, high = (first - offset).astype(float), (last - 1 - offset).astype(float)
-    places, of, flips = layout.within(low, high)
+    places, of, flips = layout.within(low.astype(float), high - 1.0)
     inside = np.asarray(((places >= -0.5) & (places <= shape - 0.5)).all(axis=1) & ~flips.any(axis=1))
     if not whole:
         # Those of the picture, in its order.
@@ -302,4 +319,5 @@ def _nearest(place: Points) -> NDArray[np.intp]:
 
 
 _PARTS: Memory[Parts] = Memory(16)
+_FOLDED: Memory[Layout] = Memory(64)
 _EXTENDED: Memory[Extended] = Memory(4)

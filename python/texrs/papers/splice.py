@@ -48,12 +48,12 @@ from texrs.kernels.warp import from_points, mesh
 from texrs.matching import spacing
 from texrs.papers._splice_edit import as_steps
 from texrs.papers._splice_entry import as_texels
-from texrs.papers._splice_layout import Match, apart, edited_match, matched, snapped, void_of
+from texrs.papers._splice_layout import Match, apart, edited_match, matched, snapped, trimmed, void_of
 from texrs.papers._splice_literal import literal_field, literal_fill, literal_match
 from texrs.papers._splice_pictures import Stages
 from texrs.papers._splice_refine import Draft, fill, refined_places
 from texrs.papers._splice_source import parts_of
-from texrs.papers._splice_warp import carried, stretched
+from texrs.papers._splice_warp import STEP, carried, stretched
 from texrs.report import Synthesis
 from texrs.source_map import SourceMap
 from texrs.texels import Texels
@@ -145,6 +145,7 @@ def splice(
         found = apart(mine, found)
     elif snap_rows:
         found = replace(found, targets=snapped(found.targets, 0.25 * spacing(found.targets)))
+    found = trimmed(mine, found, (shape[0], shape[1]))
     watch("match", 1.0)
     return made(
         mine, found, (shape[0], shape[1]), number, method=method, refined=bool(refine), watch=watch, theirs=theirs
@@ -265,7 +266,7 @@ def made(
         "triangles": warped.triangles,
         "flipped": warped.flipped / max(warped.triangles, 1),
         "flipped_rigid": warped.flipped_rigid / max(warped.triangles, 1),
-        "system": list(found.source.mask.shape),
+        "system": [-(-n // STEP) if a.tag == "F=d" else n for n in found.source.mask.shape],
         "matches": matches(a, found),
     }
     watch("done", 1.0)
@@ -298,15 +299,21 @@ def deform(a: Texels, found: Match) -> Field:
     """Move every pixel of the texture, as its tag says."""
     source = found.source
     shape, origin = source.mask.shape, np.array(source.origin)
-    grid = np.moveaxis(np.indices(shape), 0, -1) + origin
     if a.tag == "F=d":
         delta = carried(source.instance, whole_shifts(found))
-        return Field(grid + delta, source.instance > 0, void_of(source, found.of))
+        return Field(moved(delta, source.origin), source.instance > 0, void_of(source, found.of))
     rigid = source.mask if a.tag == "F=c" else ~source.mask
     pins = np.rint(source.points[found.of]).astype(np.intp) - origin
     inside = ((pins >= 0) & (pins < np.array(shape))).all(axis=1)
     delta = stretched(rigid, pins[inside], found.shift[inside], upright=a.tag == "B=c")
-    return Field(grid + delta, rigid, np.zeros(shape, bool))
+    return Field(moved(delta, source.origin), rigid, np.zeros(shape, bool))
+
+
+def moved(delta: NDArray[np.float64], origin: tuple[int, int]) -> NDArray[np.float64]:
+    """Turn displacements, in place, into where pixels go: the first one lies at the origin."""
+    delta[..., 0] += np.arange(origin[0], origin[0] + delta.shape[0])[:, None]
+    delta[..., 1] += np.arange(origin[1], origin[1] + delta.shape[1])
+    return delta
 
 
 def whole_shifts(found: Match) -> NDArray[np.float64]:
