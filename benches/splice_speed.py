@@ -27,12 +27,7 @@ ROUNDS = 5
 
 
 def entry(name: str, side: int) -> Texels:
-    sample = samples.load(name, size=(side, side))
-    assert sample.centres is not None
-    assert sample.mask is not None
-    return Texels(
-        sample.image, sample.centres, sample.mask, (23, 23), sample.tag or "F=d", np.ones(len(sample.centres))
-    )
+    return Texels.of_sample(samples.load(name, size=(side, side)))
 
 
 def best(

@@ -152,7 +152,7 @@ class Fold:
         turns = np.arange(math.floor((low - self.low) / side) - 1, math.floor((high - self.low) / side) + 2)
         mirrored = np.zeros(len(turns), bool) if self.wrap else turns % 2 == 1
         at = self.low + turns * side + np.where(mirrored, self.high - x[:, None], x[:, None] - self.low)
-        return at, turns, (at >= low) & (at <= high)
+        return np.asarray(at, np.float64), turns, (at >= low) & (at <= high)
 
 
 def fold_of(points: Points, axis: int, ends: tuple[float, float], *, wrap: bool, beyond: bool) -> Fold:

@@ -270,7 +270,7 @@ def snapped(points: Points, reach: float) -> Points:
     return out
 
 
-def void_of(source: Extended, of: NDArray[np.intp], grown: int = 3) -> Bools:
+def void_of(source: Extended, of: NDArray[np.intp], grown: int = 1) -> Bools:
     """Mark what is erased: texels that go nowhere, and strays, with the pixels around them."""
     from scipy.ndimage import maximum_filter
 

@@ -44,7 +44,9 @@ class Stages(Mapping[str, Array]):
         self._draw |= {
             "mask": lambda: masked(shown, a.mask),
             "matching": lambda: lines(
-                shown[source.table[..., 0], source.table[..., 1]], source.points[found.of] - origin, found.targets - origin
+                shown[source.table[..., 0], source.table[..., 1]],
+                source.points[found.of] - origin,
+                found.targets - origin,
             ),
             "warped mesh": lambda: meshed(target, source.mask, draft.known.shape),
             "before refinement": lambda: before(shown, draft),

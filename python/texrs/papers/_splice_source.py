@@ -206,7 +206,7 @@ def extend(entry: Texels, size: tuple[int, int], margin: int, *, whole: bool = T
 def available(entry: Texels, size: tuple[int, int], margin: int) -> int:
     """Count the texels that `extend` would find; of disjoint ones a few may lie over others."""
     layout, first, last = _bounds(entry, size, margin, exact=False)
-    of = layout.within(first.astype(float), last - 1.0)[1]
+    of = layout.within(first.astype(np.float64), (last - 1).astype(np.float64))[1]
     return int(np.count_nonzero(parts_of(entry).whole[of])) if entry.tag == "F=d" else len(of)
 
 
@@ -241,7 +241,7 @@ def _extend(entry: Texels, size: tuple[int, int], margin: int, *, whole: bool, e
     table = np.stack(np.broadcast_arrays(rows[:, None], columns[None]), axis=-1)
     mirrored = np.stack(np.broadcast_arrays(along[0][1][:, None], along[1][1][None]), axis=-1)
     mask: Bools = entry.mask[rows[:, None], columns[None]]
-    places, of, flips = layout.within(low.astype(float), high - 1.0)
+    places, of, flips = layout.within(low.astype(np.float64), (high - 1).astype(np.float64))
     inside = np.asarray(((places >= -0.5) & (places <= shape - 0.5)).all(axis=1) & ~flips.any(axis=1))
     if not whole:
         # Those of the picture, in its order.

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._typing import Bools, Labels
+from texrs._typing import Bools
 from texrs.errors import InvalidInput
 from texrs.kernels.sparse import Cholesky
 
@@ -70,8 +70,8 @@ def _key(*parts: object) -> bytes:
 # --- disjoint foreground: texels move whole --------------------------------------------------------------------------
 
 
-def carried(instance: Labels, shift: Points) -> NDArray[np.float64]:
-    """Give the displacement of every pixel where texels move whole, and the ground between them goes along smoothly.
+def carried(held: Bools, own: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Give the displacement of every pixel where texels move as they are told, and the ground between goes along smoothly.
 
     The limit of Eq. 5 for lambda_G and lambda_R without bound and epsilon = 0: each texel moves by its own pin alone. What
     is left is the ground, whose displacement is harmonic: no pixel moves further than the texels around it. It is so
@@ -79,47 +79,42 @@ def carried(instance: Labels, shift: Points) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    instance : (H, W) int32
-        The texel of each pixel, counted from 1; 0 on the ground.
-    shift : (n, 2) float64
-        How far each texel moves.
+    held : (H, W) bool
+        Texels; elsewhere is ground.
+    own : (2, H, W) float32
+        How far pixels of texels move along rows and columns.
 
     Returns
     -------
     (H, W, 2) float64
 
     """
-    moved = np.concatenate([np.zeros((1, 2)), shift])
-    texel, out = instance > 0, np.empty((*instance.shape, 2))
-    for axis, coarse in enumerate(np.moveaxis(_harmonic(instance[::STEP, ::STEP], moved), -1, 0)):
-        field = _between(coarse, instance.shape)
-        own = moved[:, axis].astype(np.float32)[instance]
-        np.copyto(field, own, where=texel)
+    out = np.empty((*held.shape, 2))
+    for axis, coarse in enumerate(_harmonic(held[::STEP, ::STEP], own[:, ::STEP, ::STEP])):
+        field = _between(coarse, held.shape)
+        np.copyto(field, own[axis], where=held)
         for _ in range(EVENED):
             _even(field)
-            np.copyto(field, own, where=texel)
+            np.copyto(field, own[axis], where=held)
         out[..., axis] = field
     return out
 
 
-def _harmonic(instance: Labels, moved: Points) -> NDArray[np.float64]:
+def _harmonic(held: Bools, own: NDArray[np.float32]) -> NDArray[np.float64]:
     """Let the ground's displacement be at each pixel the mean of those beside it."""
-    shape, free = instance.shape, instance == 0
-    out = moved[instance]
+    shape, free = held.shape, ~held
+    out = np.where(held, own, 0.0).astype(np.float64)
     if not free.any():
         return out
-    number = np.full(shape, -1, np.int64)
-    number[free] = np.arange(np.count_nonzero(free))
     key = _key("carried", np.packbits(free), shape)
-    solver = factors({key: lambda: _laplacian(free, number)})[key]
-    flow = np.zeros((*shape, 2))
-    for axis in range(2):
-        o, i = (np.moveaxis(a, axis, 0) for a in (flow, out))
-        f: Bools = np.moveaxis(free, axis, 0)
-        # What a texel's pixel hands to the ground beside it; the ground itself has nothing yet.
-        o[:-1] += np.where(f[:-1, :, None], i[1:], 0.0)
-        o[1:] += np.where(f[1:, :, None], i[:-1], 0.0)
-    out[free] = solver.solve(flow[free])
+    solver = factors({key: lambda: _laplacian(free)})[key]
+    flow = np.zeros((2, *shape))
+    # What a texel's pixel hands to the ground beside it; the ground itself has nothing yet.
+    flow[:, :-1] += out[:, 1:]
+    flow[:, 1:] += out[:, :-1]
+    flow[:, :, :-1] += out[:, :, 1:]
+    flow[:, :, 1:] += out[:, :, :-1]
+    out[:, free] = solver.solve(flow[:, free].T).T
     return out
 
 
@@ -145,10 +140,12 @@ def _even(field: NDArray[np.float32]) -> None:
     field *= 0.25
 
 
-def _laplacian(free: Bools, number: NDArray[np.int64]) -> Any:
+def _laplacian(free: Bools) -> Any:
     from scipy.sparse import coo_array
 
     count = int(np.count_nonzero(free))
+    number = np.full(free.shape, -1, np.int64)
+    number[free] = np.arange(count)
     degree = np.zeros(free.shape)
     rows, columns = [], []
     for axis in range(2):

@@ -60,6 +60,9 @@ from texrs.texels import Texels
 
 __all__ = ["self_splice", "splice"]
 
+SHRUNK = 0.9
+"""How far what is erased moves towards its middle."""
+
 Method: TypeAlias = Literal["paper", "preview"] | None
 Edit: TypeAlias = str | Mapping[str, Any] | Sequence[Mapping[str, Any]]
 
@@ -117,14 +120,10 @@ def splice(
 
     Examples
     --------
-    >>> import numpy as np
     >>> import texrs
     >>> from texrs.texels import Texels
-    >>> def entry(sample, side):
-    ...     count = len(sample.centres)
-    ...     return Texels(sample.image, sample.centres, sample.mask, (side, side), sample.tag, np.ones(count))
-    >>> buttons = entry(texrs.samples.dots((128, 128)), 21)
-    >>> stones = entry(texrs.samples.pebbles((128, 128)), 21)
+    >>> buttons = Texels.of_sample(texrs.samples.dots((128, 128)))
+    >>> stones = Texels.of_sample(texrs.samples.pebbles((128, 128)))
     >>> result = texrs.splice(buttons, stones, seed=1)
     >>> result.image.shape, bool((result.source.render(buttons.image) == result.image).all())
     ((128, 128, 3), True)
@@ -195,13 +194,11 @@ def self_splice(
 
     Examples
     --------
-    >>> import numpy as np
     >>> import texrs
     >>> from texrs.texels import Texels
-    >>> dots = texrs.samples.dots((96, 96))
-    >>> entry = Texels(dots.image, dots.centres, dots.mask, (21, 21), "F=d", np.ones(len(dots.centres)))
+    >>> entry = Texels.of_sample(texrs.samples.dots((96, 96)))
     >>> same = texrs.self_splice(entry, {"op": "move", "texel": 0, "by": [0, 0]})
-    >>> bool((same.image == dots.image).all())
+    >>> bool((same.image == entry.image).all())
     True
     >>> texrs.self_splice(entry, "randomise", seed=5).report["edit"]
     [{'op': 'randomise', 'seed': 5}]
@@ -300,7 +297,7 @@ def deform(a: Texels, found: Match) -> Field:
     source = found.source
     shape, origin = source.mask.shape, np.array(source.origin)
     if a.tag == "F=d":
-        delta = carried(source.instance, whole_shifts(found))
+        delta = carried(*told(found))
         return Field(moved(delta, source.origin), source.instance > 0, void_of(source, found.of))
     rigid = source.mask if a.tag == "F=c" else ~source.mask
     pins = np.rint(source.points[found.of]).astype(np.intp) - origin
@@ -316,18 +313,52 @@ def moved(delta: NDArray[np.float64], origin: tuple[int, int]) -> NDArray[np.flo
     return delta
 
 
-def whole_shifts(found: Match) -> NDArray[np.float64]:
-    """Give the whole pixels that every texel moves by; those that go nowhere go along with the ones around them."""
+def told(found: Match) -> tuple[Bools, NDArray[np.float32]]:
+    """Give what does not go along with the ground, and how far its pixels move, (2, H, W).
+
+    Texels move whole. What is erased shrinks besides towards its middle: it then leaves a smaller hole. But where a picture
+    stays itself, nothing stirs that is not told to.
+    """
+    from scipy.ndimage import label
+
+    source = found.source
+    if source.own:
+        moved = np.zeros((2, len(source.points) + 1), np.float32)
+        moved[:, 1:] = whole_shifts(found).T
+        return source.instance > 0, moved[:, source.instance]
+    pieces, count = label(source.stray)
+    number = np.where(pieces > 0, pieces + len(source.points), source.instance)
+    area = np.maximum(np.bincount(pieces.ravel(), minlength=count + 1)[1:], 1)
+    at = np.nonzero(pieces)
+    sums = [np.bincount(pieces[at], a, minlength=count + 1)[1:] for a in at]
+    middle = np.concatenate([source.points - source.origin, np.stack([s / area for s in sums], axis=-1)])
+    shift = np.zeros((2, len(middle) + 1), np.float32)
+    shift[:, 1:] = whole_shifts(found, middle + source.origin).T
+    own = shift[:, number]
+    idle = np.ones(len(middle) + 1, bool)
+    idle[0] = False
+    idle[found.of + 1] = False
+    gone = np.nonzero(idle[number])
+    own[(slice(None), *gone)] += SHRUNK * (middle[number[gone] - 1] - np.stack(gone, axis=-1)).T
+    return number > 0, own
+
+
+def whole_shifts(found: Match, points: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+    """Give the whole pixels that every texel moves by; those that go nowhere go along with the ones around them.
+
+    So do further ``points`` that follow those of the source, where some are given.
+    """
     from scipy.spatial import cKDTree
 
     source = found.source
-    shift = np.zeros((len(source.points), 2))
+    points = source.points if points is None else points
+    shift = np.zeros((len(points), 2))
     shift[found.of] = np.rint(found.shift)
     idle = np.ones(len(shift), bool)
     idle[found.of] = False
     if idle.any():
         count = min(4, len(found.of))
-        far, near = cKDTree(source.points[found.of]).query(source.points[idle], k=[*range(1, count + 1)])
+        far, near = cKDTree(source.points[found.of]).query(points[idle], k=[*range(1, count + 1)])
         weight = 1 / (far**2 + 1e-6)
         mean = (weight[..., None] * shift[found.of][near]).sum(axis=1) / weight.sum(axis=1)[:, None]
         shift[idle] = np.rint(mean)
@@ -350,9 +381,17 @@ class Warped:
 
 
 def drawn(field: Field, size: tuple[int, int], progress: Callable[[float], object] | None) -> Warped:
-    """Draw the dense mesh."""
-    found = mesh(field.target, field.rigid, void=field.void, size=size, progress=progress)
-    there = _pixels(found.source, field.rigid.shape)
+    """Draw the dense mesh: the rows and columns of it that come into the output."""
+    seen = np.ones(field.rigid.shape, bool)
+    for axis in range(2):
+        seen &= (field.target[..., axis] > -2) & (field.target[..., axis] < size[axis] + 1)
+    part, first = (slice(None), slice(None)), (0, 0)
+    if seen.any():
+        (top, bottom), (left, right) = (np.flatnonzero(seen.any(axis=1 - a))[[0, -1]].tolist() for a in range(2))
+        first = (max(top - 1, 0), max(left - 1, 0))
+        part = (slice(first[0], bottom + 2), slice(first[1], right + 2))
+    found = mesh(field.target[part], field.rigid[part], void=field.void[part], size=size, progress=progress)
+    there = _pixels(found.source, field.rigid[part].shape) + first
     return Warped(there, found.source.label > 0, field.target, found.triangles, found.flipped, found.flipped_heavy)
 
 
@@ -404,6 +443,11 @@ def drafted(a: Texels, found: Match, warped: Warped, *, whole: bool) -> tuple[Dr
     y, x = warped.there[..., 0], warped.there[..., 1]
     places, mirrored = source.table[y, x], source.mirrored[y, x]
     stays = copied(places, mirrored, known)
+    step = found.shift[0]
+    if source.own and (found.shift == step).all():
+        # The picture is moved as a whole: its own pixels stay, whatever comes beside them.
+        rows, columns = np.ogrid[: known.shape[0], : known.shape[1]]
+        stays |= known & (places[..., 0] == rows - step[0]) & (places[..., 1] == columns - step[1])
     label = np.zeros(known.shape, np.uint32)
     if whole and a.tag == "F=d":
         goal = np.zeros(len(source.points) + 1, np.uint32)
@@ -411,10 +455,11 @@ def drafted(a: Texels, found: Match, warped: Warped, *, whole: bool) -> tuple[Dr
         number = source.instance[y, x]
         label = np.where(known, goal[number], 0).astype(np.uint32)
         # Rims that the mesh draws out are no texels: what is rigid lies exactly where its texel goes.
-        shift = np.zeros((len(goal), 2), np.intp)
-        shift[1:] = whole_shifts(found)
-        away = warped.there + np.array(source.origin) + shift[number] - np.moveaxis(np.indices(known.shape), 0, -1)
-        drawn_out = (number > 0) & (away != 0).any(axis=-1)
+        shift = np.zeros((2, len(goal)), np.intp)
+        shift[:, 1:] = whole_shifts(found).T
+        rows, columns = np.ogrid[: known.shape[0], : known.shape[1]]
+        here = (y + shift[0][number] == rows - source.origin[0]) & (x + shift[1][number] == columns - source.origin[1])
+        drawn_out = (number > 0) & ~here
         label[drawn_out] = 0
         known = known & ~drawn_out
         kinds = ((parts_of(a).region > 0) | a.mask).astype(np.uint8)
@@ -429,17 +474,15 @@ def copied(places: NDArray[np.int32], mirrored: Bools, known: Bools) -> Bools:
     from scipy.ndimage import maximum_filter
 
     broken = np.zeros(known.shape, bool)
+    halves = (slice(None, -1), slice(1, None))
     for axis in range(2):
-        step = np.diff(places, axis=axis)
-        first, second = (np.delete(mirrored, end, axis=axis)[..., axis] for end in (-1, 0))
-        forth = np.zeros(2, np.int32)
-        forth[axis] = 1
-        joined = ((step == forth).all(-1) & ~(first & second)) | ((step == -forth).all(-1) & (first | second))
-        ends = (slice(None, -1), slice(1, None))
-        apart, there = np.moveaxis(~joined, axis, 0), np.moveaxis(known, axis, 0)
-        for end in ends:
-            b = np.moveaxis(broken, axis, 0)[end]
-            b |= apart & there[ends[0]] & there[ends[1]]
+        along, across = (np.diff(places[..., a], axis=axis) for a in (axis, 1 - axis))
+        there, turned, b = (np.moveaxis(v, axis, 0) for v in (known, mirrored[..., axis], broken))
+        both, one = (f(*(np.moveaxis(turned[h], 0, axis) for h in halves)) for f in (np.logical_and, np.logical_or))
+        joined = (across == 0) & (((along == 1) & ~both) | ((along == -1) & one))
+        apart = ~np.moveaxis(joined, axis, 0) & there[halves[0]] & there[halves[1]]
+        for half in halves:
+            b[half] |= apart
     rough = maximum_filter(broken.astype(np.uint8), 3) > 0
     return np.asarray(known & ~rough)
 

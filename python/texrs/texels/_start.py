@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from texrs._typing import Bools, Floats
 from texrs.errors import InvalidInput
+from texrs.matching import spacing
 from texrs.segment import segment
 from texrs.segment.regularity import lattice
 from texrs.texels._clean import components
 from texrs.texels._entry import Tag
 from texrs.texels._given import LEAST, Box, as_box
 from texrs.texels._mask import disc, lab, odd
-from texrs.texels._points import spacing
 from texrs.texels._search import Found, search, vectors
 
 __all__ = ["Proposal", "propose"]

@@ -261,6 +261,10 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
         let mut attempts = 0;
         let (mut best, mut least) = (places[p], i64::MAX);
         for &(place, moved) in &from[..count] {
+            // Nothing is better than what fits exactly.
+            if least == 0 {
+                break;
+            }
             let sample = nearest(place);
             let at = self.appearance.clamped(sample);
             let fraction = sub(place, sample.map(|x| x * ONE));
