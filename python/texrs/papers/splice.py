@@ -339,7 +339,7 @@ def told(found: Match) -> tuple[Bools, NDArray[np.float32]]:
     idle[0] = False
     idle[found.of + 1] = False
     gone = np.nonzero(idle[number])
-    own[(slice(None), *gone)] += SHRUNK * (middle[number[gone] - 1] - np.stack(gone, axis=-1)).T
+    own[:, gone[0], gone[1]] += SHRUNK * (middle[number[gone] - 1] - np.stack(gone, axis=-1)).T
     return number > 0, own
 
 
