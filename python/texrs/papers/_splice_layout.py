@@ -36,6 +36,8 @@ SPARE = 1.2
 """Texels there should be for each target."""
 TURN = 0.75
 """A turn must cost so much less than a smaller one: lattices have several that cost nearly the same."""
+OFFSETS, NEARER = 6, 0.9
+"""Offsets of a connected figure's layout that are tried along each axis, and how much less one must cost."""
 ROOM = 1.08
 """Least distance of texels in their diameters."""
 
@@ -100,11 +102,13 @@ def packing(a: Texels, distances: Points) -> float:
     return max(1.0, ROOM * diameter / max(float(np.percentile(distances, 25)), 1e-9))
 
 
-def targets(layout: Layout, scale: float, angle: float, size: tuple[int, int], beyond: float) -> Points:
-    """Scale and turn a layout about its centroid into the middle of an output, and cover that and a margin."""
+def targets(
+    layout: Layout, scale: float, angle: float, size: tuple[int, int], beyond: float, offset: Points | float = 0.0
+) -> Points:
+    """Scale and turn a layout about its centroid into the middle of an output, or beside it, and cover that and a margin."""
     turn = math.radians(angle)
     matrix = scale * np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
-    centre, middle = layout.points.mean(axis=0), (np.array(size) - 1) / 2
+    centre, middle = layout.points.mean(axis=0), (np.array(size) - 1) / 2 + offset
     low, high = np.full(2, -beyond), np.array(size) - 1 + beyond
     box = np.array([[y, x] for y in (low[0], high[0]) for x in (low[1], high[1])])
     back = (box - middle) @ np.linalg.inv(matrix).T + centre
@@ -149,7 +153,29 @@ def matched(a: Texels, b: Texels, size: tuple[int, int], *, align: bool, packed:
         if best is None or cost < TURN * best.cost:
             best = Match(wanted, source, of, scale * gain, angle, gain, cost)
     assert best is not None  # no turn is always among them
+    if a.tag == "F=d" or not packed:
+        return best
+    for offset in offsets(source.points, best.targets, mine):
+        wanted = targets(layout, scale, best.angle, size, beyond, offset)
+        if 0 < len(wanted) <= len(source.points):
+            of, cost = match(source.points, wanted)
+            if cost < NEARER * best.cost:
+                best = replace(best, targets=wanted, of=of, cost=cost)
     return best
+
+
+def offsets(source: Points, wanted: Points, unit: float) -> Points:
+    """Give the few offsets of a layout, within half a spacing, at which its points lie nearest to texels.
+
+    What is connected is bent the less the less far its texels go, and where in a layout the output lies is nobody's wish.
+    """
+    from scipy.spatial import cKDTree
+
+    steps = (np.arange(OFFSETS) - OFFSETS // 2) * (unit / OFFSETS)
+    tried = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+    tree = cKDTree(source)
+    costs = [float((tree.query(wanted + offset)[0] ** 2).mean()) for offset in tried]
+    return np.asarray(tried[np.argsort(costs, kind="stable")[:3]], np.float64)
 
 
 def surroundings(a: Texels, size: tuple[int, int], unit: float, needed: float) -> Extended:
