@@ -96,6 +96,13 @@ def propose(
     away = _distance(size, points, box.size, wrap)
     if tag is None:
         tag, sure["tag"] = _tag(guide, away, points, box, mask)
+    if background is None and mask is None and "tag" in sure and tag == "F=c":
+        # What repeats are the openings of the net: ground lies in the middle of each but the chosen one.
+        middle = np.array(box.centre)
+        others = points[np.abs(points - middle).max(axis=1) > max(box.size) / 2][:PLACES]
+        if len(others):
+            background = disc(size, others, int(np.clip(min(box.size) // 8, 1, 4)))
+            sure["background"] = sure["tag"]
     if background is None and mask is None:
         background, sure["background"] = _background(guide, away, box)
     return Proposal(box, np.zeros(size, bool) if background is None else background, tag, sure)
