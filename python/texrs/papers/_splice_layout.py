@@ -206,7 +206,7 @@ def trimmed(a: Texels, found: Match, size: tuple[int, int]) -> Match:
     first = [max(0, -reach - o) for o in source.origin]
     last = [min(n, s + reach - o) for n, s, o in zip(source.mask.shape, size, source.origin, strict=True)]
     cut = (slice(first[0], last[0]), slice(first[1], last[1]))
-    parts = {name: getattr(source, name)[cut] for name in ("table", "mask", "instance", "stray", "mirrored")}
+    parts = {name: getattr(source, name)[cut] for name in ("table", "mask", "instance", "stray", "mirrored", "piece")}
     origin = (source.origin[0] + first[0], source.origin[1] + first[1])
     return replace(found, source=replace(source, origin=origin, **parts))
 

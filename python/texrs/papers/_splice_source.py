@@ -177,6 +177,10 @@ class Extended:
         Foreground that moves with none: cut by the border, or left over where a texel was turned back.
     mirrored : (H, W, 2) bool
         Along which axes what a pixel shows is mirrored.
+    piece : (H, W) int32
+        As ``instance``, and after those numbers the strays, piece by piece.
+    rest : (m, 2) float64
+        The middle of each stray piece, in the output.
     own : int
         How many of the points are of the picture itself, in its order; they come first. 0 where that was not asked for.
 
@@ -190,6 +194,8 @@ class Extended:
     instance: Labels
     stray: Bools
     mirrored: Bools
+    piece: Labels
+    rest: Points
     own: int = 0
 
 
@@ -251,7 +257,8 @@ def _extend(entry: Texels, size: tuple[int, int], margin: int, *, whole: bool, e
     places = places + (offset - first)
     if not disjoint:
         none = np.zeros(mask.shape, np.int32)
-        return Extended((int(first[0]), int(first[1])), table, mask, places + first, of, none, none > 0, mirrored, own)
+        origin = (int(first[0]), int(first[1]))
+        return Extended(origin, table, mask, places + first, of, none, none > 0, mirrored, none, np.zeros((0, 2)), own)
     return _stamp(entry, table.copy(), mask, mirrored.copy(), (places, of, flips), first, own)
 
 
@@ -265,6 +272,8 @@ def _stamp(
     own: int,
 ) -> Extended:
     """Put every whole texel where the extended picture has it, the right way round; the first ``own`` ones in any case."""
+    from scipy.ndimage import label
+
     places, of, flips = copies
     parts = parts_of(entry)
     shape = np.array(entry.mask.shape)
@@ -309,8 +318,24 @@ def _stamp(
         raise InvalidInput("a: the border cuts every texel; splicing needs some that are whole")
     chosen = np.array(kept)
     shown = entry.mask[table[..., 0], table[..., 1]]
-    origin = (int(first[0]), int(first[1]))
-    return Extended(origin, table, shown, places[chosen] + first, of[chosen], instance, stray, mirrored, own)
+    pieces, count = label(stray)
+    at = np.nonzero(pieces)
+    area = np.bincount(pieces[at], minlength=count + 1)[1:]
+    rest = np.stack([np.bincount(pieces[at], a, minlength=count + 1)[1:] / area for a in at], axis=-1)
+    piece = np.where(stray, pieces + len(kept), instance).astype(np.int32)
+    return Extended(
+        (int(first[0]), int(first[1])),
+        table,
+        shown,
+        places[chosen] + first,
+        of[chosen],
+        instance,
+        stray,
+        mirrored,
+        piece,
+        rest + first,
+        own,
+    )
 
 
 def _nearest(place: Points) -> NDArray[np.intp]:

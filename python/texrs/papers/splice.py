@@ -319,27 +319,20 @@ def told(found: Match) -> tuple[Bools, NDArray[np.float32]]:
     Texels move whole. What is erased shrinks besides towards its middle: it then leaves a smaller hole. But where a picture
     stays itself, nothing stirs that is not told to.
     """
-    from scipy.ndimage import label
-
     source = found.source
-    if source.own:
-        moved = np.zeros((2, len(source.points) + 1), np.float32)
-        moved[:, 1:] = whole_shifts(found).T
-        return source.instance > 0, moved[:, source.instance]
-    pieces, count = label(source.stray)
-    number = np.where(pieces > 0, pieces + len(source.points), source.instance)
-    area = np.maximum(np.bincount(pieces.ravel(), minlength=count + 1)[1:], 1)
-    at = np.nonzero(pieces)
-    sums = [np.bincount(pieces[at], a, minlength=count + 1)[1:] for a in at]
-    middle = np.concatenate([source.points - source.origin, np.stack([s / area for s in sums], axis=-1)])
+    still = source.own > 0
+    number = source.instance if still else source.piece
+    middle = source.points if still else np.concatenate([source.points, source.rest])
     shift = np.zeros((2, len(middle) + 1), np.float32)
-    shift[:, 1:] = whole_shifts(found, middle + source.origin).T
+    shift[:, 1:] = whole_shifts(found, middle).T
     own = shift[:, number]
-    idle = np.ones(len(middle) + 1, bool)
-    idle[0] = False
-    idle[found.of + 1] = False
-    gone = np.nonzero(idle[number])
-    own[:, gone[0], gone[1]] += SHRUNK * (middle[number[gone] - 1] - np.stack(gone, axis=-1)).T
+    if not still:
+        idle = np.ones(len(middle) + 1, bool)
+        idle[0] = False
+        idle[found.of + 1] = False
+        gone = np.nonzero(idle[number])
+        centre = middle[number[gone] - 1] - source.origin
+        own[:, gone[0], gone[1]] += SHRUNK * (centre - np.stack(gone, axis=-1)).T
     return number > 0, own
 
 
