@@ -28,6 +28,7 @@ NOUNS = {
     "cyclic": {"source_map", "report"},
     "completion": {"source_map", "report", "deform"},
     "matching": set(),
+    "scale_maps": set(),
 }
 TOP = {
     "papers": set(NOUNS),

@@ -6,7 +6,7 @@ another) and `self_splice` (in an edited one), `solid` and `synthesize` (volumes
 looks anything that is in register with the exemplar up in the same way.
 """
 
-from texrs import analysis, errors, fields, io, kernels, samples, texels, volume
+from texrs import analysis, errors, fields, io, kernels, samples, scale_maps, texels, volume
 from texrs._rust import VERSION as __version__
 from texrs.completion import complete
 from texrs.cyclic import tile
@@ -37,6 +37,7 @@ __all__ = [
     "io",
     "kernels",
     "samples",
+    "scale_maps",
     "self_splice",
     "solid",
     "splice",

@@ -1,0 +1,57 @@
+"""Scale maps: how large the texels are at each place of a picture.
+
+A scale map is a float32 array (rows, columns) that is 1 where texels have their normal size, 2 where they are seen
+twice as large. Only ratios count, so maps that are measured have a geometric mean of 1. Everything here takes maps
+and gives new ones; nothing is changed in place.
+
+===================  ==========================================================================
+`from_mask`          the map measured from a mask of features
+`auto_mask`          a mask of features, found in the picture
+`from_angles`        the map of a plane seen aslant
+`slant_for_ratio`    the slant at which near texels are so many times as large as far ones
+`resample`           a map for another size: stretched, continued, drawn or by angles
+`extend`             a map continued into what is not known
+`edit`               a map changed by a list of edits
+`encode` `decode`    8-bit pictures of maps, for other programs
+`picture`            false colours with a scale bar, to look at
+===================  ==========================================================================
+
+Two angles say how a plane lies. `slant` is that between the line of sight and the plane's normal: 0 is seen from the
+front, 85 nearly edge on. `tilt` is the direction in the picture in which depth grows, in degrees counter-clockwise from
+the right (+x) with y up: a floor that runs away upwards has 90. Dong, Zhou and Paul [1]_ measure it from +y towards +x,
+so theirs is 90 - tilt.
+
+References
+----------
+.. [1] W. Dong, N. Zhou and J.-C. Paul, "Perspective-aware texture analysis and synthesis", The Visual Computer 24, 2008.
+   :doi:`10.1007/s00371-008-0232-1`
+"""
+
+from texrs.scale_maps._angles import STEEPEST, from_angles, slant_for_ratio
+from texrs.scale_maps._auto import auto_mask
+from texrs.scale_maps._edit import edit
+from texrs.scale_maps._extend import extend
+from texrs.scale_maps._maps import LARGEST, LEAST
+from texrs.scale_maps._mask import Measure, from_mask
+from texrs.scale_maps._pictures import Encoding, decode, encode, picture
+from texrs.scale_maps._resample import resample
+from texrs.scale_maps._trend import Trend
+
+__all__ = [
+    "LARGEST",
+    "LEAST",
+    "STEEPEST",
+    "Encoding",
+    "Measure",
+    "Trend",
+    "auto_mask",
+    "decode",
+    "edit",
+    "encode",
+    "extend",
+    "from_angles",
+    "from_mask",
+    "picture",
+    "resample",
+    "slant_for_ratio",
+]

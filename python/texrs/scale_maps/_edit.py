@@ -1,0 +1,225 @@
+"""Edits of scale maps: a list that can be kept, changed and done again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from texrs._typing import Floats
+from texrs.errors import InvalidInput
+from texrs.scale_maps._blur import blur
+from texrs.scale_maps._maps import as_map
+from texrs.scale_maps._regions import as_number, as_points, centre, stroke, weights
+
+__all__ = ["edit"]
+
+_LEAST, _LARGEST = 1 / 8, 8.0
+"""No step brings a scale further than that."""
+_MOST = 10_000
+
+
+def edit(scale: object, steps: Sequence[Mapping[str, Any] | str] | str) -> Floats:
+    """Change a scale map by a list of steps.
+
+    Each step is a mapping with the name of the operation, ``"op"``, and what it needs; or the name alone. A region is
+    ``[top, left, bottom, right]`` (a rectangle), ``[row, column, radius]`` (a disc) or a list of at least three points
+    ``[row, column]`` (a polygon); without one the whole map is meant. Edges of regions are ``"feather"`` pixels wide, by
+    default a quarter of the region's shorter side. All is done on log S, and no step brings a scale out of 1/8 to 8.
+
+    ===========  =============================================  ====================================================
+    op           takes                                          does
+    ===========  =============================================  ====================================================
+    `magnify`    factor (1 to 8, by default 1.25), region       makes texels larger
+    `minify`     factor (1 to 8, by default 1.25), region       makes texels smaller
+    `set`        value, region                                  gives all the same size
+    `vary`       gain (-8 to 8), region                         spreads sizes about their mean; 0 makes them alike
+    `ramp`       start, end (points), values (two), region      lets sizes grow from one point to the other
+    `duplicate`  region, to (point), mode                       copies what is around the region's middle to a point;
+                                                                mode ``"ratio"``: how it differs from its mean
+    `brush`      points, radius, factor (1/8 to 8)              draws a line along which texels are larger, or smaller
+    `smooth`     sigma (pixels), region                         takes out what is finer
+    ===========  =============================================  ====================================================
+
+    As the list is all there is, undo is to replay it without its end, and ``json.dumps`` keeps it.
+
+    Parameters
+    ----------
+    scale : array_like
+        Shape (H, W); it is not changed.
+    steps : sequence of mappings, or str
+        What to do, in this order; or the JSON text of it.
+
+    Returns
+    -------
+    ndarray
+        Float32, (H, W).
+
+    Raises
+    ------
+    InvalidInput
+        Not a scale map, or a step that cannot be done: the message says which.
+
+    Examples
+    --------
+    >>> import json
+    >>> import numpy as np
+    >>> from texrs import scale_maps
+    >>> flat = np.ones((64, 64), np.float32)
+    >>> steps = [
+    ...     {"op": "magnify", "region": [32, 32, 16], "factor": 2},
+    ...     {"op": "set", "region": [0, 0, 8, 8], "value": 0.5, "feather": 0},
+    ... ]
+    >>> changed = scale_maps.edit(flat, steps)
+    >>> changed[32, 32], changed[4, 4], changed[60, 4]
+    (np.float32(2.0), np.float32(0.5), np.float32(1.0))
+    >>> undone = scale_maps.edit(flat, steps[:-1])
+    >>> again = scale_maps.edit(flat, json.dumps(steps))
+    >>> bool(undone[4, 4] == 1 and (again == changed).all())
+    True
+
+    """
+    given = as_map(scale)
+    before = np.log(given)
+    logs = before
+    for number, (operation, options) in enumerate(_read_all(steps), start=1):
+        try:
+            changed = _OPERATIONS[operation].change(logs, **options)
+        except InvalidInput as error:
+            raise InvalidInput(f"steps: step {number}, {operation}: {error}") from None
+        # What was beyond the limits already may stay there.
+        low, high = np.minimum(logs, np.log(np.float32(_LEAST))), np.maximum(logs, np.log(np.float32(_LARGEST)))
+        logs = np.clip(changed, low, high).astype(np.float32)
+    # What no step reached is what it was, to the last bit.
+    return np.where(logs == before, given, np.exp(logs))
+
+
+def _read_all(steps: object) -> list[tuple[str, dict[str, Any]]]:
+    """Check a list of steps, or the JSON text of one: each is an operation and its options."""
+    if isinstance(steps, str):
+        try:
+            steps = json.loads(steps)
+        except (ValueError, RecursionError) as error:
+            raise InvalidInput(f"steps: not JSON ({error})") from None
+    if not isinstance(steps, Sequence) or isinstance(steps, str | bytes):
+        raise InvalidInput(f"steps: needs a list of steps, got {type(steps).__name__}")
+    if len(steps) > _MOST:
+        raise InvalidInput(f"steps: up to {_MOST} steps are taken, got {len(steps)}")
+    return [_read(one, number) for number, one in enumerate(steps, start=1)]
+
+
+def _read(one: object, number: int) -> tuple[str, dict[str, Any]]:
+    options = {"op": one} if isinstance(one, str) else dict(one) if isinstance(one, Mapping) else {}
+    operation = options.pop("op", None)
+    if not isinstance(operation, str) or operation not in _OPERATIONS:
+        raise InvalidInput(f"steps: step {number} needs an 'op' among {', '.join(_OPERATIONS)}; got {one!r}")
+    needed, allowed = _OPERATIONS[operation].needed, _OPERATIONS[operation].allowed
+    for key in options:
+        if key not in (*needed, *allowed):
+            words = ", ".join((*needed, *allowed))
+            raise InvalidInput(f"steps: step {number}, {operation}, knows no {key}; allowed are {words}")
+    for key in needed:
+        if key not in options:
+            raise InvalidInput(f"steps: step {number}, {operation}, needs {key}")
+    return operation, options
+
+
+# --- operations, on log S ------------------------------------------------------------------------------------------
+
+
+def _magnify(logs: Floats, factor: object = 1.25, region: object = None, feather: object = None) -> Floats:
+    amount = np.log(as_number(factor, "factor", 1, 8))
+    return np.asarray(logs + amount * weights(region, feather, logs.shape))
+
+
+def _minify(logs: Floats, factor: object = 1.25, region: object = None, feather: object = None) -> Floats:
+    amount = np.log(as_number(factor, "factor", 1, 8))
+    return np.asarray(logs - amount * weights(region, feather, logs.shape))
+
+
+def _set(logs: Floats, value: object, region: object = None, feather: object = None) -> Floats:
+    wanted = np.log(as_number(value, "value", _LEAST, _LARGEST))
+    return np.asarray(logs + (wanted - logs) * weights(region, feather, logs.shape))
+
+
+def _vary(logs: Floats, gain: object, region: object = None, feather: object = None) -> Floats:
+    inside = weights(region, feather, logs.shape)
+    away = logs - _mean(logs, inside)
+    return np.asarray(logs + (as_number(gain, "gain", -8, 8) - 1) * away * inside)
+
+
+def _ramp(
+    logs: Floats, start: object, end: object, values: object, region: object = None, feather: object = None
+) -> Floats:
+    first, last = as_points([start], "start")[0], as_points([end], "end")[0]
+    if not isinstance(values, list | tuple) or len(values) != 2:
+        raise InvalidInput(f"values needs two scales, at the start and at the end, got {values!r}")
+    low, high = (np.log(as_number(v, "values", _LEAST, _LARGEST)) for v in values)
+    along = last - first
+    length = float(along @ along)
+    if length == 0:
+        raise InvalidInput("end needs to be another point than start")
+    rows, columns = np.arange(logs.shape[0])[:, np.newaxis] - first[0], np.arange(logs.shape[1]) - first[1]
+    share = np.clip((rows * along[0] + columns * along[1]) / length, 0, 1)
+    return np.asarray(logs + (low + (high - low) * share - logs) * weights(region, feather, logs.shape))
+
+
+def _duplicate(logs: Floats, region: object, to: object, mode: object = "copy", feather: object = None) -> Floats:
+    if mode not in ("copy", "ratio"):
+        raise InvalidInput(f"mode needs to be 'copy' or 'ratio', got {mode!r}")
+    if region is None:
+        raise InvalidInput("region needs to be a part of the map, got None")
+    step = np.rint(as_points([to], "to")[0] - centre(region)).astype(int)
+    inside = weights(region, feather, logs.shape)
+    if not inside.any():
+        raise InvalidInput(f"region needs to be inside the map of {logs.shape[0]} x {logs.shape[1]} pixels")
+    # Beyond the border there is nothing to copy, so what would come from there stays.
+    there = [slice(max(0, d), min(n, n + d)) for d, n in zip(step, logs.shape, strict=True)]
+    here = [slice(max(0, -d), min(n, n - d)) for d, n in zip(step, logs.shape, strict=True)]
+    if any(s.stop <= s.start for s in there):
+        raise InvalidInput(f"to needs to be inside the map of {logs.shape[0]} x {logs.shape[1]} pixels, got {to}")
+    source, share = logs[tuple(here)], inside[tuple(here)]
+    part = logs[tuple(there)]
+    result = logs.copy()
+    result[tuple(there)] += share * (source - (part if mode == "copy" else _mean(logs, inside)))
+    return result
+
+
+def _brush(logs: Floats, points: object, radius: object, factor: object) -> Floats:
+    amount = np.log(as_number(factor, "factor", 1 / 8, 8))
+    drawn = as_points(points, "points")
+    return np.asarray(logs + amount * stroke(drawn, as_number(radius, "radius", 0.5, 1e5), logs.shape))
+
+
+def _smooth(logs: Floats, sigma: object, region: object = None, feather: object = None) -> Floats:
+    blurred = blur(logs, as_number(sigma, "sigma", 0.1, 1000))
+    return np.asarray(logs + (blurred - logs) * weights(region, feather, logs.shape))
+
+
+def _mean(logs: Floats, inside: Floats) -> float:
+    total = float(np.sum(inside, dtype=np.float64))
+    return float(np.sum(logs * inside, dtype=np.float64)) / total if total > 0 else 0.0
+
+
+class _Operation(NamedTuple):
+    """A change of log S, the options it needs and those it may have."""
+
+    change: Callable[..., Floats]
+    needed: tuple[str, ...]
+    allowed: tuple[str, ...]
+
+
+_SOFT = ("region", "feather")
+_OPERATIONS = {
+    "magnify": _Operation(_magnify, (), ("factor", *_SOFT)),
+    "minify": _Operation(_minify, (), ("factor", *_SOFT)),
+    "set": _Operation(_set, ("value",), _SOFT),
+    "vary": _Operation(_vary, ("gain",), _SOFT),
+    "ramp": _Operation(_ramp, ("start", "end", "values"), _SOFT),
+    "duplicate": _Operation(_duplicate, ("region", "to"), ("mode", "feather")),
+    "brush": _Operation(_brush, ("points", "radius", "factor"), ()),
+    "smooth": _Operation(_smooth, ("sigma",), _SOFT),
+}
+"""By the names that edits give them."""

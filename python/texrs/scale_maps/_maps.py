@@ -1,0 +1,59 @@
+"""What a scale map is, and the checks that all functions share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from texrs._arrays import as_image
+from texrs._typing import Floats
+from texrs.errors import InvalidInput
+
+__all__ = ["LARGEST", "LEAST", "as_choice", "as_map", "centred"]
+
+LEAST, LARGEST = 1e-3, 1e3
+"""Scales that a map may hold."""
+
+
+def as_map(value: object, name: str = "scale", shape: Sequence[int] | None = None) -> Floats:
+    """Check a scale map and give it in float32.
+
+    Raises
+    ------
+    InvalidInput
+        Not (rows, columns) of finite numbers within `LEAST` and `LARGEST`, or of another shape than asked.
+
+    """
+    given = as_image(value, name)
+    if given.shape[2] != 1:
+        raise InvalidInput(f"{name}: needs shape (rows, columns), got {given.shape}; a scale map has one channel")
+    flat = given[..., 0]
+    if given.dtype.kind != "f":
+        raise InvalidInput(
+            f"{name}: needs float scales, got {given.dtype}; scale_maps.decode makes them of an encoded picture"
+        )
+    if shape is not None and flat.shape != tuple(shape):
+        raise InvalidInput(
+            f"{name}: needs shape {tuple(shape)}, got {flat.shape}; scale_maps.resample brings a map to a size"
+        )
+    low, high = float(flat.min()), float(flat.max())
+    if not (low >= LEAST and high <= LARGEST):
+        outside = int(np.count_nonzero((flat < LEAST) | (flat > LARGEST)))
+        raise InvalidInput(
+            f"{name}: {outside} of {flat.size} scales are outside {LEAST} to {LARGEST:.0f} ({low:.4g} to {high:.4g}); "
+            "1 is the normal size of a texel, 2 twice that"
+        )
+    return np.ascontiguousarray(flat, dtype=np.float32)
+
+
+def as_choice(value: object, name: str, allowed: Sequence[str]) -> str:
+    """Check a word."""
+    if not isinstance(value, str) or value not in allowed:
+        raise InvalidInput(f"{name}: allowed are {', '.join(allowed[:-1])} and {allowed[-1]}; got {value!r}")
+    return value
+
+
+def centred(logs: Floats) -> Floats:
+    """Give the scales of logarithms, with a geometric mean of 1."""
+    return np.asarray(np.exp(logs - np.mean(logs, dtype=np.float64)), np.float32)

@@ -1,0 +1,194 @@
+"""Scale maps as pictures: for other programs in 8 bits, and in false colours to look at."""
+
+from __future__ import annotations
+
+from math import ceil, floor, log2
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_float, as_image
+from texrs._typing import Floats
+from texrs.errors import InvalidInput
+from texrs.scale_maps._maps import as_choice, as_map
+
+__all__ = ["Encoding", "decode", "encode", "picture"]
+
+Encoding: TypeAlias = Literal["log2", "paper"]
+
+_ENCODINGS = ("log2", "paper")
+_COLOURS = ("12306b", "2a6fb0", "6fb7d6", "c9e4e8", "f7f4ea", "f6d9a4", "ee9f5a", "cf4d33", "6e0f22")
+"""Small, normal and large: dark to light to dark, so that the normal size is the lightest."""
+_INK, _PAPER = 0.15, 1.0
+_GLYPHS = {
+    "0": 0o75557, "1": 0o26227, "2": 0o71747, "3": 0o71717, "4": 0o55711, "5": 0o74717,
+    "6": 0o74757, "7": 0o71122, "8": 0o75757, "9": 0o75717, ".": 0o00002,
+}  # fmt: skip
+"""Three by five dots each, the rows from the top as octal digits."""
+
+
+def encode(scale: object, encoding: Encoding = "log2") -> NDArray[np.uint8]:
+    """Give a scale map as grey levels of 8 bits.
+
+    Parameters
+    ----------
+    scale : array_like
+        Shape (H, W).
+    encoding : {"log2", "paper"}
+        ``"log2"``: 128 + 64 log2(S), equally fine for small and large, from 1/4 to 3.96. ``"paper"``: 128 S, up to 1.99.
+        What lies beyond is held at the ends.
+
+    Returns
+    -------
+    ndarray
+        Uint8, (H, W); 128 is the scale 1.
+
+    Raises
+    ------
+    InvalidInput
+        Not a scale map, or an unknown encoding.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs import scale_maps
+    >>> scale_maps.encode(np.array([[0.5, 1.0, 2.0]]))
+    array([[ 64, 128, 192]], dtype=uint8)
+
+    """
+    values = as_map(scale)
+    grey = 128 * values if as_choice(encoding, "encoding", _ENCODINGS) == "paper" else 128 + 64 * np.log2(values)
+    levels: NDArray[np.uint8] = np.clip(np.rint(grey), 0, 255).astype(np.uint8)
+    return levels
+
+
+def decode(image: object, encoding: Encoding = "log2") -> Floats:
+    """Give the scale map of grey levels, the inverse of `encode`.
+
+    Parameters
+    ----------
+    image : array_like
+        Shape (H, W), uint8; or uint16, of which 257 make one level. Of more channels, which must be equal, the first.
+    encoding : {"log2", "paper"}
+        As in `encode`. A black pixel of the paper's, whose scale would be 0, counts as half a grey level.
+
+    Returns
+    -------
+    ndarray
+        Float32, (H, W).
+
+    Raises
+    ------
+    InvalidInput
+        Colours, another dtype, or an unknown encoding.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs import scale_maps
+    >>> scale_maps.decode(np.array([[64, 128, 192]], np.uint8))
+    array([[0.5, 1. , 2. ]], dtype=float32)
+
+    """
+    given = as_image(image)
+    if given.dtype not in (np.uint8, np.uint16):
+        raise InvalidInput(f"image: needs grey levels in uint8 or uint16, got {given.dtype}; floats are scales already")
+    grey = given[..., : 3 if given.shape[2] >= 3 else 1]
+    if (grey != grey[..., :1]).any():
+        raise InvalidInput("image: needs grey levels, got colours; a false-colour picture cannot be read back")
+    levels = grey[..., 0].astype(np.float32)
+    if given.dtype == np.uint16:
+        levels /= 257
+    if as_choice(encoding, "encoding", _ENCODINGS) == "paper":
+        return np.asarray(np.maximum(levels, 0.5) / 128, np.float32)
+    return np.asarray(np.exp2((levels - 128) / 64), np.float32)
+
+
+def picture(scale: object, largest: float | None = None) -> NDArray[np.uint8]:
+    """Give a scale map in false colours, with a scale bar on the right.
+
+    Small is blue, the normal size pale, large is red; thin lines mark where the scale passes a label of the bar.
+
+    Parameters
+    ----------
+    scale : array_like
+        Shape (H, W).
+    largest : float, optional
+        The scale at the top of the bar, 1.1 to 64; its inverse is at the bottom. By default what the map needs. Give it
+        to compare maps.
+
+    Returns
+    -------
+    ndarray
+        Uint8, (H or 32, W and some columns more, 3).
+
+    Raises
+    ------
+    InvalidInput
+        Not a scale map, or ``largest`` outside its range.
+
+    Examples
+    --------
+    >>> from texrs import scale_maps
+    >>> scale_maps.picture(scale_maps.from_angles((64, 64), slant=45, tilt=90)).shape
+    (64, 120, 3)
+
+    """
+    logs: Floats = np.log2(as_map(scale))
+    if largest is None:
+        reach = min(6.0, max(0.5, ceil(2 * float(np.abs(logs).max()) - 0.01) / 2))
+    else:
+        reach = log2(as_float(largest, "largest", 1.1, 64))
+    step = 0.5 if reach <= 1.5 else 1.0 if reach <= 3 else 2.0
+    dot = max(2, len(logs) // 256)
+    ticks = [step * k for k in range(-floor(reach / step), floor(reach / step) + 1)]
+    bar = _bar(max(32, len(logs)), reach, ticks, dot)
+    shown = np.full((len(bar), logs.shape[1], 3), _PAPER, np.float32)
+    shown[: len(logs)] = _colours(logs / reach) * (1 - 0.35 * _contours(logs / step))[..., np.newaxis]
+    seen: NDArray[np.uint8] = np.rint(np.concatenate([shown, bar], 1) * 255).astype(np.uint8)
+    return seen
+
+
+def _colours(at: Floats) -> Floats:
+    """Give the colours of values from -1 to 1."""
+    table = np.array([[int(c[k : k + 2], 16) for k in (0, 2, 4)] for c in _COLOURS], np.float32) / 255
+    place = (np.clip(at, -1, 1) + 1) * ((len(table) - 1) / 2)
+    first = np.minimum(place.astype(np.intp), len(table) - 2)
+    share = (place - first)[..., np.newaxis]
+    return np.asarray(table[first] * (1 - share) + table[first + 1] * share, np.float32)
+
+
+def _contours(levels: Floats) -> NDArray[np.bool_]:
+    """Mark the pixels next to which a whole number is passed."""
+    cells = np.floor(levels)
+    marked = np.zeros(levels.shape, np.bool_)
+    marked[:-1] |= cells[:-1] != cells[1:]
+    marked[:, :-1] |= cells[:, :-1] != cells[:, 1:]
+    return marked
+
+
+def _bar(height: int, reach: float, ticks: list[float], dot: int) -> Floats:
+    """Draw the bar, its ticks and their labels."""
+    left, width = 4 * dot, 7 * dot
+    bar = np.full((height, left + width + 17 * dot, 3), _PAPER, np.float32)
+    top, bottom = 3 * dot, height - 3 * dot
+    bar[top:bottom, left : left + width] = _colours(np.linspace(1, -1, bottom - top, dtype=np.float32))[:, np.newaxis]
+    # The normal size first: where there is no room for all, it is labelled.
+    free = np.ones(height, np.bool_)
+    for tick in sorted(ticks, key=abs):
+        row = round(top + (bottom - top - 1) * (1 - tick / reach) / 2)
+        label = slice(max(0, row - 3 * dot), row + 4 * dot)
+        if not free[label].all():
+            continue
+        free[label] = False
+        bar[row : row + max(1, dot // 2), left + width - 2 * dot : left + width + dot] = _INK
+        text = f"{2.0**tick:.2g}"
+        first = row - 2 * dot
+        for k, glyph in enumerate(text):
+            rows = [_GLYPHS[glyph] >> 3 * (4 - r) & 7 for r in range(5)]
+            drawn = np.array([[bool(r & 4), bool(r & 2), bool(r & 1)] for r in rows]).repeat(dot, 0).repeat(dot, 1)
+            column = left + width + 2 * dot + 4 * dot * k
+            part = bar[max(0, first) : first + 5 * dot, column : column + 3 * dot]
+            part[drawn[max(0, -first) :][: len(part), : part.shape[1]]] = _INK
+    return bar

@@ -1,0 +1,139 @@
+"""Parts of a map, with soft edges."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from texrs._typing import Floats
+from texrs.errors import InvalidInput
+
+__all__ = ["MAX_POINTS", "as_number", "as_points", "centre", "stroke", "weights"]
+
+MAX_POINTS = 1024
+_FARTHEST = 1e6
+_SOFT = 0.25
+"""Of a region's shorter side: how wide its edge is by default."""
+
+
+def as_number(value: object, name: str, low: float, high: float) -> float:
+    """Check a number in [low, high]."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not low <= float(value) <= high:
+        raise InvalidInput(f"{name} needs a number from {low:g} to {high:g}, got {value!r}")
+    return float(value)
+
+
+def as_points(value: object, name: str, least: int = 1) -> NDArray[np.float64]:
+    """Check a list of (row, column)."""
+    try:
+        points = np.asarray(value, np.float64)
+    except (TypeError, ValueError):
+        points = np.empty(0)
+    if points.ndim != 2 or points.shape[1] != 2 or not least <= len(points) <= MAX_POINTS:
+        raise InvalidInput(f"{name} needs {least} to {MAX_POINTS} points [row, column], got {_short(value)}")
+    if not (np.abs(points) <= _FARTHEST).all():
+        raise InvalidInput(f"{name} needs points within {_FARTHEST:g} pixels, got {_short(value)}")
+    return points
+
+
+def weights(region: object, feather: object, size: tuple[int, ...]) -> Floats:
+    """Give how much each pixel belongs to a region: 1 well inside, a half at its edge, 0 well outside.
+
+    A region is [top, left, bottom, right] of a rectangle, [row, column, radius] of a disc, a list of at least three
+    points [row, column] of a polygon, or None for the whole map. The edge is ``feather`` pixels wide.
+    """
+    if region is None:
+        return np.ones(size, np.float32)
+    shape = _numbers(region)
+    rows, columns = np.arange(size[0])[:, np.newaxis], np.arange(size[1])
+    if shape is None:
+        points = as_points(region, "region", 3)
+        outside = _polygon(points, size)
+        side = float(np.ptp(points, axis=0).min())
+    elif len(shape) == 4:
+        top, left, bottom, right = shape
+        if bottom <= top or right <= left:
+            raise InvalidInput(f"region needs [top, left, bottom, right] with top < bottom, left < right, got {region}")
+        dy, dx = (
+            np.abs(at - (low + high - 1) / 2) - (high - low) / 2
+            for at, low, high in ((rows, top, bottom), (columns, left, right))
+        )
+        outside = np.hypot(np.maximum(dy, 0), np.maximum(dx, 0)) + np.minimum(np.maximum(dy, dx), 0)
+        side = min(bottom - top, right - left)
+    else:
+        row, column, radius = shape
+        if radius <= 0:
+            raise InvalidInput(f"region needs [row, column, radius] with a radius above 0, got {region}")
+        outside = np.hypot(rows - row, columns - column) - radius
+        side = radius
+    width = _SOFT * side if feather is None else as_number(feather, "feather", 0, _FARTHEST)
+    if width < 1e-6:
+        return (outside <= 0).astype(np.float32)
+    share = np.clip(0.5 - outside / width, 0, 1)
+    return np.asarray(share * share * (3 - 2 * share), np.float32)
+
+
+def centre(region: object) -> NDArray[np.float64]:
+    """Give the middle of a region."""
+    shape = _numbers(region)
+    if shape is None:
+        points = as_points(region, "region", 3)
+        return np.asarray((points.min(0) + points.max(0)) / 2)
+    if len(shape) == 4:
+        return np.array([shape[0] + shape[2] - 1, shape[1] + shape[3] - 1]) / 2
+    return np.array(shape[:2])
+
+
+def stroke(points: NDArray[np.float64], radius: float, size: tuple[int, ...]) -> Floats:
+    """Give the weights of a brush that is drawn through points: 1 on the line, 0 a radius away from it."""
+    nearest = np.full(size, np.float32(1))
+    for first, second in zip(points, points[1:] if len(points) > 1 else points, strict=False):
+        low, high = np.minimum(first, second) - radius, np.maximum(first, second) + radius
+        box = tuple(
+            slice(int(np.clip(np.floor(a), 0, n)), int(np.clip(np.ceil(b) + 1, 0, n)))
+            for a, b, n in zip(low, high, size, strict=True)
+        )
+        rows, columns = (np.arange(s.start, s.stop, dtype=np.float64) for s in box)
+        dy, dx = rows[:, np.newaxis] - first[0], columns - first[1]
+        along = second - first
+        length = float(along @ along)
+        share = np.clip((dy * along[0] + dx * along[1]) / length, 0, 1) if length > 0 else 0.0
+        away = np.hypot(dy - share * along[0], dx - share * along[1]) / radius
+        nearest[box] = np.minimum(nearest[box], away)
+    return np.asarray((1 - nearest**2) ** 2, np.float32)
+
+
+def _numbers(region: object) -> list[float] | None:
+    """Give the numbers of a rectangle or a disc; None where there are points."""
+    values: Any = region
+    if isinstance(values, list | tuple | np.ndarray) and len(values) in (3, 4) and np.ndim(values[0]) == 0:
+        return [as_number(v, "region", -_FARTHEST, _FARTHEST) for v in values]
+    if isinstance(values, list | tuple | np.ndarray) and len(values) >= 3 and np.ndim(values[0]) == 1:
+        return None
+    raise InvalidInput(
+        "region needs [top, left, bottom, right], [row, column, radius] or a list of three or more points "
+        f"[row, column], got {_short(region)}"
+    )
+
+
+def _polygon(points: NDArray[np.float64], size: tuple[int, ...]) -> NDArray[np.float64]:
+    """Give how far each pixel is outside a polygon, by the even-odd rule."""
+    inside = np.zeros(size, np.bool_)
+    rows, columns = np.arange(size[0])[:, np.newaxis], np.arange(size[1])
+    for (r0, c0), (r1, c1) in zip(points, np.roll(points, -1, axis=0), strict=True):
+        # The rows that the side crosses.
+        first, last = (int(np.clip(np.ceil(r), 0, size[0])) for r in sorted((r0, r1)))
+        if first < last:
+            inside[first:last] ^= columns < c0 + (rows[first:last] - r0) * ((c1 - c0) / (r1 - r0))
+    if inside.all() or not inside.any():
+        return np.full(size, -_FARTHEST if inside.any() else _FARTHEST)
+    away = ndimage.distance_transform_edt(~inside) - ndimage.distance_transform_edt(inside)
+    return np.asarray(away - 0.5 * np.sign(away))
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

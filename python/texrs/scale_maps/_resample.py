@@ -1,0 +1,103 @@
+"""Scale maps for pictures of another size."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+
+from texrs._arrays import as_size
+from texrs._typing import Floats
+from texrs.errors import InvalidInput
+from texrs.scale_maps._angles import from_angles
+from texrs.scale_maps._extend import extend
+from texrs.scale_maps._maps import as_choice, as_map
+
+__all__ = ["resample"]
+
+
+def resample(
+    scale: object,
+    size: Sequence[int] | int,
+    mode: Literal["stretch", "extend", "user", "angles"] = "stretch",
+    *,
+    pattern: object = None,
+    slant: float | None = None,
+    tilt: float | None = None,
+    fov: float | None = None,
+) -> Floats:
+    """Give a scale map for an output of another size.
+
+    Parameters
+    ----------
+    scale : array_like
+        Shape (H, W): the map of the exemplar. ``"user"`` and ``"angles"`` do not look at it; it may be None there.
+    size : (int, int) or int
+        Rows and columns of the output.
+    mode : {"stretch", "extend", "user", "angles"}
+        ``"stretch"``: the same map, wider or narrower, linear in log S, with the borders on the borders.
+        ``"extend"``: the map in the middle as it is, and beyond it the plane that it follows (`extend`); what is smaller
+        is cut out of the middle. ``"user"``: ``pattern``, stretched. ``"angles"``: that of a plane (`from_angles`).
+    pattern : array_like, optional
+        Scales of any shape (R, C), for ``"user"``.
+    slant, tilt, fov : float, optional
+        For ``"angles"``.
+
+    Returns
+    -------
+    ndarray
+        Float32, of that size.
+
+    Raises
+    ------
+    InvalidInput
+        Not a scale map, or an argument that the mode needs is missing.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs import scale_maps
+    >>> scale_maps.resample(np.array([[1.0, 4.0]]), (1, 4)).round(3)
+    array([[1.   , 1.414, 2.828, 4.   ]], dtype=float32)
+    >>> scale_maps.resample(np.array([[1.0, 2.0]]), (1, 4), "extend").round(3)
+    array([[0.25, 1.  , 2.  , 3.  ]], dtype=float32)
+
+    """
+    how = as_choice(mode, "mode", ("stretch", "extend", "user", "angles"))
+    sides = as_size(size)
+    if how == "angles":
+        if slant is None or tilt is None:
+            raise InvalidInput(f"{'slant' if slant is None else 'tilt'}: the mode 'angles' needs a slant and a tilt")
+        return from_angles(sides, slant, tilt, fov=fov)
+    if how == "user":
+        if pattern is None:
+            raise InvalidInput("pattern: the mode 'user' needs a pattern of scales")
+        return _stretch(as_map(pattern, "pattern"), sides)
+    given = as_map(scale)
+    return _stretch(given, sides) if how == "stretch" else _continue(given, sides)
+
+
+def _stretch(scale: Floats, size: tuple[int, ...]) -> Floats:
+    if scale.shape == size:
+        return scale.copy()
+    logs = np.log(scale)
+    for axis, sides in enumerate(size):
+        at = np.clip((np.arange(sides) + 0.5) * (logs.shape[axis] / sides) - 0.5, 0, logs.shape[axis] - 1)
+        first = np.floor(at).astype(np.intp)
+        second = np.minimum(first + 1, logs.shape[axis] - 1)
+        share = np.expand_dims((at - first).astype(np.float32), 1 - axis)
+        logs = np.take(logs, first, axis) * (1 - share) + np.take(logs, second, axis) * share
+    return np.exp(logs)
+
+
+def _continue(scale: Floats, size: tuple[int, ...]) -> Floats:
+    result, known = np.ones(size, np.float32), np.zeros(size, np.bool_)
+    there, here = [], []
+    for n, m in zip(size, scale.shape, strict=True):
+        overlap = min(n, m)
+        there.append(slice((n - overlap) // 2, (n - overlap) // 2 + overlap))
+        here.append(slice((m - overlap) // 2, (m - overlap) // 2 + overlap))
+    result[tuple(there)] = scale[tuple(here)]
+    known[tuple(there)] = True
+    return extend(result, known)

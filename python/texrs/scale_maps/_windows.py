@@ -1,0 +1,133 @@
+"""Densities of features in windows, on a lattice of cells.
+
+A window of n pixels says nothing finer than a part of n, so features are counted in cells of a ninth of it: sums of
+whole numbers, exact in any order. What lies outside the picture, or is not known, counts neither as features nor as
+area.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from texrs._typing import Array, Bools, Floats
+
+__all__ = ["Lattice", "smooth"]
+
+_ACROSS = 9
+"""Cells across a window; odd, so that one is in the middle."""
+_LEAST_AREA = 1 / 6
+"""Share of a window that must be known; a corner of the picture has a quarter."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lattice:
+    """Cells that cover a picture, and the windows around them.
+
+    Attributes
+    ----------
+    size : (int, int)
+        Rows and columns of the picture.
+    cell : int
+        Side of a cell, in pixels.
+    across : int
+        Cells across a window; odd.
+
+    """
+
+    size: tuple[int, int]
+    cell: int
+    across: int
+
+    @classmethod
+    def of(cls, size: tuple[int, int], window: int) -> Lattice:
+        """Give the lattice for windows of about so many pixels."""
+        cell = max(1, round(window / _ACROSS))
+        return cls(size, cell, max(1, round((window / cell - 1) / 2) * 2 + 1))
+
+    def densities(
+        self, features: Array, known: Bools | None
+    ) -> tuple[NDArray[np.float64], Bools, NDArray[np.float64], NDArray[np.float64]]:
+        """Count features in windows.
+
+        Parameters
+        ----------
+        features : (H, W) array of small whole numbers
+            What is counted.
+        known : (H, W) array of bool, optional
+            What is area.
+
+        Returns
+        -------
+        densities : (R, C) array
+            Features in a pixel of the window around each cell.
+        enough : (R, C) array of bool
+            Whether enough of the window is known to say so.
+        rows, columns : (R, C) arrays
+            How far the middle of the cell lies from that of its window's known part, in pixels: at borders and beside
+            holes a window sees what is on one side alone.
+
+        """
+        area = self._cells(np.ones(self.size, np.uint8) if known is None else known.view(np.uint8))
+        total = self._windows(area)
+        enough = total >= _LEAST_AREA * (self.across * self.cell) ** 2
+        if not enough.any():
+            enough = total > 0
+        shares = np.maximum(total, 1)
+        rows, columns = (
+            at - self._windows(area * at) / shares
+            for at in np.meshgrid(*(self.cell * np.arange(n, dtype=np.float64) for n in area.shape), indexing="ij")
+        )
+        return self._windows(self._cells(features)) / shares, enough, rows, columns
+
+    def _cells(self, values: Array) -> NDArray[np.float64]:
+        """Give the sums over the cells."""
+        starts = [np.arange(0, n, self.cell) for n in self.size]
+        # Rows first: contiguous, and what is left of them is small.
+        rows = np.add.reduceat(values, starts[0], axis=0, dtype=np.int32)
+        return np.add.reduceat(rows, starts[1], axis=1, dtype=np.int64).astype(np.float64)
+
+    def _windows(self, cells: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Give the sums over the windows around the cells: whole numbers, so in float64 exact."""
+        reach = self.across // 2
+        for axis in (0, 1):
+            total = np.cumsum(cells, axis=axis)
+            count = total.shape[axis]
+            upper = np.take(total, np.minimum(np.arange(count) + reach, count - 1), axis)
+            lower = np.take(total, np.maximum(np.arange(count) - reach - 1, 0), axis)
+            cells = upper - lower * np.expand_dims(np.arange(count) > reach, 1 - axis)
+        return cells
+
+    def spread(self, cells: Floats) -> Floats:
+        """Interpolate what the cells say linearly, to every pixel."""
+        values = cells
+        for axis, n in enumerate(self.size):
+            last = cells.shape[axis] - 1
+            at = np.clip((np.arange(n) + 0.5) / self.cell - 0.5, 0, last)
+            first = np.minimum(at.astype(np.intp), max(0, last - 1))
+            share = np.expand_dims((at - first).astype(np.float32), 1 - axis)
+            low = np.take(values, first, axis)
+            low += share * np.take(np.diff(values, axis=axis, append=np.take(values, [last], axis)), first, axis)
+            values = low
+        return values
+
+
+def smooth(logs: Floats, known: Bools, rounds: int, *, size: int = 3, share: float = 0.8) -> Floats:
+    """Bring values towards the mean and the median of those around them (equation 2), by ``share`` the mean."""
+    values = np.where(known, logs, 0)
+    weights = ndimage.uniform_filter(known.astype(np.float32), size, mode="nearest")
+    for _ in range(rounds):
+        mean = ndimage.uniform_filter(values, size, mode="nearest") / np.maximum(weights, 1e-6)
+        if known.all():
+            middle = ndimage.median_filter(values, size, mode="nearest")
+        else:
+            around = np.lib.stride_tricks.sliding_window_view(
+                np.pad(np.where(known, values, np.nan), size // 2, mode="edge"), (size, size)
+            ).reshape(*values.shape, -1)
+            middle = np.where(known, 0, values)
+            middle[known] = np.nanmedian(around[known], axis=-1)
+        values = np.where(known, share * mean + (1 - share) * middle, 0).astype(np.float32)
+    return values
