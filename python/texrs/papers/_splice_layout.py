@@ -22,7 +22,7 @@ from texrs.papers._splice_edit import Step, edited
 from texrs.papers._splice_source import Extended, Memory, available, extend, parts_of
 from texrs.texels import Texels
 
-__all__ = ["Match", "apart", "edited_match", "matched", "snapped", "trimmed", "void_of"]
+__all__ = ["Match", "apart", "edited_match", "matched", "snapped", "told", "trimmed", "void_of", "whole_shifts"]
 
 Points = NDArray[np.float64]
 
@@ -36,6 +36,8 @@ SPARE = 1.2
 """Texels there should be for each target."""
 TURN = 0.75
 """A turn must cost so much less than a smaller one: lattices have several that cost nearly the same."""
+SHRUNK = 0.9
+"""How far what is erased moves towards its middle."""
 OFFSETS, NEARER = 6, 0.9
 """Offsets of a connected figure's layout that are tried along each axis, and how much less one must cost."""
 ROOM = 1.08
@@ -307,3 +309,48 @@ def void_of(source: Extended, of: NDArray[np.intp], grown: int = 1) -> Bools:
     gone = idle if source.own else idle | source.stray
     wide = maximum_filter(gone.astype(np.uint8), 2 * grown + 1) > 0
     return np.asarray((wide | source.stray) & ~used[source.instance])
+
+
+def told(found: Match) -> tuple[Bools, NDArray[np.float32]]:
+    """Give what does not go along with the ground, and how far its pixels move, (2, H, W).
+
+    Texels move whole. What is erased shrinks besides towards its middle: it then leaves a smaller hole. But where a picture
+    stays itself, nothing stirs that is not told to.
+    """
+    source = found.source
+    still = source.own > 0
+    number = source.instance if still else source.piece
+    middle = source.points if still else np.concatenate([source.points, source.rest])
+    shift = np.zeros((2, len(middle) + 1), np.float32)
+    shift[:, 1:] = whole_shifts(found, middle).T
+    own = shift[:, number]
+    if not still:
+        idle = np.ones(len(middle) + 1, bool)
+        idle[0] = False
+        idle[found.of + 1] = False
+        gone = np.nonzero(idle[number])
+        centre = middle[number[gone] - 1] - source.origin
+        own[:, gone[0], gone[1]] += SHRUNK * (centre - np.stack(gone, axis=-1)).T
+    return number > 0, own
+
+
+def whole_shifts(found: Match, points: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+    """Give the whole pixels that every texel moves by; those that go nowhere go along with the ones around them.
+
+    So do further ``points`` that follow those of the source, where some are given.
+    """
+    from scipy.spatial import cKDTree
+
+    source = found.source
+    points = source.points if points is None else points
+    shift = np.zeros((len(points), 2))
+    shift[found.of] = np.rint(found.shift)
+    idle = np.ones(len(shift), bool)
+    idle[found.of] = False
+    if idle.any():
+        count = min(4, len(found.of))
+        far, near = cKDTree(source.points[found.of]).query(points[idle], k=[*range(1, count + 1)])
+        weight = 1 / (far**2 + 1e-6)
+        mean = (weight[..., None] * shift[found.of][near]).sum(axis=1) / weight.sum(axis=1)[:, None]
+        shift[idle] = np.rint(mean)
+    return shift

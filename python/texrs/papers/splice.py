@@ -14,11 +14,14 @@ Departures, with their reasons:
 
 - Both point sets go on beyond their pictures, by reflection at the lines where the layout goes on as it is: otherwise
   a third of the output is empty, and texels at its rim are missing.
-- There are more texels than targets; those that go nowhere are erased. As printed, point sets must have equal size.
+- There are more texels than targets; those that go nowhere are erased. As printed, point sets must have equal size. What is
+  erased shrinks, and the ground around it closes in: else a fifth of the output is a hole.
+- Connected figures take the layout where their texels go least far: else walls are bent for nothing.
 - Layouts grow until disjoint texels have room, and those that still collide are pushed apart: spacing alone makes chains.
 - Distances are squared in Eq. 4: the best matching then has no crossings.
 - Disjoint texels move whole, by whole pixels: Eq. 5 in the limit of its weights. The soft energy stretches components that
-  hold two pins by dozens of pixels. The ground between them is harmonic, so nothing of it moves further than its texels.
+  hold two pins by dozens of pixels. The ground between them is harmonic, so nothing of it moves further than its texels, and
+  so smooth that it is solved for at every other pixel.
 - Eq. 5 sums over rigid pixels only, so the others have no equation and the system is singular, or, for brick walls,
   moves nothing but its pins: here they count a hundredth. Long joints, which the decoupling of Table 1 leaves free to slide,
   are tied to their neighbours by a hair.
@@ -48,7 +51,17 @@ from texrs.kernels.warp import from_points, mesh
 from texrs.matching import spacing
 from texrs.papers._splice_edit import as_steps
 from texrs.papers._splice_entry import as_texels
-from texrs.papers._splice_layout import Match, apart, edited_match, matched, snapped, trimmed, void_of
+from texrs.papers._splice_layout import (
+    Match,
+    apart,
+    edited_match,
+    matched,
+    snapped,
+    told,
+    trimmed,
+    void_of,
+    whole_shifts,
+)
 from texrs.papers._splice_literal import literal_field, literal_fill, literal_match
 from texrs.papers._splice_pictures import Stages
 from texrs.papers._splice_refine import Draft, fill, refined_places
@@ -59,9 +72,6 @@ from texrs.source_map import SourceMap
 from texrs.texels import Texels
 
 __all__ = ["self_splice", "splice"]
-
-SHRUNK = 0.9
-"""How far what is erased moves towards its middle."""
 
 Method: TypeAlias = Literal["paper", "preview"] | None
 Edit: TypeAlias = str | Mapping[str, Any] | Sequence[Mapping[str, Any]]
@@ -311,51 +321,6 @@ def moved(delta: NDArray[np.float64], origin: tuple[int, int]) -> NDArray[np.flo
     delta[..., 0] += np.arange(origin[0], origin[0] + delta.shape[0])[:, None]
     delta[..., 1] += np.arange(origin[1], origin[1] + delta.shape[1])
     return delta
-
-
-def told(found: Match) -> tuple[Bools, NDArray[np.float32]]:
-    """Give what does not go along with the ground, and how far its pixels move, (2, H, W).
-
-    Texels move whole. What is erased shrinks besides towards its middle: it then leaves a smaller hole. But where a picture
-    stays itself, nothing stirs that is not told to.
-    """
-    source = found.source
-    still = source.own > 0
-    number = source.instance if still else source.piece
-    middle = source.points if still else np.concatenate([source.points, source.rest])
-    shift = np.zeros((2, len(middle) + 1), np.float32)
-    shift[:, 1:] = whole_shifts(found, middle).T
-    own = shift[:, number]
-    if not still:
-        idle = np.ones(len(middle) + 1, bool)
-        idle[0] = False
-        idle[found.of + 1] = False
-        gone = np.nonzero(idle[number])
-        centre = middle[number[gone] - 1] - source.origin
-        own[:, gone[0], gone[1]] += SHRUNK * (centre - np.stack(gone, axis=-1)).T
-    return number > 0, own
-
-
-def whole_shifts(found: Match, points: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
-    """Give the whole pixels that every texel moves by; those that go nowhere go along with the ones around them.
-
-    So do further ``points`` that follow those of the source, where some are given.
-    """
-    from scipy.spatial import cKDTree
-
-    source = found.source
-    points = source.points if points is None else points
-    shift = np.zeros((len(points), 2))
-    shift[found.of] = np.rint(found.shift)
-    idle = np.ones(len(shift), bool)
-    idle[found.of] = False
-    if idle.any():
-        count = min(4, len(found.of))
-        far, near = cKDTree(source.points[found.of]).query(points[idle], k=[*range(1, count + 1)])
-        weight = 1 / (far**2 + 1e-6)
-        mean = (weight[..., None] * shift[found.of][near]).sum(axis=1) / weight.sum(axis=1)[:, None]
-        shift[idle] = np.rint(mean)
-    return shift
 
 
 # --- the backward warp: Figure 6 -------------------------------------------------------------------------------------
