@@ -6,7 +6,8 @@
 The similarity sets are made beforehand. "cold": nothing else is kept; "cached": the factor and the texels' parts are. The
 system's side includes the margin. Other solvers get the same matrix, in turns with ours: SciPy's splu in its symmetric mode,
 and CHOLMOD where it is installed (pip install cvxopt; it is GPL, so a peer of this comparison and nothing else). "growth"
-analyses and splices ever larger pictures, each in a process of its own, whose peak of memory is told.
+analyses and splices ever larger pictures, each in a process of its own, whose peak of memory is told;
+there the similarity sets are part of a splice.
 """
 
 from __future__ import annotations
