@@ -1,18 +1,26 @@
-"""How long a splice takes, and its factorisation against other solvers.
+"""How long a splice takes, its factorisation against other solvers, and how time and memory grow.
 
     python benches/splice_speed.py [SIDE ...]
+    python benches/splice_speed.py growth [SIDE ...]
 
 The similarity sets are made beforehand. "cold": nothing else is kept; "cached": the factor and the texels' parts are. The
-system's side includes the margin. SciPy's splu is asked for its symmetric mode, on the same matrix, in turns with ours.
+system's side includes the margin. Other solvers get the same matrix, in turns with ours: SciPy's splu in its symmetric mode,
+and CHOLMOD where it is installed (pip install cvxopt; it is GPL, so a peer of this comparison and nothing else). "growth"
+analyses and splices ever larger pictures, each in a process of its own, whose peak of memory is told;
+there the similarity sets are part of a splice.
 """
 
 from __future__ import annotations
 
+import resource
+import subprocess
 import sys
 import time
 from collections.abc import Callable
 
 import numpy as np
+from scipy.ndimage import binary_erosion
+from scipy.sparse import tril
 from scipy.sparse.linalg import splu
 
 import texrs
@@ -21,18 +29,19 @@ from texrs.kernels.sparse import Cholesky
 from texrs.kernels.warp import mesh
 from texrs.papers import _splice_layout, _splice_source, _splice_warp
 from texrs.papers._splice_warp import energy
-from texrs.texels import Texels
+from texrs.texels import Texels, analyse
+
+try:
+    import cvxopt
+    from cvxopt import cholmod
+except ImportError:
+    cholmod = None
 
 ROUNDS = 5
 
 
 def entry(name: str, side: int) -> Texels:
-    sample = samples.load(name, size=(side, side))
-    assert sample.centres is not None
-    assert sample.mask is not None
-    return Texels(
-        sample.image, sample.centres, sample.mask, (23, 23), sample.tag or "F=d", np.ones(len(sample.centres))
-    )
+    return Texels.of_sample(samples.load(name, size=(side, side)))
 
 
 def best(
@@ -53,8 +62,10 @@ def forget() -> None:
     _splice_warp._FACTORS.clear()
     _splice_source._PARTS.clear()
     _splice_source._EXTENDED.clear()
+    _splice_source._FOLDED.clear()
     _splice_layout._DIRECTIONS.clear()
     _splice_layout._LAYOUTS.clear()
+    _splice_layout._REACHES.clear()
 
 
 def splices(sides: list[int]) -> None:
@@ -75,7 +86,7 @@ def splices(sides: list[int]) -> None:
 
 
 def solvers(sides: list[int]) -> None:
-    print("\nEq. 5, 13 points: factor + two solves, ms of a processor   ours     splu   ratio")
+    print("\nEq. 5, 13 points: factor + two solves, ms of a processor   ours     splu   ratio  CHOLMOD   ratio")
     for side in sides:
         sample = samples.load("net", size=(side, side))
         assert sample.mask is not None
@@ -84,16 +95,29 @@ def solvers(sides: list[int]) -> None:
         matrix = energy(sample.mask, at[:, 0] * side + at[:, 1], 1, upright=False)
         right = np.random.default_rng(0).standard_normal((side * side, 2))
         options = {"SymmetricMode": True}
-        ours, theirs = [], []
-        for _ in range(2 if side > 300 else ROUNDS):
-            ours.append(best(lambda: Cholesky(matrix).solve(right), rounds=1)[1])
-            theirs.append(
-                best(
-                    lambda: splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0, options=options).solve(right),
-                    rounds=1,
-                )[1]
-            )
-        print(f"{side:4d}^2 {min(ours):47.1f} {min(theirs):8.1f} {min(theirs) / min(ours):7.2f}", flush=True)
+        tasks: dict[str, Callable[[], object]] = {
+            "ours": lambda: Cholesky(matrix).solve(right),
+            "splu": lambda: splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0, options=options).solve(right),
+        }
+        if cholmod is not None:
+            lower = tril(matrix).tocoo()
+            parts = (lower.data, lower.row.astype(np.int64), lower.col.astype(np.int64))
+            other = cvxopt.spmatrix(*map(cvxopt.matrix, parts), matrix.shape)
+
+            def peer() -> None:
+                sides = cvxopt.matrix(right)
+                factor = cholmod.symbolic(other)
+                cholmod.numeric(other, factor)
+                cholmod.solve(factor, sides)
+
+            tasks["CHOLMOD"] = peer
+        spent: dict[str, list[float]] = {name: [] for name in tasks}
+        for _ in range(3 if side > 300 else ROUNDS):
+            for name, task in tasks.items():
+                spent[name].append(best(task, rounds=1)[1])
+        least = {name: min(times) for name, times in spent.items()}
+        rest = "".join(f" {least[n]:8.1f} {least[n] / least['ours']:7.2f}" for n in list(tasks)[1:])
+        print(f"{side:4d}^2 {least['ours']:47.1f}{rest}", flush=True)
 
 
 def warps() -> None:
@@ -105,8 +129,34 @@ def warps() -> None:
     print(f"\ndense warp of {side}^2: {wall:.1f} ms ({busy:.1f} of processors)")
 
 
+def grown(what: str, side: int) -> None:
+    """Do one thing with a picture of a side, and tell how long that took and the most memory that was held."""
+    mine = entry("dots", side)
+    theirs = entry("pebbles", side) if what == "splice" else mine
+    middle = np.abs(mine.points - side / 2).sum(axis=1).argmin()
+    before = resource.getrusage(resource.RUSAGE_SELF)
+    if what == "splice":
+        texrs.splice(mine, theirs, seed=1)
+    elif what == "similarity":
+        mine.similarity()
+    else:
+        ground = np.argwhere(binary_erosion(~mine.mask, iterations=4))[:1]
+        analyse(mine.image, box=(*mine.points[middle], *mine.box), background=ground, tag="F=d")
+    after = resource.getrusage(resource.RUSAGE_SELF)
+    busy = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    print(f"{what:12s} {side:5d}^2 {busy:8.2f} s of processors, {after.ru_maxrss / 1024:7.0f} MB at most", flush=True)
+
+
 if __name__ == "__main__":
-    asked = [int(x) for x in sys.argv[1:]] or [128, 192, 256, 512]
-    splices(asked)
-    solvers(asked)
-    warps()
+    words = sys.argv[1:]
+    if words[:1] == ["grown"]:
+        grown(words[1], int(words[2]))
+    elif words[:1] == ["growth"]:
+        for work in ("analyse", "similarity", "splice"):
+            for length in words[1:] or ["256", "512", "1024", "2048"]:
+                subprocess.run([sys.executable, __file__, "grown", work, length], check=True)
+    else:
+        asked = [int(x) for x in words] or [128, 192, 256, 512]
+        splices(asked)
+        solvers(asked)
+        warps()

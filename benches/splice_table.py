@@ -54,11 +54,7 @@ def entries(folder: str | None, *, auto: bool) -> dict[str, Texels]:
             path = next(p for p in Path(folder).glob(f"[b-d]-*/{name}.*") if p.suffix != ".json")
             found[name] = read(path, auto=auto)
             continue
-        sample = samples.load(name, size=(256, 256))
-        assert sample.centres is not None
-        assert sample.mask is not None
-        count = np.ones(len(sample.centres))
-        found[name] = Texels(sample.image, sample.centres, sample.mask, (25, 25), sample.tag or "F=d", count)
+        found[name] = Texels.of_sample(samples.load(name, size=(256, 256)))
     return found
 
 

@@ -21,10 +21,7 @@ EDITS = (
 
 def entry(name: str) -> Texels:
     """Give a sample with the texels that it is known to have."""
-    sample = samples.load(name, size=(SIDE, SIDE))
-    nearest = texrs.texels.spacing(sample.centres)
-    side = int(nearest) // 2 * 2 + 1
-    return Texels(sample.image, sample.centres, sample.mask, (side, side), sample.tag, np.ones(len(sample.centres)))
+    return Texels.of_sample(samples.load(name, size=(SIDE, SIDE)))
 
 
 def framed(pictures: list[np.ndarray]) -> np.ndarray:

@@ -144,7 +144,10 @@ def coherence(a: Texels, result: Synthesis, seed: int = 0) -> tuple[float, float
 
 
 def layout(result: Synthesis, a: Texels, b: Texels) -> dict[str, float]:
-    """S10: the arrangement of rigid pixels against the targets, and against A's own layout; in spacings."""
+    """S10: the arrangement of rigid pixels against the targets and against A's own layout, in spacings; colours against B's.
+
+    Colours in standard deviations of B's.
+    """
     goals = np.array([m["target"] for m in result.report["matches"]])
     number = result.source.label.astype(int)
     size = np.array(number.shape)
@@ -172,14 +175,13 @@ def layout(result: Synthesis, a: Texels, b: Texels) -> dict[str, float]:
         "colour": float(
             np.mean(
                 [
-                    wasserstein_distance(x.ravel(), y.ravel())
+                    wasserstein_distance(x.ravel(), y.ravel()) / max(float(np.std(y)), 1.0)
                     for x, y in zip(
                         np.moveaxis(colours(result.image), -1, 0), np.moveaxis(colours(b.image), -1, 0), strict=False
                     )
                 ]
             )
-        )
-        / 255,
+        ),
     }
 
 

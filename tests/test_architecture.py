@@ -19,7 +19,7 @@ NOUNS = {
     "io": set(),
     "report": {"source_map", "io", "volume"},
     "segment": set(),
-    "texels": {"analysis", "io", "segment"},
+    "texels": {"analysis", "io", "matching", "segment"},
     "fields": set(),
     "volume": {"io", "fields", "source_map"},
     "deform": set(),

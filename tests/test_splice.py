@@ -21,15 +21,7 @@ SIZE = (192, 192)
 
 
 def entry(name: str, seed: int = 0, size: tuple[int, int] = SIZE) -> Texels:
-    sample = samples.load(name, size=size, seed=seed)
-    assert sample.centres is not None
-    assert sample.labels is not None
-    boxes = [b for b in find_objects(sample.labels) if b]
-    box = tuple(int(np.median([b[axis].stop - b[axis].start for b in boxes])) | 1 for axis in (0, 1))
-    mask = sample.mask if sample.mask is not None else sample.labels > 0
-    return Texels(
-        sample.image, sample.centres, mask, (box[0], box[1]), sample.tag or "F=d", np.ones(len(sample.centres))
-    )
+    return Texels.of_sample(samples.load(name, size=size, seed=seed))
 
 
 ENTRIES = {name: entry(name) for name in ("dots", "pebbles", "leaves_and_flowers", "net", "bricks")}
@@ -72,8 +64,7 @@ def test_all_colours_are_the_texture_s(a: str, b: str, spliced: Any) -> None:
     if mine.tag == "F=d":
         assert result.report["flipped_rigid"] <= 0.002, "S6"
         assert result.report["flipped"] <= 0.12, "S6"
-    # Between stones that touch there is no ground to bring along.
-    assert result.report["holes"] <= (0.6 if a == "pebbles" else 0.16), "S7"
+    assert result.report["holes"] <= 0.15, "S7"
 
 
 @pytest.mark.parametrize(("a", "b"), PAIRS)
@@ -88,8 +79,8 @@ def test_the_arrangement_is_the_other_one_s(a: str, b: str, spliced: Any) -> Non
     assert found["spacing"] <= 0.05, "S10"
     assert found["nearest"] <= 0.05, "S10"
     assert found["away"] <= 0.5, "S3"
-    assert found["own"] > 0.3 or a == "pebbles", "S10"
-    assert found["colour"] > 0.03, "S10"
+    assert found["own"] > 0.3, "S10"
+    assert found["colour"] > 0.3, "S10"
 
 
 @pytest.mark.parametrize("name", ["dots", "pebbles", "net", "bricks"])
@@ -103,8 +94,7 @@ def test_nothing_moved_nothing_changed(name: str) -> None:
 def test_moving_all_moves_the_picture(name: str) -> None:
     mine = ENTRIES[name]
     image = texrs.self_splice(mine, {"op": "shift", "by": [5, -3]}).image
-    # At the rim the ground goes on beyond the picture.
-    assert (image[7:, :-5] == mine.image[2:-5, 3:-2]).all(), "S9"
+    assert (image[5:, :-3] == mine.image[:-5, 3:]).all(), "S9"
 
 
 # --- brick walls: S11 ------------------------------------------------------------------------------------------------
@@ -129,6 +119,12 @@ def joints(sample: samples.Sample) -> list[np.ndarray[Any, np.dtype[np.intp]]]:
     return found
 
 
+def bend(displacement: np.ndarray[Any, np.dtype[np.float64]]) -> float:
+    """How far the middle line of a joint leaves a straight line: the standard deviation, in pixels."""
+    rows = np.arange(len(displacement))
+    return float((displacement - np.polyval(np.polyfit(rows, displacement, 1), rows)).std())
+
+
 @pytest.mark.parametrize("edit", ["jitter", "rows", "stretch"])
 def test_joints_stay_upright(edit: str) -> None:
     sample = samples.bricks()
@@ -146,16 +142,18 @@ def test_joints_stay_upright(edit: str) -> None:
         shift[:, 1] = 0.3 * (pins[:, 1] - pins[:, 1].mean())
     found = joints(sample)
     assert len(found) >= 15
-    leans = {}
+    leans, bends = {}, {}
     for upright in (True, False):
         delta = warp.stretched(rigid, pins, shift, upright=upright)[..., 1]
         leans[upright] = np.array([abs(delta[tuple(j[0])] - delta[tuple(j[-1])]) for j in found])
+        bends[upright] = np.array([bend(delta[tuple(j.T)]) for j in found])
         if upright:
             width = [abs(delta[y, x + 2] - delta[y, x - 2]) for j in found for y, x in j[len(j) // 2 :][:1]]
             assert np.mean(width) <= 0.5
     assert leans[True].mean() <= 0.3
     assert leans[True].max() <= 1.0
     assert leans[True].mean() < leans[False].mean()
+    assert bends[True].mean() <= 0.1
 
 
 # --- two warps, and what serves them ---------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ import pytest
 from texel_checks import annotated, passes, score
 from texrs import io, samples, texels, threads
 from texrs.errors import FileError, InvalidInput, TexrsError
+from texrs.matching import directions
 from texrs.texels import Texels, analyse
 from texrs.texels._mixture import Mixture
 from texrs.texels._search import otsu
@@ -146,12 +147,12 @@ def test_rotations_find_turned_texels() -> None:
 
 def test_directions() -> None:
     grid = np.indices((8, 9)).reshape(2, -1).T
-    assert texels.peaks(grid * [10.0, 10.0])[:2] in ((0.0, 90.0), (90.0, 0.0))
+    assert directions(grid * [10.0, 10.0])[:2] in ((0.0, 90.0), (90.0, 0.0))
     turn = np.deg2rad(20)
     turned = grid * 10.0 @ np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    assert {round(p) for p in texels.peaks(turned)[:2]} == {20, 110}
+    assert {round(p) for p in directions(turned)[:2]} == {20, 110}
     rng = np.random.default_rng(5)
-    assert len(texels.peaks(rng.uniform(0, 100, (3, 2)))) == 0
+    assert len(directions(rng.uniform(0, 100, (3, 2)))) == 0
 
 
 def test_the_automatic_start() -> None:

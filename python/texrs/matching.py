@@ -141,16 +141,18 @@ class Fold:
         mirrored = np.zeros(np.shape(x), bool) if self.wrap else np.mod(turn, 2) == 1
         return self.low + np.where(mirrored, side - rest, rest), mirrored
 
-    def copies(self, x: float, low: float, high: float) -> list[tuple[float, int]]:
-        """Give all places in [low, high] that stand for ``x``, and which turn: an odd one is mirrored, if any is."""
+    def copies(
+        self, x: NDArray[np.float64], low: float, high: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.bool_]]:
+        """Give the places that stand for each coordinate, (n, turns), the turns, and which places lie in [low, high].
+
+        An odd turn is mirrored, if any is.
+        """
         side = self.high - self.low
-        found = []
-        for turn in range(math.floor((low - self.low) / side) - 1, math.floor((high - self.low) / side) + 2):
-            mirrored = not self.wrap and turn % 2 == 1
-            at = self.low + turn * side + (self.high - x if mirrored else x - self.low)
-            if low <= at <= high:
-                found.append((at, turn))
-        return found
+        turns = np.arange(math.floor((low - self.low) / side) - 1, math.floor((high - self.low) / side) + 2)
+        mirrored = np.zeros(len(turns), bool) if self.wrap else turns % 2 == 1
+        at = self.low + turns * side + np.where(mirrored, self.high - x[:, None], x[:, None] - self.low)
+        return np.asarray(at, np.float64), turns, (at >= low) & (at <= high)
 
 
 def fold_of(points: Points, axis: int, ends: tuple[float, float], *, wrap: bool, beyond: bool) -> Fold:
@@ -241,17 +243,12 @@ class Layout:
 
     def within(self, low: Points, high: Points) -> tuple[Points, NDArray[np.intp], NDArray[np.bool_]]:
         """Give the points in a box, which of ``points`` each stands for, and along which axes it is mirrored."""
-        rows, of, turns = [], [], []
-        for i, point in enumerate(self.points):
-            along = [self.folds[a].copies(float(point[a]), float(low[a]), float(high[a])) for a in range(2)]
-            for y, up in along[0]:
-                for x, aside in along[1]:
-                    rows.append((y, x))
-                    of.append(i)
-                    turns.append((up, aside))
-        if not rows:
+        along = [self.folds[a].copies(self.points[:, a], float(low[a]), float(high[a])) for a in range(2)]
+        which, up, aside = np.nonzero(along[0][2][:, :, None] & along[1][2][:, None])
+        if not len(which):
             return np.zeros((0, 2)), np.zeros(0, np.intp), np.zeros((0, 2), bool)
-        found, which, turned = np.array(rows, float), np.array(of, np.intp), np.array(turns)
+        found = np.stack([along[0][0][which, up], along[1][0][which, aside]], axis=-1)
+        turned = np.stack([along[0][1][up], along[1][1][aside]], axis=-1)
         # Those of the picture itself come first, then by place: who is merged must not hang on the box.
         order = np.lexsort((found[:, 1], found[:, 0], turned.any(axis=1)))
         found, which, turned = found[order], which[order], turned[order]

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 import math
 import os
 import re
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, cast
 
 import numpy as np
 import typer
@@ -73,15 +75,7 @@ Wrap = Annotated[
 Seed = Annotated[int, typer.Option(help="Chooses the samples of the colour models.")]
 
 
-def analyse_command(
-    image: Annotated[
-        str, typer.Argument(metavar="IMAGE", help="The texture: an image file, or sample:NAME.", show_default=False)
-    ],
-    out: Annotated[str, typer.Option("--out", "-o", metavar="ENTRY.npz", help="Entry to write.", show_default=False)],
-    more: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="[ROW,COL]...", help="More places between the texels.", show_default=False),
-    ] = None,
+def read_options(
     box: BoxText = None,
     background: Places = None,
     tag: TagText = None,
@@ -93,6 +87,56 @@ def analyse_command(
     method: Method = "default",
     wrap: Wrap = "none",
     seed: Seed = 0,
+) -> dict[str, Any]:
+    """Read what every command takes that analyses."""
+    if method not in ("default", "paper"):
+        raise InvalidInput(f"--method: allowed are default and paper; got {method!r}")
+    try:
+        sizes = [float(s) for s in scales.split(":")]
+    except ValueError:
+        raise InvalidInput(f"--scales: needs numbers such as 0.8:1:1.25, got {scales!r}") from None
+    return {
+        "box": None if box is None else _numbers(box, 4, "--box", "ROW,COL,HEIGHT,WIDTH, as in 96,92,50,50"),
+        "background": _places(background or ()) or None,
+        "tag": cast(Tag | None, tag),
+        "mask": None if mask is None else np.asarray(_files.read_hole(mask)) != 0,
+        "points": None if points is None else read_points(points),
+        "rotations": rotations,
+        "scales": sizes,
+        "threshold": threshold,
+        "method": method,
+        "wrap": _files.parse_wrap(wrap),
+        "seed": seed,
+    }
+
+
+def analysing(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of `read_options`, and what is read of them as ``options``."""
+    own, shared = (inspect.signature(c, eval_str=True).parameters for c in (command, read_options))
+
+    @functools.wraps(command)
+    def wrapped(**given: Any) -> None:
+        options = read_options(**{name: given.pop(name) for name in shared})
+        command(**given, options=options)
+
+    parameters = [p for name, p in own.items() if name != "options"]
+    first = next(i for i, p in enumerate(parameters) if p.name in ("similarity", "replace"))
+    parameters[first:first] = shared.values()
+    wrapped.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    wrapped.__annotations__ = {p.name: p.annotation for p in parameters}
+    return wrapped
+
+
+@analysing
+def analyse_command(
+    image: Annotated[
+        str, typer.Argument(metavar="IMAGE", help="The texture: an image file, or sample:NAME.", show_default=False)
+    ],
+    out: Annotated[str, typer.Option("--out", "-o", metavar="ENTRY.npz", help="Entry to write.", show_default=False)],
+    more: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[ROW,COL]...", help="More places between the texels.", show_default=False),
+    ] = None,
     similarity: Annotated[
         bool, typer.Option("--similarity/--no-similarity", help="Whether similarity sets are made now and kept too.")
     ] = False,
@@ -102,6 +146,8 @@ def analyse_command(
     ] = None,
     count: Threads = None,
     quiet: Quiet = False,
+    *,
+    options: dict[str, Any],
 ) -> None:
     """Find the texels of a texture, and what belongs to them."""
     start = time.monotonic()
@@ -110,8 +156,7 @@ def analyse_command(
     _files.check_output(out)
     if stages is not None:
         _files.check_folder(stages)
-    options = _options(box, [*(background or ()), *(more or ())], tag, mask, points, rotations, scales)
-    options |= {"threshold": threshold, "wrap": _files.parse_wrap(wrap), "seed": seed, "method": _method(method)}
+    options["background"] = [*(options["background"] or ()), *_places(more or ())] or None
     pixels = _files.read_exemplar(image)
     with named(image=image, count="--threads"), threads(count), watching(quiet=quiet) as progress:
         entry = analyse(pixels, progress=progress, **options)
@@ -124,6 +169,7 @@ def analyse_command(
     note(f"wrote {out}: {len(entry.points)} texels, {entry.tag}, in {time.monotonic() - start:.1f} s", quiet=quiet)
 
 
+@analysing
 def database_command(
     folder: Annotated[
         str, typer.Argument(metavar="DIR", help="Folder of the database; made if it is not there.", show_default=False)
@@ -146,17 +192,6 @@ def database_command(
     name: Annotated[
         str | None, typer.Option(help="Name of the texture that is added.", show_default="that of the file")
     ] = None,
-    box: BoxText = None,
-    background: Places = None,
-    tag: TagText = None,
-    mask: MaskFile = None,
-    points: PointsFile = None,
-    rotations: Rotations = 1,
-    scales: Scales = "1",
-    threshold: Threshold = None,
-    method: Method = "default",
-    wrap: Wrap = "none",
-    seed: Seed = 0,
     replace: Annotated[
         bool, typer.Option("--replace/--no-replace", help="Whether another texture of the name may be replaced.")
     ] = False,
@@ -167,22 +202,23 @@ def database_command(
     cell: Annotated[int, typer.Option(help="Side of a picture of matrix, in pixels.")] = 160,
     count: Threads = None,
     quiet: Quiet = False,
+    *,
+    options: dict[str, Any],
 ) -> None:
     """Keep analysed textures in a folder: add, list, or splice all with all."""
     given = list(items or ())
     if action not in ("add", "list", "matrix"):
         raise InvalidInput(f"add|list|matrix: allowed are add, list and matrix; got {action!r}")
     if action == "add":
-        places = [*(background or ()), *(i for i in given if re.fullmatch(PLACE, i))]
+        places = [*(options["background"] or ()), *_places([i for i in given if re.fullmatch(PLACE, i)])]
+        options["background"] = places or None
         given = [i for i in given if not re.fullmatch(PLACE, i)]
         if not given:
             raise InvalidInput("IMAGE: add needs images")
-        if len(given) > 1 and (name or box or places or mask or points):
+        if len(given) > 1 and (name or any(options[k] is not None for k in ("box", "background", "mask", "points"))):
             raise InvalidInput(
                 "IMAGE: --name, --box, --background, --mask and --points belong to one image; add one by one"
             )
-        options = _options(box, places, tag, mask, points, rotations, scales)
-        options |= {"threshold": threshold, "wrap": _files.parse_wrap(wrap), "seed": seed, "method": _method(method)}
         textures = TextureDatabase(folder, say=complain)
         for image in given:
             sample = image.startswith(_files.SAMPLE)
@@ -207,7 +243,9 @@ def database_command(
     _files.check_output(out)
     shape = _files.parse_size(size)
     with named(count="--threads"), threads(count), watching(quiet=quiet) as progress:
-        made = textures.matrix(given or None, given or None, size=shape, cell=cell, progress=progress, seed=seed)
+        made = textures.matrix(
+            given or None, given or None, size=shape, cell=cell, progress=progress, seed=options["seed"]
+        )
     for (a, b), reason in made.failed.items():
         complain(f"{a} on {b}: {reason}")
     with _files.output(out) as temporary:
@@ -218,27 +256,9 @@ def database_command(
 PLACE = r"\s*-?[0-9]+(\.[0-9]*)?\s*,\s*-?[0-9]+(\.[0-9]*)?\s*"
 
 
-def _options(
-    box: str | None,
-    places: Sequence[str],
-    tag: str | None,
-    mask: str | None,
-    points: str | None,
-    rotations: int,
-    scales: str,
-) -> dict[str, Any]:
-    """Read what both commands take."""
-    found: dict[str, Any] = {"rotations": rotations, "tag": cast(Tag | None, tag)}
-    found["box"] = None if box is None else _numbers(box, 4, "--box", "ROW,COL,HEIGHT,WIDTH, as in 96,92,50,50")
-    marks = [p for text in places for p in re.split(r"[\s;]+", text.strip()) if p]
-    found["background"] = [_numbers(p, 2, "--background", "ROW,COL, as in 125,60") for p in marks] or None
-    found["mask"] = None if mask is None else np.asarray(_files.read_hole(mask)) != 0
-    found["points"] = None if points is None else read_points(points)
-    try:
-        found["scales"] = [float(s) for s in scales.split(":")]
-    except ValueError:
-        raise InvalidInput(f"--scales: needs numbers such as 0.8:1:1.25, got {scales!r}") from None
-    return found
+def _places(texts: Sequence[str]) -> list[list[float]]:
+    parts = [p for text in texts for p in re.split(r"[\s;]+", text.strip()) if p]
+    return [_numbers(p, 2, "--background", "ROW,COL, as in 125,60") for p in parts]
 
 
 def _numbers(text: str, count: int, name: str, wanted: str) -> list[float]:
@@ -249,12 +269,6 @@ def _numbers(text: str, count: int, name: str, wanted: str) -> list[float]:
     if len(numbers) != count or not all(math.isfinite(n) for n in numbers):
         raise InvalidInput(f"{name}: needs {wanted}; got {text!r}")
     return numbers
-
-
-def _method(method: str) -> Literal["default", "paper"]:
-    if method not in ("default", "paper"):
-        raise InvalidInput(f"--method: allowed are default and paper; got {method!r}")
-    return cast(Literal["default", "paper"], method)
 
 
 def read_points(path: str) -> list[list[float]]:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from texrs.demo._html import code, figure, grid
 from texrs.demo._workshop import Section, Workshop, exemplar
 from texrs.papers.splice import self_splice, splice
-from texrs.texels import Texels, spacing
+from texrs.texels import Texels
 
 __all__ = ["SPLICE"]
 
@@ -24,12 +22,7 @@ EDITS: tuple[tuple[str, dict[str, Any], str], ...] = (
 
 def _entry(name: str) -> Texels:
     """Give a sample with the texels that it is known to have."""
-    sample = exemplar(name, SIDE)
-    assert sample.centres is not None
-    assert sample.mask is not None
-    assert sample.tag is not None
-    side = int(spacing(sample.centres)) // 2 * 2 + 1
-    return Texels(sample.image, sample.centres, sample.mask, (side, side), sample.tag, np.ones(len(sample.centres)))
+    return Texels.of_sample(exemplar(name, SIDE))
 
 
 def _splice(workshop: Workshop) -> str:

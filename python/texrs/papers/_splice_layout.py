@@ -19,10 +19,10 @@ from texrs._typing import Bools
 from texrs.errors import InvalidInput
 from texrs.matching import Layout, directions, match, nearest, spacing
 from texrs.papers._splice_edit import Step, edited
-from texrs.papers._splice_source import Extended, Memory, extend, parts_of
+from texrs.papers._splice_source import Extended, Memory, available, extend, parts_of
 from texrs.texels import Texels
 
-__all__ = ["Match", "apart", "edited_match", "matched", "snapped", "void_of"]
+__all__ = ["Match", "apart", "edited_match", "matched", "snapped", "told", "trimmed", "void_of", "whole_shifts"]
 
 Points = NDArray[np.float64]
 
@@ -30,16 +30,23 @@ BEYOND = 0.6
 """Targets lie up to so many spacings outside of the output."""
 MARGIN = 1.4
 """The texture goes on for so many of its spacings beyond the output, or for more."""
+WIDEST = 8.0
+"""Spacings beyond which no texel is fetched."""
 SPARE = 1.2
 """Texels there should be for each target."""
 TURN = 0.75
 """A turn must cost so much less than a smaller one: lattices have several that cost nearly the same."""
+SHRUNK = 0.9
+"""How far what is erased moves towards its middle."""
+OFFSETS, NEARER = 6, 0.9
+"""Offsets of a connected figure's layout that are tried along each axis, and how much less one must cost."""
 ROOM = 1.08
 """Least distance of texels in their diameters."""
 
 
 _DIRECTIONS: Memory[tuple[float, ...]] = Memory(64)
 _LAYOUTS: Memory[Layout] = Memory(64)
+_REACHES: Memory[Points] = Memory(16)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,11 +104,13 @@ def packing(a: Texels, distances: Points) -> float:
     return max(1.0, ROOM * diameter / max(float(np.percentile(distances, 25)), 1e-9))
 
 
-def targets(layout: Layout, scale: float, angle: float, size: tuple[int, int], beyond: float) -> Points:
-    """Scale and turn a layout about its centroid into the middle of an output, and cover that and a margin."""
+def targets(
+    layout: Layout, scale: float, angle: float, size: tuple[int, int], beyond: float, offset: Points | float = 0.0
+) -> Points:
+    """Scale and turn a layout about its centroid into the middle of an output, or beside it, and cover that and a margin."""
     turn = math.radians(angle)
     matrix = scale * np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
-    centre, middle = layout.points.mean(axis=0), (np.array(size) - 1) / 2
+    centre, middle = layout.points.mean(axis=0), (np.array(size) - 1) / 2 + offset
     low, high = np.full(2, -beyond), np.array(size) - 1 + beyond
     box = np.array([[y, x] for y in (low[0], high[0]) for x in (low[1], high[1])])
     back = (box - middle) @ np.linalg.inv(matrix).T + centre
@@ -130,28 +139,78 @@ def matched(a: Texels, b: Texels, size: tuple[int, int], *, align: bool, packed:
         gain = packing(a, scale * nearest(layout.points, 1)[:, 0])
     beyond = BEYOND * mine
     turns = aligned(a, b) if align else [0.0]
+    asked = [targets(layout, scale * gain, angle, size, beyond) for angle in turns]
+    if not all(len(wanted) for wanted in asked):
+        raise InvalidInput("b: its layout has no point within the output")
+    most = max(len(wanted) for wanted in asked)
+    source = surroundings(a, size, mine, SPARE * most)
+    if len(source.points) < most:
+        raise InvalidInput(
+            f"a: {len(source.points)} of its texels lie within reach, {most} are needed; "
+            "take a smaller size or a larger picture"
+        )
     best: Match | None = None
-    margin = MARGIN
-    source = extend(a, size, math.ceil(margin * mine))
-    for angle in turns:
-        wanted = targets(layout, scale * gain, angle, size, beyond)
-        if not len(wanted):
-            raise InvalidInput("b: its layout has no point within the output")
-        while len(source.points) < SPARE * len(wanted) and margin < 8:
-            margin *= 1.4
-            source = extend(a, size, math.ceil(margin * mine))
-        if len(source.points) < len(wanted):
-            raise InvalidInput(
-                f"a: {len(source.points)} of its texels lie within reach, {len(wanted)} are needed; "
-                "take a smaller size or a larger picture"
-            )
+    for angle, wanted in zip(turns, asked, strict=True):
         of, cost = match(source.points, wanted)
         if best is None or cost < TURN * best.cost:
             best = Match(wanted, source, of, scale * gain, angle, gain, cost)
-    assert best is not None  # the first turn is always tried
-    if best.source is not source:
-        best = replace(best, of=match(source.points, best.targets)[0], source=source)
+    assert best is not None  # no turn is always among them
+    if a.tag == "F=d" or not packed:
+        return best
+    for offset in offsets(source.points, best.targets, mine):
+        wanted = targets(layout, scale, best.angle, size, beyond, offset)
+        if 0 < len(wanted) <= len(source.points):
+            of, cost = match(source.points, wanted)
+            if cost < NEARER * best.cost:
+                best = replace(best, targets=wanted, of=of, cost=cost)
     return best
+
+
+def offsets(source: Points, wanted: Points, unit: float) -> Points:
+    """Give the few offsets of a layout, within half a spacing, at which its points lie nearest to texels.
+
+    What is connected is bent the less the less far its texels go, and where in a layout the output lies is nobody's wish.
+    """
+    from scipy.spatial import cKDTree
+
+    steps = (np.arange(OFFSETS) - OFFSETS // 2) * (unit / OFFSETS)
+    tried = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+    tree = cKDTree(source)
+    costs = [float((tree.query(wanted + offset)[0] ** 2).mean()) for offset in tried]
+    return np.asarray(tried[np.argsort(costs, kind="stable")[:3]], np.float64)
+
+
+def surroundings(a: Texels, size: tuple[int, int], unit: float, needed: float) -> Extended:
+    """Let a texture go on so far that it has as many texels as are needed, or nearly without end."""
+    margin = MARGIN
+    while available(a, size, math.ceil(margin * unit)) < needed and margin < WIDEST:
+        margin *= 1.4
+    source = extend(a, size, math.ceil(margin * unit))
+    while len(source.points) < needed and margin < WIDEST:
+        # Those that would lie over others are left out.
+        margin *= 1.4
+        source = extend(a, size, math.ceil(margin * unit))
+    return source
+
+
+def trimmed(a: Texels, found: Match, size: tuple[int, int]) -> Match:
+    """Leave out of the texture's surroundings what cannot come into the output.
+
+    What is kept has one of few widths, so that the next layout may find the factor of its system.
+    """
+    source = found.source
+    unit = max(2.0, spacing(np.asarray(a.points, np.float64)) / 2)
+    wide = max(1.2 * unit, 0.5 * max(a.box) + 2)
+    shown = ((found.targets > -wide) & (found.targets < np.array(size) - 1 + wide)).all(axis=1)
+    from_where = source.points[found.of[shown]]
+    over = max(0.0, float(np.max([-from_where, from_where - (np.array(size) - 1)], initial=0.0)))
+    reach = math.ceil(unit * math.ceil((over + wide) / unit))
+    first = [max(0, -reach - o) for o in source.origin]
+    last = [min(n, s + reach - o) for n, s, o in zip(source.mask.shape, size, source.origin, strict=True)]
+    cut = (slice(first[0], last[0]), slice(first[1], last[1]))
+    parts = {name: getattr(source, name)[cut] for name in ("table", "mask", "instance", "stray", "mirrored", "piece")}
+    origin = (source.origin[0] + first[0], source.origin[1] + first[1])
+    return replace(found, source=replace(source, origin=origin, **parts))
 
 
 def apart(a: Texels, found: Match, *, rounds: int = 12, room: float = 1.0) -> Match:
@@ -161,14 +220,7 @@ def apart(a: Texels, found: Match, *, rounds: int = 12, room: float = 1.0) -> Ma
     """
     from scipy.spatial import cKDTree
 
-    parts = parts_of(a)
-    angles = 2 * math.pi * np.arange(32) / 32
-    rays = np.stack([np.sin(angles), np.cos(angles)], axis=-1)
-    reach = np.zeros((len(parts.points), 32))
-    pixels = np.argwhere(parts.core > 0)
-    owner = parts.core[pixels[:, 0], pixels[:, 1]] - 1
-    for k, ray in enumerate(rays):
-        np.maximum.at(reach[:, k], owner, (pixels - np.rint(parts.points[owner])) @ ray + 0.5)
+    reach = _REACHES.get(a, None, lambda: reaches(a))
     mine = reach[found.source.of[found.of]]
     at = found.targets.copy()
     far = 2 * float(mine.max()) + room
@@ -189,6 +241,22 @@ def apart(a: Texels, found: Match, *, rounds: int = 12, room: float = 1.0) -> Ma
         np.add.at(at, first[close], -push)
         np.add.at(at, second[close], push)
     return replace(found, targets=at)
+
+
+def reaches(a: Texels, count: int = 32) -> Points:
+    """Tell how far each texel reaches from its centre in so many directions, (n, count)."""
+    parts = parts_of(a)
+    angles = 2 * math.pi * np.arange(count) / count
+    rays = np.stack([np.sin(angles), np.cos(angles)])
+    pixels = np.argwhere(parts.core > 0)
+    owner = parts.core[pixels[:, 0], pixels[:, 1]] - 1
+    order = np.argsort(owner, kind="stable")
+    along = (pixels - np.rint(parts.points[owner]))[order] @ rays + 0.5
+    found = np.zeros((len(parts.points), count))
+    present, first = np.unique(owner[order], return_index=True)
+    if len(present):
+        found[present] = np.maximum(np.maximum.reduceat(along, first, axis=0), 0)
+    return found
 
 
 def edited_match(a: Texels, steps: Sequence[Step]) -> tuple[Match, bool]:
@@ -230,7 +298,7 @@ def snapped(points: Points, reach: float) -> Points:
     return out
 
 
-def void_of(source: Extended, of: NDArray[np.intp], grown: int = 3) -> Bools:
+def void_of(source: Extended, of: NDArray[np.intp], grown: int = 1) -> Bools:
     """Mark what is erased: texels that go nowhere, and strays, with the pixels around them."""
     from scipy.ndimage import maximum_filter
 
@@ -241,3 +309,48 @@ def void_of(source: Extended, of: NDArray[np.intp], grown: int = 3) -> Bools:
     gone = idle if source.own else idle | source.stray
     wide = maximum_filter(gone.astype(np.uint8), 2 * grown + 1) > 0
     return np.asarray((wide | source.stray) & ~used[source.instance])
+
+
+def told(found: Match) -> tuple[Bools, NDArray[np.float32]]:
+    """Give what does not go along with the ground, and how far its pixels move, (2, H, W).
+
+    Texels move whole. What is erased shrinks besides towards its middle: it then leaves a smaller hole. But where a picture
+    stays itself, nothing stirs that is not told to.
+    """
+    source = found.source
+    still = source.own > 0
+    number = source.instance if still else source.piece
+    middle = source.points if still else np.concatenate([source.points, source.rest])
+    shift = np.zeros((2, len(middle) + 1), np.float32)
+    shift[:, 1:] = whole_shifts(found, middle).T
+    own = shift[:, number]
+    if not still:
+        idle = np.ones(len(middle) + 1, bool)
+        idle[0] = False
+        idle[found.of + 1] = False
+        gone = np.nonzero(idle[number])
+        centre = middle[number[gone] - 1] - source.origin
+        own[:, gone[0], gone[1]] += SHRUNK * (centre - np.stack(gone, axis=-1)).T
+    return number > 0, own
+
+
+def whole_shifts(found: Match, points: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+    """Give the whole pixels that every texel moves by; those that go nowhere go along with the ones around them.
+
+    So do further ``points`` that follow those of the source, where some are given.
+    """
+    from scipy.spatial import cKDTree
+
+    source = found.source
+    points = source.points if points is None else points
+    shift = np.zeros((len(points), 2))
+    shift[found.of] = np.rint(found.shift)
+    idle = np.ones(len(shift), bool)
+    idle[found.of] = False
+    if idle.any():
+        count = min(4, len(found.of))
+        far, near = cKDTree(source.points[found.of]).query(points[idle], k=[*range(1, count + 1)])
+        weight = 1 / (far**2 + 1e-6)
+        mean = (weight[..., None] * shift[found.of][near]).sum(axis=1) / weight.sum(axis=1)[:, None]
+        shift[idle] = np.rint(mean)
+    return shift

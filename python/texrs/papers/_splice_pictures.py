@@ -38,13 +38,16 @@ class Stages(Mapping[str, Array]):
         source = found.source
         origin = np.array(source.origin)
         shown = picture(a.image)
-        beyond = shown[source.table[..., 0], source.table[..., 1]]
         self._draw: dict[str, Callable[[], Array]] = {"points of a": lambda: marked(shown, a.points, RED)}
         if b is not None:
             self._draw["points of b"] = lambda: marked(picture(b.image), b.points, BLUE)
         self._draw |= {
             "mask": lambda: masked(shown, a.mask),
-            "matching": lambda: lines(beyond, source.points[found.of] - origin, found.targets - origin),
+            "matching": lambda: lines(
+                shown[source.table[..., 0], source.table[..., 1]],
+                source.points[found.of] - origin,
+                found.targets - origin,
+            ),
             "warped mesh": lambda: meshed(target, source.mask, draft.known.shape),
             "before refinement": lambda: before(shown, draft),
             "filled": lambda: shown[full.places[..., 0], full.places[..., 1]],

@@ -29,7 +29,7 @@ Kinds = NDArray[np.uint8]
 JITTER = 2.0
 """Pixels that places of what is not rigid are displaced by before they are corrected."""
 PASSES = 2
-WIDE = 0.5
+WIDE = 1.0
 """A hole wider than so many spacings is filled with patches; less is grown over from its rim."""
 K, APART = 3, 0.05
 """Size of a similarity set, and how far apart its samples are, as a share of the shorter side."""

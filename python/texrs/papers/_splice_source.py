@@ -23,7 +23,7 @@ from texrs.errors import InvalidInput
 from texrs.matching import Fold, Layout
 from texrs.texels import Texels
 
-__all__ = ["Extended", "Memory", "Parts", "extend", "parts_of"]
+__all__ = ["Extended", "Memory", "Parts", "available", "extend", "parts_of"]
 
 Points = NDArray[np.float64]
 Places = NDArray[np.int32]
@@ -177,6 +177,10 @@ class Extended:
         Foreground that moves with none: cut by the border, or left over where a texel was turned back.
     mirrored : (H, W, 2) bool
         Along which axes what a pixel shows is mirrored.
+    piece : (H, W) int32
+        As ``instance``, and after those numbers the strays, piece by piece.
+    rest : (m, 2) float64
+        The middle of each stray piece, in the output.
     own : int
         How many of the points are of the picture itself, in its order; they come first. 0 where that was not asked for.
 
@@ -190,6 +194,8 @@ class Extended:
     instance: Labels
     stray: Bools
     mirrored: Bools
+    piece: Labels
+    rest: Points
     own: int = 0
 
 
@@ -203,28 +209,45 @@ def extend(entry: Texels, size: tuple[int, int], margin: int, *, whole: bool = T
     return _EXTENDED.get(entry, rest, lambda: _extend(entry, size, margin, whole=whole, exact=exact))
 
 
-def _extend(entry: Texels, size: tuple[int, int], margin: int, *, whole: bool, exact: bool) -> Extended:
+def available(entry: Texels, size: tuple[int, int], margin: int) -> int:
+    """Count the texels that `extend` would find; of disjoint ones a few may lie over others."""
+    layout, first, last = _bounds(entry, size, margin, exact=False)
+    of = layout.within(first.astype(np.float64), (last - 1).astype(np.float64))[1]
+    return int(np.count_nonzero(parts_of(entry).whole[of])) if entry.tag == "F=d" else len(of)
+
+
+def _bounds(
+    entry: Texels, size: tuple[int, int], margin: int, *, exact: bool
+) -> tuple[Layout, NDArray[np.intp], NDArray[np.intp]]:
+    """Give the layout of a texture as its pixels go on, and the first pixel and the one after the last, in its own."""
     shape = np.array(entry.mask.shape)
     offset = (np.array(size) - shape) // 2  # Of the picture in the output.
-    disjoint = entry.tag == "F=d"
-    points = parts_of(entry).points if disjoint else np.asarray(entry.points, np.float64)
-    if disjoint or exact:
+    if entry.tag == "F=d" or exact:
         # The texels that the border cuts are left out, or wanted: no pixel is in the way.
+        points = parts_of(entry).points if entry.tag == "F=d" else np.asarray(entry.points, np.float64)
         ends = [(-0.5, n - 0.5) if w else (0.0, n - 1.0) for n, w in zip(shape, entry.wrap, strict=True)]
         folds = [Fold(*e, w) for e, w in zip(ends, entry.wrap, strict=True)]
         layout = Layout(points, (folds[0], folds[1]), 0.0)
     else:
-        layout = Layout.of(points, entry.mask.shape, entry.wrap, beyond=False)
-    first = np.minimum(-margin, offset)
-    last = np.maximum(np.array(size) + margin, offset + shape)
+        layout = _FOLDED.get(
+            entry, None, lambda: Layout.of(np.asarray(entry.points, float), entry.mask.shape, entry.wrap, beyond=False)
+        )
+    return layout, np.minimum(-margin - offset, 0), np.maximum(np.array(size) + margin - offset, shape)
+
+
+def _extend(entry: Texels, size: tuple[int, int], margin: int, *, whole: bool, exact: bool) -> Extended:
+    layout, low, high = _bounds(entry, size, margin, exact=exact)
+    shape = np.array(entry.mask.shape)
+    offset = (np.array(size) - shape) // 2
+    disjoint = entry.tag == "F=d"
+    first, last = low + offset, high + offset
     check_memory(int(np.prod(last - first)) * EACH)
-    along = [layout.folds[a].apply(np.arange(first[a], last[a]) - float(offset[a])) for a in range(2)]
+    along = [layout.folds[a].apply(np.arange(low[a], high[a], dtype=float)) for a in range(2)]
     rows, columns = (np.asarray(np.rint(x), np.int32) for x, _ in along)
     table = np.stack(np.broadcast_arrays(rows[:, None], columns[None]), axis=-1)
     mirrored = np.stack(np.broadcast_arrays(along[0][1][:, None], along[1][1][None]), axis=-1)
     mask: Bools = entry.mask[rows[:, None], columns[None]]
-    low, high = (first - offset).astype(float), (last - 1 - offset).astype(float)
-    places, of, flips = layout.within(low, high)
+    places, of, flips = layout.within(low.astype(np.float64), (high - 1).astype(np.float64))
     inside = np.asarray(((places >= -0.5) & (places <= shape - 0.5)).all(axis=1) & ~flips.any(axis=1))
     if not whole:
         # Those of the picture, in its order.
@@ -234,7 +257,8 @@ def _extend(entry: Texels, size: tuple[int, int], margin: int, *, whole: bool, e
     places = places + (offset - first)
     if not disjoint:
         none = np.zeros(mask.shape, np.int32)
-        return Extended((int(first[0]), int(first[1])), table, mask, places + first, of, none, none > 0, mirrored, own)
+        origin = (int(first[0]), int(first[1]))
+        return Extended(origin, table, mask, places + first, of, none, none > 0, mirrored, none, np.zeros((0, 2)), own)
     return _stamp(entry, table.copy(), mask, mirrored.copy(), (places, of, flips), first, own)
 
 
@@ -248,6 +272,8 @@ def _stamp(
     own: int,
 ) -> Extended:
     """Put every whole texel where the extended picture has it, the right way round; the first ``own`` ones in any case."""
+    from scipy.ndimage import label
+
     places, of, flips = copies
     parts = parts_of(entry)
     shape = np.array(entry.mask.shape)
@@ -292,8 +318,24 @@ def _stamp(
         raise InvalidInput("a: the border cuts every texel; splicing needs some that are whole")
     chosen = np.array(kept)
     shown = entry.mask[table[..., 0], table[..., 1]]
-    origin = (int(first[0]), int(first[1]))
-    return Extended(origin, table, shown, places[chosen] + first, of[chosen], instance, stray, mirrored, own)
+    pieces, count = label(stray)
+    at = np.nonzero(pieces)
+    area = np.bincount(pieces[at], minlength=count + 1)[1:]
+    rest = np.stack([np.bincount(pieces[at], a, minlength=count + 1)[1:] / area for a in at], axis=-1)
+    piece = np.where(stray, pieces + len(kept), instance).astype(np.int32)
+    return Extended(
+        (int(first[0]), int(first[1])),
+        table,
+        shown,
+        places[chosen] + first,
+        of[chosen],
+        instance,
+        stray,
+        mirrored,
+        piece,
+        rest + first,
+        own,
+    )
 
 
 def _nearest(place: Points) -> NDArray[np.intp]:
@@ -302,4 +344,5 @@ def _nearest(place: Points) -> NDArray[np.intp]:
 
 
 _PARTS: Memory[Parts] = Memory(16)
+_FOLDED: Memory[Layout] = Memory(64)
 _EXTENDED: Memory[Extended] = Memory(4)

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._typing import Bools, Labels
+from texrs._typing import Bools
 from texrs.errors import InvalidInput
 from texrs.kernels.sparse import Cholesky
 
-__all__ = ["carried", "energy", "stretched"]
+__all__ = ["STEP", "carried", "energy", "stretched"]
 
 Points = NDArray[np.float64]
 
@@ -30,6 +30,10 @@ LOOSE = 1e-2
 """Weight of the equations of what is not rigid: without them it would have none, and nothing would move."""
 TIE = 1e-5
 """Weight of equal displacements of neighbours: long joints that nothing else holds do not slide freely."""
+STEP = 2
+"""Of the pixels between disjoint texels those are solved for whose row and column are multiples of this."""
+EVENED = 2
+"""Rounds in which the ground between the pixels that it is solved for is made even."""
 KEPT = 1 << 30
 """Bytes of factors that are kept."""
 
@@ -66,49 +70,82 @@ def _key(*parts: object) -> bytes:
 # --- disjoint foreground: texels move whole --------------------------------------------------------------------------
 
 
-def carried(instance: Labels, shift: Points) -> NDArray[np.float64]:
-    """Give the displacement of every pixel where texels move whole, and the ground between them goes along smoothly.
+def carried(held: Bools, own: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Give the displacement of every pixel where texels move as they are told, and the ground between goes along smoothly.
 
     The limit of Eq. 5 for lambda_G and lambda_R without bound and epsilon = 0: each texel moves by its own pin alone. What
-    is left is the ground, whose displacement is harmonic: no pixel moves further than the texels around it.
+    is left is the ground, whose displacement is harmonic: no pixel moves further than the texels around it. It is so
+    smooth that it is solved for at every other pixel; the rest are made even with the ones beside them.
 
     Parameters
     ----------
-    instance : (H, W) int32
-        The texel of each pixel, counted from 1; 0 on the ground.
-    shift : (n, 2) float64
-        How far each texel moves.
+    held : (H, W) bool
+        Texels; elsewhere is ground.
+    own : (2, H, W) float32
+        How far pixels of texels move along rows and columns.
 
     Returns
     -------
     (H, W, 2) float64
 
     """
-    shape = instance.shape
-    free = instance == 0
-    out = np.zeros((*shape, 2))
-    out[~free] = shift[instance[~free] - 1]
-    if not free.any():
-        return out
-    number = np.full(shape, -1, np.int64)
-    number[free] = np.arange(np.count_nonzero(free))
-    key = _key("carried", np.packbits(free), shape)
-    solver = factors({key: lambda: _laplacian(free, number)})[key]
-    flow = np.zeros((*shape, 2))
-    for axis in range(2):
-        o, i = (np.moveaxis(a, axis, 0) for a in (flow, out))
-        f: Bools = np.moveaxis(free, axis, 0)
-        # What a texel's pixel hands to the ground beside it.
-        o[:-1] += np.where((f[:-1] & ~f[1:])[..., None], i[1:], 0.0)
-        o[1:] += np.where((f[1:] & ~f[:-1])[..., None], i[:-1], 0.0)
-    out[free] = solver.solve(flow[free])
+    out = np.empty((*held.shape, 2))
+    for axis, coarse in enumerate(_harmonic(held[::STEP, ::STEP], own[:, ::STEP, ::STEP])):
+        field = _between(coarse, held.shape)
+        np.copyto(field, own[axis], where=held)
+        for _ in range(EVENED):
+            _even(field)
+            np.copyto(field, own[axis], where=held)
+        out[..., axis] = field
     return out
 
 
-def _laplacian(free: Bools, number: NDArray[np.int64]) -> Any:
+def _harmonic(held: Bools, own: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Let the ground's displacement be at each pixel the mean of those beside it."""
+    shape, free = held.shape, ~held
+    out = np.where(held, own, 0.0).astype(np.float64)
+    if not free.any():
+        return out
+    key = _key("carried", np.packbits(free), shape)
+    solver = factors({key: lambda: _laplacian(free)})[key]
+    flow = np.zeros((2, *shape))
+    # What a texel's pixel hands to the ground beside it; the ground itself has nothing yet.
+    flow[:, :-1] += out[:, 1:]
+    flow[:, 1:] += out[:, :-1]
+    flow[:, :, :-1] += out[:, :, 1:]
+    flow[:, :, 1:] += out[:, :, :-1]
+    out[:, free] = solver.solve(flow[:, free].T).T
+    return out
+
+
+def _between(coarse: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """Give the pixels between those that are known at every other one."""
+    out = coarse.astype(np.float32)
+    for axis in range(2):
+        c = np.moveaxis(out, axis, 0)
+        fine = np.empty((shape[axis], c.shape[1]), np.float32)
+        fine[::2] = c
+        fine[1::2] = c[: shape[axis] // 2]
+        fine[1:-1:2] = (c[:-1] + c[1:])[: len(fine[1:-1:2])] / 2
+        out = np.moveaxis(fine, 0, axis)
+    return np.ascontiguousarray(out)
+
+
+def _even(field: NDArray[np.float32]) -> None:
+    """Make each pixel the mean of the four beside it; beyond the border the field goes on as it is."""
+    wide = np.pad(field, 1, mode="edge")
+    np.add(wide[:-2, 1:-1], wide[2:, 1:-1], out=field)
+    field += wide[1:-1, :-2]
+    field += wide[1:-1, 2:]
+    field *= 0.25
+
+
+def _laplacian(free: Bools) -> Any:
     from scipy.sparse import coo_array
 
     count = int(np.count_nonzero(free))
+    number = np.full(free.shape, -1, np.int64)
+    number[free] = np.arange(count)
     degree = np.zeros(free.shape)
     rows, columns = [], []
     for axis in range(2):

@@ -14,11 +14,14 @@ Departures, with their reasons:
 
 - Both point sets go on beyond their pictures, by reflection at the lines where the layout goes on as it is: otherwise
   a third of the output is empty, and texels at its rim are missing.
-- There are more texels than targets; those that go nowhere are erased. As printed, point sets must have equal size.
+- There are more texels than targets; those that go nowhere are erased. As printed, point sets must have equal size. What is
+  erased shrinks, and the ground around it closes in: else a fifth of the output is a hole.
+- Connected figures take the layout where their texels go least far: else walls are bent for nothing.
 - Layouts grow until disjoint texels have room, and those that still collide are pushed apart: spacing alone makes chains.
 - Distances are squared in Eq. 4: the best matching then has no crossings.
 - Disjoint texels move whole, by whole pixels: Eq. 5 in the limit of its weights. The soft energy stretches components that
-  hold two pins by dozens of pixels. The ground between them is harmonic, so nothing of it moves further than its texels.
+  hold two pins by dozens of pixels. The ground between them is harmonic, so nothing of it moves further than its texels, and
+  so smooth that it is solved for at every other pixel.
 - Eq. 5 sums over rigid pixels only, so the others have no equation and the system is singular, or, for brick walls,
   moves nothing but its pins: here they count a hundredth. Long joints, which the decoupling of Table 1 leaves free to slide,
   are tied to their neighbours by a hair.
@@ -48,12 +51,22 @@ from texrs.kernels.warp import from_points, mesh
 from texrs.matching import spacing
 from texrs.papers._splice_edit import as_steps
 from texrs.papers._splice_entry import as_texels
-from texrs.papers._splice_layout import Match, apart, edited_match, matched, snapped, void_of
+from texrs.papers._splice_layout import (
+    Match,
+    apart,
+    edited_match,
+    matched,
+    snapped,
+    told,
+    trimmed,
+    void_of,
+    whole_shifts,
+)
 from texrs.papers._splice_literal import literal_field, literal_fill, literal_match
 from texrs.papers._splice_pictures import Stages
 from texrs.papers._splice_refine import Draft, fill, refined_places
 from texrs.papers._splice_source import parts_of
-from texrs.papers._splice_warp import carried, stretched
+from texrs.papers._splice_warp import STEP, carried, stretched
 from texrs.report import Synthesis
 from texrs.source_map import SourceMap
 from texrs.texels import Texels
@@ -117,14 +130,10 @@ def splice(
 
     Examples
     --------
-    >>> import numpy as np
     >>> import texrs
     >>> from texrs.texels import Texels
-    >>> def entry(sample, side):
-    ...     count = len(sample.centres)
-    ...     return Texels(sample.image, sample.centres, sample.mask, (side, side), sample.tag, np.ones(count))
-    >>> buttons = entry(texrs.samples.dots((128, 128)), 21)
-    >>> stones = entry(texrs.samples.pebbles((128, 128)), 21)
+    >>> buttons = Texels.of_sample(texrs.samples.dots((128, 128)))
+    >>> stones = Texels.of_sample(texrs.samples.pebbles((128, 128)))
     >>> result = texrs.splice(buttons, stones, seed=1)
     >>> result.image.shape, bool((result.source.render(buttons.image) == result.image).all())
     ((128, 128, 3), True)
@@ -145,6 +154,7 @@ def splice(
         found = apart(mine, found)
     elif snap_rows:
         found = replace(found, targets=snapped(found.targets, 0.25 * spacing(found.targets)))
+    found = trimmed(mine, found, (shape[0], shape[1]))
     watch("match", 1.0)
     return made(
         mine, found, (shape[0], shape[1]), number, method=method, refined=bool(refine), watch=watch, theirs=theirs
@@ -194,13 +204,11 @@ def self_splice(
 
     Examples
     --------
-    >>> import numpy as np
     >>> import texrs
     >>> from texrs.texels import Texels
-    >>> dots = texrs.samples.dots((96, 96))
-    >>> entry = Texels(dots.image, dots.centres, dots.mask, (21, 21), "F=d", np.ones(len(dots.centres)))
+    >>> entry = Texels.of_sample(texrs.samples.dots((96, 96)))
     >>> same = texrs.self_splice(entry, {"op": "move", "texel": 0, "by": [0, 0]})
-    >>> bool((same.image == dots.image).all())
+    >>> bool((same.image == entry.image).all())
     True
     >>> texrs.self_splice(entry, "randomise", seed=5).report["edit"]
     [{'op': 'randomise', 'seed': 5}]
@@ -265,7 +273,7 @@ def made(
         "triangles": warped.triangles,
         "flipped": warped.flipped / max(warped.triangles, 1),
         "flipped_rigid": warped.flipped_rigid / max(warped.triangles, 1),
-        "system": list(found.source.mask.shape),
+        "system": [-(-n // STEP) if a.tag == "F=d" else n for n in found.source.mask.shape],
         "matches": matches(a, found),
     }
     watch("done", 1.0)
@@ -298,33 +306,21 @@ def deform(a: Texels, found: Match) -> Field:
     """Move every pixel of the texture, as its tag says."""
     source = found.source
     shape, origin = source.mask.shape, np.array(source.origin)
-    grid = np.moveaxis(np.indices(shape), 0, -1) + origin
     if a.tag == "F=d":
-        delta = carried(source.instance, whole_shifts(found))
-        return Field(grid + delta, source.instance > 0, void_of(source, found.of))
+        delta = carried(*told(found))
+        return Field(moved(delta, source.origin), source.instance > 0, void_of(source, found.of))
     rigid = source.mask if a.tag == "F=c" else ~source.mask
     pins = np.rint(source.points[found.of]).astype(np.intp) - origin
     inside = ((pins >= 0) & (pins < np.array(shape))).all(axis=1)
     delta = stretched(rigid, pins[inside], found.shift[inside], upright=a.tag == "B=c")
-    return Field(grid + delta, rigid, np.zeros(shape, bool))
+    return Field(moved(delta, source.origin), rigid, np.zeros(shape, bool))
 
 
-def whole_shifts(found: Match) -> NDArray[np.float64]:
-    """Give the whole pixels that every texel moves by; those that go nowhere go along with the ones around them."""
-    from scipy.spatial import cKDTree
-
-    source = found.source
-    shift = np.zeros((len(source.points), 2))
-    shift[found.of] = np.rint(found.shift)
-    idle = np.ones(len(shift), bool)
-    idle[found.of] = False
-    if idle.any():
-        count = min(4, len(found.of))
-        far, near = cKDTree(source.points[found.of]).query(source.points[idle], k=[*range(1, count + 1)])
-        weight = 1 / (far**2 + 1e-6)
-        mean = (weight[..., None] * shift[found.of][near]).sum(axis=1) / weight.sum(axis=1)[:, None]
-        shift[idle] = np.rint(mean)
-    return shift
+def moved(delta: NDArray[np.float64], origin: tuple[int, int]) -> NDArray[np.float64]:
+    """Turn displacements, in place, into where pixels go: the first one lies at the origin."""
+    delta[..., 0] += np.arange(origin[0], origin[0] + delta.shape[0])[:, None]
+    delta[..., 1] += np.arange(origin[1], origin[1] + delta.shape[1])
+    return delta
 
 
 # --- the backward warp: Figure 6 -------------------------------------------------------------------------------------
@@ -343,9 +339,17 @@ class Warped:
 
 
 def drawn(field: Field, size: tuple[int, int], progress: Callable[[float], object] | None) -> Warped:
-    """Draw the dense mesh."""
-    found = mesh(field.target, field.rigid, void=field.void, size=size, progress=progress)
-    there = _pixels(found.source, field.rigid.shape)
+    """Draw the dense mesh: the rows and columns of it that come into the output."""
+    seen = np.ones(field.rigid.shape, bool)
+    for axis in range(2):
+        seen &= (field.target[..., axis] > -2) & (field.target[..., axis] < size[axis] + 1)
+    part, first = (slice(None), slice(None)), (0, 0)
+    if seen.any():
+        (top, bottom), (left, right) = (np.flatnonzero(seen.any(axis=1 - a))[[0, -1]].tolist() for a in range(2))
+        first = (max(top - 1, 0), max(left - 1, 0))
+        part = (slice(first[0], bottom + 2), slice(first[1], right + 2))
+    found = mesh(field.target[part], field.rigid[part], void=field.void[part], size=size, progress=progress)
+    there = _pixels(found.source, field.rigid[part].shape) + first
     return Warped(there, found.source.label > 0, field.target, found.triangles, found.flipped, found.flipped_heavy)
 
 
@@ -397,6 +401,11 @@ def drafted(a: Texels, found: Match, warped: Warped, *, whole: bool) -> tuple[Dr
     y, x = warped.there[..., 0], warped.there[..., 1]
     places, mirrored = source.table[y, x], source.mirrored[y, x]
     stays = copied(places, mirrored, known)
+    step = found.shift[0]
+    if source.own and (found.shift == step).all():
+        # The picture is moved as a whole: its own pixels stay, whatever comes beside them.
+        rows, columns = np.ogrid[: known.shape[0], : known.shape[1]]
+        stays |= known & (places[..., 0] == rows - step[0]) & (places[..., 1] == columns - step[1])
     label = np.zeros(known.shape, np.uint32)
     if whole and a.tag == "F=d":
         goal = np.zeros(len(source.points) + 1, np.uint32)
@@ -404,10 +413,11 @@ def drafted(a: Texels, found: Match, warped: Warped, *, whole: bool) -> tuple[Dr
         number = source.instance[y, x]
         label = np.where(known, goal[number], 0).astype(np.uint32)
         # Rims that the mesh draws out are no texels: what is rigid lies exactly where its texel goes.
-        shift = np.zeros((len(goal), 2), np.intp)
-        shift[1:] = whole_shifts(found)
-        away = warped.there + np.array(source.origin) + shift[number] - np.moveaxis(np.indices(known.shape), 0, -1)
-        drawn_out = (number > 0) & (away != 0).any(axis=-1)
+        shift = np.zeros((2, len(goal)), np.intp)
+        shift[:, 1:] = whole_shifts(found).T
+        rows, columns = np.ogrid[: known.shape[0], : known.shape[1]]
+        here = (y + shift[0][number] == rows - source.origin[0]) & (x + shift[1][number] == columns - source.origin[1])
+        drawn_out = (number > 0) & ~here
         label[drawn_out] = 0
         known = known & ~drawn_out
         kinds = ((parts_of(a).region > 0) | a.mask).astype(np.uint8)
@@ -422,17 +432,15 @@ def copied(places: NDArray[np.int32], mirrored: Bools, known: Bools) -> Bools:
     from scipy.ndimage import maximum_filter
 
     broken = np.zeros(known.shape, bool)
+    halves = (slice(None, -1), slice(1, None))
     for axis in range(2):
-        step = np.diff(places, axis=axis)
-        first, second = (np.delete(mirrored, end, axis=axis)[..., axis] for end in (-1, 0))
-        forth = np.zeros(2, np.int32)
-        forth[axis] = 1
-        joined = ((step == forth).all(-1) & ~(first & second)) | ((step == -forth).all(-1) & (first | second))
-        ends = (slice(None, -1), slice(1, None))
-        apart, there = np.moveaxis(~joined, axis, 0), np.moveaxis(known, axis, 0)
-        for end in ends:
-            b = np.moveaxis(broken, axis, 0)[end]
-            b |= apart & there[ends[0]] & there[ends[1]]
+        along, across = (np.diff(places[..., a], axis=axis) for a in (axis, 1 - axis))
+        there, turned, b = (np.moveaxis(v, axis, 0) for v in (known, mirrored[..., axis], broken))
+        both, one = (f(*(np.moveaxis(turned[h], 0, axis) for h in halves)) for f in (np.logical_and, np.logical_or))
+        joined = (across == 0) & (((along == 1) & ~both) | ((along == -1) & one))
+        apart = ~np.moveaxis(joined, axis, 0) & there[halves[0]] & there[halves[1]]
+        for half in halves:
+            b[half] |= apart
     rough = maximum_filter(broken.astype(np.uint8), 3) > 0
     return np.asarray(known & ~rough)
 

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from texrs._arrays import as_float, as_image, as_int, as_mask, as_seed, as_wrap, check_memory, guidance
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.errors import InvalidInput
+from texrs.matching import directions, spacing
 from texrs.texels import _given, _mask, _start
 from texrs.texels._clean import Cleaned, add_missing, clean, components
 from texrs.texels._entry import Tag, Texels
 from texrs.texels._given import Box
-from texrs.texels._points import peaks, spacing
 from texrs.texels._search import Channel, Found, search
 
 __all__ = ["analyse"]
@@ -198,7 +198,7 @@ def analyse(
         given.size,
         said,
         result.scores,
-        peaks(result.points),
+        directions(result.points),
         how.wrap,
         report,
         np.array([t.angle for t in picked]),

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from texrs import analysis
 from texrs._typing import Path
+from texrs.errors import InvalidInput
 from texrs.kernels.coherence import Similarity
+from texrs.samples import Sample
 
 #: How a texture is made: separate texels on a ground, one connected figure, or texels in a connected ground (mortar).
 Tag = Literal["F=d", "F=c", "B=c"]
@@ -65,6 +67,40 @@ class Texels:
     def __repr__(self) -> str:
         rows, columns = self.image.shape[:2]
         return f"Texels({len(self.points)} of box {self.box} in {rows} x {columns}, {self.tag})"
+
+    @classmethod
+    def of_sample(cls, sample: Sample, *, wrap: tuple[bool, bool] = (False, False)) -> Texels:
+        """Give the entry of a generated texture, whose texels are known.
+
+        Parameters
+        ----------
+        sample : Sample
+            One of `texrs.samples` with centres and a mask.
+        wrap : (bool, bool)
+            Whether it was generated to repeat without a seam along rows and columns.
+
+        Raises
+        ------
+        InvalidInput
+            Nothing is known of its texels.
+
+        Examples
+        --------
+        >>> from texrs import samples
+        >>> from texrs.texels import Texels
+        >>> Texels.of_sample(samples.bricks((96, 96)))
+        Texels(3 of box (25, 47) in 96 x 96, B=c)
+
+        """
+        from scipy.ndimage import find_objects
+
+        if sample.centres is None or sample.labels is None or sample.image.ndim > 3 or len(sample.centres) < 3:
+            raise InvalidInput(f"sample: needs a picture with three known texels or more, got {sample!r}")
+        found = [box for box in find_objects(sample.labels) if box is not None]
+        height, width = (int(np.median([box[axis].stop - box[axis].start for box in found])) | 1 for axis in (0, 1))
+        mask = sample.labels > 0 if sample.mask is None else sample.mask
+        tag: Tag = "F=d" if sample.tag is None else sample.tag
+        return cls(sample.image, sample.centres, mask, (height, width), tag, np.ones(len(sample.centres)), wrap=wrap)
 
     def similarity(self, *, k: int = 3, progress: Callable[[float], object] | None = None) -> Similarity:
         """Give what each pixel of the texture may be replaced by: itself and the ``k - 1`` that look most like it.

@@ -3,8 +3,8 @@
 1. sizes: blobs of every scale, pieces of a colour segmentation, and the periods of the autocorrelation propose boxes;
 2. the texel: each box is searched for in a small picture, and the one that the texture repeats best is taken;
 3. the background: what lies farthest from all that was found, of the colours that most of it has;
-4. the tag: texels that leave much ground between them are separate; those that leave joints lie in a connected
-   background where they are all of one size, and else are the meshes of a net.
+4. the tag: texels that are busier and more varied than what lies between them are things on a ground; else what lies
+   between is a net where it stands out, and joints where it does not.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from texrs._typing import Bools, Floats
 from texrs.errors import InvalidInput
+from texrs.matching import spacing
 from texrs.segment import segment
 from texrs.segment.regularity import lattice
 from texrs.texels._clean import components
 from texrs.texels._entry import Tag
 from texrs.texels._given import LEAST, Box, as_box
 from texrs.texels._mask import disc, lab, odd
-from texrs.texels._points import spacing
 from texrs.texels._search import Found, search, vectors
 
 __all__ = ["Proposal", "propose"]
@@ -48,15 +48,16 @@ OUT = 1.1
 """Distance from a texel, in halves of its box, from which on a pixel is taken for background."""
 PLACES = 12
 """Places of the background that are proposed."""
-JOINTS, NONE = 1.3, 0.8
-"""How much stronger thin lines half-way between texels are than elsewhere where these are joints or a net, and where
-there are none for sure."""
+THING = 0.68
+"""How much busier and more varied texels are than what lies between them from where on they are things on a ground."""
+LEAST_EDGE = 0.002
+"""Differences of colour that are none, of a range of 1."""
+NET = 0.2
+"""Contrast from which on what lies between evenly spread openings is a net; half of it where they are unevenly spread."""
+EVEN = 0.15
+"""Spread of the distances to the nearest texel, over their mean, up to which they are evenly spread."""
 OPEN = 0.3
-"""Share of the image beyond that distance from which on texels are taken to be separate."""
-SCATTERED = 0.5
-"""The same, whatever lies between them."""
-EVEN = 0.22
-"""Spread of the distances to the nearest texel, over their mean, from which on texels are of no one size."""
+"""Share of a given mask's ground from which on its pieces are taken to be separate."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,6 +96,13 @@ def propose(
     away = _distance(size, points, box.size, wrap)
     if tag is None:
         tag, sure["tag"] = _tag(guide, away, points, box, mask)
+    if background is None and mask is None and "tag" in sure and tag == "F=c":
+        # What repeats are the openings of the net: ground lies in the middle of each but the chosen one.
+        middle = np.array(box.centre)
+        others = points[np.abs(points - middle).max(axis=1) > max(box.size) / 2][:PLACES]
+        if len(others):
+            background = disc(size, others, int(np.clip(min(box.size) // 8, 1, 4)))
+            sure["background"] = sure["tag"]
     if background is None and mask is None:
         background, sure["background"] = _background(guide, away, box)
     return Proposal(box, np.zeros(size, bool) if background is None else background, tag, sure)
@@ -381,36 +389,44 @@ def _tag(guide: Floats, away: Floats, points: NDArray[np.float64], box: Box, mas
         return ("F=d", 0.7) if float((~mask).mean()) > OPEN else ("B=c", 0.6)
     if len(points) < 3:
         return "F=d", 0.1
-    joints = _joints(lab(guide)[..., 0], points, box.size)
-    ground = float((away > OUT).mean())
-    if ground > SCATTERED or joints < NONE or (joints < JOINTS and ground > OPEN):
-        return "F=d", float(min(0.9, 0.5 + max(0.0, JOINTS - joints) / JOINTS))
+    thing, contrast = _thing(lab(guide), away, points)
+    sure = _odds(thing / THING)
+    if thing >= THING:
+        return "F=d", sure
     near = cKDTree(points).query(points, k=2)[0][:, 1]
     spread = float(near.std() / max(float(near.mean()), 1e-9))
-    tag: Tag = "B=c" if spread < EVEN else "F=c"
-    return tag, float(min(0.6, 0.3 + abs(spread - EVEN)))
+    # A net stands out from what is seen through it, and joints less; the less if all between them is of one size.
+    net = contrast / (NET if spread < EVEN else NET / 2)
+    return ("F=c" if net >= 1 else "B=c"), sure * _odds(net)
 
 
-def _joints(light: Floats, points: NDArray[np.float64], box: tuple[int, int]) -> float:
-    """Say how much more often thin lines lie half-way between texels than elsewhere: joints and nets do."""
-    from scipy.ndimage import gaussian_filter, maximum_filter
-    from scipy.spatial import cKDTree
+def _odds(ratio: float) -> float:
+    """Say how sure a choice is that falls where a measure is 1: a coin's toss there, and surer on either side."""
+    return float(1 / (1 + min(ratio, 1 / max(ratio, 1e-9)) ** 1.5))
 
-    unit = max(spacing(points), 4.0)
-    rows, columns, mixed = (gaussian_filter(light, max(1.0, 0.06 * unit), order=o) for o in ((2, 0), (0, 2), (1, 1)))
-    mean, apart = (rows + columns) / 2, np.hypot((rows - columns) / 2, mixed)
-    half = np.array(box) / 2
-    grid = np.indices(light.shape).reshape(2, -1).T
-    found = cKDTree(points / half).query(grid / half, k=2)[0]
-    between = ((found[:, 1] - found[:, 0] < 0.12) & (found[:, 0] < 2.5)).reshape(light.shape)
-    if not between.any():
-        return 0.0
-    ratios = []
-    for line in (np.maximum(mean + apart, 0), np.maximum(apart - mean, 0)):
-        near = maximum_filter(line, 2 * max(2, int(0.08 * unit)) + 1)
-        usual = float(np.median(near)) + 0.1 * float(np.quantile(near, 0.95))
-        ratios.append(float(np.median(near[between])) / max(usual, 1e-9))
-    return max(ratios)
+
+def _thing(colours: Floats, away: Floats, points: NDArray[np.float64]) -> tuple[float, float]:
+    """Say how much texels are things rather than openings, and how their lightness differs from what lies between.
+
+    Openings of a net and bricks between joints are even and alike; lines, edges and colours lie between them. Of things on
+    a ground the reverse is true.
+    """
+    from scipy.ndimage import gaussian_filter, gaussian_gradient_magnitude
+
+    inner, outer = away < 0.5, away > OUT
+    if not inner.any() or not outer.any():
+        return THING, 0.0
+    light = colours[..., 0]
+    edges = gaussian_gradient_magnitude(light, 1.0)
+    smooth = np.stack([gaussian_filter(colours[..., c], 2.0) for c in range(3)], axis=-1)
+    at = np.clip(np.rint(points).astype(np.intp), 0, np.array(light.shape) - 1)
+
+    def unlike(some: Floats) -> float:
+        return float(np.median(np.sqrt(((some - np.median(some, axis=0)) ** 2).sum(axis=-1))))
+
+    busy = (float(np.median(edges[inner])) + LEAST_EDGE) / (float(np.median(edges[outer])) + LEAST_EDGE)
+    varied = (unlike(smooth[tuple(at.T)]) + LEAST_EDGE) / (unlike(smooth[outer]) + LEAST_EDGE)
+    return busy * varied, abs(float(np.median(light[inner])) - float(np.median(light[outer])))
 
 
 def _background(guide: Floats, away: Floats, box: Box) -> tuple[Bools, float]:

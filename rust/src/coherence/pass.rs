@@ -171,17 +171,26 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
         for turn in 0..self.options.passes << D {
             let class = turn % (1 << D);
             par::chunks_mut(&mut scratch, CHUNK, |chunk, scratch| {
+                // Neighbours mostly share their frame.
+                let mut last = constant.map(|corners| (None, corners));
                 for (i, place) in scratch.iter_mut().enumerate() {
                     let p = chunk * CHUNK + i;
+                    *place = places[p];
+                    if self.held.get(p).is_some_and(|&h| h) {
+                        continue;
+                    }
                     let point = self.region.grid.point(p);
                     let world = self.region.world(point);
-                    let mine = (0..D).all(|axis| world[axis] & 1 == bit::<D>(class, axis));
-                    *place = if mine && !self.held.get(p).is_some_and(|&h| h) {
-                        let corners = constant.unwrap_or_else(|| self.corners(&self.frames.at(p)));
-                        self.choose(places, p, point, &corners)
-                    } else {
-                        places[p]
+                    if !(0..D).all(|axis| world[axis] & 1 == bit::<D>(class, axis)) {
+                        continue;
+                    }
+                    let frame = constant.is_none().then(|| self.frames.at(p));
+                    let corners = match last {
+                        Some((known, corners)) if known == frame => corners,
+                        _ => self.corners(&self.frames.at(p)),
                     };
+                    last = Some((frame, corners));
+                    *place = self.choose(places, p, point, &corners);
                 }
             });
             std::mem::swap(places, &mut scratch);
@@ -252,6 +261,10 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
         let mut attempts = 0;
         let (mut best, mut least) = (places[p], i64::MAX);
         for &(place, moved) in &from[..count] {
+            // Nothing is better than what fits exactly.
+            if least == 0 {
+                break;
+            }
             let sample = nearest(place);
             let at = self.appearance.clamped(sample);
             let fraction = sub(place, sample.map(|x| x * ONE));
