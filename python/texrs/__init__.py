@@ -6,13 +6,14 @@ another) and `self_splice` (in an edited one), `solid` and `synthesize` (volumes
 looks anything that is in register with the exemplar up in the same way.
 """
 
-from texrs import analysis, errors, fields, io, kernels, samples, texels, volume
+from texrs import analysis, errors, fields, io, kernels, samples, scale_maps, texels, volume
 from texrs._rust import VERSION as __version__
 from texrs.completion import complete
 from texrs.cyclic import tile
 from texrs.database import TextureDatabase
 from texrs.papers._solid_window import PlaneTexture, SolidTexture
 from texrs.papers.design import design
+from texrs.papers.perspective import perspective
 from texrs.papers.solid import solid, synthesize
 from texrs.papers.splice import self_splice, splice
 from texrs.report import Synthesis
@@ -36,7 +37,9 @@ __all__ = [
     "fields",
     "io",
     "kernels",
+    "perspective",
     "samples",
+    "scale_maps",
     "self_splice",
     "solid",
     "splice",

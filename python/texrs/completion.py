@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_image, as_int, as_mask, as_seed, as_wrap, guidance
+from texrs._completion_scaled import optimised, recovered
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.deform import Flip, flip, flip_coordinates, flip_frame, mirrors
 from texrs.errors import InvalidInput
@@ -35,7 +36,8 @@ def complete(
     hole: Array,
     *,
     source: Array | None = None,
-    method: str = "patch",
+    scale_map: Array | str | None = None,
+    method: str | None = None,
     patch: int | None = None,
     rim: int = 0,
     mirror: bool = True,
@@ -53,8 +55,12 @@ def complete(
         True, or not zero, where the picture is to be filled.
     source : (h, w) or (h, w, C) array, optional
         Another picture to copy from, of the same dtype and channels; by default what is known of ``image``.
-    method : {"patch"}
-        How: patches that fit what is around, cut in [1]_.
+    scale_map : {None, "auto"} or (H, W) float array, optional
+        For pictures taken at an angle: how large the texels are at each pixel (`texrs.scale_maps`), so that the hole is filled
+        with texels of the size that belongs there [2]_. "auto" measures it. In the hole it may be NaN; it is continued.
+    method : {None, "patch", "optimise"}
+        How: "patch", patches that fit what is around, cut in [1]_; "optimise", windows corrected until each is like one
+        of the picture, which can follow a scale map [2]_. None is "optimise" where there is a ``scale_map``.
     patch : int, optional
         Side of a patch in pixels, at least 4: about the size of what repeats. By default a sixth of the shorter side,
         12 to 32; less where no place, or few, would be free of holes.
@@ -88,6 +94,8 @@ def complete(
     ----------
     .. [1] J. Shen, X. Jin, X. Mao, J. Feng, "Completion-based texture design using deformation", The Visual Computer
        22, 2006, section 3.4. :doi:`10.1007/s00371-006-0040-9`
+    .. [2] W. Dong, N. Zhou, J.-C. Paul, "Perspective-aware texture analysis and synthesis", The Visual Computer 24,
+       2008. :doi:`10.1007/s00371-008-0232-1`
 
     Examples
     --------
@@ -101,8 +109,11 @@ def complete(
     True
 
     """
-    if method != "patch":
-        raise InvalidInput(f"method: allowed is 'patch', got {method!r}")
+    how = method or ("patch" if scale_map is None else "optimise")
+    if how not in ("patch", "optimise"):
+        raise InvalidInput(f"method: allowed are 'patch' and 'optimise', got {method!r}")
+    if how == "patch" and scale_map is not None:
+        raise InvalidInput("scale_map: needs method='optimise'; patches do not follow one")
     if not isinstance(mirror, bool | np.bool_):
         raise InvalidInput(f"mirror: needs True or False, got {mirror!r}")
     pictures, open_ = check_pictures(image, hole, source)
@@ -116,7 +127,12 @@ def complete(
     watch("complete", 0.0)
     identity = SourceMap.identity(shapes[0])
     places, side, count = SourceMap(identity.coordinates, identity.exemplar, identity.label, None, shapes), 0, 0
-    if open_.any():
+    levels: list[dict[str, object]] = []
+    if open_.any() and how == "optimise":
+        scale = recovered(pictures[0], open_, scale_map)
+        places, levels = optimised(pictures, open_, scale, wrap=(cyclic[0], cyclic[1]), seed=seed, progress=progress)
+        count = int(places.label.max())
+    elif open_.any():
         guides = guides_of(pictures)
         flips = mirrors(bool(mirror))
         free = np.ones(shapes[-1], bool) if source is not None else ~open_
@@ -139,10 +155,13 @@ def complete(
         )
         places, count = pasted(places, filled.label, filled.source, filled.coordinates, flips), len(filled.source)
     new = np.nonzero(places.label)
-    # What is kept maps to itself; of the rest every coordinate is whole.
+    # What is kept maps to itself; of patches every coordinate is whole.
     result = pictures[0].copy()
-    row, column = places.coordinates[new].astype(np.intp).T
-    result[new] = pictures[-1][row, column]
+    if how == "optimise":
+        result[new] = places.render(pictures[0], interpolation="cubic")[new]
+    else:
+        row, column = places.coordinates[new].astype(np.intp).T
+        result[new] = pictures[-1][row, column]
     watch("done", 1.0)
     known = pictures[0].copy()
     # The hole is painted over with a known pixel, which does not change the least value.
@@ -151,7 +170,7 @@ def complete(
     shades[new] = 55 + places.label[new] * 67 % 200
     stages = {"known": known, "patches": shades, "composite": result}
     report = {
-        "method": method,
+        "method": how,
         "seed": seed,
         "hole": float(open_.mean()),
         "replaced_outside": int(np.count_nonzero(~open_[new])),
@@ -160,6 +179,8 @@ def complete(
         "mirror": bool(mirror),
         "wrap": list(cyclic),
     }
+    if how == "optimise":
+        report |= {"scaled": scale_map is not None, "levels": levels}
     return Synthesis(result, places, stages, report)
 
 
