@@ -84,7 +84,7 @@ def from_angles(shape: Sequence[int] | int, slant: float, tilt: float, *, fov: f
         if scale.min() < LEAST:
             raise InvalidInput(
                 f"slant: at {slant:g} degrees the plane's horizon lies inside a picture that spans {fov:g} degrees; "
-                "a smaller slant, a smaller fov, or a crop below the horizon has none"
+                "a smaller slant, a smaller fov or a crop of the near part has none in it"
             )
     return np.asarray(scale, dtype=np.float32)
 

@@ -82,8 +82,18 @@ def auto_mask(image: object, *, detail: float | None = None, trend: Trend = "pla
     for turn in range(_ROUNDS):
         mask = (centre.at(octaves) > around.at(octaves)) & there
         if turn < _ROUNDS - 1:
-            octaves = np.log2(from_mask(mask, trend=trend, known=there))
+            octaves = np.log2(_measured(mask, trend, there))
     return mask
+
+
+def _measured(mask: Bools, trend: Trend, known: Bools) -> Floats:
+    try:
+        return from_mask(mask, trend=trend, known=known)
+    except InvalidInput:
+        raise InvalidInput(
+            "image: shows too few features to be counted; a larger part of the texture has more, or give the scale by "
+            "a mask or by angles"
+        ) from None
 
 
 def _grey(colours: Floats, known: Bools) -> Floats:
@@ -91,11 +101,14 @@ def _grey(colours: Floats, known: Bools) -> Floats:
     light = np.asarray(colours.mean(-1), np.float32)
     if colours.shape[2] == 1:
         return light
-    values, axes = np.linalg.eigh(np.cov(colours[known].T.astype(np.float64)))
+    seen = colours[known].astype(np.float64)
+    seen -= seen.mean(axis=0)
+    # Sums in one order, whatever number of threads a matrix product would take.
+    values, axes = np.linalg.eigh(np.einsum("ni,nj->ij", seen, seen) / len(seen))
     axis = axes[:, -1] if axes[:, -1].sum() >= 0 else -axes[:, -1]
     if colours.shape[2] * float(light[known].var()) >= _LIGHT * values[-1]:
         return light
-    return np.asarray(colours @ axis, np.float32)
+    return np.asarray(np.einsum("hwc,c->hw", colours, axis), np.float32)
 
 
 class _Blurs:

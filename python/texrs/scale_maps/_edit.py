@@ -17,20 +17,20 @@ from texrs.scale_maps._regions import as_number, as_points, centre, stroke, weig
 __all__ = ["edit"]
 
 _LEAST, _LARGEST = 1 / 8, 8.0
-"""No edit brings a scale further than that."""
+"""No step brings a scale further than that."""
 _MOST = 10_000
 
 
-def edit(scale: object, edits: Sequence[Mapping[str, Any]] | str) -> Floats:
-    """Change a scale map by a list of edits.
+def edit(scale: object, steps: Sequence[Mapping[str, Any] | str] | str) -> Floats:
+    """Change a scale map by a list of steps.
 
-    Each edit is a mapping with the name of the operation, ``"op"``, and what it needs. A region is
+    Each step is a mapping with the name of the operation, ``"op"``, and what it needs; or the name alone. A region is
     ``[top, left, bottom, right]`` (a rectangle), ``[row, column, radius]`` (a disc) or a list of at least three points
     ``[row, column]`` (a polygon); without one the whole map is meant. Edges of regions are ``"feather"`` pixels wide, by
-    default a quarter of the region's shorter side. All is done on log S, and no edit brings a scale out of 1/8 to 8.
+    default a quarter of the region's shorter side. All is done on log S, and no step brings a scale out of 1/8 to 8.
 
     ===========  =============================================  ====================================================
-    op           needs                                          does
+    op           takes                                          does
     ===========  =============================================  ====================================================
     `magnify`    factor (1 to 8, by default 1.25), region       makes texels larger
     `minify`     factor (1 to 8, by default 1.25), region       makes texels smaller
@@ -49,7 +49,7 @@ def edit(scale: object, edits: Sequence[Mapping[str, Any]] | str) -> Floats:
     ----------
     scale : array_like
         Shape (H, W); it is not changed.
-    edits : sequence of mappings, or str
+    steps : sequence of mappings, or str
         What to do, in this order; or the JSON text of it.
 
     Returns
@@ -60,7 +60,7 @@ def edit(scale: object, edits: Sequence[Mapping[str, Any]] | str) -> Floats:
     Raises
     ------
     InvalidInput
-        Not a scale map, or an edit that cannot be done: the message says which.
+        Not a scale map, or a step that cannot be done: the message says which.
 
     Examples
     --------
@@ -68,60 +68,61 @@ def edit(scale: object, edits: Sequence[Mapping[str, Any]] | str) -> Floats:
     >>> import numpy as np
     >>> from texrs import scale_maps
     >>> flat = np.ones((64, 64), np.float32)
-    >>> edits = [
+    >>> steps = [
     ...     {"op": "magnify", "region": [32, 32, 16], "factor": 2},
     ...     {"op": "set", "region": [0, 0, 8, 8], "value": 0.5, "feather": 0},
     ... ]
-    >>> changed = scale_maps.edit(flat, edits)
+    >>> changed = scale_maps.edit(flat, steps)
     >>> changed[32, 32], changed[4, 4], changed[60, 4]
     (np.float32(2.0), np.float32(0.5), np.float32(1.0))
-    >>> undone = scale_maps.edit(flat, edits[:-1])
-    >>> again = scale_maps.edit(flat, json.dumps(edits))
+    >>> undone = scale_maps.edit(flat, steps[:-1])
+    >>> again = scale_maps.edit(flat, json.dumps(steps))
     >>> bool(undone[4, 4] == 1 and (again == changed).all())
     True
 
     """
-    logs = np.log(as_map(scale))
-    for number, (operation, options) in enumerate(_read_all(edits), start=1):
+    given = as_map(scale)
+    before = np.log(given)
+    logs = before
+    for number, (operation, options) in enumerate(_read_all(steps), start=1):
         try:
             changed = _OPERATIONS[operation].change(logs, **options)
         except InvalidInput as error:
-            raise InvalidInput(f"edits: number {number} ({operation}): {error}") from None
+            raise InvalidInput(f"steps: step {number}, {operation}: {error}") from None
         # What was beyond the limits already may stay there.
         low, high = np.minimum(logs, np.log(np.float32(_LEAST))), np.maximum(logs, np.log(np.float32(_LARGEST)))
         logs = np.clip(changed, low, high).astype(np.float32)
-    return np.exp(logs)
+    # What no step reached is what it was, to the last bit.
+    return np.where(logs == before, given, np.exp(logs))
 
 
-def _read_all(edits: object) -> list[tuple[str, dict[str, Any]]]:
-    """Check a list of edits, or the JSON text of one: each is an operation and its options."""
-    if isinstance(edits, str):
+def _read_all(steps: object) -> list[tuple[str, dict[str, Any]]]:
+    """Check a list of steps, or the JSON text of one: each is an operation and its options."""
+    if isinstance(steps, str):
         try:
-            edits = json.loads(edits)
+            steps = json.loads(steps)
         except (ValueError, RecursionError) as error:
-            raise InvalidInput(f"edits: not JSON ({error})") from None
-    if not isinstance(edits, Sequence) or isinstance(edits, bytes):
-        raise InvalidInput(f"edits: needs a list of edits, got {type(edits).__name__}")
-    if len(edits) > _MOST:
-        raise InvalidInput(f"edits: up to {_MOST} edits are taken, got {len(edits)}")
-    return [_read(one, number) for number, one in enumerate(edits, start=1)]
+            raise InvalidInput(f"steps: not JSON ({error})") from None
+    if not isinstance(steps, Sequence) or isinstance(steps, str | bytes):
+        raise InvalidInput(f"steps: needs a list of steps, got {type(steps).__name__}")
+    if len(steps) > _MOST:
+        raise InvalidInput(f"steps: up to {_MOST} steps are taken, got {len(steps)}")
+    return [_read(one, number) for number, one in enumerate(steps, start=1)]
 
 
 def _read(one: object, number: int) -> tuple[str, dict[str, Any]]:
-    if not isinstance(one, Mapping):
-        raise InvalidInput(f'edits: number {number} needs a mapping such as {{"op": "magnify"}}, got {one!r}')
-    options = dict(one)
+    options = {"op": one} if isinstance(one, str) else dict(one) if isinstance(one, Mapping) else {}
     operation = options.pop("op", None)
     if not isinstance(operation, str) or operation not in _OPERATIONS:
-        raise InvalidInput(f"edits: number {number}: op needs one of {', '.join(_OPERATIONS)}, got {operation!r}")
+        raise InvalidInput(f"steps: step {number} needs an 'op' among {', '.join(_OPERATIONS)}; got {one!r}")
     needed, allowed = _OPERATIONS[operation].needed, _OPERATIONS[operation].allowed
     for key in options:
         if key not in (*needed, *allowed):
             words = ", ".join((*needed, *allowed))
-            raise InvalidInput(f"edits: number {number} ({operation}): there is no {key!r}; allowed are {words}")
+            raise InvalidInput(f"steps: step {number}, {operation}, knows no {key}; allowed are {words}")
     for key in needed:
         if key not in options:
-            raise InvalidInput(f"edits: number {number} ({operation}): needs {key!r}")
+            raise InvalidInput(f"steps: step {number}, {operation}, needs {key}")
     return operation, options
 
 

@@ -13,7 +13,7 @@ from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.scale_maps._extend import extend
 from texrs.scale_maps._maps import as_choice, centred
-from texrs.scale_maps._trend import Trend, as_trend, follow
+from texrs.scale_maps._trend import Trend, as_trend, follow, gradient
 from texrs.scale_maps._windows import Lattice, smooth
 
 __all__ = ["SMALLEST", "Measure", "from_mask"]
@@ -137,7 +137,7 @@ def _measured(mask: Bools, known: Bools | None, what: str, window: int | None) -
     if window is None:
         window = int(np.clip(_PERIODS * spacing, SMALLEST, max(SMALLEST, min(size) / 3)))
     lattice = Lattice.of(size, window)
-    density, enough = lattice.densities(features, known)
+    density, enough, rows, columns = lattice.densities(features, known)
     typical = float(np.median(density[enough]))
     if typical <= 0 or _area(mask, known) < _FEWEST * spacing**2:
         raise InvalidInput(
@@ -146,6 +146,10 @@ def _measured(mask: Bools, known: Bools | None, what: str, window: int | None) -
         )
     low, high = typical / _WIDEST ** (1 / power), typical * _WIDEST ** (1 / power)
     logs = (-power * np.log(np.clip(density / typical, low / typical, high / typical))).astype(np.float32)
+    # What a window says holds at the middle of what it sees.
+    cells = np.indices(logs.shape) * float(lattice.cell)
+    down, across = gradient(logs, cells[0] - rows, cells[1] - columns, enough)
+    logs += (down * rows + across * columns).astype(np.float32)
     logs = smooth(logs, enough, _ROUNDS)
     if not enough.all():
         logs = np.log(extend(np.exp(logs), enough))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isqrt
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from texrs._typing import Bools, Floats
 from texrs.scale_maps._maps import as_choice
 
-__all__ = ["TRENDS", "Trend", "as_trend", "follow"]
+__all__ = ["TRENDS", "Trend", "as_trend", "follow", "gradient"]
 
 Trend: TypeAlias = Literal["none", "plane", "linear", "quadratic"]
 """What a map is brought to: itself; a flat surface in perspective, whose S is linear in the picture; or a linear or a
@@ -19,6 +20,7 @@ quadratic function for log S."""
 TRENDS = ("none", "plane", "linear", "quadratic")
 _POINTS = 2**14
 """A surface of at most six numbers needs no more."""
+_FEWEST = 256
 _ROUNDS = 30
 _TUNING = 1.345
 """Of Huber's weights, in standard deviations: 95 % as good as least squares where nothing is amiss."""
@@ -32,48 +34,62 @@ def as_trend(value: object) -> str:
 def follow(logs: Floats, trend: str, known: Bools | None = None) -> Floats:
     """Give the logarithms of a trend that is fitted robustly where the map is known, at every pixel.
 
-    What the fit of a plane would continue below a quarter of the least scale,
-    or above four times the largest, is held there: nearer to the horizon nothing can be seen.
+    What a fit would continue below a quarter of the least scale, or above four times the largest, is held there: nearer
+    to the horizon nothing can be seen.
     """
     size = logs.shape
-    # A lattice of points, or of a small known part all of it.
-    index = np.arange(logs.size) if known is None else np.flatnonzero(known)
-    index = index[:: max(1, index.size // _POINTS)]
-    values = logs.ravel()[index].astype(np.float64)
+    places = _some(np.ones(size, np.bool_) if known is None else known)
+    values = logs[places].astype(np.float64)
     if trend == "none":
         return np.full(size, np.median(values), np.float32)
-    basis = _basis(index // size[1], index % size[1], size, trend)
+    rows, columns = places
+    # From the middle of what is known: where that is a line or a point, the surface is flat in the other direction.
+    middle = float(rows.mean()), float(columns.mean())
+    basis = np.stack(_terms(rows, columns, middle, size, trend), -1)
     if trend == "plane":
         # Noise is that of the logarithm, so large scales have more of it.
         weights = np.exp(-values)
         found = _robust(basis * weights[:, np.newaxis], np.ones_like(values))
     else:
         found = _robust(basis, values)
-    rows, columns = np.ogrid[: size[0], : size[1]]
-    surface: NDArray[Any] = _evaluate(found, rows, columns, size, trend)
+    terms = _terms(np.arange(size[0])[:, np.newaxis], np.arange(size[1]), middle, size, trend)
+    surface: NDArray[Any] = np.zeros(size)
+    for amount, term in zip(found, terms, strict=True):
+        surface += amount * term
     low, high = values.min() - np.log(4), values.max() + np.log(4)
     if trend == "plane":
         surface = np.asarray(np.log(np.maximum(surface, np.exp(low))), np.float64)
     return np.asarray(np.clip(surface, low, high), np.float32)
 
 
-def _basis(rows: NDArray[np.intp], columns: NDArray[np.intp], size: tuple[int, ...], trend: str) -> NDArray[np.float64]:
-    y, x = (2 * at / max(1, n - 1) - 1 for at, n in zip((rows, columns), size, strict=True))
-    terms = [np.ones(len(rows)), y, x]
-    if trend == "quadratic":
-        terms += [y * y, y * x, x * x]
-    return np.stack(terms, -1)
+def gradient(
+    values: Floats, rows: NDArray[np.float64], columns: NDArray[np.float64], known: Bools
+) -> tuple[float, float]:
+    """Give by how much values at places grow on the whole, down and to the right."""
+    places = _some(known)
+    rows, columns = rows[places], columns[places]
+    middle, reach = (rows.mean(), columns.mean()), max(1.0, float(np.ptp(rows)), float(np.ptp(columns)))
+    basis = np.stack([np.ones(len(rows)), (rows - middle[0]) / reach, (columns - middle[1]) / reach], -1)
+    found = _robust(basis, values[places].astype(np.float64))
+    return float(found[1]) / reach, float(found[2]) / reach
 
 
-def _evaluate(
-    found: NDArray[np.float64], rows: NDArray[np.intp], columns: NDArray[np.intp], size: tuple[int, ...], trend: str
-) -> NDArray[np.float64]:
-    """Give the surface on the whole lattice, a row and a column at a time."""
-    y, x = (2 * at / max(1, n - 1) - 1 for at, n in zip((rows, columns), size, strict=True))
-    down, across = found[0] + found[1] * y, found[2] * x
-    if trend == "quadratic":
-        return np.asarray(down + found[3] * y * y + (across + found[5] * x * x) + found[4] * y * x)
-    return np.asarray(down + across)
+def _some(known: Bools) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Give the rows and columns of a lattice of known places, or of a small known part those of all."""
+    step = max(1, isqrt(int(np.count_nonzero(known)) // _POINTS))
+    thin = np.zeros_like(known)
+    thin[::step, ::step] = known[::step, ::step]
+    rows, columns = np.nonzero(thin if np.count_nonzero(thin) >= _FEWEST else known)
+    return rows, columns
+
+
+def _terms(
+    rows: NDArray[np.intp], columns: NDArray[np.intp], middle: tuple[float, float], size: tuple[int, ...], trend: str
+) -> list[NDArray[np.float64]]:
+    """Give what a surface is the sum of, at the places of a lattice."""
+    y, x = ((at - m) / max(1, (n - 1) / 2) for at, m, n in zip((rows, columns), middle, size, strict=True))
+    terms = [np.ones_like(y), y, x]
+    return [*terms, y * y, y * x, x * x] if trend == "quadratic" else terms
 
 
 def _robust(basis: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -83,8 +99,10 @@ def _robust(basis: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[
     for _ in range(_ROUNDS):
         weighted = basis * weights[:, np.newaxis]
         before = found
-        found = np.linalg.lstsq(weighted.T @ basis, weighted.T @ values, rcond=1e-10)[0]
-        away = np.abs(values - basis @ found)
+        # Sums in one order, whatever number of threads a matrix product would take.
+        normal, right = np.einsum("ni,nj->ij", weighted, basis), np.einsum("ni,n->i", weighted, values)
+        found = np.linalg.lstsq(normal, right, rcond=1e-10)[0]
+        away = np.abs(values - np.einsum("ni,i->n", basis, found))
         spread = 1.4826 * np.median(away)
         if spread < 1e-9 or np.abs(found - before).max() < 1e-7:
             break

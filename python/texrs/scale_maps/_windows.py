@@ -48,34 +48,58 @@ class Lattice:
         cell = max(1, round(window / _ACROSS))
         return cls(size, cell, max(1, round((window / cell - 1) / 2) * 2 + 1))
 
-    def sums(self, values: Array) -> NDArray[np.float64]:
-        """Give the sums of small whole numbers (H, W) over the windows."""
+    def densities(
+        self, features: Array, known: Bools | None
+    ) -> tuple[NDArray[np.float64], Bools, NDArray[np.float64], NDArray[np.float64]]:
+        """Count features in windows.
+
+        Parameters
+        ----------
+        features : (H, W) array of small whole numbers
+            What is counted.
+        known : (H, W) array of bool, optional
+            What is area.
+
+        Returns
+        -------
+        densities : (R, C) array
+            Features in a pixel of the window around each cell.
+        enough : (R, C) array of bool
+            Whether enough of the window is known to say so.
+        rows, columns : (R, C) arrays
+            How far the middle of the cell lies from that of its window's known part, in pixels: at borders and beside
+            holes a window sees what is on one side alone.
+
+        """
+        area = self._cells(np.ones(self.size, np.uint8) if known is None else known.view(np.uint8))
+        total = self._windows(area)
+        enough = total >= _LEAST_AREA * (self.across * self.cell) ** 2
+        if not enough.any():
+            enough = total > 0
+        shares = np.maximum(total, 1)
+        rows, columns = (
+            at - self._windows(area * at) / shares
+            for at in np.meshgrid(*(self.cell * np.arange(n, dtype=np.float64) for n in area.shape), indexing="ij")
+        )
+        return self._windows(self._cells(features)) / shares, enough, rows, columns
+
+    def _cells(self, values: Array) -> NDArray[np.float64]:
+        """Give the sums over the cells."""
         starts = [np.arange(0, n, self.cell) for n in self.size]
         # Rows first: contiguous, and what is left of them is small.
         rows = np.add.reduceat(values, starts[0], axis=0, dtype=np.int32)
-        cells = np.add.reduceat(rows, starts[1], axis=1, dtype=np.int64)
+        return np.add.reduceat(rows, starts[1], axis=1, dtype=np.int64).astype(np.float64)
+
+    def _windows(self, cells: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Give the sums over the windows around the cells: whole numbers, so in float64 exact."""
         reach = self.across // 2
         for axis in (0, 1):
             total = np.cumsum(cells, axis=axis)
             count = total.shape[axis]
             upper = np.take(total, np.minimum(np.arange(count) + reach, count - 1), axis)
             lower = np.take(total, np.maximum(np.arange(count) - reach - 1, 0), axis)
-            inside = np.expand_dims(np.arange(count) > reach, 1 - axis)
-            cells = upper - lower * inside
-        return cells.astype(np.float64)
-
-    def densities(self, features: Array, known: Bools | None) -> tuple[NDArray[np.float64], Bools]:
-        """Give the features in a pixel of each window, and where enough of the window is known to say so."""
-        area = self.sums(np.ones(self.size, np.uint8) if known is None else known.view(np.uint8))
-        enough = area >= _LEAST_AREA * (self.across * self.cell) ** 2
-        if not enough.any():
-            enough = area > 0
-        return self.sums(features) / np.maximum(area, 1), enough
-
-    def centres(self, known: Bools) -> Bools:
-        """Give which cells' middle pixels are marked."""
-        at = [np.minimum(np.arange(0, n, self.cell) + self.cell // 2, n - 1) for n in self.size]
-        return np.asarray(known[np.ix_(*at)])
+            cells = upper - lower * np.expand_dims(np.arange(count) > reach, 1 - axis)
+        return cells
 
     def spread(self, cells: Floats) -> Floats:
         """Interpolate what the cells say linearly, to every pixel."""

@@ -1,0 +1,122 @@
+"""`texrs.synthesize` over many pictures, beside plain image quilting and the Resynthesizer, judged by evaluators.
+
+    python benches/synthesize_table.py OUT --evaluator FILE.py ... [--seeds 3] [--quality preserve] [--only NAME]
+        [--resynthesizer PROGRAM] PICTURE ...
+
+The exemplar is the middle 256 a side of each picture; results are twice as large and kept in OUT. A result is fine where
+every score of every evaluator is in its bounds, or no worse than 1.1 times that of a second crop of the same photograph, as
+far from the exemplar as can be. Quilting is `texrs.design` with nothing deformed, mirrored or blended. The Resynthesizer is an
+external program (`completion_vs_peers.py` says how it is built); it is given the exemplar with the rest to fill, once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from skimage import io
+
+import evaluators
+import texrs
+
+SIDE = 256
+
+
+def middle(image: np.ndarray) -> np.ndarray:
+    row, column = ((n - min(n, SIDE)) // 2 for n in image.shape[:2])
+    return np.ascontiguousarray(image[row : row + SIDE, column : column + SIDE])
+
+
+def second(image: np.ndarray) -> np.ndarray | None:
+    """Give the largest corner of the picture that overlaps the middle least; none where there is nothing beside it."""
+    if max(image.shape[:2]) < 1.5 * SIDE:
+        return None
+    rows, columns = (min(n, SIDE) for n in image.shape[:2])
+    return np.ascontiguousarray(image[:rows, :columns])
+
+
+def by_resynthesizer(program: Path, image: np.ndarray) -> np.ndarray:
+    """Give what the engine fills beside the exemplar, with colours of the exemplar alone."""
+    rows, columns = image.shape[:2]
+    canvas = np.zeros((2 * rows, 3 * columns, 3), np.uint8)
+    canvas[:rows, :columns] = image[..., :3] if image.ndim == 3 else image[..., None]
+    hole = np.full(canvas.shape[:2], 255, np.uint8)
+    hole[:rows, :columns] = 0
+    with tempfile.TemporaryDirectory() as folder:
+        names = [Path(folder) / n for n in ("image.ppm", "mask.pgm", "out.ppm")]
+        names[0].write_bytes(b"P6\n%d %d\n255\n" % canvas.shape[1::-1] + canvas.tobytes())
+        names[1].write_bytes(b"P5\n%d %d\n255\n" % canvas.shape[1::-1] + hole.tobytes())
+        ran = {**os.environ, "MATCH_CONTEXT": "0"}
+        subprocess.run([program, *names], check=True, capture_output=True, timeout=900, env=ran)
+        made = io.imread(names[2])
+    return made[:, columns:]
+
+
+def results(image: np.ndarray, options: argparse.Namespace) -> Iterator[tuple[str, int, np.ndarray]]:
+    """Give each way's results, one for each seed."""
+    size = (2 * image.shape[0], 2 * image.shape[1])
+    for seed in range(1, options.seeds + 1):
+        yield "texrs", seed, texrs.synthesize(image, size, seed=seed, quality=options.quality).image
+        if options.peers:
+            plain = texrs.design(image, size, seed=seed, operations=0, tiles=1, mirror=False, poisson=None)
+            yield "quilting", seed, plain.image
+    if options.resynthesizer:
+        yield "resynthesizer", 1, by_resynthesizer(options.resynthesizer, image)
+
+
+def judged(judges: evaluators.Judges, picture: np.ndarray, real: dict[str, float]) -> tuple[list[str], str]:
+    """Give which scores are neither in bounds nor like a real crop's, and them in words."""
+    scores = judges.scores(picture)
+    bad = [n for n in judges.failed(scores) if n not in real or judges.worse(n, scores[n], real[n]) > 1.1]
+    return bad, " ".join(f"{n} {scores[n]:.2f}" for n in bad)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("pictures", type=Path, nargs="+")
+    parser.add_argument("--evaluator", type=Path, action="append", required=True)
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--quality", default="preserve", choices=("preserve", "fast", "optimise"))
+    parser.add_argument("--only", default="", help="pictures whose names hold this")
+    parser.add_argument("--peers", action="store_true", help="plain quilting as well")
+    parser.add_argument("--resynthesizer", type=Path)
+    options = parser.parse_args()
+    modules = [evaluators.load(path) for path in options.evaluator]
+    options.out.mkdir(parents=True, exist_ok=True)
+    fine: dict[str, list[list[bool]]] = {}
+    print("| picture | way | fine | out of bounds (seed: score) |\n|---|---|---|---|", flush=True)
+    for path in options.pictures:
+        if options.only not in path.stem:
+            continue
+        whole = texrs.io.read(path)
+        image = middle(whole)
+        judges = evaluators.Judges(modules, image)
+        crop, real = second(whole), None
+        texrs.io.write(options.out / f"{path.stem}.png", image)
+        rows: dict[str, list[tuple[int, str]]] = {}
+        for way, seed, picture in results(image, options):
+            texrs.io.write(options.out / f"{path.stem}-{way}-{seed}.png", picture)
+            bad, words = judged(judges, picture, {})
+            if bad and crop is not None:
+                real = judges.scores(crop) if real is None else real
+                bad, words = judged(judges, picture, real)
+            rows.setdefault(way, []).append((seed, words))
+        for way, found in rows.items():
+            good = [not words for _, words in found]
+            fine.setdefault(way, []).append(good)
+            said = "; ".join(f"{seed}: {words}" for seed, words in found if words)
+            print(f"| {path.stem} | {way} | {sum(good)}/{len(good)} | {said} |", flush=True)
+    for way, pictures in fine.items():
+        count, total = sum(map(sum, pictures)), sum(map(len, pictures))
+        print(f"\n{way}: {count} of {total} results fine; {sum(map(all, pictures))} of {len(pictures)} in all seeds")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,142 @@
+"""The command that makes scale maps, end to end."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+
+from texrs import io, samples, scale_maps
+from texrs.cli import main
+
+Capture = pytest.CaptureFixture[str]
+FLOOR = samples.tilted_discs((96, 128))
+EDITS = [{"op": "magnify", "region": [40, 40, 12], "factor": 2}, {"op": "smooth", "sigma": 3}]
+BEFORE = b"before"
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in a folder that holds a picture, its mask, a hole, edits and a result of earlier."""
+    monkeypatch.chdir(tmp_path)
+    iio.imwrite("in.png", FLOOR.image)
+    iio.imwrite("mask.png", FLOOR.mask.astype(np.uint8) * 255)
+    hole = np.zeros((96, 128, 3), np.uint8)
+    hole[30:60, 40:80] = 200
+    iio.imwrite("hole.png", hole)
+    iio.imwrite("small.png", np.zeros((8, 8), np.uint8))
+    Path("edits.json").write_text(json.dumps(EDITS), encoding="utf-8")
+    Path("bad.json").write_text('[{"op": "erase"}]', encoding="utf-8")
+    Path("out.tif").write_bytes(BEFORE)
+    return tmp_path
+
+
+KNOWN = np.ones((96, 128), bool)
+KNOWN[30:60, 40:80] = False
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        ("--slant 45 --tilt 10", lambda: scale_maps.from_angles((96, 128), 45, 10)),
+        ("--slant 45", lambda: scale_maps.from_angles((96, 128), 45, 90)),
+        ("--slant 40 --tilt 10 --fov 50", lambda: scale_maps.from_angles((96, 128), 40, 10, fov=50)),
+        ("--mask mask.png", lambda: scale_maps.from_mask(FLOOR.mask)),
+        (
+            "--mask mask.png --measure count --window 40 --trend plane",
+            lambda: scale_maps.from_mask(FLOOR.mask, measure="count", window=40, trend="plane"),
+        ),
+        ("--auto", lambda: scale_maps.from_mask(scale_maps.auto_mask(FLOOR.image))),
+        (
+            "--auto --hole hole.png --trend linear",
+            lambda: scale_maps.from_mask(scale_maps.auto_mask(FLOOR.image, known=KNOWN), known=KNOWN, trend="linear"),
+        ),
+        (
+            "--slant 30 --edit magnify,magnify",
+            lambda: scale_maps.edit(scale_maps.from_angles((96, 128), 30, 90), ["magnify"] * 2),
+        ),
+        ("--slant 30 --edit edits.json", lambda: scale_maps.edit(scale_maps.from_angles((96, 128), 30, 90), EDITS)),
+        (
+            "--slant 30 --size 120x150 --mode extend",
+            lambda: scale_maps.resample(scale_maps.from_angles((96, 128), 30, 90), (120, 150), "extend"),
+        ),
+        ("--slant 30 --size 50", lambda: scale_maps.resample(scale_maps.from_angles((96, 128), 30, 90), (50, 50))),
+    ],
+)
+def test_it_writes_what_the_functions_make(here: Path, capsys: Capture, arguments: str, expected) -> None:
+    assert main(["scale-map", "in.png", "-o", "out.tif", *arguments.split()]) == 0
+    assert (io.read("out.tif") == expected()).all()
+    assert re.search(r"texrs: wrote out\.tif: \d+ x \d+, scales \S+ to \S+, in", capsys.readouterr().err)
+
+
+def test_a_map_made_before_is_edited_and_encoded(here: Path) -> None:
+    made = scale_maps.from_angles((96, 128), 30, 90)
+    for name, options, read in (
+        ("map.npy", [], lambda v: v),
+        ("map.exr", [], lambda v: v),
+        ("map.png", [], scale_maps.decode),
+        ("paper.png", ["--encoding", "paper"], lambda v: scale_maps.decode(v, "paper")),
+    ):
+        assert main(["scale-map", "in.png", "-o", name, "--slant", "30", "-q", *options]) == 0
+        assert np.abs(np.log(read(io.read(name)) / made)).max() < 0.02
+        assert main(["scale-map", "in.png", "-o", "two.npy", "--scale", name, "--edit", "edits.json", *options]) == 0
+        values = io.read("two.npy")
+        edited = scale_maps.decode(values, "paper") if options else values
+        assert np.abs(np.log(edited / scale_maps.edit(made, EDITS))).max() < 0.02
+
+
+def test_stages_are_pictures_to_look_at(here: Path, capsys: Capture) -> None:
+    more = ["--edit", "edits.json", "--size", "64x64", "--stages", "stages", "--quiet"]
+    assert main(["scale-map", "in.png", "-o", "out.png", "--mask", "mask.png", *more]) == 0
+    names = sorted(p.name for p in Path("stages").iterdir())
+    assert names == ["01-mask.png", "02-scale.png", "03-edited.png", "04-resampled.png", "report.json"]
+    assert (iio.imread("stages/01-mask.png") == iio.imread("mask.png")).all()
+    assert (iio.imread("stages/02-scale.png") == scale_maps.picture(scale_maps.from_mask(FLOOR.mask))).all()
+    assert capsys.readouterr().err == ""
+    report = json.loads(Path("stages/report.json").read_text(encoding="utf-8"))
+    assert report["edit"] == EDITS
+    assert report["size"] == [64, 64]
+    # What was done is done again.
+    again = ["scale-map", "in.png", "-o", "again.png", "--mask", "mask.png", "--edit", "stages/report.json", "-q"]
+    assert main([*again, "--size", "64x64"]) == 0
+    assert Path("again.png").read_bytes() == Path("out.png").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("", "scale-map: needs one of --mask, --auto, --slant and --scale, got none of them"),
+        ("--auto --slant 3", "scale-map: needs one of --mask, --auto, --slant and --scale, got --auto and --slant"),
+        ("--auto --tilt 3", "--tilt: needs --slant, got --auto"),
+        ("--slant 3 --hole hole.png", "--hole: needs --mask or --auto, got --slant"),
+        ("--slant 89", "--slant: needs a number from 0 to 85.0, got 89.0"),
+        ("--slant 80 --fov 100", "--slant: at 80 degrees the plane's horizon lies inside"),
+        ("--mask small.png", "--mask: needs the size of the image, 96 x 128; got 8 x 8"),
+        ("--auto --hole small.png", "--hole: needs the size of the image, 96 x 128; got 8 x 8"),
+        ("--mask mask.png --window 3", "--window: needs an integer from 16 to 128, got 3"),
+        ("--mask mask.png --measure area2", "--measure: allowed are boundary, skeleton, count and area"),
+        ("--mask mask.png --trend up", "--trend: allowed are none, plane, linear and quadratic; got 'up'"),
+        ("--mask hole.png", "hole.png: holds too few features"),
+        ("--slant 3 --edit bad.json", "--edit: step 1 needs an 'op' among magnify"),
+        ("--slant 3 --edit none.json", "none.json: "),
+        ("--slant 3 --edit mask.png", "--edit: step 1 needs an 'op' among magnify"),
+        ("--slant 3 --edit [", "--edit: is not JSON ("),
+        ("--slant 3 --mode user", "--mode: allowed are stretch and extend; got 'user'"),
+        ("--slant 3 --encoding log", "--encoding: allowed are log2 and paper; got 'log'"),
+        ("--slant 3 --size 0x5", "--size: each side must be at least 1"),
+        ("--scale in.png", "in.png: needs grey levels, got colours"),
+        ("--scale none.npy", "none.npy:"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_done_is_said_and_nothing_is_written(
+    here: Path, capsys: Capture, arguments: str, message: str
+) -> None:
+    assert main(["scale-map", "in.png", "-o", "out.tif", *arguments.split()]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"texrs: {message}"), error
+    assert error.count("\n") == 1
+    assert Path("out.tif").read_bytes() == BEFORE

@@ -1,0 +1,307 @@
+"""Scale maps measured in masks: against known scales, slow twins, and what cannot be measured."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+import scale_checks as checks
+from texrs import samples, scale_maps
+from texrs.errors import InvalidInput
+from texrs.scale_maps._mask import _outlines
+from texrs.scale_maps._windows import Lattice
+from texrs.threads import threads
+
+SIDE = 256
+TILES, BRICKS = checks.generated(SIDE)[0], checks.generated(SIDE)[-1]
+TEXTURES = os.environ.get("TEXRS_TEXTURES", "")
+
+
+# --- against the truth -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("case", checks.generated(SIDE)[:4], ids=lambda case: case.name)
+def test_tiles_are_measured_in_the_picture(case: checks.Case) -> None:
+    """Whichever way they run away, and whether they or the gaps are marked."""
+    mask = scale_maps.auto_mask(case.image)
+    plain, inverted = checks.by_mask(case, mask), checks.by_mask(case, ~mask)
+    assert plain.correlation >= 0.9
+    assert inverted == plain
+    assert checks.by_mask(case, mask, trend="plane").correlation >= 0.97
+
+
+@pytest.mark.parametrize(("measure", "least"), [("boundary", 0.97), ("count", 0.93), ("skeleton", 0.6)])
+def test_measures_of_a_clean_mask(measure: str, least: float) -> None:
+    assert checks.by_mask(TILES, TILES.mask, measure=measure).correlation >= least
+
+
+def test_the_root_of_the_area_and_the_width_are_measured_in_a_clean_mask() -> None:
+    area = checks.by_mask(TILES, TILES.mask, trend="plane")
+    width = checks.by_mask(TILES, TILES.mask, trend="plane", foreshortened=True)
+    assert min(area.correlation, width.correlation) >= 0.99
+    assert area.slope == pytest.approx(1.5, abs=0.15)
+    assert width.slope == pytest.approx(1, abs=0.1)
+    # The same as by angles, then.
+    by_angles = scale_maps.from_angles((SIDE, SIDE), TILES.slant, TILES.tilt, fov=TILES.fov)
+    measured = scale_maps.from_mask(TILES.mask, trend="plane", foreshortened=True)
+    off = np.log(measured / by_angles)
+    assert np.abs(off - off.mean()).max() < 0.2
+
+
+def test_bricks_are_measured_in_their_mask() -> None:
+    assert checks.by_mask(BRICKS, BRICKS.mask).correlation >= 0.9
+    assert checks.by_mask(BRICKS, BRICKS.mask, trend="plane").correlation >= 0.95
+
+
+def test_sizes_that_change_without_perspective_are_measured_as_they_are() -> None:
+    rows, columns = np.indices((300, 300)) / 300
+    # A lattice of discs on coordinates that run twice as fast at the right as at the left: S = 2^(-x), log S is linear.
+    u, v = (2**columns - 1) / np.log(2) * 30, rows * 30
+    size = 2.0**-columns
+    mask = (np.sin(2 * np.pi * u) > 0) & (np.abs(v - np.rint(v)) < 5)
+    found = scale_maps.from_mask(mask)
+    agreement = checks.Agreement.of(found, size)
+    assert agreement.correlation >= 0.98
+    assert agreement.slope == pytest.approx(1, abs=0.1)
+
+
+def test_the_paper_s_count_of_areas_measures_nothing() -> None:
+    """Equation 1 counts pixels of the mask: of areas a share that does not depend on their size."""
+    for mask in (TILES.mask, ~TILES.mask):
+        assert abs(checks.by_mask(TILES, mask, measure="area").correlation) < 0.5
+    # Of curves it is the wrong way round: it makes small what is large.
+    rows = np.cumsum(np.linspace(6, 24, 40)).astype(int)
+    curves = np.zeros((rows[-1] + 12, 200), bool)
+    curves[rows] = True
+    size = np.linspace(1, 4, len(curves))[:, None] * np.ones(200)
+    literal = checks.Agreement.of(scale_maps.from_mask(curves, measure="area"), size)
+    repaired = checks.Agreement.of(scale_maps.from_mask(curves), size)
+    assert literal.correlation < -0.7
+    assert repaired.correlation > 0.95
+
+
+def test_the_literal_map_is_equations_1_and_2_as_printed() -> None:
+    mask = TILES.mask[:70, :60]
+    padded = np.pad(mask.astype(int), 16)
+    count = np.array([[padded[r : r + 32, c : c + 32].sum() for c in range(60)] for r in range(70)])
+    scale = count / ((count.min() + count.max()) / 2)
+    border = np.pad(scale, 4, mode="edge")
+    around = np.lib.stride_tricks.sliding_window_view(border, (9, 9)).reshape(70, 60, 81)
+    expected = 0.8 * around.mean(-1) + 0.2 * np.median(around, axis=-1)
+    found = scale_maps.from_mask(mask, measure="area")
+    inner = (expected > 0.3) & (expected < 3)
+    ratio = (found / expected)[inner]
+    assert np.ptp(ratio) / ratio.mean() < 1e-3
+
+
+@pytest.mark.skipif(not TEXTURES, reason="TEXRS_TEXTURES names a folder of pictures with ground truth")
+def test_pictures_with_ground_truth() -> None:
+    for case in checks.in_folder(Path(TEXTURES)):
+        plain, exact = checks.by_angles(case)
+        assert min(plain.correlation, exact.correlation) >= 0.999
+        assert 0.95 <= exact.slope <= 1.05
+        mask = scale_maps.auto_mask(case.image)
+        rough = "stonewall" in case.name
+        for polarity in (mask, ~mask):
+            assert checks.by_mask(case, polarity).correlation >= (0.75 if rough else 0.9), case.name
+            assert checks.by_mask(case, polarity, trend="plane").correlation >= (0.94 if rough else 0.98), case.name
+
+
+# --- holes -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("case", checks.generated(SIDE)[:2], ids=lambda case: case.name)
+def test_a_hole_is_neither_features_nor_area(case: checks.Case) -> None:
+    hole, whole = checks.in_hole(case)
+    assert hole.correlation >= 0.95 * whole.correlation
+    assert 0.7 <= hole.slope / whole.slope <= 1.4
+
+
+def test_what_stands_in_the_hole_does_not_matter() -> None:
+    known = np.ones((SIDE, SIDE), bool)
+    known[90:150, 60:180] = False
+    known[:40, 200:] = False
+    maps = []
+    for filled in (False, True):
+        mask = np.where(known, TILES.mask, filled)
+        image = np.where(known[..., None], TILES.image, np.uint8(255 * filled))
+        found = scale_maps.auto_mask(image, known=known)
+        assert not found[~known].any()
+        maps.append(
+            [scale_maps.from_mask(m, known=known, measure=k) for m in (mask, found) for k in ("boundary", "count")]
+        )
+        maps[-1].append(scale_maps.from_mask(mask, known=known, measure="skeleton", trend="quadratic"))
+    assert all((a == b).all() for a, b in zip(*maps, strict=True))
+
+
+def test_all_known_is_as_if_nothing_was_said() -> None:
+    known = np.ones((SIDE, SIDE), bool)
+    assert (scale_maps.from_mask(TILES.mask, known=known) == scale_maps.from_mask(TILES.mask)).all()
+    assert (scale_maps.auto_mask(TILES.image, known=known) == scale_maps.auto_mask(TILES.image)).all()
+
+
+# --- windows -----------------------------------------------------------------------------------------------------------
+
+
+@settings(deadline=None, max_examples=30)
+@given(
+    arrays.arrays(np.bool_, st.tuples(st.integers(3, 40), st.integers(3, 40))),
+    st.integers(1, 60),
+    st.randoms(use_true_random=False),
+)
+def test_windows_count_what_a_slow_twin_counts(mask: np.ndarray, window: int, random) -> None:
+    known = np.array([[random.random() < 0.8 for _ in range(mask.shape[1])] for _ in range(mask.shape[0])])
+    lattice = Lattice.of(mask.shape, window)
+    features = (mask & known).view(np.uint8)
+    density, enough, rows, columns = lattice.densities(features, known)
+    reach, cell = lattice.across // 2, lattice.cell
+    for i, j in np.ndindex(density.shape):
+        box = tuple(slice(max(0, (k - reach) * cell), (k + reach + 1) * cell) for k in (i, j))
+        area = known[box].sum()
+        assert density[i, j] == pytest.approx(features[box].sum() / max(1, area))
+        if enough[i, j]:
+            at = np.argwhere(known[box]) // cell * cell + [box[0].start, box[1].start]
+            assert (rows[i, j], columns[i, j]) == pytest.approx(
+                (i * cell - at[:, 0].mean(), j * cell - at[:, 1].mean())
+            )
+
+
+def test_outlines_are_counted_once_and_for_both_sides() -> None:
+    mask = np.zeros((12, 12), bool)
+    mask[3:7, 2:10] = True
+    assert _outlines(mask, None).sum() == 2 * (4 + 8)
+    assert (_outlines(mask, None) == _outlines(~mask, None)).all()
+    known = np.ones_like(mask)
+    known[:, 9:] = False
+    # The right side, and what of the two long ones is not known.
+    assert _outlines(mask, known).sum() == 4 + 2 * 7
+
+
+def test_borders_see_one_side_alone_and_are_corrected() -> None:
+    case = checks.generated(SIDE)[0]
+    found = scale_maps.from_mask(case.mask, window=80)
+    area = case.width**1.5
+    off = np.log(found / area).mean(axis=1)
+    assert np.abs(off[[0, -1]] - off[SIDE // 4 : -SIDE // 4].mean()).max() < 0.15
+
+
+@pytest.mark.parametrize("window", [16, 40, 256])
+def test_any_window_gives_a_map(window: int) -> None:
+    found = scale_maps.from_mask(TILES.mask, window=window)
+    assert found.shape == (SIDE, SIDE)
+    assert found.dtype == np.float32
+    assert np.log(found).mean() == pytest.approx(0, abs=1e-4)
+    assert np.abs(np.log2(found)).max() < 4
+
+
+def test_an_enlarged_picture_has_the_same_map() -> None:
+    larger = np.repeat(np.repeat(TILES.mask, 2, axis=0), 2, axis=1)
+    off = np.log(scale_maps.from_mask(larger)[::2, ::2] / scale_maps.from_mask(TILES.mask))
+    assert np.abs(off).max() < 0.1
+
+
+def test_thousands_of_pixels_a_side_and_of_either() -> None:
+    rng = np.random.default_rng(0)
+    for shape in ((16, 3000), (3000, 17), (16, 16)):
+        mask = rng.random(shape) < 0.5
+        found = scale_maps.from_mask(mask)
+        assert found.shape == shape
+        assert np.isfinite(found).all()
+
+
+def test_same_bytes_for_any_number_of_threads() -> None:
+    known = np.ones((SIDE, SIDE), bool)
+    known[90:150, 60:180] = False
+    made = []
+    for count in (1, 2, 7):
+        with threads(count):
+            mask = scale_maps.auto_mask(TILES.image, known=known)
+            made.append((mask, scale_maps.from_mask(mask, known=known)))
+    assert all((a == b).all() for other in made[1:] for a, b in zip(made[0], other, strict=True))
+
+
+# --- masks that are found ----------------------------------------------------------------------------------------------
+
+
+def test_colours_of_one_lightness_are_told_apart() -> None:
+    image = np.where(TILES.mask[..., None], np.array([200, 100, 60], np.uint8), np.array([60, 100, 200], np.uint8))
+    mask = scale_maps.auto_mask(image)
+    assert max((mask == TILES.mask).mean(), (mask != TILES.mask).mean()) > 0.95
+
+
+def test_every_dtype_gives_the_same_mask() -> None:
+    grey = TILES.image[..., 1]
+    mask = scale_maps.auto_mask(grey)
+    for other in (
+        grey.astype(np.uint16) * 257,
+        grey / np.float64(255),
+        grey[..., None],
+        np.repeat(grey[..., None], 3, -1),
+    ):
+        assert (scale_maps.auto_mask(other) == mask).mean() > 0.999
+
+
+# --- what cannot be measured -------------------------------------------------------------------------------------------
+
+BLANK = np.zeros((64, 64), bool)
+
+
+@pytest.mark.parametrize(
+    ("mask", "options", "message"),
+    [
+        (BLANK, {}, r"^mask: marks nothing, so there are no features to count; mark the texels"),
+        (~BLANK, {}, r"^mask: marks every pixel, so there are no features to count"),
+        (BLANK, {"measure": "area"}, r"^mask: marks nothing"),
+        (np.arange(64) < np.full((64, 1), 30), {}, r"^mask: holds too few features to count them in windows of \d+ pixels"),
+        (np.arange(64) < np.full((64, 1), 30), {"measure": "count"}, r"^mask: holds too few features"),
+        (np.ones((64, 64)), {}, r"^mask: needs bool or integers, got dtype float64$"),
+        (np.ones((64, 64, 3), bool), {}, r"^mask: needs shape \(64, 64\), got \(64, 64, 3\)$"),
+        (np.eye(12, dtype=bool), {}, r"^mask: each side must be at least 16, got \(12, 12\)$"),
+        (TILES.mask, {"known": BLANK}, r"^known: needs shape \(256, 256\), got \(64, 64\)$"),
+        (TILES.mask, {"known": np.zeros((256, 256), bool)}, r"^known: no pixel of the mask is known"),
+        (TILES.mask, {"known": TILES.mask}, r"^mask: marks every pixel"),
+        (TILES.mask, {"window": 8}, r"^window: needs an integer from 16 to 256, got 8$"),
+        (TILES.mask, {"measure": "volume"}, r"^measure: allowed are boundary, skeleton, count and area; got 'volume'$"),
+        (TILES.mask, {"trend": "cubic"}, r"^trend: allowed are none, plane, linear and quadratic; got 'cubic'$"),
+    ],
+)  # fmt: skip
+def test_masks_without_features_are_refused(mask: np.ndarray, options: dict, message: str) -> None:
+    with pytest.raises(InvalidInput, match=message):
+        scale_maps.from_mask(mask, **options)
+
+
+@pytest.mark.parametrize(
+    ("image", "options", "message"),
+    [
+        (np.full((64, 64, 3), 90, np.uint8), {}, r"^image: has one colour, so there are no features"),
+        (np.zeros((8, 64)), {}, r"^image: each side must be at least 16, got \(8, 64\)$"),
+        (np.full((64, 64), np.nan), {}, r"^image: 4096 of 4096 values are NaN"),
+        (TILES.image, {"known": BLANK}, r"^known: needs shape \(256, 256\), got \(64, 64\)$"),
+        (TILES.image, {"known": np.zeros((256, 256), bool)}, r"^known: no pixel of the picture is known"),
+        (TILES.image, {"detail": 0}, r"^detail: needs a number from 0.5 to 64.0, got 0$"),
+        (TILES.image, {"trend": "flat"}, r"^trend: allowed are"),
+    ],
+)
+def test_pictures_without_features_are_refused(image: np.ndarray, options: dict, message: str) -> None:
+    with pytest.raises(InvalidInput, match=message):
+        scale_maps.auto_mask(image, **options)
+
+
+def test_a_picture_with_one_edge_has_too_few_features() -> None:
+    image = np.zeros((64, 64), np.uint8)
+    image[:, 30:] = 200
+    with pytest.raises(InvalidInput, match=r"^image: shows too few features"):
+        scale_maps.auto_mask(image)
+
+
+@pytest.mark.parametrize("name", samples.names()[:12])
+def test_every_sample_has_a_map(name: str) -> None:
+    image = samples.load(name, size=(128, 128)).image
+    found = scale_maps.from_mask(scale_maps.auto_mask(image))
+    assert np.isfinite(found).all()
