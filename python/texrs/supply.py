@@ -28,6 +28,8 @@ __all__ = ["Copy", "Grown", "Settings", "Supply", "levels_of"]
 
 LEAST = 16
 """Least side of an exemplar."""
+MOST = 1 << 24
+"""Windows that are compared with each other in a pass, where all are."""
 RADIUS = 2
 """Of a window."""
 NAT = 512
@@ -247,7 +249,7 @@ class Supply:
                 here,
                 frames,
                 passes=s.passes[which],
-                exhaustive=s.exhaustive and number == 0 and len(regions) > 1,
+                exhaustive=s.exhaustive and number == 0 and here.points * level.order.size <= MOST,
                 vote=s.votes[which],
                 hysteresis=s.hysteresis,
                 unity=s.unity,
