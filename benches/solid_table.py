@@ -91,8 +91,8 @@ def measure(
         if mask is not None:
             found["S3b"].append(checks.s3b(mask, made, turned=turned))
         found["S5"].append(checks.s5(made, COHERENT[kind]))
-        if not turned and seed == 0:
-            found["S9"].append(checks.s9(image, min(side, CROP)))
+        if not turned and "stripes" in name:
+            found["S9"].append(checks.s9(image, side, seed))
     return {check: checks.mean(several) if several else None for check, several in found.items()}
 
 

@@ -14,7 +14,7 @@ from hypothesis.extra import numpy as arrays
 import scale_checks as checks
 from texrs import samples, scale_maps
 from texrs.errors import InvalidInput
-from texrs.scale_maps._mask import _outlines
+from texrs.scale_maps._mask import _middles, _outlines
 from texrs.scale_maps._windows import Lattice
 from texrs.threads import threads
 
@@ -183,6 +183,21 @@ def test_outlines_are_counted_once_and_for_both_sides() -> None:
     assert _outlines(mask, known).sum() == 4 + 2 * 7
 
 
+def test_features_are_counted_at_their_middles_and_cut_ones_by_half() -> None:
+    mask = np.zeros((40, 40), bool)
+    mask[10:13, 20:25] = mask[30, 5] = True
+    mask[0:5, 30:33] = True
+    count = _middles(mask, None)
+    assert {tuple(at): int(count[tuple(at)]) for at in np.argwhere(count)} == {(11, 22): 2, (30, 5): 2, (2, 31): 1}
+    known = np.ones_like(mask)
+    known[10:13, 25:] = False
+    assert _middles(mask, known)[11, 22] == 1
+    # A ring and what is in its middle are two.
+    rows, columns = np.indices((41, 41)) - 20
+    ring = (np.hypot(rows, columns) > 8) & (np.hypot(rows, columns) < 11) | (np.hypot(rows, columns) < 3)
+    assert _middles(ring, None)[20, 20] == 4
+
+
 def test_borders_see_one_side_alone_and_are_corrected() -> None:
     case = checks.generated(SIDE)[0]
     found = scale_maps.from_mask(case.mask, window=80)
@@ -233,6 +248,15 @@ def test_colours_of_one_lightness_are_told_apart() -> None:
     image = np.where(TILES.mask[..., None], np.array([200, 100, 60], np.uint8), np.array([60, 100, 200], np.uint8))
     mask = scale_maps.auto_mask(image)
     assert max((mask == TILES.mask).mean(), (mask != TILES.mask).mean()) > 0.95
+
+
+def test_large_pictures_are_looked_at_in_cells() -> None:
+    larger = np.repeat(np.repeat(TILES.image, 4, axis=0), 4, axis=1)[:-2, :-1]
+    known = np.ones(larger.shape[:2], bool)
+    known[400:600, 300:700] = False
+    mask = scale_maps.auto_mask(larger, detail=4)
+    assert (mask[1::4, 1::4] == scale_maps.auto_mask(TILES.image)).mean() > 0.97
+    assert (scale_maps.auto_mask(larger, detail=4, known=known)[known] == mask[known]).mean() > 0.97
 
 
 def test_every_dtype_gives_the_same_mask() -> None:

@@ -76,6 +76,13 @@ class Twin:
                 return True
         return False
 
+    def near(self, p, changed):
+        """Tell whether a point or one beside it changed."""
+        away = np.abs(self.points[changed] - self.points[p])
+        size = np.array(self.region.shape)
+        away = np.where(self.region.wrap, np.minimum(away, size - away), away)
+        return bool((away <= 1).all(axis=1).any())
+
     def window(self, places, p):
         """Give the appearance vector of the window round a point: what is at F o belongs at o."""
         frame = self.frames[p]
@@ -182,12 +189,15 @@ class Twin:
         now = self.bring_inside(places.astype(np.int64).reshape(-1, self.axes))
         limit, alone = int(hysteresis * self.spacing), int(unity * self.spacing)
         done = [now]
+        changed = [np.ones(len(now), bool)] * 2
         for number in range(first, first + passes):
+            fresh = [p for p, recently in enumerate(changed[0] | changed[1]) if recently]
             mine = [
                 p
                 for p, point in enumerate(self.points)
                 if (point + self.region.origin).sum() % 2 == number % 2
                 and not (held is not None and held[p])
+                and self.near(p, fresh)
                 and (exhaustive or self.meet(now, p))
             ]
             matches = now.copy()
@@ -196,6 +206,7 @@ class Twin:
             elected = matches.copy()
             for p in mine if vote else ():
                 elected[p] = self.bring_inside(self.elect(matches, p, vote))
+            changed = [changed[1], (elected != now).any(axis=1)]
             now = elected
             done.append(now)
         return done

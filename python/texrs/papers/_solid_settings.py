@@ -14,8 +14,8 @@ Quality: TypeAlias = Literal["preserve", "fast", "optimise"]
 class Settings:
     """The numbers of one quality. Sequences are for the coarsest level, those between, and the finest."""
 
-    passes: tuple[int, int, int] = (8, 6, 3)
-    reaches: tuple[int, int, int] = (2, 2, 2)
+    passes: tuple[int, int, int] = (8, 6, 6)
+    reaches: tuple[int, int, int] = (2, 2, 1)
     votes: tuple[int, int, int] = (0, 0, 0)
     radii: tuple[int, ...] = (2,)
     cell: int = 6
@@ -60,6 +60,7 @@ ON_DEMAND = replace(FAST, passes=(2, 1, 2), reaches=(1, 1, 1), rounds=2, candida
 OPTIMISE = replace(
     PRESERVE,
     passes=(24, 10, 4),
+    reaches=(2, 2, 2),
     votes=(3, 2, 0),
     radii=(3, 2),
     hysteresis=0.1,

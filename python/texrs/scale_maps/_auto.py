@@ -7,9 +7,10 @@ import numpy as np
 from texrs._arrays import as_float, as_image, as_mask, guidance
 from texrs._typing import Bools, Floats
 from texrs.errors import InvalidInput
-from texrs.scale_maps._blur import blur
+from texrs.scale_maps._blur import blur, shrink
 from texrs.scale_maps._mask import SMALLEST, from_mask
 from texrs.scale_maps._trend import Trend, as_trend
+from texrs.scale_maps._windows import Lattice
 
 __all__ = ["auto_mask"]
 
@@ -17,7 +18,7 @@ _AROUND = 1 / 12
 """Of the shorter side: how far around a pixel is compared with it."""
 _DETAIL = 1 / 400
 """Of the shorter side: the size of what is too fine to be a feature; one pixel at least."""
-_ROUNDS = 4
+_ROUNDS = 6
 _RANGE = 2
 """Octaves by which texels may be smaller, or larger, than the normal size."""
 _LIGHT = 0.25
@@ -31,7 +32,7 @@ def auto_mask(image: object, *, detail: float | None = None, trend: Trend = "pla
 
     How far the surroundings reach, and what is too fine to be seen, must grow with the texels, or else the mask has
     features of one size everywhere. So a scale map is measured in the mask (`from_mask`), and the mask made anew by it,
-    four times.
+    several times.
 
     Parameters
     ----------
@@ -77,13 +78,18 @@ def auto_mask(image: object, *, detail: float | None = None, trend: Trend = "pla
     if float(colours[there].std(axis=0).max()) < _FLAT:
         raise InvalidInput("image: has one colour, so there are no features; give the scale by a mask or by angles")
     grey = _grey(colours, there)
-    centre, around = (_Blurs(grey, there, sigma) for sigma in (fine, max(2 * fine, _AROUND * min(size))))
-    octaves = np.zeros(size, np.float32)
-    for turn in range(_ROUNDS):
-        mask = (centre.at(octaves) > around.at(octaves)) & there
-        if turn < _ROUNDS - 1:
-            octaves = np.log2(_measured(mask, trend, there))
-    return mask
+    # What is finer than `detail` is not looked at, so large pictures need not be looked at pixel by pixel.
+    cells = Lattice((size[0], size[1]), max(1, int(fine / 2)), 1)
+    small, seen = (grey, there) if cells.cell == 1 else shrink(grey, there, cells.cell)
+    del colours, grey
+    sigmas = (s / cells.cell for s in (fine, max(2 * fine, _AROUND * min(size))))
+    centre, around = (_Blurs(small, seen, sigma) for sigma in sigmas)
+    octaves = np.zeros(small.shape, np.float32)
+    for _ in range(_ROUNDS - 1):
+        mask = (centre.at(octaves) > around.at(octaves)) & seen
+        octaves = np.log2(_measured(mask, trend, seen))
+    lighter = centre.at(octaves) - around.at(octaves)
+    return ((lighter if cells.cell == 1 else cells.spread(lighter)) > 0) & there
 
 
 def _measured(mask: Bools, trend: Trend, known: Bools) -> Floats:

@@ -1,13 +1,13 @@
-"""Blurs of any width, as cheap for wide ones as for narrow ones."""
+"""Blurs of any width, as cheap for wide ones as for narrow ones, and smaller pictures."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy import ndimage
 
-from texrs._typing import Floats
+from texrs._typing import Bools, Floats
 
-__all__ = ["blur"]
+__all__ = ["blur", "shrink"]
 
 
 def blur(values: Floats, sigma: float) -> Floats:
@@ -25,3 +25,15 @@ def _boxes(sigma: float) -> list[int]:
     low = int(ideal) - 1 + int(ideal) % 2
     narrow = round((12 * sigma**2 - 3 * low**2 - 12 * low - 9) / (-4 * low - 4))
     return [low if k < narrow else low + 2 for k in range(3)]
+
+
+def shrink(values: Floats, known: Bools, side: int) -> tuple[Floats, Bools]:
+    """Give the means of what is known over cells of side x side pixels, and which cells hold any of it."""
+
+    def sums(of: Floats) -> Floats:
+        rows = np.add.reduceat(of, np.arange(0, of.shape[0], side), axis=0)
+        return np.asarray(np.add.reduceat(rows, np.arange(0, of.shape[1], side), axis=1))
+
+    area = sums(known.astype(np.float32))
+    means = sums(np.where(known, values, np.float32(0))) / np.maximum(area, 1)
+    return means.astype(np.float32), area > 0

@@ -68,5 +68,6 @@ def extend(scale: object, known: object, *, trend: Trend = "plane") -> Floats:
     logs[~there] = 0
     nothing = np.zeros_like(logs)
     membrane = poisson.solve(logs, nothing, nothing, screening=0, boundary="free", mask=~there)
-    filled = np.exp(np.clip(course + membrane, *np.log([LEAST, LARGEST])))
-    return np.where(there, values, filled.astype(np.float32))
+    # As the trend, no more than four times beyond what is known.
+    low, high = max(LEAST, float(values[there].min()) / 4), min(LARGEST, float(values[there].max()) * 4)
+    return np.where(there, values, np.clip(np.exp(course + membrane), low, high).astype(np.float32))

@@ -144,8 +144,8 @@ def _measured(mask: Bools, known: Bools | None, what: str, window: int | None) -
             f"mask: holds too few features to count them in windows of {window} pixels; a mask with more of them, a "
             "larger window, or a scale by angles is needed"
         )
-    low, high = typical / _WIDEST ** (1 / power), typical * _WIDEST ** (1 / power)
-    logs = (-power * np.log(np.clip(density / typical, low / typical, high / typical))).astype(np.float32)
+    ratio = np.clip(density / typical, _WIDEST ** (-1 / power), _WIDEST ** (1 / power))
+    logs = (-power * np.log(ratio)).astype(np.float32)
     # What a window says holds at the middle of what it sees.
     cells = np.indices(logs.shape) * float(lattice.cell)
     down, across = gradient(logs, cells[0] - rows, cells[1] - columns, enough)
@@ -164,7 +164,7 @@ def _features(mask: Bools, known: Bools | None, what: str) -> tuple[Array, float
         lines = skeletonize(mask) if known is None else skeletonize(mask & known) & known
         return lines.view(np.uint8), _spacing(int(np.count_nonzero(lines)), mask, known), 1.0
     if what == "count":
-        points = _middles(mask if known is None else mask & known)
+        points = _middles(mask, known)
         number = max(1, int(points.sum(dtype=np.int64))) / 2
         return points, float(np.sqrt(_area(mask, known) / number)), 0.5
     outlines = _outlines(mask, known)
@@ -194,20 +194,22 @@ def _outlines(mask: Bools, known: Bools | None) -> NDArray[np.uint8]:
     return count
 
 
-def _middles(mask: Bools) -> NDArray[np.uint8]:
-    """Put 2 at the middle of each feature, 1 where it is cut by the border: half of it, on average, is another's."""
-    labels, number = ndimage.label(mask, np.ones((3, 3)))
-    count = np.zeros(mask.shape, np.uint8)
+def _middles(mask: Bools, known: Bools | None) -> NDArray[np.uint16]:
+    """Put 2 at the middle of each feature; 1 if the border or a hole cuts it, for half of those have theirs beyond."""
+    labels, number = ndimage.label(mask if known is None else mask & known, np.ones((3, 3)))
     cut = np.zeros(number + 1, np.bool_)
     for rim in (labels[0], labels[-1], labels[:, 0], labels[:, -1]):
         cut[rim] = True
-    areas = np.bincount(labels.ravel(), minlength=number + 1)
+    if known is not None:
+        cut[labels[ndimage.binary_dilation(~known, np.ones((3, 3)))]] = True
+    flat = labels.ravel()
+    areas = np.bincount(flat, minlength=number + 1)
     rows, columns = (
-        np.bincount(labels.ravel(), np.broadcast_to(at, mask.shape).ravel(), number + 1)
+        (np.bincount(flat, np.broadcast_to(at, mask.shape).ravel(), number + 1) // np.maximum(areas, 1)).astype(np.intp)
         for at in (np.arange(mask.shape[0])[:, np.newaxis], np.arange(mask.shape[1]))
     )
-    for k in range(1, number + 1):
-        count[int(rows[k] / areas[k]), int(columns[k] / areas[k])] = 1 if cut[k] else 2
+    count = np.zeros(mask.shape, np.uint16)
+    np.add.at(count, (rows[1:], columns[1:]), np.where(cut[1:], 1, 2).astype(np.uint16))
     return count
 
 

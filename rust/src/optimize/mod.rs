@@ -11,11 +11,13 @@
 //!
 //! Departures: a drawn match must be better by some of the exemplar's own spacing (hysteresis), so that what is good
 //! enough stays and sparse features are not washed out. Points whose neighbours all go on with the same piece of the
-//! exemplar are left: only where pieces meet is there anything to correct. Coordinates are displaced by the frame's
+//! exemplar are left: only where pieces meet is there anything to correct. So are those around which nothing changed since
+//! they were corrected last. Coordinates are displaced by the frame's
 //! Jacobian wherever a window or a match is carried from one point to another (Lefebvre and Hoppe, 2006).
 
 mod gather;
 mod improve;
+mod recent;
 mod vote;
 
 use crate::appearance::{Appearance, UNIT};
@@ -23,6 +25,7 @@ use crate::fixed::{Frames, Place, add, apply};
 use crate::grid::Region;
 use crate::guide::Guide;
 
+use self::recent::Recent;
 use crate::par::{self, Monitor};
 use crate::{Error, Result};
 
@@ -30,6 +33,8 @@ use crate::{Error, Result};
 const CHUNK: usize = 2048;
 /// Distance of windows below which they are the same.
 const FINEST: i32 = UNIT / 256;
+/// How far a change makes points look again.
+const NEAR: usize = 1;
 /// Points between two looks at whether to stop.
 const SLAB: usize = 1 << 18;
 
@@ -67,6 +72,7 @@ struct Level<'a, const D: usize> {
     options: &'a Options,
     /// Steps to all neighbours, corners included.
     around: Vec<[i32; D]>,
+    recent: Recent,
 }
 
 /// Corrects `places`, one a point of `region`, and returns the number of passes and the share of the points that the
@@ -103,7 +109,7 @@ pub fn correct<const D: usize>(
             *place = appearance.bring_inside(*place);
         }
     });
-    let level = Level {
+    let mut level = Level {
         appearance,
         region,
         frames,
@@ -111,6 +117,7 @@ pub fn correct<const D: usize>(
         held,
         options,
         around: around(),
+        recent: Recent::new(points, NEAR),
     };
     monitor.expect((options.passes * points.div_ceil(SLAB)) as u64);
     let mut matches = places.clone();
@@ -125,14 +132,13 @@ pub fn correct<const D: usize>(
         } else {
             &mut matches
         };
-        let count = par::map(points.div_ceil(CHUNK), |c| {
-            let range = c * CHUNK..points.min((c + 1) * CHUNK);
-            range.filter(|&p| newest[p] != places[p]).count()
-        });
-        moved = [moved[1], count.iter().sum::<usize>()];
+        moved = [moved[1], level.recent.note(places, newest)];
         std::mem::swap(places, newest);
         if pass > 0 && ((moved[0] + moved[1]) as f64) < options.settled * points as f64 {
             return Ok((pass + 1, (moved[0] + moved[1]) as f64 / points as f64));
+        }
+        if pass > 0 && pass + 1 < options.passes {
+            level.recent.spread(&region.grid);
         }
     }
     Ok((options.passes, (moved[0] + moved[1]) as f64 / points as f64))
@@ -145,13 +151,15 @@ impl<const D: usize> Level<'_, D> {
         self.guide.as_ref().map_or(0, |g| g.cost(point, sample))
     }
 
-    /// Whether a pass corrects a point: one of its colour of the chess board, where pieces of the exemplar meet.
+    /// Whether a pass corrects a point: one of its colour of the chess board that sees something new, where pieces of
+    /// the exemplar meet.
     #[inline(always)]
     fn corrects(&self, places: &[Place<D>], p: usize, pass: u32) -> bool {
         let point = self.region.grid.point(p);
         let world = self.region.world(point);
         let parity = world.iter().fold(pass, |sum, &x| sum ^ x as u32) & 1;
         parity == 0
+            && self.recent.near(p)
             && !self.held.get(p).is_some_and(|&h| h)
             && (self.options.exhaustive || self.guide.is_some() || self.meet(places, p, point))
     }

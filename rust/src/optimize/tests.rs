@@ -57,6 +57,7 @@ fn mean_cost<const D: usize>(
         held: &[],
         options: &OPTIONS,
         around: around(),
+        recent: Recent::new(places.len(), 0),
     };
     let seen = gather::Seen::new(&level, places);
     let mut eye = gather::Eye::new(&level, &seen);
