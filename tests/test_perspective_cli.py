@@ -40,7 +40,7 @@ def test_targets_and_sizes(files):
 
 
 def test_holes_are_filled_by_scale(files):
-    for given in ("--scale @scale.npy", "--scale auto", "--method optimise"):
+    for given in ("--scale @scale.npy", "--scale auto", "--method optimise --scale @scale.npy"):
         assert run(files, f"complete @floor.png @hole.png -o @out.png {given} -q") == 0
         made, floor, hole = (io.read(files / n) for n in ("out.png", "floor.png", "hole.png"))
         np.testing.assert_array_equal(made[hole == 0], floor[hole == 0])
@@ -61,7 +61,7 @@ def test_holes_are_filled_by_scale(files):
         ("perspective @floor.png --scale @scale.npy -o @out.png --wrap xy", "wrap"),
         ("perspective @floor.png --scale @scale.npy -o @out.png --scale-weight 99", "--scale-weight: needs a number"),
         ("complete @floor.png alpha -o @out.png", "HOLE: alpha needs an image with an alpha channel"),
-        ("complete @floor.png @hole.png -o @out.png --method patch --scale auto", "needs method='optimise'"),
+        ("complete @floor.png @hole.png -o @out.png --method heal", "--method: allowed are 'patch' and 'optimise'"),
     ],
 )
 def test_bad_input_is_named(files, capsys, line, words):

@@ -64,12 +64,8 @@ def optimised(
     """Give the source map of a picture whose holes are filled, and what was done at each level."""
     image = as_image(pictures[0])
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
-    own = len(pictures) == 1
-    if min(shapes[-1]) < LEAST:
-        what = "image" if own else "source"
-        raise InvalidInput(f"{what}: method 'optimise' needs at least {LEAST} pixels a side, got {shapes[-1]}")
-    if not own:
-        raise InvalidInput("source: method 'optimise' copies from the picture itself; method='patch' takes a source")
+    if min(shapes[0]) < LEAST:
+        raise InvalidInput(f"image: method 'optimise' needs at least {LEAST} pixels a side, got {shapes[0]}")
     # Windows may not leave a copy, but those of known pixels at the border do.
     count = levels_of(shapes[0], SETTINGS)
     margin = RADIUS << (count - 1)

@@ -25,6 +25,9 @@ from texrs.source_map import SourceMap
 
 __all__ = ["complete"]
 
+SCALED = np.float32(2.0)
+"""Weight of scales as colours that patches are compared by: texels larger by a half are as far off as black from white."""
+
 LEAST = 4
 """Side of the smallest patch that still says anything of a texture."""
 PLACES = 64
@@ -37,7 +40,7 @@ def complete(
     *,
     source: Array | None = None,
     scale_map: Array | str | None = None,
-    method: str | None = None,
+    method: str = "patch",
     patch: int | None = None,
     rim: int = 0,
     mirror: bool = True,
@@ -58,9 +61,9 @@ def complete(
     scale_map : {None, "auto"} or (H, W) float array, optional
         For pictures taken at an angle: how large the texels are at each pixel (`texrs.scale_maps`), so that the hole is filled
         with texels of the size that belongs there [2]_. "auto" measures it. In the hole it may be NaN; it is continued.
-    method : {None, "patch", "optimise"}
-        How: "patch", patches that fit what is around, cut in [1]_; "optimise", windows corrected until each is like one
-        of the picture, which can follow a scale map [2]_. None is "optimise" where there is a ``scale_map``.
+    method : {"patch", "optimise"}
+        How: "patch", patches that fit what is around, cut in [1]_; "optimise", windows corrected until each is like one of the
+        picture, resized where there is a scale map [2]_: for large holes, of which patches would repeat what is around.
     patch : int, optional
         Side of a patch in pixels, at least 4: about the size of what repeats. By default a sixth of the shorter side,
         12 to 32; less where no place, or few, would be free of holes.
@@ -109,11 +112,11 @@ def complete(
     True
 
     """
-    how = method or ("patch" if scale_map is None else "optimise")
-    if how not in ("patch", "optimise"):
+    if method not in ("patch", "optimise"):
         raise InvalidInput(f"method: allowed are 'patch' and 'optimise', got {method!r}")
-    if how == "patch" and scale_map is not None:
-        raise InvalidInput("scale_map: needs method='optimise'; patches do not follow one")
+    if source is not None and (scale_map is not None or method == "optimise"):
+        what = "a scale_map says nothing of it" if scale_map is not None else "method='optimise' copies from the image"
+        raise InvalidInput(f"source: {what}; leave one of the two out")
     if not isinstance(mirror, bool | np.bool_):
         raise InvalidInput(f"mirror: needs True or False, got {mirror!r}")
     pictures, open_ = check_pictures(image, hole, source)
@@ -127,13 +130,15 @@ def complete(
     watch("complete", 0.0)
     identity = SourceMap.identity(shapes[0])
     places, side, count = SourceMap(identity.coordinates, identity.exemplar, identity.label, None, shapes), 0, 0
+    scale = recovered(pictures[0], open_, scale_map) if open_.any() else None
     levels: list[dict[str, object]] = []
-    if open_.any() and how == "optimise":
-        scale = recovered(pictures[0], open_, scale_map)
+    if open_.any() and method == "optimise":
         places, levels = optimised(pictures, open_, scale, wrap=(cyclic[0], cyclic[1]), seed=seed, progress=progress)
         count = int(places.label.max())
     elif open_.any():
         guides = guides_of(pictures)
+        if scale is not None:
+            guides = [np.concatenate([guides[0], SCALED * np.log(scale)[..., np.newaxis]], axis=-1)]
         flips = mirrors(bool(mirror))
         free = np.ones(shapes[-1], bool) if source is not None else ~open_
         side = patch_side(free, chosen, largest)
@@ -157,7 +162,7 @@ def complete(
     new = np.nonzero(places.label)
     # What is kept maps to itself; of patches every coordinate is whole.
     result = pictures[0].copy()
-    if how == "optimise":
+    if method == "optimise":
         result[new] = places.render(pictures[0], interpolation="cubic")[new]
     else:
         row, column = places.coordinates[new].astype(np.intp).T
@@ -170,17 +175,18 @@ def complete(
     shades[new] = 55 + places.label[new] * 67 % 200
     stages = {"known": known, "patches": shades, "composite": result}
     report = {
-        "method": how,
+        "method": method,
         "seed": seed,
         "hole": float(open_.mean()),
+        "scaled": scale_map is not None,
         "replaced_outside": int(np.count_nonzero(~open_[new])),
         "patch": side,
         "patches": count,
         "mirror": bool(mirror),
         "wrap": list(cyclic),
     }
-    if how == "optimise":
-        report |= {"scaled": scale_map is not None, "levels": levels}
+    if method == "optimise":
+        report["levels"] = levels
     return Synthesis(result, places, stages, report)
 
 

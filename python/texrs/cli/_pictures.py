@@ -81,10 +81,7 @@ def complete_command(
             show_default=False,
         ),
     ] = None,
-    method: Annotated[
-        str | None,
-        typer.Option(help="patch or optimise, which follows a scale map.", show_default="optimise with --scale"),
-    ] = None,
+    method: Annotated[str, typer.Option(help="patch, or optimise: windows corrected until they fit.")] = "patch",
     patch: Annotated[
         int | None,
         typer.Option(help="Side of the patches, in pixels, at least 4.", show_default="by the picture's size"),
