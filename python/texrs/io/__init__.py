@@ -38,88 +38,22 @@ renamed. What goes wrong is a `texrs.errors.FileError`, `~texrs.errors.LimitExce
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
 from itertools import chain
 from math import prod
-from pathlib import Path
 
 import numpy as np
 
-from texrs._arrays import MAX_PIXELS, as_float, as_int
+from texrs._arrays import MAX_PIXELS, as_int
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput
 from texrs.io import _files, _npy, _pillow, _slabs, _tiff, _volumes
 from texrs.io._files import atomic
+from texrs.io._formats import FORMATS, VOLUMES, checked, kind_of, spacing_of
 from texrs.io._npy import read_arrays
 from texrs.kernels import image_io
 
 __all__ = ["atomic", "read", "read_arrays", "read_volume", "write", "write_slabs", "write_surface", "write_volume"]
-
-_MAGIC = (
-    (b"\x89PNG\r\n\x1a\n", "png"),
-    (b"II*\0", "tiff"),
-    (b"MM\0*", "tiff"),
-    (b"II+\0", "tiff"),
-    (b"MM\0+", "tiff"),
-    (b"v/1\x01", "exr"),
-    (b"#?RADIANCE", "hdr"),
-    (b"#?RGBE", "hdr"),
-    (b"\xff\xd8\xff", "jpeg"),
-    (b"GIF87a", "gif"),
-    (b"GIF89a", "gif"),
-    (b"BM", "bmp"),
-    (_npy.MAGIC, "npy"),
-    (b"PK\x03\x04", "npz"),
-    (_volumes.NRRD_MAGIC, "nrrd"),
-    (_volumes.GZIP_MAGIC, "nii.gz"),
-    *((magic, "nii") for magic in _volumes.NIFTI_MAGIC),
-)
-
-_NUMBERS = frozenset(np.dtype(kind) for kind in ("?", "u1", "i1", "u2", "i2", "u4", "i4", "f2", "f4", "f8"))
-_SMALL = frozenset({np.dtype(np.bool_), np.dtype(np.uint8)})
-_MOST_CHANNELS = 64
-_VOLUMES = ("nrrd", "nii", "nii.gz")
-_UNIT = (1.0, 1.0, 1.0)
-
-
-@dataclass(frozen=True, slots=True)
-class _Format:
-    """What the files of a suffix can hold."""
-
-    dtypes: frozenset[np.dtype[np.generic]]
-    channels: range
-    longest: int = 2**31 - 1
-    volumes: bool = False
-    images: bool = True
-
-    def holds(self, dtype: np.dtype[np.generic], channels: int, volume: bool) -> bool:
-        fits = self.volumes if volume else self.images
-        return dtype in self.dtypes and channels in self.channels and fits
-
-
-_TIFF = _Format(_NUMBERS, range(1, _MOST_CHANNELS + 1), volumes=True)
-_NUMPY = _Format(_NUMBERS | {np.dtype(np.int64), np.dtype(np.uint64)}, range(1, _MOST_CHANNELS + 1), volumes=True)
-_SCIENCE = _Format(_NUMPY.dtypes - {np.dtype(np.float16)}, _NUMPY.channels, volumes=True, images=False)
-_NIFTI = replace(_SCIENCE, longest=2**15 - 1)
-_JPEG = _Format(_SMALL, range(1, 4, 2), 65_500)
-_FORMATS = {
-    ".png": _Format(_SMALL | {np.dtype(np.uint16)}, range(1, 5)),
-    ".tif": _TIFF,
-    ".tiff": _TIFF,
-    ".exr": _Format(frozenset({np.dtype(np.float16), np.dtype(np.float32)}), range(1, 5)),
-    ".hdr": _Format(frozenset({np.dtype(np.float32)}), range(3, 4)),
-    ".webp": _Format(_SMALL, range(3, 5), 16_383),
-    ".jpg": _JPEG,
-    ".jpeg": _JPEG,
-    ".bmp": _Format(_SMALL, range(1, 4, 2), 2**15),
-    ".npy": _NUMPY,
-    ".npz": _NUMPY,
-    ".nrrd": _SCIENCE,
-    ".nii": _NIFTI,
-    ".nii.gz": _NIFTI,
-    ".vti": _SCIENCE,
-}
 
 
 def read(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
@@ -161,7 +95,7 @@ def read(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
 
     """
     name, limit = _files.as_path(path), as_int(limit, "limit", 1, 2**40)
-    kind = _kind(name)
+    kind = kind_of(name)
     if kind == "tiff":
         planes, orientation = _tiff.read_tiff(name, limit)
         return _tiff.image_of(name, planes, orientation)
@@ -173,7 +107,7 @@ def read(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
         channels = array.shape[2] if array.ndim == 3 else 1
         _files.check_size(name, array.shape[:2], channels, array.itemsize, limit)
         return array
-    if kind in _VOLUMES:
+    if kind in VOLUMES:
         raise FileError(f"{name}: is a {kind} file, which holds a volume; texrs.io.read_volume reads it")
     file = _files.load(name, limit)
     if kind == "jpeg":
@@ -222,7 +156,7 @@ def read_volume(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
 
     """
     name, limit = _files.as_path(path), as_int(limit, "limit", 1, 2**40)
-    kind = _kind(name)
+    kind = kind_of(name)
     if kind == "tiff":
         planes, orientation = _tiff.read_tiff(name, limit)
         return _tiff.volume_of(name, planes, orientation)
@@ -352,7 +286,7 @@ def write_slabs(path: PathLike, slabs: Iterable[Array], shape: Sequence[int], *,
     sides = _slabs.as_shape(shape)
     with atomic(target, overwrite=overwrite) as temporary:
         # What a slab's maker raises is its own affair and passes as it is.
-        parts = _slabs.checked((_checked(slab, suffix, 3) for slab in slabs), sides)
+        parts = _slabs.checked((checked(slab, suffix, 3) for slab in slabs), sides)
         first = next(parts)
         whole = chain((first,), parts)
         if suffix == ".npy":
@@ -409,27 +343,12 @@ def write_surface(path: PathLike, vertices: Array, faces: Array, *, overwrite: b
         _volumes.write_stl(temporary, corners.astype(np.float32), triangles.astype(np.int64))
 
 
-def _kind(path: Path) -> str:
-    """Say which format a file has, by its content."""
-    _files.size_of(path)
-    with _files.speaking(path, "reading"), path.open("rb") as file:
-        start = file.read(16)
-    for magic, kind in _MAGIC:
-        if start.startswith(magic):
-            return kind
-    if start.startswith(b"RIFF") and start[8:12] == b"WEBP":
-        return "webp"
-    raise FileError(
-        f"{path}: its content is none of PNG, TIFF, EXR, HDR, WebP, JPEG, GIF, BMP, .npy, .npz, NRRD, NIfTI"
-    )
-
-
 def _write(path: PathLike, value: Array, axes: int, overwrite: bool, spacing: Sequence[float] | None) -> None:
     target = _files.as_path(path)
     suffix = ".nii.gz" if target.name.lower().endswith(".nii.gz") else target.suffix.lower()
-    if suffix not in _FORMATS:
-        raise FileError(f"{target}: the suffix {suffix!r} is not one that is written: {', '.join(_FORMATS)}")
-    array, steps = _checked(value, suffix, axes), _spacing(spacing, suffix)
+    if suffix not in FORMATS:
+        raise FileError(f"{target}: the suffix {suffix!r} is not one that is written: {', '.join(FORMATS)}")
+    array, steps = checked(value, suffix, axes), spacing_of(spacing, suffix)
     with atomic(target, overwrite=overwrite) as temporary, _files.speaking(target, "writing"):
         if suffix == ".npy":
             _npy.write_npy(temporary, array)
@@ -460,44 +379,3 @@ def _write(path: PathLike, value: Array, axes: int, overwrite: bool, spacing: Se
         else:
             file = image_io.encode(array, suffix[1:], name=str(target))
         temporary.write_bytes(file)
-
-
-def _common_first() -> list[str]:
-    return sorted(_FORMATS, key=lambda suffix: (not _FORMATS[suffix].images, suffix))
-
-
-def _spacing(spacing: Sequence[float] | None, suffix: str) -> tuple[float, ...]:
-    if spacing is None:
-        return _UNIT
-    if _FORMATS[suffix].images:
-        raise InvalidInput(f"spacing: {suffix} cannot keep it; .nrrd, .nii, .nii.gz and .vti can")
-    steps = tuple(spacing) if isinstance(spacing, Sequence | np.ndarray) else ()
-    if len(steps) != 3:
-        raise InvalidInput(f"spacing: needs three numbers, of planes, rows and columns; got {spacing!r}")
-    return tuple(as_float(s, "spacing", 1e-12, 1e12) for s in steps)
-
-
-def _checked(value: object, suffix: str, axes: int) -> Array:
-    """Give what is to be written, contiguous and in native byte order."""
-    try:
-        array = np.asarray(value)
-    except (ValueError, TypeError) as error:
-        raise InvalidInput(f"array: not an array of numbers ({_files.reason(error)})") from None
-    if array.dtype.kind not in "buif" or array.dtype.itemsize > 8:
-        raise InvalidInput(f"array: needs bool, integers or floats, got dtype {array.dtype}")
-    if array.ndim not in (axes, axes + 1) or array.size == 0:
-        shapes = ("(H, W) or (H, W, C)", "(D, H, W) or (D, H, W, C)")[axes - 2]
-        raise InvalidInput(f"array: needs shape {shapes}, not empty; got shape {array.shape}")
-    array = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("="))
-    form, volume = _FORMATS[suffix], axes == 3
-    channels = array.shape[axes] if array.ndim > axes else 1
-    if not form.holds(array.dtype, channels, volume):
-        able = [s for s in _common_first() if _FORMATS[s].holds(array.dtype, channels, volume)]
-        what = f"{'volumes of ' * volume}{array.dtype} with {channels} channel{'s'[: channels != 1]}"
-        can = f"{', '.join(able)} can" if able else f"no format can, of more than {_MOST_CHANNELS}"
-        raise InvalidInput(f"array: {suffix} cannot hold {what}; {can}")
-    if max(array.shape[:axes]) > form.longest:
-        raise InvalidInput(f"array: a side of {suffix} may have {form.longest} pixels, got shape {array.shape}")
-    if suffix == ".hdr" and not (np.isfinite(array).all() and (array >= 0).all()):
-        raise InvalidInput("array: .hdr cannot hold negative, infinite or NaN values; .exr, .npy and .tif can")
-    return array

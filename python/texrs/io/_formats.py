@@ -1,0 +1,135 @@
+"""Which files there are: how they are recognised, and what each can hold."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from texrs._arrays import as_float
+from texrs._typing import Array
+from texrs.errors import FileError, InvalidInput
+from texrs.io import _files, _npy, _volumes
+
+MAGIC = (
+    (b"\x89PNG\r\n\x1a\n", "png"),
+    (b"II*\0", "tiff"),
+    (b"MM\0*", "tiff"),
+    (b"II+\0", "tiff"),
+    (b"MM\0+", "tiff"),
+    (b"v/1\x01", "exr"),
+    (b"#?RADIANCE", "hdr"),
+    (b"#?RGBE", "hdr"),
+    (b"\xff\xd8\xff", "jpeg"),
+    (b"GIF87a", "gif"),
+    (b"GIF89a", "gif"),
+    (b"BM", "bmp"),
+    (_npy.MAGIC, "npy"),
+    (b"PK\x03\x04", "npz"),
+    (_volumes.NRRD_MAGIC, "nrrd"),
+    (_volumes.GZIP_MAGIC, "nii.gz"),
+    *((magic, "nii") for magic in _volumes.NIFTI_MAGIC),
+)
+
+_NUMBERS = frozenset(np.dtype(kind) for kind in ("?", "u1", "i1", "u2", "i2", "u4", "i4", "f2", "f4", "f8"))
+_SMALL = frozenset({np.dtype(np.bool_), np.dtype(np.uint8)})
+_MOST_CHANNELS = 64
+VOLUMES = ("nrrd", "nii", "nii.gz")
+UNIT = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """What the files of a suffix can hold."""
+
+    dtypes: frozenset[np.dtype[np.generic]]
+    channels: range
+    longest: int = 2**31 - 1
+    volumes: bool = False
+    images: bool = True
+
+    def holds(self, dtype: np.dtype[np.generic], channels: int, volume: bool) -> bool:
+        fits = self.volumes if volume else self.images
+        return dtype in self.dtypes and channels in self.channels and fits
+
+
+_TIFF = Format(_NUMBERS, range(1, _MOST_CHANNELS + 1), volumes=True)
+_NUMPY = Format(_NUMBERS | {np.dtype(np.int64), np.dtype(np.uint64)}, range(1, _MOST_CHANNELS + 1), volumes=True)
+_SCIENCE = Format(_NUMPY.dtypes - {np.dtype(np.float16)}, _NUMPY.channels, volumes=True, images=False)
+_NIFTI = replace(_SCIENCE, longest=2**15 - 1)
+_JPEG = Format(_SMALL, range(1, 4, 2), 65_500)
+FORMATS = {
+    ".png": Format(_SMALL | {np.dtype(np.uint16)}, range(1, 5)),
+    ".tif": _TIFF,
+    ".tiff": _TIFF,
+    ".exr": Format(frozenset({np.dtype(np.float16), np.dtype(np.float32)}), range(1, 5)),
+    ".hdr": Format(frozenset({np.dtype(np.float32)}), range(3, 4)),
+    ".webp": Format(_SMALL, range(3, 5), 16_383),
+    ".jpg": _JPEG,
+    ".jpeg": _JPEG,
+    ".bmp": Format(_SMALL, range(1, 4, 2), 2**15),
+    ".npy": _NUMPY,
+    ".npz": _NUMPY,
+    ".nrrd": _SCIENCE,
+    ".nii": _NIFTI,
+    ".nii.gz": _NIFTI,
+    ".vti": _SCIENCE,
+}
+
+
+def kind_of(path: Path) -> str:
+    """Say which format a file has, by its content."""
+    _files.size_of(path)
+    with _files.speaking(path, "reading"), path.open("rb") as file:
+        start = file.read(16)
+    for magic, kind in MAGIC:
+        if start.startswith(magic):
+            return kind
+    if start.startswith(b"RIFF") and start[8:12] == b"WEBP":
+        return "webp"
+    raise FileError(
+        f"{path}: its content is none of PNG, TIFF, EXR, HDR, WebP, JPEG, GIF, BMP, .npy, .npz, NRRD, NIfTI"
+    )
+
+
+def _common_first() -> list[str]:
+    return sorted(FORMATS, key=lambda suffix: (not FORMATS[suffix].images, suffix))
+
+
+def spacing_of(spacing: Sequence[float] | None, suffix: str) -> tuple[float, ...]:
+    if spacing is None:
+        return UNIT
+    if FORMATS[suffix].images:
+        raise InvalidInput(f"spacing: {suffix} cannot keep it; .nrrd, .nii, .nii.gz and .vti can")
+    steps = tuple(spacing) if isinstance(spacing, Sequence | np.ndarray) else ()
+    if len(steps) != 3:
+        raise InvalidInput(f"spacing: needs three numbers, of planes, rows and columns; got {spacing!r}")
+    return tuple(as_float(s, "spacing", 1e-12, 1e12) for s in steps)
+
+
+def checked(value: object, suffix: str, axes: int) -> Array:
+    """Give what is to be written, contiguous and in native byte order."""
+    try:
+        array = np.asarray(value)
+    except (ValueError, TypeError) as error:
+        raise InvalidInput(f"array: not an array of numbers ({_files.reason(error)})") from None
+    if array.dtype.kind not in "buif" or array.dtype.itemsize > 8:
+        raise InvalidInput(f"array: needs bool, integers or floats, got dtype {array.dtype}")
+    if array.ndim not in (axes, axes + 1) or array.size == 0:
+        shapes = ("(H, W) or (H, W, C)", "(D, H, W) or (D, H, W, C)")[axes - 2]
+        raise InvalidInput(f"array: needs shape {shapes}, not empty; got shape {array.shape}")
+    array = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("="))
+    form, volume = FORMATS[suffix], axes == 3
+    channels = array.shape[axes] if array.ndim > axes else 1
+    if not form.holds(array.dtype, channels, volume):
+        able = [s for s in _common_first() if FORMATS[s].holds(array.dtype, channels, volume)]
+        what = f"{'volumes of ' * volume}{array.dtype} with {channels} channel{'s'[: channels != 1]}"
+        can = f"{', '.join(able)} can" if able else f"no format can, of more than {_MOST_CHANNELS}"
+        raise InvalidInput(f"array: {suffix} cannot hold {what}; {can}")
+    if max(array.shape[:axes]) > form.longest:
+        raise InvalidInput(f"array: a side of {suffix} may have {form.longest} pixels, got shape {array.shape}")
+    if suffix == ".hdr" and not (np.isfinite(array).all() and (array >= 0).all()):
+        raise InvalidInput("array: .hdr cannot hold negative, infinite or NaN values; .exr, .npy and .tif can")
+    return array
