@@ -8,7 +8,8 @@ from texrs import samples
 from texrs.errors import InvalidInput
 from texrs.kernels.appearance import Appearance, Guide
 from texrs.kernels.pyramid import ONE, Region, to_fixed
-from texrs.supply import RADIUS, Settings, Supply, _weights
+from texrs.supply import RADIUS, Settings, Supply
+from texrs.supply._sheet import weights_of
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +25,7 @@ def supply(floor):
 @pytest.mark.parametrize(("n", "m"), [(40, 40), (40, 26), (40, 50), (7, 19), (33, 5)])
 def test_resizing_is_that_of_the_twin(n, m):
     line = np.random.default_rng(n).random(n)
-    np.testing.assert_allclose(_weights(n, m) @ line, reference.resized(line, m), atol=1e-6)
+    np.testing.assert_allclose(weights_of(n, m) @ line, reference.resized(line, m), atol=1e-6)
 
 
 def test_copies_do_not_overlap_and_are_found_again(supply):

@@ -1,9 +1,10 @@
 """Make new textures from one example.
 
 The verbs: `design` (many natural textures from one example), `splice` (the texels of one texture in the arrangement of
-another) and `self_splice` (in an edited one), `perspective` (texels as large as a map says), `solid` and `synthesize` (volumes
-and pictures grown under a frame field), `tile` (any picture made cyclic) and `complete` (holes filled by example). Each gives a `Synthesis`, whose `SourceMap`
-looks anything that is in register with the exemplar up in the same way.
+another) and `self_splice` (in an edited one), `perspective` (texels as large as a map says), `solid` and `synthesize`
+(volumes and pictures grown under a frame field), `tile` (any picture made cyclic) and `complete` (holes filled by
+example). Each gives a `Synthesis`, whose `SourceMap` looks anything that is in register with the exemplar up in the same
+way.
 """
 
 from texrs import analysis, errors, fields, io, kernels, samples, scale_maps, texels, volume

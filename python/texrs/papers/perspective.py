@@ -281,6 +281,9 @@ def _sentence(outside: dict[str, float], sizes: Sequence[float]) -> str:
 
 def scale_error(supply: Supply, source: SourceMap, scale: Floats, target: Floats) -> float:
     """Give the median of |log S_e(S(p)) - log S_o(p)|: how well the synthesiser chose by scale."""
-    sizes = np.log([c.factor for c in supply.copies]).mean(axis=1)
-    shown = np.log(source.render(scale, interpolation="linear")) + sizes[source.label]
-    return round(float(np.median(np.abs(shown - np.log(target)))), 5)
+    sizes = np.log([c.factor for c in supply.copies]).mean(axis=1).astype(np.float32)
+    shown = source.render(scale, interpolation="linear")
+    np.log(shown, out=shown)
+    shown += sizes[source.label]
+    shown -= np.log(target)
+    return round(float(np.median(np.abs(shown, out=shown), overwrite_input=True)), 5)
