@@ -43,7 +43,7 @@ def complete(
     method: str = "patch",
     patch: int | None = None,
     rim: int = 0,
-    mirror: bool = True,
+    mirror: bool | None = None,
     wrap: bool | Sequence[bool] = False,
     seed: int = 0,
     progress: Progress | None = None,
@@ -70,8 +70,9 @@ def complete(
     rim : int
         Pixels around the hole that may be replaced too, 0 to 1024, so that the cut can run where it shows least. 0
         leaves all that is known as it is.
-    mirror : bool
-        Whether patches may be mirrored; False for lit or lettered textures.
+    mirror : bool, optional
+        Whether patches may be mirrored; False for lit or lettered textures. By default they may unless there is a scale map:
+        what is seen at an angle has an upper side.
     wrap : bool or (rows, columns)
         Axes along which the picture is cyclic, so that a hole at its border is also filled from across.
     seed : int
@@ -117,6 +118,7 @@ def complete(
     if source is not None and (scale_map is not None or method == "optimise"):
         what = "a scale_map says nothing of it" if scale_map is not None else "method='optimise' copies from the image"
         raise InvalidInput(f"source: {what}; leave one of the two out")
+    mirror = scale_map is None if mirror is None else mirror
     if not isinstance(mirror, bool | np.bool_):
         raise InvalidInput(f"mirror: needs True or False, got {mirror!r}")
     pictures, open_ = check_pictures(image, hole, source)

@@ -87,7 +87,10 @@ def complete_command(
         typer.Option(help="Side of the patches, in pixels, at least 4.", show_default="by the picture's size"),
     ] = None,
     rim: Annotated[int, typer.Option(help="Pixels around the hole that may be replaced too, to hide the seam.")] = 0,
-    mirror: Annotated[bool, typer.Option("--mirror/--no-mirror", help="Whether patches may be mirrored.")] = True,
+    mirror: Annotated[
+        bool | None,
+        typer.Option("--mirror/--no-mirror", help="Whether patches may be mirrored.", show_default="not with --scale"),
+    ] = None,
     wrap: Annotated[
         str, typer.Option(metavar="AXES", help="Where the picture tiles: xy, x (left-right), y (top-bottom) or none.")
     ] = "none",

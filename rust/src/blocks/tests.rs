@@ -198,7 +198,7 @@ fn what_is_held_stays_and_is_gone_on_from() {
     };
     // All but a square in the middle shows the exemplar as it is.
     let given: Vec<Place<2>> = (0..576)
-        .map(|i| [(i / 24 + 4) as i32 * ONE, (i % 24 + 4) as i32 * ONE])
+        .map(|i| [(i / 24 + 4) * ONE, (i % 24 + 4) * ONE])
         .collect();
     let held: Vec<bool> = (0..576)
         .map(|i| !((8..16).contains(&(i / 24)) && (8..16).contains(&(i % 24))))
