@@ -253,7 +253,7 @@ NAN = np.where(np.arange(96 * 112).reshape(96, 112) == 5, np.nan, 1.0)
         (PEBBLES, HOLE, {"source": PEBBLES[..., 0]}, "source: needs the dtype and channels of the image, uint8 and 3"),
         (PEBBLES, HOLE, {"source": PEBBLES / 255}, "got float64 and 3"),
         (PEBBLES, HOLE, {"source": PEBBLES[:3]}, "source: each side must be at least 4"),
-        (PEBBLES, HOLE, {"method": "heal"}, "method: allowed is 'patch', got 'heal'"),
+        (PEBBLES, HOLE, {"method": "heal"}, "method: allowed are 'patch' and 'optimise', got 'heal'"),
         (PEBBLES, HOLE, {"rim": -1}, "rim: needs an integer from 0"),
         (PEBBLES, HOLE, {"mirror": 1}, "mirror: needs True or False"),
         (PEBBLES, HOLE, {"seed": -1}, "seed: needs"),

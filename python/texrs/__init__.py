@@ -1,9 +1,10 @@
 """Make new textures from one example.
 
 The verbs: `design` (many natural textures from one example), `splice` (the texels of one texture in the arrangement of
-another) and `self_splice` (in an edited one), `solid` and `synthesize` (volumes and pictures grown under a frame field),
-`tile` (any picture made cyclic) and `complete` (holes filled by example). Each gives a `Synthesis`, whose `SourceMap`
-looks anything that is in register with the exemplar up in the same way.
+another) and `self_splice` (in an edited one), `perspective` (texels as large as a map says), `solid` and `synthesize`
+(volumes and pictures grown under a frame field), `tile` (any picture made cyclic) and `complete` (holes filled by
+example). Each gives a `Synthesis`, whose `SourceMap` looks anything that is in register with the exemplar up in the same
+way.
 """
 
 from texrs import analysis, errors, fields, io, kernels, samples, scale_maps, texels, volume
@@ -13,6 +14,7 @@ from texrs.cyclic import tile
 from texrs.database import TextureDatabase
 from texrs.papers._solid_window import PlaneTexture, SolidTexture
 from texrs.papers.design import design
+from texrs.papers.perspective import perspective
 from texrs.papers.solid import solid, synthesize
 from texrs.papers.splice import self_splice, splice
 from texrs.report import Synthesis
@@ -36,6 +38,7 @@ __all__ = [
     "fields",
     "io",
     "kernels",
+    "perspective",
     "samples",
     "scale_maps",
     "self_splice",

@@ -192,7 +192,9 @@ class Appearance:
         repetition: float,
         seed: int,
         margin: int,
-        guide: tuple[NDArray[int16], NDArray[int16], NDArray[uint16]] | None,
+        held: NDArray[bool_],
+        given: NDArray[int32],
+        guide: tuple[NDArray[int16], NDArray[int16], NDArray[uint16], NDArray[uint32]] | None,
         progress: Callable[[float], object] | None,
     ) -> NDArray[int32]: ...
     def correct(
@@ -210,7 +212,7 @@ class Appearance:
         vote: int,
         settled: float,
         seed: int,
-        guide: tuple[NDArray[int16], NDArray[int16], NDArray[uint16]] | None,
+        guide: tuple[NDArray[int16], NDArray[int16], NDArray[uint16], NDArray[uint32]] | None,
         progress: Callable[[float], object] | None,
     ) -> tuple[NDArray[int32], int, float]: ...
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_image, as_int, as_mask, as_seed, as_wrap, guidance
+from texrs._completion_scaled import optimised, recovered
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.deform import Flip, flip, flip_coordinates, flip_frame, mirrors
 from texrs.errors import InvalidInput
@@ -23,6 +24,9 @@ from texrs.report import Synthesis
 from texrs.source_map import SourceMap
 
 __all__ = ["complete"]
+
+SCALED = np.float32(2.0)
+"""Weight of scales as colours that patches are compared by: texels larger by a half are as far off as black from white."""
 
 LEAST = 4
 """Side of the smallest patch that still says anything of a texture."""
@@ -35,10 +39,11 @@ def complete(
     hole: Array,
     *,
     source: Array | None = None,
+    scale_map: Array | str | None = None,
     method: str = "patch",
     patch: int | None = None,
     rim: int = 0,
-    mirror: bool = True,
+    mirror: bool | None = None,
     wrap: bool | Sequence[bool] = False,
     seed: int = 0,
     progress: Progress | None = None,
@@ -53,16 +58,21 @@ def complete(
         True, or not zero, where the picture is to be filled.
     source : (h, w) or (h, w, C) array, optional
         Another picture to copy from, of the same dtype and channels; by default what is known of ``image``.
-    method : {"patch"}
-        How: patches that fit what is around, cut in [1]_.
+    scale_map : {None, "auto"} or (H, W) float array, optional
+        For pictures taken at an angle: how large the texels are at each pixel (`texrs.scale_maps`), so that the hole is filled
+        with texels of the size that belongs there [2]_. "auto" measures it. In the hole it may be NaN; it is continued.
+    method : {"patch", "optimise"}
+        How: "patch", patches that fit what is around, cut in [1]_; "optimise", windows corrected until each is like one of the
+        picture, resized where there is a scale map [2]_: for large holes, of which patches would repeat what is around.
     patch : int, optional
         Side of a patch in pixels, at least 4: about the size of what repeats. By default a sixth of the shorter side,
         12 to 32; less where no place, or few, would be free of holes.
     rim : int
         Pixels around the hole that may be replaced too, 0 to 1024, so that the cut can run where it shows least. 0
         leaves all that is known as it is.
-    mirror : bool
-        Whether patches may be mirrored; False for lit or lettered textures.
+    mirror : bool, optional
+        Whether patches may be mirrored; False for lit or lettered textures. By default they may unless there is a scale map:
+        what is seen at an angle has an upper side.
     wrap : bool or (rows, columns)
         Axes along which the picture is cyclic, so that a hole at its border is also filled from across.
     seed : int
@@ -88,6 +98,8 @@ def complete(
     ----------
     .. [1] J. Shen, X. Jin, X. Mao, J. Feng, "Completion-based texture design using deformation", The Visual Computer
        22, 2006, section 3.4. :doi:`10.1007/s00371-006-0040-9`
+    .. [2] W. Dong, N. Zhou, J.-C. Paul, "Perspective-aware texture analysis and synthesis", The Visual Computer 24,
+       2008. :doi:`10.1007/s00371-008-0232-1`
 
     Examples
     --------
@@ -101,8 +113,12 @@ def complete(
     True
 
     """
-    if method != "patch":
-        raise InvalidInput(f"method: allowed is 'patch', got {method!r}")
+    if method not in ("patch", "optimise"):
+        raise InvalidInput(f"method: allowed are 'patch' and 'optimise', got {method!r}")
+    if source is not None and (scale_map is not None or method == "optimise"):
+        what = "a scale_map says nothing of it" if scale_map is not None else "method='optimise' copies from the image"
+        raise InvalidInput(f"source: {what}; leave one of the two out")
+    mirror = scale_map is None if mirror is None else mirror
     if not isinstance(mirror, bool | np.bool_):
         raise InvalidInput(f"mirror: needs True or False, got {mirror!r}")
     pictures, open_ = check_pictures(image, hole, source)
@@ -116,8 +132,15 @@ def complete(
     watch("complete", 0.0)
     identity = SourceMap.identity(shapes[0])
     places, side, count = SourceMap(identity.coordinates, identity.exemplar, identity.label, None, shapes), 0, 0
-    if open_.any():
+    scale = recovered(pictures[0], open_, scale_map) if open_.any() else None
+    levels: list[dict[str, object]] = []
+    if open_.any() and method == "optimise":
+        places, levels = optimised(pictures, open_, scale, wrap=(cyclic[0], cyclic[1]), seed=seed, progress=progress)
+        count = int(places.label.max())
+    elif open_.any():
         guides = guides_of(pictures)
+        if scale is not None:
+            guides = [np.concatenate([guides[0], SCALED * np.log(scale)[..., np.newaxis]], axis=-1)]
         flips = mirrors(bool(mirror))
         free = np.ones(shapes[-1], bool) if source is not None else ~open_
         side = patch_side(free, chosen, largest)
@@ -139,10 +162,13 @@ def complete(
         )
         places, count = pasted(places, filled.label, filled.source, filled.coordinates, flips), len(filled.source)
     new = np.nonzero(places.label)
-    # What is kept maps to itself; of the rest every coordinate is whole.
+    # What is kept maps to itself; of patches every coordinate is whole.
     result = pictures[0].copy()
-    row, column = places.coordinates[new].astype(np.intp).T
-    result[new] = pictures[-1][row, column]
+    if method == "optimise":
+        result[new] = places.render(pictures[0], interpolation="cubic")[new]
+    else:
+        row, column = places.coordinates[new].astype(np.intp).T
+        result[new] = pictures[-1][row, column]
     watch("done", 1.0)
     known = pictures[0].copy()
     # The hole is painted over with a known pixel, which does not change the least value.
@@ -154,12 +180,15 @@ def complete(
         "method": method,
         "seed": seed,
         "hole": float(open_.mean()),
+        "scaled": scale_map is not None,
         "replaced_outside": int(np.count_nonzero(~open_[new])),
         "patch": side,
         "patches": count,
         "mirror": bool(mirror),
         "wrap": list(cyclic),
     }
+    if method == "optimise":
+        report["levels"] = levels
     return Synthesis(result, places, stages, report)
 
 

@@ -3,13 +3,24 @@
 use crate::appearance::{CHANNELS, Colour};
 use crate::{Error, Result};
 
+/// Samples that are drawn from, at least, as a part of all: those whose first values are nearest to the wanted one.
+const SHARE: usize = 25;
+/// First values that are as good as the wanted one.
+const ALIKE: i32 = 48;
+/// Values that 12 bits hold.
+const VALUES: i32 = 4096;
+
 /// Values of the exemplar's samples and those wanted at the points of the output, both within 12 bits.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Guide<'a> {
     exemplar: &'a [Colour],
     output: &'a [Colour],
     /// Cost of a squared difference of one, in 1 / 256; 0 where nothing is asked.
     weight: &'a [u16],
+    /// Samples by their first value, the least first; empty where samples are drawn from anywhere.
+    order: &'a [u32],
+    /// For each first value, how many of the order have a lesser one.
+    before: Vec<u32>,
 }
 
 impl<'a> Guide<'a> {
@@ -42,7 +53,50 @@ impl<'a> Guide<'a> {
             exemplar,
             output,
             weight,
+            order: &[],
+            before: Vec::new(),
         })
+    }
+
+    /// Draws from samples near what is asked: `order` holds those that may be drawn, by their first value.
+    pub fn ordered(mut self, order: &'a [u32]) -> Result<Self> {
+        let value = |k: &u32| self.exemplar.get(*k as usize).map(|v| i32::from(v[0]));
+        if !order.iter().all(|k| value(k).is_some()) || !order.is_sorted_by_key(value) {
+            return Err(Error::value(
+                "order of the guide",
+                "needs samples of the exemplar, by their first value",
+            ));
+        }
+        if !order.is_empty() {
+            self.before = vec![0; VALUES as usize + 1];
+            for k in order {
+                let v = i32::from(self.exemplar[*k as usize][0]) + VALUES / 2;
+                self.before[v as usize + 1] += 1;
+            }
+            for v in 0..VALUES as usize {
+                self.before[v + 1] += self.before[v];
+            }
+        }
+        self.order = order;
+        Ok(self)
+    }
+
+    /// A sample drawn near what is asked at a point, by a random word; none where samples are drawn from anywhere.
+    #[inline(always)]
+    pub(crate) fn near(&self, point: usize, word: u32) -> Option<usize> {
+        if self.order.is_empty() {
+            return None;
+        }
+        let wanted = i32::from(self.output[point][0]) + VALUES / 2;
+        let before = |v: i32| self.before[v.clamp(0, VALUES) as usize] as usize;
+        let (middle, half) = (before(wanted), (self.order.len() / SHARE).max(12) / 2);
+        let low = before(wanted - ALIKE).min(middle.saturating_sub(half));
+        let high = before(wanted + ALIKE + 1)
+            .max(middle + half)
+            .min(self.order.len());
+        let low = low.min(high.saturating_sub(half));
+        let pick = low + ((u64::from(word) * (high - low) as u64) >> 32) as usize;
+        Some(self.order[pick] as usize)
     }
 
     /// Whether anything is asked at a point.

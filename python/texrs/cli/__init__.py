@@ -22,7 +22,7 @@ from texrs import io, samples
 from texrs._arrays import as_float
 from texrs.blend import SCREENING
 from texrs.blend import blend as healed
-from texrs.cli import _files, _pictures, _scales, _solid, _splice, _texels, _volumes
+from texrs.cli import _files, _perspective, _pictures, _scales, _solid, _splice, _texels, _volumes
 from texrs.cli._console import Quiet, Threads, note, run, say, watching
 from texrs.cli._files import describe, named
 from texrs.errors import FileError, InvalidInput
@@ -45,6 +45,7 @@ app.command("database")(_texels.database_command)
 app.command("tile")(_pictures.tile_command)
 app.command("complete")(_pictures.complete_command)
 app.command("scale-map")(_scales.scale_map_command)
+app.command("perspective")(_perspective.perspective_command)
 app.command("solid")(_solid.solid_command)
 app.command("synthesize")(_solid.synthesize_command)
 app.command("splice")(_splice.splice_command)

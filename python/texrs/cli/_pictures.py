@@ -8,11 +8,14 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from texrs._typing import Array, Bools
 from texrs.cli import _files
 from texrs.cli._console import Out, Quiet, Source, Stages, Threads, note, watching
 from texrs.cli._files import describe, named
+from texrs.cli._scales import read_scale
 from texrs.completion import complete
 from texrs.cyclic import tile
+from texrs.errors import InvalidInput
 from texrs.threads import threads
 
 __all__ = ["complete_command", "tile_command"]
@@ -57,7 +60,11 @@ def complete_command(
     image: Picture,
     hole: Annotated[
         str,
-        typer.Argument(metavar="HOLE", help="Image of the same size: what is not black is filled.", show_default=False),
+        typer.Argument(
+            metavar="HOLE",
+            help="Image of the same size: what is not black is filled; or alpha: what is transparent in IN.",
+            show_default=False,
+        ),
     ],
     out: Out,
     source_image: Annotated[
@@ -66,12 +73,24 @@ def complete_command(
             metavar="FILE", help="Picture to copy from, of the same dtype and channels.", show_default="IN itself"
         ),
     ] = None,
+    scale: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MAP|auto",
+            help="For pictures taken at an angle: their scale map, or auto to measure it.",
+            show_default=False,
+        ),
+    ] = None,
+    method: Annotated[str, typer.Option(help="patch, or optimise: windows corrected until they fit.")] = "patch",
     patch: Annotated[
         int | None,
         typer.Option(help="Side of the patches, in pixels, at least 4.", show_default="by the picture's size"),
     ] = None,
     rim: Annotated[int, typer.Option(help="Pixels around the hole that may be replaced too, to hide the seam.")] = 0,
-    mirror: Annotated[bool, typer.Option("--mirror/--no-mirror", help="Whether patches may be mirrored.")] = True,
+    mirror: Annotated[
+        bool | None,
+        typer.Option("--mirror/--no-mirror", help="Whether patches may be mirrored.", show_default="not with --scale"),
+    ] = None,
     wrap: Annotated[
         str, typer.Option(metavar="AXES", help="Where the picture tiles: xy, x (left-right), y (top-bottom) or none.")
     ] = "none",
@@ -85,16 +104,20 @@ def complete_command(
     start = time.monotonic()
     cyclic = _files.parse_wrap(wrap)
     _files.check_outputs(out, source, stages)
-    pixels, mask = _files.read_picture(image), _files.read_hole(hole)
+    pixels = _files.read_picture(image)
+    mask = _transparent(pixels) if hole == "alpha" else _files.read_hole(hole)
+    scaled = None if scale is None else scale if scale == "auto" else read_scale(scale)
     other = None if source_image is None else _files.read_exemplar(source_image)
     # In the hole anything may stand that the format of the result cannot hold.
     _files.check_output(out, np.nan_to_num(pixels), pixels.shape[:2])
-    names = {"image": image, "hole": hole, "source": str(source_image), "count": "--threads"}
+    names = {"image": image, "hole": hole, "source": str(source_image), "scale_map": str(scale), "count": "--threads"}
     with named(**names), threads(count), watching(quiet=quiet) as progress:
         result = complete(
             pixels,
             mask,
             source=other,
+            scale_map=scaled,
+            method=method,
             patch=patch,
             rim=rim,
             mirror=mirror,
@@ -104,3 +127,13 @@ def complete_command(
         )
     _files.deliver(result, out, source, stages)
     note(f"wrote {out}: {describe(result.image, 2)}, in {time.monotonic() - start:.1f} s", quiet=quiet)
+
+
+def _transparent(pixels: Array) -> Bools:
+    """Give what is wholly transparent as the hole."""
+    if pixels.ndim < 3 or pixels.shape[2] not in (2, 4):
+        raise InvalidInput("HOLE: alpha needs an image with an alpha channel; or give an image of the hole")
+    hole: Bools = pixels[..., -1] == 0
+    if not hole.any():
+        raise InvalidInput("HOLE: nothing in the image is wholly transparent, so there is nothing to fill")
+    return hole

@@ -13,6 +13,7 @@ from texrs._typing import Progress
 from texrs.demo._design import RESULTS, SEEDS, STAGES
 from texrs.demo._html import document, section
 from texrs.demo._maps import MAPS
+from texrs.demo._perspective import PERSPECTIVE
 from texrs.demo._pictures import COMPLETE, TILE
 from texrs.demo._samples import SAMPLES
 from texrs.demo._solid import SOLID
@@ -21,7 +22,7 @@ from texrs.demo._workshop import Section, Workshop
 
 __all__ = ["SECTIONS", "Section", "Workshop", "page"]
 
-SECTIONS: tuple[Section, ...] = (RESULTS, STAGES, MAPS, SEEDS, TILE, COMPLETE, SPLICE, SOLID, SAMPLES)
+SECTIONS: tuple[Section, ...] = (RESULTS, STAGES, MAPS, SEEDS, TILE, COMPLETE, SPLICE, PERSPECTIVE, SOLID, SAMPLES)
 
 
 def page(sections: Sequence[Section] = SECTIONS, *, progress: Progress | None = None) -> str:

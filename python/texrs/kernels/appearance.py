@@ -33,12 +33,16 @@ class Guide(NamedTuple):
     weight : (points) uint16
         Cost of a squared difference of one, in 1/256; windows that have nothing to do with each other differ by
         about 2 * 512^2. 0 where nothing is asked.
+    order : (any) uint32
+        Samples by their first value, the least first: what is drawn is drawn from those near what is asked. Empty: from
+        anywhere.
 
     """
 
     exemplar: NDArray[np.int16]
     output: NDArray[np.int16]
     weight: NDArray[np.uint16]
+    order: NDArray[np.uint32] = np.zeros(0, np.uint32)
 
 
 class Corrected(NamedTuple):
@@ -183,6 +187,8 @@ class Appearance:
         repetition: float = 0.3,
         seed: int = 0,
         margin: int = 0,
+        held: NDArray[np.bool_] | None = None,
+        given: NDArray[np.int32] | None = None,
         guide: Guide | None = None,
         progress: Report | None = None,
     ) -> NDArray[np.int32]:
@@ -212,6 +218,10 @@ class Appearance:
             Chooses the texture. What is drawn belongs to the place in the world, not to the region.
         margin : int
             Points along the borders, up to 2^20, that will be cut off: cells that nothing else hangs on are not chosen.
+        held : (points) bool, optional
+            Points that keep their places, around which the others are chosen.
+        given : (points * A) int32, optional
+            The places of the points that are held; those of others do not count.
         guide : Guide, optional
             What else is asked.
         progress : callable, optional
@@ -242,6 +252,8 @@ class Appearance:
             as_float(repetition, "repetition", 0, 4),
             as_seed(seed),
             as_int(margin, "margin", 0, 1 << 20),
+            np.zeros(0, np.bool_) if held is None else np.ascontiguousarray(held.reshape(-1)),
+            np.zeros(0, np.int32) if given is None else given,
             guide,
             progress,
         )

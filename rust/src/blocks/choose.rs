@@ -1,7 +1,7 @@
 //! The piece of the exemplar for one cell: the one that fits what lies around it.
 
-use super::Options;
 use super::cells::{Cell, Cells};
+use super::{Held, Options};
 use crate::appearance::{Appearance, Feature, KEEP, UNIT, distance};
 use crate::fixed::{Frame, Frames, ONE, Place, add, apply, nearest, sub};
 use crate::guide::Guide;
@@ -14,7 +14,9 @@ const OUTSIDE: i64 = 4 * UNIT as i64;
 
 /// The points of a cell of which a guide asks something, with the steps from its centre.
 pub(super) struct Asked<'a, const D: usize> {
-    guide: Option<Guide<'a>>,
+    guide: Option<&'a Guide<'a>>,
+    /// The point nearest to the cell's centre, or one of its own.
+    middle: usize,
     points: Vec<(usize, [i32; D])>,
 }
 
@@ -86,6 +88,17 @@ impl<'a, const D: usize> Chooser<'a, D> {
         })
     }
 
+    /// A place drawn near what is asked at the cell's centre.
+    fn near(&self, asked: &Asked<'_, D>, noise: &Noise, round: u32, draw: u32) -> Option<Place<D>> {
+        let word = noise.at(self.world, round << 16 | draw)[D];
+        let sample = asked.guide?.near(asked.middle, word)?;
+        let point = self.appearance.grid().point(sample);
+        Some(std::array::from_fn(|axis| {
+            let [low, high] = self.range[axis];
+            (point[axis] as i32).clamp(low, high) * ONE
+        }))
+    }
+
     /// The best of the present place and many drawn ones; the first of equals.
     #[allow(clippy::too_many_arguments)] // what lies around, what is asked, and how to choose
     pub(super) fn choose(
@@ -108,6 +121,7 @@ impl<'a, const D: usize> Chooser<'a, D> {
         let mut least = cost(present);
         for draw in 0..options.candidates as u32 {
             let origin = self.place(noise, round, draw);
+            let origin = self.near(asked, noise, round, draw).unwrap_or(origin);
             let sum = cost(origin);
             if sum < least {
                 (best, least) = (origin, sum);
@@ -117,21 +131,34 @@ impl<'a, const D: usize> Chooser<'a, D> {
     }
 
     /// The points of the cell of which something is asked.
-    pub(super) fn asked<'g>(&self, cells: &Cells<D>, guide: Option<Guide<'g>>) -> Asked<'g, D> {
+    pub(super) fn asked<'g>(
+        &self,
+        cells: &Cells<D>,
+        guide: Option<&'g Guide<'g>>,
+        held: Held<'_, D>,
+    ) -> Asked<'g, D> {
         let mut points = Vec::new();
+        let mut middle = (i32::MAX, 0);
         if let Some(guide) = guide {
-            for &p in self.cell.points.iter().filter(|&&p| guide.asks(p as usize)) {
+            let asks = |&&p: &&u32| guide.asks(p as usize) && !held.holds(p as usize);
+            for &p in self.cell.points.iter().filter(asks) {
                 let world = cells.region.world(cells.region.grid.point(p as usize));
-                points.push((p as usize, cells.step_from_centre(self.index, world)));
+                let step = cells.step_from_centre(self.index, world);
+                middle = middle.min((step.iter().map(|x| x * x).sum(), p as usize));
+                points.push((p as usize, step));
             }
         }
-        Asked { guide, points }
+        Asked {
+            guide,
+            middle: middle.1,
+            points,
+        }
     }
 
     /// What a place costs by the guide.
     #[inline(always)]
     fn obey(&self, origin: Place<D>, asked: &Asked<'_, D>) -> i64 {
-        let Some(guide) = &asked.guide else {
+        let Some(guide) = asked.guide else {
             return 0;
         };
         let mut sum = 0;

@@ -44,12 +44,35 @@ pub struct Options {
     pub margin: usize,
 }
 
+/// Points that keep their places: none, or one flag and one place a point.
+#[derive(Debug, Clone, Copy)]
+pub struct Held<'a, const D: usize> {
+    /// Which.
+    pub points: &'a [bool],
+    /// Where they look; those of other points do not count.
+    pub places: &'a [Place<D>],
+}
+
+impl<const D: usize> Held<'_, D> {
+    /// Nothing is held.
+    pub const NONE: Self = Self {
+        points: &[],
+        places: &[],
+    };
+
+    #[inline(always)]
+    fn holds(&self, point: usize) -> bool {
+        self.points.get(point).is_some_and(|&h| h)
+    }
+}
+
 /// Gives every point of `region` a place in the exemplar.
 pub fn blocks<const D: usize>(
     appearance: &Appearance<D>,
     region: &Region<D>,
     frames: Frames<'_, D>,
-    guide: Option<Guide<'_>>,
+    guide: Option<&Guide<'_>>,
+    held: Held<'_, D>,
     options: &Options,
     monitor: &Monitor,
 ) -> Result<Vec<Place<D>>> {
@@ -58,6 +81,15 @@ pub fn blocks<const D: usize>(
             "cell",
             format!("needs at least 2 points a cell, 1 candidate and 1 round, got {options:?}"),
         ));
+    }
+    for n in [held.points.len(), held.places.len()] {
+        if n != held.points.len() || !(n == 0 || n == region.grid.len()) {
+            return Err(Error::Shape {
+                argument: "held",
+                expected: region.grid.shape().to_vec(),
+                got: vec![n],
+            });
+        }
     }
     let cells = Cells::new(region, options);
     let noise = Noise::new(options.seed).part(1);
@@ -69,23 +101,47 @@ pub fn blocks<const D: usize>(
     });
     monitor.expect((options.rounds * list.len()) as u64);
     let mut places = vec![[0; D]; region.grid.len()];
-    spread(appearance, &cells, &list, frames, &origins, &mut places);
+    for (p, place) in places
+        .iter_mut()
+        .enumerate()
+        .filter(|(p, _)| held.holds(*p))
+    {
+        *place = appearance.bring_inside(held.places[p]);
+    }
+    spread(
+        appearance,
+        &cells,
+        &list,
+        frames,
+        held,
+        &origins,
+        &mut places,
+    );
     for round in 1..=options.rounds {
         let even = round % 2 == 0;
         let chosen = par::map(list.len(), |c| {
-            let idle = list[c].even != even || list[c].points.is_empty();
+            let idle =
+                list[c].even != even || list[c].points.iter().all(|&p| held.holds(p as usize));
             if idle || !cells.counts(c, options, round) || monitor.advance(1).is_err() {
                 return origins[c];
             }
             let chooser = Chooser::new(appearance, &cells, &list, frames, c);
-            let asked = chooser.asked(&cells, guide);
+            let asked = chooser.asked(&cells, guide, held);
             let near: Vec<_> = cells.near(c).map(|n| origins[n]).collect();
             let round = round as u32;
             chooser.choose(&places, origins[c], &near, &asked, &noise, round, options)
         });
         monitor.check()?;
         origins = chosen;
-        spread(appearance, &cells, &list, frames, &origins, &mut places);
+        spread(
+            appearance,
+            &cells,
+            &list,
+            frames,
+            held,
+            &origins,
+            &mut places,
+        );
     }
     Ok(places)
 }
@@ -96,12 +152,13 @@ fn spread<const D: usize>(
     cells: &Cells<D>,
     list: &[Cell<D>],
     frames: Frames<'_, D>,
+    held: Held<'_, D>,
     origins: &[Place<D>],
     places: &mut [Place<D>],
 ) {
     for (c, cell) in list.iter().enumerate() {
         let frame = cells.frame(frames, c);
-        for &p in &cell.points {
+        for &p in cell.points.iter().filter(|&&p| !held.holds(p as usize)) {
             let world = cells.region.world(cells.region.grid.point(p as usize));
             let place = add(origins[c], apply(&frame, cells.step_from_centre(c, world)));
             places[p as usize] = appearance.bring_inside(place);

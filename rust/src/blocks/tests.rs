@@ -44,6 +44,7 @@ fn run(
         &region,
         frames,
         None,
+        Held::NONE,
         options,
         &Monitor::default(),
     )
@@ -116,7 +117,8 @@ fn a_guide_is_followed() {
         &exemplar,
         &region,
         frames,
-        Some(guide),
+        Some(&guide),
+        Held::NONE,
         &OPTIONS,
         &Monitor::default(),
     )
@@ -151,4 +153,78 @@ fn choosing_makes_the_pieces_fit() {
         ..OPTIONS
     };
     assert!(seam(&OPTIONS) * 3 < seam(&placed_anywhere) * 2);
+}
+
+#[test]
+fn what_is_drawn_near_the_guide_is_found_with_few_candidates() {
+    let exemplar = exemplar(false);
+    let rows: Vec<[i16; 4]> = (0..1024).map(|i| [(i / 32 * 60) as i16, 0, 0, 0]).collect();
+    let wanted = vec![[900, 0, 0, 0]; 1600];
+    let weight = vec![256; 1600];
+    let order: Vec<u32> = (0..1024).collect();
+    let region = Region {
+        grid: Grid::new([40; 2], [false; 2]).unwrap(),
+        origin: [0; 2],
+    };
+    let options = Options {
+        candidates: 4,
+        ..OPTIONS
+    };
+    let far = |order: &[u32]| -> i32 {
+        let guide = Guide::new(&rows, &wanted, &weight, 1024, 1600).unwrap();
+        let guide = guide.ordered(order).unwrap();
+        let frames = Frames::Constant(identity());
+        let places = blocks(
+            &exemplar,
+            &region,
+            frames,
+            Some(&guide),
+            Held::NONE,
+            &options,
+            &Monitor::default(),
+        )
+        .unwrap();
+        places.iter().map(|p| (p[0] / ONE - 15).abs()).sum::<i32>()
+    };
+    assert!(far(&order) * 3 < far(&[]) * 2);
+}
+
+#[test]
+fn what_is_held_stays_and_is_gone_on_from() {
+    let exemplar = exemplar(false);
+    let region = Region {
+        grid: Grid::new([24; 2], [false; 2]).unwrap(),
+        origin: [0; 2],
+    };
+    // All but a square in the middle shows the exemplar as it is.
+    let given: Vec<Place<2>> = (0..576)
+        .map(|i| [(i / 24 + 4) * ONE, (i % 24 + 4) * ONE])
+        .collect();
+    let held: Vec<bool> = (0..576)
+        .map(|i| !((8..16).contains(&(i / 24)) && (8..16).contains(&(i % 24))))
+        .collect();
+    let options = Options {
+        continuation: 0.0,
+        candidates: 512,
+        ..OPTIONS
+    };
+    let places = blocks(
+        &exemplar,
+        &region,
+        Frames::Constant(identity()),
+        None,
+        Held {
+            points: &held,
+            places: &given,
+        },
+        &options,
+        &Monitor::default(),
+    )
+    .unwrap();
+    assert!((0..576).all(|p| !held[p] || places[p] == given[p]));
+    let unlike = |p: usize| {
+        let [a, b] = [places[p], given[p]].map(|p| exemplar.clamped(nearest(p)));
+        distance(exemplar.feature(a), exemplar.feature(b)) > crate::appearance::UNIT
+    };
+    assert!((0..576).filter(|&p| unlike(p)).count() < 32);
 }

@@ -130,6 +130,11 @@ impl<const D: usize> Level<'_, D> {
         // All around the same one, so that their costs are read from memory at once.
         let drawn: [Place<D>; DRAWS] = std::array::from_fn(|draw| {
             let words = search.noise.at(world, search.number << 8 | draw as u32);
+            if draw == 0
+                && let Some(near) = self.guide.and_then(|g| g.near(p, words[0]))
+            {
+                return appearance.grid().point(near).map(|x| x as i32 * ONE);
+            }
             std::array::from_fn(|axis| {
                 let radius = (appearance.grid().shape()[axis] >> draw) as u64;
                 let span = 2 * radius + 1;

@@ -67,7 +67,7 @@ struct Level<'a, const D: usize> {
     appearance: &'a Appearance<D>,
     region: &'a Region<D>,
     frames: Frames<'a, D>,
-    guide: Option<Guide<'a>>,
+    guide: Option<&'a Guide<'a>>,
     held: &'a [bool],
     options: &'a Options,
     /// Steps to all neighbours, corners included.
@@ -82,7 +82,7 @@ pub fn correct<const D: usize>(
     appearance: &Appearance<D>,
     region: &Region<D>,
     frames: Frames<'_, D>,
-    guide: Option<Guide<'_>>,
+    guide: Option<&Guide<'_>>,
     held: &[bool],
     places: &mut Vec<Place<D>>,
     options: &Options,

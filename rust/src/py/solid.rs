@@ -78,24 +78,27 @@ pub(super) fn frames<const D: usize>(values: &[i16], points: usize) -> Result<Fr
     }
 }
 
-/// Values of the exemplar's samples and of the output's points, four each, and a weight a point.
+/// Values of the exemplar's samples and of the output's points, four each, a weight a point, and samples by value.
 type GuideIn<'py> = (
     PyReadonlyArray1<'py, i16>,
     PyReadonlyArray1<'py, i16>,
     PyReadonlyArray1<'py, u16>,
+    PyReadonlyArray1<'py, u32>,
 );
-type GuideSlices<'a> = Option<(&'a [i16], &'a [i16], &'a [u16])>;
+type GuideSlices<'a> = Option<(&'a [i16], &'a [i16], &'a [u16], &'a [u32])>;
 
 fn slices<'a>(guide: &'a Option<GuideIn<'_>>) -> PyResult<GuideSlices<'a>> {
     Ok(match guide {
-        Some((a, b, c)) => Some((a.as_slice()?, b.as_slice()?, c.as_slice()?)),
+        Some((a, b, c, d)) => Some((a.as_slice()?, b.as_slice()?, c.as_slice()?, d.as_slice()?)),
         None => None,
     })
 }
 
 fn guide<'a>(arrays: GuideSlices<'a>, samples: usize, points: usize) -> Result<Option<Guide<'a>>> {
     arrays
-        .map(|(a, b, c)| Guide::new(a.as_chunks().0, b.as_chunks().0, c, samples, points))
+        .map(|(a, b, c, d)| {
+            Guide::new(a.as_chunks().0, b.as_chunks().0, c, samples, points)?.ordered(d)
+        })
         .transpose()
 }
 
@@ -219,10 +222,13 @@ impl Appearance {
         repetition: f64,
         seed: u64,
         margin: usize,
+        held: PyReadonlyArray1<'py, bool>,
+        given: PyReadonlyArray1<'py, i32>,
         guide: Option<GuideIn<'py>>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<PlacesOut<'py>> {
         let guide = slices(&guide)?;
+        let (held, given) = (held.as_slice()?, given.as_slice()?);
         let options = blocks::Options {
             cell,
             rounds,
@@ -239,7 +245,11 @@ impl Appearance {
                 let region = region::<D>(&place)?;
                 let frames = self::frames(values, region.grid.len())?;
                 let guide = self::guide(guide, a.grid().len(), region.grid.len())?;
-                blocks::blocks(a, &region, frames, guide, &options, monitor)
+                let held = blocks::Held {
+                    points: held,
+                    places: given.as_chunks().0,
+                };
+                blocks::blocks(a, &region, frames, guide.as_ref(), held, &options, monitor)
                     .map(Vec::into_flattened)
             })
         })?;
@@ -290,7 +300,7 @@ impl Appearance {
                     a,
                     &region,
                     frames,
-                    guide,
+                    guide.as_ref(),
                     held,
                     &mut places,
                     &options,

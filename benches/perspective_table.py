@@ -1,0 +1,139 @@
+"""PERSPECTIVE over textures whose scale is known: texture x target x check as a markdown table, and pictures to look at.
+
+    [TEXRS_TEXTURES=<folder>] python benches/perspective_table.py [--seeds 3] [--size 256] [--only NAME]
+        [--variants default,alone,plain,paper] [--evaluator <texture_quality.py>] [--out table.md] [--pictures DIR]
+
+Without a folder: a generated floor of discs. With one: each `NAME.png` in it beside which a `NAME-scale.npy` stands, the square
+root of area ratios, S^1.5. Variants: `alone` has no resized copies, `plain` no weight of scales. With `--evaluator`, a
+module that has `perspective_agreement`, its rank correlation and slope are columns.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import os
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import texrs
+from texrs import io, scale_maps
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
+import perspective_checks as checks
+
+VARIANTS: dict[str, dict[str, Any]] = {
+    "default": {},
+    "alone": {"augment_scales": False},
+    "plain": {"scale_weight": 0.0},
+    "paper": {"method": "paper"},
+}
+HEAD = ("rho", "slope", "wavelength", "error", "sharp", "colour", "rows", "seconds")
+BOUNDS = {"error": (0, 0.08), "sharp": (0.9, 1.1), "colour": (0, 0.012)}
+MEANING = """
+rho, slope: rank correlation and slope of the logarithms of the evaluator's scale and the wanted one (>= 0.9 on a ramp and a
+wave, 0.8 on a hill, or 0.95 of the exemplar's own; the evaluator's windows flatten slopes); wavelength: rank correlation
+of the local wavelength; error: median of |log S_e(S(p)) - log S| (<= 0.08); sharp: mean gradient over the exemplar's at the
+same scales (0.9 to 1.1); colour: distance of quantiles from the exemplar's at the same scales (<= 0.012); rows: autocorrelation
+along rows, less the exemplar's (<= 0.15). Figures are means over the seeds; **bold** fails. The first line of a texture is the
+exemplar's own.
+"""
+
+
+def textures(folder: str | None) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
+    """Give names, pictures and scale maps."""
+    if folder is None:
+        yield ("discs", *checks.floor((256, 256)))
+        return
+    for path in sorted(Path(folder).glob("*.png")):
+        truth = path.with_name(f"{path.stem}-scale.npy")
+        if truth.exists():
+            image = io.read(path)[..., :3]
+            root = np.load(truth).astype(np.float32) ** np.float32(2 / 3)
+            scale = scale_maps.resample(root, image.shape[:2])
+            yield path.stem, image, np.asarray(scale / np.exp(np.log(scale).mean()), np.float32)
+
+
+def measure(
+    evaluator: Any, image: np.ndarray, target: np.ndarray, example: np.ndarray, scale: np.ndarray
+) -> dict[str, float]:
+    """Give the figures of one picture but those that only its synthesis knows."""
+    agreed = {"rho": np.nan, "gain": np.nan} if evaluator is None else evaluator.perspective_agreement(image, target)
+    return {
+        "rho": agreed["rho"],
+        "slope": agreed["gain"],
+        "wavelength": checks.fidelity(image, target)[0],
+        "sharp": checks.sharpness(example, scale, image, target),
+        "colour": checks.colour_distance(example, scale, image, target),
+        "rows": checks.repetition(image) - checks.repetition(example),
+    }
+
+
+def shown(name: str, value: float, target: str, own: dict[str, float]) -> str:
+    """Write a figure, bold where it fails."""
+    low, high = BOUNDS.get(name, (-np.inf, np.inf))
+    if name == "rho":
+        low = min({"ramp": 0.9, "wave": 0.9, "radial": 0.8}[target], 0.95 * own["rho"])
+    if name == "rows":
+        high = 0.15
+    text = f"{value:.3f}"
+    return text if low <= value <= high or np.isnan(value) else f"**{text}**"
+
+
+def main() -> None:
+    """Make the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--size", type=int, default=256)
+    parser.add_argument("--only", default="")
+    parser.add_argument("--variants", default="default,plain")
+    parser.add_argument("--evaluator")
+    parser.add_argument("--out")
+    parser.add_argument("--pictures")
+    asked = parser.parse_args()
+    evaluator = None
+    if asked.evaluator:
+        spec = importlib.util.spec_from_file_location("evaluator", asked.evaluator)
+        assert spec is not None
+        assert spec.loader is not None
+        evaluator = importlib.util.module_from_spec(spec)
+        sys.modules["evaluator"] = evaluator
+        spec.loader.exec_module(evaluator)
+    lines = [MEANING, "| texture | target | variant | " + " | ".join(HEAD) + " |", "|---" * (len(HEAD) + 3) + "|"]
+
+    def say(line: str) -> None:
+        lines.append(line)
+        print(line, flush=True)
+
+    for name, image, scale in textures(os.environ.get("TEXRS_TEXTURES")):
+        if asked.only not in name:
+            continue
+        own = measure(evaluator, image, scale, image, scale)
+        say(f"| {name} | | itself | " + " | ".join(f"{own[h]:.3f}" if h in own else "" for h in HEAD) + " |")
+        for kind, target in checks.targets(scale, (asked.size, asked.size)).items():
+            for variant in asked.variants.split(","):
+                found = []
+                for seed in range(1, asked.seeds + 1):
+                    start = time.perf_counter()
+                    made = texrs.perspective(image, scale, asked.size, target=target, seed=seed, **VARIANTS[variant])
+                    figures = measure(evaluator, made.image, target, image, scale)
+                    figures["seconds"] = time.perf_counter() - start
+                    figures["error"] = made.report.get("scale_error", np.nan)
+                    found.append(figures)
+                    if asked.pictures and seed == 1:
+                        Path(asked.pictures).mkdir(parents=True, exist_ok=True)
+                        io.write(Path(asked.pictures) / f"{name}-{kind}-{variant}.png", made.image)
+                mean = {h: float(np.mean([f[h] for f in found])) for h in HEAD}
+                cells = [shown(h, mean[h], kind, own) for h in HEAD]
+                say(f"| {name} | {kind} | {variant} | " + " | ".join(cells) + " |")
+    if asked.out:
+        Path(asked.out).write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,80 @@
+"""Make the picture of textures in perspective that the README shows: docs/pictures/perspective.jpg.
+
+    python examples/perspective_pictures.py [IMAGE SCALE.npy ...]
+
+Without arguments a generated floor; with them, each image beside its scale map.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import texrs
+from texrs import io, samples, scale_maps
+
+FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"
+SIZE, GAP = 256, 8
+
+
+def targets(scale: np.ndarray) -> dict[str, np.ndarray]:
+    """Give a ramp, a wave from left to right and a hill, within the exemplar's scales."""
+    low, high = np.log(np.quantile(scale, [0.03, 0.97]))
+    at = (np.arange(SIZE) + 0.5) / SIZE
+    far = np.clip(np.hypot(at - 0.5, at[:, np.newaxis] - 0.5) / 0.6, 0, 1)
+    maps = {
+        "ramp": low + (high - low) * at[:, np.newaxis] + 0 * at,
+        "wave": (low + high) / 2 + (high - low) / 2 * np.cos(2 * np.pi * at) + 0 * at[:, np.newaxis],
+        "hill": high - (high - low) * far,
+    }
+    return {name: np.exp(m).astype(np.float32) for name, m in maps.items()}
+
+
+def beside(pictures: list[np.ndarray]) -> np.ndarray:
+    """Set pictures side by side, on white where they are less high."""
+    height = max(p.shape[0] for p in pictures)
+    cells = []
+    for picture in pictures:
+        cell = np.full((height, picture.shape[1] + GAP, 3), 255, np.uint8)
+        cell[: picture.shape[0], GAP:] = picture
+        cells.append(cell)
+    return np.concatenate(cells, axis=1)[:, GAP:]
+
+
+def below(rows: list[np.ndarray]) -> np.ndarray:
+    """Set rows below each other, on white where they are less wide."""
+    width = max(r.shape[1] for r in rows)
+    wide = [np.pad(r, ((0, GAP), (0, width - r.shape[1]), (0, 0)), constant_values=255) for r in rows]
+    return np.concatenate(wide, axis=0)[:-GAP]
+
+
+def rows_of(image: np.ndarray, scale: np.ndarray) -> list[np.ndarray]:
+    """Give what is grown from an image to each target, and a hole filled three ways."""
+    grown = [image, scale_maps.picture(scale)]
+    for target in targets(scale).values():
+        grown.append(texrs.perspective(image, scale, SIZE, target=target, seed=1).image)
+    rows, columns = image.shape[:2]
+    hole = np.zeros((rows, columns), bool)
+    hole[rows // 3 : rows // 3 * 2, columns // 3 : columns // 3 * 2] = True
+    filled = [np.where(hole[..., np.newaxis], 128, image).astype(np.uint8)]
+    filled += [texrs.complete(image, hole, scale_map=scale, seed=1).image, texrs.complete(image, hole, seed=1).image]
+    return [beside(grown), beside(filled)]
+
+
+def main() -> None:
+    """Write the picture."""
+    named = sys.argv[1:]
+    rows = []
+    if named:
+        for path, truth in zip(named[::2], named[1::2], strict=True):
+            image = io.read(path)[..., :3]
+            rows += rows_of(image, scale_maps.resample(np.load(truth).astype(np.float32), image.shape[:2]))
+    else:
+        floor = samples.tilted_discs((224, 224))
+        rows += rows_of(floor.image, np.asarray(floor.scale_map, np.float32))
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    io.write(FOLDER / "perspective.jpg", below(rows))
+
+
+if __name__ == "__main__":
+    main()

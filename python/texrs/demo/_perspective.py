@@ -1,0 +1,70 @@
+"""Textures whose texels are as large as a map says, on the page; and a hole filled with texels of the right size."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from texrs import samples, scale_maps
+from texrs._typing import Floats
+from texrs.completion import complete
+from texrs.demo._html import code, figure, grid
+from texrs.demo._workshop import Section, Workshop
+from texrs.papers.perspective import perspective
+
+__all__ = ["PERSPECTIVE"]
+
+SIDE, SIZE = 192, 224
+"""Pixels a side of the example, and of what is grown."""
+
+
+def _patterns(scale: Floats) -> dict[str, Floats]:
+    """Give targets that do not look like the example's map."""
+    low, high = np.log(np.quantile(scale, [0.05, 0.95]))
+    at = (np.arange(SIZE) + 0.5) / SIZE
+    wave = np.broadcast_to((low + high) / 2 + (high - low) / 2 * np.cos(2 * np.pi * at), (SIZE, SIZE))
+    far = np.hypot(at - 0.5, at[:, np.newaxis] - 0.5) / 0.7
+    return {
+        "turned": np.asarray(np.exp(np.broadcast_to(low + (high - low) * at, (SIZE, SIZE))), np.float32),
+        "a wave": np.asarray(np.exp(wave), np.float32),
+        "a hill": np.asarray(np.exp(high - (high - low) * np.minimum(far, 1)), np.float32),
+    }
+
+
+def _perspective(workshop: Workshop) -> str:
+    floor = samples.tilted_discs((SIDE, SIDE))
+    scale = np.asarray(floor.scale_map, np.float32)
+    patterns = _patterns(scale)
+    grown = [
+        figure(floor.image, "Example", share=SIDE / SIZE),
+        figure(scale_maps.picture(scale), "Its scale map", share=SIDE / SIZE),
+    ]
+    made = perspective(floor.image, scale, SIZE, seed=3)
+    grown.append(figure(made.image, "Grown", note="the same map, stretched"))
+    for i, (name, target) in enumerate(patterns.items(), start=1):
+        workshop.watch(i / (len(patterns) + 2))
+        made = perspective(floor.image, scale, SIZE, target=target, seed=3)
+        grown += [figure(scale_maps.picture(target), "Target"), figure(made.image, name.capitalize())]
+    hole = np.zeros((SIDE, SIDE), bool)
+    hole[60:140, 60:130] = True
+    workshop.watch((len(patterns) + 1) / (len(patterns) + 2))
+    filled = complete(floor.image, hole, scale_map=scale, seed=3)
+    mended = [
+        figure(np.where(hole[..., np.newaxis], 128, floor.image).astype(np.uint8), "With a hole"),
+        figure(filled.image, "Filled", note="--scale"),
+    ]
+    return (
+        code("texrs scale-map floor.png -o scale.npy --slant 50 --tilt 90")
+        + code("texrs perspective floor.png --scale scale.npy --target pattern.npy -o result.png --size 224 --seed 3")
+        + grid(grown, least=200)
+        + code("texrs complete floor.png hole.png -o filled.png --scale scale.npy")
+        + grid(mended, least=200)
+    )
+
+
+PERSPECTIVE = Section(
+    "perspective",
+    "Texels of the right size",
+    "A picture taken at an angle has texels of every size. A scale map says which; textures are grown, and holes filled, with "
+    "texels as large as it, or any other map, asks for.",
+    _perspective,
+)

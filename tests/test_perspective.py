@@ -1,0 +1,158 @@
+"""texrs.perspective: what it takes, what it refuses, and that its map is its picture."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import texrs
+from texrs import samples
+from texrs.errors import Cancelled, InvalidInput
+
+
+@pytest.fixture(scope="module")
+def floor():
+    return samples.tilted_discs((96, 96))
+
+
+def grow(floor, size=64, **options):
+    return texrs.perspective(floor.image, floor.scale_map, size, **options)
+
+
+def test_the_map_is_the_picture(floor):
+    result = grow(floor, (64, 80), seed=3)
+    assert result.image.shape == (64, 80, 3)
+    assert result.image.dtype == floor.image.dtype
+    np.testing.assert_array_equal(result.source.render(floor.image, interpolation="cubic"), result.image)
+    np.testing.assert_array_equal(result.stages["composite"], result.image)
+    assert result.stages["target"].shape == (64, 80)
+    assert result.report["scale_error"] <= 0.08
+
+
+def test_maps_in_register_follow_in_any_dtype(floor):
+    result = grow(floor, seed=1)
+    red = floor.image[..., 0]
+    for twin in (red.astype(np.uint16) * 257, red.astype(np.float32) / 255):
+        shown = result.source.render(twin, interpolation="nearest").astype(float) / twin.max() * red.max()
+        np.testing.assert_allclose(shown, result.source.render(red, interpolation="nearest"), atol=1e-3)
+    whole = grow(floor, seed=1, augment_scales=False)
+    assert (whole.source.coordinates == np.rint(whole.source.coordinates)).all()
+
+
+def test_what_comes_in_comes_out():
+    floor = samples.tilted_discs((64, 64))
+    grey = floor.image[..., 1]
+    deep = grey.astype(np.uint16) * 257
+    stack = np.concatenate([floor.image, floor.image[..., :2]], axis=-1)
+    found = texrs.perspective(grey, floor.scale_map, 48, seed=2)
+    assert found.image.shape == (48, 48)
+    finer = texrs.perspective(deep, floor.scale_map, 48, seed=2)
+    assert finer.image.dtype == np.uint16
+    np.testing.assert_array_equal(finer.source.coordinates, found.source.coordinates)
+    assert texrs.perspective(stack, floor.scale_map, 48).image.shape == (48, 48, 5)
+    assert texrs.perspective(grey / 255, floor.scale_map, 48).image.dtype == np.float64
+
+
+@pytest.mark.parametrize("count", [2, 7])
+def test_same_bytes_for_any_number_of_threads(floor, count):
+    with texrs.threads(1):
+        one = grow(floor, 96, seed=5)
+    with texrs.threads(count):
+        many = grow(floor, 96, seed=5)
+    np.testing.assert_array_equal(one.source.coordinates, many.source.coordinates)
+    assert one.image.tobytes() == many.image.tobytes()
+
+
+def test_seeds_differ(floor):
+    assert (grow(floor, seed=1).source.coordinates != grow(floor, seed=2).source.coordinates).any(axis=-1).mean() > 0.5
+
+
+def test_an_output_that_repeats(floor):
+    across = np.exp(0.4 * np.cos(2 * np.pi * np.arange(64) / 64))[np.newaxis].repeat(64, axis=0)
+    result = grow(floor, 64, target=across.astype(np.float32), wrap=(False, True), seed=1)
+    image = result.image.astype(float)
+    inner = np.abs(np.diff(image, axis=1)).mean()
+    assert np.abs(image[:, 0] - image[:, -1]).mean() <= 1.6 * inner
+    with pytest.raises(InvalidInput, match="wrap: the target's first and last rows differ by a factor of"):
+        grow(floor, wrap=(True, False))
+
+
+def test_scales_that_the_exemplar_has_not_are_made_or_brought_to_those_it_has(floor):
+    small = np.full((48, 48), float(floor.scale_map.min()) / 2, np.float32)
+    result = grow(floor, 48, target=small, seed=1)
+    assert min(result.report["sizes"]) < 0.7
+    assert result.report["scale_error"] <= 0.1
+    mixed = small.copy()
+    mixed[:24] = 1
+    with pytest.warns(
+        UserWarning, match=r"target: 50.0% of it asks for scales that the exemplar has not, by a factor of"
+    ):
+        held = grow(floor, 48, target=mixed, augment_scales=False)
+    assert held.report["outside"]["share"] == pytest.approx(0.5)
+    with pytest.raises(InvalidInput, match="target: asks for scales from"):
+        grow(floor, 48, target=small, augment_scales=False)
+
+
+def test_without_weight_scales_do_not_count(floor):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        result = grow(floor, 96, scale_weight=0, seed=1)
+    assert result.report["scale_error"] > 0.15
+
+
+def test_sizes_that_are_given(floor):
+    result = grow(floor, augment_scales=[0.5, 1.3])
+    assert result.report["sizes"] == pytest.approx([1, 0.5, 1.3], abs=0.02)
+
+
+def test_progress_and_stopping(floor):
+    seen = []
+    grow(floor, progress=lambda stage, share: seen.append(stage))
+    assert "blocks" in seen
+    assert any(s.startswith("level ") for s in seen)
+
+    def stop(stage, share):
+        raise KeyboardInterrupt
+
+    with pytest.raises((KeyboardInterrupt, Cancelled)):
+        grow(floor, progress=stop)
+
+
+BAD = [
+    ({"scale_map": np.ones((9, 9))}, "scale_map: needs shape"),
+    ({"scale_map": np.zeros((32, 32))}, "scale_map: 1024 of 1024 scales are outside"),
+    ({"scale_map": np.full((32, 32), -1.0)}, "scale_map: "),
+    ({"scale_map": np.full((32, 32), np.nan)}, "scale_map: .* NaN"),
+    ({"scale_map": np.ones((32, 32), np.uint8)}, "scale_map: needs float scales"),
+    ({"target": np.ones((5, 5), np.float32)}, "target: needs shape"),
+    ({"size": 0}, "size: "),
+    ({"size": "large"}, "size: "),
+    ({"seed": -1}, "seed: "),
+    ({"method": "fast"}, "method: None or 'paper'"),
+    ({"scale_weight": 17}, "scale_weight: "),
+    ({"augment_scales": "some"}, "augment_scales: needs 'auto'"),
+    ({"augment_scales": [9.0]}, "augment_scales: "),
+    ({"interpolation": "sinc"}, "interpolation: "),
+    ({"exemplar": np.zeros((8, 40, 3), np.uint8)}, "exemplar: each side must be at least 16"),
+    ({"exemplar": np.full((32, 32), np.nan)}, "exemplar: "),
+    ({"wrap": "xy"}, "wrap: "),
+]
+
+
+@pytest.mark.parametrize(("change", "sentence"), BAD, ids=[s for _, s in BAD])
+def test_bad_input_is_named(change, sentence):
+    given = {"exemplar": np.zeros((32, 32, 3), np.uint8), "scale_map": np.ones((32, 32)), "size": 32} | change
+    exemplar, scale, size = (given.pop(k) for k in ("exemplar", "scale_map", "size"))
+    with pytest.raises(InvalidInput, match=sentence):
+        texrs.perspective(exemplar, scale, size, **given)
+
+
+@pytest.mark.parametrize("shape", [(16, 16), (16, 300), (17, 33), (1000, 16)])
+def test_odd_exemplars_and_outputs(shape):
+    noise = np.random.default_rng(1).integers(0, 255, (*shape, 3), np.uint8)
+    scale = np.linspace(0.7, 1.4, shape[0], dtype=np.float32)[:, np.newaxis].repeat(shape[1], axis=1)
+    for size in ((1, 1), (3, 50), (40, 40)):
+        assert texrs.perspective(noise, scale, size).image.shape == (*size, 3)
+    plain = np.full((*shape, 3), 7, np.uint8)
+    assert (texrs.perspective(plain, scale, 20).image == 7).all()
+    assert (texrs.perspective(plain, np.ones(shape), 20).image == 7).all()

@@ -1,0 +1,70 @@
+"""The commands texrs perspective, and texrs complete with a scale map."""
+
+import numpy as np
+import pytest
+
+from texrs import SourceMap, io, samples
+from texrs.cli import main
+
+
+@pytest.fixture
+def files(tmp_path):
+    floor = samples.tilted_discs((64, 64))
+    io.write(tmp_path / "floor.png", floor.image)
+    io.write(tmp_path / "scale.npy", floor.scale_map.astype(np.float32))
+    hole = np.zeros((64, 64), np.uint8)
+    hole[20:40, 20:44] = 255
+    io.write(tmp_path / "hole.png", hole)
+    clear = np.concatenate([floor.image, 255 - hole[..., np.newaxis]], axis=-1)
+    io.write(tmp_path / "clear.png", clear)
+    return tmp_path
+
+
+def run(folder, text):
+    words = [str(folder / w[1:]) if w.startswith("@") else w for w in text.split()]
+    return main(words)
+
+
+def test_a_picture_is_grown(files):
+    assert run(files, "perspective @floor.png --scale @scale.npy -o @out.png --size 48x80 --source @map.npz -q") == 0
+    assert io.read(files / "out.png").shape == (48, 80, 3)
+    assert SourceMap.load(files / "map.npz").shape == (48, 80)
+
+
+def test_targets_and_sizes(files):
+    small = np.full((40, 40), 0.4, np.float32)
+    io.write(files / "target.npy", small)
+    line = "perspective @floor.png --scale @scale.npy --target @target.npy -o @out.png --augment-scales 0.5:0.8 -q"
+    assert run(files, line) == 0
+    assert io.read(files / "out.png").shape == (40, 40, 3)
+
+
+def test_holes_are_filled_by_scale(files):
+    for given in ("--scale @scale.npy", "--scale auto", "--method optimise --scale @scale.npy"):
+        assert run(files, f"complete @floor.png @hole.png -o @out.png {given} -q") == 0
+        made, floor, hole = (io.read(files / n) for n in ("out.png", "floor.png", "hole.png"))
+        np.testing.assert_array_equal(made[hole == 0], floor[hole == 0])
+    assert run(files, "complete @clear.png alpha -o @out.png --scale @scale.npy -q") == 0
+    assert (io.read(files / "out.png")[..., 3] == 255).all()
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("perspective @floor.png -o @out.png", "--scale"),
+        ("perspective @floor.png --scale @hole.png -o @out.png --size 0", "--size"),
+        (
+            "perspective @floor.png --scale @scale.npy -o @out.png --method best",
+            "--method: allowed are default and paper",
+        ),
+        ("perspective @floor.png --scale @scale.npy -o @out.png --augment-scales big", "--augment-scales: needs auto"),
+        ("perspective @floor.png --scale @scale.npy -o @out.png --wrap xy", "wrap"),
+        ("perspective @floor.png --scale @scale.npy -o @out.png --scale-weight 99", "--scale-weight: needs a number"),
+        ("complete @floor.png alpha -o @out.png", "HOLE: alpha needs an image with an alpha channel"),
+        ("complete @floor.png @hole.png -o @out.png --method heal", "--method: allowed are 'patch' and 'optimise'"),
+    ],
+)
+def test_bad_input_is_named(files, capsys, line, words):
+    assert run(files, line) == 2
+    assert words in capsys.readouterr().err
+    assert not (files / "out.png").exists()

@@ -1,0 +1,111 @@
+"""texrs.complete with scale maps and by optimisation."""
+
+import numpy as np
+import pytest
+
+import perspective_checks as checks
+import texrs
+from texrs.errors import InvalidInput
+
+
+@pytest.fixture(scope="module")
+def floor():
+    return checks.floor((160, 160))
+
+
+def hole_in(shape, *boxes):
+    hole = np.zeros(shape, bool)
+    for top, bottom, left, right in boxes:
+        hole[top:bottom, left:right] = True
+    return hole
+
+
+def fill(image, hole, **options):
+    bare = np.where(hole[..., np.newaxis] if image.ndim == 3 else hole, 0, image).astype(image.dtype)
+    return texrs.complete(bare, hole, seed=1, **options)
+
+
+@pytest.mark.parametrize("method", ["patch", "optimise"])
+def test_texels_of_the_right_size_fill_the_hole(floor, method):
+    image, scale = floor
+    hole = hole_in(image.shape[:2], (40, 110, 45, 115))
+    result = fill(image, hole, scale_map=np.where(hole, np.nan, scale).astype(np.float32), method=method)
+    np.testing.assert_array_equal(result.image[~hole], image[~hole])
+    assert result.report["scaled"]
+    inside = hole_in(image.shape[:2], (46, 104, 51, 109))
+    truth, seen, own = (np.log(m)[inside] for m in (scale, checks.wavelength(result.image), checks.wavelength(image)))
+    assert np.corrcoef(seen, truth)[0, 1] >= 0.95 * np.corrcoef(own, truth)[0, 1]
+    assert 0.5 <= checks.seam(result.image, hole) / checks.seam(image, hole) <= 1.6
+    # Nothing is taken from the hole.
+    at = np.rint(result.source.coordinates[hole]).astype(int)
+    assert not hole[at[:, 0], at[:, 1]].any()
+
+
+@pytest.mark.parametrize(
+    "boxes",
+    [[(0, 30, 0, 40)], [(20, 40, 100, 160), (90, 130, 20, 60)], [(150, 160, 150, 160)], [(60, 61, 60, 61)]],
+    ids=["corner", "several", "last corner", "one pixel"],
+)
+@pytest.mark.parametrize("scaled", [False, True])
+def test_holes_anywhere(floor, boxes, scaled):
+    image, scale = floor
+    hole = hole_in(image.shape[:2], *boxes)
+    result = fill(image, hole, method="optimise", scale_map=scale if scaled else None)
+    np.testing.assert_array_equal(result.image[~hole], image[~hole])
+    np.testing.assert_array_equal(
+        result.source.render(np.where(hole[..., None], 0, image).astype(np.uint8), interpolation="cubic"), result.image
+    )
+
+
+@pytest.mark.parametrize("method", ["patch", "optimise"])
+def test_a_scale_map_that_is_measured(floor, method):
+    image, _ = floor
+    hole = hole_in(image.shape[:2], (50, 90, 50, 100))
+    result = fill(image, hole, scale_map="auto", method=method)
+    np.testing.assert_array_equal(result.image[~hole], image[~hole])
+
+
+def test_any_array_and_the_same_bytes(floor):
+    image, scale = floor
+    hole = hole_in(image.shape[:2], (50, 90, 50, 100))
+    deep = image[..., 0].astype(np.uint16) * 257
+    with texrs.threads(1):
+        one = fill(deep, hole, scale_map=scale, method="optimise")
+    with texrs.threads(7):
+        many = fill(deep, hole, scale_map=scale, method="optimise")
+    assert one.image.dtype == np.uint16
+    assert one.image.shape == deep.shape
+    assert one.image.tobytes() == many.image.tobytes()
+
+
+def test_a_hole_that_is_empty_changes_nothing(floor):
+    image, scale = floor
+    result = fill(image, np.zeros(image.shape[:2], bool), scale_map=scale)
+    np.testing.assert_array_equal(result.image, image)
+
+
+def test_an_output_that_wraps(floor):
+    image, _ = floor
+    hole = hole_in(image.shape[:2], (60, 100, 0, 20), (60, 100, 140, 160))
+    result = fill(image, hole, method="optimise", wrap=(False, True))
+    np.testing.assert_array_equal(result.image[~hole], image[~hole])
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"method": "paint"}, "method: allowed are 'patch' and 'optimise'"),
+        ({"scale_map": "guess"}, "scale_map: allowed are 'auto'"),
+        ({"scale_map": np.ones((3, 3))}, "scale_map: needs shape"),
+        ({"scale_map": np.zeros((64, 64))}, "scale_map: |scale: "),
+        ({"scale_map": np.ones((64, 64)), "source": np.zeros((40, 40), np.uint8)}, "source: a scale_map says"),
+        ({"method": "optimise", "source": np.zeros((40, 40), np.uint8)}, "source: method='optimise' copies"),
+        ({"method": "optimise", "hole": np.ones((64, 64), bool)}, "hole: covers the whole image"),
+        ({"method": "optimise", "hole": np.indices((64, 64)).sum(axis=0) % 4 > 0}, "hole: leaves no part"),
+    ],
+)
+def test_bad_input_is_named(options, sentence):
+    hole = hole_in((64, 64), (20, 30, 20, 30))
+    image = np.random.default_rng(0).integers(0, 255, (64, 64), np.uint8)
+    with pytest.raises(InvalidInput, match=sentence):
+        texrs.complete(image, options.pop("hole", hole), **options)
