@@ -154,7 +154,7 @@ def s6(exemplar: np.ndarray, image: np.ndarray) -> Found:
             if len(over) < period:
                 continue
             # Where the others differ much among themselves, one of them is always the largest.
-            more = over[-1] - max(over[:-1]) - float(np.std(over[:-1]))
+            more = over[-1] - max(over[:-1]) - 2 * float(np.std(over[:-1]))
             if more > beyond:
                 worst, beyond = float(np.exp(over[-1])), more
     speckle = volume.isolated(seen)

@@ -19,7 +19,7 @@ class Settings:
     votes: tuple[int, int, int] = (0, 0, 0)
     radii: tuple[int, ...] = (2,)
     cell: int = 6
-    rounds: int = 6
+    rounds: int = 9
     candidates: int = 512
     contrast: float = 1.0
     continuation: float = 0.15
