@@ -419,7 +419,7 @@ def test_apply(here: Path, capsys: Capture) -> None:
 
 def test_apply_blends(here: Path) -> None:
     assert main(["design", "in.png", "-q", *TINY, "-o", "out.png", "--source", "s.npz"]) == 0
-    assert main(["apply", "s.npz", "in.png", "-q", "--blend", "0.1", "-o", "again.png"]) == 0
+    assert main(["apply", "s.npz", "in.png", "-q", "--blend", "0.15", "-o", "again.png"]) == 0
     assert Path("again.png").read_bytes() == Path("out.png").read_bytes()
     assert main(["design", "in.png", "-q", *TINY, "--poisson", "0", "-o", "plain.png"]) == 0
     assert main(["apply", "s.npz", "in.png", "-q", "-o", "look-up.png"]) == 0

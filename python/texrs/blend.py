@@ -119,7 +119,7 @@ def blend(
     >>> int(np.diff(source.render(ramp)[8].astype(int)).max())
     42
     >>> int(np.diff(blend(source, ramp, wrap=False)[8].astype(int)).max())
-    8
+    10
 
     """
     if source.axes != 2:

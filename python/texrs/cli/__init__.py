@@ -233,7 +233,7 @@ def apply_command(
     blend: Annotated[
         float,
         typer.Option(
-            metavar="WEIGHT", help="Make seams disappear as design --poisson does; 0 leaves them, 0.1 is usual."
+            metavar="WEIGHT", help="Make seams disappear as design --poisson does; 0 leaves them, 0.15 is usual."
         ),
     ] = 0.0,
     wrap: Annotated[
