@@ -11,7 +11,6 @@ module that has `perspective_agreement`, its rank correlation and slope are colu
 from __future__ import annotations
 
 import argparse
-import importlib.util
 import os
 import sys
 import time
@@ -25,6 +24,7 @@ import texrs
 from texrs import io, scale_maps
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
+import evaluators
 import perspective_checks as checks
 
 VARIANTS: dict[str, dict[str, Any]] = {
@@ -92,18 +92,11 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=256)
     parser.add_argument("--only", default="")
     parser.add_argument("--variants", default="default,plain")
-    parser.add_argument("--evaluator")
+    parser.add_argument("--evaluator", type=Path)
     parser.add_argument("--out")
     parser.add_argument("--pictures")
     asked = parser.parse_args()
-    evaluator = None
-    if asked.evaluator:
-        spec = importlib.util.spec_from_file_location("evaluator", asked.evaluator)
-        assert spec is not None
-        assert spec.loader is not None
-        evaluator = importlib.util.module_from_spec(spec)
-        sys.modules["evaluator"] = evaluator
-        spec.loader.exec_module(evaluator)
+    evaluator = evaluators.load(asked.evaluator) if asked.evaluator else None
     lines = [MEANING, "| texture | target | variant | " + " | ".join(HEAD) + " |", "|---" * (len(HEAD) + 3) + "|"]
 
     def say(line: str) -> None:
