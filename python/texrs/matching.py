@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import check_memory
 from texrs.errors import InvalidInput
 
 __all__ = ["Fold", "Layout", "directions", "fold_of", "match", "nearest", "spacing"]
@@ -30,6 +31,12 @@ FINE, COARSE = 0.15, 0.8
 """Widths, in spacings, of the Gaussians that points are drawn as: lines show at the first, outlines at both."""
 WIDE_BINS = 64
 """Room at the ends for the wider ones."""
+DENSE = 1 << 20
+"""Pairs of a source and a target of which all are looked at."""
+NEAR = 64
+"""Of more pairs, so many sources a target, those nearest to it."""
+TIE = 1e-9
+"""What a later source costs more than the one before: of equal ones the first is taken."""
 
 
 def nearest(points: Points, count: int, among: Points | None = None) -> Points:
@@ -294,12 +301,51 @@ def match(source: Points, target: Points) -> tuple[NDArray[np.intp], float]:
     [2, 0]
 
     """
-    from scipy.optimize import linear_sum_assignment
-
     if len(source) < len(target):
         raise InvalidInput(f"source: needs a point for each of {len(target)} targets, got {len(source)}")
-    square = ((target[:, None] - source[None]) ** 2).sum(axis=-1)
-    rows, columns = linear_sum_assignment(square + 1e-9 * np.arange(len(source)))
-    of = np.empty(len(target), np.intp)
+    if len(source) * len(target) <= DENSE:
+        of = _assigned(((target[:, None] - source[None]) ** 2).sum(axis=-1))
+    else:
+        of = _assigned_near(source, target)
+    cost = ((target - source[of]) ** 2).sum(axis=-1)
+    return of, float(cost.mean()) if len(target) else 0.0
+
+
+def _assigned(square: Points) -> NDArray[np.intp]:
+    """Match rows with columns, every pair of which has a cost."""
+    from scipy.optimize import linear_sum_assignment
+
+    rows, columns = linear_sum_assignment(square + TIE * np.arange(square.shape[1]))
+    of = np.empty(len(square), np.intp)
     of[rows] = columns
-    return of, float(square[rows, columns].mean()) if len(target) else 0.0
+    return of
+
+
+def _assigned_near(source: Points, target: Points) -> NDArray[np.intp]:
+    """Match many targets, each with one of the sources near it.
+
+    A matching whose every pair is among the first half of the near ones is taken: were there a better one, it would reach
+    beyond the other half. All pairs would take memory and time as the square and the cube of their number.
+    """
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import min_weight_full_bipartite_matching
+    from scipy.spatial import cKDTree
+
+    tree, count = cKDTree(source), NEAR
+    while count < len(source):
+        far, near = tree.query(target, k=count)
+        # A cost of nothing would be no pair.
+        cost = 1 + far**2 + TIE * near
+        pairs = csr_array(
+            (cost.ravel(), near.ravel(), np.arange(len(target) + 1) * count), shape=(len(target), len(source))
+        )
+        try:
+            of = min_weight_full_bipartite_matching(pairs)[1]
+        except ValueError:
+            count *= 4  # Too few sources near some of them.
+            continue
+        if not (near[:, count // 2 :] == of[:, None]).any():
+            return np.asarray(of, np.intp)
+        count *= 2
+    check_memory(3 * 8 * len(source) * len(target))
+    return _assigned(((target[:, None] - source[None]) ** 2).sum(axis=-1))

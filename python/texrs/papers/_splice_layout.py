@@ -323,14 +323,15 @@ def told(found: Match) -> tuple[Bools, NDArray[np.float32]]:
     middle = source.points if still else np.concatenate([source.points, source.rest])
     shift = np.zeros((2, len(middle) + 1), np.float32)
     shift[:, 1:] = whole_shifts(found, middle).T
-    own = shift[:, number]
+    own = np.stack([along.take(number) for along in shift])
     if not still:
         idle = np.ones(len(middle) + 1, bool)
         idle[0] = False
         idle[found.of + 1] = False
-        gone = np.nonzero(idle[number])
-        centre = middle[number[gone] - 1] - source.origin
-        own[:, gone[0], gone[1]] += SHRUNK * (centre - np.stack(gone, axis=-1)).T
+        gone = np.flatnonzero(idle.take(number))
+        centre = (middle - source.origin).take(number.take(gone) - 1, axis=0)
+        for axis, at in enumerate(np.divmod(gone, number.shape[1])):
+            own[axis].ravel()[gone] += SHRUNK * (centre[:, axis] - at)
     return number > 0, own
 
 
