@@ -23,6 +23,8 @@ Points = NDArray[np.float64]
 
 NEIGHBOURS = 5
 """k of the scale normalisation: the paper says between 4 and 6."""
+INSIDE = 0.5
+"""Points farther from the outermost one along every axis than so many distances to the nearest are inner ones."""
 MERGE = 0.6
 """Points nearer than this, in spacings, that meet where a point set is folded are one."""
 PEAK, CLEAR = 1.3, 6.0
@@ -50,7 +52,7 @@ def nearest(points: Points, count: int, among: Points | None = None) -> Points:
 
 
 def spacing(points: Points, count: int = NEIGHBOURS) -> float:
-    """Give the median over points of the mean distance to the nearest ones: borders bias it less than the mean.
+    """Give the median over inner points of the mean distance to the nearest ones: borders bias it less than the mean.
 
     Examples
     --------
@@ -62,7 +64,15 @@ def spacing(points: Points, count: int = NEIGHBOURS) -> float:
     """
     if len(points) < 3:
         raise InvalidInput(f"points: a layout needs three or more, got {len(points)}")
-    return float(np.median(nearest(points, min(count, len(points) - 1)).mean(axis=1)))
+    far = nearest(points, min(count, len(points) - 1))
+    return float(np.median(far.mean(axis=1)[_inner(points, far)]))
+
+
+def _inner(points: Points, far: Points) -> NDArray[np.bool_]:
+    """Mark the points that are not the outermost, or all if there is no other: half of the neighbours of these are missing."""
+    rim = INSIDE * float(np.median(far[:, 0]))
+    found: NDArray[np.bool_] = ((points > points.min(axis=0) + rim) & (points < points.max(axis=0) - rim)).all(axis=1)
+    return found if found.any() else ~found
 
 
 def directions(points: Points, *, most: int = 3) -> tuple[float, ...]:
@@ -186,7 +196,8 @@ def fold_of(points: Points, axis: int, ends: tuple[float, float], *, wrap: bool,
         return Fold(ends[0] - 0.5, ends[1] + 0.5, True)
     scale = spacing(points)
     count = min(4, len(points) - 1)
-    inner = np.median(nearest(points, count), axis=0)
+    far = nearest(points, count)
+    inner = np.median(far[_inner(points, far)], axis=0)
     lines = []
     for sign in (-1, 1):
         x = sign * points[:, axis]
