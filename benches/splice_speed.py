@@ -63,6 +63,7 @@ def forget() -> None:
     _splice_source._PARTS.clear()
     _splice_source._EXTENDED.clear()
     _splice_source._FOLDED.clear()
+    _splice_source._COUNTS.clear()
     _splice_layout._DIRECTIONS.clear()
     _splice_layout._LAYOUTS.clear()
     _splice_layout._REACHES.clear()

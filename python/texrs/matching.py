@@ -23,6 +23,8 @@ Points = NDArray[np.float64]
 
 NEIGHBOURS = 5
 """k of the scale normalisation: the paper says between 4 and 6."""
+AROUND = 6
+"""Neighbours that tell how a layout goes on: fewer do not tell rows that are shifted from rows that are not."""
 INSIDE = 0.5
 """Points farther from the outermost one along every axis than so many distances to the nearest are inner ones."""
 MERGE = 0.6
@@ -195,7 +197,7 @@ def fold_of(points: Points, axis: int, ends: tuple[float, float], *, wrap: bool,
     if wrap:
         return Fold(ends[0] - 0.5, ends[1] + 0.5, True)
     scale = spacing(points)
-    count = min(4, len(points) - 1)
+    count = min(AROUND, len(points) - 1)
     far = nearest(points, count)
     inner = np.median(far[_inner(points, far)], axis=0)
     lines = []
@@ -230,6 +232,10 @@ def _misfit(points: Points, axis: int, sign: int, line: float, scale: float, inn
     near = np.flatnonzero(x > line - scale)
     if len(near) == 0:
         return math.inf
+    # Those at the sides lack neighbours wherever the line is.
+    aside = kept[near, 1 - axis]
+    middle = (aside > aside.min() + 0.25 * scale) & (aside < aside.max() - 0.25 * scale)
+    near = near[middle] if middle.any() else near
     found = nearest(kept[near], len(inner) + 1, both)[:, 1:]
     return float(np.abs(found - inner).mean() + 1e-3 * abs(line - float(x.max())))
 

@@ -16,7 +16,8 @@ Departures, with their reasons:
   a third of the output is empty, and texels at its rim are missing.
 - There are more texels than targets; those that go nowhere are erased. As printed, point sets must have equal size. What is
   erased shrinks, and the ground around it closes in: else a fifth of the output is a hole.
-- Connected figures take the layout where their texels go least far: else walls are bent for nothing.
+- Connected figures take the layout where their texels go least far, and neighbours differ in how far they go by no more
+  than a share of a texel: else courses are torn where a layout has none.
 - Layouts grow until disjoint texels have room, and those that still collide are pushed apart: spacing alone makes chains.
 - Distances are squared in Eq. 4: the best matching then has no crossings.
 - Disjoint texels move whole, by whole pixels: Eq. 5 in the limit of its weights. The soft energy stretches components that
@@ -54,6 +55,7 @@ from texrs.papers._splice_entry import as_texels
 from texrs.papers._splice_layout import (
     Match,
     apart,
+    eased,
     edited_match,
     matched,
     snapped,
@@ -154,6 +156,8 @@ def splice(
         found = apart(mine, found)
     elif snap_rows:
         found = replace(found, targets=snapped(found.targets, 0.25 * spacing(found.targets)))
+    if method != "paper" and mine.tag != "F=d":
+        found = eased(mine, found)
     found = trimmed(mine, found, (shape[0], shape[1]))
     watch("match", 1.0)
     return made(
@@ -300,7 +304,9 @@ def deform(a: Texels, found: Match) -> Field:
     shape, origin = source.mask.shape, np.array(source.origin)
     if a.tag == "F=d":
         delta = carried(*told(found))
-        return Field(moved(delta, source.origin), source.instance > 0, void_of(source, found.of))
+        # Ground beside what shrinks is drawn out over the place of that: a pixel of it less is a hole of many.
+        void = void_of(source, found.of, grown=int(source.own > 0))
+        return Field(moved(delta, source.origin), source.instance > 0, void)
     rigid = source.mask if a.tag == "F=c" else ~source.mask
     pins = np.rint(source.points[found.of]).astype(np.intp) - origin
     inside = ((pins >= 0) & (pins < np.array(shape))).all(axis=1)
@@ -322,7 +328,8 @@ def drafted(a: Texels, found: Match, warped: Warped, *, whole: bool) -> tuple[Dr
     """Read the warp as pixels of the texture: T_AB0, what of it stays, and the target of each pixel that moved ``whole``."""
     source, known = found.source, warped.known
     y, x = warped.there[..., 0], warped.there[..., 1]
-    places, mirrored = source.table[y, x], source.mirrored[y, x]
+    there = y * source.mask.shape[1] + x
+    places, mirrored = (v.reshape(-1, 2).take(there, axis=0) for v in (source.table, source.mirrored))
     stays = copied(places, mirrored, known)
     step = found.shift[0]
     if source.own and (found.shift == step).all():
@@ -333,20 +340,21 @@ def drafted(a: Texels, found: Match, warped: Warped, *, whole: bool) -> tuple[Dr
     if whole and a.tag == "F=d":
         goal = np.zeros(len(source.points) + 1, np.uint32)
         goal[found.of + 1] = np.arange(1, len(found.of) + 1)
-        number = source.instance[y, x]
-        label = np.where(known, goal[number], 0).astype(np.uint32)
+        number = source.instance.take(there)
+        label = np.where(known, goal.take(number), 0).astype(np.uint32)
         # Rims that the mesh draws out are no texels: what is rigid lies exactly where its texel goes.
         shift = np.zeros((2, len(goal)), np.intp)
         shift[:, 1:] = whole_shifts(found).T
         rows, columns = np.ogrid[: known.shape[0], : known.shape[1]]
-        here = (y + shift[0][number] == rows - source.origin[0]) & (x + shift[1][number] == columns - source.origin[1])
+        here = y + shift[0].take(number) == rows - source.origin[0]
+        here &= x + shift[1].take(number) == columns - source.origin[1]
         drawn_out = (number > 0) & ~here
         label[drawn_out] = 0
         known = known & ~drawn_out
         kinds = ((parts_of(a).region > 0) | a.mask).astype(np.uint8)
         return Draft(places, known, stays | (label > 0), kinds, np.zeros(known.shape, np.uint8), mirrored), label
     kinds = np.asarray(~a.mask if a.tag == "B=c" else a.mask).astype(np.uint8)
-    wanted = np.where(known, kinds[places[..., 0], places[..., 1]], 255).astype(np.uint8)
+    wanted = np.where(known, kinds.take(places[..., 0] * kinds.shape[1] + places[..., 1]), 255).astype(np.uint8)
     return Draft(places, known, stays | (known & (wanted == 1)), kinds, wanted, mirrored), label
 
 
