@@ -218,8 +218,7 @@ def coarseness(shape: Sequence[int]) -> int:
 def _thinned(rigid: Bools, step: int) -> Bools:
     """Give the cells of so many pixels that hold a rigid one: thin joints stay whole."""
     wide = np.pad(rigid, [(0, -n % step) for n in rigid.shape])
-    found: Bools = wide.reshape(wide.shape[0] // step, step, -1, step).any(axis=(1, 3))
-    return found
+    return np.asarray(wide.reshape(wide.shape[0] // step, step, -1, step).any(axis=(1, 3)))
 
 
 def _spread(coarse: NDArray[np.float64], shape: Sequence[int], step: int) -> NDArray[np.float64]:
