@@ -33,8 +33,6 @@ WIDE = 1.0
 """A hole wider than so many spacings is filled with patches; less is grown over from its rim."""
 K, APART = 3, 0.05
 """Size of a similarity set, and how far apart its samples are, as a share of the shorter side."""
-FARTHEST = 24
-"""They are no farther apart than so many pixels: larger pictures show more texels, not larger ones."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -213,7 +211,7 @@ def _corrected(
     """One level: jitter what is not rigid, then choose among similar samples of the right kind."""
     number = len(analysis.levels) - 2 + level if len(analysis.levels) > 1 else 0
     here = analysis.levels[number]
-    apart = 2 * min(int(APART * min(here.shape)), FARTHEST) + 1
+    apart = 2 * int(APART * min(here.shape)) + 1
     sets = similarity(analysis, number, k=K, n=max(3, apart))
     flat = places.reshape(-1).astype(np.int32)
     moved = jitter(flat, region, reach, seed=seed, level=level)
