@@ -38,7 +38,7 @@ MOST = 1 << 21
 _SIDES = {2: (8, 64), 3: (4, 16)}
 """Sides of the cells that are kept: of all stages but the last, about as large as what a pass can see, for each of
 them rounds up; and of the last one."""
-_STRAY = 0.3
+_STRAY = 0.4
 """How far a cell's centre strays, as a share of the cell: that of `texrs.kernels.appearance.Appearance.blocks`."""
 
 Key: TypeAlias = tuple[int, ...]

@@ -403,7 +403,8 @@ impl<const D: usize> Appearance<D> {
 }
 
 /// Squared distance of two appearance vectors.
-#[inline(always)]
+// Inlined between checks of bounds it is unrolled into single numbers: on its own it is a few wide instructions.
+#[inline(never)]
 pub fn distance(a: &Feature, b: &Feature) -> i32 {
     let mut sum = 0;
     for k in 0..KEEP {

@@ -1,13 +1,13 @@
 //! A region divided into cells with borders that are nowhere straight.
 
-use super::Options;
+use super::{CHUNK, Options};
 use crate::fixed::{Frame, Frames, sub};
 use crate::grid::{Grid, Region};
 use crate::hash::Noise;
 use crate::par;
 
 /// How far a centre strays from the middle of its cell, as a share of the cell.
-const STRAY: f64 = 0.3;
+const STRAY: f64 = 0.4;
 
 /// The cells of a region.
 pub(super) struct Cells<const D: usize> {
@@ -26,6 +26,8 @@ pub(super) struct Cell<const D: usize> {
     pub(super) points: Vec<u32>,
     pub(super) shell: Vec<(u32, [i32; D])>,
     pub(super) even: bool,
+    /// The frame at its centre, or at the point of the region nearest to it.
+    pub(super) frame: Frame<D>,
 }
 
 impl<const D: usize> Cells<D> {
@@ -107,44 +109,56 @@ impl<const D: usize> Cells<D> {
 
     /// The cell that each point belongs to: that of the nearest centre, along the axis on which it is farthest.
     pub(super) fn owners(&self) -> Vec<u32> {
-        let (grid, shape) = (&self.region.grid, self.grid.shape());
-        let neighbours = 3usize.pow(D as u32);
+        let grid = &self.region.grid;
         let mut owners = vec![0u32; grid.len()];
-        par::chunks_mut(&mut owners, 4096, |chunk, owners| {
+        par::chunks_mut(&mut owners, CHUNK, |chunk, owners| {
+            // Points one after the other mostly fall into one cell.
+            let (mut seen, mut around) = (None, Vec::new());
             for (i, owner) in owners.iter_mut().enumerate() {
-                let world = self.region.world(grid.point(chunk * 4096 + i));
-                let home: [i32; D] = std::array::from_fn(|axis| {
+                let world = self.region.world(grid.point(chunk * CHUNK + i));
+                let home = std::array::from_fn(|axis| {
                     (f64::from(world[axis]) / self.sides[axis]).floor() as i32 - self.first[axis]
                 });
-                let mut best = (i32::MAX, 0);
-                for k in 0..neighbours {
-                    let mut rest = k;
-                    let mut at = 0;
-                    let mut known = true;
-                    for axis in 0..D {
-                        let n = shape[axis] as i32;
-                        let mut x = home[axis] + (rest % 3) as i32 - 1;
-                        rest /= 3;
-                        if grid.wrap()[axis] {
-                            x = x.rem_euclid(n);
-                        }
-                        known &= (0..n).contains(&x);
-                        at = at * n as usize + x.max(0) as usize;
-                    }
-                    if known {
-                        let step = self.step_from_centre(at, world);
-                        let far = step.iter().map(|x| x.abs()).max().unwrap_or(0);
-                        best = best.min((far, at as u32));
-                    }
+                if seen != Some(home) {
+                    seen = Some(home);
+                    around = self.around(home);
                 }
-                *owner = best.1;
+                let far = |c: usize| {
+                    let step = self.step_from_centre(c, world);
+                    step.iter().map(|x| x.abs()).max().unwrap_or(0)
+                };
+                let nearest = around.iter().map(|&c| (far(c), c)).min();
+                *owner = nearest.map_or(0, |(_, c)| c as u32);
             }
         });
         owners
     }
 
+    /// The cell at a position of the lattice of cells, and those beside it.
+    fn around(&self, home: [i32; D]) -> Vec<usize> {
+        let (shape, wrap) = (self.grid.shape(), self.grid.wrap());
+        (0..3usize.pow(D as u32))
+            .filter_map(|mut k| {
+                let mut at = 0;
+                for axis in 0..D {
+                    let n = shape[axis] as i32;
+                    let mut x = home[axis] + (k % 3) as i32 - 1;
+                    k /= 3;
+                    if wrap[axis] {
+                        x = x.rem_euclid(n);
+                    }
+                    if !(0..n).contains(&x) {
+                        return None;
+                    }
+                    at = at * n as usize + x as usize;
+                }
+                Some(at)
+            })
+            .collect()
+    }
+
     /// Points and shells of all cells.
-    pub(super) fn list(&self, owners: &[u32]) -> Vec<Cell<D>> {
+    pub(super) fn list(&self, owners: &[u32], frames: Frames<'_, D>) -> Vec<Cell<D>> {
         let grid = &self.region.grid;
         let mut list: Vec<Cell<D>> = (0..self.grid.len())
             .map(|c| {
@@ -156,6 +170,7 @@ impl<const D: usize> Cells<D> {
                     points: Vec::new(),
                     shell: Vec::new(),
                     even: sum.rem_euclid(2) == 0,
+                    frame: self.frame(frames, c),
                 }
             })
             .collect();
@@ -168,20 +183,31 @@ impl<const D: usize> Cells<D> {
                 })
             })
             .collect();
+        let strides = grid.strides();
+        let offsets: Vec<isize> = steps
+            .iter()
+            .map(|step| (0..D).map(|a| step[a] as isize * strides[a] as isize).sum())
+            .collect();
         for at in 0..grid.len() {
             let point = grid.point(at);
             let owner = owners[at];
             list[owner as usize].points.push(at as u32);
             let mut seen = [u32::MAX; 27];
             let mut others = 0;
-            for &step in &steps {
-                let Some(q) = self.region.step(point, step) else {
-                    continue;
-                };
+            let mut see = |q: usize| {
                 let other = owners[q];
                 if other != owner && !seen[..others].contains(&other) {
                     seen[others] = other;
                     others += 1;
+                }
+            };
+            if (0..D).all(|axis| (1..grid.shape()[axis] - 1).contains(&point[axis])) {
+                for offset in &offsets {
+                    see(at.wrapping_add_signed(*offset));
+                }
+            } else {
+                for &step in &steps {
+                    self.region.step(point, step).into_iter().for_each(&mut see);
                 }
             }
             for &other in &seen[..others] {
@@ -210,7 +236,7 @@ impl<const D: usize> Cells<D> {
     }
 
     /// The frame at a cell's centre, or at the point of the region nearest to it.
-    pub(super) fn frame(&self, frames: Frames<'_, D>, c: usize) -> Frame<D> {
+    fn frame(&self, frames: Frames<'_, D>, c: usize) -> Frame<D> {
         let grid = &self.region.grid;
         let point = std::array::from_fn(|axis| {
             grid.resolve(

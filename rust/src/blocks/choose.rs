@@ -2,13 +2,11 @@
 
 use super::cells::{Cell, Cells};
 use super::{Held, Options};
-use crate::appearance::{Appearance, Feature, KEEP, UNIT, distance};
-use crate::fixed::{Frame, Frames, ONE, Place, add, apply, nearest, sub};
+use crate::appearance::{Appearance, UNIT, distance};
+use crate::fixed::{ONE, Place, add, apply, nearest, sub};
 use crate::guide::Guide;
 use crate::hash::Noise;
 
-/// A window without contrast.
-const NOTHING: Feature = [0; KEEP];
 /// Cost of a shell point whose continuation lies outside the exemplar.
 const OUTSIDE: i64 = 4 * UNIT as i64;
 
@@ -20,6 +18,21 @@ pub(super) struct Asked<'a, const D: usize> {
     points: Vec<(usize, [i32; D])>,
 }
 
+/// What lies around a cell, and what candidates are compared by.
+pub(super) struct Around<'a, const D: usize> {
+    shell: Vec<Beyond<D>>,
+    /// Of each sample of the exemplar.
+    contrasts: &'a [i32],
+}
+
+/// A point of the shell.
+struct Beyond<const D: usize> {
+    /// Samples of the exemplar from the place of the cell's centre to what the piece would go on with.
+    step: [i32; D],
+    /// The sample that is there.
+    there: usize,
+}
+
 /// The places that one cell may take, and what they cost.
 pub(super) struct Chooser<'a, const D: usize> {
     appearance: &'a Appearance<D>,
@@ -27,7 +40,6 @@ pub(super) struct Chooser<'a, const D: usize> {
     index: usize,
     /// World index of the cell.
     world: [i32; D],
-    frame: Frame<D>,
     /// Places of the centre for which all points of the cell lie inside the exemplar, in whole samples.
     range: [[i32; 2]; D],
 }
@@ -37,16 +49,14 @@ impl<'a, const D: usize> Chooser<'a, D> {
         appearance: &'a Appearance<D>,
         cells: &Cells<D>,
         list: &'a [Cell<D>],
-        frames: Frames<'_, D>,
         c: usize,
     ) -> Self {
         let cell = &list[c];
         let index = cells.grid.point(c);
-        let frame = cells.frame(frames, c);
         let (mut low, mut high) = ([0; D], [0; D]);
         for &p in &cell.points {
             let world = cells.region.world(cells.region.grid.point(p as usize));
-            let moved = apply(&frame, cells.step_from_centre(c, world));
+            let moved = apply(&cell.frame, cells.step_from_centre(c, world));
             for axis in 0..D {
                 low[axis] = low[axis].min(moved[axis]);
                 high[axis] = high[axis].max(moved[axis]);
@@ -73,7 +83,6 @@ impl<'a, const D: usize> Chooser<'a, D> {
             cell,
             index: c,
             world: std::array::from_fn(|axis| cells.first[axis] + index[axis] as i32),
-            frame,
             range,
         }
     }
@@ -99,11 +108,24 @@ impl<'a, const D: usize> Chooser<'a, D> {
         }))
     }
 
+    /// What lies around the cell.
+    pub(super) fn around<'c>(&self, places: &[Place<D>], contrasts: &'c [i32]) -> Around<'c, D> {
+        let shell = self.cell.shell.iter().map(|&(q, step)| Beyond {
+            // Pieces are placed on whole samples, so what a step rounds to is the same for all of them.
+            step: nearest(apply(&self.cell.frame, step)),
+            there: self.appearance.clamped(nearest(places[q as usize])),
+        });
+        Around {
+            shell: shell.collect(),
+            contrasts,
+        }
+    }
+
     /// The best of the present place and many drawn ones; the first of equals.
     #[allow(clippy::too_many_arguments)] // what lies around, what is asked, and how to choose
     pub(super) fn choose(
         &self,
-        places: &[Place<D>],
+        around: &Around<'_, D>,
         present: Place<D>,
         near: &[Place<D>],
         asked: &Asked<'_, D>,
@@ -114,7 +136,7 @@ impl<'a, const D: usize> Chooser<'a, D> {
         let mut best = present;
         let usual = 2.0 * f64::from(UNIT) * self.cell.shell.len().max(1) as f64;
         let cost = |origin| {
-            self.misfit(places, origin, options)
+            self.misfit(around, origin, options)
                 + options.repetition * self.repeated(origin, near, options.cell)
                 + self.obey(origin, asked) as f64 / usual
         };
@@ -163,7 +185,7 @@ impl<'a, const D: usize> Chooser<'a, D> {
         };
         let mut sum = 0;
         for &(p, step) in &asked.points {
-            let sample = nearest(add(origin, apply(&self.frame, step)));
+            let sample = nearest(add(origin, apply(&self.cell.frame, step)));
             sum += guide.cost(p, self.appearance.clamped(sample));
         }
         sum
@@ -173,19 +195,17 @@ impl<'a, const D: usize> Chooser<'a, D> {
     /// to do with each other. Divided by the contrast of both sides, so that a piece is neither favoured for being
     /// bland, and so near everything on average, nor for being the opposite.
     #[inline(always)]
-    fn misfit(&self, places: &[Place<D>], origin: Place<D>, options: &Options) -> f64 {
+    fn misfit(&self, around: &Around<'_, D>, origin: Place<D>, options: &Options) -> f64 {
+        let centre = nearest(origin);
         let (mut difference, mut contrast, mut same) = (0i64, 0i64, 0usize);
-        for &(q, step) in &self.cell.shell {
-            let mine = nearest(add(origin, apply(&self.frame, step)));
-            let there = self.appearance.clamped(nearest(places[q as usize]));
-            let theirs = self.appearance.feature(there);
-            let Some(at) = self.appearance.inside(mine) else {
+        for &Beyond { step, there } in &around.shell {
+            let Some(at) = self.appearance.inside(add(centre, step)) else {
                 difference += OUTSIDE;
                 continue;
             };
-            let feature = self.appearance.feature(at);
-            difference += i64::from(distance(feature, theirs));
-            contrast += i64::from(distance(feature, &NOTHING) + distance(theirs, &NOTHING));
+            let [mine, theirs] = [at, there].map(|i| self.appearance.feature(i));
+            difference += i64::from(distance(mine, theirs));
+            contrast += i64::from(around.contrasts[at] + around.contrasts[there]);
             same += usize::from(at == there);
         }
         let shell = self.cell.shell.len().max(1) as f64;

@@ -11,7 +11,7 @@
 mod cells;
 mod choose;
 
-use crate::appearance::Appearance;
+use crate::appearance::{Appearance, KEEP, distance};
 use crate::fixed::{Frames, Place, add, apply};
 use crate::grid::Region;
 use crate::guide::Guide;
@@ -19,8 +19,11 @@ use crate::hash::Noise;
 use crate::par::{self, Monitor};
 use crate::{Error, Result};
 
-use cells::{Cell, Cells};
+use cells::Cells;
 use choose::Chooser;
+
+/// Points that a thread takes at once.
+const CHUNK: usize = 4096;
 
 /// What [`blocks`] is asked for.
 #[derive(Debug, Clone, Copy)]
@@ -94,76 +97,48 @@ pub fn blocks<const D: usize>(
     let cells = Cells::new(region, options);
     let noise = Noise::new(options.seed).part(1);
     let owners = cells.owners();
-    let list = cells.list(&owners);
+    let list = cells.list(&owners, frames);
     let mut origins: Vec<Place<D>> = par::map(list.len(), |c| {
-        let chooser = Chooser::new(appearance, &cells, &list, frames, c);
-        chooser.place(&noise, 0, 0)
+        Chooser::new(appearance, &cells, &list, c).place(&noise, 0, 0)
+    });
+    let contrasts = par::map(appearance.grid().len(), |at| {
+        distance(appearance.feature(at), &[0; KEEP])
     });
     monitor.expect((options.rounds * list.len()) as u64);
     let mut places = vec![[0; D]; region.grid.len()];
-    for (p, place) in places
-        .iter_mut()
-        .enumerate()
-        .filter(|(p, _)| held.holds(*p))
-    {
-        *place = appearance.bring_inside(held.places[p]);
-    }
-    spread(
-        appearance,
-        &cells,
-        &list,
-        frames,
-        held,
-        &origins,
-        &mut places,
-    );
-    for round in 1..=options.rounds {
-        let even = round % 2 == 0;
-        let chosen = par::map(list.len(), |c| {
-            let idle =
-                list[c].even != even || list[c].points.iter().all(|&p| held.holds(p as usize));
-            if idle || !cells.counts(c, options, round) || monitor.advance(1).is_err() {
-                return origins[c];
+    for round in 0..=options.rounds {
+        if round > 0 {
+            let even = round % 2 == 0;
+            origins = par::map(list.len(), |c| {
+                let idle =
+                    list[c].even != even || list[c].points.iter().all(|&p| held.holds(p as usize));
+                if idle || !cells.counts(c, options, round) || monitor.advance(1).is_err() {
+                    return origins[c];
+                }
+                let chooser = Chooser::new(appearance, &cells, &list, c);
+                let around = chooser.around(&places, &contrasts);
+                let asked = chooser.asked(&cells, guide, held);
+                let near: Vec<_> = cells.near(c).map(|n| origins[n]).collect();
+                let round = round as u32;
+                chooser.choose(&around, origins[c], &near, &asked, &noise, round, options)
+            });
+            monitor.check()?;
+        }
+        // Each point shows what its cell's piece has for it.
+        par::chunks_mut(&mut places, CHUNK, |chunk, places| {
+            for (i, place) in places.iter_mut().enumerate() {
+                let p = chunk * CHUNK + i;
+                *place = appearance.bring_inside(if held.holds(p) {
+                    held.places[p]
+                } else {
+                    let c = owners[p] as usize;
+                    let step = cells.step_from_centre(c, region.world(region.grid.point(p)));
+                    add(origins[c], apply(&list[c].frame, step))
+                });
             }
-            let chooser = Chooser::new(appearance, &cells, &list, frames, c);
-            let asked = chooser.asked(&cells, guide, held);
-            let near: Vec<_> = cells.near(c).map(|n| origins[n]).collect();
-            let round = round as u32;
-            chooser.choose(&places, origins[c], &near, &asked, &noise, round, options)
         });
-        monitor.check()?;
-        origins = chosen;
-        spread(
-            appearance,
-            &cells,
-            &list,
-            frames,
-            held,
-            &origins,
-            &mut places,
-        );
     }
     Ok(places)
-}
-
-/// Gives each point the place that its cell's piece has for it, brought inside the exemplar.
-fn spread<const D: usize>(
-    appearance: &Appearance<D>,
-    cells: &Cells<D>,
-    list: &[Cell<D>],
-    frames: Frames<'_, D>,
-    held: Held<'_, D>,
-    origins: &[Place<D>],
-    places: &mut [Place<D>],
-) {
-    for (c, cell) in list.iter().enumerate() {
-        let frame = cells.frame(frames, c);
-        for &p in cell.points.iter().filter(|&&p| !held.holds(p as usize)) {
-            let world = cells.region.world(cells.region.grid.point(p as usize));
-            let place = add(origins[c], apply(&frame, cells.step_from_centre(c, world)));
-            places[p as usize] = appearance.bring_inside(place);
-        }
-    }
 }
 
 #[cfg(test)]

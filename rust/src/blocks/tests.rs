@@ -86,7 +86,7 @@ fn a_window_is_the_same_wherever_it_is_seen_from() {
 #[test]
 fn cells_that_do_not_count_are_not_missed() {
     let exemplar = exemplar(false);
-    let pad = 2 * 4 + OPTIONS.rounds * (2 * 4 + 1);
+    let pad = 2 * 5 + OPTIONS.rounds * (2 * 5 + 1);
     let side = 20 + 2 * pad;
     let margin = Options {
         margin: pad,

@@ -3,36 +3,41 @@
 //! In scan order the last patches of a hole would have to fit pixels that may not change; from the rim inwards they meet
 //! other patches, which a cut may still take away from.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
-use super::window::for_each;
 use crate::grid::Grid;
 
-/// How much is unknown in each window of the canvas, and its holes in order.
+/// Pixels along a side of a block.
+const BLOCK: usize = 32;
+/// No hole.
+const NONE: (u32, usize) = (u32::MAX, usize::MAX);
+
+/// How much is unknown in each window of the canvas, and the holes that have most around them.
 pub(super) struct Front {
     grid: Grid<2>,
     patch: [usize; 2],
     /// Unknown pixels of the window at each corner.
     unknown: Vec<u32>,
-    /// Unknown pixels of the window over each hole when it was last queued.
-    queued: Vec<u32>,
-    /// Holes with few unknown pixels around them first, then in scan order.
-    queue: BinaryHeap<Reverse<(u32, usize)>>,
+    /// Where the window centred on each row, and on each column, begins.
+    centred: [Vec<usize>; 2],
+    /// The hole of each block of the canvas that has the fewest unknown pixels in the window over it, the first of equals in
+    /// scan order: (unknown pixels, hole). A step changes a few blocks, which are looked through anew.
+    best: Vec<(u32, usize)>,
 }
 
 impl Front {
     pub(super) fn new(grid: Grid<2>, patch: [usize; 2], known: &[bool]) -> Self {
+        let blocks = grid.shape().map(|n| n.div_ceil(BLOCK));
         let mut front = Self {
             grid,
             patch,
             unknown: vec![0; grid.len()],
-            queued: vec![u32::MAX; grid.len()],
-            queue: BinaryHeap::new(),
+            centred: std::array::from_fn(|axis| {
+                let corner = |i| corner(&grid, patch, [i; 2], [0.5; 2])[axis];
+                (0..grid.shape()[axis]).map(corner).collect()
+            }),
+            best: vec![NONE; blocks[0] * blocks[1]],
         };
-        let holes = || (0..known.len()).filter(|&at| !known[at]);
         let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
-        for at in holes() {
+        for at in (0..known.len()).filter(|&at| !known[at]) {
             let point = grid.point(at);
             for axis in 0..2 {
                 low[axis] = low[axis].min(point[axis]);
@@ -41,23 +46,16 @@ impl Front {
         }
         if low[0] <= high[0] {
             front.recount(low, high, known);
-        }
-        for at in holes() {
-            front.enqueue(at);
+            let extent = std::array::from_fn(|axis| high[axis] + 1 - low[axis]);
+            front.look(low, extent, known);
         }
         front
     }
 
     /// The hole that has most around it.
-    pub(super) fn next(&mut self, known: &[bool]) -> Option<usize> {
-        while let Some(Reverse((unknown, at))) = self.queue.pop() {
-            if !known[at] && self.queued[at] == unknown {
-                // Should the window not reach it, it has to be asked for again.
-                self.queued[at] = u32::MAX;
-                return Some(at);
-            }
-        }
-        None
+    pub(super) fn next(&self) -> Option<usize> {
+        let best = self.best.iter().min()?;
+        (*best != NONE).then_some(best.1)
     }
 
     /// Unknown pixels of the window at a corner.
@@ -74,11 +72,7 @@ impl Front {
         let before: [usize; 2] = std::array::from_fn(|axis| self.patch[axis]);
         let after = std::array::from_fn(|axis| to[axis] + 2 * self.patch[axis] - 1);
         let (start, extent) = around(&grid, to, after, before);
-        for_each(&grid, start, extent, |_, at| {
-            if !known[at] {
-                self.enqueue(at);
-            }
-        });
+        self.look(start, extent, known);
     }
 
     /// The corner of a window that shows a hole at `share` of its sides, as far as the canvas allows.
@@ -86,11 +80,33 @@ impl Front {
         corner(&self.grid, self.patch, hole, share)
     }
 
-    fn enqueue(&mut self, at: usize) {
-        let unknown = self.unknown(self.corner(self.grid.point(at), [0.5; 2])) as u32;
-        if self.queued[at] != unknown {
-            self.queued[at] = unknown;
-            self.queue.push(Reverse((unknown, at)));
+    /// Finds the best holes of the blocks of a rectangle anew.
+    fn look(&mut self, start: [usize; 2], extent: [usize; 2], known: &[bool]) {
+        let [height, width] = self.grid.shape();
+        let across = width.div_ceil(BLOCK);
+        let [rows, columns]: [Vec<usize>; 2] = std::array::from_fn(|axis| {
+            let places = start[axis]..start[axis] + extent[axis];
+            let mut blocks: Vec<usize> = places
+                .map(|i| self.grid.resolve(axis, i as isize) / BLOCK)
+                .collect();
+            blocks.dedup();
+            blocks
+        });
+        for &row in &rows {
+            for &column in &columns {
+                let mut best = NONE;
+                let places = column * BLOCK..((column + 1) * BLOCK).min(width);
+                for r in row * BLOCK..((row + 1) * BLOCK).min(height) {
+                    let windows = &self.unknown[self.centred[0][r] * width..][..width];
+                    for c in places.clone() {
+                        let at = r * width + c;
+                        if !known[at] {
+                            best = best.min((windows[self.centred[1][c]], at));
+                        }
+                    }
+                }
+                self.best[row * across + column] = best;
+            }
         }
     }
 

@@ -18,9 +18,13 @@ mod choose;
 mod front;
 mod window;
 
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
+
 use crate::grid::Grid;
 use crate::par::{self, Monitor};
 use crate::patch_search::{Index, Pick};
+use crate::seam::stitch::Stitcher;
 use crate::{Error, Result};
 use choose::Chooser;
 use front::{Front, corner};
@@ -154,6 +158,7 @@ pub fn complete(
     };
     let mut window = Window::new(patch, canvas.channels);
     let chooser = Chooser::new(index, options, canvas.grid);
+    let mut stitchers: Vec<Mutex<Stitcher<2>>> = Vec::new();
     let holes = canvas.known.iter().filter(|known| !**known).count();
     monitor.expect(holes as u64);
     let mut order = if paper {
@@ -167,19 +172,31 @@ pub fn complete(
             window.level();
         }
         let matches = chooser.matches(&window, to, &result.patches, monitor)?;
-        let mut cuts = par::map(matches.len(), |i| {
-            window.cut(canvas, index, &matches[i], to, paper, monitor)
+        stitchers.resize_with(matches.len().max(stitchers.len()), Mutex::default);
+        // The least cost so far; bits of numbers that are not negative are ordered as they are.
+        let least = AtomicU64::new(f64::INFINITY.to_bits());
+        let cuts = par::map(matches.len(), |i| {
+            let bound = f64::from_bits(least.load(Ordering::Relaxed));
+            let stitcher = stitchers[i].lock();
+            let mut stitcher = stitcher.unwrap_or_else(PoisonError::into_inner);
+            let cut = window.cut(index, &matches[i], paper, bound, &mut stitcher, monitor)?;
+            if let Some((value, _)) = &cut {
+                least.fetch_min(value.to_bits(), Ordering::Relaxed);
+            }
+            Ok(cut)
         });
-        let mut best = 0;
-        for i in 0..cuts.len() {
-            if let Ok((value, _)) = &cuts[i]
-                && cuts[best].as_ref().is_ok_and(|(least, _)| value < least)
+        let mut best: Option<(f64, usize, Vec<bool>)> = None;
+        for (i, cut) in cuts.into_iter().enumerate() {
+            if let Some((value, taken)) = cut?
+                && best.as_ref().is_none_or(|&(least, ..)| value < least)
             {
-                best = i;
+                best = Some((value, i, taken));
             }
         }
-        let (_, taken) = cuts.swap_remove(best)?;
-        let filled = window.paste(canvas, index, &matches[best], &taken, to, &mut result);
+        let Some((_, chosen, taken)) = best else {
+            unreachable!("the cheapest is within any bound")
+        };
+        let filled = window.paste(canvas, index, &matches[chosen], &taken, to, &mut result);
         debug_assert!(!filled.is_empty());
         if let Order::Inwards(front) = &mut order {
             front.filled(to, canvas.known);
@@ -210,7 +227,7 @@ impl Order {
                 ))
             }
             Self::Inwards(front) => {
-                let hole = canvas.grid.point(front.next(canvas.known)?);
+                let hole = canvas.grid.point(front.next()?);
                 let pixels = (patch[0] * patch[1]) as f64;
                 let mut best = (f64::INFINITY, [0, 0]);
                 for down in ANCHORS {

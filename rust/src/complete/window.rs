@@ -6,7 +6,7 @@ use crate::grid::Grid;
 use crate::par::Monitor;
 use crate::patch_search::{Index, Match, Query};
 use crate::seam::cost::Cost;
-use crate::seam::stitch::{self, Overlap};
+use crate::seam::stitch::{Overlap, Stitcher};
 
 /// Calls `f(i, position)` for each pixel of a window, around the edges where the grid wraps.
 pub(super) fn for_each(
@@ -47,6 +47,10 @@ pub(super) struct Window {
     known: Vec<bool>,
     keep: Vec<bool>,
     weight: Vec<f32>,
+    /// What a cut leaves as it is.
+    core: Vec<bool>,
+    /// Neighbours of which the first one must stay and the second one is a hole.
+    ends: Vec<[usize; 2]>,
 }
 
 impl Window {
@@ -59,6 +63,8 @@ impl Window {
             known: vec![false; n],
             keep: vec![false; n],
             weight: vec![0.0; n],
+            core: vec![false; n],
+            ends: Vec::new(),
         }
     }
 
@@ -69,6 +75,7 @@ impl Window {
             self.keep[i] = canvas.known[at] && canvas.keep.is_some_and(|keep| keep[at]);
             self.colours[i * n..][..n].copy_from_slice(&canvas.colours[at * n..][..n]);
         });
+        self.tie(canvas, to);
         let distance = chamfer(&self.known, self.shape);
         let reach = self.shape[0].min(self.shape[1]) as f32 / 4.0;
         for (i, weight) in self.weight.iter_mut().enumerate() {
@@ -97,43 +104,28 @@ impl Window {
         }
     }
 
-    /// The cost of cutting a match in, and the pixels that it would take.
+    /// The cost of cutting a match in, and the pixels that it would take; none where it would cost more than `bound`.
     pub(super) fn cut(
         &self,
-        canvas: &Canvas<'_>,
         index: &Index,
         found: &Match,
-        to: [usize; 2],
         paper: bool,
+        bound: f64,
+        stitcher: &mut Stitcher<2>,
         monitor: &Monitor,
-    ) -> Result<(f64, Vec<bool>)> {
-        let [rows, columns] = self.shape;
+    ) -> Result<Option<(f64, Vec<bool>)>> {
         if self.known.iter().all(|k| !k) {
-            return Ok((0.0, vec![true; rows * columns]));
+            return Ok(Some((0.0, vec![true; self.known.len()])));
         }
-        let [height, width] = canvas.grid.shape();
-        let wrap = canvas.grid.wrap();
-        // The rim is tied to what is there, except at the edges of the canvas and beside the hole.
-        let rim = |r: usize, c: usize| {
-            (r == 0 && (wrap[0] || to[0] > 0))
-                || (r == rows - 1 && (wrap[0] || to[0] + rows < height))
-                || (c == 0 && (wrap[1] || to[1] > 0))
-                || (c == columns - 1 && (wrap[1] || to[1] + columns < width))
-        };
-        let hole_beside = |r: usize, c: usize| {
-            (r > 0 && !self.known[(r - 1) * columns + c])
-                || (r + 1 < rows && !self.known[(r + 1) * columns + c])
-                || (c > 0 && !self.known[r * columns + c - 1])
-                || (c + 1 < columns && !self.known[r * columns + c + 1])
-        };
-        let core: Vec<bool> = (0..rows * columns)
-            .map(|i| {
-                let (r, c) = (i / columns, i % columns);
-                self.keep[i] || (self.known[i] && rim(r, c) && !hole_beside(r, c))
-            })
-            .collect();
         let new = copy(index, found, self.shape);
-        let everywhere = vec![true; rows * columns];
+        let border = self.border(&new);
+        if border > bound {
+            return Ok(None);
+        }
+        if self.core.iter().zip(&self.known).all(|(c, k)| c == k) {
+            return Ok(Some((border, self.known.iter().map(|k| !k).collect())));
+        }
+        let everywhere = vec![true; self.known.len()];
         let grid = Grid::new(self.shape, [false; 2])?;
         let mut overlap = Overlap::new(
             grid,
@@ -143,43 +135,65 @@ impl Window {
             &self.known,
             &everywhere,
         );
-        overlap.core_a = Some(&core);
+        overlap.core_a = Some(&self.core);
         if paper {
             overlap.cost = Cost::Difference;
         }
-        let cut = stitch::cut(&overlap, monitor)?;
-        Ok((cut.value + self.border(&new), cut.b))
+        let cut = stitcher.cut(&overlap, monitor)?;
+        Ok(Some((cut.value + border, cut.b)))
+    }
+
+    /// What a cut leaves as it is: pixels to keep, and the rim, which is tied to what is there, except at the edges of the
+    /// canvas and beside the hole.
+    fn tie(&mut self, canvas: &Canvas<'_>, to: [usize; 2]) {
+        let [rows, columns] = self.shape;
+        let [height, width] = canvas.grid.shape();
+        let wrap = canvas.grid.wrap();
+        let rim = |r: usize, c: usize| {
+            (r == 0 && (wrap[0] || to[0] > 0))
+                || (r == rows - 1 && (wrap[0] || to[0] + rows < height))
+                || (c == 0 && (wrap[1] || to[1] > 0))
+                || (c == columns - 1 && (wrap[1] || to[1] + columns < width))
+        };
+        let known = &self.known;
+        let hole_beside = |r: usize, c: usize| {
+            (r > 0 && !known[(r - 1) * columns + c])
+                || (r + 1 < rows && !known[(r + 1) * columns + c])
+                || (c > 0 && !known[r * columns + c - 1])
+                || (c + 1 < columns && !known[r * columns + c + 1])
+        };
+        for (i, core) in self.core.iter_mut().enumerate() {
+            let (r, c) = (i / columns, i % columns);
+            *core = self.keep[i] || (known[i] && rim(r, c) && !hole_beside(r, c));
+        }
+        self.ends.clear();
+        for i in 0..rows * columns {
+            let beside = [
+                (i % columns + 1 < columns, i + 1),
+                (i + columns < rows * columns, i + columns),
+            ];
+            for (_, j) in beside.into_iter().filter(|(inside, _)| *inside) {
+                if self.keep[i] && !known[j] {
+                    self.ends.push([i, j]);
+                } else if self.keep[j] && !known[i] {
+                    self.ends.push([j, i]);
+                }
+            }
+        }
     }
 
     /// What the seam between pixels to keep and the hole costs, which is in no overlap: beyond it nothing is known, so the
     /// difference is taken to be the same on both of its sides, and the new patch to show the gradient.
     fn border(&self, new: &[f32]) -> f64 {
-        let [rows, columns] = self.shape;
         let n = self.channels;
         let apart = |a: &[f32], i: usize, b: &[f32], j: usize| -> f32 {
             (0..n).map(|k| (a[i * n + k] - b[j * n + k]).abs()).sum()
         };
-        let pair = |i: usize, j: usize| -> f64 {
-            let (kept, hole) = if self.keep[i] { (i, j) } else { (j, i) };
-            if !self.keep[kept] || self.known[hole] {
-                return 0.0;
-            }
+        let cost = |&[kept, hole]: &[usize; 2]| {
             let difference = apart(&self.colours, kept, new, kept);
             f64::from(difference / (apart(new, kept, new, hole) + FLAT))
         };
-        let mut sum = 0.0;
-        for r in 0..rows {
-            for c in 0..columns {
-                let i = r * columns + c;
-                if c + 1 < columns {
-                    sum += pair(i, i + 1);
-                }
-                if r + 1 < rows {
-                    sum += pair(i, i + columns);
-                }
-            }
-        }
-        sum
+        self.ends.iter().fold(0.0, |sum, pair| sum + cost(pair))
     }
 
     /// Pastes the pixels taken; returns those that were holes.

@@ -39,6 +39,7 @@ impl Index {
             separation: (pick.separation / 2).max(1),
             ratio: f64::INFINITY,
         };
+        // No place comes twice: proposals are more than a pixel apart. The most promising come first, which bounds the others.
         let mut places = Vec::new();
         for m in half.good(&smaller, &proposals, monitor)? {
             let of = &self.exemplars[m.exemplar];
@@ -55,8 +56,6 @@ impl Index {
                 }
             }
         }
-        places.sort_unstable();
-        places.dedup();
         if places.is_empty() {
             return self.best(query, pick, monitor);
         }

@@ -14,6 +14,7 @@ mod half;
 mod maps;
 mod score;
 
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, OnceLock};
 
 use crate::par::{self, Monitor};
@@ -319,10 +320,19 @@ impl Index {
                 return Err(Error::value("candidates", message));
             }
         }
+        // What is too dear next to any other is none of the matches, however dear. Bits of numbers that are not negative
+        // are ordered as they are.
+        let least = AtomicU64::new(f64::INFINITY.to_bits());
         let mut all = par::map(candidates.len(), |i| {
             let [exemplar, row, column] = candidates[i];
             let e = &self.exemplars[exemplar];
-            let cost = prepared.cost(&e.data, e.shape, [row, column]);
+            let bound = if pick.ratio.is_finite() {
+                pick.ratio * f64::from_bits(least.load(Ordering::Relaxed))
+            } else {
+                f64::INFINITY
+            };
+            let cost = prepared.cost_within(&e.data, e.shape, [row, column], bound);
+            least.fetch_min(cost.to_bits(), Ordering::Relaxed);
             Match {
                 cost,
                 exemplar,

@@ -2,7 +2,7 @@
 
 use super::CHUNK;
 use crate::par;
-use crate::poisson::wide::wide;
+use crate::poisson::wide::wide_fn;
 
 /// What lies beyond one side of a grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,6 +26,9 @@ pub(super) struct Level {
     /// 0 at what is not free, as are the reciprocals.
     diagonal: Vec<f32>,
     reciprocal: Vec<f32>,
+    /// Where the diagonal is the same at all that is free, as it is at the given resolution: what is free. A byte a pixel, in
+    /// place of eight, is what each pass has to read.
+    open: Option<Vec<u8>>,
     /// The part of the diagonal that ties a pixel to fixed ones.
     tied: Vec<f32>,
     screening: f32,
@@ -54,6 +57,7 @@ impl Level {
             sides,
             diagonal: Vec::new(),
             reciprocal: Vec::new(),
+            open: None,
             tied: Vec::new(),
             screening,
         };
@@ -82,6 +86,8 @@ impl Level {
         });
         level.tied = tied;
         level.finish(&open);
+        // Links and ties are four.
+        level.open = Some(open.iter().map(|&o| u8::from(o > 0.0)).collect());
         level
     }
 
@@ -174,15 +180,22 @@ impl Level {
 
     /// Calls `f(row, samples)` for each row of `data`, margins left out, then fills the margins.
     pub(super) fn each_row(&self, data: &mut [f32], f: impl Fn(usize, &mut [f32]) + Sync + Send) {
+        self.each_chunk(data, |first, out| {
+            for (r, row) in out.chunks_exact_mut(self.stride()).enumerate() {
+                f(first + r, &mut row[1..=self.columns]);
+            }
+        });
+    }
+
+    /// Calls `f(first row, rows with their margins)` for each chunk of `data`, then fills the margins.
+    fn each_chunk(&self, data: &mut [f32], f: impl Fn(usize, &mut [f32]) + Sync + Send) {
         let (stride, rows) = (self.stride(), self.chunk());
         let inner = &mut data[stride..][..self.rows * stride];
         par::chunks_mut(inner, rows * stride, |chunk, out| {
-            wide(|| {
-                for (r, row) in out.chunks_exact_mut(stride).enumerate() {
-                    f(chunk * rows + r, &mut row[1..=self.columns]);
-                    self.ends(row);
-                }
-            });
+            f(chunk * rows, out);
+            for row in out.chunks_exact_mut(stride) {
+                self.ends(row);
+            }
         });
         let last = self.rows * stride;
         match self.sides[0] {
@@ -229,44 +242,64 @@ impl Level {
         std::mem::swap(x, other);
     }
 
-    /// The first relaxation of nothing.
-    pub(super) fn begin(&self, v: &mut Vectors, step: f32) {
+    /// Two relaxations of nothing.
+    pub(super) fn begin(&self, v: &mut Vectors, steps: [f32; 2]) {
         let Vectors { x, b, .. } = v;
+        if self.open.is_some() {
+            // The first one is a multiple of the right-hand side, which need not be kept.
+            let first = steps[0] * self.same()[1];
+            return self.each_row(x, |r, out| self.second(r, b, first, steps[1], out));
+        }
         self.each_row(x, |r, x| {
             let at = self.at(r, 0);
             let terms = b[at..].iter().zip(&self.reciprocal[at..]);
             for (x, (b, d)) in x.iter_mut().zip(terms) {
-                *x = step * d * b;
+                *x = steps[0] * d * b;
             }
         });
+        self.relax(v, steps[1]);
     }
 
     /// The right-hand side of the coarser level: what `x` leaves over.
-    pub(super) fn restrict(&self, v: &mut Vectors, next: &Level, coarse: &mut [f32]) {
-        let Vectors { x, other, b } = v;
-        self.each_row(other, |r, out| self.row::<LACK>(r, x, b, 0.0, out));
-        // What lies beyond the last of an odd number counts as nothing.
-        let stride = self.stride();
-        if self.rows % 2 == 1 {
-            other[(self.rows + 1) * stride..].fill(0.0);
-        }
-        if self.columns % 2 == 1 {
-            for row in other.chunks_exact_mut(stride) {
-                row[self.columns + 1..].fill(0.0);
+    pub(super) fn restrict(&self, v: &Vectors, next: &Level, coarse: &mut [f32]) {
+        let (n, stride) = (self.columns, self.stride());
+        let odd = [self.rows % 2 == 1, n % 2 == 1];
+        // Row `i - 1` of what is left over, with its margins. What lies beyond the last of an odd number counts as nothing.
+        let lack = |i: usize, line: &mut [f32]| {
+            let last = self.rows;
+            let row = match (i, self.sides[0]) {
+                (0, [Side::Fixed, _]) => None,
+                (0, [Side::Mirror, _]) => Some(0),
+                (0, [Side::Wrap, _]) => Some(last - 1),
+                (i, _) if i <= last => Some(i - 1),
+                _ if odd[0] => None,
+                (_, [Side::Wrap, _]) => Some(0),
+                (_, [_, Side::Mirror]) => Some(last - 1),
+                _ => None,
+            };
+            let Some(row) = row else {
+                return line.fill(0.0);
+            };
+            self.row::<LACK>(row, &v.x, &v.b, 0.0, &mut line[1..=n]);
+            self.ends(line);
+            if odd[1] {
+                line[n + 1..].fill(0.0);
             }
-        }
-        let other = &*other;
-        next.each_row(coarse, |r, out| {
-            let row = |k: usize| &other[(2 * r + k) * stride..][..stride];
-            let (outer, inner) = (row(0).iter().zip(row(3)), row(1).iter().zip(row(2)));
-            let line: Vec<f32> = outer
-                .zip(inner)
-                .map(|((a, d), (b, c))| TAPS[0] * (a + d) + TAPS[1] * (b + c))
-                .collect();
-            let (pairs, _) = line.as_chunks::<2>();
-            for (out, pair) in out.iter_mut().zip(pairs.windows(2)) {
-                let [[a, b], [c, d]] = [pair[0], pair[1]];
-                *out = TAPS[0] * (a + d) + TAPS[1] * (b + c);
+        };
+        next.each_chunk(coarse, |first, out| {
+            // Each row is used twice, and is made once.
+            let mut lines: [Vec<f32>; 4] = std::array::from_fn(|_| vec![0.0; stride]);
+            let mut joined = vec![0.0f32; stride];
+            for (r, out) in out.chunks_exact_mut(next.stride()).enumerate() {
+                let made = if r == 0 { 0 } else { 2 };
+                if r > 0 {
+                    lines.rotate_left(2);
+                }
+                for (k, line) in lines.iter_mut().enumerate().skip(made) {
+                    lack(2 * (first + r) + k, line);
+                }
+                let [a, b, c, d] = &lines;
+                join([a, b, c, d], &mut joined, &mut out[1..=next.columns]);
             }
         });
     }
@@ -274,53 +307,147 @@ impl Level {
     /// Adds the coarser level's solution.
     pub(super) fn prolong(&self, next: &Level, coarse: &[f32], x: &mut [f32]) {
         let stride = next.stride();
-        self.each_row(x, |r, out| {
-            let row = |r: usize| &coarse[r * stride..][..stride];
-            let (near, far) = (row(r / 2 + 1), row(r / 2 + 2 * (r % 2)));
-            let near = near.iter().zip(far);
-            let line: Vec<f32> = near.map(|(n, f)| TAPS[1] * n + TAPS[0] * f).collect();
-            let free = &self.diagonal[self.at(r, 0)..][..out.len()];
-            let between = |from: &[f32], far: f32, free: f32| {
-                let add = TAPS[1] * from[1] + TAPS[0] * far;
-                if free > 0.0 { add } else { 0.0 }
-            };
-            let (pairs, single) = out.as_chunks_mut::<2>();
-            let (both, last) = free.as_chunks::<2>();
-            for ((out, free), from) in pairs.iter_mut().zip(both).zip(line.windows(3)) {
-                out[0] += between(from, from[0], free[0]);
-                out[1] += between(from, from[2], free[1]);
-            }
-            let from = line.windows(3).skip(pairs.len());
-            for ((out, free), from) in single.iter_mut().zip(last).zip(from) {
-                *out += between(from, from[0], *free);
+        self.each_chunk(x, |first, out| {
+            let mut line = vec![0.0; stride];
+            for (r, out) in (first..).zip(out.chunks_exact_mut(self.stride())) {
+                let row = |r: usize| &coarse[r * stride..][..stride];
+                let (near, far) = (row(r / 2 + 1), row(r / 2 + 2 * (r % 2)));
+                let free = &self.diagonal[self.at(r, 0)..][..self.columns];
+                refine(near, far, &mut line, free, &mut out[1..=self.columns]);
             }
         });
     }
 
+    /// The diagonal of the given resolution and its reciprocal, where all of it is the same.
+    fn same(&self) -> [f32; 2] {
+        let diagonal = 4.0 + self.screening;
+        [diagonal, 1.0 / diagonal]
+    }
+
     /// One row of the operator.
-    #[inline(always)]
     fn row<const WHAT: u8>(&self, r: usize, x: &[f32], b: &[f32], step: f32, out: &mut [f32]) {
-        let (n, stride) = (out.len(), self.stride());
-        let start = self.at(r, 0);
-        let here = &x[start..][..n];
-        let (before, after) = (&x[start - 1..][..n], &x[start + 1..][..n]);
-        let (above, below) = (&x[start - stride..][..n], &x[start + stride..][..n]);
-        let diagonal = &self.diagonal[start..][..n];
-        let reciprocal = &self.reciprocal[start..][..n];
-        let b = &b[start..][..n];
+        let (n, start) = (out.len(), self.at(r, 0));
+        let (x, b) = (self.lines(r, x), &b[start..][..n]);
+        if let Some(open) = &self.open {
+            return operate_same::<WHAT>(x, b, self.same(), &open[start..][..n], step, out);
+        }
+        let coefficients = [&self.diagonal, &self.reciprocal].map(|data| &data[start..][..n]);
+        operate::<WHAT>(x, b, coefficients, step, out);
+    }
+
+    /// One row of a relaxation of `first` times the right-hand side, at the given resolution.
+    fn second(&self, r: usize, b: &[f32], first: f32, step: f32, out: &mut [f32]) {
+        if let Some(open) = &self.open {
+            let open = &open[self.at(r, 0)..][..out.len()];
+            relax_multiple(self.lines(r, b), first, self.same()[1], open, step, out);
+        }
+    }
+
+    /// A row, and the pixels above, below, before and after it.
+    fn lines<'a>(&self, r: usize, data: &'a [f32]) -> [&'a [f32]; 5] {
+        let (start, stride) = (self.at(r, 0), self.stride());
+        [start, start - stride, start + stride, start - 1, start + 1]
+            .map(|from| &data[from..][..self.columns])
+    }
+}
+
+wide_fn! {
+    /// The operator where the diagonal is the same at all that is free.
+    fn operate_same<const WHAT: u8>(
+        x: [&[f32]; 5], b: &[f32], same: [f32; 2], open: &[u8], step: f32, out: &mut [f32],
+    ) {
+        let [diagonal, reciprocal] = same;
+        let n = out.len();
+        let ([here, above, below, before, after], b, open) = (x.map(|x| &x[..n]), &b[..n], &open[..n]);
         for i in 0..n {
             let around = (below[i] + above[i]) + (after[i] + before[i]);
-            let own = diagonal[i] * here[i];
-            let value = match WHAT {
-                PRODUCT => own - around,
-                LACK => b[i] + around - own,
-                _ => here[i] + step * (reciprocal[i] * (b[i] + around) - here[i]),
-            };
-            out[i] = if WHAT == RELAX || diagonal[i] > 0.0 {
-                value
-            } else {
-                0.0
-            };
+            let value = one::<WHAT>(here[i], around, b[i], diagonal, reciprocal, step);
+            out[i] = if open[i] > 0 { value } else { 0.0 };
+        }
+    }
+}
+
+wide_fn! {
+    /// The operator of a diagonal and its reciprocal.
+    fn operate<const WHAT: u8>(x: [&[f32]; 5], b: &[f32], coefficients: [&[f32]; 2], step: f32, out: &mut [f32]) {
+        let n = out.len();
+        let ([here, above, below, before, after], b) = (x.map(|x| &x[..n]), &b[..n]);
+        let [diagonal, reciprocal] = coefficients.map(|c| &c[..n]);
+        for i in 0..n {
+            let around = (below[i] + above[i]) + (after[i] + before[i]);
+            let value = one::<WHAT>(here[i], around, b[i], diagonal[i], reciprocal[i], step);
+            out[i] = if WHAT == RELAX || diagonal[i] > 0.0 { value } else { 0.0 };
+        }
+    }
+}
+
+/// The operator at one pixel.
+#[inline(always)]
+fn one<const WHAT: u8>(
+    here: f32,
+    around: f32,
+    b: f32,
+    diagonal: f32,
+    reciprocal: f32,
+    step: f32,
+) -> f32 {
+    let own = diagonal * here;
+    match WHAT {
+        PRODUCT => own - around,
+        LACK => b + around - own,
+        _ => here + step * (reciprocal * (b + around) - here),
+    }
+}
+
+wide_fn! {
+    /// A relaxation of `first` times the right-hand side.
+    fn relax_multiple(b: [&[f32]; 5], first: f32, reciprocal: f32, open: &[u8], step: f32, out: &mut [f32]) {
+        let n = out.len();
+        let ([here, above, below, before, after], open) = (b.map(|b| &b[..n]), &open[..n]);
+        for i in 0..n {
+            let x = |b: f32| first * b;
+            let around = (x(below[i]) + x(above[i])) + (x(after[i]) + x(before[i]));
+            let value = x(here[i]) + step * (reciprocal * (here[i] + around) - x(here[i]));
+            out[i] = if open[i] > 0 { value } else { 0.0 };
+        }
+    }
+}
+
+wide_fn! {
+    /// Four rows of what is left over become one of the coarser level.
+    fn join(lines: [&[f32]; 4], joined: &mut [f32], out: &mut [f32]) {
+        let n = joined.len();
+        let [a, b, c, d] = lines.map(|line| &line[..n]);
+        for i in 0..n {
+            joined[i] = TAPS[0] * (a[i] + d[i]) + TAPS[1] * (b[i] + c[i]);
+        }
+        let (pairs, _) = joined.as_chunks::<2>();
+        for (out, pair) in out.iter_mut().zip(pairs.windows(2)) {
+            let [[a, b], [c, d]] = [pair[0], pair[1]];
+            *out = TAPS[0] * (a + d) + TAPS[1] * (b + c);
+        }
+    }
+}
+
+wide_fn! {
+    /// Adds what two rows of the coarser level are between at a row.
+    fn refine(near: &[f32], far: &[f32], line: &mut [f32], free: &[f32], out: &mut [f32]) {
+        for (line, (n, f)) in line.iter_mut().zip(near.iter().zip(far)) {
+            *line = TAPS[1] * n + TAPS[0] * f;
+        }
+        let between = |from: &[f32], far: f32, free: f32| {
+            let add = TAPS[1] * from[1] + TAPS[0] * far;
+            if free > 0.0 { add } else { 0.0 }
+        };
+        let (pairs, single) = out.as_chunks_mut::<2>();
+        let (both, last) = free.as_chunks::<2>();
+        for ((out, free), from) in pairs.iter_mut().zip(both).zip(line.windows(3)) {
+            out[0] += between(from, from[0], free[0]);
+            out[1] += between(from, from[2], free[1]);
+        }
+        let from = line.windows(3).skip(pairs.len());
+        for ((out, free), from) in single.iter_mut().zip(last).zip(from) {
+            *out += between(from, from[0], *free);
         }
     }
 }

@@ -7,7 +7,7 @@
 
 mod level;
 
-use super::wide::wide;
+use super::wide::wide_fn;
 use super::{Domain, Edge};
 use crate::par::{self, Monitor};
 use crate::{Error, Result};
@@ -119,8 +119,7 @@ fn cycle(levels: &[Level], vectors: &mut [Vectors]) {
     else {
         return;
     };
-    level.begin(v, STEPS[0]);
-    level.relax(v, STEPS[1]);
+    level.begin(v, STEPS);
     let (Some(next), Some(w)) = (coarser.first(), below.first_mut()) else {
         for _ in 1..COARSEST {
             STEPS.iter().for_each(|&step| level.relax(v, step));
@@ -141,7 +140,7 @@ fn conjugate_gradients(
 ) -> Result<Vec<f32>> {
     let level = &levels[0];
     let [mut x, mut p, mut ap] = std::array::from_fn(|_| level.zeros());
-    let first = inner(level, &vectors[0].b, &vectors[0].b);
+    let [first] = inner(level, &vectors[0].b, [&vectors[0].b]);
     let (mut rz, mut alpha) = (0.0, 0.0);
     for step in 0..MAX_CYCLES {
         if first == 0.0 {
@@ -150,32 +149,30 @@ fn conjugate_gradients(
         monitor.check()?;
         cycle(levels, vectors);
         let Vectors { x: z, b: r, .. } = &mut vectors[0];
-        let previous = std::mem::replace(&mut rz, inner(level, r, z));
+        let [next, along] = inner(level, z, [&*r, &ap]);
+        let previous = std::mem::replace(&mut rz, next);
         let beta = if step == 0 {
             0.0
         } else {
-            (-alpha * inner(level, z, &ap) / previous) as f32
+            (-alpha * along / previous) as f32
         };
         level.each_row(&mut p, |r, p| {
-            let z = &z[level.at(r, 0)..];
-            p.iter_mut().zip(z).for_each(|(p, z)| *p = z + beta * *p);
+            turn(p, beta, &z[level.at(r, 0)..]);
         });
         level.apply(&p, &mut ap);
-        let curvature = inner(level, &p, &ap);
+        let [curvature] = inner(level, &p, [&ap]);
         if !(curvature > 0.0 && rz.is_finite()) {
             break;
         }
         alpha = rz / curvature;
         let length = alpha as f32;
         level.each_row(&mut x, |r, x| {
-            let p = &p[level.at(r, 0)..];
-            x.iter_mut().zip(p).for_each(|(x, p)| *x += length * p);
+            advance(x, length, &p[level.at(r, 0)..]);
         });
         level.each_row(r, |y, r| {
-            let ap = &ap[level.at(y, 0)..];
-            r.iter_mut().zip(ap).for_each(|(r, ap)| *r -= length * ap);
+            advance(r, -length, &ap[level.at(y, 0)..]);
         });
-        let left = inner(level, r, r);
+        let [left] = inner(level, r, [&*r]);
         if left <= TOLERANCE * TOLERANCE * first {
             return Ok(x);
         }
@@ -189,27 +186,50 @@ fn conjugate_gradients(
     ))
 }
 
-/// The dot product, without the margins.
-fn inner(level: &Level, a: &[f32], b: &[f32]) -> f64 {
+wide_fn! {
+    /// `p = z + beta p`.
+    fn turn(p: &mut [f32], beta: f32, z: &[f32]) {
+        p.iter_mut().zip(z).for_each(|(p, z)| *p = z + beta * *p);
+    }
+}
+
+wide_fn! {
+    /// `x += step p`.
+    fn advance(x: &mut [f32], step: f32, p: &[f32]) {
+        x.iter_mut().zip(p).for_each(|(x, p)| *x += step * p);
+    }
+}
+
+/// The dot products of one vector with others, without the margins.
+fn inner<const N: usize>(level: &Level, a: &[f32], others: [&[f32]; N]) -> [f64; N] {
     let rows = level.chunk();
     let parts = par::map(level.rows.div_ceil(rows), |chunk| {
-        wide(|| {
-            let mut lanes = [0.0f64; 8];
-            for r in chunk * rows..((chunk + 1) * rows).min(level.rows) {
-                let at = level.at(r, 0);
-                let (a, a_rest) = a[at..][..level.columns].as_chunks::<8>();
-                let (b, b_rest) = b[at..][..level.columns].as_chunks::<8>();
-                for (a, b) in a.iter().zip(b) {
-                    for l in 0..8 {
-                        lanes[l] += f64::from(a[l]) * f64::from(b[l]);
-                    }
-                }
-                for (lane, (a, b)) in lanes.iter_mut().zip(a_rest.iter().zip(b_rest)) {
-                    *lane += f64::from(*a) * f64::from(*b);
+        let mut lanes = [[0.0f64; 8]; N];
+        for r in chunk * rows..((chunk + 1) * rows).min(level.rows) {
+            let row = level.at(r, 0)..level.at(r, level.columns);
+            multiply::<N>(&a[row.clone()], others.map(|b| &b[row.clone()]), &mut lanes);
+        }
+        lanes.map(|lanes| lanes.iter().sum::<f64>())
+    });
+    std::array::from_fn(|k| parts.iter().map(|part| part[k]).sum())
+}
+
+wide_fn! {
+    /// Adds the products of one row with others.
+    fn multiply<const N: usize>(a: &[f32], others: [&[f32]; N], lanes: &mut [[f64; 8]; N]) {
+        for (lanes, b) in lanes.iter_mut().zip(others) {
+            let mut sums = *lanes;
+            let (a, a_rest) = a.as_chunks::<8>();
+            let (b, b_rest) = b.as_chunks::<8>();
+            for (a, b) in a.iter().zip(b) {
+                for l in 0..8 {
+                    sums[l] += f64::from(a[l]) * f64::from(b[l]);
                 }
             }
-            lanes.iter().sum::<f64>()
-        })
-    });
-    parts.iter().sum()
+            for (sum, (a, b)) in sums.iter_mut().zip(a_rest.iter().zip(b_rest)) {
+                *sum += f64::from(*a) * f64::from(*b);
+            }
+            *lanes = sums;
+        }
+    }
 }
