@@ -243,10 +243,12 @@ impl Index {
     fn level(&self, block: Block, layer: usize) -> Level {
         let shape = self.exemplars[block.exemplar].shape;
         let rows = self.plan.size[0].min(shape[0] - block.corner[0]);
-        let samples = || (0..rows).flat_map(|r| self.layer_row(block, layer, r));
-        let count = samples().count() as f64;
-        let mean = samples().sum::<f64>() / count;
-        let squares: f64 = samples().map(|x| (x - mean).powi(2)).sum();
+        let mut samples = Vec::new();
+        for r in 0..rows {
+            samples.extend(self.layer_row(block, layer, r));
+        }
+        let mean = samples.iter().sum::<f64>() / samples.len() as f64;
+        let squares: f64 = samples.iter().map(|x| (x - mean).powi(2)).sum();
         Level {
             mean,
             norm: 1.01 * squares.sqrt(),
@@ -447,7 +449,12 @@ fn tally<const C: usize>(data: &[f32], channels: usize, sum: &mut [f64], range: 
         for k in 0..n {
             let x = pixel[k];
             sum[k] += f64::from(x);
-            range[k] = [range[k][0].min(x), range[k][1].max(x)];
+            // Samples are numbers, for which a comparison is less work than `min` and `max`.
+            let [least, most] = range[k];
+            range[k] = [
+                if x < least { x } else { least },
+                if x > most { x } else { most },
+            ];
         }
     }
 }
