@@ -478,7 +478,10 @@ fn tally<const LANES: usize>(
     for l in 0..LANES {
         let k = l % channels;
         sum[k] += sums[l];
-        range[k] = [least(range[k][0], ranges[0][l]), most(range[k][1], ranges[1][l])];
+        range[k] = [
+            least(range[k][0], ranges[0][l]),
+            most(range[k][1], ranges[1][l]),
+        ];
     }
     let rest = if LANES > 0 { chunks.remainder() } else { data };
     for pixel in rest.chunks_exact(channels) {

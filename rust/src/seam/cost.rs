@@ -75,7 +75,14 @@ impl<'a, const C: usize> Pair<'a, C> {
     }
 
     /// [`Self::edge`] of the pixels from `s` on and those from `t` on, in plain loops that become wide instructions.
-    pub(super) fn edges(&self, cost: Cost, s: usize, t: usize, differences: &[f32], out: &mut [f32]) {
+    pub(super) fn edges(
+        &self,
+        cost: Cost,
+        s: usize,
+        t: usize,
+        differences: &[f32],
+        out: &mut [f32],
+    ) {
         let (n, len) = (self.channels(), out.len());
         let both = differences[s..][..len].iter().zip(&differences[t..][..len]);
         for (out, (s, t)) in out.iter_mut().zip(both) {

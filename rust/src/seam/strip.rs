@@ -88,7 +88,9 @@ pub fn cut(pasted: &Pasted<'_>, monitor: &Monitor) -> Result<Stitched> {
     let grid = grid(pasted)?;
     for (axis, costs) in costs.iter().enumerate() {
         runs(&grid, axis, |s, t, len| {
-            let ends = b[s..][..len].chunks(SIMILAR).zip(b[t..][..len].chunks(SIMILAR));
+            let ends = b[s..][..len]
+                .chunks(SIMILAR)
+                .zip(b[t..][..len].chunks(SIMILAR));
             for (i, (here, there)) in ends.enumerate().filter(|(_, (here, there))| here != there) {
                 let costs = &costs[s + i * SIMILAR..];
                 for ((here, there), &cost) in here.iter().zip(there).zip(costs) {
@@ -181,7 +183,10 @@ fn weigh<const C: usize>(pasted: &Pasted<'_>) -> Result<[Vec<f32>; 2]> {
         _ => pair.differences(),
     };
     // Not the place at once, so that the search takes many at a time.
-    if differences.iter().fold(false, |bad, d| bad | !d.is_finite()) {
+    if differences
+        .iter()
+        .fold(false, |bad, d| bad | !d.is_finite())
+    {
         let at = differences.iter().position(|d| !d.is_finite()).unwrap_or(0);
         return Err(Error::value(
             "a, b",

@@ -142,14 +142,22 @@ fn check(strip: &Strip<'_>) -> Result<()> {
 }
 
 /// The largest sum of costs along a straight seam or straight across it: no shortest path is longer.
-pub(super) fn longest<C: Copy, T>(columns: usize, across: &[C], along: &[C], value: impl Fn(C) -> T) -> T
+pub(super) fn longest<C: Copy, T>(
+    columns: usize,
+    across: &[C],
+    along: &[C],
+    value: impl Fn(C) -> T,
+) -> T
 where
     T: Copy + Default + PartialOrd + std::ops::Add<Output = T>,
 {
     let larger = |a: T, b: T| if b > a { b } else { a };
     let mut sums = vec![T::default(); columns];
     let mut longest = T::default();
-    for (across, along) in across.chunks_exact(columns).zip(along.chunks_exact(columns)) {
+    for (across, along) in across
+        .chunks_exact(columns)
+        .zip(along.chunks_exact(columns))
+    {
         for (sum, &cost) in sums[..columns - 1].iter_mut().zip(across) {
             *sum = *sum + value(cost);
         }
@@ -162,7 +170,13 @@ where
             }
         }
         let rest = rest.iter().map(|&cost| value(cost));
-        longest = larger(longest, lanes.into_iter().chain(rest).fold(T::default(), |a, b| a + b));
+        longest = larger(
+            longest,
+            lanes
+                .into_iter()
+                .chain(rest)
+                .fold(T::default(), |a, b| a + b),
+        );
     }
     sums.into_iter().fold(longest, larger)
 }
