@@ -142,12 +142,22 @@ def s5(made: Synthesis, least: float = 0.65) -> Found:
     )
 
 
+def has_period(profile: np.ndarray, period: int) -> bool:
+    """Tell whether a profile repeats after some steps, as a weave's does."""
+    if len(profile) < period + 8:
+        return False
+    near, far = (part - part.mean() for part in (profile[:-period], profile[period:]))
+    return float(near @ far) > 0.9 * float(np.linalg.norm(near) * np.linalg.norm(far)) > 0
+
+
 def s6(exemplar: np.ndarray, image: np.ndarray) -> Found:
     """No planes of the algorithm's own lattices show, and no speckle."""
-    seen = volume.lightness(image)
+    seen, own = volume.lightness(image), volume.lightness(exemplar)
     worst, beyond = 1.0, 0.0
-    for change in volume.seam_planes(seen):
+    for change, profile in zip(volume.seam_planes(seen), volume.seam_planes(own), strict=True):
         for period in (8, 16, 24, 32):
+            if has_period(profile, period):
+                continue  # Planes at which the texture itself changes tell nothing.
             # A lattice of the algorithm begins at its own planes; one of the texture itself, anywhere.
             combs = [change[first::period] for first in range(period)]
             over = [abs(float(np.log(max(comb.mean(), 1e-9) / change.mean()))) for comb in combs if len(comb)]

@@ -46,12 +46,13 @@ def test_held_values_stay_and_their_surroundings_agree(boxed, quality):
     np.testing.assert_array_equal(
         made.source.render(STRIPES, interpolation=made.report["interpolation"]), made.stages["composite"]
     )
-    free = texrs.solid(STRIPES, held.shape, seed=3, quality=quality).image
-    pasted = np.where(held[..., None], values, free)
-    assert edge(made.image, held) < 0.7 * edge(pasted, held)
+    # Layers that are grown without it may happen to go on as what is held does.
+    free = [texrs.solid(STRIPES, held.shape, seed=seed, quality=quality).image for seed in (1, 2, 3)]
+    pasted = [edge(np.where(held[..., None], values, image), held) for image in free]
+    assert edge(made.image, held) < 0.7 * np.mean(pasted)
     # The texture itself goes through what is held.
     off = np.abs(made.stages["composite"][held].astype(int) - values[held]).mean()
-    assert off < 0.5 * np.abs(free[held].astype(int) - values[held]).mean()
+    assert off < 0.5 * np.mean([np.abs(image[held].astype(int) - values[held]).mean() for image in free])
 
 
 def test_held_coordinates_stay_and_their_surroundings_agree(boxed):
@@ -62,8 +63,8 @@ def test_held_coordinates_stay_and_their_surroundings_agree(boxed):
     np.testing.assert_array_equal(made.source.coordinates[held], places[held])
     np.testing.assert_array_equal(made.image, made.stages["composite"])
     np.testing.assert_array_equal(made.image[held], values[held])
-    pasted = np.where(held[..., None], values, texrs.solid(STRIPES, held.shape, seed=3).image)
-    assert edge(made.image, held) < 0.8 * edge(pasted, held)
+    free = [texrs.solid(STRIPES, held.shape, seed=seed).image for seed in (1, 2, 3)]
+    assert edge(made.image, held) < 0.7 * np.mean([edge(np.where(held[..., None], values, i), held) for i in free])
 
 
 def test_held_pixels_of_pictures_and_of_labels():

@@ -226,7 +226,7 @@ def test_windows_look_as_far_as_their_frames() -> None:
     assert world.window_reach(to_fixed(None, here), 2) == 2
     assert world.window_reach(to_fixed(fields.slant(45, axes=2), here), 2) == 3
     assert world.window_reach(to_fixed(fields.constant([[3, 0], [0, 1]]), here), 2) == 6
-    assert world.blocks_reach(6, 2) == 26
+    assert world.blocks_reach(6, 2) == 32
 
 
 def test_the_source_map_knows_the_field_where_the_window_lies() -> None:
