@@ -89,7 +89,7 @@ impl<'a, const C: usize> Pair<'a, C> {
             *out = s + t;
         }
         if cost == Cost::Gradient {
-            let pixels = |x: &'a [f32], p: usize| x[p * n..][..len * n].chunks_exact(n);
+            let pixels = |x: &'a [f32], p: usize| x[p * n..][..len * n].chunks_exact(n.max(1));
             let a = pixels(self.a, s).zip(pixels(self.a, t));
             let b = pixels(self.b, s).zip(pixels(self.b, t));
             for (out, ((a_s, a_t), (b_s, b_t))) in out.iter_mut().zip(a.zip(b)) {

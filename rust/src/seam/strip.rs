@@ -280,5 +280,13 @@ mod tests {
             .is_err()
         );
         assert_eq!(cut(Pasted { axis: 0, ..pasted }).unwrap().edges, 1);
+        let bare = Pasted {
+            axis: 0,
+            channels: 0,
+            a: &[],
+            b: &[],
+            ..pasted
+        };
+        assert_eq!(cut(bare).unwrap().edges, 1);
     }
 }
