@@ -6,8 +6,8 @@
 The similarity sets are made beforehand. "cold": nothing else is kept; "cached": the factor and the texels' parts are. The
 system's side includes the margin. Other solvers get the same matrix, in turns with ours: SciPy's splu in its symmetric mode,
 and CHOLMOD where it is installed (pip install cvxopt; it is GPL, so a peer of this comparison and nothing else). "growth"
-analyses and splices ever larger pictures, each in a process of its own, whose peak of memory is told;
-there the similarity sets are part of a splice.
+analyses and splices ever larger pictures, of disjoint texels and a wall, each in a process of its own, whose peak of memory is
+told; there the similarity sets are part of a splice.
 """
 
 from __future__ import annotations
@@ -63,6 +63,7 @@ def forget() -> None:
     _splice_source._PARTS.clear()
     _splice_source._EXTENDED.clear()
     _splice_source._FOLDED.clear()
+    _splice_source._COUNTS.clear()
     _splice_layout._DIRECTIONS.clear()
     _splice_layout._LAYOUTS.clear()
     _splice_layout._REACHES.clear()
@@ -131,11 +132,11 @@ def warps() -> None:
 
 def grown(what: str, side: int) -> None:
     """Do one thing with a picture of a side, and tell how long that took and the most memory that was held."""
-    mine = entry("dots", side)
-    theirs = entry("pebbles", side) if what == "splice" else mine
+    mine = entry("bricks" if what == "wall" else "dots", side)
+    theirs = entry("pebbles", side) if what in ("splice", "wall") else mine
     middle = np.abs(mine.points - side / 2).sum(axis=1).argmin()
     before = resource.getrusage(resource.RUSAGE_SELF)
-    if what == "splice":
+    if what in ("splice", "wall"):
         texrs.splice(mine, theirs, seed=1)
     elif what == "similarity":
         mine.similarity()
@@ -152,7 +153,7 @@ if __name__ == "__main__":
     if words[:1] == ["grown"]:
         grown(words[1], int(words[2]))
     elif words[:1] == ["growth"]:
-        for work in ("analyse", "similarity", "splice"):
+        for work in ("analyse", "similarity", "splice", "wall"):
             for length in words[1:] or ["256", "512", "1024", "2048"]:
                 subprocess.run([sys.executable, __file__, "grown", work, length], check=True)
     else:

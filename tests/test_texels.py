@@ -14,6 +14,7 @@ from texrs import io, samples, texels, threads
 from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.matching import directions
 from texrs.texels import Texels, analyse
+from texrs.texels._clean import clean
 from texrs.texels._mixture import Mixture
 from texrs.texels._search import otsu
 
@@ -343,6 +344,23 @@ def test_pictures(entry: Texels) -> None:
     row, column = np.rint(entry.points[0]).astype(int)
     assert made["points"][row, column].tolist() == [255, 40, 40]
     np.testing.assert_array_equal(made["mask"][entry.mask], IMAGE[entry.mask])
+
+
+def test_what_the_border_cuts_is_no_ground() -> None:
+    mask = np.zeros((80, 80), bool)
+    points = np.array([[20.0, 20], [20, 50], [50, 20], [50, 50]])
+    rows, columns = np.indices(mask.shape)
+    for row, column in points:
+        mask |= (rows - row) ** 2 + (columns - column) ** 2 <= 64
+    ragged = np.zeros_like(mask)
+    ragged[70:, 30:34] = ragged[70:74, 30:50] = True
+    inner = np.zeros_like(mask)
+    inner[32:42, 66:69] = inner[32:35, 66:78] = True
+    found = clean(
+        mask | ragged | inner, points, np.ones(4), np.ones((80, 80), np.float32), mask[12:29, 12:29], (False, False)
+    )
+    assert len(found.points) == 4
+    assert (found.mask == mask | ragged).all()
 
 
 # --- real textures ---------------------------------------------------------------------------------------------------

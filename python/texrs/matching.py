@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import check_memory
 from texrs.errors import InvalidInput
 
 __all__ = ["Fold", "Layout", "directions", "fold_of", "match", "nearest", "spacing"]
@@ -22,6 +23,10 @@ Points = NDArray[np.float64]
 
 NEIGHBOURS = 5
 """k of the scale normalisation: the paper says between 4 and 6."""
+AROUND = 6
+"""Neighbours that tell how a layout goes on: fewer do not tell rows that are shifted from rows that are not."""
+INSIDE = 0.5
+"""Points farther from the outermost one along every axis than so many distances to the nearest are inner ones."""
 MERGE = 0.6
 """Points nearer than this, in spacings, that meet where a point set is folded are one."""
 PEAK, CLEAR = 1.3, 6.0
@@ -30,6 +35,12 @@ FINE, COARSE = 0.15, 0.8
 """Widths, in spacings, of the Gaussians that points are drawn as: lines show at the first, outlines at both."""
 WIDE_BINS = 64
 """Room at the ends for the wider ones."""
+DENSE = 1 << 20
+"""Pairs of a source and a target of which all are looked at."""
+NEAR = 64
+"""Of more pairs, so many sources a target, those nearest to it."""
+TIE = 1e-9
+"""What a later source costs more than the one before: of equal ones the first is taken."""
 
 
 def nearest(points: Points, count: int, among: Points | None = None) -> Points:
@@ -43,7 +54,7 @@ def nearest(points: Points, count: int, among: Points | None = None) -> Points:
 
 
 def spacing(points: Points, count: int = NEIGHBOURS) -> float:
-    """Give the median over points of the mean distance to the nearest ones: borders bias it less than the mean.
+    """Give the median over inner points of the mean distance to the nearest ones: borders bias it less than the mean.
 
     Examples
     --------
@@ -55,7 +66,15 @@ def spacing(points: Points, count: int = NEIGHBOURS) -> float:
     """
     if len(points) < 3:
         raise InvalidInput(f"points: a layout needs three or more, got {len(points)}")
-    return float(np.median(nearest(points, min(count, len(points) - 1)).mean(axis=1)))
+    far = nearest(points, min(count, len(points) - 1))
+    return float(np.median(far.mean(axis=1)[_inner(points, far)]))
+
+
+def _inner(points: Points, far: Points) -> NDArray[np.bool_]:
+    """Mark the points that are not the outermost, or all if there is no other: half of the neighbours of these are missing."""
+    rim = INSIDE * float(np.median(far[:, 0]))
+    found: NDArray[np.bool_] = ((points > points.min(axis=0) + rim) & (points < points.max(axis=0) - rim)).all(axis=1)
+    return found if found.any() else ~found
 
 
 def directions(points: Points, *, most: int = 3) -> tuple[float, ...]:
@@ -178,8 +197,9 @@ def fold_of(points: Points, axis: int, ends: tuple[float, float], *, wrap: bool,
     if wrap:
         return Fold(ends[0] - 0.5, ends[1] + 0.5, True)
     scale = spacing(points)
-    count = min(4, len(points) - 1)
-    inner = np.median(nearest(points, count), axis=0)
+    count = min(AROUND, len(points) - 1)
+    far = nearest(points, count)
+    inner = np.median(far[_inner(points, far)], axis=0)
     lines = []
     for sign in (-1, 1):
         x = sign * points[:, axis]
@@ -212,6 +232,10 @@ def _misfit(points: Points, axis: int, sign: int, line: float, scale: float, inn
     near = np.flatnonzero(x > line - scale)
     if len(near) == 0:
         return math.inf
+    # Those at the sides lack neighbours wherever the line is.
+    aside = kept[near, 1 - axis]
+    middle = (aside > aside.min() + 0.25 * scale) & (aside < aside.max() - 0.25 * scale)
+    near = near[middle] if middle.any() else near
     found = nearest(kept[near], len(inner) + 1, both)[:, 1:]
     return float(np.abs(found - inner).mean() + 1e-3 * abs(line - float(x.max())))
 
@@ -294,12 +318,51 @@ def match(source: Points, target: Points) -> tuple[NDArray[np.intp], float]:
     [2, 0]
 
     """
-    from scipy.optimize import linear_sum_assignment
-
     if len(source) < len(target):
         raise InvalidInput(f"source: needs a point for each of {len(target)} targets, got {len(source)}")
-    square = ((target[:, None] - source[None]) ** 2).sum(axis=-1)
-    rows, columns = linear_sum_assignment(square + 1e-9 * np.arange(len(source)))
-    of = np.empty(len(target), np.intp)
+    if len(source) * len(target) <= DENSE:
+        of = _assigned(((target[:, None] - source[None]) ** 2).sum(axis=-1))
+    else:
+        of = _assigned_near(source, target)
+    cost = ((target - source[of]) ** 2).sum(axis=-1)
+    return of, float(cost.mean()) if len(target) else 0.0
+
+
+def _assigned(square: Points) -> NDArray[np.intp]:
+    """Match rows with columns, every pair of which has a cost."""
+    from scipy.optimize import linear_sum_assignment
+
+    rows, columns = linear_sum_assignment(square + TIE * np.arange(square.shape[1]))
+    of = np.empty(len(square), np.intp)
     of[rows] = columns
-    return of, float(square[rows, columns].mean()) if len(target) else 0.0
+    return of
+
+
+def _assigned_near(source: Points, target: Points) -> NDArray[np.intp]:
+    """Match many targets, each with one of the sources near it.
+
+    A matching whose every pair is among the first half of the near ones is taken: were there a better one, it would reach
+    beyond the other half. All pairs would take memory and time as the square and the cube of their number.
+    """
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import min_weight_full_bipartite_matching
+    from scipy.spatial import cKDTree
+
+    tree, count = cKDTree(source), NEAR
+    while count < len(source):
+        far, near = tree.query(target, k=count)
+        # A cost of nothing would be no pair.
+        cost = 1 + far**2 + TIE * near
+        pairs = csr_array(
+            (cost.ravel(), near.ravel(), np.arange(len(target) + 1) * count), shape=(len(target), len(source))
+        )
+        try:
+            of = min_weight_full_bipartite_matching(pairs)[1]
+        except ValueError:
+            count *= 4  # Too few sources near some of them.
+            continue
+        if not (near[:, count // 2 :] == of[:, None]).any():
+            return np.asarray(of, np.intp)
+        count *= 2
+    check_memory(3 * 8 * len(source) * len(target))
+    return _assigned(((target[:, None] - source[None]) ** 2).sum(axis=-1))

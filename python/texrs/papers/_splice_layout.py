@@ -22,7 +22,18 @@ from texrs.papers._splice_edit import Step, edited
 from texrs.papers._splice_source import Extended, Memory, available, extend, parts_of
 from texrs.texels import Texels
 
-__all__ = ["Match", "apart", "edited_match", "matched", "snapped", "told", "trimmed", "void_of", "whole_shifts"]
+__all__ = [
+    "Match",
+    "apart",
+    "eased",
+    "edited_match",
+    "matched",
+    "snapped",
+    "told",
+    "trimmed",
+    "void_of",
+    "whole_shifts",
+]
 
 Points = NDArray[np.float64]
 
@@ -40,6 +51,9 @@ SHRUNK = 0.9
 """How far what is erased moves towards its middle."""
 OFFSETS, NEARER = 6, 0.9
 """Offsets of a connected figure's layout that are tried along each axis, and how much less one must cost."""
+EASE = {"F=c": 0.45, "B=c": 0.3}
+"""How much farther than its neighbour a texel of a connected figure goes at most, in sides of its box: nets give more than
+walls."""
 ROOM = 1.08
 """Least distance of texels in their diameters."""
 
@@ -243,6 +257,37 @@ def apart(a: Texels, found: Match, *, rounds: int = 12, room: float = 1.0) -> Ma
     return replace(found, targets=at)
 
 
+def eased(a: Texels, found: Match, *, rounds: int = 200) -> Match:
+    """Let neighbours in a connected figure differ in how far they go by no more than a share of a texel.
+
+    Each pair of neighbours that does is brought together, half by half, until none is left or the rounds are over.
+    """
+    from scipy.spatial import Delaunay, QhullError
+
+    start = found.source.points[found.of]
+    if len(start) < 4:
+        return found
+    try:
+        corners = Delaunay(start).simplices
+    except QhullError:  # all on a line
+        return found
+    edges = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
+    first, second = np.unique(edges, axis=0).T
+    limit = EASE[a.tag] * np.maximum(np.abs(start[second] - start[first]), np.array(a.box))
+    shift = found.shift
+    for _ in range(rounds):
+        apart = shift[second] - shift[first]
+        over = apart - np.clip(apart, -limit, limit)
+        if float(np.abs(over).max()) < 0.05:
+            break
+        total, count = np.zeros_like(shift), np.ones_like(shift)
+        for end, sign in ((first, 0.5), (second, -0.5)):
+            np.add.at(total, end, sign * over)
+            np.add.at(count, end, over != 0)
+        shift = shift + total / np.maximum(count - 1, 1)
+    return replace(found, targets=start + shift)
+
+
 def reaches(a: Texels, count: int = 32) -> Points:
     """Tell how far each texel reaches from its centre in so many directions, (n, count)."""
     parts = parts_of(a)
@@ -323,14 +368,15 @@ def told(found: Match) -> tuple[Bools, NDArray[np.float32]]:
     middle = source.points if still else np.concatenate([source.points, source.rest])
     shift = np.zeros((2, len(middle) + 1), np.float32)
     shift[:, 1:] = whole_shifts(found, middle).T
-    own = shift[:, number]
+    own = np.stack([along.take(number) for along in shift])
     if not still:
         idle = np.ones(len(middle) + 1, bool)
         idle[0] = False
         idle[found.of + 1] = False
-        gone = np.nonzero(idle[number])
-        centre = middle[number[gone] - 1] - source.origin
-        own[:, gone[0], gone[1]] += SHRUNK * (centre - np.stack(gone, axis=-1)).T
+        gone = np.flatnonzero(idle.take(number))
+        centre = (middle - source.origin).take(number.take(gone) - 1, axis=0)
+        for axis, at in enumerate(np.divmod(gone, number.shape[1])):
+            own[axis].ravel()[gone] += SHRUNK * (centre[:, axis] - at)
     return number > 0, own
 
 

@@ -211,6 +211,10 @@ def extend(entry: Texels, size: tuple[int, int], margin: int, *, whole: bool = T
 
 def available(entry: Texels, size: tuple[int, int], margin: int) -> int:
     """Count the texels that `extend` would find; of disjoint ones a few may lie over others."""
+    return _COUNTS.get(entry, (size, margin), lambda: _available(entry, size, margin))
+
+
+def _available(entry: Texels, size: tuple[int, int], margin: int) -> int:
     layout, first, last = _bounds(entry, size, margin, exact=False)
     of = layout.within(first.astype(np.float64), (last - 1).astype(np.float64))[1]
     return int(np.count_nonzero(parts_of(entry).whole[of])) if entry.tag == "F=d" else len(of)
@@ -344,5 +348,6 @@ def _nearest(place: Points) -> NDArray[np.intp]:
 
 
 _PARTS: Memory[Parts] = Memory(16)
+_COUNTS: Memory[int] = Memory(256)
 _FOLDED: Memory[Layout] = Memory(64)
 _EXTENDED: Memory[Extended] = Memory(4)

@@ -7,9 +7,10 @@ what is rigid and on which points are pinned, not on where they go, so its facto
 from __future__ import annotations
 
 import hashlib
+import math
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -20,7 +21,7 @@ from texrs._typing import Bools
 from texrs.errors import InvalidInput
 from texrs.kernels.sparse import Cholesky
 
-__all__ = ["STEP", "carried", "energy", "stretched"]
+__all__ = ["STEP", "carried", "coarseness", "energy", "stretched"]
 
 Points = NDArray[np.float64]
 
@@ -34,6 +35,8 @@ STEP = 2
 """Of the pixels between disjoint texels those are solved for whose row and column are multiples of this."""
 EVENED = 2
 """Rounds in which the ground between the pixels that it is solved for is made even."""
+MOST = 1 << 19
+"""Pixels of a connected figure beyond which those are solved for that are as many as can be, two, four, ... apart."""
 KEPT = 1 << 30
 """Bytes of factors that are kept."""
 
@@ -188,6 +191,9 @@ def stretched(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upright: b
     """
     if not len(pins):
         raise InvalidInput("a: has no texel in the picture to move")
+    whole, step = rigid.shape, coarseness(rigid.shape)
+    if step > 1:
+        rigid, pins = _thinned(rigid, step), pins // step
     shape = rigid.shape
     at = pins[:, 0] * shape[1] + pins[:, 1]
     out = np.empty((*shape, 2))
@@ -198,7 +204,32 @@ def stretched(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upright: b
         right = np.zeros(rigid.size)
         np.add.at(right, at, GOAL * shift[:, axis])
         out[..., axis] = made[keys[axis]].solve(right).reshape(shape)
-    return out
+    return out if step == 1 else _spread(out, whole, step)
+
+
+def coarseness(shape: Sequence[int]) -> int:
+    """Tell how many pixels apart those are that a connected figure is solved for."""
+    step = 1
+    while math.prod(-(-n // step) for n in shape) > MOST:
+        step *= 2
+    return step
+
+
+def _thinned(rigid: Bools, step: int) -> Bools:
+    """Give the cells of so many pixels that hold a rigid one: thin joints stay whole."""
+    wide = np.pad(rigid, [(0, -n % step) for n in rigid.shape])
+    return np.asarray(wide.reshape(wide.shape[0] // step, step, -1, step).any(axis=(1, 3)))
+
+
+def _spread(coarse: NDArray[np.float64], shape: Sequence[int], step: int) -> NDArray[np.float64]:
+    """Give the displacement of every pixel from those in the middle of cells."""
+    for axis, count in enumerate(shape):
+        at = np.clip((np.arange(count) - (step - 1) / 2) / step, 0, coarse.shape[axis] - 1)
+        low = np.minimum(at.astype(np.intp), max(coarse.shape[axis] - 2, 0))
+        high = np.minimum(low + 1, coarse.shape[axis] - 1)
+        share = (at - low).reshape([-1 if k == axis else 1 for k in range(3)])
+        coarse = coarse.take(low, axis) * (1 - share) + coarse.take(high, axis) * share
+    return coarse
 
 
 def energy(rigid: Bools, pins: NDArray[np.intp], axis: int, *, upright: bool, loose: float = LOOSE) -> Any:

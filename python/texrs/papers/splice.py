@@ -16,7 +16,8 @@ Departures, with their reasons:
   a third of the output is empty, and texels at its rim are missing.
 - There are more texels than targets; those that go nowhere are erased. As printed, point sets must have equal size. What is
   erased shrinks, and the ground around it closes in: else a fifth of the output is a hole.
-- Connected figures take the layout where their texels go least far: else walls are bent for nothing.
+- Connected figures take the layout where their texels go least far, and neighbours differ in how far they go by no more
+  than a share of a texel: else courses are torn where a layout has none.
 - Layouts grow until disjoint texels have room, and those that still collide are pushed apart: spacing alone makes chains.
 - Distances are squared in Eq. 4: the best matching then has no crossings.
 - Disjoint texels move whole, by whole pixels: Eq. 5 in the limit of its weights. The soft energy stretches components that
@@ -36,8 +37,8 @@ Departures, with their reasons:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -47,13 +48,14 @@ from texrs._arrays import as_seed, as_size
 from texrs._progress import stage
 from texrs._typing import Array, Bools, Progress
 from texrs.errors import InvalidInput
-from texrs.kernels.warp import from_points, mesh
 from texrs.matching import spacing
+from texrs.papers._splice_backward import Field, Warped, drawn, previewed, scattered
 from texrs.papers._splice_edit import as_steps
 from texrs.papers._splice_entry import as_texels
 from texrs.papers._splice_layout import (
     Match,
     apart,
+    eased,
     edited_match,
     matched,
     snapped,
@@ -66,7 +68,7 @@ from texrs.papers._splice_literal import literal_field, literal_fill, literal_ma
 from texrs.papers._splice_pictures import Stages
 from texrs.papers._splice_refine import Draft, fill, refined_places
 from texrs.papers._splice_source import parts_of
-from texrs.papers._splice_warp import STEP, carried, stretched
+from texrs.papers._splice_warp import STEP, carried, coarseness, stretched
 from texrs.report import Synthesis
 from texrs.source_map import SourceMap
 from texrs.texels import Texels
@@ -154,6 +156,8 @@ def splice(
         found = apart(mine, found)
     elif snap_rows:
         found = replace(found, targets=snapped(found.targets, 0.25 * spacing(found.targets)))
+    if method != "paper" and mine.tag != "F=d":
+        found = eased(mine, found)
     found = trimmed(mine, found, (shape[0], shape[1]))
     watch("match", 1.0)
     return made(
@@ -245,7 +249,7 @@ def made(
     elif method == "paper":
         warped = drawn(Field(*literal_field(a, found)), size, stage(watch, "warp"))
     elif listed and a.tag == "F=d":
-        warped = scattered(a, found, size)
+        warped = scattered(found, size)
     else:
         watch("deform", 0.0)
         field = deform(a, found)
@@ -263,6 +267,7 @@ def made(
     frame = frames_of(full.mirrored)
     source = SourceMap(places.astype(np.float32), np.zeros(size, np.uint16), label, frame, (shape,))
     image = source.render(a.image, interpolation="nearest")
+    step = STEP if a.tag == "F=d" else coarseness(found.source.mask.shape)
     report: dict[str, Any] = {
         "method": "splice",
         "seed": seed,
@@ -273,7 +278,7 @@ def made(
         "triangles": warped.triangles,
         "flipped": warped.flipped / max(warped.triangles, 1),
         "flipped_rigid": warped.flipped_rigid / max(warped.triangles, 1),
-        "system": [-(-n // STEP) if a.tag == "F=d" else n for n in found.source.mask.shape],
+        "system": [-(-n // step) for n in found.source.mask.shape],
         "matches": matches(a, found),
     }
     watch("done", 1.0)
@@ -293,22 +298,15 @@ def frames_of(mirrored: Bools) -> NDArray[np.float32] | None:
 # --- the deformation: section 4.2 ------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Field:
-    """The texture deformed: where its pixels go, what is rigid, and what is not drawn."""
-
-    target: NDArray[np.float64]
-    rigid: Bools
-    void: Bools
-
-
 def deform(a: Texels, found: Match) -> Field:
     """Move every pixel of the texture, as its tag says."""
     source = found.source
     shape, origin = source.mask.shape, np.array(source.origin)
     if a.tag == "F=d":
         delta = carried(*told(found))
-        return Field(moved(delta, source.origin), source.instance > 0, void_of(source, found.of))
+        # Ground beside what shrinks is drawn out over the place of that: a pixel of it less is a hole of many.
+        void = void_of(source, found.of, grown=int(source.own > 0))
+        return Field(moved(delta, source.origin), source.instance > 0, void)
     rigid = source.mask if a.tag == "F=c" else ~source.mask
     pins = np.rint(source.points[found.of]).astype(np.intp) - origin
     inside = ((pins >= 0) & (pins < np.array(shape))).all(axis=1)
@@ -323,83 +321,15 @@ def moved(delta: NDArray[np.float64], origin: tuple[int, int]) -> NDArray[np.flo
     return delta
 
 
-# --- the backward warp: Figure 6 -------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Warped:
-    """W_BA: the pixel of the extended texture behind each one of the output, and where there is one."""
-
-    there: NDArray[np.intp]
-    known: Bools
-    target: NDArray[np.float64]
-    triangles: int
-    flipped: int
-    flipped_rigid: int
-
-
-def drawn(field: Field, size: tuple[int, int], progress: Callable[[float], object] | None) -> Warped:
-    """Draw the dense mesh: the rows and columns of it that come into the output."""
-    seen = np.ones(field.rigid.shape, bool)
-    for axis in range(2):
-        seen &= (field.target[..., axis] > -2) & (field.target[..., axis] < size[axis] + 1)
-    part, first = (slice(None), slice(None)), (0, 0)
-    if seen.any():
-        (top, bottom), (left, right) = (np.flatnonzero(seen.any(axis=1 - a))[[0, -1]].tolist() for a in range(2))
-        first = (max(top - 1, 0), max(left - 1, 0))
-        part = (slice(first[0], bottom + 2), slice(first[1], right + 2))
-    found = mesh(field.target[part], field.rigid[part], void=field.void[part], size=size, progress=progress)
-    there = _pixels(found.source, field.rigid[part].shape) + first
-    return Warped(there, found.source.label > 0, field.target, found.triangles, found.flipped, found.flipped_heavy)
-
-
-def previewed(found: Match, size: tuple[int, int]) -> Warped:
-    """Draw triangles between the matched texels."""
-    source = found.source
-    origin = np.array(source.origin)
-    loose = from_points(source.points[found.of] - origin, found.targets, source.mask.shape, size=size)
-    target = np.moveaxis(np.indices(source.mask.shape), 0, -1) + origin * 1.0
-    return Warped(_pixels(loose, source.mask.shape), loose.label > 0, target, 0, 0, 0)
-
-
-def scattered(a: Texels, found: Match, size: tuple[int, int]) -> Warped:
-    """Draw the ground as triangles between the texels, and these whole above it: what moves stirs its neighbourhood alone."""
-    source = found.source
-    shape, origin = np.array(source.mask.shape), np.array(source.origin)
-    shift = whole_shifts(found)
-    rim = np.array([[y, x] for y in (0, shape[0] - 1) for x in (0, shape[1] - 1)], float)
-    start = np.concatenate([source.points - origin, rim])
-    end = np.concatenate([source.points + shift, rim + origin])
-    loose = from_points(start, end, (int(shape[0]), int(shape[1])), size=size)
-    below = _pixels(loose, source.mask.shape)
-    void = void_of(source, found.of)
-    ground = (source.instance == 0) & ~void
-    known = (loose.label > 0) & ground[below[..., 0], below[..., 1]]
-    moved = np.zeros((len(shift) + 1, 2), np.intp)
-    moved[1:] = shift
-    used = np.zeros(len(moved), bool)
-    used[found.of + 1] = True
-    pixels = np.argwhere(used[source.instance])
-    goal = pixels + origin + moved[source.instance[tuple(pixels.T)]]
-    seen = ((goal >= 0) & (goal < np.array(size))).all(axis=1)
-    there = below.copy()
-    there[tuple(goal[seen].T)] = pixels[seen]
-    known[tuple(goal[seen].T)] = True
-    target = np.moveaxis(np.indices(source.mask.shape), 0, -1) + origin + moved[source.instance] * 1.0
-    return Warped(there, known, target, 0, 0, 0)
-
-
-def _pixels(found: SourceMap, shape: tuple[int, ...]) -> NDArray[np.intp]:
-    """Give the nearest pixels, which lie inside."""
-    places = np.floor(found.coordinates + np.float32(0.5)).astype(np.intp)
-    return np.asarray(np.clip(places, 0, np.array(shape[:2]) - 1), np.intp)
+# --- what of it stays ------------------------------------------------------------------------------------------------
 
 
 def drafted(a: Texels, found: Match, warped: Warped, *, whole: bool) -> tuple[Draft, NDArray[np.uint32]]:
     """Read the warp as pixels of the texture: T_AB0, what of it stays, and the target of each pixel that moved ``whole``."""
     source, known = found.source, warped.known
     y, x = warped.there[..., 0], warped.there[..., 1]
-    places, mirrored = source.table[y, x], source.mirrored[y, x]
+    there = y * source.mask.shape[1] + x
+    places, mirrored = (v.reshape(-1, 2).take(there, axis=0) for v in (source.table, source.mirrored))
     stays = copied(places, mirrored, known)
     step = found.shift[0]
     if source.own and (found.shift == step).all():
@@ -410,20 +340,21 @@ def drafted(a: Texels, found: Match, warped: Warped, *, whole: bool) -> tuple[Dr
     if whole and a.tag == "F=d":
         goal = np.zeros(len(source.points) + 1, np.uint32)
         goal[found.of + 1] = np.arange(1, len(found.of) + 1)
-        number = source.instance[y, x]
-        label = np.where(known, goal[number], 0).astype(np.uint32)
+        number = source.instance.take(there)
+        label = np.where(known, goal.take(number), 0).astype(np.uint32)
         # Rims that the mesh draws out are no texels: what is rigid lies exactly where its texel goes.
         shift = np.zeros((2, len(goal)), np.intp)
         shift[:, 1:] = whole_shifts(found).T
         rows, columns = np.ogrid[: known.shape[0], : known.shape[1]]
-        here = (y + shift[0][number] == rows - source.origin[0]) & (x + shift[1][number] == columns - source.origin[1])
+        here = y + shift[0].take(number) == rows - source.origin[0]
+        here &= x + shift[1].take(number) == columns - source.origin[1]
         drawn_out = (number > 0) & ~here
         label[drawn_out] = 0
         known = known & ~drawn_out
         kinds = ((parts_of(a).region > 0) | a.mask).astype(np.uint8)
         return Draft(places, known, stays | (label > 0), kinds, np.zeros(known.shape, np.uint8), mirrored), label
     kinds = np.asarray(~a.mask if a.tag == "B=c" else a.mask).astype(np.uint8)
-    wanted = np.where(known, kinds[places[..., 0], places[..., 1]], 255).astype(np.uint8)
+    wanted = np.where(known, kinds.take(places[..., 0] * kinds.shape[1] + places[..., 1]), 255).astype(np.uint8)
     return Draft(places, known, stays | (known & (wanted == 1)), kinds, wanted, mirrored), label
 
 

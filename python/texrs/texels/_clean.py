@@ -116,7 +116,11 @@ def clean(
     table = np.array(kept, np.float64).reshape(-1, 4)
     names = {int(pieces[tuple(np.clip(np.rint(p[:2]).astype(int), 0, np.array(mask.shape) - 1))]) for p in table}
     used = np.isin(pieces, sorted(names - {0}))
-    left: Bools = mask & used
+    # What the border cuts may be no texel, but is no ground either.
+    rim = [np.take(pieces, side, axis) for axis in range(2) if not wrap[axis] for side in (0, -1)]
+    cut = np.unique(np.concatenate(rim)) if rim else np.zeros(0, np.intp)
+    cut = cut[(cut > 0) & (area[cut] >= ADDED * usual) & (area[cut] <= SWOLLEN * usual)]
+    left: Bools = mask & (used | np.isin(pieces, cut))
     return Cleaned(table[:, :2].copy(), table[:, 2].copy(), table[:, 3].astype(np.intp), left, "cut")
 
 

@@ -48,12 +48,18 @@ pub fn correct<const D: usize>(
     frames: Frames<'_, D>,
     held: &[bool],
     kinds: Kinds<'_>,
-    places: &mut Vec<Place<D>>,
+    places: &mut [Place<D>],
     options: &Options,
     monitor: &Monitor,
 ) -> Result<()> {
     let points = region.grid.len();
     let samples = appearance.grid().len();
+    if points > u32::MAX as usize {
+        return Err(Error::value(
+            "region",
+            format!("{points} points are too many"),
+        ));
+    }
     for (argument, length, wanted) in [
         ("places", places.len(), points),
         ("held", held.len(), if held.is_empty() { 0 } else { points }),
@@ -161,42 +167,69 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
         }
     }
 
-    fn run(&self, places: &mut Vec<Place<D>>, monitor: &Monitor) -> Result<()> {
+    fn run(&self, places: &mut [Place<D>], monitor: &Monitor) -> Result<()> {
         let constant = match self.frames {
             Frames::Constant(frame) => Some(self.corners(&frame)),
             Frames::Dense(_) => None,
         };
-        let mut scratch = places.clone();
+        let classes = self.classes();
+        // The turn, counted from 1, in which each point last changed.
+        let mut changed = vec![0u32; places.len()];
         monitor.expect((self.options.passes << D) as u64);
         for turn in 0..self.options.passes << D {
-            let class = turn % (1 << D);
-            par::chunks_mut(&mut scratch, CHUNK, |chunk, scratch| {
+            let class = &classes[turn % (1 << D)];
+            let now = turn as u32 + 1;
+            let before = now.saturating_sub(1 << D);
+            let mut found = vec![[0; D]; class.len()];
+            par::chunks_mut(&mut found, CHUNK, |chunk, found| {
                 // Neighbours mostly share their frame.
                 let mut last = constant.map(|corners| (None, corners));
-                for (i, place) in scratch.iter_mut().enumerate() {
-                    let p = chunk * CHUNK + i;
-                    *place = places[p];
-                    if self.held.get(p).is_some_and(|&h| h) {
-                        continue;
-                    }
+                for (i, place) in found.iter_mut().enumerate() {
+                    let p = class[chunk * CHUNK + i] as usize;
                     let point = self.region.grid.point(p);
-                    let world = self.region.world(point);
-                    if !(0..D).all(|axis| world[axis] & 1 == bit::<D>(class, axis)) {
-                        continue;
-                    }
                     let frame = constant.is_none().then(|| self.frames.at(p));
                     let corners = match last {
                         Some((known, corners)) if known == frame => corners,
                         _ => self.corners(&self.frames.at(p)),
                     };
                     last = Some((frame, corners));
-                    *place = self.choose(places, p, point, &corners);
+                    // What a point chooses hangs on its neighbours alone: where none of them has changed since it last
+                    // chose, it would choose the same.
+                    let stirred = |corner: &Corner<D>| {
+                        self.region
+                            .step(point, corner.step)
+                            .is_some_and(|q| changed[q] >= before)
+                    };
+                    *place = if before == 0 || corners[..1 << D].iter().any(stirred) {
+                        self.choose(places, p, point, &corners)
+                    } else {
+                        places[p]
+                    };
                 }
             });
-            std::mem::swap(places, &mut scratch);
+            for (&p, &place) in class.iter().zip(&found) {
+                if places[p as usize] != place {
+                    places[p as usize] = place;
+                    changed[p as usize] = now;
+                }
+            }
             monitor.advance(1)?;
         }
         Ok(())
+    }
+
+    /// The points that may change, by their parities along the axes.
+    fn classes(&self) -> Vec<Vec<u32>> {
+        let mut classes = vec![vec![]; 1 << D];
+        for p in 0..self.region.grid.len() {
+            if self.held.get(p).is_some_and(|&h| h) {
+                continue;
+            }
+            let world = self.region.world(self.region.grid.point(p));
+            let class = (0..D).fold(0, |class, axis| 2 * class + (world[axis] & 1) as usize);
+            classes[class].push(p as u32);
+        }
+        classes
     }
 
     /// The neighbours phi / |phi|, phi = F d, on the lattice, for a frame J = F^-1.
