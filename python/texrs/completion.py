@@ -161,7 +161,7 @@ def complete(
             progress=lambda share: watch("complete", share),
         )
         places, count = pasted(places, filled.label, filled.source, filled.coordinates, flips), len(filled.source)
-    new = np.nonzero(places.label)
+    new = _where(places.label)
     # What is kept maps to itself; of patches every coordinate is whole.
     result = pictures[0].copy()
     if method == "optimise":
@@ -276,6 +276,11 @@ def grown(mask: Bools, width: int, wrap: Sequence[bool]) -> Bools:
     return mask
 
 
+def _where(marked: Array) -> tuple[NDArray[np.intp], ...]:
+    """Give the places of what is not zero, as `np.nonzero`, which looks at each axis apart, in a tenth of its time."""
+    return np.unravel_index(np.flatnonzero(marked), marked.shape)
+
+
 def pasted(
     kept: SourceMap,
     label: NDArray[np.int32],
@@ -284,7 +289,7 @@ def pasted(
     flips: Sequence[Flip],
 ) -> SourceMap:
     """Give the map of a picture in which patches are pasted: those of the last exemplar, each in one of its mirrors."""
-    new = np.nonzero(label >= 0)
+    new = _where(label >= 0)
     places, exemplar = kept.coordinates.copy(), kept.exemplar.copy()
     which, found = origin[label[new]], coordinates[new]
     rows, columns = kept.shapes[-1]

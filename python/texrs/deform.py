@@ -42,7 +42,14 @@ def mirrors(allowed: bool) -> list[Flip]:
 
 def flip(array: Array, axes: Flip) -> Array:
     """Mirror an image along its rows' axis, its columns' axis, or both."""
-    return np.ascontiguousarray(array[:: -1 if axes[0] else 1, :: -1 if axes[1] else 1])
+    flipped = array[:: -1 if axes[0] else 1, :: -1 if axes[1] else 1]
+    if array.ndim < 3 or not axes[1]:
+        return np.ascontiguousarray(flipped)
+    # Channel by channel: copies run along rows then, not along the few samples of a pixel.
+    out = np.empty(array.shape, array.dtype)
+    for channel in np.ndindex(array.shape[2:]):
+        out[:, :, *channel] = flipped[:, :, *channel]
+    return out
 
 
 def flip_coordinates(coordinates: Floats, axes: Flip, shape: tuple[int, int]) -> Floats:

@@ -243,10 +243,12 @@ impl Index {
     fn level(&self, block: Block, layer: usize) -> Level {
         let shape = self.exemplars[block.exemplar].shape;
         let rows = self.plan.size[0].min(shape[0] - block.corner[0]);
-        let samples = || (0..rows).flat_map(|r| self.layer_row(block, layer, r));
-        let count = samples().count() as f64;
-        let mean = samples().sum::<f64>() / count;
-        let squares: f64 = samples().map(|x| (x - mean).powi(2)).sum();
+        let mut samples = Vec::new();
+        for r in 0..rows {
+            samples.extend(self.layer_row(block, layer, r));
+        }
+        let mean = sum(&samples, |x| x) / samples.len() as f64;
+        let squares = sum(&samples, |x| (x - mean) * (x - mean));
         Level {
             mean,
             norm: 1.01 * squares.sqrt(),
@@ -411,6 +413,18 @@ fn order(a: &Match, b: &Match) -> std::cmp::Ordering {
         .then_with(|| (a.exemplar, a.row, a.column).cmp(&(b.exemplar, b.row, b.column)))
 }
 
+/// The sum of what is made of each value, some side by side.
+fn sum(values: &[f64], of: impl Fn(f64) -> f64) -> f64 {
+    let (chunks, rest) = values.as_chunks::<8>();
+    let mut lanes = [0.0; 8];
+    for chunk in chunks {
+        for (lane, &x) in lanes.iter_mut().zip(chunk) {
+            *lane += of(x);
+        }
+    }
+    lanes.iter().sum::<f64>() + rest.iter().map(|&x| of(x)).sum::<f64>()
+}
+
 /// Mean of each channel, and a power of two above all distances from it.
 fn moments(exemplars: &[Exemplar], channels: usize) -> (Vec<f64>, f64) {
     let mut mean = vec![0.0; channels];
@@ -418,8 +432,8 @@ fn moments(exemplars: &[Exemplar], channels: usize) -> (Vec<f64>, f64) {
     let mut count = 0;
     for e in exemplars {
         match channels {
-            1 => tally::<1>(&e.data, channels, &mut mean, &mut range),
-            3 => tally::<3>(&e.data, channels, &mut mean, &mut range),
+            1 => tally::<8>(&e.data, channels, &mut mean, &mut range),
+            3 => tally::<24>(&e.data, channels, &mut mean, &mut range),
             _ => tally::<0>(&e.data, channels, &mut mean, &mut range),
         }
         count += e.data.len() / channels;
@@ -438,16 +452,42 @@ fn moments(exemplars: &[Exemplar], channels: usize) -> (Vec<f64>, f64) {
     (mean, scale)
 }
 
-/// Adds samples to the sum of each channel, and widens its range; with `C` channels where that is known, so that they are
-/// summed side by side.
-fn tally<const C: usize>(data: &[f32], channels: usize, sum: &mut [f64], range: &mut [[f32; 2]]) {
-    let n = if C == 0 { channels } else { C };
-    let (sum, range) = (&mut sum[..n], &mut range[..n]);
-    for pixel in data.chunks_exact(n) {
-        for k in 0..n {
-            let x = pixel[k];
+/// Adds samples to the sum of each channel, and widens its range; `LANES` of them side by side, which are whole pixels, or a
+/// pixel at a time if 0: a sum alone would wait for each addition.
+fn tally<const LANES: usize>(
+    data: &[f32],
+    channels: usize,
+    sum: &mut [f64],
+    range: &mut [[f32; 2]],
+) {
+    // Samples are numbers, for which comparisons are less work than `min` and `max`.
+    let least = |a: f32, b: f32| if b < a { b } else { a };
+    let most = |a: f32, b: f32| if b > a { b } else { a };
+    let mut sums = [0.0f64; LANES];
+    let mut ranges = [[f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]];
+    let mut chunks = data.chunks_exact(if LANES == 0 { channels } else { LANES });
+    if LANES > 0 {
+        for chunk in &mut chunks {
+            for l in 0..LANES {
+                sums[l] += f64::from(chunk[l]);
+                ranges[0][l] = least(ranges[0][l], chunk[l]);
+                ranges[1][l] = most(ranges[1][l], chunk[l]);
+            }
+        }
+    }
+    for l in 0..LANES {
+        let k = l % channels;
+        sum[k] += sums[l];
+        range[k] = [
+            least(range[k][0], ranges[0][l]),
+            most(range[k][1], ranges[1][l]),
+        ];
+    }
+    let rest = if LANES > 0 { chunks.remainder() } else { data };
+    for pixel in rest.chunks_exact(channels) {
+        for (k, &x) in pixel.iter().enumerate() {
             sum[k] += f64::from(x);
-            range[k] = [range[k][0].min(x), range[k][1].max(x)];
+            range[k] = [least(range[k][0], x), most(range[k][1], x)];
         }
     }
 }

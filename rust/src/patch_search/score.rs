@@ -199,18 +199,27 @@ impl Prepared {
                 return unsafe { self.cost_avx2(data, shape, at, bound) };
             }
         }
-        self.cost_any(data, shape, at, bound)
+        self.cost_any(data, shape, at, bound, add)
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
     fn cost_avx2(&self, data: &[f32], shape: [usize; 2], at: [usize; 2], bound: f64) -> f64 {
-        self.cost_any(data, shape, at, bound)
+        self.cost_any(data, shape, at, bound, |lanes, p, w, s| {
+            add_avx2(lanes, p, w, s);
+        })
     }
 
     /// Lanes, their order and the absence of fused operations are part of the result.
     #[inline(always)]
-    fn cost_any(&self, data: &[f32], shape: [usize; 2], at: [usize; 2], bound: f64) -> f64 {
+    fn cost_any(
+        &self,
+        data: &[f32],
+        shape: [usize; 2],
+        at: [usize; 2],
+        bound: f64,
+        add: impl Fn(&mut [f64; LANES], &[f32], &[f32], &[f32]),
+    ) -> f64 {
         let width = self.shape[1] * self.channels;
         let mut lanes = [0.0f64; LANES];
         let rows = self.patch.chunks_exact(width);
@@ -224,19 +233,7 @@ impl Prepared {
             let start = ((at[0] + r) * shape[1] + at[1]) * self.channels;
             let samples = &data[start..][first..end];
             let (patch, weight) = (&patch[first..end], &weight[first..end]);
-            let (p, p_rest) = patch.as_chunks::<LANES>();
-            let (w, w_rest) = weight.as_chunks::<LANES>();
-            let (s, s_rest) = samples.as_chunks::<LANES>();
-            for ((p, w), s) in p.iter().zip(w).zip(s) {
-                for l in 0..LANES {
-                    let d = f64::from(p[l]) - f64::from(s[l]);
-                    lanes[l] += f64::from(w[l]) * (d * d);
-                }
-            }
-            for (l, ((&p, &w), &s)) in p_rest.iter().zip(w_rest).zip(s_rest).enumerate() {
-                let d = f64::from(p) - f64::from(s);
-                lanes[l] += f64::from(w) * (d * d);
-            }
+            add(&mut lanes, patch, weight, samples);
             // Sums only rise, rounded or not.
             if r % LOOK == LOOK - 1 && total(&lanes) > bound {
                 return f64::INFINITY;
@@ -245,6 +242,32 @@ impl Prepared {
         let cost = total(&lanes);
         if cost > bound { f64::INFINITY } else { cost }
     }
+}
+
+/// Adds the weighted squares of a row to the lanes.
+#[inline(always)]
+fn add(lanes: &mut [f64; LANES], patch: &[f32], weight: &[f32], samples: &[f32]) {
+    let (p, p_rest) = patch.as_chunks::<LANES>();
+    let (w, w_rest) = weight.as_chunks::<LANES>();
+    let (s, s_rest) = samples.as_chunks::<LANES>();
+    for ((p, w), s) in p.iter().zip(w).zip(s) {
+        for l in 0..LANES {
+            let d = f64::from(p[l]) - f64::from(s[l]);
+            lanes[l] += f64::from(w[l]) * (d * d);
+        }
+    }
+    for (l, ((&p, &w), &s)) in p_rest.iter().zip(w_rest).zip(s_rest).enumerate() {
+        let d = f64::from(p) - f64::from(s);
+        lanes[l] += f64::from(w) * (d * d);
+    }
+}
+
+/// Not inlined: among the branches around it the lanes would become registers of half the width.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+#[inline(never)]
+fn add_avx2(lanes: &mut [f64; LANES], patch: &[f32], weight: &[f32], samples: &[f32]) {
+    add(lanes, patch, weight, samples);
 }
 
 /// The sum of the lanes, in a fixed order.

@@ -38,7 +38,7 @@ pub(super) struct Pair<'a, const C: usize> {
     pub channels: usize,
 }
 
-impl<const C: usize> Pair<'_, C> {
+impl<'a, const C: usize> Pair<'a, C> {
     #[inline(always)]
     fn channels(&self) -> usize {
         if C == 0 { self.channels } else { C }
@@ -65,6 +65,40 @@ impl<const C: usize> Pair<'_, C> {
             }
         };
         plain + SHORTEST
+    }
+
+    /// [`Self::difference`] of all pixels.
+    pub(super) fn differences(&self) -> Vec<f32> {
+        let n = self.channels();
+        let pairs = self.a.chunks_exact(n).zip(self.b.chunks_exact(n));
+        pairs.map(|(a, b)| distance(a, b)).collect()
+    }
+
+    /// [`Self::edge`] of the pixels from `s` on and those from `t` on, in plain loops that become wide instructions.
+    pub(super) fn edges(
+        &self,
+        cost: Cost,
+        s: usize,
+        t: usize,
+        differences: &[f32],
+        out: &mut [f32],
+    ) {
+        let (n, len) = (self.channels(), out.len());
+        let both = differences[s..][..len].iter().zip(&differences[t..][..len]);
+        for (out, (s, t)) in out.iter_mut().zip(both) {
+            *out = s + t;
+        }
+        if cost == Cost::Gradient {
+            let pixels = |x: &'a [f32], p: usize| x[p * n..][..len * n].chunks_exact(n.max(1));
+            let a = pixels(self.a, s).zip(pixels(self.a, t));
+            let b = pixels(self.b, s).zip(pixels(self.b, t));
+            for (out, ((a_s, a_t), (b_s, b_t))) in out.iter_mut().zip(a.zip(b)) {
+                *out /= distance(a_s, a_t) + distance(b_s, b_t) + FLAT;
+            }
+        }
+        for out in out {
+            *out += SHORTEST;
+        }
     }
 }
 

@@ -4,12 +4,15 @@
 //! the exact minimum cut (see [`super::planar`]).
 
 use super::cost::{Cost, Pair, check_costs, check_len};
-use super::links;
 use super::planar::{LONGEST, Strip, least_seam, longest};
 use super::stitch::Stitched;
 use crate::grid::Grid;
 use crate::par::Monitor;
 use crate::{Error, Result};
+use std::borrow::Cow;
+
+/// Pixels that are looked at together for whether a seam parts any of them from others.
+const SIMILAR: usize = 64;
 
 /// Two images, and how they lie beside each other.
 #[derive(Debug, Clone, Copy)]
@@ -45,15 +48,15 @@ pub fn cut(pasted: &Pasted<'_>, monitor: &Monitor) -> Result<Stitched> {
         _ => weigh::<0>(pasted),
     }?;
     let [rows, columns] = pasted.shape;
-    let seam_costs = [&costs[1 - pasted.axis], &costs[pasted.axis]];
     // The solver's rows run along the seam.
-    let shape = [pasted.shape[1 - pasted.axis], pasted.shape[pasted.axis]];
-    let at = |p: usize| match pasted.axis {
-        1 => p,
-        _ => p % shape[1] * columns + p / shape[1],
+    let (shape, across, along) = match pasted.axis {
+        1 => ([rows, columns], Cow::from(&costs[1]), Cow::from(&costs[0])),
+        _ => {
+            let [across, along] = costs.each_ref().map(|c| transposed(c, pasted.shape));
+            ([columns, rows], Cow::from(across), Cow::from(along))
+        }
     };
-    let length = |axis: usize| move |p: usize| f64::from(seam_costs[axis][at(p)]);
-    let longest = longest(shape[0], shape[1], length(1), length(0));
+    let longest = longest(shape[1], &across, &along, f64::from);
     if !longest.is_finite() {
         return Err(Error::value(
             "penalty",
@@ -64,35 +67,58 @@ pub fn cut(pasted: &Pasted<'_>, monitor: &Monitor) -> Result<Stitched> {
     while longest * scale >= (LONGEST / 2) as f64 {
         scale *= 0.5;
     }
+    // No cost is longer than the longest line.
     let rounded = |costs: &[f32]| -> Vec<u32> {
-        let round = |c: f32| (f64::from(c) * scale + 0.5) as u32;
-        match pasted.axis {
-            1 => costs.iter().map(|&c| round(c)).collect(),
-            _ => (0..costs.len()).map(|p| round(costs[at(p)])).collect(),
-        }
+        let round = |&c: &f32| (f64::from(c) * scale + 0.5) as i32 as u32;
+        costs.iter().map(round).collect()
     };
     let strip = Strip {
         rows: shape[0],
         columns: shape[1],
         cyclic: pasted.cyclic,
-        across: &rounded(seam_costs[1]),
-        along: &rounded(seam_costs[0]),
+        across: &rounded(&across),
+        along: &rounded(&along),
     };
     let far = least_seam(&strip, monitor)?.far;
-    let mut b = vec![false; rows * columns];
-    for (p, far) in far.into_iter().enumerate() {
-        b[at(p)] = far;
-    }
+    let b = match pasted.axis {
+        1 => far,
+        _ => transposed(&far, shape),
+    };
     let (mut value, mut edges) = (0.0, 0);
+    let grid = grid(pasted)?;
     for (axis, costs) in costs.iter().enumerate() {
-        links(&grid(pasted)?, axis, |i, j| {
-            if b[i] != b[j] {
-                value += f64::from(costs[i]);
-                edges += 1;
+        runs(&grid, axis, |s, t, len| {
+            let ends = b[s..][..len]
+                .chunks(SIMILAR)
+                .zip(b[t..][..len].chunks(SIMILAR));
+            for (i, (here, there)) in ends.enumerate().filter(|(_, (here, there))| here != there) {
+                let costs = &costs[s + i * SIMILAR..];
+                for ((here, there), &cost) in here.iter().zip(there).zip(costs) {
+                    if here != there {
+                        value += f64::from(cost);
+                        edges += 1;
+                    }
+                }
             }
         });
     }
     Ok(Stitched { b, value, edges })
+}
+
+/// Rows as columns.
+fn transposed<T: Copy + Default>(values: &[T], [rows, columns]: [usize; 2]) -> Vec<T> {
+    /// Rows taken at a time, so that what is read stays in the cache.
+    const BAND: usize = 16;
+    let mut out = vec![T::default(); values.len()];
+    for top in (0..rows).step_by(BAND) {
+        let bottom = rows.min(top + BAND);
+        for (c, out) in out.chunks_exact_mut(rows).enumerate() {
+            for (r, out) in (top..bottom).zip(&mut out[top..bottom]) {
+                *out = values[r * columns + c];
+            }
+        }
+    }
+    out
 }
 
 fn grid(pasted: &Pasted<'_>) -> Result<Grid<2>> {
@@ -100,6 +126,27 @@ fn grid(pasted: &Pasted<'_>) -> Result<Grid<2>> {
         pasted.shape,
         std::array::from_fn(|axis| pasted.cyclic && axis != pasted.axis),
     )
+}
+
+/// Calls `f(p, q, n)` for runs of `n` points from `p` on whose next points along an axis lie from `q` on.
+fn runs(grid: &Grid<2>, axis: usize, mut f: impl FnMut(usize, usize, usize)) {
+    let [rows, columns] = grid.shape();
+    let closes = grid.wrap()[axis];
+    if axis == 0 {
+        let inner = (rows - 1) * columns;
+        f(0, columns, inner);
+        if closes && rows > 1 {
+            f(inner, 0, columns);
+        }
+        return;
+    }
+    for start in (0..grid.len()).step_by(columns) {
+        let last = start + columns - 1;
+        f(start, start + 1, columns - 1);
+        if closes && columns > 1 {
+            f(last, start, 1);
+        }
+    }
 }
 
 /// Costs of the edges along each axis.
@@ -130,8 +177,17 @@ fn weigh<const C: usize>(pasted: &Pasted<'_>) -> Result<[Vec<f32>; 2]> {
         b: pasted.b,
         channels: pasted.channels,
     };
-    let differences: Vec<f32> = (0..n).map(|p| pair.difference(p)).collect();
-    if let Some(at) = differences.iter().position(|d| !d.is_finite()) {
+    // No channels, no differences.
+    let differences = match pasted.channels {
+        0 => vec![0.0; n],
+        _ => pair.differences(),
+    };
+    // Not the place at once, so that the search takes many at a time.
+    if differences
+        .iter()
+        .fold(false, |bad, d| bad | !d.is_finite())
+    {
+        let at = differences.iter().position(|d| !d.is_finite()).unwrap_or(0);
         return Err(Error::value(
             "a, b",
             format!("not finite, or too far apart, at {:?}", grid.point(at)),
@@ -139,11 +195,14 @@ fn weigh<const C: usize>(pasted: &Pasted<'_>) -> Result<[Vec<f32>; 2]> {
     }
     let mut costs = [vec![0.0; n], vec![0.0; n]];
     for (axis, costs) in costs.iter_mut().enumerate() {
-        links(&grid, axis, |s, t| {
-            let cost = pair.edge(pasted.cost, s, t, differences[s] + differences[t]);
-            costs[s] = pasted
-                .penalty
-                .map_or(cost, |p| cost * (1.0 + 0.5 * (p[s] + p[t])));
+        runs(&grid, axis, |s, t, len| {
+            let costs = &mut costs[s..][..len];
+            pair.edges(pasted.cost, s, t, &differences, costs);
+            if let Some(penalty) = pasted.penalty {
+                for (k, cost) in costs.iter_mut().enumerate() {
+                    *cost *= 1.0 + 0.5 * (penalty[s + k] + penalty[t + k]);
+                }
+            }
         });
     }
     Ok(costs)
@@ -221,5 +280,13 @@ mod tests {
             .is_err()
         );
         assert_eq!(cut(Pasted { axis: 0, ..pasted }).unwrap().edges, 1);
+        let bare = Pasted {
+            axis: 0,
+            channels: 0,
+            a: &[],
+            b: &[],
+            ..pasted
+        };
+        assert_eq!(cut(bare).unwrap().edges, 1);
     }
 }

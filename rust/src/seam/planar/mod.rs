@@ -131,12 +131,7 @@ fn check(strip: &Strip<'_>) -> Result<()> {
     }
     crate::seam::cost::check_len("across", pixels, strip.across.len())?;
     crate::seam::cost::check_len("along", pixels, strip.along.len())?;
-    let longest = longest(
-        rows,
-        columns,
-        |p| u64::from(strip.across[p]),
-        |p| u64::from(strip.along[p]),
-    );
+    let longest = longest(columns, strip.across, strip.along, u64::from);
     if longest >= LONGEST {
         return Err(Error::value(
             "across, along",
@@ -147,31 +142,43 @@ fn check(strip: &Strip<'_>) -> Result<()> {
 }
 
 /// The largest sum of costs along a straight seam or straight across it: no shortest path is longer.
-pub(super) fn longest<T>(
-    rows: usize,
+pub(super) fn longest<C: Copy, T>(
     columns: usize,
-    across: impl Fn(usize) -> T,
-    along: impl Fn(usize) -> T,
+    across: &[C],
+    along: &[C],
+    value: impl Fn(C) -> T,
 ) -> T
 where
-    T: Copy + Default + PartialOrd + std::ops::AddAssign,
+    T: Copy + Default + PartialOrd + std::ops::Add<Output = T>,
 {
+    let larger = |a: T, b: T| if b > a { b } else { a };
     let mut sums = vec![T::default(); columns];
     let mut longest = T::default();
-    for r in 0..rows {
-        let mut row = T::default();
-        for (c, sum) in sums.iter_mut().enumerate() {
-            if c + 1 < columns {
-                *sum += across(r * columns + c);
+    for (across, along) in across
+        .chunks_exact(columns)
+        .zip(along.chunks_exact(columns))
+    {
+        for (sum, &cost) in sums[..columns - 1].iter_mut().zip(across) {
+            *sum = *sum + value(cost);
+        }
+        // Sums beside each other, for one alone waits for each addition.
+        let (chunks, rest) = along.as_chunks::<8>();
+        let mut lanes = [T::default(); 8];
+        for chunk in chunks {
+            for (sum, &cost) in lanes.iter_mut().zip(chunk) {
+                *sum = *sum + value(cost);
             }
-            row += along(r * columns + c);
         }
-        if row > longest {
-            longest = row;
-        }
+        let rest = rest.iter().map(|&cost| value(cost));
+        longest = larger(
+            longest,
+            lanes
+                .into_iter()
+                .chain(rest)
+                .fold(T::default(), |a, b| a + b),
+        );
     }
-    sums.into_iter()
-        .fold(longest, |m, s| if s > m { s } else { m })
+    sums.into_iter().fold(longest, larger)
 }
 
 #[cfg(test)]
