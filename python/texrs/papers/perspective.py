@@ -55,7 +55,7 @@ STEP = 1.25
 """From one size to the next, where the target goes beyond all of these."""
 SMALLEST, LARGEST = 1 / 8, 4.0
 """Sizes that copies may have."""
-PLENTY = 8.0
+PLENTY = 0.75
 """Samples of about the wanted scale for each point of the output at which the exemplar alone will do."""
 ALIKE = 0.1
 """Natural logarithm of a ratio of scales that are about the same."""
