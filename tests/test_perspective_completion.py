@@ -20,25 +20,36 @@ def hole_in(shape, *boxes):
     return hole
 
 
-def fill(image, hole, **options):
+def fill(image, hole, *, seed=1, **options):
     bare = np.where(hole[..., np.newaxis] if image.ndim == 3 else hole, 0, image).astype(image.dtype)
-    return texrs.complete(bare, hole, seed=1, **options)
+    return texrs.complete(bare, hole, seed=seed, **options)
 
 
 @pytest.mark.parametrize("method", ["patch", "optimise"])
-def test_texels_of_the_right_size_fill_the_hole(floor, method):
+def test_holes_are_filled_from_outside_them_without_a_seam(floor, method):
     image, scale = floor
     hole = hole_in(image.shape[:2], (40, 110, 45, 115))
     result = fill(image, hole, scale_map=np.where(hole, np.nan, scale).astype(np.float32), method=method)
     np.testing.assert_array_equal(result.image[~hole], image[~hole])
     assert result.report["scaled"]
-    inside = hole_in(image.shape[:2], (46, 104, 51, 109))
-    truth, seen, own = (np.log(m)[inside] for m in (scale, checks.wavelength(result.image), checks.wavelength(image)))
-    assert np.corrcoef(seen, truth)[0, 1] >= 0.95 * np.corrcoef(own, truth)[0, 1]
     assert 0.5 <= checks.seam(result.image, hole) / checks.seam(image, hole) <= 1.6
     # Nothing is taken from the hole.
     at = np.rint(result.source.coordinates[hole]).astype(int)
     assert not hole[at[:, 0], at[:, 1]].any()
+
+
+@pytest.mark.parametrize("method", ["patch", "optimise"])
+def test_texels_in_the_hole_grow_as_those_around_it(floor, method):
+    image, scale = floor
+    hole, inside = hole_in(image.shape[:2], (40, 110, 45, 115)), hole_in(image.shape[:2], (46, 104, 51, 109))
+    known = np.where(hole, np.nan, scale).astype(np.float32)
+
+    def agreement(picture):
+        return np.corrcoef(np.log(checks.wavelength(picture)[inside]), np.log(scale[inside]))[0, 1]
+
+    # A few texels fill the hole, so one filling tells little.
+    found = [agreement(fill(image, hole, seed=seed, scale_map=known, method=method).image) for seed in range(6)]
+    assert np.mean(found) >= 0.95 * agreement(image), found
 
 
 @pytest.mark.parametrize(
