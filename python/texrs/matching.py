@@ -341,8 +341,9 @@ def _assigned(square: Points) -> NDArray[np.intp]:
 def _assigned_near(source: Points, target: Points) -> NDArray[np.intp]:
     """Match many targets, each with one of the sources near it.
 
-    A matching whose every pair is among the first half of the near ones is taken: were there a better one, it would reach
-    beyond the other half. All pairs would take memory and time as the square and the cube of their number.
+    A matching whose every pair is among the first half of the near ones is taken: a better one would have to send a target
+    beyond the other half, which pays only where many others gain by it. All pairs would take memory and time as the square
+    and the cube of their number.
     """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import min_weight_full_bipartite_matching

@@ -276,8 +276,8 @@ def eased(a: Texels, found: Match, *, rounds: int = 200) -> Match:
     limit = EASE[a.tag] * np.maximum(np.abs(start[second] - start[first]), np.array(a.box))
     shift = found.shift
     for _ in range(rounds):
-        apart = shift[second] - shift[first]
-        over = apart - np.clip(apart, -limit, limit)
+        stretch = shift[second] - shift[first]
+        over = stretch - np.clip(stretch, -limit, limit)
         if float(np.abs(over).max()) < 0.05:
             break
         total, count = np.zeros_like(shift), np.ones_like(shift)
