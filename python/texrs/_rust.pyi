@@ -214,7 +214,7 @@ class Appearance:
         seed: int,
         guide: tuple[NDArray[int16], NDArray[int16], NDArray[uint16], NDArray[uint32]] | None,
         progress: Callable[[float], object] | None,
-    ) -> tuple[NDArray[int32], int, float]: ...
+    ) -> tuple[int, float]: ...
 
 def upsample(
     parents: NDArray[int32],
