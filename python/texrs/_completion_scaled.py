@@ -88,7 +88,9 @@ def optimised(
         settings=SETTINGS,
     )
     if not supply.free:
-        why = ("hole: leaves no part of the image that is free", "source: has no part that is large enough")[len(pictures) - 1]
+        why = ("hole: leaves no part of the image that is free", "source: has no part that is large enough")[
+            len(pictures) - 1
+        ]
         raise InvalidInput(f"{why} to copy from; method='patch' may find one")
     box = around(open_, AROUND << (count - 1), 1 << (count - 1), wrap)
     part = (slice(box[0], box[1]), slice(box[2], box[3]))

@@ -134,7 +134,9 @@ def complete(
     for name, choice in (("mirror", mirror), ("blend", blend)):
         if not isinstance(choice, bool | np.bool_):
             raise InvalidInput(f"{name}: needs True or False, got {choice!r}")
-    pictures, open_ = check_pictures(image, transparent(image) if isinstance(hole, str) and hole == "alpha" else hole, source)
+    pictures, open_ = check_pictures(
+        image, transparent(image) if isinstance(hole, str) and hole == "alpha" else hole, source
+    )
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
     cyclic, seed = as_wrap(wrap), as_seed(seed)
     width = as_int(rim, "rim", 0, 1024)
@@ -218,7 +220,9 @@ def transparent(image: object) -> Bools:
     """Give what is wholly transparent in a picture as its hole."""
     pixels = np.asarray(image)
     if pixels.ndim != 3 or pixels.shape[2] not in (2, 4):
-        raise InvalidInput(f"hole: 'alpha' needs an image with an alpha channel, got shape {pixels.shape}; or give a mask")
+        raise InvalidInput(
+            f"hole: 'alpha' needs an image with an alpha channel, got shape {pixels.shape}; or give a mask"
+        )
     hole: Bools = pixels[..., -1] == 0
     if not hole.any():
         raise InvalidInput("hole: nothing in the image is wholly transparent, so there is nothing to fill")
