@@ -329,7 +329,7 @@ SCRIPT = """
 import hashlib, texrs
 from texrs.blend import blend
 sample = texrs.samples.pebbles((96, 96)).image
-made = texrs.design(sample, 160, seed=4, tiles=1, poisson=None)
+made = texrs.design(sample, 160, seed=4, tiles=1, blend=None)
 parts = [blend(made.source, sample, wrap=True), blend(made.source, sample, wrap=(True, False), band=5)]
 print(hashlib.sha256(b"".join(p.tobytes() for p in parts)).hexdigest())
 """
@@ -389,12 +389,12 @@ def test_away_from_seams_differences_stay(designed):
     assert np.abs(shift).max() <= 5
 
 
-def test_poisson_can_be_left_out(designed):
+def test_blending_can_be_left_out(designed):
     sample, result = designed
-    plain = texrs.design(sample, 256, seed=5, tiles=2, poisson=None)
+    plain = texrs.design(sample, 256, seed=5, tiles=2, blend=None)
     np.testing.assert_array_equal(plain.image, plain.stages["composite"])
     np.testing.assert_array_equal(plain.stages["composite"], result.stages["composite"])
-    assert plain.report["poisson"] == 0
+    assert plain.report["blend"] == 0
     assert plain.report["seams"]["before"] == plain.report["seams"]["after"]
 
 
