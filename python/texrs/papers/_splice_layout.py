@@ -349,11 +349,12 @@ def void_of(source: Extended, of: NDArray[np.intp], grown: int = 1) -> Bools:
 
     used = np.zeros(len(source.points) + 1, bool)
     used[of + 1] = True
-    idle = (source.instance > 0) & ~used[source.instance]
+    taken = used.take(source.instance)
+    idle = (source.instance > 0) & ~taken
     # Of a picture that stays itself only what is taken out leaves a rim.
     gone = idle if source.own else idle | source.stray
-    wide = maximum_filter(gone.astype(np.uint8), 2 * grown + 1) > 0
-    return np.asarray((wide | source.stray) & ~used[source.instance])
+    wide = maximum_filter(gone.view(np.uint8), 2 * grown + 1).view(bool) if grown else gone
+    return np.asarray((wide | source.stray) & ~taken)
 
 
 def told(found: Match) -> tuple[Bools, NDArray[np.float32]]:
