@@ -369,7 +369,10 @@ def told(found: Match) -> tuple[Bools, NDArray[np.float32]]:
     middle = source.points if still else np.concatenate([source.points, source.rest])
     shift = np.zeros((2, len(middle) + 1), np.float32)
     shift[:, 1:] = whole_shifts(found, middle).T
-    own = np.stack([along.take(number) for along in shift])
+    # Where it is to be at once: copies of whole pictures cost more than what is computed here.
+    own = np.empty((2, *number.shape), np.float32)
+    for along, place in zip(shift, own, strict=True):
+        along.take(number, out=place, mode="clip")
     if not still:
         idle = np.ones(len(middle) + 1, bool)
         idle[0] = False

@@ -26,12 +26,13 @@ __all__ = ["Draft", "fill", "refined_places"]
 Places = NDArray[np.int32]
 Kinds = NDArray[np.uint8]
 
+BITS = ONE.bit_length() - 1
+"""Of places, after the point."""
 JITTER = 2.0
 """Pixels that places of what is not rigid are displaced by before they are corrected."""
 PASSES = 2
 WIDE = 1.0
 """A hole wider than so many spacings is filled with patches; less is grown over from its rim."""
-BITS = ONE.bit_length() - 1
 K, APART = 3, 0.05
 """Size of a similarity set, and how far apart its samples are, as a share of the shorter side."""
 

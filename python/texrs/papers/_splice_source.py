@@ -290,31 +290,38 @@ def _stamp(
         inside[tuple(slice(-int(f), -int(f) + int(n)) for f, n in zip(first, shape, strict=True))] = True
     order = np.argsort(parts.region, axis=None, kind="stable")
     begin = np.searchsorted(parts.region.ravel()[order], np.arange(len(parts.points) + 2))
-    limits = np.array(mask.shape)
-    kept = []
+    width, limits = mask.shape[1], np.array(mask.shape)
+    spots, centres = _nearest(places), _nearest(parts.points)
     wanted = parts.whole[of]
     wanted[:own] = True
-    for k in np.flatnonzero(wanted):
-        i = int(of[k])
-        flat = order[begin[i + 1] : begin[i + 2]]
-        pixels = np.stack(np.divmod(flat, shape[1]), axis=-1)
-        centre = parts.points[i]
-        away = pixels - _nearest(centre)
+    # Of each texel: its pixels, how far they lie from its centre, and the first and the last of these; copies share that.
+    shapes: dict[int, tuple[NDArray[np.intp], NDArray[np.intp]]] = {}
+    reach = np.zeros((2, len(parts.points), 2), np.intp)
+    for i in np.unique(of[wanted]).tolist():
+        pixels = np.stack(np.divmod(order[begin[i + 1] : begin[i + 2]], shape[1]), axis=-1)
+        away = pixels - centres[i]
         away -= np.where(entry.wrap, np.rint(away / shape).astype(np.intp) * shape, 0)
-        there = _nearest(places[k]) + away
-        if k >= own and ((there < 0).any() or (there >= limits).any()):
-            continue
-        y, x = there.T
-        free = instance[y, x] == 0
-        if k >= own and (np.count_nonzero(free) < 0.9 * len(free) or inside[y, x].any()):
+        shapes[i] = pixels, away @ (width, 1)
+        if len(away):
+            reach[:, i] = away.min(axis=0), away.max(axis=0)
+    beyond = ((spots + reach[0, of] < 0) | (spots + reach[1, of] >= limits)).any(axis=1)
+    beyond[:own] = False
+    number, shown_at, turned_at = instance.reshape(-1), table.reshape(-1, 2), mirrored.reshape(-1, 2)
+    kept = []
+    for k in np.flatnonzero(wanted & ~beyond).tolist():
+        i = int(of[k])
+        pixels, steps = shapes[i]
+        at = steps + (int(spots[k, 0]) * width + int(spots[k, 1]))
+        free = number.take(at) == 0
+        if k >= own and (np.count_nonzero(free) < 0.9 * len(free) or (own and inside.take(at).any())):
             continue
         kept.append(k)
         # Where its centre is in whole pixels from the texture's own.
-        places[k] = _nearest(places[k]) - _nearest(centre) + centre
-        instance[y[free], x[free]] = len(kept)
+        places[k] = spots[k] - centres[i] + parts.points[i]
+        number[at[free]] = len(kept)
         if flips[k].any():
-            table[y[free], x[free]] = pixels[free]
-            mirrored[y[free], x[free]] = False
+            shown_at[at[free]] = pixels[free]
+            turned_at[at[free]] = False
     stray = (turned | known | mask) & (instance == 0)
     # What no texel claims belongs to the picture as it is.
     stray &= ~inside
@@ -323,9 +330,9 @@ def _stamp(
     chosen = np.array(kept)
     shown = entry.mask[table[..., 0], table[..., 1]]
     pieces, count = label(stray)
-    at = np.nonzero(pieces)
-    area = np.bincount(pieces[at], minlength=count + 1)[1:]
-    rest = np.stack([np.bincount(pieces[at], a, minlength=count + 1)[1:] / area for a in at], axis=-1)
+    there = np.nonzero(pieces)
+    area = np.bincount(pieces[there], minlength=count + 1)[1:]
+    rest = np.stack([np.bincount(pieces[there], a, minlength=count + 1)[1:] / area for a in there], axis=-1)
     piece = np.where(stray, pieces + len(kept), instance).astype(np.int32)
     return Extended(
         (int(first[0]), int(first[1])),

@@ -125,13 +125,16 @@ def _between(coarse: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.
     """Give the pixels between those that are known at every other one."""
     out = coarse.astype(np.float32)
     for axis in range(2):
-        c = np.moveaxis(out, axis, 0)
-        fine = np.empty((shape[axis], c.shape[1]), np.float32)
+        sides = (shape[0], shape[1] if axis else out.shape[1])
+        whole = np.empty(sides, np.float32)
+        c, fine = (np.moveaxis(x, axis, 0) for x in (out, whole))
         fine[::2] = c
         fine[1::2] = c[: shape[axis] // 2]
-        fine[1:-1:2] = (c[:-1] + c[1:])[: len(fine[1:-1:2])] / 2
-        out = np.moveaxis(fine, 0, axis)
-    return np.ascontiguousarray(out)
+        between = fine[1:-1:2]
+        np.add(c[: len(between)], c[1 : len(between) + 1], out=between)
+        between /= 2
+        out = whole
+    return out
 
 
 def _even(field: NDArray[np.float32]) -> None:
