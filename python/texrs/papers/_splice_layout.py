@@ -199,12 +199,7 @@ def surroundings(a: Texels, size: tuple[int, int], unit: float, needed: float) -
     margin = MARGIN
     while available(a, size, math.ceil(margin * unit)) < needed and margin < WIDEST:
         margin *= 1.4
-    source = extend(a, size, math.ceil(margin * unit))
-    while len(source.points) < needed and margin < WIDEST:
-        # Those that would lie over others are left out.
-        margin *= 1.4
-        source = extend(a, size, math.ceil(margin * unit))
-    return source
+    return extend(a, size, math.ceil(margin * unit))
 
 
 def trimmed(a: Texels, found: Match, size: tuple[int, int]) -> Match:
