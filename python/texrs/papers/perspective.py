@@ -18,7 +18,9 @@ Departures, with their reasons:
   differ within a window; ratios of scales are what is seen, so logarithms are compared. The output's map stays as asked.
 - What is optimised are coordinates, so that the last word is a copy, not a weighted mean: nothing blurs.
 - A point changes for a drawn match only if that gains more than twice the exemplar's own spacing, and the start is balanced
-  for contrast. Both keep what is rare, which is what the histograms of Eq. 8 are for.
+  for contrast. Both keep what is rare.
+- The histograms of Eq. 8 are those of the exemplar's samples weighted to the target's scales, and what is in excess of them
+  becomes dearer from pass to pass, not for one alone (`texrs.supply`): colours differ by scale, and drift without it.
 - Resized copies of the exemplar add to the supply of a scale. A ramp finds only a strip of the exemplar for each of its
   rows, and repeats it; and what is larger or smaller than all of the exemplar is not there at all.
 
@@ -49,6 +51,8 @@ __all__ = ["perspective"]
 Method: TypeAlias = Literal["paper"] | None
 Sizes: TypeAlias = Literal["auto"] | bool | Sequence[float]
 
+SETTINGS = Settings(weights=(4.0, 1.5, 0.5), balance=0.2)
+"""Where texels of all sizes lie side by side, the wanted one must be chosen at the coarsest level: later ones hardly move."""
 FACTORS = (1.0, 0.8, 0.64, 1.25, 1.5625)
 """Sizes of the copies that add to the supply, the exemplar first."""
 STEP = 1.25
@@ -153,7 +157,7 @@ def perspective(
     if outside["share"] > 0 and strength > 0:
         warnings.warn(_sentence(outside, sizes), stacklevel=2)
     reached = (float(followed.min()), float(followed.max()))
-    supply = Supply.of(image, mine, sizes, wanted=reached, settings=Settings())
+    supply = Supply.of(image, mine, sizes, wanted=reached, settings=SETTINGS)
     grown = supply.grow(Region.whole(shape, closed), followed, strength=strength, seed=seed, progress=progress)
     source = supply.source(grown.places, shape)
     composite = source.render(exemplar, interpolation=interpolation)
