@@ -24,7 +24,9 @@ def test_texels_have_the_size_that_is_asked(floor, grown):
     rho, _ = checks.fidelity(result.image, target)
     wanted = {"ramp": 0.9, "wave": 0.9, "radial": 0.8}[name]
     assert rho >= min(wanted, 0.95 * ceiling[0])
-    assert 0.75 <= checks.discs(result.image, target)[1] <= 1.25
+    others = [texrs.perspective(*floor, 224, target=target, seed=seed) for seed in (2, 3)]
+    # Discs that meet count as one, so a single picture strays.
+    assert 0.75 <= np.mean([checks.discs(r.image, target)[1] for r in (result, *others)]) <= 1.25
 
 
 def test_it_chooses_by_scale(grown):
@@ -34,7 +36,7 @@ def test_it_chooses_by_scale(grown):
 def test_it_stays_sharp_keeps_its_colours_and_does_not_repeat(floor, grown):
     _, target, result = grown
     assert 0.9 <= checks.sharpness(*floor, result.image, target) <= 1.1
-    assert checks.colour_distance(*floor, result.image, target) <= 0.02
+    assert checks.colour_distance(*floor, result.image, target) <= 0.012
     assert checks.repetition(result.image) <= checks.repetition(floor[0]) + 0.15
 
 

@@ -25,8 +25,6 @@ BANDS = 12
 """Parts of the range of the wanted scales, within each of which the exemplar's samples count alike."""
 NARROWEST = 51
 """Least width of such a part, a tenth in the units of a guide's scales: a target may be constant."""
-LIMIT = 2.0
-"""Most that an excess counts in a pass, in even shares of a bin."""
 UNRELATED = 2 * 512**2
 """Cost of windows that have nothing to do with each other."""
 
@@ -69,7 +67,7 @@ class Balance:
         shown = self.tones[:, row * shape[1] + column]
         for tone, share, cost in zip(shown, self.shares, self.costs, strict=True):
             excess = np.bincount(tone, minlength=BINS) / len(row) - share
-            cost += step * np.clip(excess / np.maximum(share, 1 / BINS), -1, LIMIT)
+            cost += step * np.clip(excess / np.maximum(share, 1 / BINS), -1, 1)
 
     def onto(self, guide: Guide) -> Guide:
         """Let a guide ask for cheap colours, too: a cost is the square of a value of the sample, where points ask for 0."""
