@@ -48,10 +48,11 @@ MEANING = """
 rho, slope: rank correlation and slope of the logarithms of the evaluator's scale and the wanted one (>= 0.9 on a ramp and a
 wave, 0.8 on a hill, or 0.95 of the exemplar's own; slopes of 0.75 to 1.25 are wanted, but the evaluator's windows flatten
 waves and hills to a half, and foreshortened texels, whose areas go with S^3, steepen all: see `drawn` and `itself`);
-wavelength: rank correlation of the local wavelength; error: median of |log S_e(S(p)) - log S| (<= 0.08); sharp: mean gradient over the exemplar's at the
-same scales (0.9 to 1.1); colour: distance of quantiles from the exemplar's at the same scales (<= 0.012); rows: autocorrelation
-along rows, less the exemplar's (<= 0.15). Figures are means over the seeds; **bold** fails, and the last line counts. The first
-line of a texture is the exemplar's own; `drawn` are discs of the very sizes that are asked for.
+wavelength: rank correlation of the local wavelength; error: median of |log S_e(S(p)) - log S| (<= 0.08); sharp: mean gradient
+over the exemplar's at the same scales (0.9 to 1.1); colour: distance of quantiles from the exemplar's at the same scales (<=
+0.012); rows: autocorrelation along rows, less the exemplar's (<= 0.15). Figures are means over the seeds; **bold** fails, and
+the last line counts. The first line of a texture is the exemplar's own; `drawn` are discs of the very sizes that are asked
+for.
 """
 
 

@@ -13,8 +13,3 @@ def stage(progress: Progress | None, name: str) -> Callable[[float], object] | N
         return None
     progress(name, 0.0)  # Short work may be done before it is asked how far it is.
     return lambda share: progress(name, share)
-
-
-def part(advance: Callable[[float], object] | None, start: float, share: float) -> Callable[[float], object] | None:
-    """Give what a kernel may call that does a part of a stage, from its start on."""
-    return None if advance is None else lambda done: advance(min(1.0, start + share * done))

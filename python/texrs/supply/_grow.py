@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import log2
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import guidance
-from texrs._progress import part, stage
+from texrs._progress import stage
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.kernels.appearance import Appearance, Guide
 from texrs.kernels.pyramid import ONE, Region, halve, to_fixed, upsample
@@ -256,7 +256,7 @@ class Supply:
                     seed=(seed + 0x9E3779B97F4A7C15 * (number + 1)) % (1 << 64),
                     held=fixed,
                     guide=guide if balance is None else balance.onto(guide),
-                    progress=part(advance, first / passes, turns.step / passes),
+                    progress=_turn(advance, first / passes, turns.step / passes),
                 )
                 places = found.places
             if spacing > 1:  # The last one is the result.
@@ -301,6 +301,11 @@ class Supply:
         sizes = np.array([np.diag([1 / f for f in c.factor]) for c in self.copies], np.float32)
         frame = sizes if len(self.copies) > 1 else None
         return SourceMap(at.reshape(*shape, 2), np.zeros(shape, np.uint16), which.reshape(shape), frame, (self.shape,))
+
+
+def _turn(advance: Callable[[float], object] | None, start: float, share: float) -> Callable[[float], object] | None:
+    """Give what a kernel may call that does a part of a level's passes."""
+    return None if advance is None else lambda done: advance(min(1.0, start + share * done))
 
 
 def _at_level(
