@@ -119,7 +119,7 @@ def test_defaults_are_those_of_the_functions() -> None:
         ours = {p.name: p.default for p in command.params}
         ours["wrap"] = {"xy": (True, True), "none": False}[ours["wrap"]]
         for option, parameter in inspect.signature(function).parameters.items():
-            if option not in ("image", "hole", "source", "scale_map", "method", "progress"):
+            if option not in ("image", "hole", "source", "scale_map", "source_scale_map", "method", "progress"):
                 assert ours[option] == parameter.default, option
 
 

@@ -60,7 +60,7 @@ def test_holes_are_filled_by_scale(files):
         ("perspective @floor.png --scale @scale.npy -o @out.png --augment-scales big", "--augment-scales: needs auto"),
         ("perspective @floor.png --scale @scale.npy -o @out.png --wrap xy", "wrap"),
         ("perspective @floor.png --scale @scale.npy -o @out.png --scale-weight 99", "--scale-weight: needs a number"),
-        ("complete @floor.png alpha -o @out.png", "HOLE: alpha needs an image with an alpha channel"),
+        ("complete @floor.png alpha -o @out.png", "HOLE: 'alpha' needs an image with an alpha channel"),
         ("complete @floor.png @hole.png -o @out.png --method heal", "--method: allowed are 'patch' and 'optimise'"),
     ],
 )

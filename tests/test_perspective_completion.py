@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from skimage import data
 
 import perspective_checks as checks
 import texrs
@@ -76,6 +77,79 @@ def test_a_scale_map_that_is_measured(floor, method):
     np.testing.assert_array_equal(result.image[~hole], image[~hole])
 
 
+@pytest.mark.parametrize("method", ["patch", "optimise"])
+def test_a_second_picture_gives_texels_of_the_size_that_belongs_there(floor, method):
+    image, scale = floor
+    hole = hole_in(image.shape[:2], (40, 110, 45, 115))
+    # Another floor of the same kind, in which the other end is large.
+    other, theirs = (np.ascontiguousarray(a[::-1]) for a in checks.floor((170, 190), seed=3))
+    result = fill(image, hole, method=method, source=other, scale_map=scale, source_scale_map=theirs)
+    np.testing.assert_array_equal(result.image[~hole], image[~hole])
+    assert (result.source.exemplar == hole).all()
+    bare = np.where(hole[..., np.newaxis], 0, image).astype(np.uint8)
+    np.testing.assert_array_equal(result.source.render([bare, other], interpolation="cubic"), result.image)
+    frame = result.source.frame_array()
+    size = np.ones(image.shape[:2]) if frame is None else 1 / frame[result.source.label][..., 0, 0]
+    shown = result.source.render([scale, theirs], interpolation="linear") * size
+    wrong = np.abs(np.log(shown / scale))[hole]
+    plain = fill(image, hole, method=method, source=other)
+    without = np.abs(np.log(plain.source.render([scale, theirs], interpolation="linear") / scale))[hole]
+    assert np.median(wrong) < 0.12
+    assert np.median(wrong) < 0.7 * np.median(without)
+
+
+def test_a_source_from_the_front_is_resized(floor):
+    image, scale = floor
+    hole = hole_in(image.shape[:2], (20, 140, 45, 115))
+    flat, _ = checks.floor((160, 160), seed=3, span=(1, 1))
+    result = fill(image, hole, method="optimise", source=flat, scale_map=scale)
+    size = 1 / result.source.frame_array()[result.source.label][..., 0, 0]
+    assert np.corrcoef(np.log(size[hole]), np.log(scale[hole]))[0, 1] > 0.8
+
+
+def test_all_of_a_picture_from_another():
+    other, theirs = checks.floor((96, 96))
+    image, everything = np.zeros((64, 80, 3), np.uint8), np.ones((64, 80), bool)
+    ramp = np.linspace(0.7, 1.5, 64, dtype=np.float32)[:, np.newaxis].repeat(80, axis=1)
+    result = texrs.complete(
+        image, everything, source=other, scale_map=ramp, source_scale_map=theirs, method="optimise", blend=True
+    )
+    assert result.source.exemplar.all()
+    assert result.image.std() > 20
+
+
+def test_transparency_is_the_hole(floor):
+    image, _ = floor
+    hole = hole_in(image.shape[:2], (50, 90, 50, 100))
+    alpha = np.where(hole, 0, 255).astype(np.uint8)
+    result = texrs.complete(np.dstack([image, alpha]), "alpha", seed=1)
+    np.testing.assert_array_equal(result.image[..., :3], fill(image, hole).image)
+    assert (result.image[..., 3] == 255).all()
+    with pytest.raises(InvalidInput, match="hole: nothing in the image is wholly transparent"):
+        texrs.complete(result.image, "alpha")
+    with pytest.raises(InvalidInput, match="hole: needs bool or integers"):
+        texrs.complete(result.image, "beta")
+
+
+@pytest.mark.parametrize("method", ["patch", "optimise"])
+@pytest.mark.parametrize("box", [(40, 80, 45, 95), (0, 70, 60, 160)], ids=["inside", "corner"])
+def test_blending_takes_the_light_of_the_picture(method, box):
+    image = data.grass()[:160, :160]
+    hole = hole_in(image.shape, box)
+    dark = (data.grass()[200:360, 200:360] * 0.7).astype(np.uint8)
+    plain = fill(image, hole, method=method, source=dark)
+    light = fill(image, hole, method=method, source=dark, blend=True)
+    np.testing.assert_array_equal(light.image[~hole], image[~hole])
+    np.testing.assert_array_equal(light.stages["composite"], plain.image)
+    np.testing.assert_array_equal(light.source.coordinates, plain.source.coordinates)
+
+    def off(picture):
+        return abs(picture[hole].mean() - image[hole].mean())
+
+    assert off(light.image) < 0.75 * off(plain.image)
+    assert checks.seam(light.image, hole) < checks.seam(plain.image, hole)
+
+
 def test_any_array_and_the_same_bytes(floor):
     image, scale = floor
     hole = hole_in(image.shape[:2], (50, 90, 50, 100))
@@ -109,8 +183,22 @@ def test_an_output_that_wraps(floor):
         ({"scale_map": "guess"}, "scale_map: allowed are 'auto'"),
         ({"scale_map": np.ones((3, 3))}, "scale_map: needs shape"),
         ({"scale_map": np.zeros((64, 64))}, "scale_map: |scale: "),
-        ({"scale_map": np.ones((64, 64)), "source": np.zeros((40, 40), np.uint8)}, "source: a scale_map says"),
-        ({"method": "optimise", "source": np.zeros((40, 40), np.uint8)}, "source: method='optimise' copies"),
+        ({"source_scale_map": np.ones((40, 40))}, "source_scale_map: needs a source"),
+        (
+            {
+                "scale_map": np.ones((64, 64)),
+                "source": np.zeros((40, 40), np.uint8),
+                "source_scale_map": np.ones((30, 40)),
+            },
+            "source_scale_map: needs shape",
+        ),
+        ({"method": "optimise", "source": np.zeros((12, 40), np.uint8)}, "source: method 'optimise' needs at least 16"),
+        (
+            {"hole": np.ones((64, 64), bool), "scale_map": "auto", "source": np.zeros((40, 40), np.uint8)},
+            "scale_map: 'auto' measures what is known",
+        ),
+        ({"blend": 1}, "blend: needs True or False"),
+        ({"hole": "alpha"}, "hole: 'alpha' needs an image with an alpha channel"),
         ({"method": "optimise", "hole": np.ones((64, 64), bool)}, "hole: covers the whole image"),
         ({"method": "optimise", "hole": np.indices((64, 64)).sum(axis=0) % 4 > 0}, "hole: leaves no part"),
     ],

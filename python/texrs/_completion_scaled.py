@@ -19,7 +19,7 @@ from texrs.errors import InvalidInput
 from texrs.kernels.pyramid import Region
 from texrs.scale_maps._maps import as_map
 from texrs.source_map import SourceMap
-from texrs.supply import LEAST, RADIUS, Settings, Supply, levels_of
+from texrs.supply import LEAST, RADIUS, Settings, Supply, levels_of, reaching
 
 SETTINGS = Settings(passes=(24, 12, 6), hysteresis=1.0, unity=0.3, continuation=0.0, repetition=0.1, exhaustive=True)
 """What goes on across a hole counts more than that nothing rare is lost, and a copy of what is beside it is no fault."""
@@ -29,58 +29,69 @@ __all__ = ["optimised", "recovered"]
 AROUND = 12
 """Points of the coarsest level around a hole that are looked at with it."""
 SIZES = (1.0, 0.8, 1.25)
-"""Sizes of the copies that are copied from where scales count."""
+"""Sizes of the copies that are copied from where scales count; more where what is wanted lies beyond them."""
+NOWHERE = 1e6
+"""Scale of what is not to be copied: none that is ever wanted."""
 
 
-def recovered(image: Array, open_: Bools, scale_map: object) -> Floats | None:
+def recovered(picture: Array, open_: Bools, given: object, name: str = "scale_map") -> Floats | None:
     """Give the scale map of a picture with holes: measured, or given, and continued into the holes where it is not."""
-    if scale_map is None:
+    if given is None:
         return None
     known = ~open_
-    if isinstance(scale_map, str):
-        if scale_map != "auto":
-            raise InvalidInput(f"scale_map: allowed are 'auto', a map or None; got {scale_map!r}")
-        features = scale_maps.auto_mask(image, known=known)
+    if isinstance(given, str):
+        if given != "auto":
+            raise InvalidInput(f"{name}: allowed are 'auto', a map or None; got {given!r}")
+        if not known.any():
+            raise InvalidInput(f"{name}: 'auto' measures what is known, and the hole covers everything; give a map")
+        features = scale_maps.auto_mask(picture, known=known)
         return scale_maps.from_mask(features, trend="plane", known=known)
-    given = np.asarray(scale_map)
-    if given.shape == open_.shape and given.dtype.kind == "f":
+    scale = np.asarray(given)
+    if scale.shape == open_.shape and scale.dtype.kind == "f":
         # Where there is a hole, a map may have one too.
         with np.errstate(invalid="ignore"):
-            bad = open_ & ~(np.isfinite(given) & (given > 0))
-        if bad.any():
-            return scale_maps.extend(given, ~bad)
-    return as_map(given, "scale_map", open_.shape)
+            bad = open_ & ~(np.isfinite(scale) & (scale > 0))
+        if bad.any() and not bad.all():
+            return scale_maps.extend(scale, ~bad)
+    return as_map(scale, name, open_.shape)
 
 
 def optimised(
     pictures: list[Array],
     open_: Bools,
-    scale: Floats | None,
+    scales: list[Floats] | None,
     *,
     wrap: tuple[bool, bool],
     seed: int,
     progress: Progress | None,
 ) -> tuple[SourceMap, list[dict[str, object]]]:
-    """Give the source map of a picture whose holes are filled, and what was done at each level."""
-    image = as_image(pictures[0])
+    """Give the source map of a picture whose holes are filled, from itself or from a second one, and what each level did."""
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
-    if min(shapes[0]) < LEAST:
-        raise InvalidInput(f"image: method 'optimise' needs at least {LEAST} pixels a side, got {shapes[0]}")
+    for name, shape in zip(("image", "source"), shapes, strict=False):
+        if min(shape) < LEAST:
+            raise InvalidInput(f"{name}: method 'optimise' needs at least {LEAST} pixels a side, got {shape}")
+    count = min(levels_of(shape, SETTINGS) for shape in shapes)
     # Windows may not leave a copy, but those of known pixels at the border do.
-    count = levels_of(shapes[0], SETTINGS)
     margin = RADIUS << (count - 1)
-    wide = ((margin, margin), (margin, margin))
+    ground, free, scale = _ground(pictures, open_, scales, margin)
+    wanted = None if scales is None else (float(scales[0][open_].min()), float(scales[0][open_].max()))
+    sizes: tuple[float, ...] = (1.0,) if scales is None else SIZES
+    if scales is not None and wanted is not None and len(pictures) > 1:
+        sizes = reaching(sizes, scales[1], wanted)
     supply = Supply.of(
-        np.pad(_painted(image, open_), (*wide, (0, 0)), mode="symmetric"),
-        None if scale is None else np.pad(scale, wide, mode="edge"),
-        SIZES if scale is not None else (1.0,),
-        wanted=None if scale is None else (float(scale[open_].min()), float(scale[open_].max())),
-        known=np.pad(~open_, wide),
+        ground,
+        scale,
+        sizes,
+        wanted=wanted,
+        known=free,
         levels=count,
         settings=SETTINGS,
     )
     if not supply.free:
-        raise InvalidInput("hole: leaves no part of the image that is free to copy from; method='patch' may find one")
+        why = ("hole: leaves no part of the image that is free", "source: has no part that is large enough")[
+            len(pictures) - 1
+        ]
+        raise InvalidInput(f"{why} to copy from; method='patch' may find one")
     box = around(open_, AROUND << (count - 1), 1 << (count - 1), wrap)
     part = (slice(box[0], box[1]), slice(box[2], box[3]))
     size = (box[1] - box[0], box[3] - box[2])
@@ -91,21 +102,46 @@ def optimised(
     )
     grown = supply.grow(
         Region(size, (box[0], box[2]), (closed[0], closed[1])),
-        None if scale is None else np.ascontiguousarray(scale[part]),
+        None if scales is None else np.ascontiguousarray(scales[0][part]),
         held=(~open_[part], given),
         seed=seed,
         progress=progress,
     )
     which, at = supply.locate(grown.places)
-    at -= margin
-    identity = SourceMap.identity(shapes[0])
-    coordinates, label = identity.coordinates.copy(), identity.label.copy()
     here = open_[part]
-    coordinates[part][here] = at.reshape(*size, 2)[here]
-    label[part][here] = which.reshape(size)[here] + 1
-    sizes = [np.eye(2), *(np.diag([1 / f for f in c.factor]) for c in supply.copies)]
-    frame = np.array(sizes, np.float32) if len(supply.copies) > 1 else None
-    return SourceMap(coordinates, identity.exemplar, label, frame, shapes), grown.report
+    which, at = which.reshape(size)[here], at.reshape(*size, 2)[here]
+    identity = SourceMap.identity(shapes[0])
+    coordinates, label, exemplar = identity.coordinates.copy(), identity.label.copy(), identity.exemplar.copy()
+    coordinates[part][here] = at - (margin if len(pictures) == 1 else (shapes[0][0] + 2 * margin, 0))
+    label[part][here] = which + 1
+    exemplar[part][here] = len(pictures) - 1
+    frames = [np.eye(2), *(np.diag([1 / f for f in c.factor]) for c in supply.copies)]
+    frame = np.array(frames, np.float32) if len(supply.copies) > 1 else None
+    return SourceMap(coordinates, exemplar, label, frame, shapes), grown.report
+
+
+def _ground(
+    pictures: list[Array], open_: Bools, scales: list[Floats] | None, margin: int
+) -> tuple[Array, Bools, Floats | None]:
+    """Give the picture, with a source below it, what of them may be copied, and their scales.
+
+    Beside a source the picture is there for what is around the hole to look like, and nothing is copied from it.
+    """
+    wide = ((margin, margin), (margin, margin))
+    image = np.pad(_painted(as_image(pictures[0]), open_), (*wide, (0, 0)), mode="symmetric")
+    if len(pictures) == 1:
+        scale = None if scales is None else np.pad(scales[0], wide, mode="edge")
+        return image, np.pad(~open_, wide), scale
+    source = as_image(pictures[1])
+    columns = max(image.shape[1], source.shape[1])
+    parts = [np.pad(p, ((0, 0), (0, columns - p.shape[1]), (0, 0)), mode="symmetric") for p in (image, source)]
+    free = np.zeros((len(image) + len(source), columns), bool)
+    free[len(image) :, : source.shape[1]] = True
+    if scales is None:
+        return np.concatenate(parts), free, None
+    scale = np.full(free.shape, NOWHERE, np.float32)
+    scale[len(image) :, : source.shape[1]] = scales[1]
+    return np.concatenate(parts), free, scale
 
 
 def around(open_: Bools, margin: int, step: int, wrap: tuple[bool, bool]) -> tuple[int, int, int, int]:

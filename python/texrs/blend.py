@@ -18,7 +18,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float, as_image, as_int, as_wrap
+from texrs._arrays import as_float, as_image, as_int, as_mask, as_wrap
 from texrs._typing import Array, Bools, Floats, Interpolation, Progress
 from texrs.errors import InvalidInput
 from texrs.kernels.poisson import Boundary, spread
@@ -46,6 +46,8 @@ def blend(
     wrap: bool | Sequence[bool],
     screening: float = SCREENING,
     band: int | None = None,
+    within: Array | None = None,
+    known: Array | Sequence[Array] | None = None,
     interpolation: Interpolation = "cubic",
     kind: Literal["colour", "normal"] = "colour",
     green: Literal["up", "down"] = "up",
@@ -66,12 +68,18 @@ def blend(
     exemplars : array, or a sequence of one an exemplar
         Any map of the exemplar's height and width: (h, w) or (h, w, C).
     wrap : bool or (rows, columns)
-        Axes along which the picture is cyclic. Along the others the outermost pixels keep their values.
+        Axes along which the picture is cyclic. Along the others the outermost pixels keep their values,
+        unless ``within`` says which do.
     screening : float
         Weight of the values against the differences, at least 0; 0 is the paper's. Colours drift over about
         ``screening ** -0.5`` pixels: 0.01 makes the transitions of smooth exemplars softer.
     band : int, optional
         Correct only what is at most this many pixels from a seam; all else keeps its values. By default everything.
+    within : (H, W) bool or integers, optional
+        Correct only pixels that are True, or not zero; all else keeps its values: of a picture whose hole was filled, the
+        hole.
+    known : (h, w) bool or integers, or a sequence of one an exemplar, optional
+        What of the exemplars may be looked at beyond a seam. By default all.
     interpolation : {"cubic", "linear", "nearest"}
         As in `SourceMap.render`.
     kind, green
@@ -127,8 +135,10 @@ def blend(
     cyclic = as_wrap(wrap)
     weight = as_float(screening, "screening", 0, 1e6)
     width = None if band is None else as_int(band, "band", 1, 2**31)
+    inside = None if within is None else as_mask(within, "within", source.shape)
     result = source.render(exemplars, interpolation=interpolation, kind=kind, green=green)
     several = list(exemplars) if isinstance(exemplars, list | tuple) else [exemplars]
+    shown = None if known is None else as_known(known, source.shapes)
     samples = Samples.of([as_image(e) for e in several], kind)
     if samples is None or interpolation == "nearest":
         return result
@@ -141,11 +151,12 @@ def blend(
     for number, (part, channels) in enumerate(steps):
         around = (part.cyclic, cyclic[1])
         if channels == groups[0]:
-            look = Look(samples, _rows(source, part.rows), interpolation, kind, green)
+            look = Look(samples, shown, _rows(source, part.rows), interpolation, kind, green)
             seen = [look.across(axis, around[axis]) for axis in range(2)]
         if any(len(seam.lack) for seam in seen):
             report = None if progress is None else _share(progress, number, len(steps))
-            correction = _correction(look.source.shape, seen, channels, around, weight, width, report)
+            marked = None if inside is None else inside[part.rows]
+            correction = _correction(look.source.shape, seen, channels, around, weight, width, marked, report)
             samples.correct(pixels[part.kept], correction[part.inner], channels, kind)
         if progress is not None:
             progress("blend", (number + 1) / len(steps))
@@ -154,6 +165,14 @@ def blend(
 
 def _share(progress: Progress, number: int, steps: int) -> Callable[[float], object]:
     return lambda share: progress("blend", (number + share) / steps)
+
+
+def as_known(value: object, shapes: Sequence[tuple[int, ...]]) -> list[Floats]:
+    """Check masks of the exemplars; 1 is what they have."""
+    several = list(value) if isinstance(value, list | tuple) else [value]
+    if len(several) != len(shapes):
+        raise InvalidInput(f"known: needs a mask for each of {len(shapes)} exemplars, got {len(several)}")
+    return [as_mask(k, "known", shape).astype(np.float32) for k, shape in zip(several, shapes, strict=True)]
 
 
 # --- values ----------------------------------------------------------------------------------------------------------
@@ -241,6 +260,7 @@ class Look:
     """A source map with what is looked up through it."""
 
     samples: Samples
+    known: list[Floats] | None
     source: SourceMap
     interpolation: Interpolation
     kind: Literal["colour", "normal"]
@@ -263,6 +283,8 @@ class Look:
             source.shapes,
         )
         shown = row.render(self.samples.images, interpolation=self.interpolation, kind=self.kind, green=self.green)
+        if self.known is not None:
+            inside = inside & (np.abs(row.render(self.known, interpolation=self.interpolation)[0] - 1) < 1e-3)
         return shown[0], inside
 
     def across(self, axis: int, wrap: bool) -> Seam:
@@ -296,6 +318,7 @@ def _correction(
     wrap: tuple[bool, bool],
     screening: float,
     band: int | None,
+    within: Bools | None,
     progress: Callable[[float], object] | None,
 ) -> Floats:
     """Solve for what must be added to some channels of the composite, (H, W, C) in [0, 1].
@@ -309,8 +332,12 @@ def _correction(
         flow[seam.after] += seam.lack[:, channels]
         if band is not None:
             near[seam.at] = near[seam.after] = True
-    rows, columns = (_boundary(w) for w in wrap)
-    mask = None if band is None else _within(near, band, wrap)
+    free = within is not None and not within.all()
+    rows, columns = (_boundary(w, free) for w in wrap)
+    mask = within
+    if band is not None:
+        close = _close(near, band, wrap)
+        mask = close if within is None else close & within
     spread(flow, screening=screening, boundary=(rows, columns), mask=mask, progress=progress)
     return flow
 
@@ -333,11 +360,11 @@ def _frames(source: SourceMap, at: tuple[Array, ...]) -> NDArray[np.float32]:
     return frame[source.label[at]] if frame.ndim == 3 else frame[at]
 
 
-def _boundary(wrap: bool) -> Boundary:
-    return "periodic" if wrap else "dirichlet"
+def _boundary(wrap: bool, free: bool) -> Boundary:
+    return "periodic" if wrap else "free" if free else "dirichlet"
 
 
-def _within(near: Bools, band: int, wrap: tuple[bool, bool]) -> Bools:
+def _close(near: Bools, band: int, wrap: tuple[bool, bool]) -> Bools:
     """Mark what is at most ``band`` pixels from a marked pixel, around cyclic axes."""
     from scipy.ndimage import distance_transform_edt
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_image, as_int, as_mask, as_seed, as_wrap, guidance
 from texrs._completion_scaled import optimised, recovered
 from texrs._typing import Array, Bools, Floats, Progress
+from texrs.blend import blend as blended
 from texrs.deform import Flip, flip, flip_coordinates, flip_frame, mirrors
 from texrs.errors import InvalidInput
 from texrs.kernels.complete import complete as fill
@@ -28,6 +29,9 @@ __all__ = ["complete"]
 SCALED = np.float32(2.0)
 """Weight of scales as colours that patches are compared by: texels larger by a half are as far off as black from white."""
 
+SCREENING = 0.0
+"""Weight of the values where colours are blended."""
+
 LEAST = 4
 """Side of the smallest patch that still says anything of a texture."""
 PLACES = 64
@@ -36,14 +40,16 @@ PLACES = 64
 
 def complete(
     image: Array,
-    hole: Array,
+    hole: Array | str,
     *,
     source: Array | None = None,
     scale_map: Array | str | None = None,
+    source_scale_map: Array | str | None = None,
     method: str = "patch",
     patch: int | None = None,
     rim: int = 0,
     mirror: bool | None = None,
+    blend: bool = False,
     wrap: bool | Sequence[bool] = False,
     seed: int = 0,
     progress: Progress | None = None,
@@ -54,16 +60,20 @@ def complete(
     ----------
     image : (H, W) or (H, W, C) array
         The picture, any real dtype, at least 4 pixels a side. What it holds in the hole does not matter; it may be NaN.
-    hole : (H, W) bool or integers
-        True, or not zero, where the picture is to be filled.
+    hole : (H, W) bool or integers, or "alpha"
+        True, or not zero, where the picture is to be filled; "alpha": where its last channel of two or four is 0.
     source : (h, w) or (h, w, C) array, optional
         Another picture to copy from, of the same dtype and channels; by default what is known of ``image``.
     scale_map : {None, "auto"} or (H, W) float array, optional
         For pictures taken at an angle: how large the texels are at each pixel (`texrs.scale_maps`), so that the hole is filled
         with texels of the size that belongs there [2]_. "auto" measures it. In the hole it may be NaN; it is continued.
+    source_scale_map : {None, "auto"} or (h, w) float array, optional
+        How large they are in ``source``, in the units of ``scale_map``. None: 1 everywhere, as in a picture taken from the
+        front; measured maps have a geometric mean of 1.
     method : {"patch", "optimise"}
         How: "patch", patches that fit what is around, cut in [1]_; "optimise", windows corrected until each is like one of the
-        picture, resized where there is a scale map [2]_: for large holes, of which patches would repeat what is around.
+        picture, or of ``source``, resized where there is a scale map [2]_: for large holes, where patches would repeat what
+        is around.
     patch : int, optional
         Side of a patch in pixels, at least 4: about the size of what repeats. By default a sixth of the shorter side,
         12 to 32; less where no place, or few, would be free of holes.
@@ -73,6 +83,9 @@ def complete(
     mirror : bool, optional
         Whether patches may be mirrored; False for lit or lettered textures. By default they may unless there is a scale map:
         what is seen at an angle has an upper side.
+    blend : bool
+        Whether the colours of what is filled are corrected so that seams disappear and light goes on across the hole
+        (`texrs.blend`). For other maps of the same material, call ``blend`` with the source map and ``within=hole``.
     wrap : bool or (rows, columns)
         Axes along which the picture is cyclic, so that a hole at its border is also filled from across.
     seed : int
@@ -86,7 +99,7 @@ def complete(
         The filled image, in the dtype and with the channels of the picture. Its source map looks into the picture, or
         into ``[image, source]``; pixels that are kept map to themselves, and none maps into the hole. To render a
         picture that is NaN in the hole through it, put any number there. The stages are ``"known"``, ``"patches"``
-        (each in a shade of its own) and ``"composite"``, the result.
+        (each in a shade of its own) and ``"composite"``, the result before ``blend``.
 
     Raises
     ------
@@ -115,13 +128,15 @@ def complete(
     """
     if method not in ("patch", "optimise"):
         raise InvalidInput(f"method: allowed are 'patch' and 'optimise', got {method!r}")
-    if source is not None and (scale_map is not None or method == "optimise"):
-        what = "a scale_map says nothing of it" if scale_map is not None else "method='optimise' copies from the image"
-        raise InvalidInput(f"source: {what}; leave one of the two out")
+    if source_scale_map is not None and (source is None or scale_map is None):
+        raise InvalidInput("source_scale_map: needs a source, and a scale_map whose units it shares")
     mirror = scale_map is None if mirror is None else mirror
-    if not isinstance(mirror, bool | np.bool_):
-        raise InvalidInput(f"mirror: needs True or False, got {mirror!r}")
-    pictures, open_ = check_pictures(image, hole, source)
+    for name, choice in (("mirror", mirror), ("blend", blend)):
+        if not isinstance(choice, bool | np.bool_):
+            raise InvalidInput(f"{name}: needs True or False, got {choice!r}")
+    pictures, open_ = check_pictures(
+        image, transparent(image) if isinstance(hole, str) and hole == "alpha" else hole, source
+    )
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
     cyclic, seed = as_wrap(wrap), as_seed(seed)
     width = as_int(rim, "rim", 0, 1024)
@@ -132,15 +147,16 @@ def complete(
     watch("complete", 0.0)
     identity = SourceMap.identity(shapes[0])
     places, side, count = SourceMap(identity.coordinates, identity.exemplar, identity.label, None, shapes), 0, 0
-    scale = recovered(pictures[0], open_, scale_map) if open_.any() else None
+    scales = scales_of(pictures, open_, scale_map, source_scale_map) if open_.any() else None
     levels: list[dict[str, object]] = []
     if open_.any() and method == "optimise":
-        places, levels = optimised(pictures, open_, scale, wrap=(cyclic[0], cyclic[1]), seed=seed, progress=progress)
+        places, levels = optimised(pictures, open_, scales, wrap=(cyclic[0], cyclic[1]), seed=seed, progress=progress)
         count = int(places.label.max())
     elif open_.any():
         guides = guides_of(pictures)
-        if scale is not None:
-            guides = [np.concatenate([guides[0], SCALED * np.log(scale)[..., np.newaxis]], axis=-1)]
+        if scales is not None:
+            pairs = zip(guides, scales, strict=True)
+            guides = [np.concatenate([g, SCALED * np.log(s)[..., np.newaxis]], axis=-1) for g, s in pairs]
         flips = mirrors(bool(mirror))
         free = np.ones(shapes[-1], bool) if source is not None else ~open_
         side = patch_side(free, chosen, largest)
@@ -165,17 +181,24 @@ def complete(
     # What is kept maps to itself; of patches every coordinate is whole.
     result = pictures[0].copy()
     if method == "optimise":
-        result[new] = places.render(pictures[0], interpolation="cubic")[new]
+        result[new] = places.render(pictures, interpolation="cubic")[new]
     else:
         row, column = places.coordinates[new].astype(np.intp).T
         result[new] = pictures[-1][row, column]
+    composite = result
+    if blend and count:
+        known = [~open_, *(np.ones(s, bool) for s in shapes[1:])]
+        replaced = places.label > 0
+        result = blended(
+            places, pictures, wrap=cyclic, screening=SCREENING, within=replaced, known=known, progress=progress
+        )
     watch("done", 1.0)
-    known = pictures[0].copy()
+    bare = pictures[0].copy()
     # The hole is painted over with a known pixel, which does not change the least value.
-    known[open_] = known.min() if count and not open_.all() else 0
+    bare[open_] = bare.min() if count and not open_.all() else 0
     shades = np.zeros(open_.shape, np.uint8)
     shades[new] = 55 + places.label[new] * 67 % 200
-    stages = {"known": known, "patches": shades, "composite": result}
+    stages = {"known": bare, "patches": shades, "composite": composite}
     report = {
         "method": method,
         "seed": seed,
@@ -185,11 +208,35 @@ def complete(
         "patch": side,
         "patches": count,
         "mirror": bool(mirror),
+        "blend": bool(blend),
         "wrap": list(cyclic),
     }
     if method == "optimise":
         report["levels"] = levels
     return Synthesis(result, places, stages, report)
+
+
+def transparent(image: object) -> Bools:
+    """Give what is wholly transparent in a picture as its hole."""
+    pixels = np.asarray(image)
+    if pixels.ndim != 3 or pixels.shape[2] not in (2, 4):
+        raise InvalidInput(
+            f"hole: 'alpha' needs an image with an alpha channel, got shape {pixels.shape}; or give a mask"
+        )
+    hole: Bools = pixels[..., -1] == 0
+    if not hole.any():
+        raise InvalidInput("hole: nothing in the image is wholly transparent, so there is nothing to fill")
+    return hole
+
+
+def scales_of(pictures: Sequence[Array], open_: Bools, own: object, of_source: object) -> list[Floats] | None:
+    """Give the scale maps of the picture and of its source, if scales count."""
+    scale = recovered(pictures[0], open_, own)
+    if scale is None or len(pictures) == 1:
+        return None if scale is None else [scale]
+    shape = (pictures[1].shape[0], pictures[1].shape[1])
+    other = recovered(pictures[1], np.zeros(shape, bool), of_source, "source_scale_map")
+    return [scale, np.ones(shape, np.float32) if other is None else other]
 
 
 def check_pictures(image: object, hole: object, source: object | None) -> tuple[list[Array], Bools]:

@@ -8,14 +8,12 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from texrs._typing import Array, Bools
 from texrs.cli import _files
 from texrs.cli._console import Out, Quiet, Source, Stages, Threads, note, watching
 from texrs.cli._files import describe, named
 from texrs.cli._scales import read_scale
 from texrs.completion import complete
 from texrs.cyclic import tile
-from texrs.errors import InvalidInput
 from texrs.threads import threads
 
 __all__ = ["complete_command", "tile_command"]
@@ -81,6 +79,14 @@ def complete_command(
             show_default=False,
         ),
     ] = None,
+    source_scale: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MAP|auto",
+            help="With --scale: the scale map of --source-image, or auto.",
+            show_default="seen from the front",
+        ),
+    ] = None,
     method: Annotated[str, typer.Option(help="patch, or optimise: windows corrected until they fit.")] = "patch",
     patch: Annotated[
         int | None,
@@ -91,6 +97,9 @@ def complete_command(
         bool | None,
         typer.Option("--mirror/--no-mirror", help="Whether patches may be mirrored.", show_default="not with --scale"),
     ] = None,
+    blend: Annotated[
+        bool, typer.Option("--blend", help="Correct the colours of what is filled, so that seams disappear.")
+    ] = False,
     wrap: Annotated[
         str, typer.Option(metavar="AXES", help="Where the picture tiles: xy, x (left-right), y (top-bottom) or none.")
     ] = "none",
@@ -105,35 +114,28 @@ def complete_command(
     cyclic = _files.parse_wrap(wrap)
     _files.check_outputs(out, source, stages)
     pixels = _files.read_picture(image)
-    mask = _transparent(pixels) if hole == "alpha" else _files.read_hole(hole)
-    scaled = None if scale is None else scale if scale == "auto" else read_scale(scale)
+    mask = hole if hole == "alpha" else _files.read_hole(hole)
+    scaled, theirs = (s if s is None or s == "auto" else read_scale(s) for s in (scale, source_scale))
     other = None if source_image is None else _files.read_exemplar(source_image)
     # In the hole anything may stand that the format of the result cannot hold.
     _files.check_output(out, np.nan_to_num(pixels), pixels.shape[:2])
-    names = {"image": image, "hole": hole, "source": str(source_image), "scale_map": str(scale), "count": "--threads"}
+    names = {"image": image, "hole": "HOLE" if hole == "alpha" else hole, "source": str(source_image)}
+    names |= {"scale_map": str(scale), "source_scale_map": source_scale or "--source-scale", "count": "--threads"}
     with named(**names), threads(count), watching(quiet=quiet) as progress:
         result = complete(
             pixels,
             mask,
             source=other,
             scale_map=scaled,
+            source_scale_map=theirs,
             method=method,
             patch=patch,
             rim=rim,
             mirror=mirror,
+            blend=blend,
             wrap=cyclic,
             seed=seed,
             progress=progress,
         )
     _files.deliver(result, out, source, stages)
     note(f"wrote {out}: {describe(result.image, 2)}, in {time.monotonic() - start:.1f} s", quiet=quiet)
-
-
-def _transparent(pixels: Array) -> Bools:
-    """Give what is wholly transparent as the hole."""
-    if pixels.ndim < 3 or pixels.shape[2] not in (2, 4):
-        raise InvalidInput("HOLE: alpha needs an image with an alpha channel; or give an image of the hole")
-    hole: Bools = pixels[..., -1] == 0
-    if not hole.any():
-        raise InvalidInput("HOLE: nothing in the image is wholly transparent, so there is nothing to fill")
-    return hole

@@ -6,6 +6,6 @@ windows that leave a copy, or touch what must not be copied, are barred.
 """
 
 from texrs.supply._grow import LEAST, Grown, Settings, Supply, levels_of
-from texrs.supply._sheet import RADIUS, Copy
+from texrs.supply._sheet import LARGEST, RADIUS, SMALLEST, Copy, reaching
 
-__all__ = ["LEAST", "RADIUS", "Copy", "Grown", "Settings", "Supply", "levels_of"]
+__all__ = ["LARGEST", "LEAST", "RADIUS", "SMALLEST", "Copy", "Grown", "Settings", "Supply", "levels_of", "reaching"]

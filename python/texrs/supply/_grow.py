@@ -311,15 +311,16 @@ def _turn(advance: Callable[[float], object] | None, start: float, share: float)
 def _at_level(
     held: tuple[Bools, NDArray[np.int32]] | None, shape: tuple[int, ...], region: Region, spacing: int
 ) -> tuple[Bools | None, NDArray[np.int32] | None]:
-    """Give which points of a level are held, those that stand for held ones alone, and the places that they show."""
+    """Give which points of a level are held, those that stand for held ones in the main, and the places that they show.
+
+    Were a point free that holds half of what is known, nothing would tell coarse levels what has to go on there.
+    """
     if held is None:
         return None, None
-    fixed: Bools = held[0].reshape(shape)
+    share = _means(held[0].reshape(shape).astype(np.float32), region.shape, spacing)
     starts = [np.minimum(np.arange(n) * spacing, m - 1) for n, m in zip(region.shape, shape, strict=True)]
     first = held[1].reshape(*shape, 2)[np.ix_(*starts)].astype(np.float64)
-    for axis, at in enumerate(starts):
-        fixed = np.logical_and.reduceat(fixed, at, axis=axis)
-    return fixed.reshape(-1), np.asarray(np.rint(first.reshape(-1) * ONE / spacing), np.int32)
+    return (share >= 0.5).reshape(-1), np.asarray(np.rint(first.reshape(-1) * ONE / spacing), np.int32)
 
 
 def _finest(places: NDArray[np.int32], region: Region, spacing: int) -> tuple[NDArray[np.int32], tuple[int, int]]:

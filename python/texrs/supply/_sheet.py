@@ -22,6 +22,7 @@ __all__ = [
     "fill",
     "ordered",
     "packed",
+    "reaching",
     "resized",
     "touched",
     "values_of",
@@ -32,6 +33,10 @@ RADIUS = 2
 """Of a window."""
 NAT = 512
 """Units of a scale's natural logarithm in the 12 bits of a guide."""
+STEP = 1.25
+"""From one size of a copy to the next."""
+SMALLEST, LARGEST = 1 / 8, 4.0
+"""Sizes that copies may have."""
 BARRED = 2047
 """What a barred sample shows in the fourth value of the guide, and no output asks for."""
 
@@ -54,6 +59,18 @@ class Copy:
     first: tuple[int, int]
     origin: tuple[int, int]
     shape: tuple[int, int]
+
+
+def reaching(sizes: Sequence[float], scale: Floats, wanted: tuple[float, float]) -> tuple[float, ...]:
+    """Give sizes of copies with more of them added until they reach the least and the largest scale that is wanted."""
+    found = list(sizes)
+    # What is wanted at the ends should not hang on the ends of the exemplar alone.
+    low, high = np.quantile(scale, [0.3, 0.7])
+    while wanted[1] > max(found) * high and max(found) * STEP <= LARGEST:
+        found.append(max(found) * STEP)
+    while wanted[0] < min(found) * low and min(found) / STEP >= SMALLEST:
+        found.append(min(found) / STEP)
+    return tuple(found)
 
 
 def box_of(
