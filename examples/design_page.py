@@ -17,7 +17,7 @@ CROP, SEED = 256, 7
 BUILT_IN = ("pebbles", "leaves_and_flowers", "beans", "dots", "tilted_discs", "bark")
 WAYS = {
     "texrs.design": {},
-    "plain quilting (nothing deformed)": {"operations": 0, "tiles": 1, "mirror": False, "poisson": None},
+    "plain quilting (nothing deformed)": {"operations": 0, "tiles": 1, "mirror": False, "blend": None},
     "as printed (method=paper)": {"method": "paper"},
 }
 

@@ -6,15 +6,14 @@ Without arguments a generated floor; with them, each image beside its scale map.
 """
 
 import sys
-from pathlib import Path
 
 import numpy as np
 
 import texrs
+from layout import FOLDER, below, beside
 from texrs import io, samples, scale_maps
 
-FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"
-SIZE, GAP = 256, 8
+SIZE = 256
 
 
 def targets(scale: np.ndarray) -> dict[str, np.ndarray]:
@@ -28,24 +27,6 @@ def targets(scale: np.ndarray) -> dict[str, np.ndarray]:
         "hill": high - (high - low) * far,
     }
     return {name: np.exp(m).astype(np.float32) for name, m in maps.items()}
-
-
-def beside(pictures: list[np.ndarray]) -> np.ndarray:
-    """Set pictures side by side, on white where they are less high."""
-    height = max(p.shape[0] for p in pictures)
-    cells = []
-    for picture in pictures:
-        cell = np.full((height, picture.shape[1] + GAP, 3), 255, np.uint8)
-        cell[: picture.shape[0], GAP:] = picture
-        cells.append(cell)
-    return np.concatenate(cells, axis=1)[:, GAP:]
-
-
-def below(rows: list[np.ndarray]) -> np.ndarray:
-    """Set rows below each other, on white where they are less wide."""
-    width = max(r.shape[1] for r in rows)
-    wide = [np.pad(r, ((0, GAP), (0, width - r.shape[1]), (0, 0)), constant_values=255) for r in rows]
-    return np.concatenate(wide, axis=0)[:-GAP]
 
 
 def rows_of(image: np.ndarray, scale: np.ndarray) -> list[np.ndarray]:

@@ -1,62 +1,57 @@
 """Make the pictures that the README shows: docs/pictures/*.jpg."""
 
-from pathlib import Path
-
 import numpy as np
-from skimage.transform import resize
 
 import texrs
+from layout import FOLDER, below, beside
+from texrs import fields, samples, volume
+from texrs.texels import Texels
 
-FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"
-PAPER, GAP = 255, 8
-
-
-def rgb(picture: np.ndarray) -> np.ndarray:
-    """Give an 8-bit RGB version of a stage or a result."""
-    seen = texrs.report.preview(np.asarray(picture))
-    return np.repeat(seen[..., None], 3, axis=-1) if seen.ndim == 2 else seen[..., :3]
+HEIGHT = 200
 
 
-def row(pictures: list[np.ndarray], height: int) -> np.ndarray:
-    """Set pictures side by side at one height."""
-    cells = []
-    for picture in pictures:
-        width = round(picture.shape[1] * height / picture.shape[0])
-        scaled = resize(rgb(picture), (height, width), anti_aliasing=True, order=1)
-        cells += [np.rint(scaled * 255).astype(np.uint8), np.full((height, GAP, 3), PAPER, np.uint8)]
-    return np.concatenate(cells[:-1], axis=1)
-
-
-def column(rows: list[np.ndarray]) -> np.ndarray:
-    """Set rows below each other."""
-    width = min(r.shape[1] for r in rows)
-    gap = np.full((GAP, width, 3), PAPER, np.uint8)
-    return np.concatenate([part for r in rows for part in (r[:, :width], gap)][:-1], axis=0)
+def four() -> np.ndarray:
+    """Show each system once: what it was given, and what it made of that."""
+    stones = samples.pebbles((192, 192)).image
+    dots, net = (Texels.of_sample(samples.load(name, size=(192, 192))) for name in ("dots", "net"))
+    floor = samples.tilted_discs((192, 192))
+    wave = np.exp(0.6 * np.cos(np.linspace(0, 2 * np.pi, 288)))[np.newaxis].repeat(192, axis=0).astype(np.float32)
+    scale = np.asarray(floor.scale_map, np.float32)
+    wood = samples.load("wood_solid").image
+    rings = texrs.solid(wood, 96, field=fields.circular(axis="z"), seed=1).image
+    shown = [
+        [stones, texrs.design(stones, (192, 384), seed=3).image],
+        [dots.image, net.image, texrs.splice(dots, net, seed=1).image],
+        [floor.image, texrs.perspective(floor.image, scale, wave.shape, target=wave, seed=1).image],
+        [volume.cube(wood, 150), volume.cube(rings, 300)],
+    ]
+    rows = [beside(pictures, HEIGHT) for pictures in shown]
+    return below([beside([rows[0], rows[3]]), beside([rows[1], rows[2]])])
 
 
 def main() -> None:
     """Write all pictures."""
     FOLDER.mkdir(parents=True, exist_ok=True)
+    texrs.io.write(FOLDER / "four.jpg", four())
     pebbles = texrs.samples.pebbles((192, 192)).image
     made = texrs.design(pebbles, (384, 768), seed=3)
-    left = column(
-        [row([pebbles, made.stages["deformed"]], 188), row([made.stages["holes"], made.stages["completed"]], 188)]
+    left = below(
+        [beside([pebbles, made.stages["deformed"]], 188), beside([made.stages["holes"], made.stages["completed"]], 188)]
     )
-    texrs.io.write(FOLDER / "design.jpg", row([left, made.image], 384))
+    texrs.io.write(FOLDER / "design.jpg", beside([left, made.image], 384))
     names = ("pebbles", "leaves_and_flowers", "beans", "dots", "grit", "bark")
     rows = []
     for first in range(0, len(names), 2):
         pair = []
         for name in names[first : first + 2]:
             example = texrs.samples.load(name, size=(192, 192)).image
-            framed = np.full((320, 192, 3), PAPER, np.uint8)
-            framed[:192] = example
+            framed = np.pad(example, ((0, 128), (0, 0), (0, 0)), constant_values=255)
             pair += [framed, texrs.design(example, (320, 320), seed=1).image]
-        rows.append(row(pair, 200))
-    texrs.io.write(FOLDER / "gallery.jpg", column(rows))
+        rows.append(beside(pair, 200))
+    texrs.io.write(FOLDER / "gallery.jpg", below(rows))
     planar = [n for n in texrs.samples.names() if texrs.samples.load(n).image.ndim == 3]
     tiles = [texrs.samples.load(n).image for n in planar]
-    texrs.io.write(FOLDER / "samples.jpg", column([row(tiles[i : i + 6], 160) for i in range(0, len(tiles) - 5, 6)]))
+    texrs.io.write(FOLDER / "samples.jpg", below([beside(tiles[i : i + 6], 160) for i in range(0, len(tiles) - 5, 6)]))
 
 
 if __name__ == "__main__":

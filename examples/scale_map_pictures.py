@@ -1,13 +1,9 @@
 """Make the picture of scale maps that the README shows: docs/pictures/scale-maps.jpg."""
 
-from pathlib import Path
-
-import numpy as np
-
+from layout import FOLDER, below, beside
 from texrs import io, samples, scale_maps
 
-FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"
-SIDE, GAP = 192, 8
+SIDE = 192
 LARGEST = 4
 EDITS = (
     {"op": "magnify", "region": [60, 130, 34], "factor": 2},
@@ -25,12 +21,8 @@ def main() -> None:
         measured = scale_maps.from_mask(mask, foreshortened=True)
         by_angles = scale_maps.from_angles(mask.shape, slant, tilt, fov=37)
         maps = (measured, by_angles, scale_maps.edit(by_angles, EDITS))
-        shown = [sample.image, np.repeat(mask[..., np.newaxis], 3, axis=-1).astype(np.uint8) * 255]
-        shown += [scale_maps.picture(one, LARGEST) for one in maps]
-        gap = np.full((SIDE, GAP, 3), 255, np.uint8)
-        rows.append(np.concatenate([part for one in shown for part in (one, gap)][:-1], axis=1))
-    between = np.full((GAP, rows[0].shape[1], 3), 255, np.uint8)
-    io.write(FOLDER / "scale-maps.jpg", np.concatenate([rows[0], between, rows[1]]))
+        rows.append(beside([sample.image, mask, *(scale_maps.picture(one, LARGEST) for one in maps)]))
+    io.write(FOLDER / "scale-maps.jpg", below(rows))
 
 
 if __name__ == "__main__":

@@ -1,15 +1,10 @@
 """Make the pictures of grown textures that the README shows: docs/pictures/solid.jpg and synthesize.jpg."""
 
-from pathlib import Path
-
-import numpy as np
-
 import texrs
+from layout import FOLDER, below, beside
 from texrs import fields, samples, volume
 
-FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"
-SIDE, GAP = 300, 8
-SIZE = 96
+SIDE, SIZE = 300, 96
 
 SOLIDS = {
     "stripes": (
@@ -36,29 +31,6 @@ PICTURES = {
 }
 
 
-def on_white(cube: np.ndarray) -> np.ndarray:
-    """Lay a picture with an alpha channel on white."""
-    alpha = cube[..., 3:] / 255
-    return np.rint(cube[..., :3] * alpha + 255 * (1 - alpha)).astype(np.uint8)
-
-
-def beside(pictures: list[np.ndarray]) -> np.ndarray:
-    """Set pictures side by side, on white where they are less high."""
-    height = max(p.shape[0] for p in pictures)
-    cells = []
-    for picture in pictures:
-        cell = np.full((height, picture.shape[1] + GAP, 3), 255, np.uint8)
-        cell[: picture.shape[0], GAP:] = picture
-        cells.append(cell)
-    return np.concatenate(cells, axis=1)[:, GAP:]
-
-
-def below(rows: list[np.ndarray]) -> np.ndarray:
-    """Set rows below each other."""
-    gap = np.full((GAP, rows[0].shape[1], 3), 255, np.uint8)
-    return np.concatenate([part for row in rows for part in (row, gap)][:-1], axis=0)
-
-
 def main() -> None:
     """Write both pictures."""
     FOLDER.mkdir(parents=True, exist_ok=True)
@@ -69,7 +41,7 @@ def main() -> None:
         for field in shown[1:]:
             grown = texrs.solid(example, SIZE, field=field, seed=1)
             cubes.append(volume.cube(grown.image, SIDE))
-        rows.append(beside([on_white(cube) for cube in cubes]))
+        rows.append(beside(cubes))
     texrs.io.write(FOLDER / "solid.jpg", below(rows))
     pairs = []
     for name, field in PICTURES.items():

@@ -26,7 +26,7 @@ NOUNS = {
     "quilt": {"source_map", "_pixels"},
     "blend": {"source_map"},
     "cyclic": {"source_map", "report"},
-    "completion": {"source_map", "report", "deform", "_completion_scaled"},
+    "completion": {"source_map", "report", "deform", "blend", "_completion_scaled"},
     "_completion_scaled": {"source_map", "scale_maps", "supply"},
     "matching": set(),
     "supply": {"source_map"},

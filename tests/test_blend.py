@@ -230,6 +230,35 @@ def test_a_band_keeps_all_else(patchwork, exemplar):
     np.testing.assert_allclose(everywhere, blend(patchwork, image, wrap=True), atol=0.02)
 
 
+def patched(light):
+    """A ramp in whose corner and middle patches of itself are pasted, lighter, from a second exemplar."""
+    ramp = np.add.outer(np.arange(40.0), np.arange(60.0)).astype(np.float32)
+    whole = SourceMap.identity(ramp.shape)
+    inside = np.zeros(ramp.shape, bool)
+    inside[10:25, 20:40] = inside[30:, 50:] = True
+    return pasted(whole.coordinates, (ramp.shape,) * 2, inside, inside), ramp, ramp + np.float32(light), inside
+
+
+def test_within_a_mask_all_else_stays_and_light_goes_on():
+    source, ramp, lighter, inside = patched(9)
+    healed = blend(source, [ramp, lighter], wrap=False, screening=0, within=inside)
+    np.testing.assert_array_equal(healed[~inside], ramp[~inside])
+    # The corner of the picture, too, where nothing holds the outermost pixels.
+    np.testing.assert_allclose(healed, ramp, atol=0.02)
+    near = blend(source, [ramp, lighter], wrap=False, screening=0, within=inside, band=2)
+    np.testing.assert_array_equal(near[~inside], ramp[~inside])
+    assert near[17, 30] == lighter[17, 30]
+
+
+def test_what_is_not_known_of_an_exemplar_says_nothing_of_a_seam():
+    source, ramp, lighter, inside = patched(9)
+    holed = np.where(inside, np.float32(0), ramp)
+    known = [~inside, np.ones(inside.shape, bool)]
+    options = {"wrap": False, "screening": 0, "within": inside}
+    np.testing.assert_allclose(blend(source, [holed, lighter], known=known, **options), ramp, atol=0.02)
+    assert np.abs(blend(source, [holed, lighter], **options) - ramp).max() > 5
+
+
 @pytest.mark.parametrize("wrap", [True, False])
 def test_strips_give_the_whole(monkeypatch, patchwork, exemplar, wrap):
     places = np.tile(patchwork.coordinates, (5, 1, 1))
@@ -300,7 +329,7 @@ SCRIPT = """
 import hashlib, texrs
 from texrs.blend import blend
 sample = texrs.samples.pebbles((96, 96)).image
-made = texrs.design(sample, 160, seed=4, tiles=1, poisson=None)
+made = texrs.design(sample, 160, seed=4, tiles=1, blend=None)
 parts = [blend(made.source, sample, wrap=True), blend(made.source, sample, wrap=(True, False), band=5)]
 print(hashlib.sha256(b"".join(p.tobytes() for p in parts)).hexdigest())
 """
@@ -360,12 +389,12 @@ def test_away_from_seams_differences_stay(designed):
     assert np.abs(shift).max() <= 5
 
 
-def test_poisson_can_be_left_out(designed):
+def test_blending_can_be_left_out(designed):
     sample, result = designed
-    plain = texrs.design(sample, 256, seed=5, tiles=2, poisson=None)
+    plain = texrs.design(sample, 256, seed=5, tiles=2, blend=None)
     np.testing.assert_array_equal(plain.image, plain.stages["composite"])
     np.testing.assert_array_equal(plain.stages["composite"], result.stages["composite"])
-    assert plain.report["poisson"] == 0
+    assert plain.report["blend"] == 0
     assert plain.report["seams"]["before"] == plain.report["seams"]["after"]
 
 
@@ -377,6 +406,9 @@ def test_poisson_can_be_left_out(designed):
         ({"wrap": True, "screening": float("nan")}, "screening"),
         ({"wrap": True, "band": 0}, "band"),
         ({"wrap": True, "band": 2.5}, "band"),
+        ({"wrap": True, "within": np.ones((3, 3), bool)}, "within"),
+        ({"wrap": True, "known": np.ones((3, 3), bool)}, "known"),
+        ({"wrap": True, "known": [np.ones((64, 64), bool)] * 2}, "known: needs a mask for each of 1"),
         ({"wrap": True, "kind": "height"}, "kind"),
     ],
 )

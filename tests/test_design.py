@@ -292,8 +292,8 @@ PICTURE = np.zeros((32, 32, 3), np.uint8)
         ((PICTURE,), {"x0": 0.5}, "x0"),
         ((PICTURE,), {"chaos": 2.5}, "chaos"),
         ((PICTURE,), {"patch": 64}, "patch"),
-        ((PICTURE,), {"poisson": -0.1}, "poisson"),
-        ((PICTURE,), {"poisson": "strong"}, "poisson"),
+        ((PICTURE,), {"blend": -0.1}, "blend"),
+        ((PICTURE,), {"blend": "strong"}, "blend"),
     ],
 )
 def test_bad_input_names_the_argument(arguments, options, names):

@@ -115,8 +115,8 @@ def test_whole_layers_leave_large_holes(result, pebbles):
     assert result.report["holes"][0] > 0.2
     assert all(0.0 < share < 0.6 for share in result.report["holes"])
     assert [entry["element"] for entry in result.report["operations"][0]] == [0, 1]
-    assert result.report["literal"]
-    assert not texrs.design(pebbles, 64, tiles=1).report["literal"]
+    assert result.report["method"] == "paper"
+    assert texrs.design(pebbles, 64, tiles=1).report["method"] == "default"
 
 
 def test_it_can_hand_back_its_input_and_the_default_does_not(pebbles):
@@ -143,7 +143,7 @@ def test_options_of_elements_play_no_part(pebbles, result):
         rotate=10.0,
         scale=(1.0, 1.0),
         mirror=False,
-        poisson=0.5,
+        blend=0.5,
     )
     np.testing.assert_array_equal(other.image, result.image)
 
@@ -234,7 +234,7 @@ def test_the_same_bytes_for_any_number_of_threads():
     assert len(found) == 1
 
 
-@pytest.mark.parametrize("method", ["literal", None, "Paper"])
+@pytest.mark.parametrize("method", ["literal", "default", "Paper"])
 def test_an_unknown_method_is_refused(pebbles, method):
     with pytest.raises(InvalidInput, match="^method"):
         texrs.design(pebbles, 64, method=method)

@@ -112,7 +112,7 @@ def test_all_of_a_picture_from_another():
     image, everything = np.zeros((64, 80, 3), np.uint8), np.ones((64, 80), bool)
     ramp = np.linspace(0.7, 1.5, 64, dtype=np.float32)[:, np.newaxis].repeat(80, axis=1)
     result = texrs.complete(
-        image, everything, source=other, scale_map=ramp, source_scale_map=theirs, method="optimise", blend=True
+        image, everything, source=other, scale_map=ramp, source_scale_map=theirs, method="optimise", blend=1e-4
     )
     assert result.source.exemplar.all()
     assert result.image.std() > 20
@@ -138,7 +138,7 @@ def test_blending_takes_the_light_of_the_picture(method, box):
     hole = hole_in(image.shape, box)
     dark = (data.grass()[200:360, 200:360] * 0.7).astype(np.uint8)
     plain = fill(image, hole, method=method, source=dark)
-    light = fill(image, hole, method=method, source=dark, blend=True)
+    light = fill(image, hole, method=method, source=dark, blend=1e-4)
     np.testing.assert_array_equal(light.image[~hole], image[~hole])
     np.testing.assert_array_equal(light.stages["composite"], plain.image)
     np.testing.assert_array_equal(light.source.coordinates, plain.source.coordinates)
@@ -197,7 +197,7 @@ def test_an_output_that_wraps(floor):
             {"hole": np.ones((64, 64), bool), "scale_map": "auto", "source": np.zeros((40, 40), np.uint8)},
             "scale_map: 'auto' measures what is known",
         ),
-        ({"blend": 1}, "blend: needs True or False"),
+        ({"blend": "soft"}, "blend: needs a number"),
         ({"hole": "alpha"}, "hole: 'alpha' needs an image with an alpha channel"),
         ({"method": "optimise", "hole": np.ones((64, 64), bool)}, "hole: covers the whole image"),
         ({"method": "optimise", "hole": np.indices((64, 64)).sum(axis=0) % 4 > 0}, "hole: leaves no part"),

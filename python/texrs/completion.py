@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_image, as_int, as_mask, as_seed, as_wrap, guidance
+from texrs._arrays import as_float, as_image, as_int, as_mask, as_seed, as_wrap, guidance
 from texrs._completion_scaled import optimised, recovered
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.blend import blend as blended
@@ -28,9 +28,6 @@ __all__ = ["complete"]
 
 SCALED = np.float32(2.0)
 """Weight of scales as colours that patches are compared by: texels larger by a half are as far off as black from white."""
-
-SCREENING = 0.0
-"""Weight of the values where colours are blended."""
 
 LEAST = 4
 """Side of the smallest patch that still says anything of a texture."""
@@ -49,7 +46,7 @@ def complete(
     patch: int | None = None,
     rim: int = 0,
     mirror: bool | None = None,
-    blend: bool = False,
+    blend: float | None = None,
     wrap: bool | Sequence[bool] = False,
     seed: int = 0,
     progress: Progress | None = None,
@@ -83,9 +80,10 @@ def complete(
     mirror : bool, optional
         Whether patches may be mirrored; False for lit or lettered textures. By default they may unless there is a scale map:
         what is seen at an angle has an upper side.
-    blend : bool
-        Whether the colours of what is filled are corrected so that seams disappear and light goes on across the hole
-        (`texrs.blend`). For other maps of the same material, call ``blend`` with the source map and ``within=hole``.
+    blend : float, optional
+        Weight of the values when colours of what is filled are corrected so that seams disappear: the smaller, the wider the
+        correction; 0.003 is good for the picture's own colours, less where a ``source`` has other light. None or 0: no
+        correction. See `texrs.blend.blend`, which corrects other maps in the same way, ``within`` the hole.
     wrap : bool or (rows, columns)
         Axes along which the picture is cyclic, so that a hole at its border is also filled from across.
     seed : int
@@ -131,9 +129,9 @@ def complete(
     if source_scale_map is not None and (source is None or scale_map is None):
         raise InvalidInput("source_scale_map: needs a source, and a scale_map whose units it shares")
     mirror = scale_map is None if mirror is None else mirror
-    for name, choice in (("mirror", mirror), ("blend", blend)):
-        if not isinstance(choice, bool | np.bool_):
-            raise InvalidInput(f"{name}: needs True or False, got {choice!r}")
+    if not isinstance(mirror, bool | np.bool_):
+        raise InvalidInput(f"mirror: needs True or False, got {mirror!r}")
+    screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
     pictures, open_ = check_pictures(
         image, transparent(image) if isinstance(hole, str) and hole == "alpha" else hole, source
     )
@@ -186,11 +184,11 @@ def complete(
         row, column = places.coordinates[new].astype(np.intp).T
         result[new] = pictures[-1][row, column]
     composite = result
-    if blend and count:
+    if screening and count:
         known = [~open_, *(np.ones(s, bool) for s in shapes[1:])]
         replaced = places.label > 0
         result = blended(
-            places, pictures, wrap=cyclic, screening=SCREENING, within=replaced, known=known, progress=progress
+            places, pictures, wrap=cyclic, screening=screening, within=replaced, known=known, progress=progress
         )
     watch("done", 1.0)
     bare = pictures[0].copy()
@@ -208,7 +206,7 @@ def complete(
         "patch": side,
         "patches": count,
         "mirror": bool(mirror),
-        "blend": bool(blend),
+        "blend": screening,
         "wrap": list(cyclic),
     }
     if method == "optimise":

@@ -13,7 +13,7 @@ import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, cast
 
 import typer
 
@@ -23,7 +23,7 @@ from texrs._arrays import as_float
 from texrs.blend import SCREENING
 from texrs.blend import blend as healed
 from texrs.cli import _files, _perspective, _pictures, _scales, _solid, _splice, _texels, _volumes
-from texrs.cli._console import Quiet, Threads, note, run, say, watching
+from texrs.cli._console import Method, Quiet, Threads, as_method, note, run, say, watching
 from texrs.cli._files import describe, named
 from texrs.errors import FileError, InvalidInput
 from texrs.papers.design import design
@@ -151,10 +151,10 @@ def design_command(
         int | None,
         typer.Option(help="Side of the patches that fill holes, in pixels.", show_default="by the example's size"),
     ] = None,
-    poisson: Annotated[
+    blend: Annotated[
         float, typer.Option(help="Weight of the values when seams are made to disappear; 0 leaves them.")
     ] = SCREENING,
-    method: Annotated[str, typer.Option(help="default, or paper: the published algorithm to the letter.")] = "default",
+    method: Method = "default",
     stages: Annotated[
         str | None,
         typer.Option(metavar="DIR", help="Folder for pictures of the stages and report.json.", show_default=False),
@@ -199,8 +199,8 @@ def design_command(
             x0=x0,
             chaos=chaos,
             patch=patch,
-            poisson=poisson,
-            method=cast(Literal["default", "paper"], method),
+            blend=blend,
+            method=as_method(method),
             progress=progress,
         )
     if variants is None:
@@ -233,7 +233,7 @@ def apply_command(
     blend: Annotated[
         float,
         typer.Option(
-            metavar="WEIGHT", help="Make seams disappear as design --poisson does; 0 leaves them, 0.15 is usual."
+            metavar="WEIGHT", help="Make seams disappear as design --blend does; 0 leaves them, 0.15 is usual."
         ),
     ] = 0.0,
     wrap: Annotated[

@@ -13,14 +13,28 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
-from typing import Annotated, cast
+from typing import Annotated, Any, cast
 
 import typer
 
 from texrs._typing import Progress
-from texrs.errors import TexrsError
+from texrs.errors import InvalidInput, TexrsError
 
-__all__ = ["Out", "Quiet", "Source", "Stages", "Stopped", "Threads", "complain", "note", "run", "say", "watching"]
+__all__ = [
+    "Method",
+    "Out",
+    "Quiet",
+    "Source",
+    "Stages",
+    "Stopped",
+    "Threads",
+    "as_method",
+    "complain",
+    "note",
+    "run",
+    "say",
+    "watching",
+]
 
 Out = Annotated[
     str, typer.Option("--out", "-o", metavar="OUT", help="File to write; its name says the format.", show_default=False)
@@ -35,6 +49,7 @@ Source = Annotated[
         "--source", "--map", metavar="FILE.npz", help="File for the source map, for texrs apply.", show_default=False
     ),
 ]
+Method = Annotated[str, typer.Option(help="default, or paper: the published algorithm to the letter.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no progress.")]
 Threads = Annotated[
     int | None,
@@ -54,6 +69,14 @@ GRACE = 1.0
 
 # The root of what typer raises on wrong usage. It is click's class or typer's own copy of it, by typer's version.
 UsageFailure = cast(type[Exception], next(c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException"))
+
+
+def as_method(text: str, *others: str) -> Any:
+    """Check a method: default, which is None, or one of the others, by default paper."""
+    allowed = ("default", *(others or ("paper",)))
+    if text not in allowed:
+        raise InvalidInput(f"--method: allowed are {', '.join(allowed[:-1])} and {allowed[-1]}; got {text!r}")
+    return None if text == "default" else text
 
 
 class Stopped(BaseException):

@@ -10,7 +10,7 @@ import typer
 
 from texrs._typing import Interpolation
 from texrs.cli import _files
-from texrs.cli._console import Out, Quiet, Source, Stages, Threads, note, watching
+from texrs.cli._console import Method, Out, Quiet, Source, Stages, Threads, as_method, note, watching
 from texrs.cli._files import describe, named
 from texrs.cli._scales import read_scale
 from texrs.errors import InvalidInput
@@ -55,7 +55,7 @@ def perspective_command(
     interpolation: Annotated[
         str, typer.Option(help="Where the example is resized: cubic, linear or nearest.")
     ] = "cubic",
-    method: Annotated[str, typer.Option(help="default, or paper: the published algorithm to the letter.")] = "default",
+    method: Method = "default",
     stages: Stages = None,
     source: Source = None,
     count: Threads = None,
@@ -67,8 +67,7 @@ def perspective_command(
     sizes = _parse_sizes(augment_scales)
     if interpolation not in ("cubic", "linear", "nearest"):
         raise InvalidInput(f"--interpolation: allowed are cubic, linear and nearest; got {interpolation!r}")
-    if method not in ("default", "paper"):
-        raise InvalidInput(f"--method: allowed are default and paper; got {method!r}")
+    how = as_method(method)
     _files.check_outputs(out, source, stages)
     example = _files.read_exemplar(image)
     wanted = None if target is None else read_scale(target)
@@ -89,7 +88,7 @@ def perspective_command(
             read_scale(scale),
             shape,
             target=wanted,
-            method=cast(Literal["paper"] | None, None if method == "default" else method),
+            method=how,
             scale_weight=scale_weight,
             augment_scales=sizes,
             wrap=cyclic,

@@ -98,8 +98,13 @@ def complete_command(
         typer.Option("--mirror/--no-mirror", help="Whether patches may be mirrored.", show_default="not with --scale"),
     ] = None,
     blend: Annotated[
-        bool, typer.Option("--blend", help="Correct the colours of what is filled, so that seams disappear.")
-    ] = False,
+        float | None,
+        typer.Option(
+            metavar="WEIGHT",
+            help="Make the seams of what is filled disappear, as design --blend does; 0.003 is usual.",
+            show_default=False,
+        ),
+    ] = None,
     wrap: Annotated[
         str, typer.Option(metavar="AXES", help="Where the picture tiles: xy, x (left-right), y (top-bottom) or none.")
     ] = "none",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Callable
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, cast
 
 import numpy as np
 import typer
@@ -13,7 +13,7 @@ import typer
 from texrs import io
 from texrs._typing import Array, Interpolation
 from texrs.cli import _files
-from texrs.cli._console import Out, Quiet, Source, Stages, Threads, note, watching
+from texrs.cli._console import Method, Out, Quiet, Source, Stages, Threads, as_method, note, watching
 from texrs.cli._files import describe, named
 from texrs.cli._volumes import read_field, read_volume
 from texrs.errors import InvalidInput
@@ -62,7 +62,6 @@ Labels = Annotated[
     ),
 ]
 Between = Annotated[str | None, typer.Option("--interpolation", help="cubic, linear or nearest.", show_default=False)]
-Method = Annotated[str, typer.Option(help="default, or paper: the published algorithm to the letter.")]
 Memory = Annotated[
     str | None,
     typer.Option(metavar="BYTES", help="Most memory that the work may take, as in 900M or 16G.", show_default="8G"),
@@ -167,8 +166,7 @@ def _grow(
     shape, cyclic = _files.parse_size(size, axes=axes), _files.parse_axes(wrap, axes=axes)
     if interpolation not in (None, "cubic", "linear", "nearest"):
         raise InvalidInput(f"--interpolation: allowed are cubic, linear and nearest; got {interpolation!r}")
-    if method not in ("default", "paper"):
-        raise InvalidInput(f"--method: allowed are default and paper; got {method!r}")
+    how = as_method(method)
     if (held is None) != (values is None):
         raise InvalidInput("--held and --values: needed together, to say where something is held, and what")
     limit = None if memory_limit is None else parse_bytes(memory_limit)
@@ -190,7 +188,7 @@ def _grow(
             values=None if values is None else _read_like(values, example, axes),
             guide=None if guide is None else (_read_map(guide[0], axes), _read_map(guide[1], axes)),
             interpolation=cast(Interpolation | None, interpolation),
-            method=cast(Literal["paper"] | None, None if method == "default" else method),
+            method=how,
             memory_limit=limit,
             progress=progress,
             **options,

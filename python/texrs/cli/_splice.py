@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 import time
 from pathlib import Path
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 
 from texrs._typing import Array
 from texrs.cli import _files
-from texrs.cli._console import Out, Quiet, Source, Stages, Threads, note, watching
+from texrs.cli._console import Out, Quiet, Source, Stages, Threads, as_method, note, watching
 from texrs.cli._files import describe, named
 from texrs.errors import FileError, InvalidInput
 from texrs.papers.splice import self_splice, splice
@@ -51,7 +51,7 @@ def splice_command(
     """Arrange the texels of one texture as those of another are."""
     start = time.monotonic()
     shape = _files.parse_size(size)
-    how = as_method(method, ("default", "paper", "preview"))
+    how = as_method(method, "paper", "preview")
     _files.check_outputs(out, source, stages)
     mine, theirs = read_texels(a), read_texels(b)
     example = mine.image if isinstance(mine, Texels) else mine
@@ -62,7 +62,7 @@ def splice_command(
             theirs,
             shape,
             seed=seed,
-            method=cast(Literal["paper", "preview"] | None, how),
+            method=how,
             align=align,
             snap_rows=snap_rows,
             refine=refine,
@@ -92,24 +92,15 @@ def self_splice_command(
 ) -> None:
     """Edit the layout of a texture's own texels."""
     start = time.monotonic()
-    how = as_method(method, ("default", "preview"))
+    how = as_method(method, "preview")
     steps = read_edit(edit)
     _files.check_outputs(out, source, stages)
     mine = read_texels(a)
     example = mine.image if isinstance(mine, Texels) else mine
     _files.check_output(out, example, example.shape[:2])
     with named(a=a, edit="--edit", count="--threads"), threads(count), watching(quiet=quiet) as progress:
-        result = self_splice(
-            mine, steps, seed=seed, method=cast(Literal["preview"] | None, how), refine=refine, progress=progress
-        )
+        result = self_splice(mine, steps, seed=seed, method=how, refine=refine, progress=progress)
     finish(result, out, source, stages, start, quiet=quiet)
-
-
-def as_method(text: str, allowed: tuple[str, ...]) -> str | None:
-    """Check a method; default is none."""
-    if text not in allowed:
-        raise InvalidInput(f"--method: allowed are {', '.join(allowed)}; got {text!r}")
-    return None if text == "default" else text
 
 
 def read_texels(text: str) -> Texels | Array:

@@ -17,7 +17,7 @@ import typer
 
 from texrs import io
 from texrs.cli import _files
-from texrs.cli._console import Quiet, Threads, complain, note, say, watching
+from texrs.cli._console import Method, Quiet, Threads, as_method, complain, note, say, watching
 from texrs.cli._files import named
 from texrs.database import TextureDatabase
 from texrs.errors import FileError, InvalidInput
@@ -68,7 +68,6 @@ Scales = Annotated[str, typer.Option(metavar="S:S:...", help="Sizes in which it 
 Threshold = Annotated[
     float | None, typer.Option(help="Least similarity, -1 to 1.", show_default="what parts the candidates best")
 ]
-Method = Annotated[str, typer.Option(help="default, or paper: the published algorithm to the letter.")]
 Wrap = Annotated[
     str, typer.Option(metavar="AXES", help="Where the texture tiles: xy, x (left-right), y (top-bottom) or none.")
 ]
@@ -89,8 +88,7 @@ def read_options(
     seed: Seed = 0,
 ) -> dict[str, Any]:
     """Read what every command takes that analyses."""
-    if method not in ("default", "paper"):
-        raise InvalidInput(f"--method: allowed are default and paper; got {method!r}")
+    how = as_method(method)
     try:
         sizes = [float(s) for s in scales.split(":")]
     except ValueError:
@@ -104,7 +102,7 @@ def read_options(
         "rotations": rotations,
         "scales": sizes,
         "threshold": threshold,
-        "method": method,
+        "method": how,
         "wrap": _files.parse_wrap(wrap),
         "seed": seed,
     }

@@ -48,7 +48,8 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_image, as_int, as_seed, as_size, as_wrap, check_memory, guidance
 from texrs._typing import Array, Floats, Progress
-from texrs.blend import SCREENING, blend, visibility
+from texrs.blend import SCREENING, visibility
+from texrs.blend import blend as blended
 from texrs.deform import Flip, flip_coordinates, flip_frame
 from texrs.errors import InvalidInput
 from texrs.kernels.complete import complete
@@ -69,7 +70,7 @@ MINIMUM_SIDE = 16
 
 Exemplars: TypeAlias = Array | Sequence[Array]
 Size: TypeAlias = int | Sequence[int] | None
-Method: TypeAlias = Literal["default", "paper"]
+Method: TypeAlias = Literal["paper"] | None
 
 
 @overload
@@ -96,8 +97,8 @@ def design(  # type: ignore[misc]  # the overloads leave the options to this sig
     x0: float | None = None,
     chaos: float = 2.0,
     patch: int | None = None,
-    poisson: float | None = SCREENING,
-    method: Method = "default",
+    blend: float | None = SCREENING,
+    method: Method = None,
     progress: Progress | None = None,
 ) -> Synthesis | list[Synthesis]:
     """Design a large texture from one example.
@@ -140,14 +141,14 @@ def design(  # type: ignore[misc]  # the overloads leave the options to this sig
         The lambda of Eq. 2, 0 to 2; below about 1.4 the sequence is periodic.
     patch : int, optional
         Side of the patches that fill holes, in pixels; a sixth of the shorter side, 12 to 32, by default.
-    poisson : float, optional
+    blend : float, optional
         Weight of the values when colours are corrected so that seams disappear (section 3.6): the smaller, the wider
         the correction. None or 0: no correction. See `texrs.blend.blend`, which corrects other maps in the same way.
-    method : {"default", "paper"}
+    method : {None, "paper"}
         "paper": the algorithm as printed, with only its misprints repaired, for comparison. Whole colour layers are moved,
         once each, by the literal generator, and stitched at the plain cost; holes take the best match; colours are
         corrected without weight on the values. ``children``, ``operations``, ``translate``, ``rotate``, ``scale`` and
-        ``mirror`` play no part, nor does the amount of ``poisson``.
+        ``mirror`` play no part, nor does the amount of ``blend``.
     progress : callable, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
 
@@ -192,11 +193,11 @@ def design(  # type: ignore[misc]  # the overloads leave the options to this sig
     shape = as_size(size if size is not None else tuple(2 * n for n in pixels[0].shape[:2]), minimum=MINIMUM_SIDE)
     seed, cyclic, count = as_seed(seed), as_wrap(wrap), as_int(tiles, "tiles", 1, 64)
     shares = as_shares(weights, len(pixels), shape)
-    screening = as_float(0.0 if poisson is None else poisson, "poisson", 0, 1e6)
+    screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
     moves = check_moves(operations, translate, 0.0 if rotate is None else rotate, scale, mirror, x0, chaos)
     side = None if patch is None else as_int(patch, "patch", 4, min(min(p.shape[:2]) for p in pixels))
-    if method not in ("default", "paper"):
-        raise InvalidInput(f"method: allowed are default and paper, got {method!r}")
+    if method not in (None, "paper"):
+        raise InvalidInput(f"method: None or 'paper' is allowed, got {method!r}")
     paper = method == "paper"
     total = 1 if variants is None else as_int(variants, "variants", 1, 4096)
     check_memory(memory(shape, pixels[0], total, shares, paper=paper))
@@ -258,7 +259,7 @@ def one(
     before = after = visibility(composite, exemplars, picture, wrap=wrap)
     if screening:
         free = sources[0].paper
-        image = blend(
+        image = blended(
             composite,
             exemplars,
             wrap=False if free else wrap,
@@ -268,7 +269,7 @@ def one(
         after = visibility(composite, exemplars, image, wrap=wrap)
     stages = {"segmentation": sources[0].parts.elements.astype(np.uint16), **pictures[0].stages, "composite": picture}
     report: dict[str, Any] = {
-        "method": "design",
+        "method": "paper" if sources[0].paper else "default",
         "seed": seed,
         "size": list(size),
         "wrap": list(wrap),
@@ -278,8 +279,7 @@ def one(
         "rotate": sources[0].moves.rotate,
         "shares": [int(np.count_nonzero(composite.exemplar == which)) for which in range(len(sources))],
         "holes": [v.holes for v in pictures],
-        "literal": sources[0].paper,
-        "poisson": screening,
+        "blend": screening,
         "seams": {"before": asdict(before), "after": asdict(after)},
         "operations": [v.log for v in pictures],
     }

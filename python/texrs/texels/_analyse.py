@@ -46,7 +46,7 @@ def analyse(
     threshold: float | None = None,
     channel: Channel | None = None,
     model: _mask.Model | None = None,
-    method: Literal["default", "paper"] = "default",
+    method: Literal["paper"] | None = None,
     wrap: bool | Sequence[bool] = False,
     seed: int = 0,
     progress: Progress | None = None,
@@ -80,7 +80,7 @@ def analyse(
         The similarity of all channels by their variance, or that of the least entropy.
     model : {"mixture", "nearest"}, optional
         Colours as mixtures of Gaussians, or by the nearest sample.
-    method : {"default", "paper"}
+    method : {None, "paper"}
         "paper": the published algorithm, its misprints repaired: one channel, no cut, nearest samples, no cleaning.
     wrap : bool or (rows, columns)
         Whether the texture repeats without a seam.
@@ -180,7 +180,7 @@ def analyse(
     report |= {
         "box": [*given.centre, *given.size],
         "background": [] if known is None else _some_points(known),
-        "method": method,
+        "method": method or "default",
         "channel": found.channel,
         "threshold": found.threshold,
         "detections": len(found.points),
@@ -222,7 +222,7 @@ class _How:
     @classmethod
     def of(
         cls,
-        method: str,
+        method: str | None,
         channel: Channel | None,
         model: _mask.Model | None,
         rotations: int,
@@ -231,8 +231,8 @@ class _How:
         wrap: tuple[bool, bool],
         seed: int,
     ) -> _How:
-        if method not in ("default", "paper"):
-            raise InvalidInput(f"method: allowed are default and paper; got {method!r}")
+        if method not in (None, "paper"):
+            raise InvalidInput(f"method: None or 'paper' is allowed, got {method!r}")
         literal = method == "paper"
         channel = ("min-entropy" if literal else "weighted") if channel is None else channel
         model = ("nearest" if literal else "mixture") if model is None else model
