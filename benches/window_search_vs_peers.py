@@ -61,7 +61,13 @@ def flat(vectors: np.ndarray, queries: np.ndarray, k: int) -> np.ndarray:
     faiss.omp_set_num_threads(2)
     index = faiss.IndexFlatL2(vectors.shape[1])
     index.add(vectors)
-    return index.search(queries, k)[1][:, -1]
+    found = index.search(queries, k)[1]
+    return found[:, 0] if k == 1 else other(found)
+
+
+def other(pairs: np.ndarray) -> np.ndarray:
+    """Give, of the two windows found for each window, the one that is not itself: it need not be the first."""
+    return np.where(pairs[:, 1] == np.arange(len(pairs)), pairs[:, 0], pairs[:, 1])
 
 
 def ours(vectors: np.ndarray, queries: np.ndarray | None) -> np.ndarray:
@@ -85,14 +91,16 @@ def compared(name: str, tasks: dict[str, Callable[[], np.ndarray]], rounds: int,
             walls[task].append(wall)
             works[task].append(cpu)
     mine = apart(results["texrs"])
-    # FAISS adds in single precision, so that of windows as good as equal it may find another.
-    same = all(np.allclose(mine, apart(r), atol=1e-3 if "FAISS" in task else 1e-9) for task, r in results.items())
+    # FAISS adds in single precision, so that of windows as good as equal it may find another, which is a little farther.
+    off = {task: apart(r) - mine for task, r in results.items()}
+    same = np.abs(off["cKDTree"]).max() <= 1e-9 and all(o.min() >= -1e-9 for o in off.values())
+    off_by = f"; FAISS finds windows farther by up to {off['FAISS flat'].max():.1e}" if "FAISS flat" in off else ""
     ratios = [sum(works[task]) / max(sum(works["texrs"]), 1e-9) for task in tasks]
     row = "  ".join(
         f"{task} {1e3 * min(walls[task]):.0f} ms ({min(walls[task]) / min(walls['texrs']):.1f}x, CPU {ratio:.1f}x)"
         for task, ratio in zip(tasks, ratios, strict=True)
     )
-    print(f"{name}: {row}; same distances: {same}", flush=True)
+    print(f"{name}: {row}; same distances: {same}{off_by}", flush=True)
     return ratios
 
 
@@ -101,7 +109,7 @@ def case(name: str, image: np.ndarray, rounds: int) -> list[list[float]]:
     mine, theirs = np.ascontiguousarray(mine), np.ascontiguousarray(theirs)
     singles = mine.astype(np.float32), theirs.astype(np.float32)
     print(f"{name}: {len(mine)} windows, {kept:.1%} of their variance")
-    others = {"texrs": lambda: ours(mine, None), "cKDTree": lambda: cKDTree(mine).query(mine, k=2, workers=2)[1][:, 1]}
+    others = {"texrs": lambda: ours(mine, None), "cKDTree": lambda: other(cKDTree(mine).query(mine, k=2, workers=2)[1])}
     second = {"texrs": lambda: ours(mine, theirs), "cKDTree": lambda: cKDTree(mine).query(theirs, workers=2)[1]}
     if faiss is not None:
         others["FAISS flat"] = lambda: flat(singles[0], singles[0], 2)

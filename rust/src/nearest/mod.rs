@@ -121,7 +121,7 @@ impl Nearest {
 }
 
 fn check(argument: &'static str, numbers: &[f64]) -> Result<()> {
-    match numbers.iter().find(|x| !(x.abs() <= LARGEST)) {
+    match numbers.iter().find(|x| x.is_nan() || x.abs() > LARGEST) {
         Some(bad) => Err(Error::value(
             argument,
             format!("numbers within {LARGEST:e} are allowed, got {bad}"),

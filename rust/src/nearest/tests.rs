@@ -18,7 +18,7 @@ fn vectors(n: usize, count: usize, seed: u64, shift: f64) -> Vec<f64> {
             let (which, k) = (i / n % 97, i % n);
             let fine = 1e-7 * noise.uniform([(i / n) as u32, k as u32, 1, 0]);
             let coarse = noise.uniform([which as u32, k as u32, 0, 0]) / (1.0 + k as f64);
-            shift + coarse + if i / n % 5 == 0 { 0.0 } else { fine }
+            shift + coarse + if (i / n).is_multiple_of(5) { 0.0 } else { fine }
         })
         .collect()
 }
