@@ -38,7 +38,7 @@ MOST = 1 << 24
 WEIGHT = 1264
 """Cost of another scale than the wanted one, in 1/256: at a factor of 1.6 as much as windows that have nothing to do
 with each other."""
-_BAND = 1 << 18
+_BAND = 1 << 15
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,6 +238,7 @@ class Supply:
                 seed=(seed + 0x9E3779B97F4A7C15 * (number + 1)) % (1 << 64),
                 held=fixed,
                 guide=guide,
+                overwrite=True,
                 progress=stage(progress, f"level {number + 1} of {len(regions)}"),
             )
             places = found.places
@@ -251,11 +252,17 @@ class Supply:
         self, level: Level, region: Region, target: Floats | None, spacing: int, which: int, strength: float
     ) -> Guide:
         """Ask for the target's scales at the points of a level, for copies of the exemplar's own size, and for none barred."""
-        asked = np.zeros((region.points, 4), np.int16)
+        asked = np.zeros(region.shape, np.int16)
         if target is not None:
-            asked[:, 0] = coded(_means(np.log(target), region.shape, spacing)).reshape(-1)
+            thick = max(1, _BAND // (spacing * target.shape[1]))
+            for first in range(0, len(asked), thick):
+                band = asked[first : first + thick]
+                # The last point of a closed axis stands for what is left.
+                last = (first + thick) * spacing if first + thick < len(asked) else len(target)
+                logs = np.log(target[min(first * spacing, len(target) - 1) : last])
+                band[...] = coded(_means(logs, band.shape, spacing))
         weight = min(round(WEIGHT * self.settings.weights[which] * strength), 65535)
-        return Guide(level.values, asked.reshape(-1), np.full(region.points, weight, np.uint16), level.order)
+        return Guide(level.values, asked.reshape(-1), np.array([weight], np.uint16), level.order)
 
     def locate(self, places: NDArray[np.int32]) -> tuple[NDArray[np.uint32], Floats]:
         """Give the copy, and the place in the exemplar, of places in the sheet."""
