@@ -129,6 +129,7 @@ KERNEL_ARROWS = {
     "patch_search": set(),
     "mean_shift": set(),
     "ncc": set(),
+    "nearest": set(),
     "poisson": set(),
     "appearance": set(),
     "guide": {"appearance"},

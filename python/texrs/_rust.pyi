@@ -9,6 +9,7 @@ __all__ = [
     "Appearance",
     "Cholesky",
     "Correlation",
+    "Nearest",
     "PatchIndex",
     "cohere",
     "complete",
@@ -44,6 +45,14 @@ def gather(
     coordinates: NDArray[float32],
     interpolation: str,
 ) -> NDArray[Any]: ...
+
+@final
+class Nearest:
+    def __new__(cls, vectors: NDArray[float64]) -> Nearest: ...
+    def query(
+        self, queries: NDArray[float64], progress: Callable[[float], object] | None
+    ) -> tuple[NDArray[uint32], NDArray[float64]]: ...
+    def others(self, progress: Callable[[float], object] | None) -> tuple[NDArray[uint32], NDArray[float64]]: ...
 
 @final
 class Correlation:
@@ -214,7 +223,7 @@ class Appearance:
         seed: int,
         guide: tuple[NDArray[int16], NDArray[int16], NDArray[uint16], NDArray[uint32]] | None,
         progress: Callable[[float], object] | None,
-    ) -> tuple[NDArray[int32], int, float]: ...
+    ) -> tuple[int, float]: ...
 
 def upsample(
     parents: NDArray[int32],

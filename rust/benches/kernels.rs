@@ -4,6 +4,7 @@ mod coherence;
 mod complete;
 mod mean_shift;
 mod ncc;
+mod nearest;
 mod patch_search;
 mod poisson;
 mod seam;
@@ -63,6 +64,7 @@ criterion_group!(
     complete::bench,
     mean_shift::bench,
     ncc::bench,
+    nearest::bench,
     patch_search::bench,
     poisson::bench,
     seam::bench,

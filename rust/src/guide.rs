@@ -14,8 +14,8 @@ const VALUES: i32 = 4096;
 #[derive(Debug, Clone)]
 pub struct Guide<'a> {
     exemplar: &'a [Colour],
-    output: &'a [Colour],
-    /// Cost of a squared difference of one, in 1 / 256; 0 where nothing is asked.
+    output: Wanted<'a>,
+    /// Cost of a squared difference of one, in 1 / 256; 0 where nothing is asked. One, or one a point.
     weight: &'a [u16],
     /// Samples by their first value, the least first; empty where samples are drawn from anywhere.
     order: &'a [u32],
@@ -23,19 +23,31 @@ pub struct Guide<'a> {
     before: Vec<u32>,
 }
 
+/// Values at the points of the output. Outputs are large, and a scale is one number.
+#[derive(Debug, Clone, Copy)]
+enum Wanted<'a> {
+    All(&'a [Colour]),
+    /// The first ones; the others are zero.
+    First(&'a [i16]),
+}
+
 impl<'a> Guide<'a> {
-    /// A guide for an exemplar of `samples` and an output of `points`.
+    /// A guide for an exemplar of `samples` and an output of `points`: for each its four values or the first, and a
+    /// weight for each or one for all.
     pub fn new(
         exemplar: &'a [Colour],
-        output: &'a [Colour],
+        output: &'a [i16],
         weight: &'a [u16],
         samples: usize,
         points: usize,
     ) -> Result<Self> {
+        let first = output.len() == points;
+        let values = if first { 1 } else { CHANNELS };
+        let weights = if weight.len() == 1 { 1 } else { points };
         for (argument, expected, got) in [
             ("guide of the exemplar", samples, exemplar.len()),
-            ("guide of the output", points, output.len()),
-            ("weight of the guide", points, weight.len()),
+            ("guide of the output", points * values, output.len()),
+            ("weight of the guide", weights, weight.len()),
         ] {
             if expected != got {
                 return Err(Error::Shape {
@@ -46,12 +58,16 @@ impl<'a> Guide<'a> {
             }
         }
         let within = |x: &i16| (-2048..2048).contains(x);
-        if !exemplar.iter().chain(output).flatten().all(within) {
+        if !exemplar.as_flattened().iter().chain(output).all(within) {
             return Err(Error::value("guide", "values of 12 bits are allowed"));
         }
         Ok(Self {
             exemplar,
-            output,
+            output: if first {
+                Wanted::First(output)
+            } else {
+                Wanted::All(output.as_chunks().0)
+            },
             weight,
             order: &[],
             before: Vec::new(),
@@ -87,7 +103,7 @@ impl<'a> Guide<'a> {
         if self.order.is_empty() {
             return None;
         }
-        let wanted = i32::from(self.output[point][0]) + VALUES / 2;
+        let wanted = i32::from(self.wanted(point)[0]) + VALUES / 2;
         let before = |v: i32| self.before[v.clamp(0, VALUES) as usize] as usize;
         let (middle, half) = (before(wanted), (self.order.len() / SHARE).max(12) / 2);
         let low = before(wanted - ALIKE).min(middle.saturating_sub(half));
@@ -101,17 +117,30 @@ impl<'a> Guide<'a> {
 
     /// Whether anything is asked at a point.
     pub(crate) fn asks(&self, point: usize) -> bool {
-        self.weight[point] > 0
+        self.weight(point) > 0
+    }
+
+    #[inline(always)]
+    fn weight(&self, point: usize) -> u16 {
+        self.weight[point.min(self.weight.len() - 1)]
+    }
+
+    #[inline(always)]
+    fn wanted(&self, point: usize) -> Colour {
+        match self.output {
+            Wanted::All(values) => values[point],
+            Wanted::First(values) => [values[point], 0, 0, 0],
+        }
     }
 
     /// What it costs to show a sample at a point.
     #[inline(always)]
     pub(crate) fn cost(&self, point: usize, sample: usize) -> i64 {
-        let weight = self.weight[point];
+        let weight = self.weight(point);
         if weight == 0 {
             return 0;
         }
-        let (a, b) = (&self.exemplar[sample], &self.output[point]);
+        let (a, b) = (&self.exemplar[sample], self.wanted(point));
         let mut sum = 0;
         for c in 0..CHANNELS {
             let d = i64::from(a[c]) - i64::from(b[c]);

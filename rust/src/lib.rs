@@ -21,6 +21,7 @@
 //! | [`seam`] | minimum cuts on grids: max-flow, planar strips, binary labels |
 //! | [`mean_shift`] | joint spatial and range filtering |
 //! | [`ncc`] | how alike a template and each window of an image are |
+//! | [`nearest`] | the nearest of many vectors |
 //! | [`patch_search`] | exact best matches of a masked patch |
 //! | [`poisson`] | images from their differences, near given values |
 //! | [`complete`] | filling holes by example |
@@ -48,6 +49,7 @@ pub mod gather;
 pub mod guide;
 pub mod mean_shift;
 pub mod ncc;
+pub mod nearest;
 pub mod optimize;
 pub mod patch_search;
 pub mod poisson;

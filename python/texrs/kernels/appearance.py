@@ -28,9 +28,9 @@ class Guide(NamedTuple):
     ----------
     exemplar : (samples * 4) int16
         Values of the exemplar's samples, -2048 to 2047; unused ones are zero.
-    output : (points * 4) int16
-        Values wanted at the points of the output.
-    weight : (points) uint16
+    output : (points * 4) or (points) int16
+        Values wanted at the points of the output; one a point is the first, and the others are zero.
+    weight : (points) or (1) uint16
         Cost of a squared difference of one, in 1/256; windows that have nothing to do with each other differ by
         about 2 * 512^2. 0 where nothing is asked.
     order : (any) uint32
@@ -275,6 +275,7 @@ class Appearance:
         seed: int = 0,
         held: NDArray[np.bool_] | None = None,
         guide: Guide | None = None,
+        overwrite: bool = False,
         progress: Report | None = None,
     ) -> Corrected:
         """Correct places until every window of the output is like one of the exemplar.
@@ -306,6 +307,8 @@ class Appearance:
             Chooses what is drawn.
         held : (points) bool, optional
             Points that keep their places.
+        overwrite : bool
+            Write the result over ``places``, which saves 4 bytes for each of their numbers.
         guide, progress
             As of `blocks`.
 
@@ -327,7 +330,9 @@ class Appearance:
                 f"places: needs int32, {len(region.shape)} for each of {region.points} points, "
                 f"got {places.dtype} {places.shape}"
             )
-        found = self._inner.correct(
+        if not overwrite:
+            places = places.copy()
+        passes, changed = self._inner.correct(
             places,
             region.place,
             frames,
@@ -344,7 +349,7 @@ class Appearance:
             guide,
             progress,
         )
-        return Corrected(*found)
+        return Corrected(places, passes, changed)
 
     def _check(self, region: Region) -> None:
         if len(region.shape) != len(self.shape):

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from texrs._arrays import to_unit
 from texrs._progress import stage
 from texrs._typing import Array, Floats, Progress
+from texrs.kernels.nearest import Nearest
 from texrs.kernels.pyramid import halve
 
 __all__ = ["Averaged", "average"]
@@ -113,11 +113,11 @@ def doubled(x: Doubles, shape: tuple[int, ...]) -> Doubles:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Search:
-    """The exemplar's windows, projected, in a tree."""
+    """The exemplar's windows, projected, ready to be searched."""
 
     e: Doubles
     bases: list[tuple[Doubles, Doubles]]
-    tree: cKDTree
+    nearest: Nearest
     least: float
     columns: int
 
@@ -134,14 +134,14 @@ class Search:
             bases.append((mean, axes[:, ::-1][:, :keep]))
             parts.append((windows - mean) @ bases[-1][1])
             variance += float(total[-1])
-        tree = cKDTree(np.concatenate(parts, axis=1))
-        return cls(e, bases, tree, NEAREST * max(variance, 1e-12), e.shape[1] - SIDE + 1)
+        nearest = Nearest(np.concatenate(parts, axis=1))
+        return cls(e, bases, nearest, NEAREST * max(variance, 1e-12), e.shape[1] - SIDE + 1)
 
     def step(self, x: Doubles, scale: Doubles) -> tuple[Doubles, NDArray[np.intp], float]:
         """Search the nearest window for each of the output's, then average them: a round."""
         seen = [_windows(v, SPACING) for v in (x, scale[..., np.newaxis])]
         query = np.concatenate([(w - m) @ b for w, (m, b) in zip(seen, self.bases, strict=True)], axis=1)
-        distance, found = self.tree.query(query)
+        found, distance = self.nearest.query(query)
         square = np.maximum(distance**2, self.least)
         energy = float((square ** (R / 2)).mean())  # Eq. 5
         omega = square ** ((R - 2) / 2)  # Eq. 6

@@ -37,6 +37,7 @@ import numpy as np
 
 from texrs import scale_maps
 from texrs._arrays import as_float, as_image, as_seed, as_size, as_wrap
+from texrs._pixels import bands
 from texrs._typing import Array, Floats, Interpolation, Progress
 from texrs.errors import InvalidInput
 from texrs.kernels.pyramid import Region
@@ -154,16 +155,17 @@ def perspective(
     if method == "paper":
         return literal(exemplar, mine, wanted, closed, strength, seed, progress)
     sizes = factors_for(mine, wanted, augment_scales)
-    followed, outside = clamped(mine, wanted, sizes)
+    wanted, outside = clamped(mine, wanted, sizes)
     if outside["share"] > 0 and strength > 0:
         warnings.warn(_sentence(outside, sizes), stacklevel=2)
-    reached = (float(followed.min()), float(followed.max()))
+    reached = (float(wanted.min()), float(wanted.max()))
     supply = Supply.of(image, mine, sizes, wanted=reached, settings=SETTINGS)
-    grown = supply.grow(Region.whole(shape, closed), followed, strength=strength, seed=seed, progress=progress)
-    source = supply.source(grown.places, shape)
+    grown = supply.grow(Region.whole(shape, closed), wanted, strength=strength, seed=seed, progress=progress)
+    source, levels, between = supply.source(grown.places, shape), grown.report, grown.stages
+    del grown  # Its places take as much memory as all the rest.
     composite = source.render(exemplar, interpolation=interpolation)
-    stages = {"target": followed}
-    for name, (places, points) in grown.stages.items():
+    stages = {"target": wanted}
+    for name, (places, points) in between.items():
         stages[name] = supply.source(places, points).render(exemplar, interpolation="nearest")
     report: dict[str, Any] = {
         "method": "default",
@@ -171,10 +173,10 @@ def perspective(
         "scale_weight": strength,
         "sizes": [round(float(np.sqrt(np.prod(c.factor))), 4) for c in supply.copies],
         "outside": outside,
-        "scale_error": scale_error(supply, source, mine, followed),
+        "scale_error": scale_error(supply, source, mine, wanted),
         "wrap": list(closed),
         "interpolation": interpolation,
-        "levels": grown.report,
+        "levels": levels,
     }
     return Synthesis(composite, source, stages | {"composite": composite}, report)
 
@@ -208,10 +210,10 @@ def literal(
 
 def check_wrap(target: Floats, wrap: Sequence[bool], stretched: bool) -> None:
     """Refuse a target whose ends do not meet where the output is to repeat."""
-    logs = np.log(target)
     for axis, closed in enumerate(wrap):
         if not closed:
             continue
+        logs = np.log(target)
         inner = float(np.abs(np.diff(logs, axis=axis)).max(initial=0.0))
         across = float(np.abs(np.take(logs, 0, axis) - np.take(logs, -1, axis)).max())
         if across > 2 * inner + 0.02:
@@ -288,7 +290,9 @@ def scale_error(supply: Supply, source: SourceMap, scale: Floats, target: Floats
     """Give the median of |log S_e(S(p)) - log S_o(p)|: how well the synthesiser chose by scale."""
     sizes = np.log([c.factor for c in supply.copies]).mean(axis=1).astype(np.float32)
     shown = source.render(scale, interpolation="linear")
-    np.log(shown, out=shown)
-    shown += sizes[source.label]
-    shown -= np.log(target)
+    for band in bands(target.shape):
+        part = shown[band]
+        np.log(part, out=part)
+        part += sizes[source.label[band]]
+        part -= np.log(target[band])
     return round(float(np.median(np.abs(shown, out=shown), overwrite_input=True)), 5)

@@ -41,7 +41,7 @@ WEIGHT = 1264
 with each other."""
 TURN = 2
 """Passes, of which each corrects every other point, between two looks at the balance of colours."""
-_BAND = 1 << 18
+_BAND = 1 << 15
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,6 +256,7 @@ class Supply:
                     seed=(seed + 0x9E3779B97F4A7C15 * (number + 1)) % (1 << 64),
                     held=fixed,
                     guide=guide if balance is None else balance.onto(guide),
+                    overwrite=True,
                     progress=_turn(advance, first / passes, turns.step / passes),
                 )
                 places = found.places
@@ -270,11 +271,17 @@ class Supply:
         self, level: Level, region: Region, target: Floats | None, spacing: int, which: int, strength: float
     ) -> Guide:
         """Ask for the target's scales at the points of a level, for copies of the exemplar's own size, and for none barred."""
-        asked = np.zeros((region.points, 4), np.int16)
+        asked = np.zeros(region.shape, np.int16)
         if target is not None:
-            asked[:, 0] = coded(_means(np.log(target), region.shape, spacing)).reshape(-1)
+            thick = max(1, _BAND // (spacing * target.shape[1]))
+            for first in range(0, len(asked), thick):
+                band = asked[first : first + thick]
+                # The last point of a closed axis stands for what is left.
+                last = (first + thick) * spacing if first + thick < len(asked) else len(target)
+                logs = np.log(target[min(first * spacing, len(target) - 1) : last])
+                band[...] = coded(_means(logs, band.shape, spacing))
         weight = min(round(WEIGHT * self.settings.weights[which] * strength), 65535)
-        return Guide(level.values, asked.reshape(-1), np.full(region.points, weight, np.uint16), level.order)
+        return Guide(level.values, asked.reshape(-1), np.array([weight], np.uint16), level.order)
 
     def locate(self, places: NDArray[np.int32]) -> tuple[NDArray[np.uint32], Floats]:
         """Give the copy, and the place in the exemplar, of places in the sheet."""

@@ -4,28 +4,46 @@ use super::{CHUNK, Level};
 use crate::appearance::{Colour, Feature};
 use crate::fixed::{BITS, Frame, Frames, ONE, Place, add, apply, identity, inverse, nearest, sub};
 use crate::par;
+use std::ops::Range;
 
-/// The output's colours as they are, where frames leave everything in place: a window is a box of them.
+/// The output's colours as they are, where frames leave everything in place: a window is a box of them. Of some points,
+/// and as many before and behind as windows reach.
+#[derive(Default)]
 pub(super) struct Seen {
+    first: usize,
     colours: Vec<Colour>,
 }
 
 impl Seen {
-    pub(super) fn new<const D: usize>(level: &Level<'_, D>, places: &[Place<D>]) -> Self {
+    pub(super) fn look<const D: usize>(
+        &mut self,
+        level: &Level<'_, D>,
+        places: &[Place<D>],
+        range: Range<usize>,
+    ) {
         if !level.frames.is_identity() {
-            return Self {
-                colours: Vec::new(),
-            };
+            return;
         }
-        let mut colours = vec![[0; 4]; places.len()];
-        par::chunks_mut(&mut colours, CHUNK, |c, colours| {
+        let margin = level.margin();
+        self.first = range.start.saturating_sub(margin);
+        let last = places.len().min(range.end + margin);
+        self.colours.resize(last - self.first, [0; 4]);
+        let places = &places[self.first..last];
+        par::chunks_mut(&mut self.colours, CHUNK, |c, colours| {
             for (colour, &place) in colours.iter_mut().zip(&places[c * CHUNK..]) {
                 *colour = level
                     .appearance
                     .colour(level.appearance.clamped(nearest(place)));
             }
         });
-        Self { colours }
+    }
+}
+
+impl<const D: usize> Level<'_, D> {
+    /// How far apart in row-major order a point and another of its window are.
+    pub(super) fn margin(&self) -> usize {
+        let rows: usize = self.region.grid.strides().iter().sum();
+        self.appearance.radius() * rows
     }
 }
 
@@ -84,7 +102,8 @@ impl<'a, const D: usize> Eye<'a, D> {
         } else {
             let appearance = self.level.appearance;
             for (k, look) in self.looks.iter().enumerate() {
-                let colour = self.seen.colours[(p as isize + look.across) as usize];
+                let at = (p - self.seen.first) as isize + look.across;
+                let colour = self.seen.colours[at as usize];
                 appearance.put(&mut self.window, k, colour);
             }
         }

@@ -1,7 +1,7 @@
 //! A better match for a point, from its neighbours and drawn.
 
 use super::gather::{Eye, Seen};
-use super::{FINEST, Level, SLAB};
+use super::{FINEST, Level};
 use crate::Result;
 use crate::appearance::distance;
 use crate::fixed::{ONE, Place, add, apply, nearest};
@@ -38,9 +38,11 @@ impl<const D: usize> Level<'_, D> {
             limit: (self.options.hysteresis * spacing) as i64,
             unity: (self.options.unity * spacing) as i64,
         };
-        let seen = Seen::new(self, places);
-        for start in (0..places.len()).step_by(SLAB) {
-            let range = start..places.len().min(start + SLAB);
+        let mut seen = Seen::default();
+        let slab = self.slab();
+        for start in (0..places.len()).step_by(slab) {
+            let range = start..places.len().min(start + slab);
+            seen.look(self, places, range.clone());
             self.pass(
                 places,
                 range,

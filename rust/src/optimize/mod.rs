@@ -35,7 +35,7 @@ const CHUNK: usize = 2048;
 const FINEST: i32 = UNIT / 256;
 /// How far a change makes points look again.
 const NEAR: usize = 1;
-/// Points between two looks at whether to stop.
+/// Points between two looks at whether to stop, at least.
 const SLAB: usize = 1 << 18;
 
 /// What [`correct`] is asked for.
@@ -84,7 +84,7 @@ pub fn correct<const D: usize>(
     frames: Frames<'_, D>,
     guide: Option<&Guide<'_>>,
     held: &[bool],
-    places: &mut Vec<Place<D>>,
+    places: &mut [Place<D>],
     options: &Options,
     monitor: &Monitor,
 ) -> Result<(usize, f64)> {
@@ -119,32 +119,44 @@ pub fn correct<const D: usize>(
         around: around(),
         recent: Recent::new(points, NEAR),
     };
-    monitor.expect((options.passes * points.div_ceil(SLAB)) as u64);
-    let mut matches = places.clone();
+    monitor.expect((options.passes * points.div_ceil(level.slab())) as u64);
+    let mut matches = places.to_vec();
     let mut elected = vec![[0; D]; if options.vote > 0 { points } else { 0 }];
-    let mut moved = [0, 0];
-    for pass in 0..options.passes {
-        let number = options.first + pass as u32;
-        level.matches(places, &mut matches, number, monitor)?;
+    // What is before a pass and what is after it take turns.
+    let (mut before, mut matches, mut elected) = (places, &mut matches[..], &mut elected[..]);
+    let (mut moved, mut done) = ([0, 0], 0);
+    while done < options.passes {
+        let number = options.first + done as u32;
+        level.matches(before, matches, number, monitor)?;
         let newest = if options.vote > 0 {
-            level.vote(places, &matches, &mut elected, number);
+            level.vote(before, matches, elected, number);
             &mut elected
         } else {
             &mut matches
         };
-        moved = [moved[1], level.recent.note(places, newest)];
-        std::mem::swap(places, newest);
-        if pass > 0 && ((moved[0] + moved[1]) as f64) < options.settled * points as f64 {
-            return Ok((pass + 1, (moved[0] + moved[1]) as f64 / points as f64));
+        moved = [moved[1], level.recent.note(before, newest)];
+        std::mem::swap(&mut before, newest);
+        done += 1;
+        if done > 1 && ((moved[0] + moved[1]) as f64) < options.settled * points as f64 {
+            break;
         }
-        if pass > 0 && pass + 1 < options.passes {
+        if done > 1 && done < options.passes {
             level.recent.spread(&region.grid);
         }
     }
-    Ok((options.passes, (moved[0] + moved[1]) as f64 / points as f64))
+    if done % 2 == 1 {
+        let places = if options.vote > 0 { elected } else { matches };
+        places.copy_from_slice(before);
+    }
+    Ok((done, (moved[0] + moved[1]) as f64 / points as f64))
 }
 
 impl<const D: usize> Level<'_, D> {
+    /// Points that are corrected between two looks at whether to stop: many more than windows reach beyond them.
+    fn slab(&self) -> usize {
+        SLAB.max(8 * self.margin())
+    }
+
     /// What the guide says of showing a sample at a point.
     #[inline(always)]
     fn asked(&self, point: usize, sample: usize) -> i64 {

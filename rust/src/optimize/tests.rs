@@ -59,7 +59,8 @@ fn mean_cost<const D: usize>(
         around: around(),
         recent: Recent::new(places.len(), 0),
     };
-    let seen = gather::Seen::new(&level, places);
+    let mut seen = gather::Seen::default();
+    seen.look(&level, places, 0..places.len());
     let mut eye = gather::Eye::new(&level, &seen);
     let sum: f64 = (0..places.len())
         .map(|p| {

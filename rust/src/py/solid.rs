@@ -1,9 +1,11 @@
-use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, ToPyArray};
+use numpy::{
+    PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyReadwriteArray1, ToPyArray,
+};
 use pyo3::prelude::*;
 
 use super::run;
 use crate::appearance::{CHANNELS, KEEP, Parts};
-use crate::fixed::{Frame, Frames, Place};
+use crate::fixed::{Frame, Frames};
 use crate::grid::{Grid, Region};
 use crate::guide::Guide;
 use crate::{Error, Result, appearance, blocks, optimize, pyramid};
@@ -78,7 +80,7 @@ pub(super) fn frames<const D: usize>(values: &[i16], points: usize) -> Result<Fr
     }
 }
 
-/// Values of the exemplar's samples and of the output's points, four each, a weight a point, and samples by value.
+/// Values of the exemplar's samples and of the output's points, weights, and samples by value.
 type GuideIn<'py> = (
     PyReadonlyArray1<'py, i16>,
     PyReadonlyArray1<'py, i16>,
@@ -96,9 +98,7 @@ fn slices<'a>(guide: &'a Option<GuideIn<'_>>) -> PyResult<GuideSlices<'a>> {
 
 fn guide<'a>(arrays: GuideSlices<'a>, samples: usize, points: usize) -> Result<Option<Guide<'a>>> {
     arrays
-        .map(|(a, b, c, d)| {
-            Guide::new(a.as_chunks().0, b.as_chunks().0, c, samples, points)?.ordered(d)
-        })
+        .map(|(a, b, c, d)| Guide::new(a.as_chunks().0, b, c, samples, points)?.ordered(d))
         .transpose()
 }
 
@@ -256,12 +256,12 @@ impl Appearance {
         Ok(PyArray1::from_vec(py, places))
     }
 
-    /// Corrected places, the number of passes and the share of points that the last two changed.
+    /// Corrects places, and gives the number of passes and the share of points that the last two changed.
     #[allow(clippy::too_many_arguments)] // the options of the kernel
     fn correct<'py>(
         &self,
         py: Python<'py>,
-        places: PyReadonlyArray1<'py, i32>,
+        mut places: PyReadwriteArray1<'py, i32>,
         place: Where,
         frames: PyReadonlyArray3<'py, i16>,
         held: PyReadonlyArray1<'py, bool>,
@@ -276,7 +276,7 @@ impl Appearance {
         seed: u64,
         guide: Option<GuideIn<'py>>,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<(PlacesOut<'py>, usize, f64)> {
+    ) -> PyResult<(usize, f64)> {
         let guide = slices(&guide)?;
         let options = optimize::Options {
             passes,
@@ -289,27 +289,24 @@ impl Appearance {
             settled,
             seed,
         };
-        let (values, held, places) = (frames.as_slice()?, held.as_slice()?, places.as_slice()?);
-        let (places, done, changed) = run(py, progress, |monitor| {
+        let (values, held, places) = (frames.as_slice()?, held.as_slice()?, places.as_slice_mut()?);
+        run(py, progress, |monitor| {
             either!(&self.0, a, {
                 let region = region::<D>(&place)?;
                 let frames = self::frames(values, region.grid.len())?;
-                let mut places: Vec<Place<D>> = places.as_chunks().0.to_vec();
                 let guide = self::guide(guide, a.grid().len(), region.grid.len())?;
-                let (done, changed) = optimize::correct(
+                optimize::correct(
                     a,
                     &region,
                     frames,
                     guide.as_ref(),
                     held,
-                    &mut places,
+                    places.as_chunks_mut().0,
                     &options,
                     monitor,
-                )?;
-                Ok((places.into_flattened(), done, changed))
+                )
             })
-        })?;
-        Ok((PyArray1::from_vec(py, places), done, changed))
+        })
     }
 }
 
