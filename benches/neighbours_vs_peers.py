@@ -3,13 +3,12 @@
 python benches/neighbours_vs_peers.py [rounds]
 
 For each pixel of a texture the nearest other one, in the whole of it: what similarity sets are made of. All take the
-same vectors, build what they need, and use two threads. Rounds are interleaved; user CPU seconds do not hang on what
+same vectors, build what they need, and use two threads. Rounds are interleaved; seconds of processors hang less on what
 else the machine does. FAISS is left out where it is not installed (pip install faiss-cpu).
 """
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from collections.abc import Callable
@@ -33,10 +32,9 @@ BORDER = 2
 
 def measured(work: Callable[[], np.ndarray]) -> tuple[float, float, np.ndarray]:
     """Give seconds on the clock, seconds of CPU, and what the work gives."""
-    before, start = os.times(), time.perf_counter()
+    start = time.perf_counter(), time.process_time()
     result = work()
-    wall, after = time.perf_counter() - start, os.times()
-    return wall, after.user - before.user + after.system - before.system, result
+    return time.perf_counter() - start[0], time.process_time() - start[1], result
 
 
 def case(name: str, image: np.ndarray, rounds: int) -> None:

@@ -262,7 +262,7 @@ HALF[:, :40] = True
         ({"threshold": 3}, "threshold: needs a number from -1 to 1"),
         ({"channel": "third"}, "channel: allowed are"),
         ({"model": "forest"}, "model: allowed are"),
-        ({"method": "letter"}, "method: allowed are"),
+        ({"method": "letter"}, "method: None or 'paper' is allowed"),
     ],
 )
 def test_bad_input_gets_a_sentence(change: dict, message: str) -> None:

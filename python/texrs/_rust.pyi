@@ -251,6 +251,7 @@ def cohere(
 def jitter(
     places: NDArray[int32],
     place: tuple[Sequence[int], Sequence[int], Sequence[bool]],
+    held: NDArray[bool_],
     reach: int,
     seed: int,
     level: int,

@@ -26,7 +26,15 @@ fn sides<const D: usize>(c: &mut Criterion, side: usize) {
     };
     let sets = similar(&appearance, 3, 7, FEW, &Monitor::default()).unwrap();
     let mut start: Vec<Place<D>> = vec![[side as i32 / 2 * ONE; D]; grid.len()];
-    jitter(&mut start, &region, (side as i32 / 2 * ONE) as u32, 1, 0).unwrap();
+    jitter(
+        &mut start,
+        &region,
+        &[],
+        (side as i32 / 2 * ONE) as u32,
+        1,
+        0,
+    )
+    .unwrap();
     let options = Options {
         passes: 1,
         numbers: FEW,

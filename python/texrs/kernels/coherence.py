@@ -178,7 +178,7 @@ def correct(
         places,
         region.place,
         frames,
-        np.zeros(0, np.bool_) if held is None else np.ascontiguousarray(held.reshape(-1)),
+        _held(held),
         _kinds(kinds),
         as_int(passes, "passes", 0, 1000),
         _numbers(similarity.numbers),
@@ -188,7 +188,13 @@ def correct(
 
 
 def jitter(
-    places: NDArray[np.int32], region: Region, reach: float, *, seed: int = 0, level: int = 0
+    places: NDArray[np.int32],
+    region: Region,
+    reach: float,
+    *,
+    seed: int = 0,
+    level: int = 0,
+    held: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.int32]:
     """Displace places by noise that belongs to their points in the world.
 
@@ -202,6 +208,8 @@ def jitter(
         Largest displacement along an axis, in samples, 0 to 65536.
     seed, level : int
         Choose the noise.
+    held : (points) bool, optional
+        Points that keep their places.
 
     Returns
     -------
@@ -210,7 +218,7 @@ def jitter(
     Raises
     ------
     InvalidInput
-        An option out of its range, or places that are not those of the region.
+        An option out of its range, or arrays that are not of the region.
 
     Examples
     --------
@@ -223,13 +231,19 @@ def jitter(
     """
     _check(places, region)
     most = round(as_float(reach, "reach", 0, 65536) * ONE)
-    return _rust.jitter(places, region.place, most, as_seed(seed), as_int(level, "level", 0, (1 << 32) - 1))
+    return _rust.jitter(
+        places, region.place, _held(held), most, as_seed(seed), as_int(level, "level", 0, (1 << 32) - 1)
+    )
 
 
 def _numbers(numbers: int) -> int:
     if numbers not in (8, 24):
         raise InvalidInput(f"numbers: 8 or 24 are allowed, got {numbers!r}")
     return int(numbers)
+
+
+def _held(held: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
+    return np.zeros(0, np.bool_) if held is None else np.ascontiguousarray(held.reshape(-1))
 
 
 def _kinds(

@@ -199,12 +199,7 @@ def surroundings(a: Texels, size: tuple[int, int], unit: float, needed: float) -
     margin = MARGIN
     while available(a, size, math.ceil(margin * unit)) < needed and margin < WIDEST:
         margin *= 1.4
-    source = extend(a, size, math.ceil(margin * unit))
-    while len(source.points) < needed and margin < WIDEST:
-        # Those that would lie over others are left out.
-        margin *= 1.4
-        source = extend(a, size, math.ceil(margin * unit))
-    return source
+    return extend(a, size, math.ceil(margin * unit))
 
 
 def trimmed(a: Texels, found: Match, size: tuple[int, int]) -> Match:
@@ -349,11 +344,12 @@ def void_of(source: Extended, of: NDArray[np.intp], grown: int = 1) -> Bools:
 
     used = np.zeros(len(source.points) + 1, bool)
     used[of + 1] = True
-    idle = (source.instance > 0) & ~used[source.instance]
+    taken = used.take(source.instance)
+    idle = (source.instance > 0) & ~taken
     # Of a picture that stays itself only what is taken out leaves a rim.
     gone = idle if source.own else idle | source.stray
-    wide = maximum_filter(gone.astype(np.uint8), 2 * grown + 1) > 0
-    return np.asarray((wide | source.stray) & ~used[source.instance])
+    wide = maximum_filter(gone.view(np.uint8), 2 * grown + 1).view(bool) if grown else gone
+    return np.asarray((wide | source.stray) & ~taken)
 
 
 def told(found: Match) -> tuple[Bools, NDArray[np.float32]]:
@@ -368,7 +364,10 @@ def told(found: Match) -> tuple[Bools, NDArray[np.float32]]:
     middle = source.points if still else np.concatenate([source.points, source.rest])
     shift = np.zeros((2, len(middle) + 1), np.float32)
     shift[:, 1:] = whole_shifts(found, middle).T
-    own = np.stack([along.take(number) for along in shift])
+    # Where it is to be at once: copies of whole pictures cost more than what is computed here.
+    own = np.empty((2, *number.shape), np.float32)
+    for along, place in zip(shift, own, strict=True):
+        along.take(number, out=place, mode="clip")
     if not still:
         idle = np.ones(len(middle) + 1, bool)
         idle[0] = False

@@ -26,6 +26,8 @@ __all__ = ["Draft", "fill", "refined_places"]
 Places = NDArray[np.int32]
 Kinds = NDArray[np.uint8]
 
+BITS = ONE.bit_length() - 1
+"""Of places, after the point."""
 JITTER = 2.0
 """Pixels that places of what is not rigid are displaced by before they are corrected."""
 PASSES = 2
@@ -90,9 +92,10 @@ def fill(image: NDArray[np.generic], draft: Draft, scale: float, seed: int, prog
     inside = ((there >= 0) & (there < limits)).all(axis=1)
     sound = np.zeros(len(at), bool)
     sound[inside] = ground[there[inside, 0], there[inside, 1]]
-    choices = np.argwhere(ground)
-    if len(choices):
-        there[~sound] = choices[np.random.default_rng(seed).integers(len(choices), size=np.count_nonzero(~sound))]
+    choices = np.flatnonzero(ground)
+    if len(choices) and not sound.all():
+        drawn = choices[np.random.default_rng(seed).integers(len(choices), size=np.count_nonzero(~sound))]
+        there[~sound] = np.stack(np.divmod(drawn, ground.shape[1]), axis=-1)
     places[holes] = np.clip(there, 0, limits - 1)
     return replace(draft, places=places, known=np.ones_like(holes), mirrored=draft.mirrored & ~holes[..., None])
 
@@ -153,22 +156,23 @@ def refined_places(
     levels = analysis.levels[-2:]
     size = draft.fixed.shape
     fine = Region.whole(size)
-    places = draft.places.astype(np.int32) * ONE
-    held = draft.fixed.ravel()
+    places = draft.places.astype(np.int32, copy=False) << BITS
     if len(levels) == 2:
         coarse = fine.parents()
         pick = tuple(slice(None, None, 2) for _ in size)
         # The coarse sample that lies between this pixel and the next, at (S + 1/2) / 2 - 1/2.
-        half = (places[pick] - ONE // 2) // 2
+        half = (places[pick] - ONE // 2) >> 1
         kinds = _halved(draft.kinds)
         half = _corrected(analysis, 0, half, coarse, sampled(draft, pick, kinds), reach / 2, passes, seed, progress)
         grown = upsample(half.reshape(-1), coarse, fine, frames(draft.mirrored)).reshape(*size, 2)
         places = np.where(draft.fixed[..., None], places, grown)
     found = _corrected(analysis, 1, places, fine, draft, reach / 2, passes, seed, progress)
-    result = (found + ONE // 2) // ONE
-    limits = np.array(image.shape[:2])
-    result = np.where(wrap, result % limits, np.clip(result, 0, limits - 1)).astype(np.int32)
-    result[held.reshape(size)] = draft.places[held.reshape(size)]
+    # Of whole numbers a shift, which rounds down as well, takes a tenth of the time of a division.
+    result = (found + ONE // 2) >> BITS
+    for axis, n in enumerate(image.shape[:2]):
+        along = result[..., axis]
+        along[...] = along % n if wrap[axis] else along.clip(0, n - 1)
+    np.copyto(result, draft.places, where=draft.fixed[..., None])
     return result
 
 
@@ -213,14 +217,12 @@ def _corrected(
     here = analysis.levels[number]
     apart = 2 * int(APART * min(here.shape)) + 1
     sets = similarity(analysis, number, k=K, n=max(3, apart))
-    flat = places.reshape(-1).astype(np.int32)
-    moved = jitter(flat, region, reach, seed=seed, level=level)
-    free = np.repeat(~draft.fixed.ravel() & (draft.wanted.ravel() != 1), 2)
-    flat = np.where(free, moved, flat)
+    still = draft.fixed | (draft.wanted == 1)
+    flat = np.ascontiguousarray(places).reshape(-1)
     found = correct(
         here,
         sets,
-        flat,
+        jitter(flat, region, reach, seed=seed, level=level, held=still),
         region,
         frames(draft.mirrored),
         passes=passes,

@@ -210,14 +210,17 @@ def extend(entry: Texels, size: tuple[int, int], margin: int, *, whole: bool = T
 
 
 def available(entry: Texels, size: tuple[int, int], margin: int) -> int:
-    """Count the texels that `extend` would find; of disjoint ones a few may lie over others."""
+    """Count the texels that `extend` finds, without what it makes of them."""
     return _COUNTS.get(entry, (size, margin), lambda: _available(entry, size, margin))
 
 
 def _available(entry: Texels, size: tuple[int, int], margin: int) -> int:
-    layout, first, last = _bounds(entry, size, margin, exact=False)
-    of = layout.within(first.astype(np.float64), (last - 1).astype(np.float64))[1]
-    return int(np.count_nonzero(parts_of(entry).whole[of])) if entry.tag == "F=d" else len(of)
+    layout, low, high = _bounds(entry, size, margin, exact=False)
+    places, of, flips = layout.within(low.astype(np.float64), (high - 1).astype(np.float64))
+    if entry.tag != "F=d":
+        return len(of)
+    check_memory(int(np.prod(high - low)) * EACH)
+    return len(_placed(entry, np.zeros(high - low, np.int32), (places - low, of, flips), None)[0])
 
 
 def _bounds(
@@ -278,7 +281,7 @@ def _stamp(
     """Put every whole texel where the extended picture has it, the right way round; the first ``own`` ones in any case."""
     from scipy.ndimage import label
 
-    places, of, flips = copies
+    places, of, _ = copies
     parts = parts_of(entry)
     shape = np.array(entry.mask.shape)
     known = parts.region[table[..., 0], table[..., 1]] > 0
@@ -288,33 +291,10 @@ def _stamp(
     inside = np.zeros(mask.shape, bool)
     if own:
         inside[tuple(slice(-int(f), -int(f) + int(n)) for f, n in zip(first, shape, strict=True))] = True
-    order = np.argsort(parts.region, axis=None, kind="stable")
-    begin = np.searchsorted(parts.region.ravel()[order], np.arange(len(parts.points) + 2))
-    limits = np.array(mask.shape)
-    kept = []
-    wanted = parts.whole[of]
-    wanted[:own] = True
-    for k in np.flatnonzero(wanted):
-        i = int(of[k])
-        flat = order[begin[i + 1] : begin[i + 2]]
-        pixels = np.stack(np.divmod(flat, shape[1]), axis=-1)
-        centre = parts.points[i]
-        away = pixels - _nearest(centre)
-        away -= np.where(entry.wrap, np.rint(away / shape).astype(np.intp) * shape, 0)
-        there = _nearest(places[k]) + away
-        if k >= own and ((there < 0).any() or (there >= limits).any()):
-            continue
-        y, x = there.T
-        free = instance[y, x] == 0
-        if k >= own and (np.count_nonzero(free) < 0.9 * len(free) or inside[y, x].any()):
-            continue
-        kept.append(k)
-        # Where its centre is in whole pixels from the texture's own.
-        places[k] = _nearest(places[k]) - _nearest(centre) + centre
-        instance[y[free], x[free]] = len(kept)
-        if flips[k].any():
-            table[y[free], x[free]] = pixels[free]
-            mirrored[y[free], x[free]] = False
+    kept, turns = _placed(entry, instance, copies, inside if own else None, own)
+    for at, pixels in turns:
+        table.reshape(-1, 2)[at] = pixels
+        mirrored.reshape(-1, 2)[at] = False
     stray = (turned | known | mask) & (instance == 0)
     # What no texel claims belongs to the picture as it is.
     stray &= ~inside
@@ -323,9 +303,9 @@ def _stamp(
     chosen = np.array(kept)
     shown = entry.mask[table[..., 0], table[..., 1]]
     pieces, count = label(stray)
-    at = np.nonzero(pieces)
-    area = np.bincount(pieces[at], minlength=count + 1)[1:]
-    rest = np.stack([np.bincount(pieces[at], a, minlength=count + 1)[1:] / area for a in at], axis=-1)
+    there = np.nonzero(pieces)
+    area = np.bincount(pieces[there], minlength=count + 1)[1:]
+    rest = np.stack([np.bincount(pieces[there], a, minlength=count + 1)[1:] / area for a in there], axis=-1)
     piece = np.where(stray, pieces + len(kept), instance).astype(np.int32)
     return Extended(
         (int(first[0]), int(first[1])),
@@ -340,6 +320,56 @@ def _stamp(
         rest + first,
         own,
     )
+
+
+def _placed(
+    entry: Texels,
+    instance: Labels,
+    copies: tuple[Points, NDArray[np.intp], Bools],
+    inside: Bools | None,
+    own: int = 0,
+) -> tuple[list[int], list[tuple[NDArray[np.intp], NDArray[np.intp]]]]:
+    """Write into the pixels of each texel its number, if it has room: the first ``own`` always, others not ``inside``.
+
+    Gives which of the copies these are, and of those that are turned back where they lie and the pixels that they show.
+    """
+    places, of, flips = copies
+    parts = parts_of(entry)
+    shape = np.array(entry.mask.shape)
+    order = np.argsort(parts.region, axis=None, kind="stable")
+    begin = np.searchsorted(parts.region.ravel()[order], np.arange(len(parts.points) + 2))
+    width, limits = instance.shape[1], np.array(instance.shape)
+    spots, centres = _nearest(places), _nearest(parts.points)
+    wanted = parts.whole[of]
+    wanted[:own] = True
+    # Of each texel: its pixels, how far they lie from its centre, and the first and the last of these; copies share that.
+    shapes: dict[int, tuple[NDArray[np.intp], NDArray[np.intp]]] = {}
+    reach = np.zeros((2, len(parts.points), 2), np.intp)
+    for i in np.unique(of[wanted]).tolist():
+        pixels = np.stack(np.divmod(order[begin[i + 1] : begin[i + 2]], shape[1]), axis=-1)
+        away = pixels - centres[i]
+        away -= np.where(entry.wrap, np.rint(away / shape).astype(np.intp) * shape, 0)
+        shapes[i] = pixels, away @ (width, 1)
+        if len(away):
+            reach[:, i] = away.min(axis=0), away.max(axis=0)
+    beyond = ((spots + reach[0, of] < 0) | (spots + reach[1, of] >= limits)).any(axis=1)
+    beyond[:own] = False
+    number = instance.reshape(-1)
+    kept, turns = [], []
+    for k in np.flatnonzero(wanted & ~beyond).tolist():
+        i = int(of[k])
+        pixels, steps = shapes[i]
+        at = steps + (int(spots[k, 0]) * width + int(spots[k, 1]))
+        free = number.take(at) == 0
+        if k >= own and (np.count_nonzero(free) < 0.9 * len(free) or (inside is not None and inside.take(at).any())):
+            continue
+        kept.append(k)
+        # Where its centre is in whole pixels from the texture's own.
+        places[k] = spots[k] - centres[i] + parts.points[i]
+        number[at[free]] = len(kept)
+        if flips[k].any():
+            turns.append((at[free], pixels[free]))
+    return kept, turns
 
 
 def _nearest(place: Points) -> NDArray[np.intp]:

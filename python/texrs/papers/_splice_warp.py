@@ -93,11 +93,13 @@ def carried(held: Bools, own: NDArray[np.float32]) -> NDArray[np.float64]:
 
     """
     out = np.empty((*held.shape, 2))
+    # One for all: to fetch new memory takes longer than to compute what is in it.
+    wide = np.empty((held.shape[0] + 2, held.shape[1] + 2), np.float32)
     for axis, coarse in enumerate(_harmonic(held[::STEP, ::STEP], own[:, ::STEP, ::STEP])):
         field = _between(coarse, held.shape)
         np.copyto(field, own[axis], where=held)
         for _ in range(EVENED):
-            _even(field)
+            _even(field, wide)
             np.copyto(field, own[axis], where=held)
         out[..., axis] = field
     return out
@@ -125,18 +127,23 @@ def _between(coarse: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.
     """Give the pixels between those that are known at every other one."""
     out = coarse.astype(np.float32)
     for axis in range(2):
-        c = np.moveaxis(out, axis, 0)
-        fine = np.empty((shape[axis], c.shape[1]), np.float32)
+        sides = (shape[0], shape[1] if axis else out.shape[1])
+        whole = np.empty(sides, np.float32)
+        c, fine = (np.moveaxis(x, axis, 0) for x in (out, whole))
         fine[::2] = c
         fine[1::2] = c[: shape[axis] // 2]
-        fine[1:-1:2] = (c[:-1] + c[1:])[: len(fine[1:-1:2])] / 2
-        out = np.moveaxis(fine, 0, axis)
-    return np.ascontiguousarray(out)
+        between = fine[1:-1:2]
+        np.add(c[: len(between)], c[1 : len(between) + 1], out=between)
+        between /= 2
+        out = whole
+    return out
 
 
-def _even(field: NDArray[np.float32]) -> None:
-    """Make each pixel the mean of the four beside it; beyond the border the field goes on as it is."""
-    wide = np.pad(field, 1, mode="edge")
+def _even(field: NDArray[np.float32], wide: NDArray[np.float32]) -> None:
+    """Make each pixel the mean of the four beside it; beyond the border, in ``wide``, the field goes on as it is."""
+    wide[1:-1, 1:-1] = field
+    wide[0, 1:-1], wide[-1, 1:-1] = field[0], field[-1]
+    wide[1:-1, 0], wide[1:-1, -1] = field[:, 0], field[:, -1]
     np.add(wide[:-2, 1:-1], wide[2:, 1:-1], out=field)
     field += wide[1:-1, :-2]
     field += wide[1:-1, 2:]

@@ -11,6 +11,7 @@
 //!
 //! Coordinates and vectors are whole numbers, so a cost is exact and the least is found whatever the order.
 
+mod boxes;
 mod pass;
 mod similar;
 mod tree;
@@ -32,15 +33,23 @@ pub const FEW: usize = 8;
 /// Samples of a similarity set, at most.
 pub const LARGEST: usize = 16;
 
-/// Displaces each place by noise of its point in the world and of the `level`: up to `reach` along each axis, in the
-/// units of places.
+/// Displaces each place that is not `held` by noise of its point in the world and of the `level`: up to `reach` along each
+/// axis, in the units of places.
 pub fn jitter<const D: usize>(
     places: &mut [Place<D>],
     region: &Region<D>,
+    held: &[bool],
     reach: u32,
     seed: u64,
     level: u32,
 ) -> Result<()> {
+    if !held.is_empty() && held.len() != places.len() {
+        return Err(crate::Error::Shape {
+            argument: "held",
+            expected: vec![places.len()],
+            got: vec![held.len()],
+        });
+    }
     if places.len() != region.grid.len() {
         return Err(crate::Error::Shape {
             argument: "places",
@@ -51,6 +60,9 @@ pub fn jitter<const D: usize>(
     let noise = Noise::new(seed).part(4);
     par::chunks_mut(places, CHUNK, |chunk, places| {
         for (i, place) in places.iter_mut().enumerate() {
+            if held.get(chunk * CHUNK + i).is_some_and(|&h| h) {
+                continue;
+            }
             let world = region.world(region.grid.point(chunk * CHUNK + i));
             let words = noise.at(world, level);
             for axis in 0..D {

@@ -1,6 +1,6 @@
 //! One point chooses among what its diagonal neighbours' samples are like.
 
-use super::{CHUNK, FEW, LARGEST, Similarity, Table, apart};
+use super::{CHUNK, FEW, LARGEST, Similarity, Table};
 use crate::appearance::{Appearance, KEEP};
 use crate::fixed::{Frame, Frames, ONE, Place, add, apply, inverse, nearest, sub};
 use crate::grid::Region;
@@ -9,6 +9,10 @@ use crate::{Error, Result};
 
 /// Diagonal neighbours, at most.
 const CORNERS: usize = 8;
+/// Points of a class that a task takes at a time: small pictures have few, and no thread is to wait long for another.
+const SHARE: usize = 256;
+/// Sums that a cost is added up in, each of pairs of numbers.
+const LANES: usize = 4;
 
 /// What [`correct`] is asked for.
 #[derive(Debug, Clone, Copy)]
@@ -83,14 +87,19 @@ pub fn correct<const D: usize>(
             });
         }
     }
-    let inside = |&s: &u32| {
-        (s as usize) < samples && {
-            let sample = appearance.grid().point(s as usize).map(|x| x as i32);
+    // Each sample once, for divisions cost more than all else here.
+    let inside: Vec<bool> = (0..samples)
+        .map(|s| {
+            let sample = appearance.grid().point(s).map(|x| x as i32);
             appearance.inside(sample).is_some()
-        }
-    };
-    let own = |(i, s): (usize, &u32)| inside(s) || *s as usize == i / similarity.k;
-    if !(1..=LARGEST).contains(&similarity.k) || !similarity.sets.iter().enumerate().all(own) {
+        })
+        .collect();
+    let sets = similarity.sets.chunks_exact(similarity.k.max(1));
+    let sound = sets.enumerate().all(|(i, set)| {
+        let allowed = |&s: &u32| s as usize == i || inside.get(s as usize).is_some_and(|&b| b);
+        set.iter().all(allowed)
+    });
+    if !(1..=LARGEST).contains(&similarity.k) || !sound {
         return Err(Error::value(
             "similarity",
             format!(
@@ -181,11 +190,11 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
             let now = turn as u32 + 1;
             let before = now.saturating_sub(1 << D);
             let mut found = vec![[0; D]; class.len()];
-            par::chunks_mut(&mut found, CHUNK, |chunk, found| {
+            par::chunks_mut(&mut found, SHARE, |chunk, found| {
                 // Neighbours mostly share their frame.
                 let mut last = constant.map(|corners| (None, corners));
                 for (i, place) in found.iter_mut().enumerate() {
-                    let p = class[chunk * CHUNK + i] as usize;
+                    let p = class[chunk * SHARE + i] as usize;
                     let point = self.region.grid.point(p);
                     let frame = constant.is_none().then(|| self.frames.at(p));
                     let corners = match last {
@@ -290,8 +299,6 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
             Some(&Kinds::ANY) | None => None,
             Some(&kind) => Some(kind),
         };
-        let mut tried = [i32::MIN; CORNERS * LARGEST];
-        let mut attempts = 0;
         let (mut best, mut least) = (places[p], i64::MAX);
         for &(place, moved) in &from[..count] {
             // Nothing is better than what fits exactly.
@@ -312,22 +319,15 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
                     continue;
                 }
                 let centre = self.table.at(self.settle(there));
-                // What looks at the same sample costs the same, and the first one wins.
-                if tried[..attempts].contains(&centre) {
-                    continue;
-                }
-                tried[attempts] = centre;
-                attempts += 1;
-                let mut cost = 0;
-                for (vector, beside) in seen {
-                    cost += i64::from(apart(
+                // To add all up costs less than to ask after each whether it is too much already.
+                let cost = seen.iter().fold([0; LANES], |sums, (vector, beside)| {
+                    added(
+                        sums,
                         vector,
                         &self.table.vectors[(centre + beside) as usize],
-                    ));
-                    if cost >= least {
-                        break;
-                    }
-                }
+                    )
+                });
+                let cost = cost.into_iter().map(i64::from).sum();
                 if cost < least {
                     (best, least) = (candidate, cost);
                 }
@@ -365,6 +365,19 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
         sample[0] = at as i32;
         sample
     }
+}
+
+/// Adds squared differences, pair by pair: twelve bits each, so the sums of eight vectors fit.
+#[inline(always)]
+fn added<const N: usize>(mut sums: [u32; LANES], a: &[i16; N], b: &[i16; N]) -> [u32; LANES] {
+    for part in 0..N / (2 * LANES) {
+        for (lane, sum) in sums.iter_mut().enumerate() {
+            let at = 2 * (part * LANES + lane);
+            let [first, second] = [at, at + 1].map(|k| i32::from(a[k].wrapping_sub(b[k])));
+            *sum += (first * first + second * second) as u32;
+        }
+    }
+    sums
 }
 
 /// Which side of an axis the `corner`-th of 2^D corners lies on: the last axis alternates fastest.

@@ -76,7 +76,7 @@ fn search<const D: usize, const N: usize>(
         monitor.check()?;
         let mut sets = Vec::with_capacity(tree.places(leaf).len() * k);
         let mut chosen: Vec<[i32; D]> = Vec::with_capacity(k);
-        for place in tree.places(leaf).iter().flatten() {
+        for place in tree.places(leaf) {
             sets.push(place.number);
             chosen.clear();
             chosen.push(place.sample);

@@ -131,7 +131,7 @@ fn a_copy_stays_and_threads_change_nothing() {
         };
         assert_eq!(run(&copy, 2), copy);
         let mut start = copy.clone();
-        jitter(&mut start, &region, 2 * ONE as u32, 1, 0).unwrap();
+        jitter(&mut start, &region, &[], 2 * ONE as u32, 1, 0).unwrap();
         assert_ne!(start, copy);
         let once = run(&start, 1);
         assert_eq!(once, run(&start, 2));
@@ -147,7 +147,7 @@ fn held_points_and_bad_sets() {
     let region = region::<2>(15, true);
     let mut sets = similar(&exemplar, 3, 7, KEEP, &Monitor::default()).unwrap();
     let mut start = vec![[0; 2]; 225];
-    jitter(&mut start, &region, 24 * ONE as u32, 1, 0).unwrap();
+    jitter(&mut start, &region, &[], 24 * ONE as u32, 1, 0).unwrap();
     let held: Vec<bool> = (0..225).map(|p| p % 4 == 0).collect();
     let options = Options {
         numbers: KEEP,

@@ -87,6 +87,7 @@ pub(super) fn jitter<'py>(
     py: Python<'py>,
     places: PyReadonlyArray1<'py, i32>,
     place: Where,
+    held: PyReadonlyArray1<'py, bool>,
     reach: u32,
     seed: u64,
     level: u32,
@@ -94,18 +95,19 @@ pub(super) fn jitter<'py>(
     fn work<const D: usize>(
         places: &[i32],
         place: &Where,
+        held: &[bool],
         reach: u32,
         seed: u64,
         level: u32,
     ) -> Result<Vec<i32>> {
         let mut places: Vec<Place<D>> = places.as_chunks().0.to_vec();
-        coherence::jitter(&mut places, &region::<D>(place)?, reach, seed, level)?;
+        coherence::jitter(&mut places, &region::<D>(place)?, held, reach, seed, level)?;
         Ok(places.into_flattened())
     }
-    let places = places.as_slice()?;
+    let (places, held) = (places.as_slice()?, held.as_slice()?);
     let places = run(py, None, |_| match place.0.len() {
-        2 => work::<2>(places, &place, reach, seed, level),
-        _ => work::<3>(places, &place, reach, seed, level),
+        2 => work::<2>(places, &place, held, reach, seed, level),
+        _ => work::<3>(places, &place, held, reach, seed, level),
     })?;
     Ok(PyArray1::from_vec(py, places))
 }

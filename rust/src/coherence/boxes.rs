@@ -1,0 +1,184 @@
+//! Eight vectors, or eight boxes, against one vector: squared distances of whole numbers, exact whatever computes them.
+
+use super::FEW;
+
+/// Vectors, and boxes, that are compared at a time.
+pub(super) const WIDTH: usize = 8;
+/// Pairs of numbers of a vector.
+const PAIRS: usize = FEW / 2;
+
+/// The first [`FEW`] numbers of [`WIDTH`] vectors: for each pair of numbers those of one vector after the other, as the
+/// instruction that multiplies pairs and adds them wants them.
+pub(super) type Block = [[i16; 2 * WIDTH]; PAIRS];
+/// The first [`FEW`] numbers of a vector, pair by pair.
+pub(super) type Query = [[i16; 2]; PAIRS];
+/// Which of eight are no farther than a limit, bit by bit, and how far each is.
+pub(super) type Found = (u32, [i32; WIDTH]);
+/// The lowest and the highest of each number.
+pub(super) type Extent = [(i16, i16); FEW];
+
+/// The boxes of up to eight things, and the least number within each.
+pub(super) struct Boxes {
+    low: Block,
+    high: Block,
+    pub(super) least: [u32; WIDTH],
+    /// Which there are, bit by bit.
+    there: u32,
+}
+
+impl Boxes {
+    /// The boxes of up to eight things.
+    pub(super) fn of(things: impl Iterator<Item = (Extent, u32)>) -> Self {
+        let mut boxes = Self {
+            low: [[0; 2 * WIDTH]; PAIRS],
+            high: [[0; 2 * WIDTH]; PAIRS],
+            least: [u32::MAX; WIDTH],
+            there: 0,
+        };
+        for (lane, (extent, least)) in things.take(WIDTH).enumerate() {
+            for k in 0..FEW {
+                boxes.low[k / 2][2 * lane + k % 2] = extent[k].0;
+                boxes.high[k / 2][2 * lane + k % 2] = extent[k].1;
+            }
+            boxes.least[lane] = least;
+            boxes.there |= 1 << lane;
+        }
+        boxes
+    }
+
+    /// The box of all, and the least number.
+    pub(super) fn whole(&self) -> (Extent, u32) {
+        let lanes = 0..self.there.count_ones() as usize;
+        let at = |side: &Block, k: usize, lane: usize| side[k / 2][2 * lane + k % 2];
+        let extent = std::array::from_fn(|k| {
+            lanes.clone().fold((i16::MAX, i16::MIN), |(low, high), l| {
+                (low.min(at(&self.low, k, l)), high.max(at(&self.high, k, l)))
+            })
+        });
+        (extent, self.least.into_iter().min().unwrap_or(u32::MAX))
+    }
+}
+
+/// The block of eight vectors.
+pub(super) fn block(vector: impl Fn(usize) -> [i16; FEW]) -> Block {
+    let mut block = [[0; 2 * WIDTH]; PAIRS];
+    for lane in 0..WIDTH {
+        for (k, x) in vector(lane).into_iter().enumerate() {
+            block[k / 2][2 * lane + k % 2] = x;
+        }
+    }
+    block
+}
+
+/// A vector, pair by pair.
+pub(super) fn pairs(vector: &[i16; FEW]) -> Query {
+    std::array::from_fn(|k| [vector[2 * k], vector[2 * k + 1]])
+}
+
+/// The box of vectors.
+pub(super) fn extent(vectors: impl Iterator<Item = [i16; FEW]>) -> Extent {
+    let mut bounds = [(i16::MAX, i16::MIN); FEW];
+    for vector in vectors {
+        for (bound, x) in bounds.iter_mut().zip(vector) {
+            *bound = (bound.0.min(x), bound.1.max(x));
+        }
+    }
+    bounds
+}
+
+/// Squared distances of a vector to those of a block.
+pub(super) fn distances(block: &Block, query: &Query, limit: i32) -> Found {
+    found(limit, |k, lane| {
+        let apart = block[k / 2][2 * lane + k % 2].wrapping_sub(query[k / 2][k % 2]);
+        i32::from(apart)
+    })
+}
+
+/// What any vector of each box is at least away by.
+pub(super) fn bounds(boxes: &Boxes, query: &Query, limit: i32) -> Found {
+    let (near, found) = found(limit, |k, lane| {
+        let (side, x) = (2 * lane + k % 2, query[k / 2][k % 2]);
+        let below = boxes.low[k / 2][side].wrapping_sub(x);
+        let above = x.wrapping_sub(boxes.high[k / 2][side]);
+        i32::from(below.max(above).max(0))
+    });
+    (near & boxes.there, found)
+}
+
+#[inline(always)]
+fn found(limit: i32, apart: impl Fn(usize, usize) -> i32) -> Found {
+    let mut sums = [0; WIDTH];
+    for k in 0..FEW {
+        for (lane, sum) in sums.iter_mut().enumerate() {
+            let apart = apart(k, lane);
+            *sum += apart * apart;
+        }
+    }
+    let near = (0..WIDTH).fold(0, |near, l| near | u32::from(sums[l] <= limit) << l);
+    (near, sums)
+}
+
+/// The same in the registers that nearly every x86-64 has.
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code)] // loads from arrays
+pub(super) mod avx2 {
+    use std::arch::x86_64::{
+        __m256i, _mm256_add_epi32, _mm256_castsi256_ps, _mm256_cmpgt_epi32, _mm256_loadu_si256,
+        _mm256_madd_epi16, _mm256_max_epi16, _mm256_movemask_ps, _mm256_set1_epi32,
+        _mm256_setzero_si256, _mm256_storeu_si256, _mm256_sub_epi16,
+    };
+
+    use super::{Block, Boxes, Found, PAIRS, Query, WIDTH};
+
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    pub(in super::super) fn distances(block: &Block, query: &Query, limit: i32) -> Found {
+        let mut sums = _mm256_setzero_si256();
+        for k in 0..PAIRS {
+            let apart = _mm256_sub_epi16(load(&block[k]), same(query[k]));
+            sums = _mm256_add_epi32(sums, _mm256_madd_epi16(apart, apart));
+        }
+        found(sums, limit)
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    pub(in super::super) fn bounds(boxes: &Boxes, query: &Query, limit: i32) -> Found {
+        let zero = _mm256_setzero_si256();
+        let mut sums = zero;
+        for k in 0..PAIRS {
+            let x = same(query[k]);
+            let below = _mm256_sub_epi16(load(&boxes.low[k]), x);
+            let above = _mm256_sub_epi16(x, load(&boxes.high[k]));
+            let apart = _mm256_max_epi16(_mm256_max_epi16(below, above), zero);
+            sums = _mm256_add_epi32(sums, _mm256_madd_epi16(apart, apart));
+        }
+        let (near, found) = found(sums, limit);
+        (near & boxes.there, found)
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn load(numbers: &[i16; 2 * WIDTH]) -> __m256i {
+        // SAFETY: sixteen numbers of 16 bits.
+        unsafe { _mm256_loadu_si256(numbers.as_ptr().cast()) }
+    }
+
+    /// One pair for all vectors.
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn same([first, second]: [i16; 2]) -> __m256i {
+        _mm256_set1_epi32(i32::from(second) << 16 | i32::from(first as u16))
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn found(sums: __m256i, limit: i32) -> Found {
+        let mut found = [0; WIDTH];
+        // SAFETY: eight numbers of 32 bits.
+        unsafe { _mm256_storeu_si256(found.as_mut_ptr().cast(), sums) };
+        let far = _mm256_cmpgt_epi32(sums, _mm256_set1_epi32(limit));
+        let far = _mm256_movemask_ps(_mm256_castsi256_ps(far));
+        (!far as u32 & 255, found)
+    }
+}
