@@ -101,10 +101,9 @@ def scales_of(values, order=None):
     """Give a guide of scales alone."""
     mine = np.zeros((len(values[0]), 4), np.int16)
     mine[:, 0] = values[0]
-    asked = np.zeros((len(values[1]), 4), np.int16)
-    asked[:, 0] = values[1]
+    asked = np.asarray(values[1], np.int16)
     order = np.arange(len(mine)) if order is None else order
-    return Guide(mine.ravel(), asked.ravel(), np.full(len(asked), 1264, np.uint16), order.astype(np.uint32))
+    return Guide(mine.ravel(), asked, np.array([1264], np.uint16), order.astype(np.uint32))
 
 
 def test_shares_are_those_of_samples_of_the_scales_that_are_asked_for():

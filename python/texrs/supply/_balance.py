@@ -25,6 +25,8 @@ BANDS = 12
 """Parts of the range of the wanted scales, within each of which the exemplar's samples count alike."""
 NARROWEST = 51
 """Least width of such a part, a tenth in the units of a guide's scales: a target may be constant."""
+SLAB = 1 << 15
+"""Points that are looked at at once."""
 UNRELATED = 2 * 512**2
 """Cost of windows that have nothing to do with each other."""
 
@@ -55,19 +57,22 @@ class Balance:
         tones : (channels, samples) uint8
             As of `tones_of`.
         guide : Guide
-            The scales of samples and points; its order holds what may be copied.
+            The scales of samples, and of points one number each; its order holds what may be copied.
         """
-        weight = _weights(guide.exemplar[0::4][guide.order].astype(np.int64), _asked(guide).astype(np.int64))
+        weight = _weights(guide.exemplar[0::4][guide.order].astype(np.int64), guide.output.astype(np.int64))
         shares = [np.bincount(tone[guide.order], weight, BINS) for tone in tones]
         return cls(tones, guide.order, np.stack(shares), np.zeros((len(tones), BINS)))
 
     def note(self, places: NDArray[np.int32], shape: tuple[int, ...], step: float) -> None:
         """Add the excess of what an output shows, in places of a sheet of a shape, to the costs."""
-        row, column = np.rint(places.reshape(-1, 2) / np.float32(ONE)).astype(np.intp).T
-        shown = self.tones[:, row * shape[1] + column]
-        for tone, share, cost in zip(shown, self.shares, self.costs, strict=True):
-            excess = np.bincount(tone, minlength=BINS) / len(row) - share
-            cost += step * np.clip(excess / np.maximum(share, 1 / BINS), -1, 1)
+        points = places.reshape(-1, 2)
+        counts = np.zeros(self.costs.shape)
+        for start in range(0, len(points), SLAB):
+            row, column = np.rint(points[start : start + SLAB] / np.float32(ONE)).astype(np.intp).T
+            shown = self.tones[:, row * shape[1] + column]
+            counts += [np.bincount(tone, minlength=BINS) for tone in shown]
+        excess = (counts / len(points) - self.shares) / np.maximum(self.shares, 1 / BINS)
+        self.costs[...] += step * np.clip(excess, -1, 1)
 
     def onto(self, guide: Guide) -> Guide:
         """Let a guide ask for cheap colours, too: a cost is the square of a value of the sample, where points ask for 0."""
@@ -78,11 +83,6 @@ class Balance:
         values = guide.exemplar.copy()
         values[2::4] = np.minimum(np.rint(np.sqrt(cost * UNRELATED * 256 / int(guide.weight[0]))), 2047)
         return guide._replace(exemplar=values)
-
-
-def _asked(guide: Guide) -> NDArray[np.int16]:
-    """Give the scales that are asked for at the points."""
-    return guide.output[0::4]
 
 
 def _weights(mine: NDArray[np.int64], asked: NDArray[np.int64]) -> Array:
