@@ -22,22 +22,29 @@ def targets(scale, shape):
 
 def floor(shape=(224, 224), seed=0, span=(0.6, 1.7), radius=6.0):
     """Give a dark floor of coloured discs that grow downwards, and its scale map: a disc's radius is that of its middle."""
-    rng = np.random.default_rng(seed)
     logs = np.linspace(*np.log(span), shape[0])
     scale = np.exp(logs)[:, np.newaxis].repeat(shape[1], axis=1).astype(np.float32)
+    return drawn(scale, seed, radius), scale
+
+
+def drawn(scale, seed=0, radius=6.0):
+    """Give a dark floor of coloured discs whose sizes are those of a scale map, without any synthesis."""
+    rng = np.random.default_rng(seed)
+    shape = scale.shape
     image = np.full((*shape, 3), 40.0) + rng.normal(0, 2, (*shape, 1))
     y, x = np.mgrid[: shape[0], : shape[1]]
     placed = np.zeros((0, 3))
     colours = np.array([[220, 60, 50], [230, 190, 40], [60, 110, 210], [90, 180, 70]])
     for _ in range(6000):
         at = rng.uniform((-10, -10), (shape[0] + 10, shape[1] + 10))
-        r = radius * scale[int(np.clip(at[0], 0, shape[0] - 1)), 0]
+        row, column = (int(np.clip(a, 0, n - 1)) for a, n in zip(at, shape, strict=True))
+        r = radius * scale[row, column]
         if (np.hypot(*(placed[:, :2] - at).T) < 1.12 * (placed[:, 2] + r)).any():
             continue
         placed = np.vstack([placed, [*at, r]])
         cover = np.clip(r + 0.5 - np.hypot(y - at[0], x - at[1]), 0, 1)[..., np.newaxis]
         image = image * (1 - cover) + colours[rng.integers(4)] * cover
-    return np.clip(image, 0, 255).astype(np.uint8), scale
+    return np.clip(image, 0, 255).astype(np.uint8)
 
 
 def luma(image):

@@ -38,6 +38,16 @@ def test_jitter(level):
         np.testing.assert_array_equal(found, twin.jitter(zero, region, 0.7, (1 << 40) + 3, level))
 
 
+def test_jitter_leaves_what_is_held():
+    region = Region.whole((40, 50))
+    held = np.random.default_rng(3).random((40, 50)) < 0.5
+    zero = np.zeros(region.points * 2, np.int32)
+    free, some = (jitter(zero, region, 2, seed=4, held=h).reshape(40, 50, 2) for h in (None, held))
+    np.testing.assert_array_equal(some, np.where(held[..., None], 0, free))
+    with pytest.raises(InvalidInput, match="held"):
+        jitter(zero, region, 2, held=held[1:])
+
+
 @pytest.mark.parametrize("compensated", [False, True])
 @pytest.mark.parametrize("wrap", [False, True])
 @pytest.mark.parametrize(("axes", "shape"), [(2, (17, 14)), (3, (7, 6, 5))])

@@ -15,27 +15,31 @@ def floor():
 @pytest.fixture(scope="module", params=["ramp", "wave", "radial"])
 def grown(request, floor):
     target = checks.targets(floor[1], (224, 224))[request.param]
-    return request.param, target, texrs.perspective(floor[0], floor[1], 224, target=target, seed=1)
+    return request.param, target, [texrs.perspective(*floor, 224, target=target, seed=seed) for seed in (1, 2, 3)]
+
+
+def mean(measure, results):
+    """Measure several pictures: discs that meet count as one, and large ones are few, so a single picture strays."""
+    return np.mean([measure(result.image) for result in results])
 
 
 def test_texels_have_the_size_that_is_asked(floor, grown):
-    name, target, result = grown
-    ceiling = checks.fidelity(floor[0], floor[1])
-    rho, _ = checks.fidelity(result.image, target)
+    name, target, results = grown
+    ceiling = checks.fidelity(floor[0], floor[1])[0]
     wanted = {"ramp": 0.9, "wave": 0.9, "radial": 0.8}[name]
-    assert rho >= min(wanted, 0.95 * ceiling[0])
-    assert 0.75 <= checks.discs(result.image, target)[1] <= 1.25
+    assert mean(lambda image: checks.fidelity(image, target)[0], results) >= min(wanted, 0.95 * ceiling)
+    assert 0.75 <= mean(lambda image: checks.discs(image, target)[1], results) <= 1.25
 
 
 def test_it_chooses_by_scale(grown):
-    assert grown[2].report["scale_error"] <= 0.08
+    assert all(result.report["scale_error"] <= 0.08 for result in grown[2])
 
 
 def test_it_stays_sharp_keeps_its_colours_and_does_not_repeat(floor, grown):
-    _, target, result = grown
-    assert 0.9 <= checks.sharpness(*floor, result.image, target) <= 1.1
-    assert checks.colour_distance(*floor, result.image, target) <= 0.02
-    assert checks.repetition(result.image) <= checks.repetition(floor[0]) + 0.15
+    _, target, results = grown
+    assert 0.9 <= mean(lambda image: checks.sharpness(*floor, image, target), results) <= 1.1
+    assert mean(lambda image: checks.colour_distance(*floor, image, target), results) <= 0.012
+    assert mean(checks.repetition, results) <= checks.repetition(floor[0]) + 0.15
 
 
 def test_plain_synthesis_fails_the_same_check(floor):

@@ -9,6 +9,7 @@ from texrs.errors import InvalidInput
 from texrs.kernels.appearance import Appearance, Guide
 from texrs.kernels.pyramid import ONE, Region, to_fixed
 from texrs.supply import RADIUS, Settings, Supply
+from texrs.supply._balance import Balance, tones_of
 from texrs.supply._sheet import weights_of
 
 
@@ -94,3 +95,51 @@ def test_held_blocks_need_a_place_each():
     region = Region.whole((16, 16))
     with pytest.raises(InvalidInput, match="held"):
         exemplar.blocks(region, to_fixed(None, region), held=np.ones(256, bool), given=np.zeros(4, np.int32))
+
+
+def scales_of(values, order=None):
+    """Give a guide of scales alone."""
+    mine = np.zeros((len(values[0]), 4), np.int16)
+    mine[:, 0] = values[0]
+    asked = np.asarray(values[1], np.int16)
+    order = np.arange(len(mine)) if order is None else order
+    return Guide(mine.ravel(), asked, np.array([1264], np.uint16), order.astype(np.uint32))
+
+
+def test_shares_are_those_of_samples_of_the_scales_that_are_asked_for():
+    # Three quarters of the output ask for scales whose samples are dark, a quarter for those of bright ones.
+    guide = scales_of((np.repeat([0, 500], [90, 10]), np.repeat([0, 500], [30, 10])))
+    tones = tones_of(np.repeat(np.float32([0.1, 0.9]), [90, 10])[:, np.newaxis], guide.order)
+    shares = Balance.of(tones, guide).shares
+    np.testing.assert_allclose(shares[0, [0, -1]], [0.75, 0.25])
+    assert shares.sum() == pytest.approx(1)
+    # Nothing of the scale: all counts.
+    none = Balance.of(tones, scales_of((np.repeat([0, 500], [90, 10]), np.full(5, 2000)))).shares
+    np.testing.assert_allclose(none[0, [0, -1]], [0.9, 0.1])
+    # A barred sample counts for nothing.
+    barred = Balance.of(tones, scales_of((np.zeros(100), np.zeros(5)), np.arange(95))).shares
+    np.testing.assert_allclose(barred[0, [0, -1]], [90 / 95, 5 / 95])
+
+
+def test_what_is_in_excess_becomes_dearer_and_what_is_missing_cheaper():
+    guide = scales_of((np.zeros(100), np.zeros(50)))
+    tones = tones_of(np.repeat(np.float32([0, 1]), 50)[:, np.newaxis], guide.order)
+    balance = Balance.of(tones, guide)
+    balance.note(np.zeros(100, np.int32), (1, 100), 0.2)  # All points show the first sample.
+    np.testing.assert_allclose(balance.costs[0, [0, -1]], [0.2, -0.2])
+    values = balance.onto(guide).exemplar.reshape(-1, 4)
+    # 0.4 of what unrelated windows cost, as a square under the weight.
+    assert (values[:50, 2] == round((0.4 * 2 * 512**2 * 256 / 1264) ** 0.5)).all()
+    assert not values[50:].any()
+    assert not values[:, [0, 1, 3]].any()
+
+
+def test_balanced_colours_are_nearer_to_the_exemplars(floor):
+    scale, far = np.asarray(floor.scale_map, np.float32), []
+    mine = np.sort(floor.image.reshape(-1, 3), axis=0)
+    for balance in (0.0, 0.2):
+        supply = Supply.of(floor.image, scale, settings=Settings(coarsest=16, balance=balance))
+        grown = supply.grow(Region.whole((96, 80)), scale, seed=3)
+        shown = supply.source(grown.places, (96, 80)).render(floor.image, interpolation="nearest")
+        far.append(np.abs(np.sort(shown.reshape(-1, 3), axis=0).astype(float) - mine).mean())
+    assert far[1] < 0.7 * far[0]

@@ -18,7 +18,9 @@ Departures, with their reasons:
   differ within a window; ratios of scales are what is seen, so logarithms are compared. The output's map stays as asked.
 - What is optimised are coordinates, so that the last word is a copy, not a weighted mean: nothing blurs.
 - A point changes for a drawn match only if that gains more than twice the exemplar's own spacing, and the start is balanced
-  for contrast. Both keep what is rare, which is what the histograms of Eq. 8 are for.
+  for contrast. Both keep what is rare.
+- The histograms of Eq. 8 are those of the exemplar's samples weighted to the target's scales, and what is in excess of them
+  becomes dearer from pass to pass, not for one alone (`texrs.supply`): colours differ by scale, and drift without it.
 - Resized copies of the exemplar add to the supply of a scale. A ramp finds only a strip of the exemplar for each of its
   rows, and repeats it; and what is larger or smaller than all of the exemplar is not there at all.
 
@@ -43,19 +45,18 @@ from texrs.papers._perspective_literal import SIDE, average
 from texrs.report import Synthesis
 from texrs.scale_maps._maps import as_map
 from texrs.source_map import SourceMap
-from texrs.supply import LEAST, Settings, Supply
+from texrs.supply import LARGEST, LEAST, SMALLEST, Settings, Supply, reaching
 
 __all__ = ["perspective"]
 
 Method: TypeAlias = Literal["paper"] | None
 Sizes: TypeAlias = Literal["auto"] | bool | Sequence[float]
 
+SETTINGS = Settings(weights=(4.0, 1.5, 0.5), balance=0.05)
+"""Where texels of all sizes lie side by side, the wanted one must be chosen at the coarsest level: later ones hardly move.
+Costs of colours that grow faster wash away what is rare: drops on paint."""
 FACTORS = (1.0, 0.8, 0.64, 1.25, 1.5625)
 """Sizes of the copies that add to the supply, the exemplar first."""
-STEP = 1.25
-"""From one size to the next, where the target goes beyond all of these."""
-SMALLEST, LARGEST = 1 / 8, 4.0
-"""Sizes that copies may have."""
 PLENTY = 0.75
 """Samples of about the wanted scale for each point of the output at which the exemplar alone will do."""
 ALIKE = 0.1
@@ -154,7 +155,7 @@ def perspective(
     if outside["share"] > 0 and strength > 0:
         warnings.warn(_sentence(outside, sizes), stacklevel=2)
     reached = (float(wanted.min()), float(wanted.max()))
-    supply = Supply.of(image, mine, sizes, wanted=reached, settings=Settings())
+    supply = Supply.of(image, mine, sizes, wanted=reached, settings=SETTINGS)
     grown = supply.grow(Region.whole(shape, closed), wanted, strength=strength, seed=seed, progress=progress)
     source, levels, between = supply.source(grown.places, shape), grown.report, grown.stages
     del grown  # Its places take as much memory as all the rest.
@@ -229,14 +230,7 @@ def factors_for(scale: Floats, target: Floats, asked: Sizes) -> tuple[float, ...
         return _given(asked)
     elif supplied(scale, target) >= PLENTY:
         return (1.0,)
-    sizes = list(FACTORS)
-    # What the target asks for at its ends should not hang on the ends of the exemplar alone.
-    low, high = np.quantile(scale, [0.3, 0.7])
-    while target.max() > max(sizes) * high and max(sizes) * STEP <= LARGEST:
-        sizes.append(max(sizes) * STEP)
-    while target.min() < min(sizes) * low and min(sizes) / STEP >= SMALLEST:
-        sizes.append(min(sizes) / STEP)
-    return tuple(sizes)
+    return reaching(FACTORS, scale, (float(target.min()), float(target.max())))
 
 
 def _given(asked: object) -> tuple[float, ...]:

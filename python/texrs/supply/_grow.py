@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import log2
 
@@ -15,6 +15,7 @@ from texrs._typing import Array, Bools, Floats, Progress
 from texrs.kernels.appearance import Appearance, Guide
 from texrs.kernels.pyramid import ONE, Region, halve, to_fixed, upsample
 from texrs.source_map import SourceMap
+from texrs.supply._balance import Balance, tones_of
 from texrs.supply._sheet import (
     RADIUS,
     Copy,
@@ -38,6 +39,8 @@ MOST = 1 << 24
 WEIGHT = 1264
 """Cost of another scale than the wanted one, in 1/256: at a factor of 1.6 as much as windows that have nothing to do
 with each other."""
+TURN = 2
+"""Passes, of which each corrects every other point, between two looks at the balance of colours."""
 _BAND = 1 << 15
 
 
@@ -55,6 +58,9 @@ class Settings:
         What it costs to be taken from a copy of another size, as a share of what a scale costs that is as far off.
     exhaustive : bool
         Whether windows of the coarsest level are compared with all of the sheet's.
+    balance : float
+        How much the excess of a colour adds to its cost every other pass, at all levels but the finest, where costs that
+        change would break up what is whole.
     """
 
     coarsest: int = 32
@@ -71,6 +77,7 @@ class Settings:
     unity: float = 0.2
     votes: tuple[int, int, int] = (0, 0, 0)
     exhaustive: bool = False
+    balance: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,11 +91,12 @@ class Grown:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Level:
-    """The sheet at one resolution: its windows, the logarithm of its scale, of its factor, and what is barred."""
+    """The sheet at one resolution: its windows, the logarithm of its scale, of its factor, and what is barred; its tones."""
 
     appearance: Appearance
     values: NDArray[np.int16]
     order: NDArray[np.uint32]
+    tones: NDArray[np.uint8] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,7 +163,9 @@ class Supply:
                 sheet = halve(sheet)
             appearance = Appearance(sheet, axes=2, radius=RADIUS)
             values = values_of(copies, logs, free, sheet.shape[:2], spacing, settings.resized)
-            made.append(Level(appearance, values, ordered(values)))
+            order = ordered(values)
+            balanced = settings.balance > 0 and k > 0 and order.size > 0
+            made.append(Level(appearance, values, order, tones_of(sheet, order) if balanced else None))
         return cls(shape, copies, tuple(reversed(made)), settings)
 
     @property
@@ -224,27 +234,36 @@ class Supply:
                 places = upsample(places, regions[number - 1], here, frames)
                 if fixed is not None and given is not None:
                     places = np.where(np.repeat(fixed, 2), given, places)
-            found = level.appearance.correct(
-                places,
-                here,
-                frames,
-                passes=s.passes[which],
-                exhaustive=s.exhaustive and number == 0 and here.points * level.order.size <= MOST,
-                vote=s.votes[which],
-                hysteresis=s.hysteresis,
-                unity=s.unity,
-                settled=0.005,
-                # The noise of a level is its own.
-                seed=(seed + 0x9E3779B97F4A7C15 * (number + 1)) % (1 << 64),
-                held=fixed,
-                guide=guide,
-                overwrite=True,
-                progress=stage(progress, f"level {number + 1} of {len(regions)}"),
-            )
-            places = found.places
+            balance = None if level.tones is None or not guide.weight[0] else Balance.of(level.tones, guide)
+            advance = stage(progress, f"level {number + 1} of {len(regions)}")
+            passes = s.passes[which]
+            turns = range(0, passes, passes if balance is None else TURN)
+            for first in turns:
+                if balance is not None:
+                    balance.note(places, level.appearance.shape, s.balance)
+                found = level.appearance.correct(
+                    places,
+                    here,
+                    frames,
+                    passes=min(turns.step, passes - first),
+                    first=first,
+                    exhaustive=s.exhaustive and number == 0 and here.points * level.order.size <= MOST,
+                    vote=s.votes[which],
+                    hysteresis=s.hysteresis,
+                    unity=s.unity,
+                    settled=0.005 if balance is None else 0.0,
+                    # The noise of a level is its own.
+                    seed=(seed + 0x9E3779B97F4A7C15 * (number + 1)) % (1 << 64),
+                    held=fixed,
+                    guide=guide if balance is None else balance.onto(guide),
+                    overwrite=True,
+                    progress=_turn(advance, first / passes, turns.step / passes),
+                )
+                places = found.places
             if spacing > 1:  # The last one is the result.
                 stages[f"level {number + 1}"] = _finest(places, here, spacing)
-            report.append({"shape": list(here.shape), "passes": found.passes, "changed": round(found.changed, 6)})
+            done = first + found.passes
+            report.append({"shape": list(here.shape), "passes": done, "changed": round(found.changed, 6)})
         assert places is not None  # there is at least one level
         return Grown(places, report, stages)
 
@@ -289,6 +308,11 @@ class Supply:
         sizes = np.array([np.diag([1 / f for f in c.factor]) for c in self.copies], np.float32)
         frame = sizes if len(self.copies) > 1 else None
         return SourceMap(at.reshape(*shape, 2), np.zeros(shape, np.uint16), which.reshape(shape), frame, (self.shape,))
+
+
+def _turn(advance: Callable[[float], object] | None, start: float, share: float) -> Callable[[float], object] | None:
+    """Give what a kernel may call that does a part of a level's passes."""
+    return None if advance is None else lambda done: advance(min(1.0, start + share * done))
 
 
 def _at_level(

@@ -81,6 +81,35 @@ fn sets_are_those_of_the_definition() {
 }
 
 #[test]
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code)] // behind the question whether the CPU has the feature
+fn wide_registers_give_the_same_numbers() {
+    use super::boxes::{self, Boxes, avx2, block, pairs};
+    if !is_x86_feature_detected!("avx2") {
+        return;
+    }
+    let noise = Noise::new(9);
+    let vector = |i: usize| -> [i16; FEW] {
+        std::array::from_fn(|k| (noise.uniform([i as u32, k as u32, 0, 0]) * 8190.0) as i16 - 4095)
+    };
+    for trial in 0..200 {
+        let query = pairs(&vector(100 * trial));
+        let limit = (1 << 20) * (trial as i32 % 7 * 40);
+        let vectors = block(|lane| vector(100 * trial + 1 + lane));
+        let boxes = Boxes::of((0..1 + trial % 8).map(|lane| {
+            let ends = [0, 1].map(|end| vector(100 * trial + 20 + 2 * lane + end));
+            (boxes::extent(ends.into_iter()), lane as u32)
+        }));
+        let plain = boxes::distances(&vectors, &query, limit);
+        // SAFETY: asked for above.
+        assert_eq!(plain, unsafe { avx2::distances(&vectors, &query, limit) });
+        let plain = boxes::bounds(&boxes, &query, limit);
+        // SAFETY: asked for above.
+        assert_eq!(plain, unsafe { avx2::bounds(&boxes, &query, limit) });
+    }
+}
+
+#[test]
 fn equal_samples_are_found_in_order_and_at_once() {
     let grid = Grid::new([300, 300], [false; 2]).unwrap();
     let same = Appearance::new(&vec![0.5; grid.len()], grid, 1, 2).unwrap();
