@@ -73,7 +73,7 @@ def other(pairs: np.ndarray) -> np.ndarray:
 def ours(vectors: np.ndarray, queries: np.ndarray | None) -> np.ndarray:
     with threads(2):
         nearest = Nearest(vectors)
-        return (nearest.others() if queries is None else nearest.query(queries)).index
+        return (nearest.others() if queries is None else nearest.query(queries)).which
 
 
 def distances(vectors: np.ndarray, queries: np.ndarray, found: np.ndarray) -> np.ndarray:

@@ -26,13 +26,13 @@ def test_what_is_found_is_what_the_twin_finds(count, numbers, shift):
     vectors = rng.integers(0, 7, (count, numbers)) + shift
     queries = rng.integers(-1, 8, (90, numbers)) + shift
     found = Nearest(vectors).query(queries)
-    which, apart = twin.nearest(vectors, queries)
-    np.testing.assert_array_equal(found.index, which)
+    wanted, apart = twin.nearest(vectors, queries)
+    np.testing.assert_array_equal(found.which, wanted)
     np.testing.assert_array_equal(found.distance, apart)
     if count > 1:
         found = Nearest(vectors).others()
-        which, apart = twin.nearest(vectors, vectors, own=True)
-        np.testing.assert_array_equal(found.index, which)
+        wanted, apart = twin.nearest(vectors, vectors, own=True)
+        np.testing.assert_array_equal(found.which, wanted)
         np.testing.assert_array_equal(found.distance, apart)
 
 
@@ -41,7 +41,7 @@ def test_windows_are_found_as_a_tree_finds_them():
     queries = vectors[::3] + np.random.default_rng(0).normal(0, 0.05, vectors[::3].shape)
     found = Nearest(vectors).query(queries)
     distance, index = cKDTree(vectors).query(queries)
-    np.testing.assert_array_equal(found.index, index)
+    np.testing.assert_array_equal(found.which, index)
     np.testing.assert_array_equal(found.distance, distance)
 
 
@@ -51,13 +51,13 @@ def test_threads_do_not_change_a_bit():
         with threads(count):
             results.append(nearest.others())
     for other in results[1:]:
-        np.testing.assert_array_equal(results[0].index, other.index)
+        np.testing.assert_array_equal(results[0].which, other.which)
         np.testing.assert_array_equal(results[0].distance, other.distance)
 
 
 def test_what_is_far_away_is_found():
     found = Nearest([[0.0, 1e-30], [0.0, 3e-30]]).query([[1e150, 0.0], [0.0, 2.9e-30], [0.0, 0.0]])
-    assert found.index.tolist() == [0, 1, 0]
+    assert found.which.tolist() == [0, 1, 0]
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_bad_arguments(work, message):
 
 def test_no_queries_have_no_answers():
     found = Nearest([[1.0]]).query(np.zeros((0, 1)))
-    assert len(found.index) == len(found.distance) == 0
+    assert len(found.which) == len(found.distance) == 0
 
 
 def test_a_search_can_be_stopped():

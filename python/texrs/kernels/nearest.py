@@ -22,14 +22,14 @@ class Found(NamedTuple):
 
     Attributes
     ----------
-    index : (queries) uint32
-        Which, in the order in which they were given.
+    which : (queries) uint32
+        In the order in which they were given.
     distance : (queries) float64
         Euclidean.
 
     """
 
-    index: NDArray[np.uint32]
+    which: NDArray[np.uint32]
     distance: NDArray[np.float64]
 
 
@@ -61,7 +61,7 @@ class Nearest:
     >>> import numpy as np
     >>> grid = np.stack(np.mgrid[:20, :20], axis=-1).reshape(-1, 2)
     >>> found = Nearest(grid).query([[3.2, 7.1], [3.0, 7.5]])
-    >>> found.index.tolist(), found.distance.round(3).tolist()
+    >>> found.which.tolist(), found.distance.round(3).tolist()
     ([67, 67], [0.224, 0.5])
 
     """
