@@ -228,7 +228,7 @@ def self_splice(
     result = made(
         mine, found, size, number, method=method, refined=bool(refine), watch=watch, theirs=None, listed=listed
     )
-    return replace(result, report={**result.report, "method": "self-splice", "edit": steps})
+    return replace(result, report={**result.report, "edit": steps})
 
 
 def made(
@@ -269,7 +269,7 @@ def made(
     image = source.render(a.image, interpolation="nearest")
     step = STEP if a.tag == "F=d" else coarseness(found.source.mask.shape)
     report: dict[str, Any] = {
-        "method": "splice",
+        "method": method or "default",
         "seed": seed,
         "size": list(size),
         "tag": a.tag,
