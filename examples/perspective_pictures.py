@@ -38,7 +38,8 @@ def rows_of(image: np.ndarray, scale: np.ndarray) -> list[np.ndarray]:
     hole = np.zeros((rows, columns), bool)
     hole[rows // 3 : rows // 3 * 2, columns // 3 : columns // 3 * 2] = True
     filled = [np.where(hole[..., np.newaxis], 128, image).astype(np.uint8)]
-    filled += [texrs.complete(image, hole, scale_map=scale, seed=1).image, texrs.complete(image, hole, seed=1).image]
+    for options in ({"scale_map": scale}, {"scale_map": scale, "method": "optimise"}, {}):
+        filled.append(texrs.complete(image, hole, seed=1, **options).image)
     return [beside(grown), beside(filled)]
 
 
