@@ -75,7 +75,7 @@ def complete(
         Side of a patch in pixels, at least 4: about the size of what repeats. By default a sixth of the shorter side,
         12 to 32; less where no place, or few, would be free of holes.
     rim : int
-        Pixels around the hole that may be replaced too, 0 to 1024, so that the cut can run where it shows least. 0
+        Pixels around the hole that patches may replace too, 0 to 1024, so that the cut can run where it shows least. 0
         leaves all that is known as it is.
     mirror : bool, optional
         Whether patches may be mirrored; False for lit or lettered textures. By default they may unless there is a scale map:
