@@ -138,43 +138,21 @@ def complete(
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
     cyclic, seed = as_wrap(wrap), as_seed(seed)
     width = as_int(rim, "rim", 0, 1024)
-    largest = min(n for shape in shapes for n in shape)
-    chosen = None if patch is None else as_int(patch, "patch", LEAST, largest)
+    chosen = None if patch is None else as_int(patch, "patch", LEAST, min(n for shape in shapes for n in shape))
     watch = progress or (lambda stage, share: None)
 
     watch("complete", 0.0)
-    identity = SourceMap.identity(shapes[0])
-    places, side, count = SourceMap(identity.coordinates, identity.exemplar, identity.label, None, shapes), 0, 0
+    places, side, count = untouched(shapes), 0, 0
     scales = scales_of(pictures, open_, scale_map, source_scale_map) if open_.any() else None
     levels: list[dict[str, object]] = []
     if open_.any() and method == "optimise":
         places, levels = optimised(pictures, open_, scales, wrap=(cyclic[0], cyclic[1]), seed=seed, progress=progress)
         count = int(places.label.max())
     elif open_.any():
-        guides = guides_of(pictures)
-        if scales is not None:
-            pairs = zip(guides, scales, strict=True)
-            guides = [np.concatenate([g, SCALED * np.log(s)[..., np.newaxis]], axis=-1) for g, s in pairs]
-        flips = mirrors(bool(mirror))
-        free = np.ones(shapes[-1], bool) if source is not None else ~open_
-        side = patch_side(free, chosen, largest)
-        index = PatchIndex(
-            [flip(guides[-1], f) for f in flips],
-            allowed=[corners(flip(free, f), side) for f in flips],
-            max_patch=side,
+        keep = ~grown(open_, width, cyclic)
+        places, side, count = patched(
+            pictures, open_, scales, chosen, keep, mirror=bool(mirror), wrap=cyclic, seed=seed, watch=watch
         )
-        filled = fill(
-            guides[0],
-            ~open_,
-            index,
-            patch=side,
-            keep=~grown(open_, width, cyclic),
-            wrap=cyclic,
-            seed=seed,
-            shown=None if source is not None else 0,
-            progress=lambda share: watch("complete", share),
-        )
-        places, count = pasted(places, filled.label, filled.source, filled.coordinates, flips), len(filled.source)
     new = _where(places.label)
     # What is kept maps to itself; of patches every coordinate is whole.
     result = pictures[0].copy()
@@ -262,6 +240,54 @@ def check_pictures(image: object, hole: object, source: object | None) -> tuple[
     if mask.all():
         pixels[...] = other[0, 0]
     return [pixels.reshape(array.shape), other.reshape(other.shape[: array.ndim])], mask
+
+
+def untouched(shapes: tuple[tuple[int, ...], ...]) -> SourceMap:
+    """Give the source map of a picture of which nothing is replaced yet."""
+    identity = SourceMap.identity(shapes[0])
+    return SourceMap(identity.coordinates, identity.exemplar, identity.label, None, shapes)
+
+
+def patched(
+    pictures: Sequence[Array],
+    open_: Bools,
+    scales: Sequence[Floats] | None,
+    chosen: int | None,
+    keep: Bools,
+    *,
+    mirror: bool,
+    wrap: Sequence[bool],
+    seed: int,
+    watch: Progress,
+) -> tuple[SourceMap, int, int]:
+    """Fill a hole with patches, and give the source map, the side of the patches and how many there are."""
+    guides = guides_of(pictures)
+    if scales is not None:
+        pairs = zip(guides, scales, strict=True)
+        guides = [np.concatenate([g, SCALED * np.log(s)[..., np.newaxis]], axis=-1) for g, s in pairs]
+    shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
+    flips = mirrors(mirror)
+    itself = len(pictures) == 1
+    free = ~open_ if itself else np.ones(shapes[-1], bool)
+    side = patch_side(free, chosen, min(n for shape in shapes for n in shape))
+    index = PatchIndex(
+        [flip(guides[-1], f) for f in flips],
+        allowed=[corners(flip(free, f), side) for f in flips],
+        max_patch=side,
+    )
+    filled = fill(
+        guides[0],
+        ~open_,
+        index,
+        patch=side,
+        keep=keep,
+        wrap=wrap,
+        seed=seed,
+        shown=0 if itself else None,
+        progress=lambda share: watch("complete", share),
+    )
+    places = pasted(untouched(shapes), filled.label, filled.source, filled.coordinates, flips)
+    return places, side, len(filled.source)
 
 
 def guides_of(pictures: Sequence[Array]) -> list[Floats]:
