@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import texrs
-from texrs import blend as noun
 from texrs import samples
-from texrs.blend import blend, visibility
+from texrs.blend import _seams, _strips, _values, _visibility, blend, visibility
 from texrs.errors import InvalidInput
 from texrs.source_map import SourceMap
 
@@ -188,7 +187,7 @@ def test_normals_stay_unit_vectors(patchwork, exemplar):
     healed = blend(patchwork, normals.astype(np.float32), wrap=True, kind="normal")
     np.testing.assert_allclose(np.linalg.norm(healed, axis=-1), 1, atol=1e-5)
     rendered = patchwork.render(normals.astype(np.float32), kind="normal")
-    at, after = noun.seams(patchwork, 1, True)
+    at, after = _seams.seams(patchwork, 1, True)
     assert np.abs(healed[after] - healed[at]).mean() < 0.5 * np.abs(rendered[after] - rendered[at]).mean()
     coded = np.rint((normals + 1) / 2 * 255).astype(np.uint8)
     eight = blend(patchwork, coded, wrap=True, kind="normal")
@@ -265,9 +264,9 @@ def test_strips_give_the_whole(monkeypatch, patchwork, exemplar, wrap):
     tall = pasted(places, patchwork.shapes)
     image = exemplar.astype(np.float32)
     whole = blend(tall, image, wrap=wrap, screening=0.04)
-    monkeypatch.setattr(noun, "STRIP", 100 * 128)
-    assert len(list(noun._strips(tall.shape, wrap, 0.04))) == 5
-    assert len(list(noun._strips(tall.shape, wrap, 0.0))) == 1
+    monkeypatch.setattr(_values, "STRIP", 100 * 128)
+    assert len(list(_strips(tall.shape, wrap, 0.04))) == 5
+    assert len(list(_strips(tall.shape, wrap, 0.0))) == 1
     np.testing.assert_allclose(blend(tall, image, wrap=wrap, screening=0.04), whole, atol=0.02)
 
 
@@ -275,20 +274,20 @@ def test_strips_give_the_whole(monkeypatch, patchwork, exemplar, wrap):
 def test_without_screening_a_large_picture_is_solved_whole(monkeypatch, patchwork, exemplar, kind):
     image = exemplar.astype(np.float32) if kind == "colour" else exemplar
     whole = blend(patchwork, image, wrap=(False, True), screening=0, kind=kind)
-    monkeypatch.setattr(noun, "STRIP", 1000)
+    monkeypatch.setattr(_values, "STRIP", 1000)
     np.testing.assert_array_equal(blend(patchwork, image, wrap=(False, True), screening=0, kind=kind), whole)
 
 
 def test_an_exemplar_of_many_rows_is_scaled_in_bands(monkeypatch, patchwork, exemplar):
     whole = blend(patchwork, exemplar, wrap=True)
-    monkeypatch.setattr(noun, "BAND", 7)
+    monkeypatch.setattr(_values, "BAND", 7)
     np.testing.assert_array_equal(blend(patchwork, exemplar, wrap=True), whole)
 
 
 def test_work_can_be_watched_and_stopped(monkeypatch, patchwork, exemplar):
     places = np.tile(patchwork.coordinates, (5, 1, 1))
     tall = pasted(places, patchwork.shapes)
-    monkeypatch.setattr(noun, "STRIP", 100 * 128)
+    monkeypatch.setattr(_values, "STRIP", 100 * 128)
     seen = []
     blend(tall, exemplar, wrap=True, screening=0.04, progress=lambda stage, share: seen.append((stage, share)))
     shares = [share for _, share in seen]
@@ -307,19 +306,19 @@ def test_work_can_be_watched_and_stopped(monkeypatch, patchwork, exemplar):
 @pytest.mark.parametrize("wrap", [True, False, (True, False)])
 def test_visibility_does_not_depend_on_bands(monkeypatch, patchwork, exemplar, wrap):
     image = patchwork.render(exemplar)
-    monkeypatch.setattr(noun, "BAND", 96)
+    monkeypatch.setattr(_values, "BAND", 96)
     whole = visibility(patchwork, exemplar, image, wrap=wrap)
     pair = (wrap, wrap) if isinstance(wrap, bool) else wrap
-    assert whole.edges == sum(len(noun.seams(patchwork, axis, pair[axis])[0][0]) for axis in range(2))
+    assert whole.edges == sum(len(_seams.seams(patchwork, axis, pair[axis])[0][0]) for axis in range(2))
     for rows in (1, 7, 64):
-        monkeypatch.setattr(noun, "BAND", rows)
+        monkeypatch.setattr(_values, "BAND", rows)
         banded = visibility(patchwork, exemplar, image, wrap=wrap)
         assert banded.edges == whole.edges
         assert banded.outliers == whole.outliers
         assert abs(banded.mean - whole.mean) < 1e-9
     # Every fourth row of the picture, every second of the exemplar.
-    monkeypatch.setattr(noun, "BAND", 1)
-    monkeypatch.setattr(noun, "LOOK", 96 * 128 // 4)
+    monkeypatch.setattr(_values, "BAND", 1)
+    monkeypatch.setattr(_visibility, "LOOK", 96 * 128 // 4)
     sampled = visibility(patchwork, exemplar, image, wrap=wrap)
     assert 0 < sampled.edges < whole.edges
     assert abs(sampled.mean - whole.mean) < 0.2 * whole.mean
@@ -374,7 +373,7 @@ def test_away_from_seams_differences_stay(designed):
     before, after = (i.astype(float) for i in (result.stages["composite"], result.image))
     near = np.zeros(result.source.shape, bool)
     for axis in range(2):
-        at, beyond = noun.seams(result.source, axis, True)
+        at, beyond = _seams.seams(result.source, axis, True)
         near[at] = near[beyond] = True
     far = distance_transform_edt(~near) > 3
     errors = np.concatenate(

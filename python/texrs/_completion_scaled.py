@@ -74,10 +74,12 @@ def optimised(
     # Windows may not leave a copy, but those of known pixels at the border do.
     margin = RADIUS << (count - 1)
     ground, free, scale = _ground(pictures, open_, scales, margin)
-    wanted = None if scales is None else (float(scales[0][open_].min()), float(scales[0][open_].max()))
-    sizes: tuple[float, ...] = (1.0,) if scales is None else SIZES
-    if scales is not None and wanted is not None and len(pictures) > 1:
-        sizes = reaching(sizes, scales[1], wanted)
+    sizes: tuple[float, ...] = (1.0,)
+    wanted: tuple[float, float] | None = None
+    if scales is not None:
+        asked = scales[0][open_]
+        wanted = (float(asked.min()), float(asked.max()))
+        sizes = SIZES if len(pictures) == 1 else reaching(SIZES, scales[1], wanted)
     supply = Supply.of(
         ground,
         scale,
@@ -88,9 +90,11 @@ def optimised(
         settings=SETTINGS,
     )
     if not supply.free:
-        why = ("hole: leaves no part of the image that is free", "source: has no part that is large enough")[
-            len(pictures) - 1
-        ]
+        why = (
+            "hole: leaves no part of the image that is free"
+            if len(pictures) == 1
+            else "source: has no part large enough"
+        )
         raise InvalidInput(f"{why} to copy from; method='patch' may find one")
     box = around(open_, AROUND << (count - 1), 1 << (count - 1), wrap)
     part = (slice(box[0], box[1]), slice(box[2], box[3]))
