@@ -73,7 +73,7 @@ def by_opencv(image: Picture, hole: np.ndarray) -> tuple[Picture, float]:
 
 
 def patch_error(truth: Picture, made: Picture, hole: np.ndarray) -> float:
-    """Give the mean distance of patches that touch the hole from the nearest known one, over a fixed sample of both."""
+    """Return the mean distance of patches that touch the hole from the nearest known one, over a fixed sample of both."""
     touched = sliding_window_view(hole, (PATCH, PATCH)).any((2, 3))
     rng = np.random.default_rng(0)
 
@@ -88,7 +88,7 @@ def patch_error(truth: Picture, made: Picture, hole: np.ndarray) -> float:
 
 
 def square(picture: Picture) -> Picture:
-    """Give the middle of a picture in three channels, at most 512 pixels a side."""
+    """Return the middle of a picture in three channels, at most 512 pixels a side."""
     side = min(SIDE, *picture.shape[:2])
     top, left = ((n - side) // 2 for n in picture.shape[:2])
     crop = picture[top : top + side, left : left + side]

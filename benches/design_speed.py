@@ -44,7 +44,7 @@ class Stages:
 
 
 def peak() -> float:
-    """Give the peak of resident memory so far, in MiB."""
+    """Return the peak of resident memory so far, in MiB."""
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return most / (2**20 if sys.platform == "darwin" else 2**10)
 

@@ -49,7 +49,7 @@ def generated(crop: int) -> Iterator[tuple[str, np.ndarray, np.ndarray | None]]:
 
 
 def in_folder(folder: Path, crop: int) -> Iterator[tuple[str, np.ndarray, np.ndarray | None]]:
-    """Give the images of a folder and of those in it; say which files were left out, and why."""
+    """Return the images of a folder and of those in it; say which files were left out, and why."""
     for path in sorted(p for p in folder.rglob("*") if p.is_file()):
         name = str(path.relative_to(folder))
         try:
@@ -72,7 +72,7 @@ def size_of(text: str, image: np.ndarray) -> tuple[int, int]:
 
 
 def worst(found: list[Any]) -> Any:
-    """Give the first that fails, else the first."""
+    """Return the first that fails, else the first."""
     return next((f for f in found if f.applies and not f.passed), found[0])
 
 
@@ -125,7 +125,7 @@ def row(name: str, image: np.ndarray, records: dict[str, Any], results: list[Any
 
 
 def seen(image: np.ndarray) -> np.ndarray:
-    """Give 8-bit RGB to look at."""
+    """Return 8-bit RGB to look at."""
     values = np.rint(255 * np.clip(checks.unit(image), 0, 1)).astype(np.uint8)
     return values[..., :3] if values.shape[-1] >= 3 else np.repeat(values[..., :1], 3, axis=-1)
 

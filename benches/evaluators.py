@@ -11,7 +11,7 @@ import numpy as np
 
 
 def load(path: Path) -> Any:
-    """Give the module of a file."""
+    """Return the module of a file."""
     spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec is not None
     assert spec.loader is not None
@@ -38,18 +38,18 @@ class Judges:
         }
 
     def scores(self, picture: np.ndarray) -> dict[str, float]:
-        """Give all that has a bound."""
+        """Return all that has a bound."""
         shown, found = as_float(picture), {}
         for module, judge in self.modules:
             found |= judge.scores(shown) if judge else module.compare(self.exemplar, shown)
         return {name: value for name, value in found.items() if name in self.bounds}
 
     def failed(self, scores: dict[str, float]) -> list[str]:
-        """Give the names of what is out of its bounds."""
+        """Return the names of what is out of its bounds."""
         return [n for n, v in scores.items() if not self.bounds[n][0] <= v <= self.bounds[n][1]]
 
     def worse(self, name: str, ours: float, real: float) -> float:
-        """Give how many times as far from perfect a score is as that of a real crop."""
+        """Return how many times as far from perfect a score is as that of a real crop."""
         low, high = self.bounds[name]
         if low > 0 and high != float("inf"):
             return float(abs(np.log(max(ours, 1e-9))) / max(abs(np.log(max(real, 1e-9))), 1e-9))
@@ -57,6 +57,6 @@ class Judges:
 
 
 def as_float(picture: np.ndarray) -> np.ndarray:
-    """Give colours of 0 to 1 in three channels."""
+    """Return colours of 0 to 1 in three channels."""
     shown = picture.astype(np.float32) / np.iinfo(picture.dtype).max if picture.dtype.kind == "u" else picture
     return np.repeat(shown[..., None], 3, axis=2) if shown.ndim == 2 else shown[..., :3]

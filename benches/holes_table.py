@@ -60,7 +60,7 @@ def ours(options: dict[str, Any]) -> Filler:
 
 
 def peers(program: Path | None) -> dict[str, Filler]:
-    """Give the peers that are here; none of them knows scales, or seeds."""
+    """Return the peers that are here; none of them knows scales, or seeds."""
     found: dict[str, Filler] = {}
     if cv2 is not None:
         found["OpenCV inpaint"] = lambda image, hole, scale, seed: cv2.inpaint(
@@ -75,7 +75,7 @@ def peers(program: Path | None) -> dict[str, Filler]:
 
 
 def holes_of(shape: tuple[int, ...]) -> list[np.ndarray]:
-    """Give three holes side by side, of 0.44 of the height, where the scale changes, and 0.31 of the width."""
+    """Return three holes side by side, of 0.44 of the height, where the scale changes, and 0.31 of the width."""
     found = []
     for middle in (0.3, 0.5, 0.7):
         hole = np.zeros(shape, bool)
@@ -90,7 +90,7 @@ def without(image: np.ndarray, hole: np.ndarray) -> np.ndarray:
 
 
 def agreement(image: np.ndarray, hole: np.ndarray, scale: np.ndarray) -> float:
-    """Give the correlation of sizes seen and true ones in a hole, away from its rim."""
+    """Return the correlation of sizes seen and true ones in a hole, away from its rim."""
     at = np.argwhere(hole)
     (top, left), (bottom, right) = at.min(axis=0) + 6, at.max(axis=0) - 5
     inside = (slice(top, bottom), slice(left, right))

@@ -17,9 +17,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 from skimage import data
 
-from texrs import samples, threads
-from texrs.kernels.appearance import Appearance
-from texrs.kernels.coherence import similar
+from texrs import _threads as threads
+from texrs import samples
+from texrs._engine.appearance import Appearance
+from texrs._engine.coherence import similar
 
 try:
     import faiss
@@ -31,7 +32,7 @@ BORDER = 2
 
 
 def measured(work: Callable[[], np.ndarray]) -> tuple[float, float, np.ndarray]:
-    """Give seconds on the clock, seconds of CPU, and what the work gives."""
+    """Return seconds on the clock, seconds of CPU, and what the work gives."""
     start = time.perf_counter(), time.process_time()
     result = work()
     return time.perf_counter() - start[0], time.process_time() - start[1], result

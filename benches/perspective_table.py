@@ -26,7 +26,7 @@ import numpy as np
 import texrs
 from texrs import io, scale_maps
 from texrs.papers import perspective
-from texrs.report import Synthesis
+from texrs.synthesis import Synthesis
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 import evaluators
@@ -47,7 +47,7 @@ BOUNDS = {"error": (0, 0.08), "sharp": (0.9, 1.1), "colour": (0, 0.012)}
 MEANING = """
 rho, slope: rank correlation and slope of the logarithms of the evaluator's scale and the wanted one (>= 0.9 on a ramp and a
 wave, 0.8 on a hill, or 0.95 of the exemplar's own; slopes of 0.75 to 1.25 are wanted, but the evaluator's windows flatten
-waves and hills to a half, and foreshortened texels, whose areas go with S^3, steepen all: see `drawn` and `itself`);
+waves and hills to a half, and foreshortened elements, whose areas go with S^3, steepen all: see `drawn` and `itself`);
 wavelength: rank correlation of the local wavelength; error: median of |log S_e(S(p)) - log S| (<= 0.08); sharp: mean gradient
 over the exemplar's at the same scales (0.9 to 1.1); colour: distance of quantiles from the exemplar's at the same scales (<=
 0.012); rows: autocorrelation along rows, less the exemplar's (<= 0.15). Figures are means over the seeds; **bold** fails, and
@@ -57,7 +57,7 @@ for.
 
 
 def textures(folder: str | None) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
-    """Give names, pictures and scale maps."""
+    """Return names, pictures and scale maps."""
     if folder is None:
         yield ("discs", *checks.floor((256, 256)))
         return
@@ -81,7 +81,7 @@ def grown(image: np.ndarray, scale: np.ndarray, target: np.ndarray, seed: int, o
 
 
 def drawn(evaluator: Any, target: np.ndarray, seeds: int) -> dict[str, float]:
-    """Give what the evaluator says of discs that have the wanted sizes by construction."""
+    """Return what the evaluator says of discs that have the wanted sizes by construction."""
     relative = target / np.exp(np.log(target).mean())
     pictures = [checks.drawn(relative, seed) for seed in range(1, seeds + 1)]
     seen = [evaluator.perspective_agreement(p, target) for p in pictures]
@@ -93,7 +93,7 @@ def drawn(evaluator: Any, target: np.ndarray, seeds: int) -> dict[str, float]:
 def measure(
     evaluator: Any, image: np.ndarray, target: np.ndarray, example: np.ndarray, scale: np.ndarray
 ) -> dict[str, float]:
-    """Give the figures of one picture but those that only its synthesis knows."""
+    """Return the figures of one picture but those that only its synthesis knows."""
     agreed = {"rho": np.nan, "gain": np.nan} if evaluator is None else evaluator.perspective_agreement(image, target)
     return {
         "rho": agreed["rho"],

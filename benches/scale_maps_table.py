@@ -28,7 +28,7 @@ HEAD = (
     "picture", "angles", "with fov", "mask", "inverted", *TRENDS, *MEASURES, "width", "in a hole", "without hole",
 )  # fmt: skip
 MEANING = """
-Correlation of the scales with the width of texels (truth^(2/3)) / slope of their logarithms. `angles`: from_angles with
+Correlation of the scales with the width of elements (truth^(2/3)) / slope of their logarithms. `angles`: from_angles with
 the true slant and tilt (>= .999); `with fov` (slope .95 to 1.05); `mask`, `inverted`: from_mask by auto_mask and by its
 opposite (>= .90, stone wall .75); then brought to a trend (`plane` >= .98, stone wall .94); other
 measures; `width`: plane and foreshortened. A mask gives the root of the area, so the ideal slope of `mask` and of the
@@ -56,7 +56,7 @@ def row(case: checks.Case) -> list[str]:
 
 
 def picture(case: checks.Case) -> np.ndarray:
-    """Give the picture, its mask, the truth, the map of the mask and the map of the angles, side by side."""
+    """Return the picture, its mask, the truth, the map of the mask and the map of the angles, side by side."""
     mask = scale_maps.auto_mask(case.image)
     shown = np.rint(to_unit(case.image)[..., :3] * 255).astype(np.uint8)
     if shown.shape[-1] == 1:
@@ -71,7 +71,7 @@ def picture(case: checks.Case) -> np.ndarray:
 
 
 def seconds(work: Callable[[], object]) -> float:
-    """Give the least processor time of five, which neighbours on the machine disturb least."""
+    """Return the least processor time of five, which neighbours on the machine disturb least."""
     spent = []
     for _ in range(5):
         start = time.process_time()

@@ -26,8 +26,9 @@ from typing import Any
 import numpy as np
 
 import texrs
-from texrs import analysis, fields, samples
-from texrs.kernels.pyramid import Region, to_fixed
+from texrs import fields, samples
+from texrs._engine.pyramid import Region, to_fixed
+from texrs.exemplar import analysis
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests" / "reference"))
 from solid import Twin
@@ -43,14 +44,14 @@ def timed(task: Callable[[], Any]) -> tuple[float, Any]:
 
 
 def products(report: dict[str, Any], channels: int) -> float:
-    """Give the multiplications of the windows' projections: each window of each iteration of each level."""
+    """Return the multiplications of the windows' projections: each window of each iteration of each level."""
     axes = len(report["levels"][0]["shape"])
     each = KEEP * channels * WINDOW**axes
     return sum(float(prod(level["shape"])) * level["passes"] / 2 * each for level in report["levels"])
 
 
 def rate() -> float:
-    """Give the multiplications a second of a matrix product of windows and components."""
+    """Return the multiplications a second of a matrix product of windows and components."""
     rng = np.random.default_rng(0)
     windows, basis = (rng.random(shape, dtype=np.float32) for shape in ((1 << 16, 375), (375, KEEP)))
     seconds = min(timed(lambda: windows @ basis)[0] for _ in range(7))
@@ -58,7 +59,7 @@ def rate() -> float:
 
 
 def peak(size: int, quality: str) -> tuple[float, float]:
-    """Give the peak of memory of a process that grows a volume, and that of one that only loads texrs, in MiB."""
+    """Return the peak of memory of a process that grows a volume, and that of one that only loads texrs, in MiB."""
     # Linux hands ru_maxrss down from the process that starts another; its own peak is in /proc.
     script = (
         "import pathlib, re, resource, sys, texrs; from texrs import fields, samples\n"
@@ -79,7 +80,7 @@ def peak(size: int, quality: str) -> tuple[float, float]:
 
 
 def naive() -> float:
-    """Give how many times longer the tests' slow twin takes for the same passes than the kernel on one thread."""
+    """Return how many times longer the tests' slow twin takes for the same passes than the kernel on one thread."""
     level = analysis.analyse(samples.particles().image, axes=3).levels[0]
     region = Region.whole((12, 12, 12))
     frames = to_fixed(fields.circular(axis="x").over(region.shape), region)

@@ -54,7 +54,7 @@ Figures are means over the seeds; **bold** fails; "-" where a check does not app
 
 
 def textures(folder: str | None) -> Iterator[tuple[str, np.ndarray, np.ndarray | None]]:
-    """Give the samples, and what of a folder are volumes of at least 16 a side."""
+    """Return the samples, and what of a folder are volumes of at least 16 a side."""
     for name in samples.names():
         sample = samples.load(name)
         if sample.image.ndim == 4:
@@ -78,7 +78,7 @@ def asked(name: str) -> tuple[str, ...]:
 def measure(
     name: str, image: np.ndarray, mask: np.ndarray | None, kind: str, results: list[Any], still: list[Any], side: int
 ) -> dict[str, Any]:
-    """Give what each check finds, the mean over the seeds; none where it does not apply."""
+    """Return what each check finds, the mean over the seeds; none where it does not apply."""
     turned = kind != "identity"
     found: dict[str, list[Any]] = {check: [] for check in HEAD}
     for seed, (made, unturned) in enumerate(zip(results, still, strict=True)):
@@ -103,7 +103,7 @@ def cell(record: Any) -> str:
 
 
 def judged(evaluator: Any, image: np.ndarray, made: np.ndarray) -> str:
-    """Give what the evaluator says of a volume: its figures, and which fail."""
+    """Return what the evaluator says of a volume: its figures, and which fail."""
     try:
         scores = evaluator.compare_volumes(image, made)
     except ValueError as problem:
@@ -149,7 +149,7 @@ def main() -> None:
             if options.pictures:
                 options.pictures.mkdir(parents=True, exist_ok=True)
                 for seed, result in enumerate(results):
-                    shown = texrs.report.preview(volume.slices(result.image))
+                    shown = texrs.synthesis.preview(volume.slices(result.image))
                     texrs.io.write(options.pictures / f"{name}-{kind}-{seed}.png", shown)
     print(MEANING)
     if options.out:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import texrs
 from texrs import fields, io, samples
-from texrs.analysis import analyse
+from texrs.exemplar.analysis import analyse
 
 
 def measured(name: str, work: Callable[[], object]) -> None:
@@ -29,7 +29,7 @@ def measured(name: str, work: Callable[[], object]) -> None:
 
 
 def peak() -> str:
-    """Give the most memory that was held so far."""
+    """Return the most memory that was held so far."""
     return f"{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB at most"
 
 

@@ -3,10 +3,10 @@
     python benches/splice_speed.py [SIDE ...]
     python benches/splice_speed.py growth [SIDE ...]
 
-The similarity sets are made beforehand. "cold": nothing else is kept; "cached": the factor and the texels' parts are. The
+The similarity sets are made beforehand. "cold": nothing else is kept; "cached": the factor and the elements' parts are. The
 system's side includes the margin. Other solvers get the same matrix, in turns with ours: SciPy's splu in its symmetric mode,
 and CHOLMOD where it is installed (pip install cvxopt; it is GPL, so a peer of this comparison and nothing else). "growth"
-analyses and splices ever larger pictures, of disjoint texels and a wall, each in a process of its own, whose peak of memory is
+analyses and splices ever larger pictures, of disjoint elements and a wall, each in a process of its own, whose peak of memory is
 told; there the similarity sets are part of a splice.
 """
 
@@ -25,11 +25,13 @@ from scipy.sparse.linalg import splu
 
 import texrs
 from texrs import samples
+from texrs.elements import Elements, analyse
 from texrs.kernels.sparse import Cholesky
 from texrs.kernels.warp import mesh
-from texrs.papers import _splice_layout, _splice_source, _splice_warp
-from texrs.papers._splice_warp import energy
-from texrs.texels import Texels, analyse
+from texrs.papers.splice import layout as _splice_layout
+from texrs.papers.splice import source as _splice_source
+from texrs.papers.splice import warp as _splice_warp
+from texrs.papers.splice.warp import energy
 
 try:
     import cvxopt
@@ -40,14 +42,14 @@ except ImportError:
 ROUNDS = 5
 
 
-def entry(name: str, side: int) -> Texels:
-    return Texels.of_sample(samples.load(name, size=(side, side)))
+def entry(name: str, side: int) -> Elements:
+    return Elements.of_sample(samples.load(name, size=(side, side)))
 
 
 def best(
     work: Callable[[], object], before: Callable[[], object] = lambda: None, rounds: int = ROUNDS
 ) -> tuple[float, float]:
-    """Give the least time that passed, and the least time of all processors, in milliseconds."""
+    """Return the least time that passed, and the least time of all processors, in milliseconds."""
     found = []
     for _ in range(rounds):
         before()
@@ -77,7 +79,7 @@ def splices(sides: list[int]) -> None:
                 continue
             mine, theirs = entry(a, side), entry(b, side)
 
-            def work(mine: Texels = mine, theirs: Texels = theirs) -> texrs.Synthesis:
+            def work(mine: Elements = mine, theirs: Elements = theirs) -> texrs.Synthesis:
                 return texrs.splice(mine, theirs, seed=1)
 
             system = work().report["system"]

@@ -20,10 +20,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 import splice_checks as checks
 import texrs
-from texrs import io, samples, texels
+from texrs import elements as elements
+from texrs import io, samples
+from texrs.elements import Elements
 from texrs.errors import TexrsError
-from texrs.papers._splice_pictures import picture
-from texrs.texels import Texels
+from texrs.papers.splice.pictures import picture
 
 ROWS = (
     ("coins-greek", "dots-two-colours", "bubbles-teal"),
@@ -33,32 +34,32 @@ ROWS = (
 SAMPLES = (("dots", "pebbles", "leaves_and_flowers"), ("net",), ("bricks",))
 
 
-def read(path: Path, *, auto: bool) -> Texels:
+def read(path: Path, *, auto: bool) -> Elements:
     """Analyse a picture, as its JSON says or all by itself."""
     image = io.read(path)
     told = json.loads(path.with_suffix(".json").read_text())
     if auto:
-        return texels.analyse(image)
+        return elements.analyse(image)
     box = told["foreground_box"]
     x, y = box["center"]
     width, height = box["size"]
     ground = np.array(told["background_scribble"])[:, ::-1]
-    return texels.analyse(image, box=(y, x, height, width), background=ground, tag=told["tag"])
+    return elements.analyse(image, box=(y, x, height, width), background=ground, tag=told["tag"])
 
 
-def entries(folder: str | None, *, auto: bool) -> dict[str, Texels]:
-    """Give the textures by name, disjoint foregrounds first."""
-    found: dict[str, Texels] = {}
+def entries(folder: str | None, *, auto: bool) -> dict[str, Elements]:
+    """Return the textures by name, disjoint foregrounds first."""
+    found: dict[str, Elements] = {}
     for name in (n for group in (ROWS if folder else SAMPLES) for n in group):
         if folder:
             path = next(p for p in Path(folder).glob(f"[b-d]-*/{name}.*") if p.suffix != ".json")
             found[name] = read(path, auto=auto)
             continue
-        found[name] = Texels.of_sample(samples.load(name, size=(256, 256)))
+        found[name] = Elements.of_sample(samples.load(name, size=(256, 256)))
     return found
 
 
-def verdict(a: Texels, b: Texels, result: texrs.Synthesis) -> dict[str, float]:
+def verdict(a: Elements, b: Elements, result: texrs.Synthesis) -> dict[str, float]:
     """Measure a splice; what does not apply is left out."""
     found = {
         "colours": checks.copied(a, result)[0],

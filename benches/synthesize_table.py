@@ -34,7 +34,7 @@ def middle(image: np.ndarray) -> np.ndarray:
 
 
 def second(image: np.ndarray) -> np.ndarray | None:
-    """Give the largest corner of the picture that overlaps the middle least; none where there is nothing beside it."""
+    """Return the largest corner of the picture that overlaps the middle least; none where there is nothing beside it."""
     if max(image.shape[:2]) < 1.5 * SIDE:
         return None
     rows, columns = (min(n, SIDE) for n in image.shape[:2])
@@ -42,7 +42,7 @@ def second(image: np.ndarray) -> np.ndarray | None:
 
 
 def by_resynthesizer(program: Path, image: np.ndarray) -> np.ndarray:
-    """Give what the engine fills beside the exemplar, with colours of the exemplar alone."""
+    """Return what the engine fills beside the exemplar, with colours of the exemplar alone."""
     rows, columns = image.shape[:2]
     canvas = np.zeros((2 * rows, 3 * columns, 3), np.uint8)
     canvas[:rows, :columns] = image[..., :3] if image.ndim == 3 else image[..., None]
@@ -59,7 +59,7 @@ def by_resynthesizer(program: Path, image: np.ndarray) -> np.ndarray:
 
 
 def results(image: np.ndarray, options: argparse.Namespace) -> Iterator[tuple[str, int, np.ndarray]]:
-    """Give each way's results, one for each seed."""
+    """Return each way's results, one for each seed."""
     size = (2 * image.shape[0], 2 * image.shape[1])
     for seed in range(1, options.seeds + 1):
         yield "texrs", seed, texrs.synthesize(image, size, seed=seed, quality=options.quality).image
@@ -71,7 +71,7 @@ def results(image: np.ndarray, options: argparse.Namespace) -> Iterator[tuple[st
 
 
 def judged(judges: evaluators.Judges, picture: np.ndarray, real: dict[str, float]) -> tuple[list[str], str]:
-    """Give which scores are neither in bounds nor like a real crop's, and them in words."""
+    """Return which scores are neither in bounds nor like a real crop's, and them in words."""
     scores = judges.scores(picture)
     bad = [n for n in judges.failed(scores) if n not in real or judges.worse(n, scores[n], real[n]) > 1.1]
     return bad, " ".join(f"{n} {scores[n]:.2f}" for n in bad)

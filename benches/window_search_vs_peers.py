@@ -21,7 +21,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from texrs import io, samples, threads
+from texrs import _threads as threads
+from texrs import io, samples
 from texrs._arrays import to_unit
 from texrs.kernels.nearest import Nearest
 
@@ -34,7 +35,7 @@ SIDE, WINDOW, KEEP = 160, 8, 30
 
 
 def measured(work: Callable[[], np.ndarray]) -> tuple[float, float, np.ndarray]:
-    """Give seconds on the clock, seconds of CPU, and what the work gives."""
+    """Return seconds on the clock, seconds of CPU, and what the work gives."""
     before, start = os.times(), time.perf_counter()
     result = work()
     wall, after = time.perf_counter() - start, os.times()
@@ -47,7 +48,7 @@ def windows(image: np.ndarray, spacing: int) -> np.ndarray:
 
 
 def vectors_of(image: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Give the vectors of the picture's first part and of its last, and the share of the variance that they keep."""
+    """Return the vectors of the picture's first part and of its last, and the share of the variance that they keep."""
     top = (image.shape[0] - SIDE) // 2
     first, last = image[top : top + SIDE, :SIDE], image[top : top + SIDE, -SIDE:]
     mine, theirs = windows(first, 1), windows(last, 2)

@@ -23,7 +23,7 @@ WAYS = {
 
 
 def exemplars(paths: list[str]) -> dict[str, np.ndarray]:
-    """Give the middles of images, or built-in examples."""
+    """Return the middles of images, or built-in examples."""
     if not paths:
         return {name: texrs.samples.load(name).image for name in BUILT_IN}
     found = {}

@@ -12,8 +12,8 @@ GAP = 8
 
 
 def rgb(picture: np.ndarray, height: int | None = None) -> np.ndarray:
-    """Give an 8-bit RGB version of a picture or a stage, on white where it is transparent, at a height or at its own."""
-    seen = texrs.report.preview(np.asarray(picture))
+    """Return an 8-bit RGB version of a picture or a stage, on white where it is transparent, at a height or at its own."""
+    seen = texrs.synthesis.preview(np.asarray(picture))
     if seen.ndim == 2:
         seen = np.repeat(seen[..., np.newaxis], 3, axis=-1)
     elif seen.shape[-1] == 4:

@@ -17,7 +17,7 @@ SIZE = 256
 
 
 def targets(scale: np.ndarray) -> dict[str, np.ndarray]:
-    """Give a ramp, a wave from left to right and a hill, within the exemplar's scales."""
+    """Return a ramp, a wave from left to right and a hill, within the exemplar's scales."""
     low, high = np.log(np.quantile(scale, [0.03, 0.97]))
     at = (np.arange(SIZE) + 0.5) / SIZE
     far = np.clip(np.hypot(at - 0.5, at[:, np.newaxis] - 0.5) / 0.6, 0, 1)
@@ -30,7 +30,7 @@ def targets(scale: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def rows_of(image: np.ndarray, scale: np.ndarray) -> list[np.ndarray]:
-    """Give what is grown from an image to each target, and a hole filled three ways."""
+    """Return what is grown from an image to each target, and a hole filled three ways."""
     grown = [image, scale_maps.picture(scale)]
     for target in targets(scale).values():
         grown.append(texrs.perspective(image, scale, SIZE, target=target, seed=1).image)

@@ -3,7 +3,7 @@
 import texrs
 from layout import FOLDER, below, beside
 from texrs import samples
-from texrs.texels import Texels
+from texrs.elements import Elements
 
 SIDE = 192
 
@@ -15,9 +15,9 @@ EDITS = (
 )
 
 
-def entry(name: str) -> Texels:
-    """Give a sample with the texels that it is known to have."""
-    return Texels.of_sample(samples.load(name, size=(SIDE, SIDE)))
+def entry(name: str) -> Elements:
+    """Return a sample with the elements that it is known to have."""
+    return Elements.of_sample(samples.load(name, size=(SIDE, SIDE)))
 
 
 def main() -> None:
@@ -25,8 +25,8 @@ def main() -> None:
     FOLDER.mkdir(parents=True, exist_ok=True)
     rows = []
     for (a, b), (c, edit) in zip(SPLICES, EDITS, strict=True):
-        texels, layout, own = entry(a), entry(b), entry(c)
-        spliced = beside([texels.image, layout.image, texrs.splice(texels, layout, seed=1).image])
+        elements, layout, own = entry(a), entry(b), entry(c)
+        spliced = beside([elements.image, layout.image, texrs.splice(elements, layout, seed=1).image])
         edited = beside([own.image, texrs.self_splice(own, edit, seed=1).image])
         rows.append(beside([spliced, edited]))
     texrs.io.write(FOLDER / "splice.jpg", below(rows))

@@ -83,7 +83,7 @@ def npz(members):
 
 
 def mutations(file, count, rng):
-    """Give corrupt versions of a file: changed, cut, doubled, blanked; half in the header."""
+    """Return corrupt versions of a file: changed, cut, doubled, blanked; half in the header."""
     for _ in range(count):
         data = bytearray(file)
         for _ in range(rng.integers(1, 4)):

@@ -10,7 +10,7 @@ INNER = 12
 
 
 def targets(scale, shape):
-    """Give scale maps within the exemplar's range: a ramp, a wave from left to right, and a hill in the middle."""
+    """Return scale maps within the exemplar's range: a ramp, a wave from left to right, and a hill in the middle."""
     low, high = np.log(np.quantile(scale, [0.03, 0.97]))
     y, x = ((np.arange(n) + 0.5) / n for n in shape)
     y, x = y[:, np.newaxis], x[np.newaxis]
@@ -21,14 +21,14 @@ def targets(scale, shape):
 
 
 def floor(shape=(224, 224), seed=0, span=(0.6, 1.7), radius=6.0):
-    """Give a dark floor of coloured discs that grow downwards, and its scale map: a disc's radius is that of its middle."""
+    """Return a dark floor of coloured discs that grow downwards, and its scale map: a disc's radius is that of its middle."""
     logs = np.linspace(*np.log(span), shape[0])
     scale = np.exp(logs)[:, np.newaxis].repeat(shape[1], axis=1).astype(np.float32)
     return drawn(scale, seed, radius), scale
 
 
 def drawn(scale, seed=0, radius=6.0):
-    """Give a dark floor of coloured discs whose sizes are those of a scale map, without any synthesis."""
+    """Return a dark floor of coloured discs whose sizes are those of a scale map, without any synthesis."""
     rng = np.random.default_rng(seed)
     shape = scale.shape
     image = np.full((*shape, 3), 40.0) + rng.normal(0, 2, (*shape, 1))
@@ -52,7 +52,7 @@ def luma(image):
 
 
 def wavelength(image):
-    """Give the local wavelength: 2 pi sqrt(<g^2> / <g'^2>) of the band-pass luminance, in Gaussian windows."""
+    """Return the local wavelength: 2 pi sqrt(<g^2> / <g'^2>) of the band-pass luminance, in Gaussian windows."""
     g = ndimage.gaussian_filter(luma(image), 1.2) - ndimage.gaussian_filter(luma(image), 14)
     dy, dx = np.gradient(g)
     mean = [ndimage.gaussian_filter(v, 14) for v in (g * g, (dy * dy + dx * dx) / 2)]
@@ -60,14 +60,14 @@ def wavelength(image):
 
 
 def fidelity(image, target):
-    """Give the rank correlation of measured and wanted sizes, and the slope of their logarithms."""
+    """Return the rank correlation of measured and wanted sizes, and the slope of their logarithms."""
     inner = (slice(INNER, -INNER, 4),) * 2
     seen, wanted = np.log(wavelength(image))[inner].ravel(), np.log(target)[inner].ravel()
     return float(stats.spearmanr(seen, wanted).statistic), float(np.polyfit(wanted, seen, 1)[0])
 
 
 def discs(image, target):
-    """Give rank correlation and slope of the logarithms of coloured discs' diameters and the wanted scales, and their solidity.
+    """Return rank correlation and slope of the logarithms of coloured discs' diameters and the wanted scales, and their solidity.
 
     Solidity is the share of a disc's bounding ellipse that it fills.
     """
@@ -95,7 +95,7 @@ def gradient(image):
 
 
 def weights(scale, target, bins=12):
-    """Give each exemplar pixel's weight, so that together they have the target's scales."""
+    """Return each exemplar pixel's weight, so that together they have the target's scales."""
     mine, theirs = np.log(scale).ravel(), np.log(target).ravel()
     edges = np.linspace(min(mine.min(), theirs.min()) - 1e-6, max(mine.max(), theirs.max()) + 1e-6, bins + 1)
     there, asked = (np.histogram(v, edges)[0] for v in (mine, theirs))
@@ -105,12 +105,12 @@ def weights(scale, target, bins=12):
 
 
 def sharpness(exemplar, scale, image, target):
-    """Give the mean gradient, as a share of the exemplar's at the target's scales."""
+    """Return the mean gradient, as a share of the exemplar's at the target's scales."""
     return float(gradient(image).mean() / (gradient(exemplar).ravel() @ weights(scale, target)))
 
 
 def colour_distance(exemplar, scale, image, target):
-    """Give the mean distance of 512 quantiles of each channel from the exemplar's at the target's scales."""
+    """Return the mean distance of 512 quantiles of each channel from the exemplar's at the target's scales."""
     at, weight = (np.arange(512) + 0.5) / 512, weights(scale, target)
     found = []
     for channel in range(image.shape[-1]):
@@ -122,7 +122,7 @@ def colour_distance(exemplar, scale, image, target):
 
 
 def repetition(image, band=8, least=20):
-    """Give the largest autocorrelation along rows at lags from 20 pixels on, a mean over bands of rows."""
+    """Return the largest autocorrelation along rows at lags from 20 pixels on, a mean over bands of rows."""
     g = luma(image) - ndimage.gaussian_filter(luma(image), 14)
     found = []
     for top in range(0, g.shape[0] - band + 1, band):
@@ -135,7 +135,7 @@ def repetition(image, band=8, least=20):
 
 
 def seam(image, hole, width=2):
-    """Give the mean gradient across a hole's rim, as a share of that inside it."""
+    """Return the mean gradient across a hole's rim, as a share of that inside it."""
     inside = ndimage.binary_erosion(hole, iterations=3 * width)
     rim = ndimage.binary_dilation(hole, iterations=width) & ~ndimage.binary_erosion(hole, iterations=width)
     return float(gradient(image)[rim].mean() / gradient(image)[inside].mean())

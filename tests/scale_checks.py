@@ -19,7 +19,7 @@ from texrs import io, samples, scale_maps
 class Case:
     """A picture of a plane aslant.
 
-    `width` is the size of texels across the slope. What ground truth gives is the square root of their area, which in
+    `width` is the size of elements across the slope. What ground truth gives is the square root of their area, which in
     perspective is the 3/2 power of that.
     """
 
@@ -51,7 +51,7 @@ def _of_focal(size: tuple[int, ...], focal: float) -> float:
 
 @cache
 def generated(side: int = 256) -> tuple[Case, ...]:
-    """Give the tilted samples, and the tiles turned so that they run away in other directions."""
+    """Return the tilted samples, and the tiles turned so that they run away in other directions."""
     discs, bricks = samples.tilted_discs((side, side)), samples.tilted_bricks((side, side))
     fov = _of_focal((side, side), 1.5 * side)
     cases = []
@@ -67,7 +67,7 @@ def generated(side: int = 256) -> tuple[Case, ...]:
 
 
 def in_folder(folder: Path) -> Iterator[Case]:
-    """Give the pictures of a folder that has a ``ground-truth.json``, itself or in one of its folders."""
+    """Return the pictures of a folder that has a ``ground-truth.json``, itself or in one of its folders."""
     for listing in sorted(folder.rglob("ground-truth.json")):
         for name, known in json.loads(listing.read_text(encoding="utf-8")).items():
             image = io.read(listing.parent / name)

@@ -14,7 +14,7 @@ import numpy as np
 from texrs import fields, volume
 from texrs._typing import Interpolation
 from texrs.papers.solid import solid
-from texrs.report import Synthesis
+from texrs.synthesis import Synthesis
 
 MARGIN = 6
 """Voxels over which the direction of layers is measured."""
@@ -143,7 +143,7 @@ def s5(made: Synthesis, least: float = 0.65) -> Found:
 
 
 def has_period(profile: np.ndarray, period: int) -> bool:
-    """Tell whether a profile repeats after some steps, as a weave's does."""
+    """Return whether a profile repeats after some steps, as a weave's does."""
     if len(profile) < period + 8:
         return False
     near, far = (part - part.mean() for part in (profile[:-period], profile[period:]))
@@ -177,7 +177,7 @@ def s6(exemplar: np.ndarray, image: np.ndarray) -> Found:
 
 
 def turned_exemplar(exemplar: np.ndarray, frame: np.ndarray) -> np.ndarray:
-    """Give the exemplar as a frame of right angles turns it."""
+    """Return the exemplar as a frame of right angles turns it."""
     order = np.abs(frame).argmax(axis=1)
     out = exemplar.transpose(*order.tolist(), *range(3, exemplar.ndim))
     flipped = [a for a in range(3) if frame[a, order[a]] < 0]

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from scipy.stats import wasserstein_distance
 
 from texrs import Synthesis
-from texrs.texels import Texels
+from texrs.elements import Elements
 
 Points = NDArray[np.float64]
 
@@ -26,7 +26,9 @@ def colours(image: NDArray[Any]) -> NDArray[np.float64]:
     return values if values.ndim == 3 else values[..., None]
 
 
-def windows(a: Texels, result: Synthesis, share: float = 0.75) -> list[tuple[Points, Points, Points, tuple[int, int]]]:
+def windows(
+    a: Elements, result: Synthesis, share: float = 0.75
+) -> list[tuple[Points, Points, Points, tuple[int, int]]]:
     """Targets whose windows lie inside the output and the texture: target, source, the rest of both, half sizes."""
     half = tuple(max(2, int(share * n / 2)) for n in a.box)
     found = []
@@ -47,8 +49,8 @@ def correlation(a: NDArray[Any], b: NDArray[Any]) -> float:
     return float((x * y).sum()) / power if power > 1e-9 else 0.0
 
 
-def presence(a: Texels, result: Synthesis) -> tuple[float, float]:
-    """S2 and S3: the share of targets that show their texel, and how far from them, in pixels."""
+def presence(a: Elements, result: Synthesis) -> tuple[float, float]:
+    """S2 and S3: the share of targets that show their element, and how far from them, in pixels."""
     one, other = grey(a.image), grey(result.image)
     hits, away = [], []
     for target, source, rest, (h, w) in windows(a, result):
@@ -78,8 +80,8 @@ def component(mask: NDArray[np.bool_], at: Points, h: int, w: int) -> NDArray[np
     return number == number[tuple(nearest)]
 
 
-def shapes(a: Texels, result: Synthesis) -> tuple[float, float]:
-    """S4: overlap of the foreground of a texel before and after, 5th percentile and median."""
+def shapes(a: Elements, result: Synthesis) -> tuple[float, float]:
+    """S4: overlap of the foreground of an element before and after, 5th percentile and median."""
     rows, columns = np.moveaxis(result.source.coordinates.astype(int), -1, 0)
     shown = a.mask[rows, columns]
     overlaps = []
@@ -94,8 +96,8 @@ def shapes(a: Texels, result: Synthesis) -> tuple[float, float]:
     return float(np.percentile(overlaps, 5)), float(np.median(overlaps))
 
 
-def copied(a: Texels, result: Synthesis) -> tuple[float, float]:
-    """S5: share of colours that the texture has, and of rigid pixels that show the texel that was matched."""
+def copied(a: Elements, result: Synthesis) -> tuple[float, float]:
+    """S5: share of colours that the texture has, and of rigid pixels that show the element that was matched."""
     flat = colours(a.image).reshape(-1, colours(a.image).shape[-1])
     known = {c.tobytes() for c in flat}
     out = colours(result.image).reshape(-1, flat.shape[1])
@@ -108,11 +110,11 @@ def copied(a: Texels, result: Synthesis) -> tuple[float, float]:
     starts = np.array([m["source"] for m in result.report["matches"]])
     which = number[tuple(rigid.T)] - 1
     away = (result.source.coordinates[tuple(rigid.T)] - starts[which]) - (rigid - goals[which])
-    # Texels go by whole pixels.
+    # Elements go by whole pixels.
     return share, float((np.abs(away) <= 1.01).all(axis=1).mean())
 
 
-def coherence(a: Texels, result: Synthesis, seed: int = 0) -> tuple[float, float]:
+def coherence(a: Elements, result: Synthesis, seed: int = 0) -> tuple[float, float]:
     """S8: RMS distance of 9 x 9 patches of ground to the texture's, p95, and over that of the texture to itself."""
     side = 9
     rows, columns = np.moveaxis(result.source.coordinates.astype(int), -1, 0)
@@ -143,7 +145,7 @@ def coherence(a: Texels, result: Synthesis, seed: int = 0) -> tuple[float, float
     return found / max(1e-9, float(np.percentile(theirs[np.isfinite(theirs)], 95))), found
 
 
-def layout(result: Synthesis, a: Texels, b: Texels) -> dict[str, float]:
+def layout(result: Synthesis, a: Elements, b: Elements) -> dict[str, float]:
     """S10: the arrangement of rigid pixels against the targets and against A's own layout, in spacings; colours against B's.
 
     Colours in standard deviations of B's.
@@ -185,16 +187,16 @@ def layout(result: Synthesis, a: Texels, b: Texels) -> dict[str, float]:
     }
 
 
-def doubled(a: Texels, result: Synthesis) -> float:
-    """S12: the largest rigid region of the output over the largest texel of the texture."""
+def doubled(a: Elements, result: Synthesis) -> float:
+    """S12: the largest rigid region of the output over the largest element of the texture."""
     areas = np.bincount(label(a.mask)[0].ravel())[1:]
     rows, columns = np.moveaxis(result.source.coordinates.astype(int), -1, 0)
     number = np.where(a.mask[rows, columns], result.source.label, 0)
     return float(np.bincount(number.ravel())[1:].max() / areas.max())
 
 
-def share(a: Texels, result: Synthesis) -> float:
-    """S13: the foreground's share of the output over that of as many mean texels as have targets in it."""
+def share(a: Elements, result: Synthesis) -> float:
+    """S13: the foreground's share of the output over that of as many mean elements as have targets in it."""
     rows, columns = np.moveaxis(result.source.coordinates.astype(int), -1, 0)
     shown = float(a.mask[rows, columns].mean())
     number, count = label(a.mask)

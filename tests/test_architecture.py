@@ -19,7 +19,7 @@ NOUNS = {
     "io": set(),
     "report": {"source_map", "io", "volume"},
     "segment": set(),
-    "texels": {"analysis", "io", "matching", "segment"},
+    "elements": {"analysis", "io", "matching", "segment"},
     "fields": set(),
     "volume": {"io", "fields", "source_map"},
     "deform": set(),
@@ -34,14 +34,14 @@ NOUNS = {
 }
 TOP = {
     "papers": set(NOUNS),
-    "database": {"io", "texels"},
+    "database": {"io", "elements"},
     "cli": {"papers", "demo", "database", *NOUNS},
     "demo": {"papers", *NOUNS},
 }
 
 
 def imports(path: Path) -> set[str]:
-    """Give the texrs modules, by their first name inside the package, that a file imports."""
+    """Return the texrs modules, by their first name inside the package, that a file imports."""
     found = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):

@@ -40,7 +40,7 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def complaint(capture: Capture) -> str:
-    """Give the one line on stderr, and nothing on stdout."""
+    """Return the one line on stderr, and nothing on stdout."""
     out, err = capture.readouterr()
     assert out == ""
     assert re.fullmatch(r"texrs: [^\n]+\n", err), err

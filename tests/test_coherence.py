@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 from reference import coherence as twin
-from texrs import analysis, fields, samples, threads
+from texrs import _threads as threads
+from texrs import fields, samples
+from texrs._engine.appearance import Appearance
+from texrs._engine.coherence import correct, jitter, similar
+from texrs._engine.pyramid import ONE, Region, to_fixed
 from texrs.errors import InvalidInput
-from texrs.kernels.appearance import Appearance
-from texrs.kernels.coherence import correct, jitter, similar
-from texrs.kernels.pyramid import ONE, Region, to_fixed
+from texrs.exemplar import analysis
 
 
 def exemplar(axes, wrap=False):

@@ -38,7 +38,7 @@ def test_what_is_added_is_kept(textures: TextureDatabase, said: list[str]) -> No
     assert "dots" in again
     assert len(again) == 1
     record = again.list()[0]
-    assert (record.tag, record.source, record.texels) == ("F=d", "dots.npy", len(again["dots"].points))
+    assert (record.tag, record.source, record.elements) == ("F=d", "dots.npy", len(again["dots"].points))
     assert again["dots"].sets is not None
     assert not said
 
@@ -71,7 +71,7 @@ def test_a_damaged_entry_is_said_and_remade(textures: TextureDatabase, said: lis
         path.write_text("no entry")
     else:
         parts = dict(np.load(path))
-        np.savez(path, **{**parts, "texrs_texels": np.array(0)})
+        np.savez(path, **{**parts, "texrs_elements": np.array(0)})
     after = textures["dots"]
     assert len(said) == 1
     assert said[0].startswith("dots: made anew")
@@ -89,7 +89,7 @@ def test_an_entry_of_another_version_is_remade(textures: TextureDatabase, said: 
     manifest.write_text(json.dumps(table))
     assert len(textures["dots"].points) > 3
     assert "is of version 0" in said[0]
-    assert textures.list()[0].version == texrs.texels.FORMAT
+    assert textures.list()[0].version == texrs.elements.FORMAT
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"layout": 1}', '{"layout": 1, "textures": {"../x": {}}}', None])

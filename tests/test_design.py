@@ -9,9 +9,9 @@ import pytest
 
 import texrs
 from texrs import samples
-from texrs.deform import Moves, Operation, chaotic_sequence, elements_of, place
 from texrs.errors import Cancelled, InvalidInput, LimitExceeded
-from texrs.segment import segment
+from texrs.exemplar.segmentation import segment
+from texrs.papers.design.operations import Moves, Operation, chaotic_sequence, elements_of, place
 
 
 @pytest.fixture(scope="module")

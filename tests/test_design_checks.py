@@ -12,7 +12,7 @@ from scipy import ndimage
 import design_checks as checks
 import texrs
 from texrs import samples
-from texrs.deform import Moves, chaotic_sequence
+from texrs.papers.design.operations import Moves, chaotic_sequence
 from texrs.source_map import SourceMap
 
 SIZE = (256, 256)

@@ -10,11 +10,11 @@ import pytest
 import texrs
 from texrs import samples
 from texrs._arrays import to_unit
-from texrs.deform import chaotic_sequence, flip
 from texrs.errors import InvalidInput
 from texrs.kernels.complete import complete
 from texrs.kernels.patch_search import PatchIndex
-from texrs.papers._design_literal import X0, operation, start, stitch_layers
+from texrs.papers.design.literal import X0, operation, start, stitch_layers
+from texrs.papers.design.operations import chaotic_sequence, flip
 
 WEAK = -0.356261
 """A start whose first two operations are translations by nothing."""
@@ -31,14 +31,14 @@ def result(pebbles):
 
 
 def apart(a, b):
-    """Give how different two pictures are, 1 being as different as one is from itself rolled by half its size."""
+    """Return how different two pictures are, 1 being as different as one is from itself rolled by half its size."""
     a, b = a.astype(float), b.astype(float)
     rolled = np.roll(a, (a.shape[0] // 2, a.shape[1] // 2), (0, 1))
     return np.abs(a - b).mean() / np.abs(a - rolled).mean()
 
 
 def nearest(a, b):
-    """Give the same against the nearest of a picture and its mirrors."""
+    """Return the same against the nearest of a picture and its mirrors."""
     return min(apart(a, flip(b, axes)) for axes in [(False, False), (True, False), (False, True), (True, True)])
 
 
@@ -186,7 +186,7 @@ def test_unscreened_poisson_acts_and_keeps_the_rim(result):
     for axis in range(2):
         for line in (0, -1):
             np.testing.assert_array_equal(np.take(result.image, line, axis), np.take(composite, line, axis))
-    plain = texrs.blend.blend(result.source, samples.pebbles((128, 128)).image, wrap=False, screening=0)
+    plain = texrs.blending.blend(result.source, samples.pebbles((128, 128)).image, wrap=False, screening=0)
     np.testing.assert_array_equal(result.image, plain)
 
 
@@ -198,7 +198,7 @@ def test_screening_keeps_the_colours(result, pebbles):
         shift = image.astype(float) - result.stages["composite"]
         return np.abs(gaussian_filter(shift, (12, 12, 0))).max()
 
-    screened = texrs.blend.blend(result.source, pebbles, wrap=False)
+    screened = texrs.blending.blend(result.source, pebbles, wrap=False)
     assert drift(screened) < 0.5 * drift(result.image)
 
 

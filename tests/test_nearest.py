@@ -5,13 +5,14 @@ import pytest
 from scipy.spatial import cKDTree
 
 from reference import nearest as twin
-from texrs import samples, threads
+from texrs import _threads as threads
+from texrs import samples
 from texrs.errors import Cancelled, InvalidInput
 from texrs.kernels.nearest import Nearest
 
 
 def windows(keep=30):
-    """Give windows of a picture in the axes of their principal components."""
+    """Return windows of a picture in the axes of their principal components."""
     image = samples.pebbles((60, 60)).image / 255.0
     every = np.lib.stride_tricks.sliding_window_view(image, (8, 8), axis=(0, 1))
     flat = every.reshape(-1, 192) - every.reshape(-1, 192).mean(axis=0)

@@ -23,7 +23,7 @@ def mean(measure, results):
     return np.mean([measure(result.image) for result in results])
 
 
-def test_texels_have_the_size_that_is_asked(floor, grown):
+def test_elements_have_the_size_that_is_asked(floor, grown):
     name, target, results = grown
     ceiling = checks.fidelity(floor[0], floor[1])[0]
     wanted = {"ramp": 0.9, "wave": 0.9, "radial": 0.8}[name]

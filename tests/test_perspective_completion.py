@@ -40,7 +40,7 @@ def test_holes_are_filled_from_outside_them_without_a_seam(floor, method):
 
 
 @pytest.mark.parametrize("method", ["patch", "optimise"])
-def test_texels_in_the_hole_grow_as_those_around_it(floor, method):
+def test_elements_in_the_hole_grow_as_those_around_it(floor, method):
     image, scale = floor
     hole, inside = hole_in(image.shape[:2], (40, 110, 45, 115)), hole_in(image.shape[:2], (46, 104, 51, 109))
     known = np.where(hole, np.nan, scale).astype(np.float32)
@@ -48,7 +48,7 @@ def test_texels_in_the_hole_grow_as_those_around_it(floor, method):
     def agreement(picture):
         return np.corrcoef(np.log(checks.wavelength(picture)[inside]), np.log(scale[inside]))[0, 1]
 
-    # A few texels fill the hole, so one filling tells little.
+    # A few elements fill the hole, so one filling tells little.
     found = [agreement(fill(image, hole, seed=seed, scale_map=known, method=method).image) for seed in range(6)]
     assert np.mean(found) >= 0.95 * agreement(image), found
 
@@ -78,7 +78,7 @@ def test_a_scale_map_that_is_measured(floor, method):
 
 
 @pytest.mark.parametrize("method", ["patch", "optimise"])
-def test_a_second_picture_gives_texels_of_the_size_that_belongs_there(floor, method):
+def test_a_second_picture_gives_elements_of_the_size_that_belongs_there(floor, method):
     image, scale = floor
     hole = hole_in(image.shape[:2], (40, 110, 45, 115))
     # Another floor of the same kind, in which the other end is large.

@@ -81,13 +81,13 @@ def test_shapes_and_types(name: str) -> None:
 
 @pytest.mark.parametrize("name", COUNTED)
 @pytest.mark.parametrize("seed", [0, 5])
-def test_centres_are_centroids_of_whole_texels(name: str, seed: int) -> None:
+def test_centres_are_centroids_of_whole_elements(name: str, seed: int) -> None:
     sample = default(name) if seed == 0 else samples.load(name, size=(150, 280), seed=seed)
     assert sample.labels is not None
     assert sample.centres is not None
     whole = whole_labels(sample.labels)
     assert len(whole) >= 3
-    # The centroid of a whole texel is inside the picture, and so is its number among the centres.
+    # The centroid of a whole element is inside the picture, and so is its number among the centres.
     assert max(whole) <= len(sample.centres)
     found = np.array(ndimage.center_of_mass(sample.labels > 0, sample.labels, whole))
     away = np.hypot(*(found - sample.centres[np.array(whole) - 1]).T)
@@ -96,7 +96,7 @@ def test_centres_are_centroids_of_whole_texels(name: str, seed: int) -> None:
 
 
 @pytest.mark.parametrize("name", [n for n in WRAPPED if n in COUNTED])
-def test_no_texel_comes_from_beyond_a_torus(name: str) -> None:
+def test_no_element_comes_from_beyond_a_torus(name: str) -> None:
     sample = torus(name)
     assert sample.labels is not None
     assert sample.centres is not None
@@ -104,7 +104,7 @@ def test_no_texel_comes_from_beyond_a_torus(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["pebbles", "dots", "leaves_and_flowers"])
-def test_disjoint_texels_do_not_touch(name: str) -> None:
+def test_disjoint_elements_do_not_touch(name: str) -> None:
     labels = default(name).labels
     assert labels is not None
     _, parts = ndimage.label(labels > 0, np.ones((3, 3)))
@@ -156,7 +156,7 @@ def test_beans_touch_and_share_one_colour() -> None:
 
 
 @pytest.mark.parametrize("name", ["pebbles", "leaves_and_flowers", "bricks"])
-def test_a_threshold_does_not_find_the_texels(name: str) -> None:
+def test_a_threshold_does_not_find_the_elements(name: str) -> None:
     sample = default(name)
     assert sample.mask is not None
     assert best_threshold(sample.image, sample.mask) < 0.9
@@ -199,7 +199,7 @@ def test_a_torus_has_no_seam(name: str) -> None:
     for axis in range(image.ndim - 1):
         steps = np.abs(image - np.roll(image, 1, axis))
         steps = steps.mean(tuple(k for k in range(image.ndim) if k != axis))
-        # Lattices put the border on one phase of their texel: compare with the steps of like phase.
+        # Lattices put the border on one phase of their element: compare with the steps of like phase.
         inner = np.sort(steps[1:])
         assert steps[0] <= 1.3 * inner.mean() or steps[0] <= inner[int(0.95 * len(inner))]
 
@@ -218,7 +218,7 @@ def test_labels_go_on_across_the_border(name: str) -> None:
     sample = torus(name)
     assert sample.labels is not None
     assert sample.centres is not None
-    # On the torus every texel is whole: rolled so that one is in the middle, its centroid is there.
+    # On the torus every element is whole: rolled so that one is in the middle, its centroid is there.
     for i, centre in enumerate(sample.centres):
         at = np.argwhere(sample.labels == i + 1)
         box = np.array(sample.labels.shape)

@@ -31,7 +31,7 @@ def test_the_extreme_corners_have_the_extreme_scales(slant: float, tilt: float) 
 @pytest.mark.parametrize(
     ("tilt", "far"), [(0, "right"), (90, "top"), (180, "left"), (270, "bottom"), (360, "right"), (-90, "bottom")]
 )
-def test_texels_are_small_where_depth_grows(tilt: float, far: str) -> None:
+def test_elements_are_small_where_depth_grows(tilt: float, far: str) -> None:
     scale = scale_maps.from_angles((41, 61), 40, tilt)
     sides = {"right": scale[:, -1], "left": scale[:, 0], "top": scale[0], "bottom": scale[-1]}
     assert min(sides, key=lambda side: float(sides[side].mean())) == far

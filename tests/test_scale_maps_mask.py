@@ -13,10 +13,10 @@ from hypothesis.extra import numpy as arrays
 
 import scale_checks as checks
 from texrs import samples, scale_maps
+from texrs._threads import threads
 from texrs.errors import InvalidInput
 from texrs.scale_maps._mask import _middles, _outlines
 from texrs.scale_maps._windows import Lattice
-from texrs.threads import threads
 
 SIDE = 256
 TILES, BRICKS = checks.generated(SIDE)[0], checks.generated(SIDE)[-1]
@@ -279,7 +279,7 @@ BLANK = np.zeros((64, 64), bool)
 @pytest.mark.parametrize(
     ("mask", "options", "message"),
     [
-        (BLANK, {}, r"^mask: marks nothing, so there are no features to count; mark the texels"),
+        (BLANK, {}, r"^mask: marks nothing, so there are no features to count; mark the elements"),
         (~BLANK, {}, r"^mask: marks every pixel, so there are no features to count"),
         (BLANK, {"measure": "area"}, r"^mask: marks nothing"),
         (np.arange(64) < np.full((64, 1), 30), {}, r"^mask: holds too few features to count them in windows of \d+ pixels"),

@@ -12,9 +12,9 @@ import pytest
 
 import texrs
 from texrs import fields, samples, volume
-from texrs.analysis import Analysis, analyse, colours, repeats
+from texrs._engine.pyramid import ONE
 from texrs.errors import Cancelled, FileError, InvalidInput, LimitExceeded
-from texrs.kernels.pyramid import ONE
+from texrs.exemplar.analysis import Analysis, analyse, colours, repeats
 
 STRIPES = samples.stripes((32, 32, 32)).image
 PARTICLES = samples.particles((32, 32, 32))
@@ -204,7 +204,7 @@ if "fork" in sys.argv:
 else:
     for count in (1, 2, 7):
         with texrs.threads(count):
-            texrs.analysis._KEPT._kept.clear()
+            texrs.exemplar.analysis._KEPT._kept.clear()
             print(digest())
     print(digest())
 """

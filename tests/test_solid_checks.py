@@ -13,8 +13,8 @@ import pytest
 import solid_checks as checks
 import texrs
 from texrs import fields, samples
-from texrs.analysis import analyse
-from texrs.kernels.pyramid import ONE, Region, to_fixed, upsample
+from texrs._engine.pyramid import ONE, Region, to_fixed, upsample
+from texrs.exemplar.analysis import analyse
 from texrs.source_map import SourceMap
 
 FIELDS = {
@@ -174,7 +174,7 @@ def test_s8_without_its_parts_particles_are_lost(name):
 
 
 def shown(places, image):
-    """Give what places of the exemplar look like, and their map."""
+    """Return what places of the exemplar look like, and their map."""
     shape = places.shape[:3]
     empty = np.zeros(shape, np.uint16), np.zeros(shape, np.uint32)
     source = SourceMap(places.astype(np.float32), *empty, None, (image.shape[:3],))

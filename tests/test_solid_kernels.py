@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from texrs import fields
+from texrs._engine.appearance import Appearance
+from texrs._engine.pyramid import Region, to_fixed, upsample
 from texrs.errors import Cancelled, InvalidInput
-from texrs.kernels.appearance import Appearance
-from texrs.kernels.pyramid import Region, to_fixed, upsample
 
 sys.path.insert(0, str(Path(__file__).parent / "reference"))
 from solid import ONE, Twin, upsampled
@@ -31,7 +31,7 @@ def region_of(axes, wrap=False, origin=-3):
 
 
 def scattered(appearance, region, seed=0):
-    """Give places of any kind: fractions, outside, far away."""
+    """Return places of any kind: fractions, outside, far away."""
     rng = np.random.default_rng(seed)
     axes = len(region.shape)
     at = rng.integers(-2 * ONE, (max(appearance.shape) + 1) * ONE, (region.points, axes))

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 import texrs
-from texrs import fields, samples, threads, volume
+from texrs import _threads as threads
+from texrs import fields, samples, volume
+from texrs._engine.appearance import Appearance
+from texrs._engine.coherence import correct
+from texrs._engine.pyramid import ONE
 from texrs.errors import InvalidInput
-from texrs.kernels.appearance import Appearance
-from texrs.kernels.coherence import correct
-from texrs.kernels.pyramid import ONE
-from texrs.papers import _solid_literal
-from texrs.papers._solid_literal import _inside
+from texrs.papers.solid import literal as _solid_literal
+from texrs.papers.solid.literal import _inside
 
 SIZE = 64
 
@@ -99,7 +100,7 @@ def test_coordinates_that_leave_come_back_on_the_other_side():
 
 
 def speckle(image):
-    """Give the share of voxels that both neighbours along an axis differ from, the same way, by a third of the range."""
+    """Return the share of voxels that both neighbours along an axis differ from, the same way, by a third of the range."""
     grey = volume.lightness(image)
     least = (np.quantile(grey, 0.95) - np.quantile(grey, 0.05)) / 3
     alone = []

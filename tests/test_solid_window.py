@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 
 import texrs
 from texrs import fields, samples, volume
+from texrs._engine.pyramid import Region, to_fixed
 from texrs._typing import Array
-from texrs.analysis import analyse
 from texrs.errors import InvalidInput, LimitExceeded
-from texrs.kernels.pyramid import Region, to_fixed
-from texrs.papers import _solid_world as world
-from texrs.papers._solid_settings import ON_DEMAND
+from texrs.exemplar.analysis import analyse
+from texrs.papers.solid import world
+from texrs.papers.solid.settings import ON_DEMAND
 
 SOLID = samples.particles((32, 32, 32)).image
 PLANE = samples.weave((64, 64)).image

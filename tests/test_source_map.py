@@ -8,7 +8,7 @@ from texrs.errors import FileError, InvalidInput
 
 
 def turned(shape, degrees):
-    """Give a map that turns an exemplar of ``shape`` about its middle, with its frame."""
+    """Return a map that turns an exemplar of ``shape`` about its middle, with its frame."""
     angle = np.radians(degrees)
     frame = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     middle = (np.array(shape) - 1) / 2

@@ -1,4 +1,4 @@
-"""Splicing: the checks of the specification on samples whose texels are known, and what a user may do wrong."""
+"""Splicing: the checks of the specification on samples whose elements are known, and what a user may do wrong."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from scipy.ndimage import find_objects
 import splice_checks as checks
 import texrs
 from texrs import samples
+from texrs.elements import Elements
 from texrs.errors import InvalidInput
-from texrs.papers import _splice_warp as warp
-from texrs.texels import Texels
+from texrs.papers.splice import warp
 
 SIZE = (192, 192)
 
 
-def entry(name: str, seed: int = 0, size: tuple[int, int] = SIZE) -> Texels:
-    return Texels.of_sample(samples.load(name, size=size, seed=seed))
+def entry(name: str, seed: int = 0, size: tuple[int, int] = SIZE) -> Elements:
+    return Elements.of_sample(samples.load(name, size=size, seed=seed))
 
 
 ENTRIES = {name: entry(name) for name in ("dots", "pebbles", "leaves_and_flowers", "net", "bricks")}
@@ -41,7 +41,7 @@ def spliced() -> Callable[[str, str], texrs.Synthesis]:
 
 
 @pytest.mark.parametrize(("a", "b"), PAIRS)
-def test_every_texel_is_there_whole_and_in_its_place(a: str, b: str, spliced: Any) -> None:
+def test_every_element_is_there_whole_and_in_its_place(a: str, b: str, spliced: Any) -> None:
     mine, result = ENTRIES[a], spliced(a, b)
     found, away = checks.presence(mine, result)
     irregular = a == "pebbles"
@@ -86,7 +86,7 @@ def test_the_arrangement_is_the_other_one_s(a: str, b: str, spliced: Any) -> Non
 @pytest.mark.parametrize("name", ["dots", "pebbles", "net", "bricks"])
 def test_nothing_moved_nothing_changed(name: str) -> None:
     mine = ENTRIES[name]
-    for edit in ({"op": "move", "texel": 1, "by": 0}, {"op": "shift", "by": 0}, {"op": "scale", "factor": 1}):
+    for edit in ({"op": "move", "element": 1, "by": 0}, {"op": "shift", "by": 0}, {"op": "scale", "factor": 1}):
         assert (texrs.self_splice(mine, edit).image == mine.image).all(), "S9"
 
 
@@ -162,7 +162,7 @@ def test_joints_stay_upright(edit: str) -> None:
 def test_a_listed_edit_stirs_its_neighbourhood_alone() -> None:
     """Moved points are carried by triangles between them, anything else by the mesh: each reaches its own pixels."""
     mine = ENTRIES["dots"]
-    listed = texrs.self_splice(mine, {"op": "move", "texel": 12, "by": [6, 4]})
+    listed = texrs.self_splice(mine, {"op": "move", "element": 12, "by": [6, 4]})
     changed = np.argwhere((listed.image != mine.image).any(axis=-1))
     assert len(changed)
     assert np.abs(changed - mine.points[12]).max() < 70
@@ -170,11 +170,11 @@ def test_a_listed_edit_stirs_its_neighbourhood_alone() -> None:
     points[12] += (6, 4)
     again = texrs.self_splice(mine, {"op": "points", "points": points.tolist()})
     assert (again.image == listed.image).all()
-    meshed = texrs.self_splice(mine, [{"op": "move", "texel": 12, "by": [6, 4]}, {"op": "shift", "by": 0}])
+    meshed = texrs.self_splice(mine, [{"op": "move", "element": 12, "by": [6, 4]}, {"op": "shift", "by": 0}])
     for result in (listed, meshed):
-        moved = [m["target"] for m in result.report["matches"] if m["texel"] == 12]
+        moved = [m["target"] for m in result.report["matches"] if m["element"] == 12]
         assert np.allclose(moved[0], points[12], atol=1e-3)
-        rigid = np.argwhere(result.source.label == 1 + [m["texel"] for m in result.report["matches"]].index(12))
+        rigid = np.argwhere(result.source.label == 1 + [m["element"] for m in result.report["matches"]].index(12))
         assert len(rigid) > 100
 
 
@@ -270,7 +270,7 @@ def test_edits_replay() -> None:
 
 
 def test_regular_layouts() -> None:
-    from texrs.papers._splice_edit import edited, lattice
+    from texrs.papers.splice.edit import edited, lattice
 
     skew = np.array([[20.0, 4.0], [3.0, 25.0]])
     index = np.argwhere(np.ones((6, 6)))
@@ -290,7 +290,7 @@ def test_regular_layouts() -> None:
     ("change", "words"),
     [
         ({"points": np.zeros((0, 2))}, "three or more"),
-        ({"points": np.array([[5.0, 5], [9, 9]])}, "2 texels are too few"),
+        ({"points": np.array([[5.0, 5], [9, 9]])}, "2 elements are too few"),
         ({"points": np.array([[5.0, 5], [5, 5], [9, 9], [7, 20]])}, "same place"),
         ({"points": np.array([[5.0, 5], [np.nan, 5], [9, 9]])}, "NaN"),
         ({"points": np.array([[5.0, 5], [500, 5], [9, 9]])}, "must lie in the picture"),
@@ -311,8 +311,8 @@ def test_bad_entries(change: dict[str, Any], words: str) -> None:
     [
         ("melt", "needs an 'op'"),
         (3, "needs a name, a step or a list"),
-        ({"op": "move", "texel": 900, "by": 1}, "texel of move"),
-        ({"op": "move", "texel": 1}, "one of 'by' and 'to'"),
+        ({"op": "move", "element": 900, "by": 1}, "element of move"),
+        ({"op": "move", "element": 1}, "one of 'by' and 'to'"),
         ({"op": "scale", "factor": 0}, "factor of scale"),
         ({"op": "scale", "factor": "big"}, "needs factor"),
         ({"op": "shift", "by": [1e9, 0]}, "further than|four times"),

@@ -1,4 +1,4 @@
-"""The commands that arrange texels."""
+"""The commands that arrange elements."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_self_splice_and_its_replay(tmp_path: Path) -> None:
     assert main([*line, "-o", str(first), "--edit", "randomise", "--stages", str(stages)]) == 0
     assert main([*line, "-o", str(again), "--edit", str(stages / "report.json")]) == 0
     assert first.read_bytes() == again.read_bytes()
-    moved = '[{"op": "move", "texel": 1, "by": [3, 4]}]'
+    moved = '[{"op": "move", "element": 1, "by": [3, 4]}]'
     assert main([*line, "-o", str(again), "--edit", moved]) == 0
 
 

@@ -9,10 +9,10 @@ import pytest
 from scipy.spatial import Delaunay
 
 import texrs
-from texrs import matching, samples
-from texrs.papers import _splice_layout as layout
-from texrs.papers import _splice_warp as warp
-from texrs.texels import Texels
+from texrs import layouts as matching
+from texrs import samples
+from texrs.elements import Elements
+from texrs.papers.splice import layout, warp
 
 
 def lattice(rows: int, columns: int, *, shifted: bool, noise: float = 0.0) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -22,7 +22,7 @@ def lattice(rows: int, columns: int, *, shifted: bool, noise: float = 0.0) -> np
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_many_texels_are_matched_as_few_are(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_elements_are_matched_as_few_are(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     random = np.random.default_rng(seed)
     source, target = random.random((500, 2)) * 400, random.random((400, 2)) * 400
     dense = matching.match(source, target)
@@ -42,7 +42,7 @@ def test_crowded_targets_find_sources_farther_away(monkeypatch: pytest.MonkeyPat
 
 @pytest.mark.parametrize("upright", [True, False])
 def test_large_walls_are_solved_for_at_fewer_pixels(upright: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    wall = Texels.of_sample(samples.load("bricks", size=(192, 192)))
+    wall = Elements.of_sample(samples.load("bricks", size=(192, 192)))
     pins = np.rint(wall.points).astype(np.intp)
     shift = np.random.default_rng(1).uniform(-3, 3, pins.shape)
     full = warp.stretched(~wall.mask, pins, shift, upright=upright)
@@ -57,8 +57,8 @@ def test_large_walls_are_solved_for_at_fewer_pixels(upright: bool, monkeypatch: 
 
 
 def test_neighbours_in_walls_go_about_as_far() -> None:
-    wall = Texels.of_sample(samples.load("bricks", size=(192, 192)))
-    stones = Texels.of_sample(samples.load("pebbles", size=(192, 192)))
+    wall = Elements.of_sample(samples.load("bricks", size=(192, 192)))
+    stones = Elements.of_sample(samples.load("pebbles", size=(192, 192)))
     torn = layout.matched(wall, stones, (192, 192), align=True)
     found = layout.eased(wall, torn)
     start = found.source.points[found.of]
@@ -97,8 +97,8 @@ def test_pictures_of_any_size_take_their_time_only(monkeypatch: pytest.MonkeyPat
     """Coarser systems and near matches go through the whole of a splice."""
     monkeypatch.setattr(warp, "MOST", 1 << 13)
     monkeypatch.setattr(matching, "DENSE", 0)
-    wall = Texels.of_sample(samples.load("bricks", size=(128, 128)))
-    stones = Texels.of_sample(samples.load("pebbles", size=(128, 128)))
+    wall = Elements.of_sample(samples.load("bricks", size=(128, 128)))
+    stones = Elements.of_sample(samples.load("pebbles", size=(128, 128)))
     result = texrs.splice(wall, stones, seed=1)
     assert max(result.report["system"]) < 128
     assert (result.source.render(wall.image) == result.image).all()

@@ -117,7 +117,7 @@ def test_bad_warps() -> None:
 def test_factors_agree_with_scipy() -> None:
     from scipy.sparse.linalg import spsolve
 
-    from texrs.papers._splice_warp import energy
+    from texrs.papers.splice.warp import energy
 
     random = np.random.default_rng(0)
     rigid = random.random((24, 30)) < 0.4
@@ -145,7 +145,7 @@ def test_several_factors_are_each_what_one_is() -> None:
 
 def test_energy_is_that_of_the_paper() -> None:
     """Eq. 5, Table 1 and Figure 5 pixel by pixel, for the displacement along columns."""
-    from texrs.papers._splice_warp import weights
+    from texrs.papers.splice.warp import weights
 
     rigid = np.random.default_rng(3).random((7, 8)) < 0.5
     coupling, small = 0.25, 0.1

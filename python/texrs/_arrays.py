@@ -77,7 +77,7 @@ def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int 
 
 
 def as_kernel(array: Array) -> Array:
-    """Give the values in a dtype that the kernels take: bool as uint8, float16 as float32."""
+    """Return the values in a dtype that the kernels take: bool as uint8, float16 as float32."""
     if array.dtype == np.bool_:
         return array.view(np.uint8)
     if array.dtype == np.float16:
@@ -107,7 +107,7 @@ def to_unit(array: Array) -> Floats:
 
 
 def guidance(pixels: Array) -> Floats:
-    """Give the colours that decisions are made on: up to three channels in [0, 1], transparency over mid grey."""
+    """Return the colours that decisions are made on: up to three channels in [0, 1], transparency over mid grey."""
     unit = to_unit(pixels)
     if unit.shape[-1] in (2, 4):
         alpha = unit[..., -1:]

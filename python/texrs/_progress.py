@@ -8,7 +8,7 @@ from texrs._typing import Progress
 
 
 def stage(progress: Progress | None, name: str) -> Callable[[float], object] | None:
-    """Give what a kernel may call with the share that is done of a stage, or none where nobody listens."""
+    """Return what a kernel may call with the share that is done of a stage, or none where nobody listens."""
     if progress is None:
         return None
     progress(name, 0.0)  # Short work may be done before it is asked how far it is.

@@ -26,4 +26,4 @@ class Frames(Protocol):
     axes: int
 
     def lattice(self, shape: Sequence[int], *, origin: Any = 0, step: float = 1) -> Floats:
-        """Give the Jacobians (..., A, A) of a lattice of that shape."""
+        """Return the Jacobians (..., A, A) of a lattice of that shape."""

@@ -70,7 +70,7 @@ def d5(exemplar: np.ndarray, images: Sequence[np.ndarray], report: Mapping[str, 
 
 
 def repeats(example: np.ndarray) -> float:
-    """Give the least difference of an image to itself moved by a quarter to a half of its shorter side, over the usual."""
+    """Return the least difference of an image to itself moved by a quarter to a half of its shorter side, over the usual."""
     height, width = example.shape[:2]
     size = (2 * height, 2 * width)
     spectrum = fft.rfft2(example, size, axes=(0, 1))
@@ -93,7 +93,7 @@ def repeats(example: np.ndarray) -> float:
 
 
 def best_shift(part: np.ndarray, example: np.ndarray) -> float:
-    """Give the mean difference of a part to the exemplar, moved cyclically to where the squared difference is least."""
+    """Return the mean difference of a part to the exemplar, moved cyclically to where the squared difference is least."""
     height, width = part.shape[:2]
     padded = np.zeros_like(example)
     padded[:height, :width] = part
@@ -283,7 +283,7 @@ def census(before: np.ndarray, size_before: int, after: np.ndarray, size_after: 
 
 
 def instances(labels: np.ndarray) -> np.ndarray:
-    """Give the areas of connected pieces of one label each."""
+    """Return the areas of connected pieces of one label each."""
     areas = []
     for label in np.unique(labels[labels > 0]):
         where, _ = ndimage.label(labels == label, np.ones((3, 3)))

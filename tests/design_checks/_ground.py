@@ -11,7 +11,7 @@ MIRRORS = ((1, 1), (-1, 1), (1, -1), (-1, -1))
 
 
 def unit(image: np.ndarray, like: np.ndarray | None = None) -> np.ndarray:
-    """Give the colour channels as (H, W, C) float64; integers fill [0, 1], floats are scaled by the range of `like`."""
+    """Return the colour channels as (H, W, C) float64; integers fill [0, 1], floats are scaled by the range of `like`."""
     values = np.asarray(image)
     values = values[..., np.newaxis] if values.ndim == 2 else values
     if values.shape[-1] in (2, 4):
@@ -26,18 +26,18 @@ def unit(image: np.ndarray, like: np.ndarray | None = None) -> np.ndarray:
 
 
 def gradient(image: np.ndarray, axis: int, *, wrap: bool = False) -> np.ndarray:
-    """Give the gradient over each edge along an axis; with `wrap` the last one leads back to the start."""
+    """Return the gradient over each edge along an axis; with `wrap` the last one leads back to the start."""
     values = np.concatenate([image, image.take([0], axis)], axis) if wrap else image
     return np.abs(np.diff(values, axis=axis)).mean(axis=-1)
 
 
 def gradients(image: np.ndarray) -> np.ndarray:
-    """Give the gradients over all inner edges, in a row."""
+    """Return the gradients over all inner edges, in a row."""
     return np.concatenate([gradient(image, axis).ravel() for axis in range(2)])
 
 
 def jacobians(source: Any) -> np.ndarray:
-    """Give the local frame of each pixel of a source map."""
+    """Return the local frame of each pixel of a source map."""
     if source.frame is None:
         return np.broadcast_to(np.eye(2), (*source.label.shape, 2, 2))
     return np.asarray(source.frame[source.label] if source.frame.ndim == 3 else source.frame, np.float64)
@@ -66,7 +66,7 @@ def seams(source: Any, axis: int, *, wrap: bool = False, tolerance: float = 0.25
 def nearest_patches(
     image: np.ndarray, at: np.ndarray, exemplar: np.ndarray, *, side: int = 9, own: int | None = None
 ) -> np.ndarray:
-    """Give the RMS distance of the patches whose corners are `at` to their nearest patch of the exemplar.
+    """Return the RMS distance of the patches whose corners are `at` to their nearest patch of the exemplar.
 
     With `own`, the image is the exemplar, and patches that start within so many pixels of a corner do not count.
     """
@@ -112,12 +112,12 @@ ROLLS = ((0.5, 0.5), (0.38, 0.29), (0.23, 0.41))
 
 
 def variation(image: np.ndarray) -> float:
-    """Give the mean difference of an image and itself, moved: what two textures that have nothing in common show."""
+    """Return the mean difference of an image and itself, moved: what two textures that have nothing in common show."""
     height, width = image.shape[:2]
     rolled = (np.roll(image, (round(r * height), round(c * width)), (0, 1)) for r, c in ROLLS)
     return max(float(np.abs(image - other).mean()) for other in rolled)
 
 
 def difference(one: np.ndarray, other: np.ndarray) -> float:
-    """Give the mean difference of two images over the variation of one."""
+    """Return the mean difference of two images over the variation of one."""
     return ratio(float(np.abs(one - other).mean()), variation(one))

@@ -44,7 +44,7 @@ class Exemplar:
         self.border = [0 if w else appearance.radius for w in self.wrap]
 
     def inside(self, sample):
-        """Give the sample, around cyclic axes, or none if its window does not lie inside."""
+        """Return the sample, around cyclic axes, or none if its window does not lie inside."""
         out = []
         for x, n, w, b in zip(sample, self.shape, self.wrap, self.border, strict=True):
             if not w and not b <= x < n - b:
@@ -62,7 +62,7 @@ class Exemplar:
         return tuple(out)
 
     def vector(self, sample):
-        """Give the vector of a sample, of the nearest one whose window lies inside."""
+        """Return the vector of a sample, of the nearest one whose window lies inside."""
         at = []
         for x, n, w, b in zip(sample, self.shape, self.wrap, self.border, strict=True):
             at.append(x % n if w else min(max(x, b), n - 1 - b))

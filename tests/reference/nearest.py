@@ -4,7 +4,7 @@ import numpy as np
 
 
 def nearest(vectors, queries, own=False):
-    """Give which vector is nearest to each query, the first of equal ones, and how far it is."""
+    """Return which vector is nearest to each query, the first of equal ones, and how far it is."""
     which, apart = [], []
     for number, query in enumerate(queries):
         square = ((vectors - query) ** 2).sum(axis=1)

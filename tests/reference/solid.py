@@ -39,7 +39,7 @@ class Twin:
         self.frames = np.broadcast_to(frames.astype(np.int64), (len(self.points), self.axes, self.axes))
 
     def step(self, point, step):
-        """Give the number of the point a step away, around cyclic axes; none beyond an end."""
+        """Return the number of the point a step away, around cyclic axes; none beyond an end."""
         q = point + step
         size = np.array(self.region.shape)
         q = np.where(self.region.wrap, q % size, q)
@@ -49,7 +49,7 @@ class Twin:
         return tuple(np.where(self.wrap, sample % self.shape, np.clip(sample, 0, self.shape - 1)).tolist())
 
     def inside(self, sample):
-        """Give the sample, if all its window lies inside the exemplar."""
+        """Return the sample, if all its window lies inside the exemplar."""
         near = np.where(self.wrap, 0, self.radius)
         i = np.where(self.wrap, sample % self.shape, sample)
         return tuple(i.tolist()) if ((i >= near) & (i < self.shape - near)).all() else None
@@ -62,14 +62,14 @@ class Twin:
         return np.where(self.wrap, places % (self.shape * ONE), kept)
 
     def same(self, a, b):
-        """Tell whether two places for one point are of one piece."""
+        """Return whether two places for one point are of one piece."""
         d = np.abs(a - b)
         around = d % (self.shape * ONE)
         d = np.where(self.wrap, np.minimum(around, self.shape * ONE - around), d)
         return bool((d <= 3 * ONE // 4).all())
 
     def meet(self, places, p):
-        """Tell whether pieces meet beside a point."""
+        """Return whether pieces meet beside a point."""
         for step in product((-1, 0, 1), repeat=self.axes):
             q = self.step(self.points[p], np.array(step))
             if q is not None and not self.same(places[p] + self.frames[p] @ np.array(step), places[q]):
@@ -77,14 +77,14 @@ class Twin:
         return False
 
     def near(self, p, changed):
-        """Tell whether a point or one beside it changed."""
+        """Return whether a point or one beside it changed."""
         away = np.abs(self.points[changed] - self.points[p])
         size = np.array(self.region.shape)
         away = np.where(self.region.wrap, np.minimum(away, size - away), away)
         return bool((away <= 1).all(axis=1).any())
 
     def window(self, places, p):
-        """Give the appearance vector of the window round a point: what is at F o belongs at o."""
+        """Return the appearance vector of the window round a point: what is at F o belongs at o."""
         frame = self.frames[p]
         back = np.rint(np.linalg.inv(frame / ONE) * ONE).astype(np.int64)
         numbers = []
@@ -98,7 +98,7 @@ class Twin:
         return np.clip(scaled, -2047, 2047)
 
     def improve(self, places, p, reach, limit, unity, number, seed, exhaustive):
-        """Give the best of a point's own match, those of its neighbours, and some that are drawn."""
+        """Return the best of a point's own match, those of its neighbours, and some that are drawn."""
         feature = self.window(places, p)
 
         def cost(at):
@@ -149,7 +149,7 @@ class Twin:
         return best
 
     def elect(self, matches, p, radius):
-        """Give the proposal of the windows around a point that is nearest to their mean colour."""
+        """Return the proposal of the windows around a point that is nearest to their mean colour."""
         flat = self.colours.reshape(-1, 4).astype(float)
         variance = (flat**2).sum() / len(flat) - (flat.mean(axis=0) ** 2).sum()
         proposals, total, count = [], np.zeros(4, np.int64), 0
@@ -185,7 +185,7 @@ class Twin:
         seed=0,
         held=None,
     ):
-        """Give the places after each pass."""
+        """Return the places after each pass."""
         now = self.bring_inside(places.astype(np.int64).reshape(-1, self.axes))
         limit, alone = int(hysteresis * self.spacing), int(unity * self.spacing)
         done = [now]
@@ -217,7 +217,7 @@ def nearest(place):
 
 
 def upsampled(places, parents, region, frames):
-    """Twin of `texrs.kernels.pyramid.upsample`."""
+    """Twin of `texrs._engine.pyramid.upsample`."""
     axes = len(region.shape)
     coarse = places.astype(np.int64).reshape(*parents.shape, axes)
     out = []

@@ -20,16 +20,16 @@ import typer
 import texrs as package
 from texrs import io, samples
 from texrs._arrays import as_float
-from texrs.blend import SCREENING
-from texrs.blend import blend as healed
-from texrs.cli import _files, _perspective, _pictures, _scales, _solid, _splice, _texels, _volumes
+from texrs._threads import threads
+from texrs.blending import SCREENING
+from texrs.blending import blend as healed
+from texrs.cli import _elements, _files, _perspective, _pictures, _scales, _solid, _splice, _volumes
 from texrs.cli._console import Method, Quiet, Threads, as_method, note, run, say, watching
 from texrs.cli._files import describe, named
 from texrs.errors import FileError, InvalidInput
+from texrs.exemplar.segmentation import Children
 from texrs.papers.design import design
-from texrs.segment import Children
 from texrs.source_map import SourceMap
-from texrs.threads import threads
 
 __all__ = ["main"]
 
@@ -40,8 +40,8 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("analyse")(_texels.analyse_command)
-app.command("database")(_texels.database_command)
+app.command("analyse")(_elements.analyse_command)
+app.command("database")(_elements.database_command)
 app.command("tile")(_pictures.tile_command)
 app.command("complete")(_pictures.complete_command)
 app.command("scale-map")(_scales.scale_map_command)

@@ -186,7 +186,7 @@ def unwarned() -> Iterator[None]:
 
 @contextmanager
 def watching(*, quiet: bool) -> Iterator[Progress]:
-    """Give a callback that shows progress on stderr: a bar on a terminal, lines elsewhere."""
+    """Return a callback that shows progress on stderr: a bar on a terminal, lines elsewhere."""
     if quiet or sys.stderr is None:
         yield lambda stage, share: None
     elif sys.stderr.isatty() and os.environ.get("TERM") != "dumb":
@@ -226,7 +226,7 @@ def _lines() -> Progress:
 
 
 def _stopped(number: int) -> int:
-    """Give the exit code of a command that a signal ended; a broken pipe is no news to anybody."""
+    """Return the exit code of a command that a signal ended; a broken pipe is no news to anybody."""
     if number == PIPE:
         # What is still buffered has nowhere to go, and Python would complain of that at its end.
         with suppress(OSError, ValueError):

@@ -14,7 +14,7 @@ from texrs import io, samples
 from texrs._arrays import as_image, as_size
 from texrs._typing import Array
 from texrs.errors import FileError, InvalidInput, TexrsError
-from texrs.report import Synthesis
+from texrs.synthesis import Synthesis
 
 __all__ = [
     "check_distinct",
@@ -134,7 +134,7 @@ def read_hole(path: str) -> Array:
 
 @contextmanager
 def output(path: str) -> Iterator[Path]:
-    """Give a temporary name that takes the place of ``path`` at the end; errors speak of ``path``."""
+    """Return a temporary name that takes the place of ``path`` at the end; errors speak of ``path``."""
     with io.atomic(path) as temporary:
         try:
             yield temporary
@@ -197,7 +197,7 @@ def deliver_variants(made: Sequence[Synthesis], seed: int, out: str, source: str
 
 
 def beside(path: str, seed: int) -> str:
-    """Give the name of one of several results."""
+    """Return the name of one of several results."""
     plain = Path(path)
     return str(plain.with_name(f"{plain.stem}-{seed}{plain.suffix}"))
 

@@ -8,6 +8,7 @@ from typing import Annotated, Literal, cast
 
 import typer
 
+from texrs._threads import threads
 from texrs._typing import Interpolation
 from texrs.cli import _files
 from texrs.cli._console import Method, Out, Quiet, Source, Stages, Threads, as_method, note, watching
@@ -15,7 +16,6 @@ from texrs.cli._files import describe, named
 from texrs.cli._scales import read_scale
 from texrs.errors import InvalidInput
 from texrs.papers.perspective import perspective
-from texrs.threads import threads
 
 __all__ = ["perspective_command"]
 
@@ -61,7 +61,7 @@ def perspective_command(
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
-    """Grow a picture whose texels are as large as a scale map says."""
+    """Grow a picture whose elements are as large as a scale map says."""
     start = time.monotonic()
     shape, cyclic = _files.parse_size(size), _files.parse_wrap(wrap)
     sizes = _parse_sizes(augment_scales)

@@ -8,13 +8,13 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from texrs._threads import threads
 from texrs.cli import _files
 from texrs.cli._console import Out, Quiet, Source, Stages, Threads, note, watching
 from texrs.cli._files import describe, named
 from texrs.cli._scales import read_scale
 from texrs.completion import complete
-from texrs.cyclic import tile
-from texrs.threads import threads
+from texrs.tiling import tile
 
 __all__ = ["complete_command", "tile_command"]
 

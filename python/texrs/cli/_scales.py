@@ -12,14 +12,14 @@ import numpy as np
 import typer
 
 from texrs import io, scale_maps
+from texrs._threads import threads
 from texrs._typing import Array, Floats
 from texrs.cli import _files
 from texrs.cli._console import Out, Quiet, Stages, Threads, note
 from texrs.cli._files import named
 from texrs.cli._splice import read_edit
 from texrs.errors import InvalidInput
-from texrs.report import preview
-from texrs.threads import threads
+from texrs.synthesis import preview
 
 __all__ = ["read_scale", "scale_map_command"]
 
@@ -34,7 +34,7 @@ def scale_map_command(
     out: Out,
     mask: Annotated[
         str | None,
-        typer.Option(metavar="FILE", help="Measure in a mask of the texels: what is not black.", show_default=False),
+        typer.Option(metavar="FILE", help="Measure in a mask of the elements: what is not black.", show_default=False),
     ] = None,
     auto: Annotated[bool, typer.Option("--auto", help="Measure in a mask that is found in the image.")] = False,
     slant: Annotated[
@@ -115,7 +115,7 @@ def scale_map_command(
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
-    """Make a scale map: how large the texels of a picture are at each place."""
+    """Make a scale map: how large the elements of a picture are at each place."""
     start = time.monotonic()
     sides = _files.parse_size(size)
     sources = {"mask": mask, "auto": auto or None, "slant": slant, "scale": scale}

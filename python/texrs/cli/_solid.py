@@ -11,6 +11,7 @@ import numpy as np
 import typer
 
 from texrs import io
+from texrs._threads import threads
 from texrs._typing import Array, Interpolation
 from texrs.cli import _files
 from texrs.cli._console import Method, Out, Quiet, Source, Stages, Threads, as_method, note, watching
@@ -18,8 +19,7 @@ from texrs.cli._files import describe, named
 from texrs.cli._volumes import read_field, read_volume
 from texrs.errors import InvalidInput
 from texrs.papers.solid import solid, synthesize
-from texrs.report import Synthesis
-from texrs.threads import threads
+from texrs.synthesis import Synthesis
 
 __all__ = ["solid_command", "synthesize_command"]
 

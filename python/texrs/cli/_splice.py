@@ -1,4 +1,4 @@
-"""Commands that arrange texels: ``texrs splice`` and ``texrs self-splice``."""
+"""Commands that arrange elements: ``texrs splice`` and ``texrs self-splice``."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from texrs._threads import threads
 from texrs._typing import Array
 from texrs.cli import _files
 from texrs.cli._console import Out, Quiet, Source, Stages, Threads, as_method, note, watching
 from texrs.cli._files import describe, named
+from texrs.elements import Elements, load
 from texrs.errors import FileError, InvalidInput
 from texrs.papers.splice import self_splice, splice
-from texrs.report import Synthesis
-from texrs.texels import Texels, load
-from texrs.threads import threads
+from texrs.synthesis import Synthesis
 
 __all__ = ["self_splice_command", "splice_command"]
 
@@ -28,7 +28,7 @@ ENTRY = "An image file, sample:NAME, or an entry that texrs analyse wrote (.npz)
 
 
 def splice_command(
-    a: Annotated[str, typer.Argument(metavar="A", help=f"Whose texels are shown. {ENTRY}", show_default=False)],
+    a: Annotated[str, typer.Argument(metavar="A", help=f"Whose elements are shown. {ENTRY}", show_default=False)],
     b: Annotated[str, typer.Argument(metavar="B", help=f"Whose layout they take. {ENTRY}", show_default=False)],
     out: Out,
     size: Annotated[
@@ -38,7 +38,7 @@ def splice_command(
     align: Annotated[
         bool, typer.Option("--align/--no-align", help="Whether to turn the layout as A's lines run.")
     ] = True,
-    snap_rows: Annotated[bool, typer.Option("--snap-rows", help="Bring texels of about one row to one row.")] = False,
+    snap_rows: Annotated[bool, typer.Option("--snap-rows", help="Bring elements of about one row to one row.")] = False,
     refine: Refine = True,
     method: Annotated[
         str, typer.Option(help="default, paper (the published algorithm to the letter) or preview.")
@@ -48,13 +48,13 @@ def splice_command(
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
-    """Arrange the texels of one texture as those of another are."""
+    """Arrange the elements of one texture as those of another are."""
     start = time.monotonic()
     shape = _files.parse_size(size)
     how = as_method(method, "paper", "preview")
     _files.check_outputs(out, source, stages)
-    mine, theirs = read_texels(a), read_texels(b)
-    example = mine.image if isinstance(mine, Texels) else mine
+    mine, theirs = read_elements(a), read_elements(b)
+    example = mine.image if isinstance(mine, Elements) else mine
     _files.check_output(out, example, shape or example.shape[:2])
     with named(a=a, b=b, count="--threads"), threads(count), watching(quiet=quiet) as progress:
         result = splice(
@@ -90,20 +90,20 @@ def self_splice_command(
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
-    """Edit the layout of a texture's own texels."""
+    """Edit the layout of a texture's own elements."""
     start = time.monotonic()
     how = as_method(method, "preview")
     steps = read_edit(edit)
     _files.check_outputs(out, source, stages)
-    mine = read_texels(a)
-    example = mine.image if isinstance(mine, Texels) else mine
+    mine = read_elements(a)
+    example = mine.image if isinstance(mine, Elements) else mine
     _files.check_output(out, example, example.shape[:2])
     with named(a=a, edit="--edit", count="--threads"), threads(count), watching(quiet=quiet) as progress:
         result = self_splice(mine, steps, seed=seed, method=how, refine=refine, progress=progress)
     finish(result, out, source, stages, start, quiet=quiet)
 
 
-def read_texels(text: str) -> Texels | Array:
+def read_elements(text: str) -> Elements | Array:
     """Read an entry, or a picture, which is analysed by whoever takes it."""
     if not text.lower().endswith(".npz"):
         return _files.read_exemplar(text)
@@ -135,6 +135,6 @@ def finish(result: Synthesis, out: str, source: str | None, stages: str | None, 
     report = result.report
     matched = len(report["matches"])
     note(
-        f"wrote {out}: {describe(np.asarray(result.image), 2)}, {matched} texels moved, in {time.monotonic() - start:.1f} s",
+        f"wrote {out}: {describe(np.asarray(result.image), 2)}, {matched} elements moved, in {time.monotonic() - start:.1f} s",
         quiet=quiet,
     )

@@ -11,13 +11,13 @@ import typer
 
 from texrs import fields, io, samples
 from texrs._arrays import as_image, as_int
+from texrs._threads import threads
 from texrs._typing import Array, Interpolation
 from texrs.cli import _files
 from texrs.cli._console import Quiet, Threads, note, watching
 from texrs.cli._files import SAMPLE, describe, named
 from texrs.errors import FileError, InvalidInput
 from texrs.fields import Field
-from texrs.threads import threads
 from texrs.volume import cube, oblique, paint, slices, turntable
 
 __all__ = ["read_field", "read_volume", "slice_command"]

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from texrs import io
+from texrs.elements import FORMAT, Elements, digest, load
 from texrs.errors import FileError, TexrsError
-from texrs.texels import FORMAT, Texels, digest, load
 
 __all__ = ["NAME", "Folder", "Record", "given_again"]
 
@@ -42,7 +42,7 @@ class Record:
     version: int
     tag: str
     box: tuple[int, ...]
-    texels: int
+    elements: int
     options: Mapping[str, Any] = field(repr=False)
     """With which it was analysed."""
 
@@ -57,7 +57,7 @@ class Folder:
         except (OSError, ValueError) as error:
             raise FileError(f"{self.path}: no folder can be made there ({error})") from None
 
-    def keep(self, name: str, entry: Texels, source: str, options: Mapping[str, Any]) -> Texels:
+    def keep(self, name: str, entry: Elements, source: str, options: Mapping[str, Any]) -> Elements:
         """Write an entry and what the manifest says of it."""
         plain = {k: _plain(v) for k, v in options.items()}
         # With all that the manifest needs, should that be lost.
@@ -121,7 +121,7 @@ class Folder:
                     "version": r.version,
                     "tag": r.tag,
                     "box": list(r.box),
-                    "texels": r.texels,
+                    "elements": r.elements,
                     "options": dict(r.options),
                 }
                 for name, r in sorted(found.items())
@@ -172,7 +172,7 @@ def _lock(number: int) -> bool:
     return True
 
 
-def _of(name: str, file: str, entry: Texels) -> Record:
+def _of(name: str, file: str, entry: Elements) -> Record:
     kept = entry.report.get("database", {})
     box = tuple(int(n) for n in entry.report.get("box", (0, 0, *entry.box)))
     source, options = str(kept.get("source", "")), dict(kept.get("options", {}))
@@ -190,7 +190,7 @@ def _record(name: str, item: Mapping[str, Any]) -> Record:
         int(item["version"]),
         str(item["tag"]),
         tuple(int(n) for n in item["box"]),
-        int(item["texels"]),
+        int(item["elements"]),
         dict(item["options"]),
     )
 
@@ -210,7 +210,7 @@ def _plain(value: Any) -> Any:
 
 
 def given_again(value: Any) -> Any:
-    """Give an option as it was before it was written."""
+    """Return an option as it was before it was written."""
     if isinstance(value, dict):
         rows, columns = (int(n) for n in value["shape"])
         steps = np.zeros(rows * columns, np.int8)

@@ -15,8 +15,8 @@ from texrs import io
 from texrs._arrays import as_image, as_int, guidance
 from texrs._typing import Array, Path, Progress
 from texrs.database._folder import NAME, Folder, Record, given_again
+from texrs.elements import FORMAT, Elements, analyse, digest, load
 from texrs.errors import FileError, InvalidInput, TexrsError
-from texrs.texels import FORMAT, Texels, analyse, digest, load
 
 __all__ = ["Matrix", "TextureDatabase"]
 
@@ -27,7 +27,7 @@ OPTIONS = {"box", "mask", "background", "tag", "points", "rotations", "scales", 
     "wrap",
     "seed",
 }
-"""What `texrs.texels.analyse` takes, and an entry is remade with."""
+"""What `texrs.elements.analyse` takes, and an entry is remade with."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,7 +35,7 @@ class Matrix:
     """Splices of several textures with each other."""
 
     rows: tuple[str, ...]
-    """Those that give their texels."""
+    """Those that give their elements."""
     columns: tuple[str, ...]
     """Those that give their arrangement."""
     results: Mapping[tuple[str, str], Any]
@@ -96,12 +96,12 @@ class TextureDatabase:
     def __contains__(self, name: object) -> bool:
         return name in self._folder.read()
 
-    def __getitem__(self, name: str) -> Texels:
-        """Give an entry, remade if it has to be."""
+    def __getitem__(self, name: str) -> Elements:
+        """Return an entry, remade if it has to be."""
         return self.analyse(name)
 
     def list(self) -> list[Record]:
-        """Give what the manifest says of all textures, by name."""
+        """Return what the manifest says of all textures, by name."""
         found = self._folder.read()
         return [found[name] for name in sorted(found)]
 
@@ -114,7 +114,7 @@ class TextureDatabase:
         similarity: bool = False,
         progress: Progress | None = None,
         **options: Any,
-    ) -> Texels:
+    ) -> Elements:
         """Analyse a texture and keep it.
 
         Parameters
@@ -130,16 +130,16 @@ class TextureDatabase:
         progress : callable, optional
             Called as ``progress(stage, share)``; raising stops the work.
         **options
-            As of `texrs.texels.analyse`.
+            As of `texrs.elements.analyse`.
 
         Returns
         -------
-        Texels
+        Elements
 
         Raises
         ------
         InvalidInput
-            A name that is taken or cannot be that of a file, or what `texrs.texels.analyse` refuses.
+            A name that is taken or cannot be that of a file, or what `texrs.elements.analyse` refuses.
         FileError
             The file cannot be read, or the entry not written.
 
@@ -166,8 +166,8 @@ class TextureDatabase:
             io.write(self.path / source, pixels)
         return self._folder.keep(name, entry, source, {**options, "similarity": similarity} if similarity else options)
 
-    def analyse(self, name: str, *, progress: Progress | None = None) -> Texels:
-        """Give an entry, made anew if its image or the version is another one, or if it is damaged.
+    def analyse(self, name: str, *, progress: Progress | None = None) -> Elements:
+        """Return an entry, made anew if its image or the version is another one, or if it is damaged.
 
         Raises
         ------
@@ -178,7 +178,7 @@ class TextureDatabase:
 
         """
         record = self._record(name)
-        entry: Texels | None = None
+        entry: Elements | None = None
         reason = ""
         if record.version != FORMAT:
             reason = f"is of version {record.version}, this is {FORMAT}"
@@ -201,7 +201,7 @@ class TextureDatabase:
         return self._folder.keep(name, entry.prepared() if similar else entry, record.source, record.options)
 
     def splice(self, a: str, b: str, size: Sequence[int] | None = None, **options: Any) -> Any:
-        """Splice two textures: the texels of ``a`` in the arrangement of ``b``; see `texrs.splice`."""
+        """Splice two textures: the elements of ``a`` in the arrangement of ``b``; see `texrs.splice`."""
         return _splice(self.analyse(a), self.analyse(b), size, options)
 
     def matrix(
@@ -219,7 +219,7 @@ class TextureDatabase:
         Parameters
         ----------
         rows, columns : sequence of str, optional
-            Names of those that give texels, and of those that give arrangements; by default all.
+            Names of those that give elements, and of those that give arrangements; by default all.
         size : (rows, columns), optional
             Of each result.
         cell : int
@@ -282,7 +282,7 @@ class TextureDatabase:
             return None
 
 
-def _splice(a: Texels, b: Texels, size: Sequence[int] | None, options: Mapping[str, Any]) -> Any:
+def _splice(a: Elements, b: Elements, size: Sequence[int] | None, options: Mapping[str, Any]) -> Any:
     import texrs
 
     verb: Any = vars(texrs)["splice"]
@@ -290,7 +290,7 @@ def _splice(a: Texels, b: Texels, size: Sequence[int] | None, options: Mapping[s
 
 
 def thumbnail(image: Array, side: int) -> NDArray[np.uint8]:
-    """Give a small picture of an image, for people."""
+    """Return a small picture of an image, for people."""
     from skimage.transform import resize
 
     guide = guidance(as_image(image))

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from texrs._engine.noise import uniform
 from texrs._typing import Array
 from texrs.demo._html import code, figure, grid, row, tiled
 from texrs.demo._workshop import Section, Workshop
-from texrs.kernels.noise import uniform
-from texrs.report import preview
+from texrs.synthesis import preview
 
 __all__ = ["RESULTS", "SEEDS", "STAGES", "coloured"]
 
@@ -77,7 +77,7 @@ def _seeds(workshop: Workshop) -> str:
 
 
 def coloured(labels: Array, picture: Array | None = None) -> Array:
-    """Give each label a colour of its own, the background none; shade them by the picture."""
+    """Return each label a colour of its own, the background none; shade them by the picture."""
     count = int(labels.max()) + 1
     hues = [uniform(1, i, 0) for i in range(count)]
     palette = np.array([colorsys.hsv_to_rgb(h, 0.6, 1.0) for h in hues])

@@ -10,7 +10,7 @@ import imageio.v3 as iio
 
 import texrs
 from texrs._typing import Array
-from texrs.report import preview
+from texrs.synthesis import preview
 
 __all__ = ["code", "document", "figure", "grid", "row", "section", "tiled", "uri"]
 

@@ -64,7 +64,7 @@ def height_of(labels: Labels, picture: Array) -> Array:
 
 
 def normals_of(height: Array) -> Array:
-    """Give the tangent-space normals of a relief: uint8, x to the right and y up."""
+    """Return the tangent-space normals of a relief: uint8, x to the right and y up."""
     down, right = np.gradient(RELIEF * height.astype(np.float64) / 65535)
     normals = np.stack([-right, down, np.ones_like(down)], axis=-1)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)

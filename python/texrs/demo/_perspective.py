@@ -1,4 +1,4 @@
-"""Textures whose texels are as large as a map says, on the page; and a hole filled with texels of the right size."""
+"""Textures whose elements are as large as a map says, on the page; and a hole filled with elements of the right size."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SIDE, SIZE = 192, 224
 
 
 def _patterns(scale: Floats) -> dict[str, Floats]:
-    """Give targets that do not look like the example's map."""
+    """Return targets that do not look like the example's map."""
     low, high = np.log(np.quantile(scale, [0.05, 0.95]))
     at = (np.arange(SIZE) + 0.5) / SIZE
     wave = np.broadcast_to((low + high) / 2 + (high - low) / 2 * np.cos(2 * np.pi * at), (SIZE, SIZE))
@@ -63,8 +63,8 @@ def _perspective(workshop: Workshop) -> str:
 
 PERSPECTIVE = Section(
     "perspective",
-    "Texels of the right size",
-    "A picture taken at an angle has texels of every size. A scale map says which; textures are grown, and holes filled, with "
-    "texels as large as it, or any other map, asks for.",
+    "Elements of the right size",
+    "A picture taken at an angle has elements of every size. A scale map says which; textures are grown, and holes filled, with "
+    "elements as large as it, or any other map, asks for.",
     _perspective,
 )

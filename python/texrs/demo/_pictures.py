@@ -6,9 +6,9 @@ import numpy as np
 
 from texrs._typing import Bools
 from texrs.completion import complete
-from texrs.cyclic import tile
 from texrs.demo._html import code, figure, grid, row, tiled
 from texrs.demo._workshop import Section, Workshop, exemplar
+from texrs.tiling import tile
 
 __all__ = ["COMPLETE", "TILE"]
 

@@ -1,4 +1,4 @@
-"""Texels of one texture in the layout of another, on the page."""
+"""Elements of one texture in the layout of another, on the page."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from typing import Any
 
 from texrs.demo._html import code, figure, grid
 from texrs.demo._workshop import Section, Workshop, exemplar
+from texrs.elements import Elements
 from texrs.papers.splice import self_splice, splice
-from texrs.texels import Texels
 
 __all__ = ["SPLICE"]
 
@@ -15,14 +15,14 @@ SIDE = 192
 SPLICES = (("dots", "net"), ("dots", "bricks"), ("pebbles", "dots"))
 EDITS: tuple[tuple[str, dict[str, Any], str], ...] = (
     ("dots", {"op": "regularise"}, "--edit regularise"),
-    ("dots", {"op": "scale", "factor": 1.25}, "the layout, not the texels, 1.25 times as large"),
+    ("dots", {"op": "scale", "factor": 1.25}, "the layout, not the elements, 1.25 times as large"),
     ("bricks", {"op": "rows", "by": 8}, "rows shifted by 8 pixels; the joints stay upright"),
 )
 
 
-def _entry(name: str) -> Texels:
-    """Give a sample with the texels that it is known to have."""
-    return Texels.of_sample(exemplar(name, SIDE))
+def _entry(name: str) -> Elements:
+    """Return a sample with the elements that it is known to have."""
+    return Elements.of_sample(exemplar(name, SIDE))
 
 
 def _splice(workshop: Workshop) -> str:
@@ -30,14 +30,14 @@ def _splice(workshop: Workshop) -> str:
     spliced, edited = [], []
     for i, (a, b) in enumerate(SPLICES):
         workshop.watch(i / total)
-        texels, layout = _entry(a), _entry(b)
-        made = splice(texels, layout, seed=1)
-        spliced += [figure(texels.image, a), figure(layout.image, b), figure(made.image, f"{a} laid out as {b}")]
+        elements, layout = _entry(a), _entry(b)
+        made = splice(elements, layout, seed=1)
+        spliced += [figure(elements.image, a), figure(layout.image, b), figure(made.image, f"{a} laid out as {b}")]
     for i, (a, edit, note) in enumerate(EDITS, start=len(SPLICES)):
         workshop.watch(i / total)
-        texels = _entry(a)
-        made = self_splice(texels, edit, seed=1)
-        edited += [figure(texels.image, a), figure(made.image, str(edit["op"]), note=note)]
+        elements = _entry(a)
+        made = self_splice(elements, edit, seed=1)
+        edited += [figure(elements.image, a), figure(made.image, str(edit["op"]), note=note)]
     return (
         code("texrs splice sample:dots sample:net -o result.png --seed 1")
         + grid(spliced, least=180)
@@ -48,7 +48,7 @@ def _splice(workshop: Workshop) -> str:
 
 SPLICE = Section(
     "splice",
-    "The texels of one texture in the layout of another",
+    "The elements of one texture in the layout of another",
     "What is rigid is copied pixel by pixel; the ground between is warped, filled and refined by example. The same with the "
     "texture's own layout, edited.",
     _splice,

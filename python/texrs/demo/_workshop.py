@@ -12,7 +12,7 @@ import numpy as np
 from texrs import samples
 from texrs._typing import Array, Progress
 from texrs.papers.design import design
-from texrs.report import Synthesis
+from texrs.synthesis import Synthesis
 
 __all__ = ["Designed", "Section", "Workshop"]
 
@@ -79,7 +79,7 @@ class Workshop:
 
 
 def exemplar(name: str, side: int) -> samples.Sample:
-    """Give a sample of a size; of a photograph, which has its own, the middle at half the scale."""
+    """Return a sample of a size; of a photograph, which has its own, the middle at half the scale."""
     if name in samples.names():
         return samples.load(name, size=(side, side))
     image: Array = samples.load(name).image

@@ -56,11 +56,11 @@ class Field(ABC):
 
     @abstractmethod
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
-        """Give the frames (A, A, N) of (N, A) points, unchecked."""
+        """Return the frames (A, A, N) of (N, A) points, unchecked."""
 
     @abstractmethod
     def _content(self) -> tuple[Any, ...] | None:
-        """Give what the field is made of, for its key; None if that cannot be known."""
+        """Return what the field is made of, for its key; None if that cannot be known."""
 
     @abstractmethod
     def describe(self) -> str:
@@ -103,7 +103,7 @@ class Field(ABC):
         return f"<{self.axes}-D field: {self.describe()}>"
 
     def frames(self, points: ArrayLike) -> Floats:
-        """Give the frames F.
+        """Return the frames F.
 
         Parameters
         ----------
@@ -134,7 +134,7 @@ class Field(ABC):
         return self._evaluate(points, False)
 
     def jacobians(self, points: ArrayLike) -> Floats:
-        """Give the Jacobians J, the inverses of the frames: output steps to exemplar steps.
+        """Return the Jacobians J, the inverses of the frames: output steps to exemplar steps.
 
         Parameters
         ----------
@@ -164,7 +164,7 @@ class Field(ABC):
     def lattice(
         self, shape: Sequence[int], *, origin: ArrayLike = 0, step: float = 1, jacobians: bool = True
     ) -> Floats:
-        """Give the Jacobians (or the frames) at the samples of a level of a pyramid.
+        """Return the Jacobians (or the frames) at the samples of a level of a pyramid.
 
         Parameters
         ----------
@@ -210,7 +210,7 @@ class Field(ABC):
         return out.reshape(*sides, self.axes, self.axes)
 
     def over(self, shape: Sequence[int]) -> Field:
-        """Give the field as it lies over a bounded output: what was left open (a centre, a length) is set by its size.
+        """Return the field as it lies over a bounded output: what was left open (a centre, a length) is set by its size.
 
         Parameters
         ----------
@@ -233,7 +233,7 @@ class Field(ABC):
         return self
 
     def inverse(self) -> Field:
-        """Give the field whose frames are the inverses of these at each point.
+        """Return the field whose frames are the inverses of these at each point.
 
         Examples
         --------
@@ -263,7 +263,7 @@ class Field(ABC):
 
 
 def refuse_flat(frames: Matrices, places: NDArray[np.float64], name: str = "field") -> Matrices:
-    """Give the inverses of frames, or raise InvalidInput that names the first place where there is none."""
+    """Return the inverses of frames, or raise InvalidInput that names the first place where there is none."""
     inverse, det = inverses(frames)
     bad = too_flat(frames, inverse, det, LEAST_DETERMINANT, WORST_CONDITION)
     if bad.any():

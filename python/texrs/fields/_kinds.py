@@ -133,7 +133,7 @@ class Ramp(Field):
 
 
 def turn(degrees: float, first: int, second: int, axes: int) -> NDArray[np.float64]:
-    """Give the matrix that turns one axis towards another."""
+    """Return the matrix that turns one axis towards another."""
     matrix = np.eye(axes)
     matrix[first, first] = matrix[second, second] = cos(radians(degrees))
     matrix[second, first] = sin(radians(degrees))

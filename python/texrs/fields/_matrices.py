@@ -22,17 +22,17 @@ _TERMS, _SQUARINGS = 9, 4
 
 
 def everywhere(matrix: NDArray[np.float64], count: int) -> Matrices:
-    """Give one matrix for each of so many points."""
+    """Return one matrix for each of so many points."""
     return np.repeat(matrix[:, :, np.newaxis], count, axis=2)
 
 
 def transposed(m: Matrices) -> Matrices:
-    """Give the transposes, as a view."""
+    """Return the transposes, as a view."""
     return m.transpose(1, 0, 2)
 
 
 def multiply(a: Matrices, b: Matrices) -> Matrices:
-    """Give the products a b."""
+    """Return the products a b."""
     axes = len(b)
     out = np.empty_like(b)
     for i in range(axes):
@@ -45,7 +45,7 @@ def multiply(a: Matrices, b: Matrices) -> Matrices:
 
 
 def cofactors(m: Matrices) -> Matrices:
-    """Give the cofactors: the inverse is their transpose, divided by the determinant."""
+    """Return the cofactors: the inverse is their transpose, divided by the determinant."""
     out = np.empty_like(m)
     if len(m) == 2:
         out[0, 0], out[0, 1] = m[1, 1], -m[1, 0]
@@ -60,7 +60,7 @@ def cofactors(m: Matrices) -> Matrices:
 
 
 def determinants(m: Matrices, cofactor: Matrices | None = None) -> Numbers:
-    """Give the determinants, along the first row."""
+    """Return the determinants, along the first row."""
     c = cofactors(m) if cofactor is None else cofactor
     out: Numbers = m[0, 0] * c[0, 0]
     for j in range(1, len(m)):
@@ -69,7 +69,7 @@ def determinants(m: Matrices, cofactor: Matrices | None = None) -> Numbers:
 
 
 def inverses(m: Matrices) -> tuple[Matrices, Numbers]:
-    """Give the inverses (not finite where there is none) and the determinants."""
+    """Return the inverses (not finite where there is none) and the determinants."""
     c = cofactors(m)
     det = determinants(m, c)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -79,7 +79,7 @@ def inverses(m: Matrices) -> tuple[Matrices, Numbers]:
 
 
 def norms(m: Matrices) -> Numbers:
-    """Give the Frobenius norms."""
+    """Return the Frobenius norms."""
     total = np.zeros(m.shape[2])
     for row in m:
         for entry in row:
@@ -88,7 +88,7 @@ def norms(m: Matrices) -> Numbers:
 
 
 def rotations(m: Matrices) -> Matrices:
-    """Give the nearest orthogonal matrices (the polar factors); not finite where there are none."""
+    """Return the nearest orthogonal matrices (the polar factors); not finite where there are none."""
     x = m
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for _ in range(POLAR_STEPS):
@@ -99,7 +99,7 @@ def rotations(m: Matrices) -> Matrices:
 
 
 def exponentials(m: Matrices) -> Matrices:
-    """Give the exponentials of symmetric matrices, by Taylor's series and squaring of what is not uniform in them."""
+    """Return the exponentials of symmetric matrices, by Taylor's series and squaring of what is not uniform in them."""
     axes = len(m)
     mean: Numbers = m[0, 0].copy()
     for a in range(1, axes):
@@ -119,7 +119,7 @@ def exponentials(m: Matrices) -> Matrices:
 
 
 def too_flat(m: Matrices, inverse: Matrices, det: Numbers, least: float, worst: float) -> Bools:
-    """Tell which matrices are not finite, of a determinant below ``least`` or a condition beyond ``worst``."""
+    """Return which matrices are not finite, of a determinant below ``least`` or a condition beyond ``worst``."""
     with np.errstate(invalid="ignore", over="ignore"):
         bound = norms(m) * norms(inverse)
         bad: Bools = ~(np.abs(det) >= least) | ~np.isfinite(bound)

@@ -30,7 +30,7 @@ _WORDS = ("axis", "plane", "radial")
 
 
 def names() -> dict[str, str]:
-    """Give the fields that have a name in words, with their parameters and the defaults of these.
+    """Return the fields that have a name in words, with their parameters and the defaults of these.
 
     Examples
     --------

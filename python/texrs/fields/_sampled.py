@@ -39,7 +39,7 @@ _FLATTEST = 0.02
 def from_array(
     frames: ArrayLike, extent: Sequence[int] | None = None, *, origin: Sequence[float] | None = None
 ) -> Field:
-    """Give a field that is sampled from an array, of any resolution.
+    """Return a field that is sampled from an array, of any resolution.
 
     The array's cells divide the box of ``extent`` voxels from ``origin`` evenly; each frame holds at the middle of
     its cell, and lies exactly on a voxel where the array has the box's own resolution. Between samples rotations and
@@ -91,7 +91,7 @@ def from_array(
 
 
 def interpolate(points: ArrayLike, frames: ArrayLike) -> Field:
-    """Give a smooth field through frames that are set at points.
+    """Return a smooth field through frames that are set at points.
 
     Each point counts by the inverse fourth power of its distance: the field has the given frame at a given point,
     follows the nearest points elsewhere, and far away becomes the mean of all. Rotations and stretches are averaged
@@ -132,7 +132,7 @@ def interpolate(points: ArrayLike, frames: ArrayLike) -> Field:
 
 
 def from_function(function: Callable[[NDArray[np.float64]], ArrayLike], axes: int = 3) -> Field:
-    """Give a field that a function describes.
+    """Return a field that a function describes.
 
     Parameters
     ----------

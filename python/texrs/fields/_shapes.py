@@ -20,7 +20,7 @@ _WORDS = {"plane": "z", "row": "y", "column": "x"}
 
 
 def identity(axes: int = 3) -> Field:
-    """Give the field of textures that stand as their exemplar does.
+    """Return the field of textures that stand as their exemplar does.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def identity(axes: int = 3) -> Field:
 
 
 def constant(matrix: ArrayLike) -> Field:
-    """Give a field that is the same everywhere.
+    """Return a field that is the same everywhere.
 
     Parameters
     ----------

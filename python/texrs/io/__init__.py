@@ -48,10 +48,10 @@ from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput
 from texrs.io import _files, _npy, _pillow, _slabs, _tiff, _volumes
+from texrs.io import _image_io as image_io
 from texrs.io._files import atomic
 from texrs.io._formats import FORMATS, VOLUMES, checked, kind_of, spacing_of
 from texrs.io._npy import read_arrays
-from texrs.kernels import image_io
 
 __all__ = ["atomic", "read", "read_arrays", "read_volume", "write", "write_slabs", "write_surface", "write_volume"]
 

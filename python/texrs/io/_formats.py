@@ -80,7 +80,7 @@ FORMATS = {
 
 
 def kind_of(path: Path) -> str:
-    """Say which format a file has, by its content."""
+    """Return which format a file has, by its content."""
     _files.size_of(path)
     with _files.speaking(path, "reading"), path.open("rb") as file:
         start = file.read(16)
@@ -110,7 +110,7 @@ def spacing_of(spacing: Sequence[float] | None, suffix: str) -> tuple[float, ...
 
 
 def checked(value: object, suffix: str, axes: int) -> Array:
-    """Give what is to be written, contiguous and in native byte order."""
+    """Return what is to be written, contiguous and in native byte order."""
     try:
         array = np.asarray(value)
     except (ValueError, TypeError) as error:

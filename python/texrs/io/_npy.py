@@ -118,7 +118,7 @@ def _array(path: Path, file: BinaryIO, length: int, limit: int) -> Array:
 
 
 def _header(path: Path, file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[np.generic], int]:
-    """Give shape, whether columns come first, dtype and where the data starts."""
+    """Return shape, whether columns come first, dtype and where the data starts."""
     start = file.read(8)
     if len(start) < 8 or not start.startswith(MAGIC) or start[6] not in (1, 2, 3):
         raise FileError(f"{path}: is not a NumPy file of version 1, 2 or 3")

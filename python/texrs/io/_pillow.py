@@ -18,7 +18,7 @@ import numpy as np
 from texrs._typing import Array
 from texrs.errors import FileError, LimitExceeded
 from texrs.io._files import check_size, speaking, upright
-from texrs.kernels.image_io import exif_orientation
+from texrs.io._image_io import exif_orientation
 
 QUALITY = 95
 """Of JPEG files that are written; colour is not subsampled."""
@@ -149,7 +149,7 @@ def _jpeg(path: Path, file: bytes) -> _Jpeg:
 
 
 def _gif(path: Path, file: bytes) -> tuple[int, int]:
-    """Give the sides of the screen, or of the first frame where that reaches beyond it."""
+    """Return the sides of the screen, or of the first frame where that reaches beyond it."""
     cut = FileError(f"{path}: is cut off or corrupt; its GIF header does not reach the pixels")
     if len(file) < 13:
         raise cut

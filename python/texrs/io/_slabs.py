@@ -20,7 +20,7 @@ def as_shape(shape: object) -> tuple[int, ...]:
 
 
 def checked(slabs: Iterable[Array], shape: tuple[int, ...]) -> Iterator[Array]:
-    """Give slabs on, as long as they fit together; there is at least one."""
+    """Return slabs on, as long as they fit together; there is at least one."""
     done, dtype = 0, None
     for slab in slabs:
         dtype = dtype or slab.dtype
@@ -38,7 +38,7 @@ def checked(slabs: Iterable[Array], shape: tuple[int, ...]) -> Iterator[Array]:
 
 
 def planes(slabs: Iterable[Array]) -> Iterator[Array]:
-    """Give the planes of slabs, with channels; bool as 0 and 255."""
+    """Return the planes of slabs, with channels; bool as 0 and 255."""
     for slab in slabs:
         part = slab.astype(np.uint8) * np.uint8(255) if slab.dtype == np.bool_ else slab
         yield from part if part.ndim == 4 else part[..., np.newaxis]

@@ -14,8 +14,8 @@ import numpy as np
 
 from texrs._typing import Array
 from texrs.errors import FileError
+from texrs.io import _image_io as image_io
 from texrs.io._files import check_size, load, size_of, speaking, upright
-from texrs.kernels import image_io
 
 _LZW, _JPEG = 5, 7
 _ORIENTATION = 274
@@ -66,14 +66,14 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
 
 
 def image_of(path: Path, planes: Array, orientation: int) -> Array:
-    """Give the only plane of a file."""
+    """Return the only plane of a file."""
     if planes.shape[0] != 1:
         raise FileError(f"{path}: holds {planes.shape[0]} planes; texrs.io.read_volume reads them as a volume")
     return upright(planes[0, ..., 0] if planes.shape[3] == 1 else planes[0], orientation)
 
 
 def volume_of(path: Path, planes: Array, orientation: int) -> Array:
-    """Give all planes of a file."""
+    """Return all planes of a file."""
     if orientation != 1:
         planes = np.stack([upright(plane, orientation) for plane in planes])
     return planes[..., 0] if planes.shape[3] == 1 else planes
@@ -99,7 +99,7 @@ def write_tiff(path: Path, planes: Iterable[Array], channels: int, size: int) ->
 
 
 def _sides(path: Path, axes: str, shape: tuple[int, ...]) -> tuple[tuple[int, int, int], int]:
-    """Give (planes, rows, columns) and channels: S and C are channels, T, Z and others planes."""
+    """Return (planes, rows, columns) and channels: S and C are channels, T, Z and others planes."""
     size = dict(zip(axes, shape, strict=True))
     if "Y" not in size or "X" not in size or len(size) != len(axes):
         raise FileError(f"{path}: has the axes {axes}; an image needs rows and columns")

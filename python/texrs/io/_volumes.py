@@ -116,7 +116,7 @@ def write_nrrd(path: Path, volume: Array, spacing: Sequence[float]) -> None:
 
 
 def _nrrd_channel(path: Path, sizes: list[int], kinds: list[str]) -> int | None:
-    """Say which axis is the channels; without kinds the fastest of four."""
+    """Return which axis is the channels; without kinds the fastest of four."""
     if len(sizes) == 3:
         return None
     if len(sizes) != 4:

@@ -26,7 +26,7 @@ def mean_shift(
     wrap: bool | tuple[bool, bool] = False,
     progress: Progress | None = None,
 ) -> Array:
-    """Give every pixel the colour of the mode of its joint spatial and range density.
+    """Return every pixel the colour of the mode of its joint spatial and range density.
 
     Each pixel moves to the mean position and colour of the pixels of a square window whose colour
     is within a range of its own, until it stays (Comaniciu and Meer [1]_, flat kernels). The

@@ -191,7 +191,7 @@ class PatchIndex:
         return [Match(*m) for m in found]
 
     def cost_map(self, patch: object, weight: object = None, *, exemplar: int = 0) -> Floats:
-        """Give the costs of all positions in one image.
+        """Return the costs of all positions in one image.
 
         Returns
         -------

@@ -233,7 +233,7 @@ def blend(
 
 
 def _beyond(values: Array, other: Array, inside: Bools) -> Floats:
-    """Give the differences of two images outside a mask, and 0 under it."""
+    """Return the differences of two images outside a mask, and 0 under it."""
     result = np.empty(values.shape, np.float32)
     for band in _bands(len(values)):
         part = result[band]
@@ -244,7 +244,7 @@ def _beyond(values: Array, other: Array, inside: Bools) -> Floats:
 
 
 def _mixed(values: Array, other: Array, axis: int) -> Floats:
-    """Give by how much the target's differences exceed the source's, where they are the larger ones."""
+    """Return by how much the target's differences exceed the source's, where they are the larger ones."""
     floats = (v.astype(np.float32) for v in (other, values))
     wanted, present = (np.roll(v, -1, axis) - v for v in floats)
     return np.where(np.abs(present) > np.abs(wanted), present - wanted, np.float32(0))
@@ -271,7 +271,7 @@ def _bands(rows: int) -> Iterator[slice]:
 
 
 def _numbers(array: Array, name: str) -> Array:
-    """Give values that float32 holds; others than float64 as they are."""
+    """Return values that float32 holds; others than float64 as they are."""
     return _floats(array, name) if array.dtype == np.float64 else array
 
 

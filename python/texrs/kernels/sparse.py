@@ -104,7 +104,7 @@ class Cholesky:
 
 
 def _entries(matrix: Any) -> tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float64]]:
-    """Give the lower triangle, column by column."""
+    """Return the lower triangle, column by column."""
     from scipy.sparse import csc_array, tril
 
     if getattr(matrix, "ndim", 0) != 2 or matrix.shape[0] != matrix.shape[1]:

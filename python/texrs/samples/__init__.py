@@ -1,8 +1,8 @@
 """Pictures and volumes whose contents are known exactly.
 
 Each generator draws a texture as a small photograph would show it (a relief under a sun and a sky,
-with colours that vary within and between its texels, and the grain of a sensor) and returns it
-with what it drew: where every texel is, which pixels are its own, how large the texture is
+with colours that vary within and between its elements, and the grain of a sensor) and returns it
+with what it drew: where every element is, which pixels are its own, how large the texture is
 on screen and how its frame is turned. They are what texrs is tested on and shown with, and they are
 CC0: use them as you like.
 
@@ -10,18 +10,18 @@ CC0: use them as you like.
 name                  what it shows                         tag   known
 ====================  ====================================  ====  ==============================
 `bark`                furrowed bark                               nothing
-`beans`               touching beans of one colour          F=d   texels
-`bricks`              a wall, 21 whole vertical joints      B=c   texels
-`dots`                sewing buttons on paper               F=d   texels
+`beans`               touching beans of one colour          F=d   elements
+`bricks`              a wall, 21 whole vertical joints      B=c   elements
+`dots`                sewing buttons on paper               F=d   elements
 `grit`                crushed stone, several layers deep          nothing
-`leaves_and_flowers`  flowers of 5 to 8 petals on leaves    F=d   texels
-`net`                 a rope net over dark water            F=c   texels: the cells; the net
-`pebbles`             rounded stones on sand                F=d   texels
-`scales`              overlapping scales of a fish                texels
-`tilted_bricks`       a wall seen aslant                    B=c   texels, scale, frames
-`tilted_discs`        round tiles of a floor seen aslant    F=d   texels, scale, frames
-`weave`               a plain weave                               texels
-`particles`           a volume: ellipsoids of three colours  F=d   texels
+`leaves_and_flowers`  flowers of 5 to 8 petals on leaves    F=d   elements
+`net`                 a rope net over dark water            F=c   elements: the cells; the net
+`pebbles`             rounded stones on sand                F=d   elements
+`scales`              overlapping scales of a fish                elements
+`tilted_bricks`       a wall seen aslant                    B=c   elements, scale, frames
+`tilted_discs`        round tiles of a floor seen aslant    F=d   elements, scale, frames
+`weave`               a plain weave                               elements
+`particles`           a volume: ellipsoids of three colours  F=d   elements
 `stripes`             a volume: folded layers, 9 voxels apart        mask, frames
 `weave_solid`         a volume: layers of woven yarn              mask
 `wood_solid`          a volume: growth rings and fibres           mask

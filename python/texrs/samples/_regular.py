@@ -35,7 +35,7 @@ def bricks(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fals
     Returns
     -------
     Sample
-        With `centres`, `labels` and `mask`; every brick is a texel.
+        With `centres`, `labels` and `mask`; every brick is an element.
 
     Raises
     ------
@@ -182,7 +182,7 @@ def scales(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fals
 def net(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
     """Return a knotted rope net, connected, over dark water.
 
-    The net is the foreground (`mask`); the texels are the cells that are seen through it, so that
+    The net is the foreground (`mask`); the elements are the cells that are seen through it, so that
     here ``mask`` is ``labels == 0``. Tag ``F=c``.
 
     Parameters
@@ -253,7 +253,7 @@ def net(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) 
 def weave(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
     """Return a plain weave of two yarns, close to.
 
-    A texel is the visible float of a yarn over the one below: weft where row and column of the
+    An element is the visible float of a yarn over the one below: weft where row and column of the
     crossing add up to an even number, warp elsewhere. Background is what shows between yarns.
 
     Parameters
@@ -337,7 +337,7 @@ def _strand(scene: Scene, knot: Floats, span: Floats, tone: Floats, fray: Floats
 
 
 def _label_cells(scene: Scene, cells: Sequence[tuple[float, float]]) -> None:
-    """Give the holes in the net (label -1) the numbers of the cells' middles in them."""
+    """Return the holes in the net (label -1) the numbers of the cells' middles in them."""
     from scipy import ndimage
 
     parts = np.zeros(scene.shape, np.int32)

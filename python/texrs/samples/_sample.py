@@ -27,7 +27,7 @@ class Sample:
 
     Coordinates are (row, col) or (plane, row, col) in pixels; pixel centres are at the integers,
     so that a picture of H rows covers -0.5 <= row < H - 0.5. H, W and D stand for the picture's
-    rows and columns and the volume's planes; N is the number of texels whose centre is inside.
+    rows and columns and the volume's planes; N is the number of elements whose centre is inside.
 
     Attributes
     ----------
@@ -36,13 +36,13 @@ class Sample:
     image : uint8 array, (H, W, 3) or (D, H, W, 3); a grey photograph is (H, W)
         The picture, sRGB.
     centres : float64 array, (N, 2) or (N, 3), or None
-        Centroids of the texels, in pixels. A texel's centroid is that of its whole visible area,
+        Centroids of the elements, in pixels. An element's centroid is that of its whole visible area,
         before the border of the picture cuts it. The tilted samples give the point where the
         centroid on the plane is seen instead.
     labels : int32 array, (H, W) or (D, H, W), or None
-        0 is background; ``i + 1`` is the texel of ``centres[i]``. A texel that shows in the picture
+        0 is background; ``i + 1`` is the element of ``centres[i]``. An element that shows in the picture
         with its centre outside has a label above N, so that ``labels > N`` is what only enters
-        from beyond the border. With `wrap` there are none: a texel that crosses the border
+        from beyond the border. With `wrap` there are none: an element that crosses the border
         comes back on the other side under the same label.
     mask : bool array, (H, W) or (D, H, W), or None
         The foreground. It is ``labels > 0``, except where the generator says otherwise.

@@ -163,7 +163,7 @@ def dots(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
 def leaves_and_flowers(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
     """Return flowers of five to eight petals, none of which touch, over a leafy ground.
 
-    The flowers are the texels, the leaves are ground. Tag ``F=d``.
+    The flowers are the elements, the leaves are ground. Tag ``F=d``.
 
     Parameters
     ----------
@@ -324,7 +324,7 @@ def _leaf(
 
 
 def _flower(scene: Scene, centre: tuple[float, float], radius: float, tone: Floats, crinkle: Floats) -> None:
-    """Lay one flower of five to eight petals over everything, as a new texel."""
+    """Lay one flower of five to eight petals over everything, as a new element."""
     rng, label = scene.rng, scene.add(centre)
     window = scene.window(centre, 22)
     rows, cols = window.where

@@ -1,7 +1,7 @@
 """The table on which the planar samples are laid out, lit and photographed.
 
 A scene is always a torus, sampled twice a pixel. A sample that wraps is the whole torus; one that
-does not is cut out of a larger torus, so that texels come in over the border as they would in a
+does not is cut out of a larger torus, so that elements come in over the border as they would in a
 photograph. The odd samples lie between pixels, the even ones on them: labels are read at pixel
 centres, and the picture is the tent average around them.
 """
@@ -115,7 +115,7 @@ class Scene:
         return Window((rows, cols), offsets[0][:, None], offsets[1][None, :])
 
     def add(self, anchor: tuple[float, float]) -> int:
-        """Return the label of a new texel around `anchor`."""
+        """Return the label of a new element around `anchor`."""
         self.anchors.append((float(anchor[0]), float(anchor[1])))
         return len(self.anchors)
 
@@ -184,7 +184,7 @@ class Scene:
         mask : callable, optional
             The foreground from the labels; ``labels > 0`` if not given.
         truth : bool
-            False for a texture without countable texels: only the image is returned.
+            False for a texture without countable elements: only the image is returned.
         grain, soft : float
             Noise of the sensor in parts of white, blur of the lens in pixels.
         **lamp : float
@@ -218,9 +218,9 @@ def relabel(raw: NDArray[np.int32], centres: NDArray[np.float64]) -> tuple[NDArr
     Parameters
     ----------
     raw : int32 array, (H, W)
-        ``i + 1`` is the texel of ``centres[i]``.
+        ``i + 1`` is the element of ``centres[i]``.
     centres : float64 array, (n, 2)
-        NaN for a texel that shows nowhere.
+        NaN for an element that shows nowhere.
     """
     within = ((centres >= -0.5) & (centres < np.array(raw.shape) - 0.5)).all(1)
     seen = np.bincount(raw.ravel(), minlength=len(centres) + 1)[1:] > 0

@@ -1,4 +1,4 @@
-"""Textures without countable texels: bark and grit."""
+"""Textures without countable elements: bark and grit."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def bark(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
     Returns
     -------
     Sample
-        The image alone: it has no countable texels.
+        The image alone: it has no countable elements.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def grit(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
     Returns
     -------
     Sample
-        The image alone: it has no countable texels.
+        The image alone: it has no countable elements.
 
     Raises
     ------

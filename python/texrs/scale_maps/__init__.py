@@ -1,6 +1,6 @@
-"""Scale maps: how large the texels are at each place of a picture.
+"""Scale maps: how large the elements are at each place of a picture.
 
-A scale map is a float32 array (rows, columns) that is 1 where texels have their normal size, 2 where they are seen
+A scale map is a float32 array (rows, columns) that is 1 where elements have their normal size, 2 where they are seen
 twice as large. Only ratios count, so maps that are measured have a geometric mean of 1. Everything here takes maps
 and gives new ones; nothing is changed in place.
 
@@ -8,7 +8,7 @@ and gives new ones; nothing is changed in place.
 `from_mask`          the map measured from a mask of features
 `auto_mask`          a mask of features, found in the picture
 `from_angles`        the map of a plane seen aslant
-`slant_for_ratio`    the slant at which near texels are so many times as large as far ones
+`slant_for_ratio`    the slant at which near elements are so many times as large as far ones
 `resample`           a map for another size: stretched, continued, drawn or by angles
 `extend`             a map continued into what is not known
 `edit`               a map changed by a list of edits

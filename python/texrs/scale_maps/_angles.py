@@ -19,13 +19,13 @@ STEEPEST = 85.0
 
 
 def from_angles(shape: Sequence[int] | int, slant: float, tilt: float, *, fov: float | None = None) -> Floats:
-    """Give the scale map of a plane seen aslant.
+    """Return the scale map of a plane seen aslant.
 
-    The size of texels falls linearly in the direction in which depth grows. Without ``fov`` its ends are set by the
+    The size of elements falls linearly in the direction in which depth grows. Without ``fov`` its ends are set by the
     slant alone, 1 / cos(slant) in the nearest corner and cos(slant) in the farthest [1]_, with three corrections: the
     largest scale, not a coordinate, begins equation 4; the picture's middle is (size - 1) / 2; and the extreme corners
     are those of the tilt, whichever way it points. With ``fov`` the map is that of a pinhole camera: 1 in the middle,
-    and as wide as the angle of view makes it. It is the width of texels across the slope; along it they are
+    and as wide as the angle of view makes it. It is the width of elements across the slope; along it they are
     foreshortened besides, so that the square root of their area is the 3/2 power of it.
 
     Parameters
@@ -90,7 +90,7 @@ def from_angles(shape: Sequence[int] | int, slant: float, tilt: float, *, fov: f
 
 
 def slant_for_ratio(ratio: float) -> float:
-    """Give the slant at which the nearest texels are ``ratio`` times as large as the farthest.
+    """Return the slant at which the nearest elements are ``ratio`` times as large as the farthest.
 
     The inverse of what `from_angles` does without ``fov``, where the ratio is 1 / cos(slant)^2.
 

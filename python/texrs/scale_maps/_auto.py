@@ -20,7 +20,7 @@ _DETAIL = 1 / 400
 """Of the shorter side: the size of what is too fine to be a feature; one pixel at least."""
 _ROUNDS = 6
 _RANGE = 2
-"""Octaves by which texels may be smaller, or larger, than the normal size."""
+"""Octaves by which elements may be smaller, or larger, than the normal size."""
 _LIGHT = 0.25
 """Lightness is looked at where it varies at least so much as what varies most."""
 _FLAT = 1e-4
@@ -30,7 +30,7 @@ _FLAT = 1e-4
 def auto_mask(image: object, *, detail: float | None = None, trend: Trend = "plane", known: object = None) -> Bools:
     """Find the features of a picture: what is lighter than its surroundings.
 
-    How far the surroundings reach, and what is too fine to be seen, must grow with the texels, or else the mask has
+    How far the surroundings reach, and what is too fine to be seen, must grow with the elements, or else the mask has
     features of one size everywhere. So a scale map is measured in the mask (`from_mask`), and the mask made anew by it,
     several times.
 
@@ -39,7 +39,7 @@ def auto_mask(image: object, *, detail: float | None = None, trend: Trend = "pla
     image : array_like
         Shape (H, W) or (H, W, C).
     detail : float, optional
-        What is finer than so many pixels, where texels have their normal size, is no feature. By default 1/400 of the
+        What is finer than so many pixels, where elements have their normal size, is no feature. By default 1/400 of the
         shorter side, at least 1.
     trend : {"plane", "linear", "quadratic", "none"}
         What the scales follow meanwhile, as in `from_mask`.
@@ -103,7 +103,7 @@ def _measured(mask: Bools, trend: Trend, known: Bools) -> Floats:
 
 
 def _grey(colours: Floats, known: Bools) -> Floats:
-    """Give lightness, or where the colours differ in hue rather than in that, the channel that shows most."""
+    """Return lightness, or where the colours differ in hue rather than in that, the channel that shows most."""
     light = np.asarray(colours.mean(-1), np.float32)
     if colours.shape[2] == 1:
         return light
@@ -127,7 +127,7 @@ class _Blurs:
         self._kept: dict[int, Floats] = {}
 
     def at(self, octaves: Floats) -> Floats:
-        """Give each pixel as its own octave has it, linear between the whole ones."""
+        """Return each pixel as its own octave has it, linear between the whole ones."""
         where = np.clip(octaves, -_RANGE, _RANGE)
         result = np.zeros_like(self._grey)
         for level in range(int(np.floor(where.min())), int(np.ceil(where.max())) + 1):

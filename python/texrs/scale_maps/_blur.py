@@ -20,7 +20,7 @@ def blur(values: Floats, sigma: float) -> Floats:
 
 
 def _boxes(sigma: float) -> list[int]:
-    """Give three odd widths whose boxes together have the variance of a Gaussian."""
+    """Return three odd widths whose boxes together have the variance of a Gaussian."""
     ideal = np.sqrt(4 * sigma**2 + 1)
     low = int(ideal) - 1 + int(ideal) % 2
     narrow = round((12 * sigma**2 - 3 * low**2 - 12 * low - 9) / (-4 * low - 4))
@@ -28,7 +28,7 @@ def _boxes(sigma: float) -> list[int]:
 
 
 def shrink(values: Floats, known: Bools, side: int) -> tuple[Floats, Bools]:
-    """Give the means of what is known over cells of side x side pixels, and which cells hold any of it."""
+    """Return the means of what is known over cells of side x side pixels, and which cells hold any of it."""
 
     def sums(of: Floats) -> Floats:
         rows = np.add.reduceat(of, np.arange(0, of.shape[0], side), axis=0)

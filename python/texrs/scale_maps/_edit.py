@@ -32,14 +32,14 @@ def edit(scale: object, steps: Sequence[Mapping[str, Any] | str] | str) -> Float
     ===========  =============================================  ====================================================
     op           takes                                          does
     ===========  =============================================  ====================================================
-    `magnify`    factor (1 to 8, by default 1.25), region       makes texels larger
-    `minify`     factor (1 to 8, by default 1.25), region       makes texels smaller
+    `magnify`    factor (1 to 8, by default 1.25), region       makes elements larger
+    `minify`     factor (1 to 8, by default 1.25), region       makes elements smaller
     `set`        value, region                                  gives all the same size
     `vary`       gain (-8 to 8), region                         spreads sizes about their mean; 0 makes them alike
     `ramp`       start, end (points), values (two), region      lets sizes grow from one point to the other
     `duplicate`  region, to (point), mode                       copies what is around the region's middle to a point;
                                                                 mode ``"ratio"``: how it differs from its mean
-    `brush`      points, radius, factor (1/8 to 8)              draws a line along which texels are larger, or smaller
+    `brush`      points, radius, factor (1/8 to 8)              draws a line along which elements are larger, or smaller
     `smooth`     sigma (pixels), region                         takes out what is finer
     ===========  =============================================  ====================================================
 

@@ -42,7 +42,7 @@ def as_map(value: object, name: str = "scale", shape: Sequence[int] | None = Non
         outside = int(np.count_nonzero((flat < LEAST) | (flat > LARGEST)))
         raise InvalidInput(
             f"{name}: {outside} of {flat.size} scales are outside {LEAST} to {LARGEST:.0f} ({low:.4g} to {high:.4g}); "
-            "1 is the normal size of a texel, 2 twice that"
+            "1 is the normal size of an element, 2 twice that"
         )
     return np.ascontiguousarray(flat, dtype=np.float32)
 
@@ -55,5 +55,5 @@ def as_choice(value: object, name: str, allowed: Sequence[str]) -> str:
 
 
 def centred(logs: Floats) -> Floats:
-    """Give the scales of logarithms, with a geometric mean of 1."""
+    """Return the scales of logarithms, with a geometric mean of 1."""
     return np.asarray(np.exp(logs - np.mean(logs, dtype=np.float64)), np.float32)

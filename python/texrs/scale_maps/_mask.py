@@ -29,7 +29,7 @@ _PERIODS = 8
 _FEWEST = 6
 """Features without which a window says nothing."""
 _WIDEST = 4.0
-"""A window may say that texels are so many times as large, or as small, as the middle one."""
+"""A window may say that elements are so many times as large, or as small, as the middle one."""
 _ROUNDS = 4
 _PAPER_WINDOW, _PAPER_SIZE = 32, 9
 
@@ -43,9 +43,9 @@ def from_mask(
     foreshortened: bool = False,
     known: object = None,
 ) -> Floats:
-    """Measure the size of texels by how densely the features of a mask lie.
+    """Measure the size of elements by how densely the features of a mask lie.
 
-    Where texels are seen twice as large there are half as many outlines in a window (equation 1 of [1]_, which counts
+    Where elements are seen twice as large there are half as many outlines in a window (equation 1 of [1]_, which counts
     the pixels of the mask and has it the other way round). What is measured so is smoothed (equation 2), on logarithms.
 
     Parameters
@@ -55,7 +55,7 @@ def from_mask(
     measure : {"boundary", "skeleton", "count", "area"}
         ``"boundary"``: the length of the outlines; it does not matter which side of them is marked. ``"skeleton"``: the
         length of the features' middle lines, for curves. ``"count"``: how many features there are, for clean masks of
-        texels that do not touch. ``"area"``: the pixels of the mask, in windows of 32, larger where there are more of
+        elements that do not touch. ``"area"``: the pixels of the mask, in windows of 32, larger where there are more of
         them: the paper's equations as printed. They hold for none but drawn curves, and those they turn round; how
         much of a window is covered by areas does not depend on their size.
     window : int, optional
@@ -65,7 +65,7 @@ def from_mask(
         What the map is brought to by a robust fit: ``"plane"``, a flat surface in perspective, whose S is linear in the
         picture; ``"linear"`` or ``"quadratic"``, log S is.
     foreshortened : bool
-        Whether the picture shows a plane aslant. A mask gives the size of texels as the square root of their area; in
+        Whether the picture shows a plane aslant. A mask gives the size of elements as the square root of their area; in
         perspective that is the 3/2 power of their width across the slope, which is what `from_angles` gives. With True
         the map is that width.
     known : array_like of bool, optional
@@ -125,13 +125,13 @@ def _refuse_bare(mask: Bools, known: Bools | None) -> None:
     if marked in (0, total):
         what = "marks nothing" if marked == 0 else "marks every pixel"
         raise InvalidInput(
-            f"mask: {what}, so there are no features to count; mark the texels or the gaps between them, or give the "
+            f"mask: {what}, so there are no features to count; mark the elements or the gaps between them, or give the "
             "scale by angles"
         )
 
 
 def _measured(mask: Bools, known: Bools | None, what: str, window: int | None) -> Floats:
-    """Give log S as the mask has it."""
+    """Return log S as the mask has it."""
     size = mask.shape[0], mask.shape[1]
     features, spacing, power = _features(mask, known, what)
     if window is None:
@@ -157,7 +157,7 @@ def _measured(mask: Bools, known: Bools | None, what: str, window: int | None) -
 
 
 def _features(mask: Bools, known: Bools | None, what: str) -> tuple[Array, float, float]:
-    """Give what is counted at each pixel, how far apart features are, and the power of S in their density's inverse."""
+    """Return what is counted at each pixel, how far apart features are, and the power of S in their density's inverse."""
     if what == "skeleton":
         from skimage.morphology import skeletonize
 

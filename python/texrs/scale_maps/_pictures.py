@@ -29,7 +29,7 @@ _GLYPHS = {
 
 
 def encode(scale: object, encoding: Encoding = "log2") -> NDArray[np.uint8]:
-    """Give a scale map as grey levels of 8 bits.
+    """Return a scale map as grey levels of 8 bits.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def encode(scale: object, encoding: Encoding = "log2") -> NDArray[np.uint8]:
 
 
 def decode(image: object, encoding: Encoding = "log2") -> Floats:
-    """Give the scale map of grey levels, the inverse of `encode`.
+    """Return the scale map of grey levels, the inverse of `encode`.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def decode(image: object, encoding: Encoding = "log2") -> Floats:
 
 
 def picture(scale: object, largest: float | None = None) -> NDArray[np.uint8]:
-    """Give a scale map in false colours, with a scale bar on the right.
+    """Return a scale map in false colours, with a scale bar on the right.
 
     Small is blue, the normal size pale, large is red; thin lines mark where the scale passes a label of the bar.
 
@@ -151,7 +151,7 @@ def picture(scale: object, largest: float | None = None) -> NDArray[np.uint8]:
 
 
 def _colours(at: Floats) -> Floats:
-    """Give the colours of values from -1 to 1."""
+    """Return the colours of values from -1 to 1."""
     table = np.array([[int(c[k : k + 2], 16) for k in (0, 2, 4)] for c in _COLOURS], np.float32) / 255
     place = (np.clip(at, -1, 1) + 1) * ((len(table) - 1) / 2)
     first = np.minimum(place.astype(np.intp), len(table) - 2)

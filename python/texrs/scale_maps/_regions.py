@@ -40,7 +40,7 @@ def as_points(value: object, name: str, least: int = 1) -> NDArray[np.float64]:
 
 
 def weights(region: object, feather: object, size: tuple[int, ...]) -> Floats:
-    """Give how much each pixel belongs to a region: 1 well inside, a half at its edge, 0 well outside.
+    """Return how much each pixel belongs to a region: 1 well inside, a half at its edge, 0 well outside.
 
     A region is [top, left, bottom, right] of a rectangle, [row, column, radius] of a disc, a list of at least three
     points [row, column] of a polygon, or None for the whole map. The edge is ``feather`` pixels wide.
@@ -77,7 +77,7 @@ def weights(region: object, feather: object, size: tuple[int, ...]) -> Floats:
 
 
 def centre(region: object) -> NDArray[np.float64]:
-    """Give the middle of a region."""
+    """Return the middle of a region."""
     shape = _numbers(region)
     if shape is None:
         points = as_points(region, "region", 3)
@@ -88,7 +88,7 @@ def centre(region: object) -> NDArray[np.float64]:
 
 
 def stroke(points: NDArray[np.float64], radius: float, size: tuple[int, ...]) -> Floats:
-    """Give the weights of a brush that is drawn through points: 1 on the line, 0 a radius away from it."""
+    """Return the weights of a brush that is drawn through points: 1 on the line, 0 a radius away from it."""
     nearest = np.full(size, np.float32(1))
     for first, second in zip(points, points[1:] if len(points) > 1 else points, strict=False):
         low, high = np.minimum(first, second) - radius, np.maximum(first, second) + radius
@@ -107,7 +107,7 @@ def stroke(points: NDArray[np.float64], radius: float, size: tuple[int, ...]) ->
 
 
 def _numbers(region: object) -> list[float] | None:
-    """Give the numbers of a rectangle or a disc; None where there are points."""
+    """Return the numbers of a rectangle or a disc; None where there are points."""
     values: Any = region
     if isinstance(values, list | tuple | np.ndarray) and len(values) in (3, 4) and np.ndim(values[0]) == 0:
         return [as_number(v, "region", -_FARTHEST, _FARTHEST) for v in values]
@@ -120,7 +120,7 @@ def _numbers(region: object) -> list[float] | None:
 
 
 def _polygon(points: NDArray[np.float64], size: tuple[int, ...]) -> NDArray[np.float64]:
-    """Give how far each pixel is outside a polygon, by the even-odd rule."""
+    """Return how far each pixel is outside a polygon, by the even-odd rule."""
     inside = np.zeros(size, np.bool_)
     rows, columns = np.arange(size[0])[:, np.newaxis], np.arange(size[1])
     for (r0, c0), (r1, c1) in zip(points, np.roll(points, -1, axis=0), strict=True):

@@ -27,7 +27,7 @@ def resample(
     tilt: float | None = None,
     fov: float | None = None,
 ) -> Floats:
-    """Give a scale map for an output of another size.
+    """Return a scale map for an output of another size.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ def as_trend(value: object) -> str:
 
 
 def follow(logs: Floats, trend: str, known: Bools | None = None) -> Floats:
-    """Give the logarithms of a trend that is fitted robustly where the map is known, at every pixel.
+    """Return the logarithms of a trend that is fitted robustly where the map is known, at every pixel.
 
     What a fit would continue below a quarter of the least scale, or above four times the largest, is held there: nearer
     to the horizon nothing can be seen.
@@ -65,7 +65,7 @@ def follow(logs: Floats, trend: str, known: Bools | None = None) -> Floats:
 def gradient(
     values: Floats, rows: NDArray[np.float64], columns: NDArray[np.float64], known: Bools
 ) -> tuple[float, float]:
-    """Give by how much values at places grow on the whole, down and to the right."""
+    """Return by how much values at places grow on the whole, down and to the right."""
     places = _some(known)
     rows, columns = rows[places], columns[places]
     middle, reach = (rows.mean(), columns.mean()), max(1.0, float(np.ptp(rows)), float(np.ptp(columns)))
@@ -75,7 +75,7 @@ def gradient(
 
 
 def _some(known: Bools) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Give the rows and columns of a lattice of known places, or of a small known part those of all."""
+    """Return the rows and columns of a lattice of known places, or of a small known part those of all."""
     step = max(1, isqrt(int(np.count_nonzero(known)) // _POINTS))
     thin = np.zeros_like(known)
     thin[::step, ::step] = known[::step, ::step]
@@ -86,7 +86,7 @@ def _some(known: Bools) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 def _terms(
     rows: NDArray[np.intp], columns: NDArray[np.intp], middle: tuple[float, float], size: tuple[int, ...], trend: str
 ) -> list[NDArray[np.float64]]:
-    """Give what a surface is the sum of, at the places of a lattice."""
+    """Return what a surface is the sum of, at the places of a lattice."""
     y, x = ((at - m) / max(1, (n - 1) / 2) for at, m, n in zip((rows, columns), middle, size, strict=True))
     terms = [np.ones_like(y), y, x]
     return [*terms, y * y, y * x, x * x] if trend == "quadratic" else terms

@@ -44,7 +44,7 @@ class Lattice:
 
     @classmethod
     def of(cls, size: tuple[int, int], window: int) -> Lattice:
-        """Give the lattice for windows of about so many pixels."""
+        """Return the lattice for windows of about so many pixels."""
         cell = max(1, round(window / _ACROSS))
         return cls(size, cell, max(1, round((window / cell - 1) / 2) * 2 + 1))
 
@@ -84,14 +84,14 @@ class Lattice:
         return self._windows(self._cells(features)) / shares, enough, rows, columns
 
     def _cells(self, values: Array) -> NDArray[np.float64]:
-        """Give the sums over the cells."""
+        """Return the sums over the cells."""
         starts = [np.arange(0, n, self.cell) for n in self.size]
         # Rows first: contiguous, and what is left of them is small.
         rows = np.add.reduceat(values, starts[0], axis=0, dtype=np.int32)
         return np.add.reduceat(rows, starts[1], axis=1, dtype=np.int64).astype(np.float64)
 
     def _windows(self, cells: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Give the sums over the windows around the cells: whole numbers, so in float64 exact."""
+        """Return the sums over the windows around the cells: whole numbers, so in float64 exact."""
         reach = self.across // 2
         for axis in (0, 1):
             total = np.cumsum(cells, axis=axis)

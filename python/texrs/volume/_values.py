@@ -15,12 +15,12 @@ __all__ = ["as_direction", "as_region", "as_values", "axes_of", "colours_of", "l
 
 
 def leading(array: Array, axis: int, step: int) -> Array:
-    """Give all but the last lines along an axis."""
+    """Return all but the last lines along an axis."""
     return array[(slice(None),) * axis + (slice(0, array.shape[axis] - step),)]
 
 
 def trailing(array: Array, axis: int, step: int) -> Array:
-    """Give all but the first lines along an axis."""
+    """Return all but the first lines along an axis."""
     return array[(slice(None),) * axis + (slice(step, None),)]
 
 

@@ -224,7 +224,7 @@ def compare(
 
 
 def _turned(field: Field, shape: tuple[int, ...], normal: NDArray[np.float64]) -> float:
-    """Give the mean angle between the exemplar's normal and where the field takes it."""
+    """Return the mean angle between the exemplar's normal and where the field takes it."""
     lines = [np.linspace(0, n - 1, min(n, 16)) for n in shape]
     frames = field.jacobians(np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)).astype(np.float64)
     there = np.einsum("...ji,j->...i", frames, normal)
@@ -259,6 +259,6 @@ def _ratio(pair: tuple[float, float]) -> float:
 
 
 def _distance(pair: NDArray[np.float64]) -> float:
-    """Give the mean absolute difference where both are known."""
+    """Return the mean absolute difference where both are known."""
     off = np.abs(pair[1] - pair[0])
     return float(off[np.isfinite(off)].mean())

@@ -21,7 +21,7 @@ _GOLDEN = 0.6180339887498949
 
 
 def paint(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArray[np.uint8]:
-    """Give each label a colour, so that a picture shows it.
+    """Return each label a colour, so that a picture shows it.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def paint(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArray[np.uin
 def surface(
     mask: ArrayLike, *, spacing: Sequence[float] = (1, 1, 1), closed: bool = True
 ) -> tuple[Floats, NDArray[np.int64]]:
-    """Give the surface of a material as triangles, for `texrs.io.write_surface` (marching cubes).
+    """Return the surface of a material as triangles, for `texrs.io.write_surface` (marching cubes).
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def surface(
 
 
 def _table(count: int) -> Array:
-    """Give colours of hues that go round by the golden section, of three brightnesses in turn."""
+    """Return colours of hues that go round by the golden section, of three brightnesses in turn."""
     k = np.arange(count)
     hue = 6 * (k * _GOLDEN % 1)
     value = np.array([0.86, 0.66, 0.48])[k % 3]

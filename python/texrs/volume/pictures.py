@@ -338,7 +338,7 @@ def _render(
 
 
 def _view(azimuth: float, elevation: float) -> NDArray[np.float64]:
-    """Give the directions down, right and away from the eye, as (plane, row, column)."""
+    """Return the directions down, right and away from the eye, as (plane, row, column)."""
     a, e = radians(azimuth), radians(elevation)
     return np.array(
         [
@@ -350,7 +350,7 @@ def _view(azimuth: float, elevation: float) -> NDArray[np.float64]:
 
 
 def _across(normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give unit steps of rows and columns on a plane: as those of a slice where it is one."""
+    """Return unit steps of rows and columns on a plane: as those of a slice where it is one."""
     n = normal / np.linalg.norm(normal)
     along = np.eye(3)[2 if abs(n[2]) < 0.9 else 1]
     columns = along - n * (n @ along)
@@ -362,7 +362,7 @@ def _across(normal: NDArray[np.float64]) -> NDArray[np.float64]:
 def _cut(
     steps: NDArray[np.float64], point: NDArray[np.float64], shape: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give the least and the largest steps from the point that stay in the box."""
+    """Return the least and the largest steps from the point that stay in the box."""
     corners = np.array(list(product((0, 1), repeat=3))) * (shape - 1)
     normal = np.cross(*steps)
     side = (corners - point) @ normal

@@ -43,7 +43,7 @@ class CellReuse:
 
 
 def coherent(source: SourceMap, axis: int, field: Field | None = None) -> Bools:
-    """Tell where a voxel and the next along an axis go on in one piece: max |S(p + e) - S(p) - J e| < 0.6.
+    """Return where a voxel and the next along an axis go on in one piece: max |S(p + e) - S(p) - J e| < 0.6.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def cell_reuse(source: SourceMap, field: Field | None = None, *, cell: int = 8) 
 
 
 def _cell_use(source: SourceMap, number: int, side: int) -> Floats:
-    """Give the uses of a voxel of each cell of an exemplar, on average."""
+    """Return the uses of a voxel of each cell of an exemplar, on average."""
     shape = np.array(source.shapes[number])
     cells = -(-shape // side)
     place = np.floor(source.coordinates[source.exemplar == number] + np.float32(0.5)).astype(np.int64)
@@ -140,7 +140,7 @@ def _cell_use(source: SourceMap, number: int, side: int) -> Floats:
 
 
 def _step(source: SourceMap, field: Field | None, i: int, here: tuple[slice, ...], along: int) -> Floats:
-    """Give J e of the voxels of one plane."""
+    """Return J e of the voxels of one plane."""
     if field is not None:
         if field.constant is not None:
             return np.asarray(field.jacobians(np.zeros(source.axes))[:, along])
@@ -156,7 +156,7 @@ def _step(source: SourceMap, field: Field | None, i: int, here: tuple[slice, ...
 
 
 def _check(source: SourceMap, field: Field | None) -> Field | None:
-    """Give the field that J is taken from: the one that is given, or the map's own, where that is a field."""
+    """Return the field that J is taken from: the one that is given, or the map's own, where that is a field."""
     if not isinstance(source, SourceMap):
         raise InvalidInput(f"source: needs a source map, got {type(source).__name__}")
     if field is not None and (not isinstance(field, Field) or field.axes != source.axes):

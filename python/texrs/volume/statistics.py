@@ -37,14 +37,14 @@ class Classes:
     centres: Floats
 
     def of(self, image: ArrayLike, *, axes: int | None = None) -> NDArray[np.uint8]:
-        """Give the class of each pixel or voxel: the nearest centre; the lower one of two as near."""
+        """Return the class of each pixel or voxel: the nearest centre; the lower one of two as near."""
         colours = colours_of(image, "image", axes)
         if colours.shape[-1] != self.centres.shape[1]:
             raise InvalidInput(f"image: needs {self.centres.shape[1]} colour channels, got {colours.shape[-1]}")
         return self._nearest(colours)
 
     def shares(self, image: ArrayLike, *, axes: int | None = None) -> NDArray[np.float64]:
-        """Give the share of each class, (K,); they sum to 1."""
+        """Return the share of each class, (K,); they sum to 1."""
         labels = self.of(image, axes=axes)
         return np.bincount(labels.ravel(), minlength=len(self.centres)) / labels.size
 
@@ -83,7 +83,7 @@ class Particles:
 
 
 def lightness(image: ArrayLike, *, axes: int | None = None) -> Floats:
-    """Give the mean of the colour channels in [0, 1], float32; transparency counts as mid grey.
+    """Return the mean of the colour channels in [0, 1], float32; transparency counts as mid grey.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def classes(exemplar: ArrayLike, count: int = 4, *, axes: int | None = None) -> 
 
 
 def two_point(mask: ArrayLike, reach: int = 16) -> NDArray[np.float64]:
-    """Give the two-point correlation S2 along each axis: how often both ends of a step are in a material.
+    """Return the two-point correlation S2 along each axis: how often both ends of a step are in a material.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def two_point(mask: ArrayLike, reach: int = 16) -> NDArray[np.float64]:
 
 
 def lineal_path(mask: ArrayLike, reach: int = 16) -> NDArray[np.float64]:
-    """Give the lineal path along each axis: how often all of a step, with its ends, is in a material.
+    """Return the lineal path along each axis: how often all of a step, with its ends, is in a material.
 
     Parameters
     ----------
@@ -246,7 +246,7 @@ def particles(mask: ArrayLike, *, least: int = 8) -> Particles:
 def _means(
     points: Floats, weights: NDArray[np.float64], k: int, rng: np.random.Generator
 ) -> tuple[NDArray[np.float64], float]:
-    """Give k centres by Lloyd's turns, and the spread about them; starts are spread out by their distance."""
+    """Return k centres by Lloyd's turns, and the spread about them; starts are spread out by their distance."""
     p = points.astype(np.float64)
     centres = p[rng.choice(len(p), 1, p=weights / weights.sum())]
     while len(centres) < k:

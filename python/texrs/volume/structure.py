@@ -32,7 +32,7 @@ _BAND = (1 / 30, 0.45)
 
 
 def autocorrelation(values: ArrayLike, reach: int = 12) -> NDArray[np.float64]:
-    """Give the correlation of values with those some steps further, along each axis.
+    """Return the correlation of values with those some steps further, along each axis.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def autocorrelation(values: ArrayLike, reach: int = 12) -> NDArray[np.float64]:
 
 
 def frequency(values: ArrayLike, *, window: int | None = None, whole: bool = False) -> float:
-    """Give the mean spectral frequency, in cycles a pixel: how fine a texture is.
+    """Return the mean spectral frequency, in cycles a pixel: how fine a texture is.
 
     Of each axis slice: it is cut into windows that overlap by half, under a Hann window; frequencies from 1/30 to
     0.45 are weighted by their power. The result is the mean over the slices.
@@ -138,7 +138,7 @@ def seam_planes(values: ArrayLike, *, wrap: bool | Sequence[bool] = False) -> tu
 
 
 def isolated(values: ArrayLike, threshold: float = 0.35) -> float:
-    """Give the share of voxels (pixels) that differ from the median of their surroundings, 3 a side: speckle.
+    """Return the share of voxels (pixels) that differ from the median of their surroundings, 3 a side: speckle.
 
     Examples
     --------
@@ -160,7 +160,7 @@ def isolated(values: ArrayLike, threshold: float = 0.35) -> float:
 
 
 def slice_distances(exemplar: ArrayLike, values: ArrayLike, *, quantiles: int = 256) -> NDArray[np.float64]:
-    """Give the Wasserstein distance of the values of each axis slice to those of the whole exemplar.
+    """Return the Wasserstein distance of the values of each axis slice to those of the whole exemplar.
 
     Returns
     -------
@@ -186,7 +186,7 @@ def slice_distances(exemplar: ArrayLike, values: ArrayLike, *, quantiles: int = 
 
 
 def texture_normal(values: ArrayLike) -> NDArray[np.float64]:
-    """Give the direction in which an exemplar changes most, (A,): the normal of its layers.
+    """Return the direction in which an exemplar changes most, (A,): the normal of its layers.
 
     Examples
     --------
@@ -210,7 +210,7 @@ def orientation_errors(
     margin: int = 6,
     step: int = 1,
 ) -> Floats:
-    """Give the angle between the layers of a texture and where a field turns those of its exemplar.
+    """Return the angle between the layers of a texture and where a field turns those of its exemplar.
 
     The normal that is there is the main direction of the structure tensor (gradients of a Gaussian of sigma 1, summed
     under one of sigma 4). The wanted one is J^T n, as normals go, for the exemplar's normal n.
@@ -288,7 +288,7 @@ def _structure(v: Floats, sigma: float) -> NDArray[np.float64]:
 
 
 def _mean_frequency(arrays: list[Floats], side: int) -> float:
-    """Give the mean over some arrays of the mean frequency of each; NaN where none changes at all."""
+    """Return the mean over some arrays of the mean frequency of each; NaN where none changes at all."""
     axes = arrays[0].ndim
     weights, square = np.ones((side,) * axes, np.float32), np.zeros((side,) * axes)
     for a in range(axes):

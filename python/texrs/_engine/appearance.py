@@ -1,0 +1,356 @@
+"""Appearance vectors of an exemplar, and what is grown from them: coherent blocks, and their correction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs import _rust
+from texrs._arrays import as_float, as_image, as_int, as_seed, as_wrap
+from texrs._engine.pyramid import Region
+from texrs._typing import Array
+from texrs.errors import InvalidInput
+
+__all__ = ["Appearance", "Corrected", "Guide"]
+
+Report = Callable[[float], object]
+
+_PARTS = ("colours", "features", "basis", "bias", "gain", "spacing")
+
+
+class Guide(NamedTuple):
+    """What an output is asked to show at its points, beside looking like the exemplar.
+
+    Attributes
+    ----------
+    exemplar : (samples * 4) int16
+        Values of the exemplar's samples, -2048 to 2047; unused ones are zero.
+    output : (points * 4) or (points) int16
+        Values wanted at the points of the output; one a point is the first, and the others are zero.
+    weight : (points) or (1) uint16
+        Cost of a squared difference of one, in 1/256; windows that have nothing to do with each other differ by
+        about 2 * 512^2. 0 where nothing is asked.
+    order : (any) uint32
+        Samples by their first value, the least first: what is drawn is drawn from those near what is asked. Empty: from
+        anywhere.
+
+    """
+
+    exemplar: NDArray[np.int16]
+    output: NDArray[np.int16]
+    weight: NDArray[np.uint16]
+    order: NDArray[np.uint32] = np.zeros(0, np.uint32)
+
+
+class Corrected(NamedTuple):
+    """Places after correction.
+
+    Attributes
+    ----------
+    places : (points * A) int32
+        In units of 1/4096 of a sample.
+    passes : int
+        How many were made.
+    changed : float
+        Share of the points that the last two changed.
+
+    """
+
+    places: NDArray[np.int32]
+    passes: int
+    changed: float
+
+
+class Appearance:
+    """What the surroundings of each sample of an exemplar look like, in 24 numbers.
+
+    Windows of colours, weighted by a Gaussian, are projected onto their leading principal components [1]_. All is
+    integer arithmetic of 12 bits, so that results are the same on any machine and for any number of threads.
+
+    Parameters
+    ----------
+    colours : (..., C) array
+        Colours that windows are compared by, up to four channels of any scale. Shape (rows, columns[, C]) or
+        (planes, rows, columns[, C]).
+    axes : int
+        2 or 3.
+    wrap : bool or one an axis
+        Axes along which the exemplar repeats.
+    radius : int
+        Of a window; its side is 2 radius + 1.
+
+    Raises
+    ------
+    InvalidInput
+        Sides below 2 radius + 2, more than four channels, or windows of more than 2048 numbers.
+
+    References
+    ----------
+    .. [1] S. Lefebvre and H. Hoppe, "Appearance-space texture synthesis", SIGGRAPH 2006.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs._engine.pyramid import Region, to_fixed
+    >>> noise = np.random.default_rng(0).random((32, 32))
+    >>> exemplar = Appearance(noise, axes=2)
+    >>> region = Region.whole((40, 40))
+    >>> frames = to_fixed(None, region)
+    >>> start = exemplar.blocks(region, frames, seed=3)
+    >>> exemplar.correct(start, region, frames, seed=3).places.shape
+    (3200,)
+
+    """
+
+    def __init__(self, colours: object, *, axes: int, wrap: bool | Sequence[bool] = False, radius: int = 2) -> None:
+        image = as_image(colours, "colours", axes=axes)
+        flat = np.ascontiguousarray(image.reshape(-1, image.shape[-1]), np.float32)
+        near = as_int(radius, "radius", 1, 8)
+        self._inner = _rust.Appearance(flat, image.shape[:axes], as_wrap(wrap, axes=axes), near)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Samples along each axis."""
+        return tuple(self._inner.shape)
+
+    @property
+    def wrap(self) -> tuple[bool, ...]:
+        """Axes along which the exemplar repeats."""
+        return tuple(self._inner.wrap)
+
+    @property
+    def radius(self) -> int:
+        """Radius of a window."""
+        return self._inner.radius
+
+    @property
+    def spacing(self) -> float:
+        """Median squared distance from a window to the nearest other one, in variances of all windows.
+
+        It is the natural unit of what is good enough.
+        """
+        return self._inner.spacing
+
+    def arrays(self) -> dict[str, Array]:
+        """Return the analysis as plain arrays, to be kept; `from_arrays` takes them back."""
+        kept: dict[str, Any] = dict(zip(_PARTS, self._inner.parts(), strict=True))
+        kept |= {"shape": self.shape, "wrap": self.wrap, "radius": self.radius, "channels": self._inner.channels}
+        return {name: np.asarray(value) for name, value in kept.items()}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, Array]) -> Appearance:
+        """Take back what `arrays` gave.
+
+        Raises
+        ------
+        InvalidInput
+            Arrays that are missing or do not belong together.
+
+        """
+        missing = {*_PARTS, "shape", "wrap", "radius", "channels"} - set(arrays)
+        if missing:
+            raise InvalidInput(f"analysis: lacks {', '.join(sorted(missing))}")
+        made = cls.__new__(cls)
+        try:
+            colours, features, basis = (
+                np.ascontiguousarray(arrays[name], np.int16).reshape(-1) for name in ("colours", "features", "basis")
+            )
+            made._inner = _rust.Appearance.from_parts(
+                [int(n) for n in arrays["shape"]],
+                [bool(w) for w in arrays["wrap"]],
+                int(arrays["radius"]),
+                int(arrays["channels"]),
+                colours,
+                features,
+                basis,
+                np.ascontiguousarray(arrays["bias"], np.int64).reshape(-1),
+                int(arrays["gain"]),
+                int(arrays["spacing"]),
+            )
+        except (TypeError, ValueError, OverflowError) as error:
+            raise InvalidInput(f"analysis: its arrays do not belong together ({error})") from None
+        return made
+
+    def blocks(
+        self,
+        region: Region,
+        frames: NDArray[np.int16],
+        *,
+        cell: int = 6,
+        rounds: int = 6,
+        candidates: int = 512,
+        contrast: float = 1.0,
+        continuation: float = 0.15,
+        repetition: float = 0.3,
+        seed: int = 0,
+        margin: int = 0,
+        held: NDArray[np.bool_] | None = None,
+        given: NDArray[np.int32] | None = None,
+        guide: Guide | None = None,
+        progress: Report | None = None,
+    ) -> NDArray[np.int32]:
+        """Fill the cells of a region with pieces of the exemplar that fit each other.
+
+        Parameters
+        ----------
+        region : Region
+            What to fill.
+        frames : (1 or points, A, A) int16
+            Jacobians over the region (see `texrs._engine.pyramid.to_fixed`).
+        cell : int
+            Side of a cell in points, 2 to 256.
+        rounds : int
+            Half-rounds of choosing, 1 to 64: cells of even and of odd parity take turns.
+        candidates : int
+            Places that a cell tries in each, 1 to 65535.
+        contrast : float
+            How far misfits are divided by the contrast of the pieces, 0 to 1. At 0 bland pieces are favoured, for they are
+            near everything on average.
+        continuation : float
+            Cost of going on exactly where a neighbour ends, in misfits of unrelated pieces, 0 to 4. At 0 the exemplar is
+            copied in large pieces.
+        repetition : float
+            Cost of showing what one of the cells around shows, in the same units, 0 to 4.
+        seed : int
+            Chooses the texture. What is drawn belongs to the place in the world, not to the region.
+        margin : int
+            Points along the borders, up to 2^20, that will be cut off: cells that nothing else hangs on are not chosen.
+        held : (points) bool, optional
+            Points that keep their places, around which the others are chosen.
+        given : (points * A) int32, optional
+            The places of the points that are held; those of others do not count.
+        guide : Guide, optional
+            What else is asked.
+        progress : callable, optional
+            Called with the share that is done; raising stops the work.
+
+        Returns
+        -------
+        (points * A) int32
+            Places in units of 1/4096 of a sample.
+
+        Raises
+        ------
+        InvalidInput
+            An option out of its range, or arrays of other sizes than the region's.
+        Cancelled
+            The work was stopped.
+
+        """
+        self._check(region)
+        return self._inner.blocks(
+            region.place,
+            frames,
+            as_int(cell, "cell", 2, 256),
+            as_int(rounds, "rounds", 1, 64),
+            as_int(candidates, "candidates", 1, 65535),
+            as_float(contrast, "contrast", 0, 1),
+            as_float(continuation, "continuation", 0, 4),
+            as_float(repetition, "repetition", 0, 4),
+            as_seed(seed),
+            as_int(margin, "margin", 0, 1 << 20),
+            np.zeros(0, np.bool_) if held is None else np.ascontiguousarray(held.reshape(-1)),
+            np.zeros(0, np.int32) if given is None else given,
+            guide,
+            progress,
+        )
+
+    def correct(
+        self,
+        places: NDArray[np.int32],
+        region: Region,
+        frames: NDArray[np.int16],
+        *,
+        passes: int = 6,
+        first: int = 0,
+        exhaustive: bool = False,
+        reach: int = 2,
+        hysteresis: float = 2.0,
+        unity: float = 0.0,
+        vote: int = 0,
+        settled: float = 0.0,
+        seed: int = 0,
+        held: NDArray[np.bool_] | None = None,
+        guide: Guide | None = None,
+        overwrite: bool = False,
+        progress: Report | None = None,
+    ) -> Corrected:
+        """Correct places until every window of the output is like one of the exemplar.
+
+        Parameters
+        ----------
+        places : (points * A) int32
+            In units of 1/4096 of a sample.
+        region, frames
+            As of `blocks`.
+        passes : int
+            At most so many, up to 1000; each corrects every other point, as on a chess board.
+        first : int
+            Number of the first one, for work that is done in parts.
+        exhaustive : bool
+            Whether to compare each window with all of the exemplar's in each pass: for small exemplars.
+        reach : int
+            How far the neighbours are whose matches are tried, 1 or 2.
+        hysteresis : float
+            How much better than the present a drawn match must be, in units of `spacing`, 0 to 100: what is good enough stays.
+        unity : float
+            What each neighbour costs whose piece of the exemplar is another, in units of `spacing`, 0 to 100: pieces
+            stay whole where several fit equally well.
+        vote : int
+            Radius within which windows vote on the place of a point, up to `radius`; at 0 each takes its own match.
+        settled : float
+            Stop when two passes change less than this share of the points. The result then hangs on the whole region.
+        seed : int
+            Chooses what is drawn.
+        held : (points) bool, optional
+            Points that keep their places.
+        overwrite : bool
+            Write the result over ``places``, which saves 4 bytes for each of their numbers.
+        guide, progress
+            As of `blocks`.
+
+        Returns
+        -------
+        Corrected
+
+        Raises
+        ------
+        InvalidInput
+            An option out of its range, or arrays of other sizes than the region's.
+        Cancelled
+            The work was stopped.
+
+        """
+        self._check(region)
+        if places.dtype != np.int32 or places.shape != (region.points * len(region.shape),):
+            raise InvalidInput(
+                f"places: needs int32, {len(region.shape)} for each of {region.points} points, "
+                f"got {places.dtype} {places.shape}"
+            )
+        if not overwrite:
+            places = places.copy()
+        passes, changed = self._inner.correct(
+            places,
+            region.place,
+            frames,
+            np.zeros(0, np.bool_) if held is None else np.ascontiguousarray(held.reshape(-1)),
+            as_int(passes, "passes", 0, 1000),
+            as_int(first, "first", 0, 1 << 20),
+            exhaustive,
+            as_int(reach, "reach", 1, 2),
+            as_float(hysteresis, "hysteresis", 0, 100),
+            as_float(unity, "unity", 0, 100),
+            as_int(vote, "vote", 0, self.radius),
+            as_float(settled, "settled", 0, 1),
+            as_seed(seed),
+            guide,
+            progress,
+        )
+        return Corrected(places, passes, changed)
+
+    def _check(self, region: Region) -> None:
+        if len(region.shape) != len(self.shape):
+            raise InvalidInput(f"region: the exemplar has {len(self.shape)} axes, got {region.shape}")

@@ -1,0 +1,261 @@
+"""k-coherence: samples that look alike, and points that choose among those their neighbours know."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs import _rust
+from texrs._arrays import as_float, as_int, as_seed
+from texrs._engine.appearance import Appearance
+from texrs._engine.pyramid import ONE, Region
+from texrs.errors import InvalidInput
+
+__all__ = ["Similarity", "correct", "jitter", "similar"]
+
+Report = Callable[[float], object]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Similarity:
+    """What each sample of an exemplar may be replaced by.
+
+    Attributes
+    ----------
+    sets : (samples, k) uint32
+        Row-major positions, the sample's own first; all its own where its window does not lie inside the exemplar.
+    numbers : int
+        Numbers of the appearance vectors that are compared.
+
+    """
+
+    sets: NDArray[np.uint32]
+    numbers: int
+
+    @property
+    def k(self) -> int:
+        """Samples of a set."""
+        return int(self.sets.shape[1])
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that the sets take."""
+        return self.sets.nbytes
+
+
+def similar(
+    appearance: Appearance, *, k: int = 3, n: int = 7, numbers: int = 8, progress: Report | None = None
+) -> Similarity:
+    """Find the samples of an exemplar that look most like each one, far from it and from each other.
+
+    C_1 is the sample itself. Each further C_j is the nearest, by squared distance of appearance vectors, of those that
+    are more than (n - 1) / 2 samples from every earlier one along some axis [1]_. The whole exemplar is searched, and
+    the result is exact: of equally near samples the first is taken.
+
+    Parameters
+    ----------
+    appearance : Appearance
+        Of the exemplar.
+    k : int
+        Samples of a set, 1 to 16.
+    n : int
+        Side of the box around each chosen sample from which no other is chosen; odd.
+    numbers : {8, 24}
+        How many of the leading numbers of the vectors are compared.
+    progress : callable, optional
+        Called with the share that is done; raising stops the work.
+
+    Returns
+    -------
+    Similarity
+
+    Raises
+    ------
+    InvalidInput
+        An option out of its range, or an exemplar too small for ``k`` samples so far apart.
+    Cancelled
+        The work was stopped.
+
+    References
+    ----------
+    .. [1] X. Tong et al., "Synthesis of bidirectional texture functions on arbitrary surfaces", SIGGRAPH 2002.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> exemplar = Appearance(np.tile(np.arange(8.0), (32, 4)), axes=2)
+    >>> similar(exemplar, k=2).sets[32 * 16 + 16].tolist()  # row 2, column 8: the first that looks the same
+    [528, 72]
+
+    """
+    if as_int(n, "n", 1, 1 << 20) % 2 == 0:
+        raise InvalidInput(f"n: needs an odd number, the side of a box around a sample, got {n}")
+    count = as_int(k, "k", 1, 16)
+    sets = _rust.similar(appearance._inner, count, n, _numbers(numbers), progress)
+    return Similarity(sets.reshape(-1, count), numbers)
+
+
+def correct(
+    appearance: Appearance,
+    similarity: Similarity,
+    places: NDArray[np.int32],
+    region: Region,
+    frames: NDArray[np.int16],
+    *,
+    passes: int = 2,
+    compensated: bool = True,
+    held: NDArray[np.bool_] | None = None,
+    kinds: tuple[NDArray[np.uint8], NDArray[np.uint8]] | None = None,
+    progress: Report | None = None,
+) -> NDArray[np.int32]:
+    """Correct places by k-coherence: each point takes what makes its diagonal neighbours look right.
+
+    A pass goes over the 2^A classes of points of the same parity along each axis, in fixed order [1]_. Candidates
+    are what the samples of a point's 2^A diagonal neighbours, warped by the frames, are similar to, brought back to the
+    point; they are compared by the appearance vectors of the neighbours. The first of equally good ones wins.
+
+    Parameters
+    ----------
+    appearance : Appearance
+        Of the exemplar.
+    similarity : Similarity
+        Of the same exemplar.
+    places : (points * A) int32
+        In units of 1/4096 of a sample.
+    region : Region
+        Where the points lie.
+    frames : (1 or points, A, A) int16
+        Jacobians over the region (see `texrs._engine.pyramid.to_fixed`).
+    passes : int
+        0 to 1000.
+    compensated : bool
+        Whether neighbours are read where the diagonal leads in the exemplar, as released code has it [1]_, and not
+        only where the lattice makes it end.
+    held : (points) bool, optional
+        Points that keep their places.
+    kinds : (samples) uint8 and (points) uint8, optional
+        The kind of each sample, and the kind that each point takes; 255 takes any. A point that is offered none keeps
+        its place.
+    progress : callable, optional
+        Called with the share that is done; raising stops the work.
+
+    Returns
+    -------
+    (points * A) int32
+
+    Raises
+    ------
+    InvalidInput
+        An option out of its range, or arrays that do not belong together.
+    Cancelled
+        The work was stopped.
+
+    References
+    ----------
+    .. [1] S. Lefebvre and H. Hoppe, "Appearance-space texture synthesis", SIGGRAPH 2006.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs._engine.pyramid import to_fixed
+    >>> exemplar = Appearance(np.random.default_rng(0).random((32, 32)), axes=2)
+    >>> region = Region.whole((20, 20))
+    >>> copy = (np.indices((20, 20)).transpose(1, 2, 0) + 5).astype(np.int32).reshape(-1) * ONE
+    >>> bool((correct(exemplar, similar(exemplar), copy, region, to_fixed(None, region)) == copy).all())
+    True
+
+    """
+    _check(places, region)
+    if len(region.shape) != len(appearance.shape):
+        raise InvalidInput(f"region: the exemplar has {len(appearance.shape)} axes, got {region.shape}")
+    return _rust.cohere(
+        appearance._inner,
+        np.ascontiguousarray(similarity.sets, np.uint32).reshape(-1),
+        similarity.k,
+        places,
+        region.place,
+        frames,
+        _held(held),
+        _kinds(kinds),
+        as_int(passes, "passes", 0, 1000),
+        _numbers(similarity.numbers),
+        compensated,
+        progress,
+    )
+
+
+def jitter(
+    places: NDArray[np.int32],
+    region: Region,
+    reach: float,
+    *,
+    seed: int = 0,
+    level: int = 0,
+    held: NDArray[np.bool_] | None = None,
+) -> NDArray[np.int32]:
+    """Displace places by noise that belongs to their points in the world.
+
+    Parameters
+    ----------
+    places : (points * A) int32
+        In units of 1/4096 of a sample.
+    region : Region
+        Where the points lie.
+    reach : float
+        Largest displacement along an axis, in samples, 0 to 65536.
+    seed, level : int
+        Choose the noise.
+    held : (points) bool, optional
+        Points that keep their places.
+
+    Returns
+    -------
+    (points * A) int32
+
+    Raises
+    ------
+    InvalidInput
+        An option out of its range, or arrays that are not of the region.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> region = Region.whole((2, 2))
+    >>> moved = jitter(np.zeros(8, np.int32), region, 0.7, seed=1) / ONE
+    >>> bool((np.abs(moved) <= 0.7).all() and np.ptp(moved) > 0.5)
+    True
+
+    """
+    _check(places, region)
+    most = round(as_float(reach, "reach", 0, 65536) * ONE)
+    return _rust.jitter(
+        places, region.place, _held(held), most, as_seed(seed), as_int(level, "level", 0, (1 << 32) - 1)
+    )
+
+
+def _numbers(numbers: int) -> int:
+    if numbers not in (8, 24):
+        raise InvalidInput(f"numbers: 8 or 24 are allowed, got {numbers!r}")
+    return int(numbers)
+
+
+def _held(held: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
+    return np.zeros(0, np.bool_) if held is None else np.ascontiguousarray(held.reshape(-1))
+
+
+def _kinds(
+    kinds: tuple[NDArray[np.uint8], NDArray[np.uint8]] | None,
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    if kinds is None:
+        return np.zeros(0, np.uint8), np.zeros(0, np.uint8)
+    samples, points = (np.ascontiguousarray(k, np.uint8).reshape(-1) for k in kinds)
+    return samples, points
+
+
+def _check(places: NDArray[np.int32], region: Region) -> None:
+    wanted = region.points * len(region.shape)
+    if places.dtype != np.int32 or places.shape != (wanted,):
+        raise InvalidInput(f"places: needs int32 of {wanted} numbers, got {places.dtype} {places.shape}")

@@ -1,0 +1,101 @@
+"""Where the source of a picture does not go on, and what its sources show on both sides of there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Array, Bools, Floats, Interpolation
+from texrs.blending._values import Samples
+from texrs.source_map import SourceMap
+
+__all__ = ["Look", "Seam", "around", "rows_of", "seams"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """A source map with what is looked up through it."""
+
+    samples: Samples
+    known: list[Floats] | None
+    source: SourceMap
+    interpolation: Interpolation
+    kind: Literal["colour", "normal"]
+    green: Literal["up", "down"]
+
+    def beside(self, at: tuple[Array, ...], axis: int, step: int) -> tuple[Floats, Bools]:
+        """Return what the sources of pixels show ``step`` pixels on along an axis, and whether the exemplar has that."""
+        source = self.source
+        frames = _frames(source, at)
+        places = source.coordinates[at] + np.float32(step) * frames[..., axis]
+        which = source.exemplar[at]
+        # Coordinates of a mirrored or turned copy carry rounding.
+        last = np.array(source.shapes, np.float32)[which] - 1
+        inside: Bools = np.all((places >= -1e-3) & (places <= last + np.float32(1e-3)), axis=-1)
+        row = SourceMap(
+            places[np.newaxis],
+            which[np.newaxis],
+            np.arange(len(which), dtype=np.uint32)[np.newaxis],
+            frames if self.kind == "normal" else None,
+            source.shapes,
+        )
+        shown = row.render(self.samples.images, interpolation=self.interpolation, kind=self.kind, green=self.green)
+        if self.known is not None:
+            inside = inside & (np.abs(row.render(self.known, interpolation=self.interpolation)[0] - 1) < 1e-3)
+        return shown[0], inside
+
+    def across(self, axis: int, wrap: bool) -> Seam:
+        """Return the seams that cross an axis: the differences wanted less those of the picture."""
+        at, after = seams(self.source, axis, wrap)
+        if not len(at[0]):
+            return Seam(at, after, np.zeros((0, self.samples.channels), np.float32))
+        here, _ = self.beside(at, axis, 0)
+        there, _ = self.beside(after, axis, 0)
+        ahead, forward = self.beside(at, axis, 1)
+        behind, backward = self.beside(after, axis, -1)
+        known = forward.astype(np.float32) + backward
+        total = (ahead - here) * forward[:, np.newaxis] + (there - behind) * backward[:, np.newaxis]
+        return Seam(at, after, total / np.maximum(known, 1)[:, np.newaxis] - (there - here))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seam:
+    """Pairs of neighbours that seams part."""
+
+    at: tuple[Array, ...]
+    after: tuple[Array, ...]
+    lack: Floats
+    """What the differences from ``at`` to ``after`` lack, (n, C) in [0, 1]."""
+
+
+def seams(source: SourceMap, axis: int, wrap: bool) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+    """Return the pixels before the seams that cross an axis, and those after them, each as (rows, columns)."""
+    parted = ~source.continues(axis, wrap=wrap)
+    if not wrap:
+        np.moveaxis(parted, axis, 0)[-1] = False
+    at = np.nonzero(parted)
+    after = tuple((index + (a == axis)) % n for a, (index, n) in enumerate(zip(at, source.shape, strict=True)))
+    return at, after
+
+
+def _frames(source: SourceMap, at: tuple[Array, ...]) -> NDArray[np.float32]:
+    """Return the Jacobians of some pixels, (n, 2, 2)."""
+    frame = source.frame_array()
+    if frame is None:
+        return np.broadcast_to(np.eye(2, dtype=np.float32), (len(at[0]), 2, 2))
+    return frame[source.label[at]] if frame.ndim == 3 else frame[at]
+
+
+def around(first: int, last: int, height: int) -> slice | NDArray[np.intp]:
+    """Return rows of a picture that is cyclic, without a copy where they do not cross its end."""
+    return slice(first, last) if first >= 0 and last <= height else np.arange(first, last) % height
+
+
+def rows_of(source: SourceMap, rows: slice | NDArray[np.intp]) -> SourceMap:
+    """Take some rows of a source map."""
+    frame = source.frame_array()
+    frame = frame if frame is None or frame.ndim == 3 else frame[rows]
+    return SourceMap(source.coordinates[rows], source.exemplar[rows], source.label[rows], frame, source.shapes)

@@ -1,0 +1,93 @@
+"""The values of exemplars, brought to [0, 1] and back."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from texrs._typing import Array, Floats
+from texrs.errors import InvalidInput
+
+__all__ = ["STRIP", "Samples", "bands_of"]
+
+STRIP = 2**22
+"""Pixels that are solved at once; up to four times as many where corrections reach far."""
+BAND = 64
+"""Rows whose values are converted at once."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Samples:
+    """The exemplars' values in [0, 1], so that the solver's precision does not depend on their range."""
+
+    images: list[Floats]
+    low: float
+    span: float
+    channels: int
+    """How many channels are corrected."""
+    least: Array
+    most: Array
+    """Range of each channel."""
+
+    @classmethod
+    def of(cls, given: Sequence[Array], kind: str) -> Samples | None:
+        """Scale them; None where no values between theirs make sense."""
+        dtype, channels = given[0].dtype, given[0].shape[-1]
+        if kind == "normal":
+            top = float(np.iinfo(dtype).max) if dtype.kind in "ui" else 1.0
+            low = -top if dtype.kind != "u" and min(float(e[..., :3].min()) for e in given) < 0 else 0.0
+            high, channels = top, 3
+        else:
+            if dtype.kind in "bi":
+                return None
+            channels -= channels in (2, 4)
+            low = min(float(e[..., :channels].min()) for e in given)
+            high = max(float(e[..., :channels].max()) for e in given)
+        if high <= low:
+            return None
+        if not math.isfinite(high - low):
+            raise InvalidInput(f"exemplars: the range of values is too large, {low:g} to {high:g}")
+        return cls(
+            [_scaled(e[..., :channels], low, high) for e in given],
+            low,
+            high - low,
+            channels,
+            np.min([e[..., :channels].min(axis=(0, 1)) for e in given], axis=0),
+            np.max([e[..., :channels].max(axis=(0, 1)) for e in given], axis=0),
+        )
+
+    def groups(self, strips: int, pixels: int, kind: str) -> list[slice]:
+        """Return the channels that are solved together: all, but one by one where a large picture is one strip."""
+        if strips > 1 or pixels <= STRIP or kind == "normal":
+            return [slice(0, self.channels)]
+        return [slice(c, c + 1) for c in range(self.channels)]
+
+    def correct(self, pixels: Array, correction: Floats, channels: slice, kind: str) -> None:
+        """Add a correction to channels of pixels in the exemplar's own values, in place."""
+        exact = np.dtype("f4" if pixels.dtype.itemsize <= 2 else "f8")
+        for rows in bands_of(len(pixels)):
+            mine = pixels[rows, :, channels]
+            value = mine.astype(exact) + correction[rows].astype(exact) * self.span
+            if kind == "normal":
+                vector = 2 * (value - self.low) / self.span - 1
+                vector /= np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), 1e-12)
+                value = (vector + 1) / 2 * self.span + self.low
+            else:
+                value = np.clip(value, self.least[channels], self.most[channels])
+            mine[...] = np.rint(value) if pixels.dtype.kind in "ui" else value
+
+
+def _scaled(image: Array, low: float, high: float) -> Floats:
+    """Bring ``low`` to ``high`` to [0, 1], a band of rows at a time."""
+    result = np.empty(image.shape, np.float32)
+    for rows in bands_of(len(image)):
+        result[rows] = (image[rows].astype(np.float64) - low) / (high - low)
+    return result
+
+
+def bands_of(rows: int) -> Iterator[slice]:
+    """Divide rows so that what is made of them in float64 stays small."""
+    return (slice(first, min(first + BAND, rows)) for first in range(0, rows, BAND))

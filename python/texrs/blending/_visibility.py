@@ -1,0 +1,113 @@
+"""How visible the seams of a picture are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_image, as_wrap
+from texrs._typing import Array
+from texrs.blending._seams import around, rows_of, seams
+from texrs.blending._values import bands_of
+from texrs.errors import InvalidInput
+from texrs.source_map import SourceMap
+
+__all__ = ["Visibility", "visibility"]
+
+LOOK = 2**22
+"""Pixels whose seams are measured, and four times as many as those of an exemplar that they are compared with."""
+
+
+@dataclass(frozen=True, slots=True)
+class Visibility:
+    """How the differences across seams compare with the exemplar's own.
+
+    Attributes
+    ----------
+    edges : int
+        Pairs of neighbours that a seam parts, of those that were looked at.
+    mean : float
+        Mean difference across seams over the exemplar's mean difference.
+    outliers : float
+        Share of the differences across seams that exceed the 99th percentile of the exemplar's; 0.01 is what the
+        exemplar itself has.
+
+    """
+
+    edges: int
+    mean: float
+    outliers: float
+
+
+def visibility(
+    source: SourceMap, exemplars: Array | Sequence[Array], image: Array, *, wrap: bool | Sequence[bool]
+) -> Visibility:
+    """Measure how visible the seams of a picture are.
+
+    Parameters
+    ----------
+    source : SourceMap
+        Of the picture, shape (H, W).
+    exemplars : array, or a sequence of one an exemplar
+        What the picture was made from.
+    image : (H, W) or (H, W, C) array
+        The picture, corrected or not. Its first three channels count, or the first one of two.
+    wrap : bool or (rows, columns)
+        Axes along which the picture is cyclic.
+
+    Returns
+    -------
+    Visibility
+        All 0 where there is no seam, or where the exemplar is constant.
+
+    Notes
+    -----
+    Of a picture of more than 2^22 pixels, bands of rows spread over it are looked at; of an exemplar of more than 2^20,
+    rows spread over it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs import SourceMap
+    >>> from texrs.blending import visibility
+    >>> visibility(SourceMap.identity((8, 8)), np.eye(8), np.eye(8), wrap=False)
+    Visibility(edges=0, mean=0.0, outliers=0.0)
+
+    """
+    cyclic = as_wrap(wrap)
+    several = [as_image(e, "exemplars") for e in (exemplars if isinstance(exemplars, list | tuple) else [exemplars])]
+    pixels = as_image(image)
+    if pixels.shape[:2] != source.shape:
+        raise InvalidInput(f"image: needs the size of the source map, {source.shape}, got {pixels.shape[:2]}")
+    count = min(3, pixels.shape[-1] - (pixels.shape[-1] == 2))
+    own = np.concatenate([_steps(e[..., :count], axis) for e in several for axis in range(2)])
+    height, width = source.shape
+    across = []
+    for band in list(bands_of(height))[:: -(-height * width // LOOK)]:
+        # With the row after it, for the differences that leave the band.
+        last = min(band.stop + 1, height + cyclic[0])
+        rows = around(band.start, last, height)
+        piece, shown = rows_of(source, rows), pixels[rows, :, :count]
+        for axis in range(2):
+            at, after = seams(piece, axis, axis == 1 and cyclic[1])
+            own_row = at[0] < band.stop - band.start
+            before, beyond = (shown[i[0][own_row], i[1][own_row]].astype(np.float64) for i in (at, after))
+            across.append(np.abs(beyond - before).mean(axis=-1))
+    difference = np.concatenate(across)
+    if not len(difference) or not own.any():
+        return Visibility(len(difference), 0.0, 0.0)
+    outliers = (difference > np.percentile(own, 99)).mean()
+    return Visibility(len(difference), float(difference.mean() / own.mean()), float(outliers))
+
+
+def _steps(image: Array, axis: int) -> NDArray[np.float64]:
+    """Return the sizes of an exemplar's differences along an axis; of rows spread over a large one."""
+    every = -(-image.shape[0] * image.shape[1] // (LOOK // 4))
+    before = image[::every] if axis == 1 else image[:-1:every]
+    after = before[:, 1:] if axis == 1 else image[1::every]
+    before = before[:, :-1] if axis == 1 else before
+    sizes: NDArray[np.float64] = np.abs(after.astype(np.float64) - before).mean(axis=-1).ravel()
+    return sizes

@@ -1,0 +1,373 @@
+"""Holes in a picture filled with patches of what is around them, or of another picture.
+
+J. Shen, X. Jin, X. Mao and J. Feng, "Completion-based texture design using deformation", 2006, section 3.4: patches
+that fit what is known around a hole, each cut into it, and the one with the cheapest cut pasted; here from the rim of
+the hole inwards, where the paper goes in scan order. A verb of its own, for any picture: `texrs.papers.design` fills its
+own holes in the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_float, as_image, as_int, as_mask, as_seed, as_wrap, guidance
+from texrs._typing import Array, Bools, Floats, Progress
+from texrs.blending import blend as blended
+from texrs.completion._optimise import optimised, recovered
+from texrs.errors import InvalidInput
+from texrs.kernels.complete import complete as fill
+from texrs.kernels.patch_search import PatchIndex
+from texrs.papers.design.operations import Flip, flip, flip_coordinates, flip_frame, mirrors
+from texrs.source_map import SourceMap
+from texrs.synthesis import Synthesis
+
+__all__ = ["complete"]
+
+SCALED = np.float32(2.0)
+"""Weight of scales as colours that patches are compared by: elements larger by a half are as far off as black from white."""
+
+LEAST = 4
+"""Side of the smallest patch that still says anything of a texture."""
+PLACES = 64
+"""Places to copy from that a patch should have; where it has fewer, smaller patches are taken."""
+
+
+def complete(
+    image: Array,
+    hole: Array | str,
+    *,
+    source: Array | None = None,
+    scale_map: Array | str | None = None,
+    source_scale_map: Array | str | None = None,
+    method: str = "patch",
+    patch: int | None = None,
+    rim: int = 0,
+    mirror: bool | None = None,
+    blend: float | None = None,
+    wrap: bool | Sequence[bool] = False,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Synthesis:
+    """Fill a hole in a picture by example.
+
+    Parameters
+    ----------
+    image : (H, W) or (H, W, C) array
+        The picture, any real dtype, at least 4 pixels a side. What it holds in the hole does not matter; it may be NaN.
+    hole : (H, W) bool or integers, or "alpha"
+        True, or not zero, where the picture is to be filled; "alpha": where its last channel of two or four is 0.
+    source : (h, w) or (h, w, C) array, optional
+        Another picture to copy from, of the same dtype and channels; by default what is known of ``image``.
+    scale_map : {None, "auto"} or (H, W) float array, optional
+        For pictures taken at an angle: how large the elements are at each pixel (`texrs.scale_maps`), so that the hole is filled
+        with elements of the size that belongs there [2]_. "auto" measures it. In the hole it may be NaN; it is continued.
+    source_scale_map : {None, "auto"} or (h, w) float array, optional
+        How large they are in ``source``, in the units of ``scale_map``. None: 1 everywhere, as in a picture taken from the
+        front; measured maps have a geometric mean of 1.
+    method : {"patch", "optimise"}
+        How: "patch", patches that fit what is around, cut in [1]_; "optimise", windows corrected until each is like one of the
+        picture, or of ``source``, resized where there is a scale map [2]_: for large holes, where patches would repeat what
+        is around.
+    patch : int, optional
+        Side of a patch in pixels, at least 4: about the size of what repeats. By default a sixth of the shorter side,
+        12 to 32; less where no place, or few, would be free of holes.
+    rim : int
+        Pixels around the hole that patches may replace too, 0 to 1024, so that the cut can run where it shows least. 0
+        leaves all that is known as it is.
+    mirror : bool, optional
+        Whether patches may be mirrored; False for lit or lettered textures. By default they may unless there is a scale map:
+        what is seen at an angle has an upper side.
+    blend : float, optional
+        Weight of the values when colours of what is filled are corrected so that seams disappear: the smaller, the wider the
+        correction; 0.003 is good for the picture's own colours, less where a ``source`` has other light. None or 0: no
+        correction. See `texrs.blending.blend`, which corrects other maps in the same way, ``within`` the hole.
+    wrap : bool or (rows, columns)
+        Axes along which the picture is cyclic, so that a hole at its border is also filled from across.
+    seed : int
+        Chooses patches where nothing is known around.
+    progress : callable, optional
+        Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
+
+    Returns
+    -------
+    Synthesis
+        The filled image, in the dtype and with the channels of the picture. Its source map looks into the picture, or
+        into ``[image, source]``; pixels that are kept map to themselves, and none maps into the hole. To render a
+        picture that is NaN in the hole through it, put any number there. The stages are ``"known"``, ``"patches"``
+        (each in a shade of its own) and ``"composite"``, the result before ``blend``.
+
+    Raises
+    ------
+    InvalidInput
+        A hole of another shape; a source of another dtype or other channels; nothing known to copy from; a patch larger
+        than the pictures, or with no place for it outside the hole.
+
+    References
+    ----------
+    .. [1] J. Shen, X. Jin, X. Mao, J. Feng, "Completion-based texture design using deformation", The Visual Computer
+       22, 2006, section 3.4. :doi:`10.1007/s00371-006-0040-9`
+    .. [2] W. Dong, N. Zhou, J.-C. Paul, "Perspective-aware texture analysis and synthesis", The Visual Computer 24,
+       2008. :doi:`10.1007/s00371-008-0232-1`
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import texrs
+    >>> wall = np.tile(np.uint8([[0, 0, 9, 9], [9, 9, 0, 0]]), (24, 12))
+    >>> hole = np.zeros(wall.shape, bool)
+    >>> hole[10:25, 12:30] = True
+    >>> result = texrs.complete(np.where(hole, 5, wall).astype(np.uint8), hole)
+    >>> bool((result.image == wall).all())
+    True
+
+    """
+    if method not in ("patch", "optimise"):
+        raise InvalidInput(f"method: allowed are 'patch' and 'optimise', got {method!r}")
+    if source_scale_map is not None and (source is None or scale_map is None):
+        raise InvalidInput("source_scale_map: needs a source, and a scale_map whose units it shares")
+    mirror = scale_map is None if mirror is None else mirror
+    if not isinstance(mirror, bool | np.bool_):
+        raise InvalidInput(f"mirror: needs True or False, got {mirror!r}")
+    screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
+    pictures, open_ = check_pictures(
+        image, transparent(image) if isinstance(hole, str) and hole == "alpha" else hole, source
+    )
+    shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
+    cyclic, seed = as_wrap(wrap), as_seed(seed)
+    width = as_int(rim, "rim", 0, 1024)
+    chosen = None if patch is None else as_int(patch, "patch", LEAST, min(n for shape in shapes for n in shape))
+    watch = progress or (lambda stage, share: None)
+
+    watch("complete", 0.0)
+    places, side, count = untouched(shapes), 0, 0
+    scales = scales_of(pictures, open_, scale_map, source_scale_map) if open_.any() else None
+    levels: list[dict[str, object]] = []
+    if open_.any() and method == "optimise":
+        places, levels = optimised(pictures, open_, scales, wrap=(cyclic[0], cyclic[1]), seed=seed, progress=progress)
+        count = int(places.label.max())
+    elif open_.any():
+        keep = ~grown(open_, width, cyclic)
+        places, side, count = patched(
+            pictures, open_, scales, chosen, keep, mirror=bool(mirror), wrap=cyclic, seed=seed, watch=watch
+        )
+    new = _where(places.label)
+    # What is kept maps to itself; of patches every coordinate is whole.
+    result = pictures[0].copy()
+    if method == "optimise":
+        result[new] = places.render(pictures, interpolation="cubic")[new]
+    else:
+        row, column = places.coordinates[new].astype(np.intp).T
+        result[new] = pictures[-1][row, column]
+    composite = result
+    if screening and count:
+        known = [~open_, *(np.ones(s, bool) for s in shapes[1:])]
+        replaced = places.label > 0
+        result = blended(
+            places, pictures, wrap=cyclic, screening=screening, within=replaced, known=known, progress=progress
+        )
+    watch("done", 1.0)
+    bare = pictures[0].copy()
+    # The hole is painted over with a known pixel, which does not change the least value.
+    bare[open_] = bare.min() if count and not open_.all() else 0
+    shades = np.zeros(open_.shape, np.uint8)
+    shades[new] = 55 + places.label[new] * 67 % 200
+    stages = {"known": bare, "patches": shades, "composite": composite}
+    report = {
+        "method": method,
+        "seed": seed,
+        "hole": float(open_.mean()),
+        "scaled": scale_map is not None,
+        "replaced_outside": int(np.count_nonzero(~open_[new])),
+        "patch": side,
+        "patches": count,
+        "mirror": bool(mirror),
+        "blend": screening,
+        "wrap": list(cyclic),
+    }
+    if method == "optimise":
+        report["levels"] = levels
+    return Synthesis(result, places, stages, report)
+
+
+def transparent(image: object) -> Bools:
+    """Return what is wholly transparent in a picture as its hole."""
+    pixels = np.asarray(image)
+    if pixels.ndim != 3 or pixels.shape[2] not in (2, 4):
+        raise InvalidInput(
+            f"hole: 'alpha' needs an image with an alpha channel, got shape {pixels.shape}; or give a mask"
+        )
+    hole: Bools = pixels[..., -1] == 0
+    if not hole.any():
+        raise InvalidInput("hole: nothing in the image is wholly transparent, so there is nothing to fill")
+    return hole
+
+
+def scales_of(pictures: Sequence[Array], open_: Bools, own: object, of_source: object) -> list[Floats] | None:
+    """Return the scale maps of the picture and of its source, if scales count."""
+    scale = recovered(pictures[0], open_, own)
+    if scale is None or len(pictures) == 1:
+        return None if scale is None else [scale]
+    shape = (pictures[1].shape[0], pictures[1].shape[1])
+    other = recovered(pictures[1], np.zeros(shape, bool), of_source, "source_scale_map")
+    return [scale, np.ones(shape, np.float32) if other is None else other]
+
+
+def check_pictures(image: object, hole: object, source: object | None) -> tuple[list[Array], Bools]:
+    """Return the picture with its hole painted over, the source if there is one, and the hole."""
+    array = np.asarray(image)
+    mask = None
+    if array.ndim in (2, 3) and array.dtype.kind in "buif" and array.size:
+        mask = as_mask(hole, "hole", array.shape[:2])
+        # What is in the hole must not matter, not even to the range of the values.
+        array = array.copy()
+        first = np.unravel_index(mask.argmin(), mask.shape)
+        array[mask] = array[first] if not mask[first] else 0
+    pixels = as_image(array, "image", minimum=LEAST)
+    mask = as_mask(hole, "hole", pixels.shape[:2]) if mask is None else mask
+    if source is None:
+        if mask.all():
+            raise InvalidInput("hole: covers the whole image, so there is nothing to copy from; give a source")
+        return [pixels.reshape(array.shape)], mask
+    other = as_image(source, "source", minimum=LEAST)
+    if other.dtype != pixels.dtype or other.shape[-1] != pixels.shape[-1]:
+        raise InvalidInput(
+            f"source: needs the dtype and channels of the image, {pixels.dtype} and {pixels.shape[-1]}; "
+            f"got {other.dtype} and {other.shape[-1]}"
+        )
+    if mask.all():
+        pixels[...] = other[0, 0]
+    return [pixels.reshape(array.shape), other.reshape(other.shape[: array.ndim])], mask
+
+
+def untouched(shapes: tuple[tuple[int, ...], ...]) -> SourceMap:
+    """Return the source map of a picture of which nothing is replaced yet."""
+    identity = SourceMap.identity(shapes[0])
+    return SourceMap(identity.coordinates, identity.exemplar, identity.label, None, shapes)
+
+
+def patched(
+    pictures: Sequence[Array],
+    open_: Bools,
+    scales: Sequence[Floats] | None,
+    chosen: int | None,
+    keep: Bools,
+    *,
+    mirror: bool,
+    wrap: Sequence[bool],
+    seed: int,
+    watch: Progress,
+) -> tuple[SourceMap, int, int]:
+    """Fill a hole with patches, and give the source map, the side of the patches and how many there are."""
+    guides = guides_of(pictures)
+    if scales is not None:
+        pairs = zip(guides, scales, strict=True)
+        guides = [np.concatenate([g, SCALED * np.log(s)[..., np.newaxis]], axis=-1) for g, s in pairs]
+    shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
+    flips = mirrors(mirror)
+    itself = len(pictures) == 1
+    free = ~open_ if itself else np.ones(shapes[-1], bool)
+    side = patch_side(free, chosen, min(n for shape in shapes for n in shape))
+    index = PatchIndex(
+        [flip(guides[-1], f) for f in flips],
+        allowed=[corners(flip(free, f), side) for f in flips],
+        max_patch=side,
+    )
+    filled = fill(
+        guides[0],
+        ~open_,
+        index,
+        patch=side,
+        keep=keep,
+        wrap=wrap,
+        seed=seed,
+        shown=0 if itself else None,
+        progress=lambda share: watch("complete", share),
+    )
+    places = pasted(untouched(shapes), filled.label, filled.source, filled.coordinates, flips)
+    return places, side, len(filled.source)
+
+
+def guides_of(pictures: Sequence[Array]) -> list[Floats]:
+    """Return the colours that patches are compared by, brought to [0, 1] together."""
+    pixels = [as_image(p) for p in pictures]
+    if len(pixels) == 1:
+        return [guidance(pixels[0])]
+    lines = guidance(np.concatenate([p.reshape(1, -1, p.shape[-1]) for p in pixels], axis=1))
+    found, start = [], 0
+    for p in pixels:
+        count = p.shape[0] * p.shape[1]
+        found.append(np.ascontiguousarray(lines[0, start : start + count].reshape(*p.shape[:2], -1)))
+        start += count
+    return found
+
+
+def patch_side(free: Bools, chosen: int | None, largest: int) -> int:
+    """Return the side of the patches: the one asked for, or the usual one, smaller where few places are free for it."""
+    if chosen is not None:
+        if not corners(free, chosen).any():
+            fits = next((s for s in range(chosen - 1, LEAST - 1, -1) if corners(free, s).any()), None)
+            hint = f"at most {fits} has one" if fits else "nor has any other; give a source"
+            raise InvalidInput(f"patch: {chosen} has no place in the image that is free of holes; {hint}")
+        return chosen
+    usual = min(largest, max(12, min(32, min(free.shape) // 6)))
+    for side in range(usual, LEAST - 1, -1):
+        if np.count_nonzero(corners(free, side)) >= PLACES:
+            return side
+    if not corners(free, LEAST).any():
+        raise InvalidInput(f"hole: leaves no {LEAST} x {LEAST} pixels in one piece to copy from; give a source")
+    return LEAST
+
+
+def corners(free: Bools, side: int) -> Bools:
+    """Mark the top-left corners of the patches that are free of holes."""
+    found = np.zeros(free.shape, bool)
+    whole, width = free, 1
+    while width < side:
+        # Two overlapping squares of `width` make one that is larger by `step`.
+        step = min(width, side - width)
+        whole = whole[step:] & whole[:-step]
+        whole = whole[:, step:] & whole[:, :-step]
+        width += step
+    found[: whole.shape[0], : whole.shape[1]] = whole
+    return found
+
+
+def grown(mask: Bools, width: int, wrap: Sequence[bool]) -> Bools:
+    """Widen a mask by so many pixels, around the edges of axes that wrap."""
+    if not width:
+        return mask
+    from scipy.ndimage import maximum_filter1d
+
+    for axis, cyclic in enumerate(wrap):
+        reach = min(width, mask.shape[axis])
+        mask = maximum_filter1d(mask, 2 * reach + 1, axis, mode="wrap" if cyclic else "nearest")
+    return mask
+
+
+def _where(marked: Array) -> tuple[NDArray[np.intp], ...]:
+    """Return the places of what is not zero, as `np.nonzero`, which looks at each axis apart, in a tenth of its time."""
+    return np.unravel_index(np.flatnonzero(marked), marked.shape)
+
+
+def pasted(
+    kept: SourceMap,
+    label: NDArray[np.int32],
+    origin: NDArray[np.int64],
+    coordinates: Floats,
+    flips: Sequence[Flip],
+) -> SourceMap:
+    """Return the map of a picture in which patches are pasted: those of the last exemplar, each in one of its mirrors."""
+    new = _where(label >= 0)
+    places, exemplar = kept.coordinates.copy(), kept.exemplar.copy()
+    which, found = origin[label[new]], coordinates[new]
+    rows, columns = kept.shapes[-1]
+    for number, mirror in enumerate(flips):
+        here = which == number
+        found[here] = flip_coordinates(found[here], mirror, (rows, columns))
+    places[new] = found
+    exemplar[new] = len(kept.shapes) - 1
+    frames = np.stack([np.eye(2, dtype=np.float32), *(flip_frame(flips[o]) for o in origin)])
+    return SourceMap(places, exemplar, (label + 1).astype(np.uint32), frames, kept.shapes)

@@ -1,0 +1,168 @@
+"""Holes filled by optimisation: windows that fit what is around them, with elements of the size that belongs there.
+
+W. Dong, N. Zhou and J.-C. Paul, "Perspective-aware texture analysis and synthesis", 2008: the scale is recovered from what
+is known, continued into the hole, and the hole synthesised with the rest as the exemplar.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from texrs import scale_maps
+from texrs._arrays import as_image
+from texrs._engine.pyramid import Region
+from texrs._typing import Array, Bools, Floats, Progress
+from texrs.errors import InvalidInput
+from texrs.growth import LEAST, RADIUS, Settings, Supply, levels_of, reaching
+from texrs.scale_maps._maps import as_map
+from texrs.source_map import SourceMap
+
+SETTINGS = Settings(passes=(24, 12, 6), hysteresis=1.0, unity=0.3, continuation=0.0, repetition=0.1, exhaustive=True)
+"""What goes on across a hole counts more than that nothing rare is lost, and a copy of what is beside it is no fault."""
+
+__all__ = ["optimised", "recovered"]
+
+AROUND = 12
+"""Points of the coarsest level around a hole that are looked at with it."""
+SIZES = (1.0, 0.8, 1.25)
+"""Sizes of the copies that are copied from where scales count; more where what is wanted lies beyond them."""
+NOWHERE = 1e6
+"""Scale of what is not to be copied: none that is ever wanted."""
+
+
+def recovered(picture: Array, open_: Bools, given: object, name: str = "scale_map") -> Floats | None:
+    """Return the scale map of a picture with holes: measured, or given, and continued into the holes where it is not."""
+    if given is None:
+        return None
+    known = ~open_
+    if isinstance(given, str):
+        if given != "auto":
+            raise InvalidInput(f"{name}: allowed are 'auto', a map or None; got {given!r}")
+        if not known.any():
+            raise InvalidInput(f"{name}: 'auto' measures what is known, and the hole covers everything; give a map")
+        features = scale_maps.auto_mask(picture, known=known)
+        return scale_maps.from_mask(features, trend="plane", known=known)
+    scale = np.asarray(given)
+    if scale.shape == open_.shape and scale.dtype.kind == "f":
+        # Where there is a hole, a map may have one too.
+        with np.errstate(invalid="ignore"):
+            bad = open_ & ~(np.isfinite(scale) & (scale > 0))
+        if bad.any() and not bad.all():
+            return scale_maps.extend(scale, ~bad)
+    return as_map(scale, name, open_.shape)
+
+
+def optimised(
+    pictures: list[Array],
+    open_: Bools,
+    scales: list[Floats] | None,
+    *,
+    wrap: tuple[bool, bool],
+    seed: int,
+    progress: Progress | None,
+) -> tuple[SourceMap, list[dict[str, object]]]:
+    """Return the source map of a picture whose holes are filled, from itself or from a second one, and what each level did."""
+    shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
+    for name, shape in zip(("image", "source"), shapes, strict=False):
+        if min(shape) < LEAST:
+            raise InvalidInput(f"{name}: method 'optimise' needs at least {LEAST} pixels a side, got {shape}")
+    count = min(levels_of(shape, SETTINGS) for shape in shapes)
+    # Windows may not leave a copy, but those of known pixels at the border do.
+    margin = RADIUS << (count - 1)
+    ground, free, scale = _ground(pictures, open_, scales, margin)
+    sizes: tuple[float, ...] = (1.0,)
+    wanted: tuple[float, float] | None = None
+    if scales is not None:
+        asked = scales[0][open_]
+        wanted = (float(asked.min()), float(asked.max()))
+        sizes = SIZES if len(pictures) == 1 else reaching(SIZES, scales[1], wanted)
+    supply = Supply.of(
+        ground,
+        scale,
+        sizes,
+        wanted=wanted,
+        known=free,
+        levels=count,
+        settings=SETTINGS,
+    )
+    if not supply.free:
+        why = (
+            "hole: leaves no part of the image that is free"
+            if len(pictures) == 1
+            else "source: has no part large enough"
+        )
+        raise InvalidInput(f"{why} to copy from; method='patch' may find one")
+    box = around(open_, AROUND << (count - 1), 1 << (count - 1), wrap)
+    part = (slice(box[0], box[1]), slice(box[2], box[3]))
+    size = (box[1] - box[0], box[3] - box[2])
+    closed = tuple(w and n == m for w, n, m in zip(wrap, size, open_.shape, strict=True))
+    row, column = np.mgrid[part]
+    given: NDArray[np.int32] = (
+        np.stack([row, column], axis=-1).astype(np.int32) + np.array(supply.copies[0].origin, np.int32) + margin
+    )
+    grown = supply.grow(
+        Region(size, (box[0], box[2]), (closed[0], closed[1])),
+        None if scales is None else np.ascontiguousarray(scales[0][part]),
+        held=(~open_[part], given),
+        seed=seed,
+        progress=progress,
+    )
+    which, at = supply.locate(grown.places)
+    here = open_[part]
+    which, at = which.reshape(size)[here], at.reshape(*size, 2)[here]
+    identity = SourceMap.identity(shapes[0])
+    coordinates, label, exemplar = identity.coordinates.copy(), identity.label.copy(), identity.exemplar.copy()
+    coordinates[part][here] = at - (margin if len(pictures) == 1 else (shapes[0][0] + 2 * margin, 0))
+    label[part][here] = which + 1
+    exemplar[part][here] = len(pictures) - 1
+    frames = [np.eye(2), *(np.diag([1 / f for f in c.factor]) for c in supply.copies)]
+    frame = np.array(frames, np.float32) if len(supply.copies) > 1 else None
+    return SourceMap(coordinates, exemplar, label, frame, shapes), grown.report
+
+
+def _ground(
+    pictures: list[Array], open_: Bools, scales: list[Floats] | None, margin: int
+) -> tuple[Array, Bools, Floats | None]:
+    """Return the picture, with a source below it, what of them may be copied, and their scales.
+
+    Beside a source the picture is there for what is around the hole to look like, and nothing is copied from it.
+    """
+    wide = ((margin, margin), (margin, margin))
+    image = np.pad(_painted(as_image(pictures[0]), open_), (*wide, (0, 0)), mode="symmetric")
+    if len(pictures) == 1:
+        scale = None if scales is None else np.pad(scales[0], wide, mode="edge")
+        return image, np.pad(~open_, wide), scale
+    source = as_image(pictures[1])
+    columns = max(image.shape[1], source.shape[1])
+    parts = [np.pad(p, ((0, 0), (0, columns - p.shape[1]), (0, 0)), mode="symmetric") for p in (image, source)]
+    free = np.zeros((len(image) + len(source), columns), bool)
+    free[len(image) :, : source.shape[1]] = True
+    if scales is None:
+        return np.concatenate(parts), free, None
+    scale = np.full(free.shape, NOWHERE, np.float32)
+    scale[len(image) :, : source.shape[1]] = scales[1]
+    return np.concatenate(parts), free, scale
+
+
+def around(open_: Bools, margin: int, step: int, wrap: tuple[bool, bool]) -> tuple[int, int, int, int]:
+    """Return the part of a picture that a filling looks at: rows from, to, columns from, to; all of an axis that wraps."""
+    found: list[int] = []
+    for axis, closed in enumerate(wrap):
+        n = open_.shape[axis]
+        at = np.nonzero(open_.any(axis=1 - axis))[0]
+        low, high = int(at[0]) - margin, int(at[-1]) + 1 + margin
+        if closed or high - low >= n:
+            low, high = 0, n
+        found += [max(0, low) // step * step, min(n, -(-high // step) * step)]
+    return found[0], found[1], found[2], found[3]
+
+
+def _painted(image: Array, open_: Bools) -> Array:
+    """Paint over holes with the nearest known colours, which is what windows at their rim see."""
+    nearest: Any = ndimage.distance_transform_edt(open_, return_distances=False, return_indices=True)
+    painted: Array = image[tuple(nearest)]
+    return painted

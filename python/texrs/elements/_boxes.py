@@ -1,0 +1,118 @@
+"""Boxes that may hold an element: round things of every size, pieces of a segmentation, cells of a lattice."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from texrs._typing import Floats
+from texrs.elements._given import LEAST, Box
+from texrs.elements._mask import lab, odd
+from texrs.exemplar.regularity import lattice
+from texrs.exemplar.segmentation import segment
+
+__all__ = ["proposed", "resized"]
+
+SIGMAS = (2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)
+"""Standard deviations under which blobs are looked for there, in pixels."""
+A_KIND, PIECES = 3, 6
+"""Boxes tried for each size of blobs, and of pieces."""
+BLOB = 2.6
+"""Side of the box around a blob over the standard deviation of its Gaussian; a disc's diameter is 2.83 of it."""
+LARGEST = 0.34
+"""Longest side of a box as a share of the image's: three must fit."""
+
+
+def proposed(small: Floats) -> list[Box]:
+    """List boxes worth trying, none twice."""
+    size = (small.shape[0], small.shape[1])
+    found: list[tuple[float, float, float, float]] = [*_blobs(small), *_pieces(small), *_periods(small)]
+    kept: dict[tuple[int, ...], Box] = {}
+    for row, column, height, width in found:
+        if min(height, width) < LEAST + 2 or height > LARGEST * size[0] or width > LARGEST * size[1]:
+            continue
+        centre = (int(np.floor(row + 0.5)), int(np.floor(column + 0.5)))
+        sides = (odd(height), odd(width))
+        if all(sides[a] // 2 <= centre[a] < size[a] - sides[a] // 2 for a in range(2)):
+            kept[(*centre, *sides)] = Box(centre, sides)
+    return list(kept.values())
+
+
+def _blobs(small: Floats) -> list[tuple[float, float, float, float]]:
+    """Find round things: tops of the normalised Laplacian in scale and space (Lindeberg 1998)."""
+    from scipy.ndimage import gaussian_laplace, maximum_filter
+
+    light = lab(small)[..., 0]
+    stack = np.stack([-(s * s) * gaussian_laplace(light, s, mode="nearest") for s in SIGMAS])
+    found = []
+    for sign in (1.0, -1.0):
+        signed = sign * stack
+        for k, sigma in enumerate(SIGMAS):
+            near = signed[max(0, k - 1) : k + 2].max(axis=0)
+            margin = int(BLOB * sigma / 2) + 1
+            top = (maximum_filter(near, 2 * int(sigma) + 1) == signed[k]) & (signed[k] > 0.01)
+            inner = np.zeros_like(top)
+            inner[margin:-margin, margin:-margin] = True
+            places = np.argwhere(top & inner)
+            if len(places) < 3:
+                continue
+            values = signed[k][tuple(places.T)]
+            # Those of usual strength: the strongest are often something else.
+            order = np.lexsort((places[:, 1], places[:, 0], np.abs(values - np.quantile(values, 0.7))))
+            found += [(float(r), float(c), BLOB * sigma, BLOB * sigma) for r, c in places[order[:A_KIND]]]
+    return found
+
+
+def _pieces(small: Floats) -> list[tuple[float, float, float, float]]:
+    """Take pieces of a segmentation by colour, of the usual size."""
+    from skimage.measure import regionprops
+
+    elements = segment(small, children="components").elements
+    rows, columns = elements.shape
+    inner = [
+        r for r in regionprops(elements) if r.bbox[0] > 0 and r.bbox[1] > 0 and r.bbox[2] < rows and r.bbox[3] < columns
+    ]
+    if len(inner) < 3:
+        return []
+    usual = float(np.median([r.area for r in inner]))
+    inner.sort(key=lambda r: (abs(float(np.log(r.area / usual))), r.label))
+    sides = [np.median([r.bbox[a + 2] - r.bbox[a] for r in inner[: max(3, len(inner) // 2)]]) for a in range(2)]
+    found = []
+    for r in inner[:PIECES]:
+        middle = [(r.bbox[a] + r.bbox[a + 2] - 1) / 2 for a in range(2)]
+        found.append((middle[0], middle[1], float(r.bbox[2] - r.bbox[0]), float(r.bbox[3] - r.bbox[1])))
+        found.append((middle[0], middle[1], float(sides[0]), float(sides[1])))
+    return found
+
+
+def _periods(small: Floats) -> list[tuple[float, float, float, float]]:
+    """Take the cell of the lattice that the image repeats on, at its evenest places."""
+    from scipy.ndimage import gaussian_gradient_magnitude, uniform_filter
+
+    regular = lattice(small)
+    if regular is None:
+        return []
+    sides = [max(abs(regular.a[axis]), abs(regular.b[axis])) * 0.8 for axis in range(2)]
+    edges = gaussian_gradient_magnitude(small.mean(axis=-1), 1.0)
+    found = []
+    for share in (1.0, 0.5):
+        height, width = (max(5.0, share * s) for s in sides)
+        even = uniform_filter(edges, (odd(height * 0.7), odd(width * 0.7)))
+        rows, columns = (int(s / 2) + 1 for s in (height, width))
+        inner = even[rows:-rows, columns:-columns]
+        if not inner.size:
+            continue
+        for place in np.argsort(inner, axis=None, kind="stable")[:: max(1, inner.size // 3)][:2]:
+            row, column = np.unravel_index(int(place), inner.shape)
+            found.append((float(row + rows), float(column + columns), height, width))
+    return found
+
+
+def resized(box: Box, size: tuple[int, ...]) -> list[Box]:
+    """List the boxes with one side a third longer or shorter, or both, that fit."""
+    found = []
+    for tall, wide in ((1.35, 1), (1, 1.35), (0.74, 1), (1, 0.74), (1.35, 1.35), (0.74, 0.74)):
+        sides = (odd(box.size[0] * tall + 0.5), odd(box.size[1] * wide + 0.5))
+        fits = all(sides[a] // 2 <= box.centre[a] < size[a] - sides[a] // 2 for a in range(2))
+        if fits and min(sides) >= LEAST + 2 and all(sides[a] <= LARGEST * size[a] for a in range(2)):
+            found.append(Box(box.centre, sides))
+    return found

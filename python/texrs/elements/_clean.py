@@ -1,0 +1,187 @@
+"""Detections and mask made to agree, for separate elements (section 3.3, and what it leaves open)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Bools, Floats, Labels
+from texrs.elements._mask import Wrap, ellipse, stamp
+
+__all__ = ["Cleaned", "add_missing", "clean", "components"]
+
+ADDED = 0.25
+"""Least area of a component that is taken for an element that was not found, as a share of the usual one's."""
+SOLID, ROUND = 0.8, 0.9
+"""Share of its convex hull that an element fills at least, and from which on several detections are of one element."""
+SWOLLEN, ONE = 2.5, 3.5
+"""How many times the usual area a component has at most for each detection in it, and for several to be of one element."""
+LONG, THIN = 2.2, 0.6
+"""Length and mean thickness of a component, over the sides of the box, beyond which it is no element."""
+HEAP = 0.3
+"""Largest share of the detections that may lie in one component."""
+JOINED, MESHED = 0.5, 0.25
+"""Least share of the usual area of a piece that is taken for an element between joints, and for a mesh of a net."""
+TRUSTED = 0.7
+"""Share of the detections that must lie in such components, else the mask is at fault."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cleaned:
+    """Points, their scores, which detection each was (-1 for none), and the mask."""
+
+    points: NDArray[np.float64]
+    scores: NDArray[np.float64]
+    origin: NDArray[np.intp]
+    mask: Bools
+    source: str
+    """Where the mask is from: "cut", or "elements", copies of the chosen one."""
+
+
+def components(mask: Bools, wrap: Wrap) -> tuple[Labels, int]:
+    """Return numbers to the pieces of a mask, around cyclic axes too."""
+    from scipy.ndimage import label
+
+    pieces, count = label(mask)
+    into = np.arange(count + 1)
+    for axis in range(2):
+        if wrap[axis]:
+            ends = np.take(pieces, 0, axis), np.take(pieces, -1, axis)
+            for a, b in sorted(set(zip(*(e.tolist() for e in ends), strict=True))):
+                if a and b:
+                    low, high = sorted((int(into[a]), int(into[b])))
+                    into[into == high] = low
+    names, dense = np.unique(into, return_inverse=True)
+    return dense[pieces].astype(np.int32), len(names) - 1
+
+
+def clean(
+    mask: Bools,
+    points: NDArray[np.float64],
+    scores: NDArray[np.float64],
+    map: Floats,
+    shape: Bools,
+    wrap: Wrap,
+    *,
+    certain: bool = False,
+) -> Cleaned:
+    """Move detections into the middle of their components, add and drop some, or make the mask of copies.
+
+    ``shape`` is the chosen element's foreground within its box. A mask that is ``certain`` is never replaced.
+    """
+    from skimage.measure import regionprops
+
+    pieces, count = components(mask, wrap)
+    at = np.clip(np.rint(points).astype(np.intp), 0, np.array(mask.shape) - 1)
+    owner = pieces[tuple(at.T)]
+    regions = {r.label: r for r in regionprops(pieces)}
+    area, solid = np.zeros(count + 1), np.zeros(count + 1)
+    for number, region in regions.items():
+        area[number], solid[number] = region.area, region.solidity
+    inside = np.bincount(owner, minlength=count + 1)
+    inside[0] = 0
+    usual = float(np.median(area[inside == 1])) if (inside == 1).any() else float(shape.sum())
+    usual = float(np.clip(usual, shape.sum() / 4, shape.size * 1.5))
+    good = (area >= ADDED * usual) & (area <= SWOLLEN * usual * np.maximum(inside, 1)) & (solid >= SOLID)
+    good[0] = False
+    several = (inside > 1) & (area <= SWOLLEN * usual * inside) & (area >= ADDED * usual)
+    # A piece that holds much of the texture is no heap of elements.
+    several &= inside <= max(4, HEAP * len(points))
+    good &= inside <= max(4, HEAP * len(points))
+    share = float((good | several)[owner].mean()) if len(points) else 0.0
+    if share < TRUSTED and not certain:
+        copies = np.zeros(mask.shape, bool)
+        stamp(copies, points, shape if shape.any() else ellipse((shape.shape[0], shape.shape[1])), wrap)
+        return Cleaned(points, scores, np.arange(len(points)), copies, "elements")
+    kept: list[tuple[float, float, float, int]] = []
+    for number, region in regions.items():
+        mine = np.flatnonzero(owner == number)
+        centre = _centre(region.coords, mask.shape, wrap)
+        if not certain and not any(wrap) and _is_strip(region.bbox, region.area, shape.shape):
+            continue
+        whole = solid[number] >= ROUND and area[number] <= ONE * usual
+        if len(mine) > 1 and not whole:
+            kept.extend((*points[i], scores[i], int(i)) for i in mine)
+        elif len(mine):
+            best = int(mine[np.argmax(scores[mine])])
+            # What is much larger than an element, or ragged, has no middle to speak of.
+            place = centre if good[number] or whole else points[best]
+            kept.append((*place, scores[best], best))
+        elif good[number] or certain:
+            place = np.clip(np.rint(centre).astype(np.intp), 0, np.array(mask.shape) - 1)
+            kept.append((*centre, float(map[tuple(place)]), -1))
+    kept.sort(key=lambda p: (-p[2], p[0], p[1]))
+    table = np.array(kept, np.float64).reshape(-1, 4)
+    names = {int(pieces[tuple(np.clip(np.rint(p[:2]).astype(int), 0, np.array(mask.shape) - 1))]) for p in table}
+    used = np.isin(pieces, sorted(names - {0}))
+    # What the border cuts may be no element, but is no ground either.
+    rim = [np.take(pieces, side, axis) for axis in range(2) if not wrap[axis] for side in (0, -1)]
+    cut = np.unique(np.concatenate(rim)) if rim else np.zeros(0, np.intp)
+    cut = cut[(cut > 0) & (area[cut] >= ADDED * usual) & (area[cut] <= SWOLLEN * usual)]
+    left: Bools = mask & (used | np.isin(pieces, cut))
+    return Cleaned(table[:, :2].copy(), table[:, 2].copy(), table[:, 3].astype(np.intp), left, "cut")
+
+
+def _is_strip(bounds: tuple[int, ...], area: float, box: tuple[int, ...]) -> bool:
+    """Return whether a component is much longer than an element and much thinner: a rim along the border, mostly."""
+    side = max(bounds[axis + 2] - bounds[axis] for axis in range(2))
+    return side > LONG * max(box) and area / side < THIN * min(box)
+
+
+def add_missing(found: Cleaned, map: Floats, wrap: Wrap, *, joints: bool) -> Cleaned:
+    """Add the elements between joints, or the meshes of a net, that look like those that were found.
+
+    A piece counts that is whole, as solid as an element, and of about the usual area. Of detections between joints those
+    are dropped that lie on what is far too small.
+    """
+    from skimage.measure import regionprops
+
+    size, least = found.mask.shape, JOINED if joints else MESHED
+    pieces, count = components(found.mask if joints else ~found.mask, wrap)
+    at = np.clip(np.rint(found.points).astype(np.intp), 0, np.array(size) - 1)
+    inside = np.bincount(pieces[tuple(at.T)], minlength=count + 1)
+    inside[0] = 0
+    areas = np.bincount(pieces.ravel(), minlength=count + 1)
+    if not (inside == 1).any():
+        return found
+    usual = float(np.median(areas[inside == 1]))
+    if joints:
+        found = _without_bits(found, pieces, areas, usual)
+    new = []
+    for region in regionprops(pieces):
+        cut = any(not wrap[a] and (region.bbox[a] == 0 or region.bbox[a + 2] == size[a]) for a in range(2))
+        fits = least * usual <= region.area <= SWOLLEN * usual
+        if inside[region.label] or cut or not fits or region.solidity < SOLID:
+            continue
+        centre = _centre(region.coords, size, wrap)
+        place = np.clip(np.rint(centre).astype(np.intp), 0, np.array(size) - 1)
+        new.append((*centre, float(map[tuple(place)]), -1.0))
+    if not new:
+        return found
+    table = np.concatenate([np.column_stack([found.points, found.scores, found.origin]), np.array(new)])
+    table = table[np.lexsort((table[:, 1], table[:, 0], -table[:, 2]))]
+    origin = table[:, 3].astype(np.intp)
+    return Cleaned(table[:, :2].copy(), table[:, 2].copy(), origin, found.mask, found.source)
+
+
+def _without_bits(found: Cleaned, pieces: Labels, areas: NDArray[np.intp], usual: float) -> Cleaned:
+    at = np.clip(np.rint(found.points).astype(np.intp), 0, np.array(pieces.shape) - 1)
+    owner = pieces[tuple(at.T)]
+    bits = (owner > 0) & (areas[owner] < ADDED * usual)
+    if not bits.any() or bits.mean() > 1 - TRUSTED:
+        return found
+    mask = found.mask & ~np.isin(pieces, owner[bits])
+    return Cleaned(found.points[~bits], found.scores[~bits], found.origin[~bits], mask, found.source)
+
+
+def _centre(pixels: NDArray[np.intp], shape: tuple[int, ...], wrap: Wrap) -> NDArray[np.float64]:
+    """Return the centroid of pixels, around cyclic axes that of their angles."""
+    centre = pixels.mean(axis=0)
+    for axis in range(2):
+        side = shape[axis]
+        if wrap[axis] and np.ptp(pixels[:, axis]) == side - 1:
+            turn = 2 * np.pi * pixels[:, axis] / side
+            centre[axis] = np.arctan2(np.sin(turn).mean(), np.cos(turn).mean()) % (2 * np.pi) * side / (2 * np.pi)
+    return np.asarray(centre, np.float64)

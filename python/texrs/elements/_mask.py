@@ -1,0 +1,216 @@
+"""What belongs to the elements (section 3.3): a graph cut between the colours of foreground and background."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._engine.noise import uniform
+from texrs._typing import Bools, Floats
+from texrs.elements._elements import Tag
+from texrs.elements._mixture import Mixture
+from texrs.kernels.seam import binary_labels
+
+__all__ = ["Model", "cut", "disc", "ellipse", "lab", "stamp", "tidy"]
+
+Model: TypeAlias = Literal["mixture", "nearest"]
+Wrap: TypeAlias = tuple[bool, bool]
+
+SMOOTH = 2.0
+"""Cost of parting neighbours of the same colour."""
+NATS, PRIOR = 12.0, 6.0
+"""Most that a pixel's colour may speak for one side, and what lying in the middle of an element does."""
+RADIUS = 4
+"""Of what a point of the background stands for, in pixels."""
+SAMPLES = 4000
+"""Colours of each side that a model is made from."""
+HOLE, SPECK = 0.1, 0.25
+"""Largest hole that is filled, as a share of its component, and smallest component that is kept, of the chosen element."""
+CORE, MESH, RIM, FAR = 0.8, 0.6, 0.9, 1.3
+"""Of the box: the middle, that of a mesh, what lies around it, and from where on a picture of separate elements is background."""
+WHOLE = 0.35
+"""Distance from the border, as a share of the box, from which on what was found is taken as an example."""
+ALIKE = 0.3
+"""Share of what may be a net, those colours least like the background, that it is learnt from."""
+
+
+def lab(guide: Floats) -> Floats:
+    """Return Lab / 100, so that a just visible difference is about 0.02."""
+    from skimage.color import rgb2lab
+
+    rgb = guide if guide.shape[-1] == 3 else np.repeat(guide[..., :1], 3, axis=-1)
+    return np.asarray(rgb2lab(rgb) / 100, np.float32)
+
+
+def ellipse(box: tuple[int, int], share: float = 1.0) -> Bools:
+    """Return the ellipse inscribed in a box, or one that much smaller."""
+    rows, columns = (np.arange(n) - (n - 1) / 2 for n in box)
+    inside: Bools = np.add.outer((2 * rows / box[0]) ** 2, (2 * columns / box[1]) ** 2) <= share**2
+    return inside
+
+
+def disc(shape: tuple[int, int], points: NDArray[np.float64], radius: int = RADIUS) -> Bools:
+    """Mark what lies within a radius of points."""
+    marked = np.zeros(shape, bool)
+    stamp(marked, points, ellipse((2 * radius + 1, 2 * radius + 1)), (False, False))
+    return marked
+
+
+def stamp(mask: Bools, points: NDArray[Any], shape: Bools, wrap: Wrap) -> None:
+    """Mark copies of a shape around points, as far as they lie inside."""
+    rows, columns = np.nonzero(shape)
+    offsets = np.stack([rows - shape.shape[0] // 2, columns - shape.shape[1] // 2], axis=-1)
+    places = (np.rint(points).astype(np.intp)[:, np.newaxis] + offsets).reshape(-1, 2)
+    keep = np.ones(len(places), bool)
+    for axis in range(2):
+        side = mask.shape[axis]
+        if wrap[axis]:
+            places[:, axis] %= side
+        else:
+            keep &= (places[:, axis] >= 0) & (places[:, axis] < side)
+    mask[tuple(places[keep].T)] = True
+
+
+def cut(
+    colours: Floats,
+    centres: NDArray[Any],
+    box: tuple[int, int],
+    background: Bools,
+    *,
+    tag: Tag,
+    shape: Bools | None = None,
+    wrap: Wrap = (False, False),
+    seed: int = 0,
+    model: Model = "mixture",
+) -> Bools:
+    """Part foreground from background.
+
+    Parameters
+    ----------
+    colours : (H, W, 3) float32
+        Lab / 100.
+    centres : (n, 2)
+        The elements, the chosen one first.
+    box : tuple of int
+        Of an element.
+    background : (H, W) bool
+        Known background.
+    tag : Tag
+        Elements that are no net fill the middles of their boxes.
+    shape : bool, optional
+        What of the chosen one's box is foreground, where it is certain.
+    """
+    size = background.shape
+    if tag == "B=c" and model == "mixture":
+        colours = level(colours, max(box), wrap)
+    flat = colours.reshape(-1, 3).astype(np.float64)
+
+    def around(places: NDArray[Any], part: Bools) -> Bools:
+        marked = np.zeros(size, bool)
+        stamp(marked, places, part, wrap)
+        return marked
+
+    def cost(mine: Sequence[NDArray[np.float64]], number: int) -> NDArray[np.float64]:
+        samples = np.concatenate([_some(m, SAMPLES // len(mine), seed + number) for m in mine if len(m)])
+        if model == "nearest":
+            return _nearest(flat, samples)
+        return -Mixture.fit(samples, seed=seed + number).log(flat)
+
+    half = WHOLE * np.array(box)
+    whole = ((centres >= half) & (centres <= np.array(size) - 1 - half)) | np.array(wrap)
+    whole[0] = True
+    # Where the border cuts an element, it may as well be none.
+    centres = centres[whole.all(axis=1)]
+    known = flat[background.ravel()]
+    core = shape if shape is not None else ellipse(box, CORE)
+    sure = around(centres[:1], core) & ~background
+    fore, back = around(centres, core) & ~background, np.zeros(size, bool)
+    away, mesh = cost([known], 0), False
+    if tag == "F=c" and shape is None:
+        sure[:] = False
+        rim = around(centres, ~ellipse(box, RIM)) & ~background
+        mesh = bool(np.median(away[fore.ravel()]) < np.median(away[rim.ravel()]))
+        if mesh:
+            # The box holds a mesh of the net, whose middle is background.
+            fore, back = rim & ~fore, around(centres, ellipse(box, MESH)) & ~rim
+        unlike = away[fore.ravel()]
+        fore.ravel()[np.flatnonzero(fore.ravel())[unlike < np.quantile(unlike, 1 - ALIKE)]] = False
+    elif tag == "F=d" and model == "mixture":
+        back = ~around(centres, np.ones((odd(box[0] * FAR), odd(box[1] * FAR)), bool))
+    costs = [cost([known, flat[(back & ~background).ravel()]], 0), cost([flat[fore.ravel()]], 1)]
+    difference = np.clip(costs[1] - costs[0], -NATS, NATS).reshape(size)
+    if model == "mixture" and (tag != "F=c" or mesh):
+        difference += np.where(around(centres, ellipse(box, MESH)), PRIOR if mesh else -PRIOR, 0)
+    unary = np.stack([np.maximum(-difference, 0), np.maximum(difference, 0)], axis=-1).astype(np.float32)
+    unary[sure, 0] = np.inf
+    unary[background, 1] = np.inf
+    return binary_labels(unary, _smoothness(colours, wrap, model), wrap=wrap).mask
+
+
+def level(colours: Floats, reach: float, wrap: Wrap) -> Floats:
+    """Take away what changes slowly: the light, where elements lie everywhere alike."""
+    from scipy.ndimage import gaussian_filter
+
+    mode = ["wrap" if w else "nearest" for w in wrap]
+    slow = np.stack([gaussian_filter(colours[..., c], reach, mode=mode) for c in range(3)], axis=-1)
+    return np.asarray(colours - slow + slow.mean(axis=(0, 1)), np.float32)
+
+
+def odd(length: float) -> int:
+    """Return the odd number nearest to a length, at least 3."""
+    return max(3, 2 * int(np.floor(length / 2)) + 1)
+
+
+def _some(samples: NDArray[np.float64], most: int, seed: int) -> NDArray[np.float64]:
+    """Take at most so many, at even steps from a hashed start."""
+    if len(samples) <= most:
+        return samples
+    at = (np.arange(most) + uniform(seed, 1 << 20)) * (len(samples) / most)
+    return samples[np.minimum(at.astype(np.intp), len(samples) - 1)]
+
+
+def _nearest(colours: NDArray[np.float64], samples: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Equation 2, its sign made right: the squared distance to the nearest sample, of colours from 0 to 255."""
+    from scipy.spatial import cKDTree
+
+    found: NDArray[np.float64] = (255 * cKDTree(samples).query(colours)[0]) ** 2
+    return found
+
+
+def _smoothness(colours: Floats, wrap: Wrap, model: Model) -> Sequence[Any]:
+    """Equation 3, for pairs along each axis; its sigma is that of the picture, or 1 to the letter."""
+    squares = [((colours - np.roll(colours, -1, axis)) ** 2).sum(axis=-1) for axis in range(2)]
+    inner = [s if wrap[axis] else np.delete(s, -1, axis) for axis, s in enumerate(squares)]
+    mean = float(np.concatenate([s.ravel() for s in inner]).mean(dtype=np.float64))
+    scale = 1 / max(2 * mean, 1e-12) if model == "mixture" else 255**2 / 2
+    strength = SMOOTH if model == "mixture" else 1.0
+    return [(strength * np.exp(-s * scale)).astype(np.float32) for s in squares]
+
+
+def tidy(mask: Bools, area: float, *, net: bool = False) -> Bools:
+    """Fill small holes, smooth the outline by a pixel, and drop specks; ``area`` is the chosen element's.
+
+    Of a net small specks alone are dropped: thin lines are what it is made of.
+    """
+    from scipy import ndimage
+
+    pieces, count = ndimage.label(mask)
+    holes, _ = ndimage.label(~mask)
+    size = np.bincount(holes.ravel())
+    # The component around a hole is the one above its first pixel.
+    first = np.unique(holes, return_index=True)[1]
+    above = np.where(first >= mask.shape[1], pieces.ravel()[first - mask.shape[1]], 0)
+    areas = np.bincount(pieces.ravel(), minlength=count + 1)
+    fill = (above > 0) & (size[: len(first)] < HOLE * np.minimum(areas[above], 4 * area))
+    fill[0] = False
+    opened = mask | fill[holes]
+    if not net:
+        opened = ndimage.binary_opening(np.pad(opened, 1, mode="edge"))[1:-1, 1:-1]
+    pieces, count = ndimage.label(opened)
+    kept = np.bincount(pieces.ravel(), minlength=count + 1) >= (SPECK / 5 if net else SPECK) * area
+    kept[0] = False
+    cleaned: Bools = kept[pieces]
+    return cleaned

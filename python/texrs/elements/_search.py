@@ -1,0 +1,286 @@
+"""Where a texture looks like its chosen element (section 3.2): similarity map, suppression, cut, sub-pixel places."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._engine.appearance import Appearance
+from texrs._typing import Floats
+from texrs.elements._mask import odd
+from texrs.kernels.ncc import Correlation
+
+__all__ = ["Channel", "Found", "Template", "otsu", "search", "suppress", "vectors"]
+
+Channel: TypeAlias = Literal["weighted", "min-entropy"]
+Wrap: TypeAlias = tuple[bool, bool]
+
+CHANNELS = 8
+"""Channels of the appearance vectors that are compared (section 3.2)."""
+RADIUS = 2
+"""Of the windows that an appearance vector sums up: 5 x 5."""
+COVERED = 0.95
+"""Share of the map from which on no more candidates are taken (section 3.2)."""
+CONTEXT = 1.3
+"""Sides of what is compared over those of the box: what an element stands out from belongs to its looks, and inside a tile or a
+coin there may be nothing but noise."""
+APART = 1.3
+"""Sides of what is removed around an element over those of its box: boxes of neighbours overlap, but seldom that much."""
+RANGE = 0.25
+"""Least spread of the candidates' scores for a cut to mean anything."""
+BINS = 64
+"""Of the histogram over [-1, 1] whose entropy chooses a channel."""
+
+
+@dataclass(frozen=True, slots=True)
+class Template:
+    """One of the bank: the element's box with what lies around it, turned and scaled."""
+
+    box: tuple[int, int]
+    inner: tuple[int, int]
+    """The box alone."""
+    angle: float = 0.0
+    scale: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """The places that look like the element, best first.
+
+    Attributes
+    ----------
+    pixels : (n, 2) intp
+        The local maxima of the map.
+    points : (n, 2) float64
+        The same, between the pixels.
+    scores : (n,) float64
+        Values of the map.
+    which : (n,) intp
+        The template of the bank that fits best.
+    map : (H, W) float32
+        Similarity to the element.
+    threshold : float
+        Least score; -1 where nothing was cut.
+    channel : int or None
+        The channel that was used; None for all by weight.
+    templates : list of Template
+        The bank, the element itself first.
+    """
+
+    pixels: NDArray[np.intp]
+    points: NDArray[np.float64]
+    scores: NDArray[np.float64]
+    which: NDArray[np.intp]
+    map: Floats
+    threshold: float
+    channel: int | None
+    templates: Sequence[Template] = (Template((3, 3), (3, 3)),)
+
+
+def pad(array: NDArray[Any], margin: tuple[int, int], wrap: Wrap) -> NDArray[Any]:
+    """Continue an image beyond its border: around where it repeats, mirrored elsewhere."""
+    for axis in range(2):
+        widths = [(margin[axis], margin[axis]) if a == axis else (0, 0) for a in range(array.ndim)]
+        array = np.pad(array, widths, mode="wrap" if wrap[axis] else "symmetric" if len(array) < 2 else "reflect")
+    return array
+
+
+def vectors(colours: Floats, wrap: Wrap, patches: Sequence[Floats] = ()) -> tuple[Floats, list[Floats]]:
+    """Return the appearance vectors of an image, (H, W, 8), and of patches whose margins are `RADIUS` wide.
+
+    All lie on one sheet, so that the same components describe them.
+    """
+    image = pad(colours, (RADIUS, RADIUS), wrap)
+    height, width = image.shape[:2]
+    sheet = image
+    if patches:
+        extra = sum(len(p) for p in patches), max(0, *(p.shape[1] - width for p in patches))
+        sheet = np.pad(image, ((0, extra[0]), (0, extra[1]), (0, 0)), mode="symmetric")
+    tops, top = [], height
+    for patch in patches:
+        sheet[top : top + len(patch), : patch.shape[1]] = patch
+        tops.append(top)
+        top += len(patch)
+    features = Appearance(sheet, axes=2, radius=RADIUS).arrays()["features"]
+    described = features.reshape(*sheet.shape[:2], -1)[..., :CHANNELS].astype(np.float32)
+
+    def inside(top: int, shape: tuple[int, ...]) -> Floats:
+        return described[top + RADIUS : top + shape[0] - RADIUS, RADIUS : shape[1] - RADIUS]
+
+    return inside(0, image.shape), [inside(top, p.shape) for top, p in zip(tops, patches, strict=True)]
+
+
+def bank(box: tuple[int, int], rotations: int, scales: Sequence[float]) -> list[Template]:
+    """List the templates to try, the element itself first."""
+    found = []
+    for scale in sorted(scales, key=lambda s: abs(np.log(s))):
+        for turn in range(rotations):
+            angle = 360.0 * turn / rotations
+            share = float(np.cos(np.deg2rad(angle)) ** 2)
+            sides = (box[0] * share + box[1] * (1 - share), box[1] * share + box[0] * (1 - share))
+            inner = (odd(sides[0] * scale), odd(sides[1] * scale))
+            found.append(Template((odd(inner[0] * CONTEXT), odd(inner[1] * CONTEXT)), inner, angle, float(scale)))
+    return found
+
+
+def cut_out(colours: Floats, centre: tuple[int, int], template: Template, wrap: Wrap) -> Floats:
+    """Look at the image around an element through a turned and scaled window, with a margin of `RADIUS`."""
+    from scipy.ndimage import map_coordinates
+
+    half = [n // 2 + RADIUS for n in template.box]
+    rows, columns = np.mgrid[-half[0] : half[0] + 1, -half[1] : half[1] + 1].astype(np.float64)
+    angle = np.deg2rad(template.angle)
+    # What the template shows at an offset is what the element shows at the offset turned back and made smaller.
+    back = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]) / template.scale
+    places = [back[i, 0] * rows + back[i, 1] * columns + centre[i] for i in range(2)]
+    modes = ["grid-wrap" if w else "mirror" for w in wrap]
+    if modes[0] != modes[1]:
+        side = colours.shape[1 if wrap[1] else 0]
+        places[1 if wrap[1] else 0] %= side
+    mode = modes[0] if modes[0] == modes[1] else "mirror"
+    channels = [map_coordinates(colours[..., c], places, order=1, mode=mode) for c in range(colours.shape[-1])]
+    return np.stack(channels, axis=-1).astype(np.float32)
+
+
+def search(
+    colours: Floats,
+    centre: tuple[int, int],
+    box: tuple[int, int],
+    *,
+    wrap: Wrap = (False, False),
+    rotations: int = 1,
+    scales: Sequence[float] = (1.0,),
+    channel: Channel = "weighted",
+    threshold: float | None = None,
+    cut: bool = True,
+    features: Floats | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> Found:
+    """Find the places that look like the box around ``centre``.
+
+    Who looks for many boxes gives the ``features``, what `vectors` makes of the image alone.
+    """
+    templates = bank(box, rotations, scales)
+    turned = [t for t in templates if t.angle or t.scale != 1.0]
+    patches: list[Floats] = []
+    if features is None or turned:
+        features, patches = vectors(colours, wrap, [cut_out(colours, centre, t, wrap) for t in turned])
+    margin = tuple(max(t.box[axis] for t in templates) // 2 for axis in range(2))
+    around = pad(features, (margin[0], margin[1]), wrap)
+    variance = features.reshape(-1, CHANNELS).var(axis=0, dtype=np.float64)
+    weights = (variance / max(float(variance.sum()), 1e-12)).astype(np.float32)
+    correlation = Correlation(around)
+    best: Floats | None = None
+    which = np.zeros(colours.shape[:2], np.intp)
+    chosen: int | None = None
+    for i, template in enumerate(templates):
+        half = [n // 2 for n in template.box]
+        if template in turned:
+            patch = patches[turned.index(template)]
+        else:
+            at = [centre[axis] + margin[axis] - half[axis] for axis in range(2)]
+            patch = around[at[0] : at[0] + template.box[0], at[1] : at[1] + template.box[1]]
+        maps = correlation.maps(patch)
+        first = [margin[axis] - half[axis] for axis in range(2)]
+        maps = maps[first[0] : first[0] + colours.shape[0], first[1] : first[1] + colours.shape[1]]
+        if channel == "min-entropy":
+            chosen = least_entropy(maps) if chosen is None else chosen
+            here = np.ascontiguousarray(maps[..., chosen])
+        else:
+            # Added in order, so that no library decides about the last bits.
+            here = np.zeros(colours.shape[:2], np.float32)
+            for c in range(CHANNELS):
+                here += weights[c] * maps[..., c]
+        if best is None:
+            best = here
+        else:
+            better = here > best
+            best[better], which[better] = here[better], i
+        if progress is not None:
+            progress((i + 1) / len(templates))
+    assert best is not None
+    pixels = suppress(best, [t.inner for t in templates], which, wrap)
+    scores = best[tuple(pixels.T)].astype(np.float64)
+    least = -1.0
+    if threshold is not None:
+        least = threshold
+    elif cut and len(scores) and scores[1:].max(initial=-1) - scores[-1] > RANGE:
+        least = otsu(scores[1:])
+    if cut:
+        # The cut needs to see what lies between elements; afterwards nothing is one that overlaps a better one.
+        apart = suppress(best, [t.inner for t in templates], which, wrap, share=APART)
+        pixels, scores = apart, best[tuple(apart.T)].astype(np.float64)
+    pixels, scores = pixels[scores >= least], scores[scores >= least]
+    points = pixels + subpixel(best, pixels, wrap)
+    return Found(pixels, points, scores, which[tuple(pixels.T)], best, least, chosen, templates)
+
+
+def least_entropy(maps: Floats) -> int:
+    """Return the channel whose map has the least entropy (section 3.2, to the letter)."""
+    entropies = []
+    for c in range(maps.shape[-1]):
+        share = np.histogram(maps[..., c], BINS, (-1, 1))[0] / maps[..., c].size
+        share = share[share > 0]
+        entropies.append(float(-(share * np.log(share)).sum()))
+    return int(np.argmin(entropies))
+
+
+def suppress(
+    map: Floats, boxes: Sequence[tuple[int, int]], which: NDArray[np.intp], wrap: Wrap, share: float = 1.0
+) -> NDArray[np.intp]:
+    """Take local maxima, best first, and with each remove the box around it; (n, 2), in the order taken."""
+    from scipy.ndimage import maximum_filter
+
+    top = maximum_filter(map, 3, mode=["wrap" if w else "nearest" for w in wrap]) == map
+    rows, columns = np.nonzero(top)
+    order = np.lexsort((columns, rows, -map[rows, columns]))
+    free = np.ones(map.shape, bool)
+    left, taken = map.size, []
+    for row, column in zip(rows[order].tolist(), columns[order].tolist(), strict=True):
+        if not free[row, column]:
+            continue
+        taken.append((row, column))
+        spans = []
+        for axis, at in enumerate((row, column)):
+            half = int(share * (boxes[which[row, column]][axis] // 2))
+            span = np.arange(at - half, at + half + 1)
+            side = map.shape[axis]
+            spans.append(np.unique(span % side) if wrap[axis] else span[(span >= 0) & (span < side)])
+        window = np.ix_(*spans)
+        left -= int(free[window].sum())
+        free[window] = False
+        if left <= (1 - COVERED) * map.size:
+            break
+    return np.array(taken, np.intp).reshape(-1, 2)
+
+
+def otsu(values: NDArray[np.float64]) -> float:
+    """Return the value that parts two classes of numbers with the largest variance between them."""
+    ordered = np.sort(values)
+    count = np.arange(1, len(ordered))
+    below = np.cumsum(ordered)[:-1] / count
+    above = (ordered.sum() - np.cumsum(ordered)[:-1]) / (len(ordered) - count)
+    between = count * (len(ordered) - count) * (above - below) ** 2
+    split = int(np.argmax(between)) if len(between) else 0
+    return float((ordered[split] + ordered[min(split + 1, len(ordered) - 1)]) / 2)
+
+
+def subpixel(map: Floats, pixels: NDArray[np.intp], wrap: Wrap) -> NDArray[np.float64]:
+    """Return the tops of the parabolas through a maximum and its neighbours, along each axis, within half a pixel."""
+    offsets = np.zeros((len(pixels), 2))
+    for axis in range(2):
+        near = []
+        for step in (-1, 0, 1):
+            moved = pixels.copy()
+            moved[:, axis] += step
+            side = map.shape[axis]
+            moved[:, axis] = moved[:, axis] % side if wrap[axis] else np.clip(moved[:, axis], 0, side - 1)
+            near.append(map[tuple(moved.T)].astype(np.float64))
+        bend = near[0] - 2 * near[1] + near[2]
+        slope = (near[0] - near[2]) / 2
+        offsets[:, axis] = np.where(bend < -1e-9, np.clip(slope / np.minimum(bend, -1e-9), -0.5, 0.5), 0.0)
+    return offsets

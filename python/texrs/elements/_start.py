@@ -1,0 +1,344 @@
+"""A start without a user: which element, which background, which tag, and how sure that is.
+
+1. sizes: blobs of every scale, pieces of a colour segmentation, and the periods of the autocorrelation propose boxes;
+2. the element: each box is searched for in a small picture, and the one that the texture repeats best is taken;
+3. the background: what lies farthest from all that was found, of the colours that most of it has;
+4. the tag: elements that are busier and more varied than what lies between them are things on a ground; else what lies
+   between is a net where it stands out, and joints where it does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Bools, Floats
+from texrs.elements._boxes import proposed, resized
+from texrs.elements._clean import components
+from texrs.elements._elements import Tag
+from texrs.elements._given import LEAST, Box, as_box
+from texrs.elements._mask import disc, lab, odd
+from texrs.elements._search import Found, search, vectors
+from texrs.errors import InvalidInput
+from texrs.layouts import spacing
+
+__all__ = ["Proposal", "propose"]
+
+SMALL = 224
+"""Longest side of the picture in which boxes are compared."""
+GROWN, STEPS = 3, 5
+"""Boxes whose sides are changed as long as that makes them better, and how often."""
+AGAIN = 6
+"""Boxes that are moved to where they hold one thing, and tried again."""
+WIDE = 1.3
+"""Sides of what is looked at for that, over those of the box."""
+OUT = 1.1
+"""Distance from an element, in halves of its box, from which on a pixel is taken for background."""
+PLACES = 12
+"""Places of the background that are proposed."""
+THING = 0.68
+"""How much busier and more varied elements are than what lies between them from where on they are things on a ground."""
+LEAST_EDGE = 0.002
+"""Differences of colour that are none, of a range of 1."""
+NET = 0.2
+"""Contrast from which on what lies between evenly spread openings is a net; half of it where they are unevenly spread."""
+EVEN = 0.15
+"""Spread of the distances to the nearest element, over their mean, up to which they are evenly spread."""
+OPEN = 0.3
+"""Share of a given mask's ground from which on its pieces are taken to be separate."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Proposal:
+    """A start, and how sure each part of it is, 0 to 1."""
+
+    box: Box
+    background: Bools
+    tag: Tag
+    confidence: dict[str, float] = field(default_factory=dict)
+
+
+def propose(
+    guide: Floats,
+    wrap: tuple[bool, bool],
+    box: Box | None,
+    background: Bools | None,
+    mask: Bools | None,
+    tag: Tag | None,
+    points: NDArray[np.float64] | None,
+    progress: Callable[[float], object],
+) -> Proposal:
+    """Propose what is not given."""
+    size = (guide.shape[0], guide.shape[1])
+    sure: dict[str, float] = {}
+    if box is None:
+        if points is not None and len(points) > 2:
+            box = _around(points, size)
+            sure["box"] = 0.5
+        else:
+            box, sure["box"] = _best(guide, wrap, progress)
+    if points is None:
+        found = search(guide, box.centre, box.size, wrap=wrap)
+        points = found.points
+    progress(0.9)
+    away = _distance(size, points, box.size, wrap)
+    if tag is None:
+        tag, sure["tag"] = _tag(guide, away, points, box, mask)
+    if background is None and mask is None and "tag" in sure and tag == "F=c":
+        # What repeats are the openings of the net: ground lies in the middle of each but the chosen one.
+        middle = np.array(box.centre)
+        others = points[np.abs(points - middle).max(axis=1) > max(box.size) / 2][:PLACES]
+        if len(others):
+            background = disc(size, others, int(np.clip(min(box.size) // 8, 1, 4)))
+            sure["background"] = sure["tag"]
+    if background is None and mask is None:
+        background, sure["background"] = _background(guide, away, box)
+    return Proposal(box, np.zeros(size, bool) if background is None else background, tag, sure)
+
+
+# --- the element -------------------------------------------------------------------------------------------------------
+
+
+def _best(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[float], object]) -> tuple[Box, float]:
+    """Try boxes in a small picture and take the one that explains most of it."""
+    step = max(1, -(-max(guide.shape[:2]) // SMALL))
+    small = _reduced(guide, step)
+    boxes = proposed(small)
+    if not boxes:
+        raise InvalidInput("box: none could be proposed for this image; give one, or the points")
+    light, features = lab(small)[..., 0], vectors(small, wrap)[0]
+    best: tuple[float, Box] | None = None
+    tried: list[tuple[float, Box, Found]] = []
+
+    def attempt(box: Box) -> float:
+        nonlocal best
+        known = [value for value, other, _ in tried if other == box]
+        if known:
+            return known[0]
+        found = search(small, box.centre, box.size, wrap=wrap, features=features)
+        value = _worth(light, found, box)
+        tried.append((value, box, found))
+        if best is None or value > best[0] + 1e-6:
+            best = (value, box)
+        return value
+
+    for number, box in enumerate(boxes):
+        attempt(box)
+        progress(0.5 * (number + 1) / len(boxes))
+    for _, box, found in sorted(tried, key=lambda t: -t[0])[:AGAIN]:
+        moved = _centred(light, found, box)
+        if moved is not None:
+            attempt(moved)
+    for number, (value, box, _) in enumerate(sorted(tried, key=lambda t: -t[0])[:GROWN]):
+        for _ in range(STEPS):
+            better = [(attempt(b), b) for b in resized(box, small.shape[:2])]
+            top = max(better, key=lambda t: t[0], default=(0.0, box))
+            if top[0] <= value:
+                break
+            value, box = top
+        progress(0.5 + 0.3 * (number + 1) / GROWN)
+    assert best is not None
+    sure = _sure(light, best[1], next(f for _, b, f in tried if b == best[1]))
+    row, column = (float(c * step + (step - 1) / 2) for c in best[1].centre)
+    height, width = (float(s * step) for s in best[1].size)
+    whole = (guide.shape[0], guide.shape[1])
+    height, width = min(height, whole[0] - 1.0), min(width, whole[1] - 1.0)
+    row = float(np.clip(row, height / 2 - 0.5, whole[0] - 0.5 - height / 2))
+    column = float(np.clip(column, width / 2 - 0.5, whole[1] - 0.5 - width / 2))
+    return as_box((row, column, height, width), whole), sure
+
+
+def _reduced(guide: Floats, step: int) -> Floats:
+    """Average squares of pixels."""
+    rows, columns = (n // step for n in guide.shape[:2])
+    cut = guide[: rows * step, : columns * step]
+    return np.ascontiguousarray(
+        cut.reshape(rows, step, columns, step, -1).mean(axis=(1, 3), dtype=np.float64), np.float32
+    )
+
+
+def _worth(light: Floats, found: Found, box: Box) -> float:
+    """Return how well copies of a box explain a picture.
+
+    They do so by how alike they are, how clearly they stand out, how much they cover, and how much what they have in
+    common is one thing in the middle of the box.
+    """
+    if len(found.scores) < 4:
+        return 0.0
+    inner = found.scores[1:]
+    alike = float(inner.mean())
+    cover = min(1.0, len(found.scores) * box.size[0] * box.size[1] / float(light.size))
+    clear = float(inner.mean() - np.median(found.map))
+    window = _common(light, found, box, WIDE)
+    if window is None:
+        return 0.0
+    # What is alike by chance is so less often the more there is of it (Fisher's z grows with the root of the area).
+    large = float(np.sqrt(box.size[0] * box.size[1] / light.size))
+    return large * alike * float(np.sqrt(cover)) * max(0.0, clear) * _closed(window, np.zeros(2), box.size) ** 2
+
+
+def _sure(light: Floats, box: Box, found: Found) -> float:
+    """Return how sure a box is: how alike its copies are, and how much it holds one thing."""
+    window = _common(light, found, box, WIDE)
+    if window is None or len(found.scores) < 4:
+        return 0.1
+    return float(np.clip(found.scores[1:].mean() * _closed(window, np.zeros(2), box.size) * 1.5, 0.05, 0.95))
+
+
+def _common(light: Floats, found: Found, box: Box, wide: float) -> Floats | None:
+    """Average what lies around the places that were found, where it is inside the picture."""
+    half = [odd(wide * s) // 2 for s in box.size]
+    sides = light.shape
+    whole = [p for p in found.pixels.tolist() if all(half[a] <= p[a] < sides[a] - half[a] for a in range(2))]
+    if not whole:
+        return None
+    cuts = [light[r - half[0] : r + half[0] + 1, c - half[1] : c + half[1] + 1] for r, c in whole[:64]]
+    return np.asarray(np.mean(cuts, axis=0, dtype=np.float64), np.float32)
+
+
+def _closed(window: Floats, centre: NDArray[np.float64], size: tuple[int, int]) -> float:
+    """Return how much of what changes in a window does so outwards from a centre, 0 to 1: the outline of one thing does."""
+    rows, columns = np.gradient(window)
+    middle = (np.array(window.shape) - 1) / 2 + centre
+    out = [np.arange(n) - m for n, m in zip(window.shape, middle, strict=True)]
+    y, x = (o / (s / 2) for o, s in zip(out, size, strict=True))
+    away = np.maximum(np.hypot(y[:, np.newaxis], x), 1e-6)
+    # In units of the box, in which an oblong thing is round.
+    slope = rows * size[0], columns * size[1]
+    total = np.hypot(*slope) * (away < WIDE)
+    outward = (slope[0] * y[:, np.newaxis] + slope[1] * x) / away * (away < WIDE)
+    change = float(total.sum())
+    if change < 1e-9:
+        return 0.0
+    return float(0.5 * np.abs(outward).sum() + 0.5 * abs(outward.sum())) / change
+
+
+def _centred(light: Floats, found: Found, box: Box) -> Box | None:
+    """Move a box, within half of it, to where what it has in common with its copies is one thing in its middle."""
+    window = _common(light, found, box, 2.2)
+    if window is None:
+        return None
+    best, move = 0.0, np.zeros(2)
+    for row in np.linspace(-0.55, 0.55, 9) * box.size[0]:
+        for column in np.linspace(-0.55, 0.55, 9) * box.size[1]:
+            half = [int(WIDE * s / 2) for s in box.size]
+            at = [round((n - 1) / 2 + d) for n, d in zip(window.shape, (float(row), float(column)), strict=True)]
+            low = [max(0, a - h) for a, h in zip(at, half, strict=True)]
+            part = window[low[0] : at[0] + half[0] + 1, low[1] : at[1] + half[1] + 1]
+            offset = np.array([a - lo - (n - 1) / 2 for a, lo, n in zip(at, low, part.shape, strict=True)])
+            value = _closed(part, offset, box.size)
+            if value > best + 1e-6:
+                best, move = value, np.array([row, column])
+    half_box = np.array(box.size) // 2
+    for place in found.pixels:
+        centre = np.floor(place + move + 0.5).astype(int)
+        if ((centre >= half_box) & (centre < np.array(light.shape) - half_box)).all():
+            return Box((int(centre[0]), int(centre[1])), box.size)
+    return None
+
+
+def _around(points: NDArray[np.float64], size: tuple[int, int]) -> Box:
+    """Return a box of three quarters of the spacing around the point that lies farthest inside."""
+    side = max(float(LEAST), 0.75 * spacing(points))
+    side = min(side, min(size) - 1.0)
+    depth = np.minimum(points, np.array(size) - 1 - points).min(axis=1)
+    centre = np.clip(points[int(depth.argmax())], side / 2 - 0.5, np.array(size) - 0.5 - side / 2)
+    return as_box((*centre.tolist(), side, side), size)
+
+
+# --- background and tag ----------------------------------------------------------------------------------------------
+
+
+def _distance(
+    size: tuple[int, int], points: NDArray[np.float64], box: tuple[int, int], wrap: tuple[bool, bool]
+) -> Floats:
+    """Return the distance of each pixel to the nearest element, in halves of its box."""
+    from scipy.spatial import cKDTree
+
+    if not len(points):
+        return np.full(size, 9.0, np.float32)
+    half = np.array(box) / 2
+    copies = [points]
+    for axis in range(2):
+        if wrap[axis]:
+            move = np.zeros(2)
+            move[axis] = size[axis]
+            copies = [c + k * move for c in copies for k in (-1, 0, 1)]
+    grid = np.indices(size).reshape(2, -1).T
+    found = cKDTree(np.concatenate(copies) / half).query(grid / half)[0]
+    return np.asarray(found.reshape(size), np.float32)
+
+
+def _tag(guide: Floats, away: Floats, points: NDArray[np.float64], box: Box, mask: Bools | None) -> tuple[Tag, float]:
+    """Choose a tag, and say how far the choice is from the other ones."""
+    from scipy.spatial import cKDTree
+
+    if mask is not None:
+        pieces, count = components(mask, (False, False))
+        main = float(np.bincount(pieces.ravel())[1:].max(initial=0)) / max(float(mask.sum()), 1.0)
+        if main > 0.5 or count < 3:
+            return "F=c", min(1.0, main)
+        return ("F=d", 0.7) if float((~mask).mean()) > OPEN else ("B=c", 0.6)
+    if len(points) < 3:
+        return "F=d", 0.1
+    thing, contrast = _thing(lab(guide), away, points)
+    sure = _odds(thing / THING)
+    if thing >= THING:
+        return "F=d", sure
+    near = cKDTree(points).query(points, k=2)[0][:, 1]
+    spread = float(near.std() / max(float(near.mean()), 1e-9))
+    # A net stands out from what is seen through it, and joints less; the less if all between them is of one size.
+    net = contrast / (NET if spread < EVEN else NET / 2)
+    return ("F=c" if net >= 1 else "B=c"), sure * _odds(net)
+
+
+def _odds(ratio: float) -> float:
+    """Return how sure a choice is that falls where a measure is 1: a coin's toss there, and surer on either side."""
+    return float(1 / (1 + min(ratio, 1 / max(ratio, 1e-9)) ** 1.5))
+
+
+def _thing(colours: Floats, away: Floats, points: NDArray[np.float64]) -> tuple[float, float]:
+    """Return how much elements are things rather than openings, and how their lightness differs from what lies between.
+
+    Openings of a net and bricks between joints are even and alike; lines, edges and colours lie between them. Of things on
+    a ground the reverse is true.
+    """
+    from scipy.ndimage import gaussian_filter, gaussian_gradient_magnitude
+
+    inner, outer = away < 0.5, away > OUT
+    if not inner.any() or not outer.any():
+        return THING, 0.0
+    light = colours[..., 0]
+    edges = gaussian_gradient_magnitude(light, 1.0)
+    smooth = np.stack([gaussian_filter(colours[..., c], 2.0) for c in range(3)], axis=-1)
+    at = np.clip(np.rint(points).astype(np.intp), 0, np.array(light.shape) - 1)
+
+    def unlike(some: Floats) -> float:
+        return float(np.median(np.sqrt(((some - np.median(some, axis=0)) ** 2).sum(axis=-1))))
+
+    busy = (float(np.median(edges[inner])) + LEAST_EDGE) / (float(np.median(edges[outer])) + LEAST_EDGE)
+    varied = (unlike(smooth[tuple(at.T)]) + LEAST_EDGE) / (unlike(smooth[outer]) + LEAST_EDGE)
+    return busy * varied, abs(float(np.median(light[inner])) - float(np.median(light[outer])))
+
+
+def _background(guide: Floats, away: Floats, box: Box) -> tuple[Bools, float]:
+    """Take the places farthest from all elements, of the colour that most of them have."""
+    from scipy.ndimage import gaussian_filter, maximum_filter
+
+    colours = lab(guide)
+    reach = odd(min(box.size) / 2)
+    top = maximum_filter(away, reach) == away
+    places = np.argwhere(top)
+    order = np.lexsort((places[:, 1], places[:, 0], -away[tuple(places.T)]))
+    places = places[order[: 3 * PLACES]]
+    smooth = np.stack([gaussian_filter(colours[..., c], 1.0) for c in range(3)], axis=-1)
+    shown = smooth[tuple(places.T)]
+    usual = np.median(shown, axis=0)
+    apart = np.sqrt(((shown - usual) ** 2).sum(axis=1))
+    kept = places[np.argsort(apart, kind="stable")[: max(3, min(PLACES, len(places) // 2 + 1))]]
+    radius = int(np.clip(min(box.size) // 12, 1, 4))
+    sure = float(np.clip((float(np.median(away[tuple(kept.T)])) - 0.9) / 0.6, 0.1, 0.9))
+    return disc((away.shape[0], away.shape[1]), kept.astype(np.float64), radius), sure

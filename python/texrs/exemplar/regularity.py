@@ -1,0 +1,203 @@
+"""How regular an exemplar is: the lattice that it repeats on, its directions, and whether its mirror image is like it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Floats
+
+__all__ = ["Lattice", "direction", "lattice"]
+
+Vector = tuple[int, int]
+
+WINDOW = 512
+"""Side of the middle of an image that is looked at."""
+REACH = 0.45
+"""Longest shift that is tried, as a share of a side: beyond it too little of the image overlaps itself."""
+SHORTEST, PEAKS = 6, 8
+"""Length of the shortest period in pixels, and the number of peaks that periods are made of."""
+REGULAR = 0.3
+"""Mean correlation on a lattice from which on it is believed; scattered things have up to 0.2."""
+DIP = 0.75
+"""A correlation falls below this share of its peak on the way to it, else it is a stripe and no period."""
+FINE, BLOCKS = (0.7, 1.5), 4
+"""Standard deviations of the Gaussians under which an image is compared with its mirror image; parts of a side that its spread
+is known from."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lattice:
+    """The shifts by which an image repeats itself: all sums of multiples of two vectors (row, column) in pixels."""
+
+    a: Vector
+    b: Vector
+    correlation: float
+    """Mean over the lattice of the correlation of the image with itself, shifted."""
+
+    def __str__(self) -> str:
+        return f"a lattice of periods {self.a} and {self.b} (correlation {self.correlation:.2f})"
+
+    def shifts(self, reach: float) -> list[Vector]:
+        """Return the shifts within ``reach`` pixels, and those to the next places in any case; the shortest first."""
+        a, b = np.array(self.a), np.array(self.b)
+        reach = max(reach, *(float(np.hypot(*v)) for v in (a, b, a + b, a - b)))
+        most = int(max(reach / np.hypot(*a), reach / np.hypot(*b)) * 2) + 2
+        found = [i * a + j * b for i in range(-most, most + 1) for j in range(-most, most + 1) if i or j]
+        found.sort(key=lambda v: (int(v @ v), tuple(v)))
+        return [(int(v[0]), int(v[1])) for v in found if v @ v <= reach**2 + 0.5]
+
+
+def lattice(guide: Floats) -> Lattice | None:
+    """Find the lattice that an image repeats on, by the correlation of its lightness, or of its edges, with itself."""
+    from scipy.ndimage import gaussian_filter
+
+    height, width = guide.shape[:2]
+    if min(height, width) < 4 * SHORTEST:
+        return None
+    top, left = max(0, height - WINDOW) // 2, max(0, width - WINDOW) // 2
+    light = guide[top : top + WINDOW, left : left + WINDOW].mean(axis=-1, dtype=np.float32)
+    if light.std() < 1e-4:
+        return None
+    rows, columns = np.gradient(gaussian_filter(light, 1.0))
+    edges = np.hypot(rows, columns)
+    found = [_fit(_correlation(picture)) for picture in (light, np.minimum(edges, np.quantile(edges, 0.95)))]
+    believed = [each for each in found if each is not None and each.correlation >= REGULAR]
+    # Edges are told apart less well than colours: two of them may be half a period apart.
+    return believed[0] if believed else None
+
+
+def _correlation(picture: Floats) -> Floats:
+    """Correlate a picture with itself, without its slow changes; the middle is no shift at all."""
+    from scipy.fft import irfft2, next_fast_len, rfft2
+    from scipy.ndimage import gaussian_filter, uniform_filter
+
+    height, width = picture.shape
+    flat = gaussian_filter(picture, 1.0) - uniform_filter(picture, min(picture.shape) // 2)
+    size = tuple(next_fast_len(2 * n, real=True) for n in picture.shape)
+    product = irfft2(np.abs(rfft2(flat, size)) ** 2, size)
+    rows, columns = (int(REACH * n) for n in picture.shape)
+    near = np.roll(product, (rows, columns), (0, 1))[: 2 * rows + 1, : 2 * columns + 1]
+    shift = np.abs(np.arange(-rows, rows + 1)), np.abs(np.arange(-columns, columns + 1))
+    overlap = np.outer(height - shift[0], width - shift[1])
+    variance = max(float((flat.astype(np.float64) ** 2).mean()), 1e-12)
+    return np.asarray(near / overlap / variance, np.float32)
+
+
+def _fit(correlation: Floats) -> Lattice | None:
+    """Find the lattice of the highest mean correlation; of those nearly as high, the one of the smallest cell."""
+    from scipy.ndimage import maximum_filter
+
+    reach = np.array(correlation.shape) // 2
+    tolerant = maximum_filter(correlation, 5)
+    rows, columns = (np.arange(-r, r + 1) for r in reach)
+    far = np.add.outer(rows**2, columns**2) > SHORTEST**2
+    half = (rows[:, None] > 0) | ((rows[:, None] == 0) & (columns > 0))
+    peaks = np.argwhere((maximum_filter(correlation, 7) == correlation) & far & half)
+    value = correlation[tuple(peaks.T)]
+    order = np.lexsort((peaks[:, 1], peaks[:, 0], -value))[:PEAKS]
+    vectors = [v - reach for v in peaks[order]]
+    found: dict[tuple[Vector, Vector], tuple[float, int]] = {}
+    for i, one in enumerate(vectors):
+        for other in vectors[i + 1 :]:
+            a, b = _reduce(one, other)
+            cell = abs(int(a[0] * b[1] - a[1] * b[0]))
+            if cell < 0.3 * np.hypot(*a) * np.hypot(*b) or cell < SHORTEST**2:
+                continue
+            mean = _mean(tolerant, a, b, reach)
+            if mean > 0 and all(_dips(correlation, v, reach) for v in (a, b)):
+                found[(int(a[0]), int(a[1])), (int(b[0]), int(b[1]))] = (mean, cell)
+    if not found:
+        return None
+    best = max(mean for mean, _ in found.values())
+    good = [(cell, pair, mean) for pair, (mean, cell) in found.items() if mean >= 0.85 * best]
+    _, (first, second), mean = min(good)
+    return Lattice(first, second, mean)
+
+
+def _reduce(one: NDArray[np.intp], other: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the shortest vectors of the lattice of two (Lagrange and Gauss)."""
+    a, b = sorted((one, other), key=lambda v: int(v @ v))
+    while a.any():
+        b = b - round(int(a @ b) / int(a @ a)) * a
+        if b @ b >= a @ a:
+            break
+        a, b = b, a
+    return a, b
+
+
+def _mean(correlation: Floats, a: NDArray[np.intp], b: NDArray[np.intp], reach: NDArray[np.intp]) -> float:
+    """Average over the places of a lattice; 0 for fewer than four, which prove nothing."""
+    most = int(np.hypot(*reach) * 2 / max(1.0, float(np.hypot(*a)))) + 1
+    times = np.arange(-most, most + 1)
+    places = (times[:, None, None] * a + times[:, None] * b).reshape(-1, 2)
+    ahead = (places[:, 0] > 0) | ((places[:, 0] == 0) & (places[:, 1] > 0))
+    places = places[ahead & (np.abs(places) <= reach - 2).all(axis=1)] + reach
+    return float(correlation[tuple(places.T)].mean()) if len(places) >= 4 else 0.0
+
+
+def _dips(correlation: Floats, vector: NDArray[np.intp], reach: NDArray[np.intp]) -> bool:
+    """Whether the correlation falls on the way to a vector, and rises again."""
+    if (np.abs(vector) > reach).any():
+        return False
+    steps = int(np.abs(vector).max())
+    way = np.round(np.linspace(0, 1, steps + 1)[:, None] * vector).astype(np.intp) + reach
+    along = correlation[tuple(way.T)]
+    return bool(along.min() < DIP * along[-1])
+
+
+def direction(guide: Floats) -> float:
+    """Return how much an image's edges agree in direction: 0 not at all, 1 wholly.
+
+    The larger of two measures: of one direction (the structure tensor), as in bark, and of two at right angles (its
+    like of fourth order), which cancel in the tensor, as in brickwork.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    rows, columns = np.gradient(gaussian_filter(guide.mean(axis=-1, dtype=np.float64), 1.5))
+    slope = columns + 1j * rows
+    energy = np.abs(slope) ** 2
+    total = float(energy.sum())
+    if total < 1e-9 * energy.size:
+        return 0.0
+    second = slope**2
+    fourth = second**2 / np.maximum(energy, 1e-300)
+    return float(max(abs(second.sum()), abs(fourth.sum())) / total)
+
+
+def polarity(guide: Floats) -> tuple[float, float, float]:
+    """Return how surely an image differs from its mirror images, in standard errors.
+
+    Three values: by what a mirror along rows turns round, by what one along columns does, and by what either does and both
+    together do not. What is lit from one side grows dark slowly and bright at once, on the way along rows or along columns:
+    slopes weighed by their square, or by that of the other slope, do not sum to 0 as they do where a mirror image is as likely.
+    What is oblique has slopes whose product does not.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    height, width = guide.shape[:2]
+    top, left = max(0, height - WINDOW) // 2, max(0, width - WINDOW) // 2
+    light = guide[top : top + WINDOW, left : left + WINDOW].mean(axis=-1, dtype=np.float32)
+    along = [0.0, 0.0, 0.0]
+    if min(light.shape) < BLOCKS * SHORTEST:
+        return along[0], along[1], along[2]
+    for sigma in FINE:
+        rows, columns = (gaussian_filter(light, sigma, order=order) for order in ((1, 0), (0, 1)))
+        squares = rows * rows, columns * columns
+        energy = squares[0] + squares[1]
+        cubes = energy * np.sqrt(energy)
+        for axis, slope in enumerate((rows, columns)):
+            along[axis] = max(along[axis], *(_sureness(slope * square, cubes) for square in squares))
+        along[2] = max(along[2], _sureness(rows * columns, energy))
+    return along[0], along[1], along[2]
+
+
+def _sureness(odd: Floats, scale: Floats) -> float:
+    """Return the mean of values over that of a scale, in standard errors, which equal parts of the image show."""
+    rows, columns = (n // BLOCKS for n in odd.shape)
+    parts = [v[: BLOCKS * rows, : BLOCKS * columns].reshape(BLOCKS, rows, BLOCKS, columns) for v in (odd, scale)]
+    sums, scales = (p.sum(axis=(1, 3), dtype=np.float64).ravel() for p in parts)
+    mean = sums.sum() / max(scales.sum(), 1e-12)
+    return abs(float(sums.sum())) / max(float(np.sqrt(((sums - mean * scales) ** 2).sum())), 1e-12)

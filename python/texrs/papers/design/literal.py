@@ -1,0 +1,147 @@
+"""DESIGN as printed: whole colour layers, each moved once by the literal generator (``method="paper"``).
+
+Sections 3.3 and 3.4 of Shen, Jin, Mao and Feng 2006, with their misprints repaired:
+
+- h(k), a real number, is floored before ``mod``: the worked example computes with integers;
+- starts that a fixed point absorbs are refused, and the ends of (0, 255), which are reachable, are let be;
+- e = xi n is clipped to the interval that the paper sets: m and n are one number, so S sees but n = 3, or e = 0.39, and
+  n = 7, or e = 0.91;
+- the second term of Eq. 3 is ``|C_i(v_t) - C_j(v_t)|``.
+
+Where the paper is silent: l = n / u of half the shorter side, a = n / u of 90 degrees, everything about the centre of the
+image; sense and axis are the two lowest bits of h(k) div u, up and left where the lowest is 0. (Those of h(k) itself go
+with the operation: it is even for every T and odd for every R.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._engine.noise import uniform
+from texrs._typing import Bools, Floats, Labels
+from texrs.errors import InvalidInput
+from texrs.kernels.gather import gather
+from texrs.kernels.seam import cut
+from texrs.papers.design.operations import Operation, U, V, chaotic_sequence
+from texrs.source_map import SourceMap
+
+__all__ = ["X0", "Layered", "operation", "start", "stitch_layers"]
+
+X0 = 0.76234783
+"""Start of the chaotic sequence of the first variant (section 3.3)."""
+XI = 0.13
+"""Of the scaling extent e = xi n (section 3.3)."""
+SCALE = (0.8, 1.2)
+"""Where e lies (Eq. 1)."""
+FARTHEST, WIDEST = 0.5, 90.0
+"""What u would stand for: translation as a share of the shorter side, rotation in degrees."""
+
+
+def operation(value: float, side: int) -> Operation:
+    """Choose O(m) and its extent from one chaotic value (section 3.3, step 2).
+
+    Parameters
+    ----------
+    value : float
+        h(k), 0 to 255.
+    side : int
+        Shorter side of the exemplar, in pixels.
+
+    Returns
+    -------
+    Operation
+        Kind, extent and axis.
+
+    Examples
+    --------
+    >>> operation(37, 100)
+    Operation(kind='S', amount=0.91, axis=1)
+
+    """
+    h = int(value)
+    n = h % U
+    kind = "TRMS"[n % V]
+    sense, axis = (1 if h // U % 2 else -1), h // U // 2 % 2
+    amount = {
+        "T": float(sense * round(n / U * FARTHEST * side)),
+        "R": sense * n / U * WIDEST,
+        "M": 0.0,
+        "S": min(max(round(XI * n, 2), SCALE[0]), SCALE[1]),
+    }[kind]
+    return Operation(kind, amount, axis)
+
+
+def start(x0: float | None, chaos: float, seed: int, which: int, number: int) -> float:
+    """Return the start of the sequence of a variant of an exemplar: the paper's for the first one, others by the seed."""
+    if (which, number) == (0, 0):
+        return X0 if x0 is None else x0
+    for attempt in range(64):
+        drawn = 2 * uniform(seed, which, number, attempt, 5) - 1
+        try:
+            chaotic_sequence(drawn, chaos)
+        except InvalidInput:
+            continue
+        return drawn
+    return X0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Layered:
+    """Layers stitched: colours, where they come from, and what is covered (the mask of Eq. 4)."""
+
+    colours: Floats
+    coordinates: Floats
+    label: NDArray[np.uint32]
+    covered: Bools
+    frames: list[NDArray[np.float64]]
+    """The Jacobian of each label."""
+    log: list[dict[str, object]]
+
+
+def stitch_layers(picture: Floats, layers: Labels, x0: float, chaos: float) -> Layered:
+    """Move each layer by one operation and cut it into those before it, at the plain cost of Eq. 3.
+
+    A layer that lies wholly over others is lost: nothing ties the minimum cut to it.
+
+    Parameters
+    ----------
+    picture : (H, W, C) float32
+        The exemplar.
+    layers : (H, W) int32
+        The layer of each pixel, from 0.
+    x0, chaos : float
+        Of the chaotic sequence (Eq. 2).
+
+    Returns
+    -------
+    Layered
+        What is covered, and how.
+
+    """
+    shape = layers.shape
+    count = int(layers.max()) + 1
+    values = chaotic_sequence(x0, chaos, count)
+    whole = SourceMap.identity(shape)
+    made = Layered(np.zeros_like(picture), whole.coordinates.copy(), whole.label, np.zeros(shape, bool), [], [])
+    centre, last = (np.array(shape) - 1) / 2, np.array(shape) - 1
+    for layer in range(count):
+        chosen = operation(values[layer], min(shape))
+        inverse = np.asarray(np.linalg.inv(chosen.matrix()), np.float64)
+        places: Floats = (centre + (whole.coordinates - centre - chosen.shift()) @ inverse.T).astype(np.float32)
+        inside = np.all((places >= 0) & (places <= last), axis=-1)
+        mask = gather((layers == layer).astype(np.float32), places, interpolation="linear")
+        offered: Bools = inside & (mask > 0.5)
+        colours = gather(picture, places, interpolation="cubic")
+        taken = offered
+        if (offered & made.covered).any():
+            taken = offered & cut(made.colours, colours, made.covered, offered, cost="paper").mask
+        made.colours[taken] = colours[taken]
+        made.coordinates[taken] = places[taken]
+        made.label[taken] = layer
+        made.covered[taken] = True
+        made.frames.append(inverse)
+        made.log.append({"element": layer, "operations": [[chosen.kind, round(chosen.amount, 3), chosen.axis]]})
+    return made

@@ -1,0 +1,42 @@
+"""Memory, known before it is used."""
+
+from __future__ import annotations
+
+import numbers
+
+from texrs._engine.pyramid import Region
+from texrs._typing import Array
+from texrs.errors import InvalidInput, LimitExceeded
+from texrs.fields import Field
+
+LIMIT = 8 << 30
+"""Bytes that a synthesis may take unless another limit is given."""
+
+
+def needed(image: Array, region: Region, field: Field | None) -> int:
+    """Return the bytes that a synthesis takes at most, about.
+
+    A point of the output has its place four times over (12 bytes an axis triple), what its window shows, its value and
+    where the field varies its frame; the coarser levels add a seventh. A sample of the exemplar has its vector
+    and its colours.
+    """
+    axes = len(region.shape)
+    point = 4 * 4 * axes + 12 + 2 * image.itemsize * image.shape[-1] + 6
+    if field is not None and field.constant is None:
+        point += 2 * axes * axes
+    samples = image.size // image.shape[-1]
+    return int(region.points * point * 8 // 7 + samples * (56 + 8 * image.shape[-1]) * 8 // 7 + (24 << 20))
+
+
+def check_memory(image: Array, region: Region, field: Field | None, limit: object) -> None:
+    """Refuse what would take more memory than allowed, before anything is allocated."""
+    if limit is None:
+        limit = LIMIT
+    if isinstance(limit, bool) or not isinstance(limit, numbers.Integral) or int(limit) <= 0:
+        raise InvalidInput(f"memory_limit: needs a positive number of bytes, got {limit!r}")
+    total = needed(image, region, field)
+    if total > int(limit):
+        raise LimitExceeded(
+            f"size: {region.shape} would take {total / 2**30:.1f} GiB, more than the limit of "
+            f"{int(limit) / 2**30:.1f} GiB (memory_limit); an unbounded texture gives it in parts"
+        )

@@ -1,0 +1,320 @@
+"""Unbounded textures, of which any part can be had.
+
+What a point becomes hangs only on what is near it, so a texture without borders can be grown where it is looked at. The
+work is a chain of stages: the blocks, then one pass of the correction after the other, each on the lattice of its
+level. A box of a stage is made from a box of the stage before that is larger by what one point can see, its reach:
+
+    blocks      2 e + rounds (2 e + 1), where e is the farthest that a point lies from the centre of its cell
+    pass        vote + max(n, w), where n is how far the neighbours are that propose, and w = max_i [ r sum_j |F_ij| + 1/2 ]
+                how far a window of radius r looks along an axis of the output, over all frames F in sight
+
+Places within the reach of a box's border are wrong and are cut off; those that are left are the same in whatever box they
+were made. Finished parts of every stage are kept in a bounded memory, so that a neighbour of what has been seen is cheap.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import ceil, prod
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._engine.pyramid import ONE, Region, upsample
+from texrs._typing import Bools, Progress
+from texrs.papers.solid import Grower, Places
+from texrs.papers.solid.constraints import Hold
+from texrs.papers.solid.settings import Step
+
+__all__ = ["World", "blocks_reach", "window_reach"]
+
+MOST = 1 << 21
+"""Points of a box that is made at once: its memory is bounded, and what is seen beyond it is small beside it."""
+_SIDES = {2: (8, 64), 3: (4, 16)}
+"""Sides of the cells that are kept: of all stages but the last, about as large as what a pass can see, for each of
+them rounds up; and of the last one."""
+_STRAY = 0.4
+"""How far a cell's centre strays, as a share of the cell: that of `texrs._engine.appearance.Appearance.blocks`."""
+
+Key: TypeAlias = tuple[int, ...]
+
+
+def blocks_reach(cell: int, rounds: int, repetition: float = 0.0) -> int:
+    """Return how many points away the blocks at a point can see.
+
+    A point lies within e of the centre of its cell, for it lies so near to that of the cell it falls into. A cell is
+    chosen by its shell, e + 1 away from its centre, whose points lie within e of the centres of their own cells; each
+    round does so once more. Of the last cells all points must be there, for they tell where it may lie. Where
+    repetition has a cost, cells two steps away count too.
+    """
+    far = max(int((0.5 + _STRAY) * cell + 1e-6), cell - 1 - int((0.5 - _STRAY) * cell - 1e-6))
+    steps = ceil(2 * (1 + _STRAY) * cell) if repetition else 0
+    return 2 * far + rounds * max(2 * far + 1, steps)
+
+
+def window_reach(frames: NDArray[np.int16], radius: int) -> int:
+    """Return how far windows look along an axis of the output: they round F o, for offsets o of up to the radius.
+
+    The frames are J, in fixed point; their inverses are rounded there, by less than 1/64 in all.
+    """
+    inverses = np.linalg.inv(frames.astype(np.float64) / ONE)
+    return int(radius * float(np.abs(inverses).sum(axis=2).max()) + 0.5 + 1 / 64)
+
+
+@dataclass(frozen=True, slots=True)
+class _Stage:
+    """One of the chain: a pass of a level, or the blocks (pass -1)."""
+
+    level: int
+    number: int
+    side: int
+
+
+class _Kept:
+    """Boxes of the last stage, or of those before it; those that were not used for longest are dropped."""
+
+    def __init__(self, limit: int) -> None:
+        self.limit, self.used = limit, 0
+        self._boxes: OrderedDict[Key, Places] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def get(self, key: Key) -> Places | None:
+        with self._lock:
+            found = self._boxes.get(key)
+            if found is not None:
+                self._boxes.move_to_end(key)
+            return found
+
+    def put(self, key: Key, places: Places) -> None:
+        if places.nbytes > self.limit:
+            return
+        # A view would keep all that it is a part of.
+        places = places.copy()
+        with self._lock:
+            former = self._boxes.pop(key, None)
+            self.used += places.nbytes - (0 if former is None else former.nbytes)
+            self._boxes[key] = places
+            while self.used > self.limit:
+                self.used -= self._boxes.popitem(last=False)[1].nbytes
+
+    def clear(self) -> None:
+        with self._lock:
+            self._boxes.clear()
+            self.used = 0
+
+
+class World:
+    """The places of an endless texture, stage by stage."""
+
+    def __init__(self, grower: Grower, cache_bytes: int) -> None:
+        self.grower = grower
+        self.axes = len(grower.analysis.shape)
+        levels = range(len(grower.analysis.levels))
+        small, large = _SIDES[self.axes]
+        chain = [(0, -1)] + [(v, i) for v in levels for i in range(self._step(v).passes)]
+        self.stages = [_Stage(*s, large if s == chain[-1] else small) for s in chain]
+        # The stages before the last are small and dear: the last one must not crowd them out.
+        self._kept = _Kept(cache_bytes // 2), _Kept(cache_bytes // 2)
+        self._hold = Hold(grower.image)
+
+    def _step(self, level: int) -> Step:
+        return self.grower.settings.at(level, len(self.grower.analysis.levels))
+
+    @property
+    def cached(self) -> int:
+        return sum(kept.used for kept in self._kept)
+
+    def clear(self) -> None:
+        for kept in self._kept:
+            kept.clear()
+
+    def reach(self, stage: int, window: int) -> int:
+        """Return how many points away a stage can see in the one before; windows look so far."""
+        if stage == 0:
+            settings = self.grower.settings
+            return blocks_reach(settings.cell, settings.rounds, settings.repetition)
+        here = self.stages[stage]
+        step = self._step(here.level)
+        radius = self.grower.analysis.levels[here.level].radius
+        return min(step.vote, radius) + max(step.reach, window)
+
+    def read(self, box: Region, progress: Progress | None = None, stage: int = -1) -> Places:
+        """Return the places of a box, (..., A) int32."""
+        stage %= len(self.stages)
+        out = np.empty((*box.shape, self.axes), np.int32)
+        side = self.stages[stage].side
+        low = [o // side for o in box.origin]
+        high = [(o + n - 1) // side + 1 for o, n in zip(box.origin, box.shape, strict=True)]
+        wanted = np.ones([b - a for a, b in zip(low, high, strict=True)], bool)
+        for part, places in self.parts(low, wanted, progress, stage):
+            here, there = _overlap(box, part)
+            out[here] = places[there]
+        return out
+
+    def pick(self, points: NDArray[np.int64], progress: Progress | None = None) -> Places:
+        """Return the places of single points (N, A) of the world: (N, A) int32."""
+        stage = len(self.stages) - 1
+        side = self.stages[stage].side
+        cells = points // side
+        low = cells.min(axis=0)
+        wanted = np.zeros(tuple((cells.max(axis=0) - low + 1).tolist()), bool)
+        number = np.ravel_multi_index(tuple((cells - low).T), wanted.shape)
+        wanted.reshape(-1)[number] = True
+        # The points of each cell of the kept lattice, one cell after the other.
+        order = np.argsort(number, kind="stable")
+        first = np.searchsorted(number[order], np.arange(wanted.size + 1))
+        out = np.empty((len(points), self.axes), np.int32)
+        for part, places in self.parts(low.tolist(), wanted, progress, stage):
+            start = [o // side - int(b) for o, b in zip(part.origin, low, strict=True)]
+            for cell in product(*(range(s, s + n // side) for s, n in zip(start, part.shape, strict=True))):
+                k = int(np.ravel_multi_index(cell, wanted.shape))
+                here = order[first[k] : first[k + 1]]
+                if len(here):
+                    out[here] = places[tuple((points[here] - part.origin).T)]
+        return out
+
+    def parts(
+        self, low: Sequence[int], wanted: Bools, progress: Progress | None, stage: int
+    ) -> Iterator[tuple[Region, Places]]:
+        """Return boxes of places that together hold the wanted cells of the kept lattice, counted from a first one."""
+        side, kept = self.stages[stage].side, self._kept[stage == len(self.stages) - 1]
+        missing = wanted.copy()
+        for at in np.argwhere(wanted).tolist():
+            index = tuple(i + b for i, b in zip(at, low, strict=True))
+            if (places := kept.get((stage, *index))) is not None:
+                missing[tuple(at)] = False
+                yield self._box(index, (1,) * self.axes, side), places
+        radius = self.grower.analysis.levels[self.stages[stage].level].radius
+        boxes = list(_boxes(missing, side, self.reach(stage, radius)))
+        if len(boxes) > 1 and self.stages[stage].level:
+            # What the coarsest level sees beyond each box is larger than the box.
+            self._prepare(missing, low, stage, progress)
+        for start, stop in boxes:
+            first = [a + b for a, b in zip(start, low, strict=True)]
+            counts = [b - a for a, b in zip(start, stop, strict=True)]
+            part = self._box(first, counts, side)
+            places = self.make(part, stage, progress)
+            for step in product(*(range(n) for n in counts)):
+                cell = places[tuple(slice(i * side, (i + 1) * side) for i in step)]
+                kept.put((stage, *(a + i for a, i in zip(first, step, strict=True))), cell)
+            yield part, places
+
+    def make(self, box: Region, stage: int, progress: Progress | None = None) -> Places:
+        """Grow a box of a stage from the one before."""
+        here, grower = self.stages[stage], self.grower
+        if stage == 0:
+            margin = self.reach(0, 0)
+            region = box.grown(margin)
+            places = grower.start(region, grower.frames(0, region), self._hold, progress, margin=margin)
+        else:
+            region, frames = self._seen(box, stage)
+            if here.level and here.number == 0:
+                parents = region.parents()
+                below = self.read(parents, progress, stage - 1).reshape(-1)
+                places = upsample(below, parents, region, frames)
+            else:
+                places = self.read(region, progress, stage - 1).reshape(-1)
+            places = grower.correct(
+                places, here.level, region, frames, self._hold, progress, first=here.number, passes=1
+            ).places
+        return places.reshape(*region.shape, self.axes)[box.inside(region)]
+
+    def _seen(self, box: Region, stage: int) -> tuple[Region, NDArray[np.int16]]:
+        """Return the region that a box of a stage is made from, with its frames.
+
+        How far one must look hangs on the frames in sight, so the region grows until it holds what they ask for.
+        """
+        level = self.stages[stage].level
+        radius = self.grower.analysis.levels[level].radius
+        window = radius if self.grower.field is None else int(radius * self.axes**0.5 + 0.5)
+        while True:
+            region = box.grown(self.reach(stage, window))
+            frames = self.grower.frames(level, region)
+            needed = window_reach(frames, radius)
+            if needed <= window:
+                return region, frames
+            window = needed
+
+    def _prepare(self, missing: Bools, low: Sequence[int], stage: int, progress: Progress | None) -> None:
+        """Grow the coarsest level below all that is missing, at once."""
+        at = np.argwhere(missing)
+        first, last = at.min(axis=0), at.max(axis=0) + 1
+        region = self._box((first + np.array(low)).tolist(), (last - first).tolist(), self.stages[stage].side)
+        while self.stages[stage].level:
+            here = self.stages[stage]
+            region = region.grown(self.reach(stage, self.grower.analysis.levels[here.level].radius))
+            if here.number == 0:
+                region = region.parents()
+            stage -= 1
+        self.read(region, progress, stage)
+
+    def _box(self, first: Sequence[int], counts: Sequence[int], side: int) -> Region:
+        """Return the region of some cells of the kept lattice."""
+        return Region(tuple(n * side for n in counts), tuple(i * side for i in first), (False,) * self.axes)
+
+
+def _overlap(a: Region, b: Region) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
+    """Return what two regions have in common as slices of the one and of the other."""
+    starts = [max(o, p) for o, p in zip(a.origin, b.origin, strict=True)]
+    stops = [min(o + n, p + m) for o, n, p, m in zip(a.origin, a.shape, b.origin, b.shape, strict=True)]
+    here, there = (
+        tuple(slice(s - o, max(s, t) - o) for s, t, o in zip(starts, stops, r.origin, strict=True)) for r in (a, b)
+    )
+    return here, there
+
+
+def _boxes(missing: Bools, side: int, margin: int) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
+    """Return boxes, as first and last cells, that together hold all that is missing: few, and with little else.
+
+    A box costs its points, and those of the margin around it. It is divided where two halves, each cut down to what is
+    missing in it, cost less, and where it is too large to be made at once.
+    """
+    found = _hull(missing)
+    if found is None:
+        return
+    start, stop = found
+
+    def cost(box: tuple[tuple[int, ...], tuple[int, ...]] | None) -> int:
+        return 0 if box is None else prod((b - a) * side + 2 * margin for a, b in zip(*box, strict=True))
+
+    best, halves = cost(found), None
+    too_large = prod((b - a) * side for a, b in zip(start, stop, strict=True)) > MOST
+    longest = max(range(missing.ndim), key=lambda axis: stop[axis] - start[axis])
+    for axis in range(missing.ndim):
+        middle = (start[axis] + stop[axis]) // 2
+        if middle == start[axis]:
+            continue
+        pair = [
+            tuple(cut if a == axis else slice(start[a], stop[a]) for a in range(missing.ndim))
+            for cut in (slice(start[axis], middle), slice(middle, stop[axis]))
+        ]
+        total = sum(cost(_hull(missing[half])) for half in pair)
+        if total < best or (too_large and axis == longest and halves is None):
+            best, halves = total, pair
+    if halves is None:
+        yield start, stop
+        return
+    for half in halves:
+        offset = [s.start for s in half]
+        for a, b in _boxes(missing[half], side, margin):
+            yield (
+                tuple(x + o for x, o in zip(a, offset, strict=True)),
+                tuple(x + o for x, o in zip(b, offset, strict=True)),
+            )
+
+
+def _hull(missing: Bools) -> tuple[tuple[int, ...], tuple[int, ...]] | None:
+    """Return the first and the last cell along each axis, one beyond it, that are missing."""
+    start, stop = [], []
+    for axis in range(missing.ndim):
+        line = np.flatnonzero(missing.any(axis=tuple(a for a in range(missing.ndim) if a != axis)))
+        if not len(line):
+            return None
+        start.append(int(line[0]))
+        stop.append(int(line[-1]) + 1)
+    return tuple(start), tuple(stop)

@@ -1,0 +1,255 @@
+"""Edits of a texture's own layout, for `texrs.self_splice` (Figure 9 of the paper): lists of steps in plain JSON types."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_float, as_int, as_seed
+from texrs.errors import InvalidInput
+from texrs.layouts import match, nearest, spacing
+
+__all__ = ["Edited", "Step", "as_steps", "edited"]
+
+Points = NDArray[np.float64]
+Step = Mapping[str, Any]
+
+STEPS = {
+    "scale": {"factor"},
+    "shift": {"by"},
+    "rows": {"by"},
+    "randomise": {"amount", "least", "seed"},
+    "regularise": {"amount"},
+    "move": {"element", "by", "to"},
+    "remove": {"element"},
+    "points": {"points"},
+}
+"""What steps there are, and what each may say."""
+DRAWS = 24
+"""Places that an element may try when it is moved at random."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Edited:
+    """A layout after its edit.
+
+    Attributes
+    ----------
+    points : (n, 2) float64
+        Where each point goes.
+    kept : (n) bool
+        False where it goes nowhere.
+    listed : bool
+        Whether the edit is a list of moved points, and nothing else.
+
+    """
+
+    points: Points
+    kept: NDArray[np.bool_]
+    listed: bool
+
+
+def as_steps(edit: object, seed: int) -> list[dict[str, Any]]:
+    """Read an edit: a name, a step, or a list of steps; random ones get their seed, so that the list can be replayed."""
+    steps: Any = [edit] if isinstance(edit, str | Mapping) else edit
+    if not isinstance(steps, Sequence):
+        raise InvalidInput(f"edit: needs a name, a step or a list of steps, got {type(edit).__name__}")
+    found = []
+    for number, step in enumerate(steps):
+        told = {"op": step} if isinstance(step, str) else step
+        if not isinstance(told, Mapping) or told.get("op") not in STEPS:
+            raise InvalidInput(f"edit: step {number} needs an 'op' among {', '.join(STEPS)}; got {step!r}")
+        unknown = set(told) - {"op"} - STEPS[told["op"]]
+        if unknown:
+            raise InvalidInput(
+                f"edit: step {number}, {told['op']}, knows no {', '.join(sorted(map(str, unknown)))}; "
+                f"allowed are {', '.join(sorted(STEPS[told['op']]))}"
+            )
+        plain = dict(told)
+        if plain["op"] == "randomise":
+            plain["seed"] = as_seed(plain.get("seed", seed), "edit: seed")
+        found.append(plain)
+    return found
+
+
+def edited(points: Points, own: int, steps: Sequence[Step], named: int | None = None) -> Edited:
+    """Apply the steps to a layout.
+
+    Parameters
+    ----------
+    points : (n, 2) array
+        The elements of the picture, and after them their copies beyond its borders.
+    own : int
+        How many are of the picture. Copies follow where a step is a rule of places, and stay where it names elements.
+    steps : sequence
+        As `as_steps` gives them.
+    named : int, optional
+        How many of those of the picture a step may name; all by default.
+
+    """
+    at, kept = points.copy(), np.ones(len(points), bool)
+    acts: dict[str, Callable[[Step, Points, int, NDArray[np.bool_]], Points]] = {
+        "scale": _scale,
+        "shift": _shift,
+        "rows": _rows,
+        "randomise": _randomise,
+        "regularise": _regularise,
+        "move": _move,
+        "remove": _remove,
+        "points": _points,
+    }
+    for step in steps:
+        by_name = named is not None and step["op"] in ("move", "remove", "points")
+        at = acts[step["op"]](step, at, named if by_name and named is not None else own, kept)
+    if not np.isfinite(at).all() or np.abs(at).max() > 1e6:
+        raise InvalidInput("edit: moves elements further than 10^6 pixels")
+    return Edited(at, kept, all(step["op"] in ("move", "points") for step in steps))
+
+
+def _pair(step: Step, name: str, default: object = None) -> NDArray[np.float64]:
+    value = step.get(name, default)
+    try:
+        array = np.array(value, np.float64)
+    except (TypeError, ValueError):
+        array = np.zeros(0)
+    if array.shape not in ((), (2,)) or not np.isfinite(array).all():
+        raise InvalidInput(f"edit: {step['op']} needs {name} as a number or [rows, columns], got {value!r}")
+    return np.array(np.broadcast_to(array, 2), np.float64)
+
+
+def _element(step: Step, own: int) -> int:
+    return as_int(step.get("element"), f"edit: element of {step['op']}", 0, own - 1)
+
+
+def _scale(step: Step, at: Points, own: int, kept: NDArray[np.bool_]) -> Points:
+    factor = _pair(step, "factor", 1.0)
+    if (factor < 0.1).any() or (factor > 10).any():
+        raise InvalidInput(f"edit: factor of scale must lie within 0.1 and 10, got {factor.tolist()}")
+    centre = at[:own].mean(axis=0)
+    return np.asarray((at - centre) * factor + centre, np.float64)
+
+
+def _shift(step: Step, at: Points, own: int, kept: NDArray[np.bool_]) -> Points:
+    return at + _pair(step, "by", 0.0)
+
+
+def _rows(step: Step, at: Points, own: int, kept: NDArray[np.bool_]) -> Points:
+    """Slide every other row one way, and those between the other way."""
+    by = as_float(step.get("by", 0.0), "edit: by of rows", -1e4, 1e4)
+    order = np.argsort(at[:, 0], kind="stable")
+    gap = 0.5 * float(np.median(nearest(at[:own], 1)))
+    row = np.concatenate([[0], np.cumsum(np.diff(at[order, 0]) > gap)])
+    first = row[np.flatnonzero(order < own)[0]]
+    out = at.copy()
+    out[order, 1] += np.where((row - first) % 2 == 0, by, -by)
+    return out
+
+
+def _randomise(step: Step, at: Points, own: int, kept: NDArray[np.bool_]) -> Points:
+    """Displace points by Gaussian noise in spacings, none nearer to another than a share of the least usual distance."""
+    amount = as_float(step.get("amount", 0.25), "edit: amount of randomise", 0, 10)
+    least = as_float(step.get("least", 0.7), "edit: least of randomise", 0, 1)
+    noise = np.random.default_rng(step["seed"])
+    apart = least * float(np.percentile(nearest(at[:own], 1), 10))
+    sigma = amount * spacing(at[:own])
+    out = at.copy()
+    for i in range(own):
+        for _ in range(DRAWS):
+            there = at[i] + sigma * noise.standard_normal(2)
+            others = np.hypot(*(out - there).T)
+            others[i] = np.inf
+            if others.min() >= apart:
+                out[i] = there
+                break
+    return out
+
+
+def _regularise(step: Step, at: Points, own: int, kept: NDArray[np.bool_]) -> Points:
+    """Bring points to the lattice that fits them best, each to a place of its own."""
+    amount = as_float(step.get("amount", 1.0), "edit: amount of regularise", 0, 1)
+    origin, basis = lattice(at[:own])
+    span = np.linalg.inv(basis)
+    index = np.rint((at - origin) @ span)
+    low, high = index.min(axis=0).astype(int) - 1, index.max(axis=0).astype(int) + 1
+    sites = np.stack(np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(low, high, strict=True)), indexing="ij"), -1)
+    places = sites.reshape(-1, 2) @ basis + origin
+    of, _ = match(places, at)
+    return at + amount * (places[of] - at)
+
+
+def lattice(points: Points) -> tuple[Points, Points]:
+    """Fit a lattice by least squares: its origin, and two vectors as rows.
+
+    The vectors are those differences of near points that most pairs repeat; where none is repeated they make a square
+    lattice of the same density.
+    """
+    scale = spacing(points)
+    difference = points[:, None] - points[None]
+    length = np.hypot(*difference.reshape(-1, 2).T)
+    near = difference.reshape(-1, 2)[(length > 0) & (length < 2.2 * scale)]
+    # Votes within a sixth of a spacing, of one half of the plane.
+    half = near[(near[:, 0] > 1e-9) | ((np.abs(near[:, 0]) <= 1e-9) & (near[:, 1] > 0))]
+    basis = np.zeros((0, 2))
+    if len(half):
+        votes = (np.hypot(*(half[:, None] - half[None]).reshape(-1, 2).T) < scale / 6).reshape(len(half), -1)
+        count = votes.sum(axis=1)
+        order = np.lexsort((half[:, 1], half[:, 0], -count + 0.3 * count.max() * np.hypot(*half.T) / scale))
+        first = votes[order[0]] @ half / count[order[0]]
+        for k in order[1:]:
+            mean = votes[k] @ half / count[k]
+            lean = abs(float(np.cross(np.append(first, 0), np.append(mean, 0))[2]))
+            if lean > 0.5 * np.hypot(*first) * np.hypot(*mean):
+                if count[order[0]] >= 0.4 * len(points) and count[k] >= 0.4 * len(points):
+                    basis = np.array([first, mean])
+                break
+    if not len(basis):
+        area = float(np.prod(np.ptp(points, axis=0) + scale))
+        basis = np.eye(2) * np.sqrt(area / len(points))
+    origin = points[int(np.hypot(*(points - points.mean(axis=0)).T).argmin())]
+    for _ in range(3):
+        index = np.rint((points - origin) @ np.linalg.inv(basis))
+        system = np.concatenate([index, np.ones((len(points), 1))], axis=1)
+        if np.linalg.matrix_rank(system) < 3:
+            break
+        fit = np.linalg.lstsq(system, points, rcond=None)[0]
+        if abs(np.linalg.det(fit[:2])) < 0.2 * abs(np.linalg.det(basis)):
+            break
+        basis, origin = fit[:2], fit[2]
+    return origin, basis
+
+
+def _move(step: Step, at: Points, own: int, kept: NDArray[np.bool_]) -> Points:
+    if ("by" in step) == ("to" in step):
+        raise InvalidInput("edit: move needs one of 'by' and 'to'")
+    out, i = at.copy(), _element(step, own)
+    out[i] = at[i] + _pair(step, "by") if "by" in step else _pair(step, "to")
+    return out
+
+
+def _remove(step: Step, at: Points, own: int, kept: NDArray[np.bool_]) -> Points:
+    kept[_element(step, own)] = False
+    return at
+
+
+def _points(step: Step, at: Points, own: int, kept: NDArray[np.bool_]) -> Points:
+    """Take a list of points: by index where there are as many as elements, else each the element that costs least."""
+    try:
+        listed = np.array(step.get("points"), np.float64)
+    except (TypeError, ValueError):
+        listed = np.zeros(0)
+    if listed.ndim != 2 or listed.shape[1] != 2 or not np.isfinite(listed).all():
+        raise InvalidInput("edit: points needs a list of finite [row, column]")
+    if len(np.unique(listed, axis=0)) < len(listed):
+        raise InvalidInput("edit: points holds one place twice")
+    if len(listed) > own:
+        raise InvalidInput(f"edit: points has {len(listed)} places for {own} elements; give as many or fewer")
+    out = at.copy()
+    of = np.arange(own) if len(listed) == own else match(at[:own], listed)[0]
+    kept[:own] = False
+    kept[of] = True
+    out[of] = listed
+    return out

@@ -1,0 +1,121 @@
+"""Pictures of the stages of `texrs.papers.splice`, drawn when they are looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_image, to_unit
+from texrs._typing import Array, Bools
+from texrs.elements import Elements
+from texrs.papers.splice.layout import Match
+from texrs.papers.splice.refine import Draft
+
+__all__ = ["Stages"]
+
+Points = NDArray[np.float64]
+Picture = NDArray[np.uint8]
+
+RED, BLUE, GREEN, WHITE = (230, 40, 30), (40, 90, 230), (30, 170, 70), (255, 255, 255)
+HOLE = (255, 0, 255)
+
+
+class Stages(Mapping[str, Array]):
+    """Pictures by name, in the order of the stages; each is drawn when first asked for."""
+
+    def __init__(
+        self,
+        a: Elements,
+        b: Elements | None,
+        found: Match,
+        target: Points,
+        draft: Draft,
+        full: Draft,
+        image: Array,
+    ) -> None:
+        source = found.source
+        origin = np.array(source.origin)
+        shown = picture(a.image)
+        self._draw: dict[str, Callable[[], Array]] = {"points of a": lambda: marked(shown, a.points, RED)}
+        if b is not None:
+            self._draw["points of b"] = lambda: marked(picture(b.image), b.points, BLUE)
+        self._draw |= {
+            "mask": lambda: masked(shown, a.mask),
+            "matching": lambda: lines(
+                shown[source.table[..., 0], source.table[..., 1]],
+                source.points[found.of] - origin,
+                found.targets - origin,
+            ),
+            "warped mesh": lambda: meshed(target, source.mask, draft.known.shape),
+            "before refinement": lambda: before(shown, draft),
+            "filled": lambda: shown[full.places[..., 0], full.places[..., 1]],
+            "composite": lambda: image,
+        }
+        self._drawn: dict[str, Array] = {}
+
+    def __getitem__(self, name: str) -> Array:
+        """Draw a stage."""
+        if name not in self._drawn:
+            self._drawn[name] = self._draw[name]()
+        return self._drawn[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Go through the names."""
+        return iter(self._draw)
+
+    def __len__(self) -> int:
+        """Return the number of stages."""
+        return len(self._draw)
+
+
+def picture(image: Array) -> Picture:
+    """Return 8-bit RGB of anything."""
+    unit = to_unit(as_image(image))
+    colours = unit[..., :3] if unit.shape[-1] >= 3 else np.repeat(unit[..., :1], 3, axis=-1)
+    return np.rint(colours * 255).astype(np.uint8)
+
+
+def marked(image: Picture, points: Points, colour: tuple[int, int, int]) -> Picture:
+    """Draw a ring around each point."""
+    out = image.copy()
+    angles = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    for radius, shade in ((4, WHITE), (3, colour), (2, colour)):
+        at = np.rint(points[:, None] + radius * np.stack([np.sin(angles), np.cos(angles)], axis=-1)).astype(np.intp)
+        _put(out, at.reshape(-1, 2), shade)
+    return out
+
+
+def masked(image: Picture, mask: Bools) -> Picture:
+    """Show the ground dimmed."""
+    return np.where(mask[..., None], image, (image // 3 + np.array(BLUE) // 3).astype(np.uint8)).astype(np.uint8)
+
+
+def lines(image: Picture, start: Points, end: Points) -> Picture:
+    """Draw from each element to its target."""
+    out = (image // 2 + 100).astype(np.uint8)
+    share = np.linspace(0, 1, 200)[None, :, None]
+    _put(out, np.rint(start[:, None] * (1 - share) + end[:, None] * share).astype(np.intp).reshape(-1, 2), GREEN)
+    return marked(marked(out, start, RED), end, BLUE)
+
+
+def meshed(target: Points, mask: Bools, size: tuple[int, ...], step: int = 8) -> Picture:
+    """Draw every so manieth line of the warped mesh, darker where the texture's foreground is."""
+    out = np.full((*size, 3), 255, np.uint8)
+    for of, places in ((mask[::step], target[::step]), (mask[:, ::step], target[:, ::step])):
+        for shade, where in (((170, 170, 190), ~of), ((40, 40, 60), of)):
+            _put(out, np.rint(places[where]).astype(np.intp), shade)
+    return out
+
+
+def before(image: Picture, draft: Draft) -> Picture:
+    """Show the warp, with its holes."""
+    out: Picture = image[draft.places[..., 0], draft.places[..., 1]].copy()
+    out[~draft.known] = HOLE
+    return out
+
+
+def _put(image: Picture, at: NDArray[np.intp], colour: tuple[int, int, int]) -> None:
+    inside = ((at >= 0) & (at < np.array(image.shape[:2]))).all(axis=1)
+    image[at[inside, 0], at[inside, 1]] = colour

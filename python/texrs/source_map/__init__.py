@@ -1,0 +1,384 @@
+"""Source maps: for each output pixel, which exemplar it comes from, where, and in which local frame.
+
+Every pipeline of texrs makes one. The picture is only the exemplar looked up through it, so the same map serves each
+map that is in register with the exemplar: colours, normals, heights, labels, in any dtype and with any channels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_image
+from texrs._typing import Array, Bools, Frames, Interpolation, Path
+from texrs.errors import FileError, InvalidInput
+from texrs.kernels.gather import gather
+from texrs.source_map._pixels import Pixels, bands, number_pairs
+
+__all__ = ["Reuse", "SourceMap"]
+
+FORMAT = 1
+"""Version of the file layout."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reuse:
+    """How much of a synthesis is copied verbatim (see `SourceMap.reuse`).
+
+    Attributes
+    ----------
+    verbatim : float
+        Share of the output pixels that are exemplar samples, unchanged: whole coordinates.
+    largest : float
+        Area of the largest connected region copied in one piece, as a share of the exemplar's area.
+    regions : int
+        Number of such regions.
+
+    """
+
+    verbatim: float
+    largest: float
+    regions: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SourceMap:
+    """Where each output pixel (or voxel) comes from.
+
+    Attributes
+    ----------
+    coordinates : (..., A) float32
+        Place in the exemplar, (row, column) or (plane, row, column), in samples with centres at the integers. The
+        output's shape is ``...``; A is 2 or 3.
+    exemplar : (...) uint16
+        Which exemplar.
+    label : (...) uint32
+        Which patch.
+    frame : None, (L, A, A) or (..., A, A) float32, or a field
+        The Jacobian J = dS/dp of each pixel's patch: none (the identity), a table by label, dense, or a field of
+        `texrs.fields`, which is evaluated where it is needed. Its inverse says where the exemplar's axes point in the
+        output.
+    shapes : tuple of tuple of int
+        Shapes of the exemplars, without channels: what `render` expects.
+
+    """
+
+    coordinates: NDArray[np.float32]
+    exemplar: NDArray[np.uint16]
+    label: NDArray[np.uint32]
+    frame: NDArray[np.float32] | Frames | None
+    shapes: tuple[tuple[int, ...], ...]
+
+    def __post_init__(self) -> None:
+        """Check that the parts agree."""
+        shape = self.coordinates.shape[:-1]
+        axes = self.coordinates.shape[-1] if self.coordinates.ndim else 0
+        if len(shape) != axes or axes not in (2, 3):
+            raise InvalidInput(
+                "coordinates: needs shape (rows, columns, 2) or (planes, rows, columns, 3), "
+                f"got {self.coordinates.shape}"
+            )
+        for name, array, dtype in (
+            ("coordinates", self.coordinates, np.float32),
+            ("exemplar", self.exemplar, np.uint16),
+            ("label", self.label, np.uint32),
+        ):
+            if array.dtype != dtype or array.shape[:axes] != shape:
+                raise InvalidInput(f"{name}: needs {np.dtype(dtype)} over {shape}, got {array.dtype} {array.shape}")
+        if isinstance(self.frame, Frames):
+            if self.frame.axes != axes:
+                raise InvalidInput(f"frame: the field has {self.frame.axes} axes, the map {axes}")
+        elif self.frame is not None:
+            table = self.frame.ndim == 3
+            wanted = self.frame.shape[:1] if table else shape
+            if self.frame.dtype != np.float32 or self.frame.shape != (*wanted, axes, axes):
+                raise InvalidInput(
+                    f"frame: needs float32 (labels, {axes}, {axes}) or {(*shape, axes, axes)}, got {self.frame.shape}"
+                )
+            if table and self.label.size and int(self.label.max()) >= len(self.frame):
+                raise InvalidInput(f"frame: has {len(self.frame)} rows, but labels reach {int(self.label.max())}")
+        if any(len(s) != axes for s in self.shapes):
+            raise InvalidInput(f"shapes: each needs {axes} sides, got {self.shapes}")
+        if self.exemplar.size and int(self.exemplar.max()) >= len(self.shapes):
+            raise InvalidInput(f"exemplar: reaches {int(self.exemplar.max())}, but there are {len(self.shapes)} shapes")
+
+    @classmethod
+    def identity(cls, shape: tuple[int, ...]) -> SourceMap:
+        """Return the map of a picture that is the exemplar itself."""
+        grid = np.stack(np.meshgrid(*(np.arange(n, dtype=np.float32) for n in shape), indexing="ij"), axis=-1)
+        return cls(grid, np.zeros(shape, np.uint16), np.zeros(shape, np.uint32), None, (tuple(shape),))
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the output, without channels."""
+        return self.label.shape
+
+    @property
+    def axes(self) -> int:
+        """Number of axes, 2 or 3."""
+        return self.label.ndim
+
+    def frame_array(self) -> NDArray[np.float32] | None:
+        """Return `frame` as an array: none, a table by label, or dense."""
+        return self.frame.lattice(self.shape) if isinstance(self.frame, Frames) else self.frame
+
+    def frames(self) -> NDArray[np.float32]:
+        """Return the Jacobian of every pixel, dense: (..., A, A) float32."""
+        frame = self.frame_array()
+        if frame is None:
+            return np.broadcast_to(np.eye(self.axes, dtype=np.float32), (*self.shape, self.axes, self.axes))
+        return frame[self.label] if frame.ndim == 3 else frame
+
+    def render(
+        self,
+        exemplars: Array | Sequence[Array],
+        *,
+        interpolation: Interpolation = "cubic",
+        kind: Literal["colour", "normal"] = "colour",
+        green: Literal["up", "down"] = "up",
+    ) -> Array:
+        """Look a map that is in register with the exemplar up through this source map.
+
+        Parameters
+        ----------
+        exemplars : array, or a sequence of one an exemplar
+            Any map of the exemplar's height and width (and depth), any dtype and channels.
+        interpolation : {"cubic", "linear", "nearest"}
+            Between samples; use "nearest" for labels. Samples at whole coordinates are copied bit for bit.
+        kind : {"colour", "normal"}
+            "normal": a tangent-space normal map (channels x, y, z; unsigned values mean 2 v - 1). Its vectors turn
+            with the local frame.
+        green : {"up", "down"}
+            Whether the y of normals grows up (OpenGL) or down (DirectX).
+
+        Returns
+        -------
+        array
+            Shape of the output with the map's channels, in the map's dtype.
+
+        Raises
+        ------
+        InvalidInput
+            Another number of exemplars, or of another size, than the map was made from.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from texrs import SourceMap
+        >>> picture = np.arange(6, dtype=np.uint16).reshape(2, 3)
+        >>> bool((SourceMap.identity((2, 3)).render(picture) == picture).all())
+        True
+
+        """
+        several: list[Array] = list(exemplars) if isinstance(exemplars, list | tuple) else [exemplars]  # type: ignore[list-item]
+        if len(several) != len(self.shapes):
+            raise InvalidInput(f"exemplars: the map was made from {len(self.shapes)}, got {len(several)}")
+        images = [as_image(e, "exemplars", axes=self.axes) for e in several]
+        for i, (image, shape) in enumerate(zip(images, self.shapes, strict=True)):
+            if image.shape[: self.axes] != shape:
+                raise InvalidInput(f"exemplars: number {i} needs size {shape}, got {image.shape[: self.axes]}")
+        out = gather(several, self.coordinates, self.exemplar, interpolation=interpolation)
+        if kind == "colour":
+            return out
+        if kind != "normal" or green not in ("up", "down"):
+            raise InvalidInput(f"kind, green: allowed are colour or normal, up or down; got {kind!r}, {green!r}")
+        # Asked of the exemplars, for a part of them that a picture shows may have no negative value.
+        return self._turn_normals(out, green, any(float(e[..., :3].min()) < 0 for e in images))
+
+    def _turn_normals(self, normals: Array, green: str, signed: bool) -> Array:
+        """Turn tangent-space normals with the frame: a surface h(S(p)) has the slope J^T grad h."""
+        if self.axes != 2 or normals.ndim != 3 or normals.shape[-1] < 3:
+            raise InvalidInput(f"exemplars: a normal map needs shape (rows, columns, 3), got {normals.shape}")
+        if normals.dtype == np.bool_:
+            raise InvalidInput("exemplars: a normal map cannot be bool")
+        if self.frame is None:
+            return normals
+        integers = normals.dtype.kind in "ui"
+        top = float(np.iinfo(normals.dtype).max) if integers else 1.0
+        offset = 0.0 if signed else 1.0
+        scale = (2.0 if offset else 1.0) / top
+        n = normals[..., :3].astype(np.float64) * scale - offset
+        down = -1.0 if green == "up" else 1.0
+        flat = np.stack([n[..., 1] * down, n[..., 0]], axis=-1)
+        turned = np.einsum("...ji,...j->...i", self.frames().astype(np.float64), flat)
+        n = np.stack([turned[..., 1], turned[..., 0] * down, n[..., 2]], axis=-1)
+        n /= np.maximum(np.linalg.norm(n, axis=-1, keepdims=True), 1e-12)
+        value = (n + offset) / scale
+        out = normals.copy()
+        out[..., :3] = np.rint(value) if integers else value
+        return out
+
+    def compose(self, inner: SourceMap | Sequence[SourceMap]) -> SourceMap:
+        """Return the map of a picture made from pictures that were made from exemplars.
+
+        ``self`` looks into pictures whose own source maps are ``inner``, one for each of its exemplars; the result
+        looks
+        into the exemplars of ``inner`` at once: S(p) = inner(q) + J_inner (self(p) - q), where q is the pixel nearest
+        to self(p), and J = J_inner J_self.
+
+        Raises
+        ------
+        InvalidInput
+            Another number of maps, or of other sizes, than ``self`` looks into, or maps of different exemplars.
+
+        """
+        maps = [inner] if isinstance(inner, SourceMap) else list(inner)
+        if tuple(m.shape for m in maps) != self.shapes:
+            raise InvalidInput(f"inner: needs outputs of sizes {self.shapes}, got {[m.shape for m in maps]}")
+        if any(m.shapes != maps[0].shapes for m in maps):
+            raise InvalidInput("inner: all maps must look into the same exemplars")
+        inners = Pixels.of(maps)
+        place = np.empty(self.shape, np.uint32 if inners.count < 2**32 else np.uint64)
+        rest = np.zeros_like(self.coordinates)
+        for band in bands(self.shape):
+            near = np.floor(self.coordinates[band] + np.float32(0.5)).astype(np.int64)
+            place[band] = inners.places(near, self.exemplar[band])
+            rest[band] = self.coordinates[band] - near.astype(np.float32)
+        return self._picked(inners, place, self.label, self.frame_array(), rest if rest.any() else None, maps[0].shapes)
+
+    @classmethod
+    def pick(
+        cls,
+        maps: Sequence[SourceMap],
+        place: NDArray[np.unsignedinteger],
+        label: NDArray[np.uint32],
+        *,
+        overwrite: bool = False,
+    ) -> SourceMap:
+        """Return the map of a picture that is put together from single pixels of pictures.
+
+        Parameters
+        ----------
+        maps : sequence of SourceMap
+            Those of the pictures; they look into the same exemplars.
+        place : (rows, columns) of unsigned int
+            Which pixel: counted row by row, through one picture after the other.
+        label : (rows, columns) uint32
+            Which patch: pixels of two patches get different labels, also where they are neighbours in a picture.
+        overwrite : bool
+            Write the labels of the map over ``label``, which saves 4 bytes a pixel.
+
+        Returns
+        -------
+        SourceMap
+            It looks into the exemplars.
+
+        """
+        return cls._picked(Pixels.of(maps), place, label, None, None, maps[0].shapes, label if overwrite else None)
+
+    @classmethod
+    def _picked(
+        cls,
+        inners: Pixels,
+        place: NDArray[np.unsignedinteger],
+        outer: NDArray[np.uint32],
+        frame: NDArray[np.float32] | None,
+        rest: NDArray[np.float32] | None,
+        shapes: tuple[tuple[int, ...], ...],
+        out: NDArray[np.uint32] | None = None,
+    ) -> SourceMap:
+        """Put pixels together: S(p) = inner(q) + J_inner rest, J = J_inner frame; ``out`` for labels may be ``outer``."""
+        axes = place.ndim
+        exemplar = np.empty(place.shape, np.uint16)
+        coordinates = np.empty((*place.shape, axes), np.float32)
+        label = np.empty(place.shape, np.uint32) if out is None else out
+        each = inners.framed or (frame is not None and frame.ndim > 3)
+        frames = np.empty((*place.shape, axes, axes), np.float32) if each else None
+        for band in bands(place.shape):
+            at = place[band]
+            coordinates[band], exemplar[band] = inners.coordinates[at], inners.exemplar[at]
+            if rest is not None:
+                coordinates[band] += np.einsum("...ij,...j->...i", inners.frames(at), rest[band])
+            if frames is not None:
+                frames[band] = inners.frames(at)
+                if frame is not None:
+                    frames[band] @= frame[band] if frame.ndim > 3 else frame[outer[band]]
+        keys = number_pairs(outer, inners, place, label)
+        if frames is None and (frame is not None or inners.table is not None):
+            outer_of, inner_of = np.divmod(keys, np.uint64(max(1, inners.labels)))
+            frames = inners.frames_of(inner_of)
+            frames = np.asarray(frames if frame is None else frames @ frame[outer_of], np.float32)
+        return cls(coordinates, exemplar, label, frames, shapes)
+
+    def continues(self, axis: int, *, wrap: bool = False) -> Bools:
+        """Return where a pixel and the next one along ``axis`` come from one piece of the exemplar.
+
+        True where S(p + e) = S(p) + J(p) e within a tenth of a sample, in one exemplar. Along an axis that does not
+        wrap the last one is False. False means a seam.
+        """
+        joined = self.exemplar == np.roll(self.exemplar, -1, axis)
+        frame = self.frame_array()
+        # One coordinate at a time, for a dense frame of a large picture is many times its size.
+        for a in range(self.axes):
+            place = self.coordinates[..., a]
+            step: Any = np.float32(a == axis)
+            if frame is not None:
+                step = frame[:, a, axis][self.label] if frame.ndim == 3 else frame[..., a, axis]
+            joined &= np.abs(place + step - np.roll(place, -1, axis)) < 0.1
+        if not wrap:
+            joined[tuple(slice(None) if a != axis else -1 for a in range(self.axes))] = False
+        result: Bools = joined
+        return result
+
+    def reuse(self) -> Reuse:
+        """Measure how much is copied verbatim from the exemplars, and in how large pieces."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        count = self.label.size
+        index = np.arange(count).reshape(self.shape)
+        starts, ends = [], []
+        for axis in range(self.axes):
+            joined = self.continues(axis)
+            starts.append(index[joined])
+            ends.append(np.roll(index, -1, axis)[joined])
+        start, end = np.concatenate(starts), np.concatenate(ends)
+        graph = coo_array((np.ones(len(start), np.uint8), (start, end)), shape=(count, count))
+        regions, region = connected_components(graph, directed=False)
+        largest = int(np.bincount(region).max())
+        whole = (self.coordinates == np.rint(self.coordinates)).all(axis=-1)
+        return Reuse(float(whole.mean()), largest / max(int(np.prod(s)) for s in self.shapes), int(regions))
+
+    def save(self, path: Path) -> None:
+        """Write the map to an ``.npz`` file, whole or not at all."""
+        from texrs.io import atomic
+
+        parts: dict[str, Any] = {
+            "texrs_source_map": np.array(FORMAT),
+            "coordinates": self.coordinates,
+            "exemplar": self.exemplar,
+            "label": self.label,
+            "shapes": np.array(self.shapes, np.int64),
+        }
+        if (frame := self.frame_array()) is not None:
+            parts["frame"] = frame
+        with atomic(path) as temporary, open(temporary, "wb") as file:
+            np.savez_compressed(file, **parts)
+
+    @classmethod
+    def load(cls, path: Path) -> SourceMap:
+        """Read a map that `save` wrote.
+
+        Raises
+        ------
+        FileError
+            Not there, not a source map, damaged, or of a later version.
+
+        """
+        from texrs.io import read_arrays
+
+        parts = read_arrays(path)
+        names = ("texrs_source_map", "coordinates", "exemplar", "label", "shapes")
+        if any(name not in parts for name in names):
+            raise FileError(f"{path}: is not a source map")
+        if parts["texrs_source_map"].ravel().tolist() != [FORMAT]:
+            raise FileError(f"{path}: has another layout than {FORMAT}, which this version of texrs reads")
+        try:
+            shapes = tuple(tuple(int(n) for n in s) for s in parts["shapes"])
+            return cls(parts["coordinates"], parts["exemplar"], parts["label"], parts.get("frame"), shapes)
+        except (InvalidInput, TypeError, ValueError) as error:
+            raise FileError(f"{path}: is damaged ({error})") from None

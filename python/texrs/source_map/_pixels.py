@@ -1,0 +1,129 @@
+"""The pixels of several source maps in one row, from which another map is put together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from texrs.source_map import SourceMap
+
+__all__ = ["Pixels", "bands", "number_pairs"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pixels:
+    """Pixels of source maps, one map after the other, their labels counted on."""
+
+    shapes: NDArray[np.int64]
+    """Sides of each map."""
+    first: NDArray[np.int64]
+    """Where each map begins in the row."""
+    coordinates: NDArray[np.float32]
+    exemplar: NDArray[np.uint16]
+    label: NDArray[np.uint64]
+    labels: int
+    table: NDArray[np.float32] | None
+    """Frame of each label; none where all are the identity or some map has a frame for each pixel."""
+    pixels: NDArray[np.float32] | None
+    """Frame of each pixel, where some map has one."""
+
+    @classmethod
+    def of(cls, maps: Sequence[SourceMap]) -> Pixels:
+        axes = maps[0].axes
+        counts = [int(m.label.max()) + 1 if m.label.size else 0 for m in maps]
+        offsets = np.cumsum([0, *counts]).astype(np.uint64)
+        table = pixels = None
+        arrays = [m.frame_array() for m in maps]
+        if any(f is not None and f.ndim > 3 for f in arrays):
+            pixels = np.concatenate([m.frames().reshape(-1, axes, axes) for m in maps])
+        elif any(f is not None for f in arrays):
+            eye = np.eye(axes, dtype=np.float32)
+            table = np.concatenate(
+                [
+                    np.broadcast_to(eye, (n, axes, axes)) if frame is None else frame[:n]
+                    for frame, n in zip(arrays, counts, strict=True)
+                ]
+            )
+        return cls(
+            np.array([m.shape for m in maps]),
+            np.cumsum([0, *(m.label.size for m in maps[:-1])]),
+            np.concatenate([m.coordinates.reshape(-1, axes) for m in maps]),
+            np.concatenate([m.exemplar.ravel() for m in maps]),
+            np.concatenate([m.label.ravel() + o for m, o in zip(maps, offsets[:-1], strict=True)]),
+            int(offsets[-1]),
+            table,
+            pixels,
+        )
+
+    @property
+    def count(self) -> int:
+        """Number of pixels."""
+        return self.label.size
+
+    @property
+    def framed(self) -> bool:
+        """Whether some map has a frame for each pixel."""
+        return self.pixels is not None
+
+    def places(self, point: NDArray[np.int64], which: NDArray[np.uint16]) -> NDArray[np.int64]:
+        """Return the place in the row of a pixel of each of some maps; points outside are moved to the border, in place."""
+        place = np.zeros(which.shape, np.int64)
+        for axis in range(point.shape[-1]):
+            side = self.shapes[:, axis][which]
+            np.clip(point[..., axis], 0, side - 1, out=point[..., axis])
+            place = place * side + point[..., axis]
+        return place + self.first[which]
+
+    def frames(self, at: NDArray[np.integer]) -> NDArray[np.float32]:
+        """Return the frames at places in the row."""
+        return self.frames_of(self.label[at]) if self.pixels is None else self.pixels[at]
+
+    def frames_of(self, label: NDArray[np.integer]) -> NDArray[np.float32]:
+        """Return the frames of labels."""
+        axes = self.coordinates.shape[-1]
+        if self.table is None:
+            return np.broadcast_to(np.eye(axes, dtype=np.float32), (*label.shape, axes, axes))
+        return np.asarray(self.table[label], np.float32)
+
+
+BAND = 1 << 18
+"""Pixels that are composed at once."""
+
+
+def bands(shape: tuple[int, ...]) -> Iterator[slice]:
+    """Cut the first axis into bands, so that what is computed for each pixel needs little memory."""
+    step = max(1, BAND // max(1, math.prod(shape[1:])))
+    for start in range(0, shape[0], step):
+        yield slice(start, start + step)
+
+
+def number_pairs(
+    outer: NDArray[np.uint32], pixels: Pixels, place: NDArray[np.unsignedinteger], out: NDArray[np.uint32]
+) -> NDArray[np.uint64]:
+    """Return the pairs of an outer label and the label of the pixel at a place that occur, and number them by rising value.
+
+    Pairs are outer * pixels.labels + inner. The number of that of each pixel is written into ``out``.
+    """
+
+    def pairs(band: slice) -> NDArray[np.uint64]:
+        return np.asarray(outer[band] * np.uint64(pixels.labels) + pixels.label[place[band]], np.uint64)
+
+    most = (int(outer.max()) + 1) * pixels.labels if outer.size else 0
+    if most > max(1 << 22, place.size):
+        found = np.unique(np.concatenate([np.unique(pairs(band)) for band in bands(place.shape)]))
+        for band in bands(place.shape):
+            out[band] = np.searchsorted(found, pairs(band))
+        return found
+    seen = np.zeros(most, bool)
+    for band in bands(place.shape):
+        seen[pairs(band)] = True
+    number = (np.cumsum(seen, dtype=np.uint32) - np.uint32(1)).astype(np.uint32)
+    for band in bands(place.shape):
+        out[band] = number[pairs(band)]
+    return np.flatnonzero(seen).astype(np.uint64)

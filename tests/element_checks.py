@@ -1,0 +1,89 @@
+"""What is measured of an analysis: how many elements were found, and how many of those that were found are some (S1)."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+TOLERANCE = 0.2
+"""Distance between an element and its detection, as a share of the box along each axis."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """Of points against true centres."""
+
+    recall: float
+    """Of all true centres."""
+    inner: float
+    """Of those no nearer to the border than half a box."""
+    precision: float
+    """Of the points no nearer to the border than half a box."""
+    error: float
+    """Mean distance of the pairs, in pixels."""
+
+
+def score(points: Any, centres: Any, box: Any, shape: Any, tolerance: float = TOLERANCE) -> Score:
+    """Pair points with centres, each with one at most, so that most are paired, and the nearest ones."""
+    from scipy.optimize import linear_sum_assignment
+
+    box = np.asarray(box, float)
+    away = np.sqrt((((points[:, None] - centres[None]) / box) ** 2).sum(axis=-1))
+    i, j = linear_sum_assignment(np.where(away <= tolerance, away, 1e3))
+    paired = away[i, j] <= tolerance
+    i, j = i[paired], j[paired]
+    hit, got = np.zeros(len(points), bool), np.zeros(len(centres), bool)
+    hit[i], got[j] = True, True
+
+    def inside(p: Any) -> Any:
+        return ((p >= box / 2) & (p <= np.array(shape[:2]) - 1 - box / 2)).all(axis=1)
+
+    near, true = inside(points), inside(centres)
+    return Score(
+        float(got.mean()),
+        float(got[true].mean()) if true.any() else 1.0,
+        float(hit[near].mean()) if near.any() else 1.0,
+        float(np.linalg.norm(points[i] - centres[j], axis=1).mean()) if len(i) else np.inf,
+    )
+
+
+def passes(found: Score, *, recall_only: bool = False) -> bool:
+    """Return whether check S1 is met."""
+    return found.inner >= 0.9 and (recall_only or found.precision >= 0.85)
+
+
+@dataclass(frozen=True)
+class Annotated:
+    """A texture with what its annotation says, all of it (row, column)."""
+
+    name: str
+    image: Path
+    tag: str
+    box: tuple[float, float, float, float]
+    background: Any
+    centres: Any
+
+    @classmethod
+    def of(cls, path: Path) -> Annotated:
+        """Read a JSON annotation, which has (x, y)."""
+        given = json.loads(path.read_text(encoding="utf-8"))
+        (x, y), (width, height) = given["foreground_box"]["center"], given["foreground_box"]["size"]
+        centres = given.get("element_centres")
+        return cls(
+            path.stem,
+            path.parent / given["image"],
+            given["tag"],
+            (y, x, height, width),
+            np.array(given["background_scribble"], float)[:, ::-1],
+            np.array(centres, float)[:, ::-1] if centres else None,
+        )
+
+
+def annotated(folder: Path) -> list[Annotated]:
+    """Read all annotations of the textures with separate elements, nets and joints."""
+    rooms = ("b-disjoint", "c-connected", "d-background")
+    return [Annotated.of(path) for room in rooms for path in sorted((folder / room).glob("*.json"))]

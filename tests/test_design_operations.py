@@ -1,0 +1,180 @@
+"""Elements under moves: by chance, from place to place of a heap, and on a lattice."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import texrs
+from texrs import samples
+from texrs.errors import InvalidInput
+from texrs.papers.design.operations import Heap, Moves, chaotic_sequence, elements_of, fit, place
+
+FREE = Moves(2, 0.12, 60.0, (0.8, 1.2), True, None, 2.0)
+
+
+def bars(*angles):
+    """Draw a bar of 30 x 10 pixels at each angle, 50 pixels apart."""
+    rows, columns = np.mgrid[:60, : 50 * len(angles)]
+    labels = np.zeros(rows.shape, np.int32)
+    for k, angle in enumerate(np.radians(angles)):
+        y, x = rows - 30, columns - 25 - 50 * k
+        along, across = x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle)
+        labels[(np.abs(along) < 15) & (np.abs(across) < 5)] = k + 1
+    return labels
+
+
+# --- the chaotic sequence --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "x0", [0, 0.5, -0.5, 1, -1, 0.5**0.5, -(0.5**0.5), 1.5, float("nan"), float("inf"), "half", None]
+)
+def test_starts_that_lead_nowhere_are_refused(x0):
+    with pytest.raises(InvalidInput, match="^x0"):
+        chaotic_sequence(x0)
+
+
+@pytest.mark.parametrize("chaos", [-0.1, 2.001, 4, float("nan"), "strong"])
+def test_a_lambda_outside_0_to_2_is_refused(chaos):
+    with pytest.raises(InvalidInput, match="^chaos"):
+        chaotic_sequence(0.3, chaos)
+
+
+@pytest.mark.parametrize("chaos", [0, 0.5, 1, 2])
+def test_a_lambda_within_0_to_2_is_taken(chaos):
+    values = chaotic_sequence(0.3, chaos, 100)
+    assert values.shape == (100,)
+    assert ((values >= 0) & (values <= 255)).all()
+
+
+# --- heaps -----------------------------------------------------------------------------------------------------------
+
+
+def test_a_turned_element_takes_the_place_of_its_like():
+    labels = bars(0, 40, 90)
+    elements = elements_of(labels)
+    heap = Heap.of(elements, labels)
+    for site, element in enumerate(elements):
+        taken = heap.take_place(site, FREE, 0, 0)
+        assert taken is not None
+        other, operations, placement = taken
+        assert other is not element
+        assert {o.kind for o in operations} <= set("TRS")
+        turn = sum(o.amount for o in operations if o.kind == "R")
+        assert abs((turn - {1: 0, 2: 40, 3: 90}[element.label] + {1: 0, 2: 40, 3: 90}[other.label] + 90) % 180 - 90) < 3
+        assert abs(turn) <= 60
+        assert not np.any((placement.distance > 2) & (labels[placement.window] != element.label))
+
+
+def test_unlike_elements_stay():
+    labels = bars(0, 40)
+    labels[labels == 2] = 0
+    labels[20:40, 65:85] = 2
+    heap = Heap.of(elements_of(labels), labels)
+    assert heap.take_place(0, FREE, 0, 0) is None
+    assert heap.take_place(1, FREE, 0, 0) is None
+
+
+@pytest.mark.parametrize(
+    "moves",
+    [
+        Moves(0, 0.12, 60.0, (0.8, 1.2), True, None, 2.0),
+        Moves(2, 0.0, 60.0, (0.8, 1.2), True, None, 2.0),
+        Moves(2, 0.12, 0.0, (0.8, 1.2), True, None, 2.0),
+    ],
+    ids=["no operations", "no translation", "no rotation"],
+)
+def test_elements_of_a_heap_do_only_what_they_may(moves):
+    labels = bars(0, 60)
+    assert Heap.of(elements_of(labels), labels).take_place(0, moves, 0, 0) is None
+
+
+def test_an_element_at_the_border_neither_goes_nor_gives_way():
+    labels = bars(0, 0)
+    labels[25:35, :12] = 1
+    heap = Heap.of(elements_of(labels), labels)
+    assert [heap.take_place(site, FREE, 0, 0) for site in range(2)] == [None, None]
+
+
+def test_elements_of_one_pixel_and_of_all_pixels_are_measured():
+    for labels in (np.pad([[1]], 5), np.ones((6, 7), int)):
+        (element,) = elements_of(labels.astype(np.int32))
+        assert np.isfinite(element.axes).all()
+        assert place(element, [], labels.shape) is not None
+
+
+def test_heaps_move_without_holes_to_speak_of():
+    beans = samples.beans((128, 128)).image
+    made = texrs.design(beans, 96, tiles=2, seed=1)
+    moved = [e for e in made.report["operations"][0][1:] if "place" in e]
+    assert len(moved) >= 0.15 * made.report["elements"]
+    assert max(made.report["holes"]) < 0.1
+
+
+# --- lattices --------------------------------------------------------------------------------------------------------
+
+
+def test_on_a_lattice_elements_move_by_its_shifts_alone():
+    weave = samples.weave((160, 160)).image
+    found = texrs.exemplar.segmentation.segment(weave)
+    assert found.lattice is not None
+    made = texrs.design(weave, 96, tiles=2, seed=2)
+    assert "lattice" in made.report["children_reason"]
+    assert (made.report["rotate"], made.report["holes"]) == (0, [0, 0])
+    lattice = np.array([found.lattice.a, found.lattice.b], float).T
+    entries = [entry for log in made.report["operations"] for entry in log[1:] if any(entry.get("place", []))]
+    shifts = [entry["place"] for entry in entries]
+    assert len(shifts) > 20
+    assert not any(entry["operations"] for entry in entries)
+    # Along an axis that is mirrored a lattice of orthogonal periods is its own mirror.
+    times = np.linalg.solve(lattice, np.array(shifts).T)
+    assert np.abs(times - np.round(times)).max() < 0.1
+
+
+def test_mirrors_keep_to_the_axes_that_allow_them():
+    kinds = {
+        axes: {
+            (o.kind, o.axis if o.kind == "M" else 0)
+            for e in range(99)
+            for o in replace(FREE, axes=axes).draw(FREE.values(0, 0, e), (False, False), 99)
+        }
+        for axes in ((True, True), (False, True), (True, False), (False, False))
+    }
+    others = {("T", 0), ("R", 0), ("S", 0)}
+    assert kinds[True, True] == others | {("M", 0), ("M", 1)}
+    assert kinds[False, True] == others | {("M", 1)}
+    assert kinds[True, False] == others | {("M", 0)}
+    assert kinds[False, False] == others
+
+
+def test_shifts_are_mirrored_with_the_picture():
+    moves = Moves(2, 0.12, 0.0, (1.0, 1.0), False, None, 2.0, ((3, 5), (-2, 7)))
+    assert moves.flipped((True, False)).shifts == ((-3, 5), (2, 7))
+    assert moves.flipped((False, True)).shifts == ((3, -5), (-2, -7))
+    drawn = {
+        tuple((o.kind, o.amount, o.axis) for o in moves.draw(moves.values(0, 0, e), (False, False), 99))
+        for e in range(99)
+    }
+    assert drawn == {(("T", 3.0, 0), ("T", 5.0, 1)), (("T", -2.0, 0), ("T", 7.0, 1))}
+    assert moves.draw(moves.values(0, 0, 1), (True, False), 99) == []
+
+
+def test_elements_keep_out_of_what_others_occupy():
+    """Also of the places of those that have yet to move: so an element can always stay."""
+    rows, columns = np.mgrid[:96, :96]
+    labels = np.zeros((96, 96), np.int32)
+    for number, (r, c) in enumerate([(24, 24), (24, 50), (50, 24), (50, 50), (74, 74)], start=1):
+        labels[(rows - r) ** 2 + (columns - c) ** 2 < 100] = number
+    moves = Moves(2, 0.3, 60.0, (0.8, 1.2), True, None, 2.0)
+    moved = 0
+    for seed in range(8):
+        for element in elements_of(labels):
+            fitted = fit(element, labels, moves, seed, 0)
+            assert fitted is not None
+            operations, placement = fitted
+            mine = (placement.distance > 0) & placement.inside
+            there = labels[placement.window]
+            assert (mine & (there > 0) & (there != element.label)).sum() <= 0.12 * mine.sum()
+            moved += bool(operations)
+    assert moved >= 20

@@ -1,0 +1,383 @@
+"""Elements of textures whose centres and masks are known; bad input; entries as files."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from element_checks import annotated, passes, score
+from texrs import _threads as threads
+from texrs import elements as elements
+from texrs import io, samples
+from texrs.elements import Elements, analyse
+from texrs.elements._clean import clean
+from texrs.elements._mixture import Mixture
+from texrs.elements._search import otsu
+from texrs.errors import FileError, InvalidInput, TexrsError
+from texrs.layouts import directions
+
+DISC, SPACING = 9, 32
+
+
+def discs(rows: int = 5, columns: int = 6, *, jitter: int = 4, seed: int = 0, radius: float = DISC) -> tuple:
+    """Shaded discs on a grainy ground: image, centres, mask."""
+    rng = np.random.default_rng(seed)
+    size = (rows * SPACING, columns * SPACING)
+    centres = (np.indices((rows, columns)).reshape(2, -1).T + 0.5) * SPACING
+    centres = np.rint(centres + rng.uniform(-jitter, jitter, centres.shape))
+    grid = np.indices(size).transpose(1, 2, 0)
+    image = np.array([0.55, 0.5, 0.3]) + rng.normal(0, 0.02, (*size, 3))
+    mask = np.zeros(size, bool)
+    for centre in centres:
+        off = (grid - centre) / radius
+        inside = (off**2).sum(axis=-1) <= 1
+        mask |= inside
+        tone = (0.6 + 0.25 * off[..., 0])[inside, None] * np.array([0.9, 0.4, 0.35])
+        image[inside] = tone + rng.normal(0, 0.02, tone.shape)
+    return np.clip(image * 255, 0, 255).astype(np.uint8), centres, mask
+
+
+IMAGE, CENTRES, MASK = discs()
+BOX = (*CENTRES[8], 2 * DISC + 1, 2 * DISC + 1)
+GROUND = [(c[0], c[1] + SPACING / 2) for c in CENTRES[[0, 7, 14, 21, 28]]]
+
+
+@pytest.fixture(scope="module")
+def entry() -> Elements:
+    return analyse(IMAGE, box=BOX, background=GROUND, tag="F=d")
+
+
+# --- what is found ---------------------------------------------------------------------------------------------------
+
+
+def test_elements_mask_and_places(entry: Elements) -> None:
+    found = score(entry.points, CENTRES, BOX[2:], IMAGE.shape)
+    assert found.recall == 1
+    assert found.precision == 1
+    assert found.error < 0.7
+    assert (entry.mask & MASK).sum() / (entry.mask | MASK).sum() > 0.93
+    assert entry.report["mask"] == "cut"
+    assert entry.box == (19, 19)
+    assert (np.diff(entry.scores) <= 0).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "recall", "overlap"), [("dots", 0.88, 0.75), ("leaves_and_flowers", 0.9, 0.7), ("net", 0.95, 0.3)]
+)
+def test_samples_with_exact_centres(name: str, recall: float, overlap: float) -> None:
+    sample = samples.load(name)
+    box, ground = told(sample)
+    found = analyse(sample.image, box=box, background=ground, tag=sample.tag)
+    result = score(found.points, sample.centres, box[2:], sample.image.shape)
+    assert result.inner >= recall
+    assert result.precision >= 0.95
+    assert result.error <= 1.5
+    assert (found.mask & sample.mask).sum() / (found.mask | sample.mask).sum() >= overlap
+
+
+def told(sample: samples.Sample) -> tuple:
+    """Say of a sample what a user would: the box of a usual element, and places far from all of them."""
+    from scipy.ndimage import distance_transform_edt, find_objects
+
+    height, width = sample.image.shape[:2]
+    boxes = [
+        ((r.start + r.stop - 1) / 2, (c.start + c.stop - 1) / 2, r.stop - r.start, c.stop - c.start)
+        for r, c in (s for s in find_objects(sample.labels) if s)
+        if r.start > 0 and c.start > 0 and r.stop < height and c.stop < width
+    ]
+    usual = np.median([b[2] * b[3] for b in boxes])
+    away = distance_transform_edt(~sample.mask)
+    far = np.argwhere(away >= np.quantile(away[~sample.mask], 0.9))
+    return min(boxes, key=lambda b: abs(b[2] * b[3] - usual)), far[:: max(1, len(far) // 8)]
+
+
+def test_a_mask_of_all_replaces_the_cut() -> None:
+    found = analyse(IMAGE, mask=MASK, tag="F=d")
+    assert found.report["mask"] == "given"
+    np.testing.assert_array_equal(found.mask, MASK)
+    assert len(found.points) == len(CENTRES)
+
+
+def test_a_mask_of_one_is_a_start() -> None:
+    rows, columns = np.indices(MASK.shape)
+    one = MASK & (np.hypot(rows - CENTRES[8][0], columns - CENTRES[8][1]) < DISC + 2)
+    found = analyse(IMAGE, mask=one, background=GROUND, tag="F=d")
+    assert found.report["box"][:2] == CENTRES[8].astype(int).tolist()
+    assert analyse(IMAGE, mask=one, tag="F=d").report["proposed"] == ["background"]
+    assert score(found.points, CENTRES, BOX[2:], IMAGE.shape).recall == 1
+
+
+def test_points_that_are_listed_stay() -> None:
+    listed = CENTRES[:7] + 0.25
+    found = analyse(IMAGE, points=listed, background=GROUND, tag="F=d")
+    np.testing.assert_array_equal(found.points, listed)
+    assert found.mask[tuple(np.rint(listed).astype(int).T)].all()
+
+
+def test_elements_that_look_like_the_ground_are_copies_of_the_box() -> None:
+    grey = IMAGE[..., 1].copy()
+    grey[MASK] = (grey[MASK] * 0.2 + 100).astype(np.uint8)
+    grey[~MASK] = (grey[~MASK] * 0.3 + 88).astype(np.uint8)
+    found = analyse(grey, box=BOX, background=GROUND, tag="F=d")
+    assert score(found.points, CENTRES, BOX[2:], IMAGE.shape).recall > 0.8
+    assert (found.mask & MASK).sum() / (found.mask | MASK).sum() > 0.6
+
+
+def test_rotations_find_turned_elements() -> None:
+    rng = np.random.default_rng(1)
+    image = np.full((160, 160), 0.4) + rng.normal(0, 0.01, (160, 160))
+    grid = np.indices(image.shape).transpose(1, 2, 0)
+    centres, angles = [], []
+    for k in range(16):
+        centre, turn = np.array([20 + 40 * (k // 4), 20 + 40 * (k % 4)]), 90.0 * (k % 2)
+        off = grid - centre
+        along, across = (off[..., 1], off[..., 0]) if turn == 0 else (off[..., 0], off[..., 1])
+        image[(abs(along) <= 12) & (abs(across) <= 4)] += 0.4
+        centres.append(centre)
+        angles.append(turn)
+    given = {"box": (20, 20, 11, 27), "background": [(40, 40), (80, 80), (120, 40)], "tag": "F=d", "threshold": 0.5}
+    found = analyse(image, rotations=4, **given)
+    assert score(found.points, np.array(centres, float), (20, 20), image.shape).recall == 1
+    assert found.angles is not None
+    nearest = np.argmin(((found.points[:, None] - np.array(centres)) ** 2).sum(axis=-1), axis=1)
+    np.testing.assert_array_equal(found.angles % 180, np.array(angles)[nearest])
+    assert len(analyse(image, **given).points) <= 16
+
+
+def test_directions() -> None:
+    grid = np.indices((8, 9)).reshape(2, -1).T
+    assert directions(grid * [10.0, 10.0])[:2] in ((0.0, 90.0), (90.0, 0.0))
+    turn = np.deg2rad(20)
+    turned = grid * 10.0 @ np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    assert {round(p) for p in directions(turned)[:2]} == {20, 110}
+    rng = np.random.default_rng(5)
+    assert len(directions(rng.uniform(0, 100, (3, 2)))) == 0
+
+
+def test_the_automatic_start() -> None:
+    found = analyse(IMAGE)
+    assert found.tag == "F=d"
+    assert found.report["proposed"] == ["box", "background", "tag"]
+    assert all(0 < sure <= 1 for sure in found.report["confidence"].values())
+    assert passes(score(found.points, CENTRES, BOX[2:], IMAGE.shape))
+
+
+def test_the_letter_of_the_paper() -> None:
+    found = analyse(IMAGE, box=BOX, background=GROUND, tag="F=d", method="paper")
+    assert found.report["threshold"] == -1
+    assert found.report["channel"] in range(8)
+    assert len(found.points) > len(CENTRES)
+
+
+@pytest.mark.parametrize("kind", ["grey", "float", "sixteen", "alpha"])
+def test_any_array(kind: str, entry: Elements) -> None:
+    given = {
+        "grey": IMAGE[..., 0],
+        "float": IMAGE.astype(np.float32) / 255,
+        "sixteen": IMAGE.astype(np.uint16) * 257,
+        "alpha": np.dstack([IMAGE, np.full(MASK.shape, 255, np.uint8)]),
+    }[kind]
+    found = analyse(given, box=BOX, background=GROUND, tag="F=d")
+    assert found.image.dtype == given.dtype
+    assert score(found.points, CENTRES, BOX[2:], IMAGE.shape).recall == 1
+    if kind != "grey":
+        np.testing.assert_allclose(found.points, entry.points, atol=0.2)
+
+
+def test_wrap() -> None:
+    moved = np.roll(IMAGE, (SPACING // 2, SPACING // 2), (0, 1))
+    place = (BOX[0] + SPACING // 2, BOX[1] + SPACING // 2, *BOX[2:])
+    ground = [((r + SPACING / 2) % IMAGE.shape[0], (c + SPACING / 2) % IMAGE.shape[1]) for r, c in GROUND]
+    found = analyse(moved, box=place, background=ground, tag="F=d", wrap=True)
+    assert len(found.points) == len(CENTRES)
+    assert found.wrap == (True, True)
+
+
+def test_same_bytes_for_any_number_of_threads() -> None:
+    found = []
+    for count in (1, 2, 7):
+        with threads(count):
+            made = analyse(IMAGE, box=BOX, background=GROUND, tag="F=d")
+            sets = made.similarity().sets
+        found.append((made.points.tobytes(), made.mask.tobytes(), made.scores.tobytes(), sets.tobytes()))
+    assert len(set(found)) == 1
+
+
+# --- parts -----------------------------------------------------------------------------------------------------------
+
+
+def test_otsu_parts_two_heaps() -> None:
+    assert 0.3 < otsu(np.array([0.1, 0.2, 0.25, 0.7, 0.8, 0.9, 0.95])) < 0.65
+
+
+def test_a_mixture_knows_its_colours() -> None:
+    rng = np.random.default_rng(0)
+    samples_of = np.concatenate([rng.normal(m, 0.03, (500, 3)) for m in (0.2, 0.8)])
+    model = Mixture.fit(samples_of)
+    near, far = model.log(np.array([[0.2] * 3, [0.5] * 3]))
+    assert near > far + 5
+    np.testing.assert_array_equal(model.means, Mixture.fit(samples_of).means)
+    assert np.isfinite(Mixture.fit(np.full((3, 3), 0.4)).log(np.zeros((2, 3)))).all()
+
+
+# --- bad input -------------------------------------------------------------------------------------------------------
+
+GOOD = {"box": BOX, "background": GROUND, "tag": "F=d"}
+HALF = np.zeros(MASK.shape, bool)
+HALF[:, :40] = True
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            {"box": (300, 50, 20, 20)},
+            "box: reaches from 290 to 310 along the rows, outside of the image, which has 160",
+        ),
+        ({"box": (80, 96, 20)}, "box: needs \\(row, column, height, width\\)"),
+        ({"box": (80, np.nan, 20, 20)}, "box: needs"),
+        ({"box": (80, 96, 1, 20)}, "box: sides of at least 3"),
+        ({"box": "here"}, "box: needs"),
+        ({"background": []}, "background: marks nothing"),
+        ({"background": [(5, 900)]}, "background: point 0, .* outside of the image"),
+        ({"background": [(5, 5), (np.nan, 3)]}, "background: must be finite, but point 1"),
+        ({"background": [(5, 5), (5, 5)]}, "background: point 1, .* is there twice"),
+        ({"background": [BOX[:2]]}, "background: contradicts the box"),
+        ({"mask": MASK, "background": [tuple(CENTRES[3])]}, "background: contradicts the mask"),
+        ({"tag": "F=x"}, "tag: allowed are F=d"),
+        ({"mask": HALF, "box": None, "background": None}, "box: is needed with this mask"),
+        ({"mask": HALF, "box": (80, 30, 30, 30), "background": None}, "tag: contradicts the mask: F=d means separate"),
+        ({"mask": MASK, "background": None, "tag": "F=c"}, "tag: contradicts the mask: F=c means a connected"),
+        ({"mask": MASK[:5]}, "mask: needs shape"),
+        ({"mask": np.ones_like(MASK)}, "mask: is all foreground"),
+        ({"points": [(10, 10), (20, np.inf)]}, "points: must be finite, but point 1"),
+        ({"points": [(10, 10), (20, 10), (10, 10)]}, "points: point 2, .* is there twice"),
+        ({"points": [(10, 10), (20, 400)]}, "points: point 1, .* outside"),
+        ({"points": [(10, 10, 3)]}, "points: needs points \\(row, column\\)"),
+        ({"rotations": 0}, "rotations: needs an integer from 1 to 72"),
+        ({"scales": []}, "scales: needs 1 to 16 numbers"),
+        ({"scales": [9.0]}, "scales\\[0\\]: needs a number"),
+        ({"threshold": 3}, "threshold: needs a number from -1 to 1"),
+        ({"channel": "third"}, "channel: allowed are"),
+        ({"model": "forest"}, "model: allowed are"),
+        ({"method": "letter"}, "method: None or 'paper' is allowed"),
+    ],
+)
+def test_bad_input_gets_a_sentence(change: dict, message: str) -> None:
+    with pytest.raises(InvalidInput, match=message):
+        analyse(IMAGE, **{**GOOD, **change})
+
+
+def test_too_few_elements() -> None:
+    with pytest.raises(InvalidInput, match="image: [012] elements were found, at least 3 are needed; try another box"):
+        analyse(IMAGE, threshold=0.9999, method="paper", **GOOD)
+
+
+@pytest.mark.parametrize(
+    "image",
+    [
+        np.zeros((40, 40), np.uint8),
+        np.full((20, 200, 3), 0.5),
+        np.random.default_rng(0).random((16, 16)),
+        np.random.default_rng(0).random((64, 64, 4)),
+        np.indices((48, 48)).sum(axis=0) % 2,
+    ],
+)
+def test_nothing_to_be_found(image: np.ndarray) -> None:
+    """Whatever comes of it: an entry, or a sentence."""
+    with suppress(TexrsError):
+        assert len(analyse(image.astype(np.float32)).points) >= 3
+
+
+# --- files -----------------------------------------------------------------------------------------------------------
+
+
+def test_an_entry_comes_back(tmp_path: Path, entry: Elements) -> None:
+    kept = entry.prepared(k=2)
+    kept.save(tmp_path / "e.npz")
+    back = elements.load(tmp_path / "e.npz")
+    for name in ("image", "points", "mask", "scores", "angles", "scales"):
+        np.testing.assert_array_equal(getattr(back, name), getattr(kept, name))
+    assert (back.box, back.tag, back.peaks, back.wrap, back.report) == (
+        kept.box,
+        kept.tag,
+        kept.peaks,
+        kept.wrap,
+        kept.report,
+    )
+    assert back.sets is not None
+    np.testing.assert_array_equal(back.similarity(k=2).sets, entry.similarity(k=2).sets)
+
+
+def test_entries_that_cannot_be_read(tmp_path: Path, entry: Elements) -> None:
+    path = tmp_path / "e.npz"
+    entry.save(path)
+    parts = dict(np.load(path))
+    whole = path.read_bytes()
+
+    def written(**change: object) -> Path:
+        np.savez(path, **{**parts, **change})
+        return path
+
+    with pytest.raises(FileError, match="version 99, this texrs reads version"):
+        elements.load(written(texrs_elements=np.array(99)))
+    with pytest.raises(FileError, match="damaged .*not the one that was analysed"):
+        elements.load(written(image=255 - parts["image"]))
+    with pytest.raises(FileError, match="damaged .*points"):
+        elements.load(written(points=parts["points"][:, :1]))
+    with pytest.raises(FileError, match="damaged .*tag"):
+        elements.load(written(tag=np.frombuffer(b"F=x", np.uint8)))
+    np.savez(path, other=np.zeros(3))
+    with pytest.raises(FileError, match="is no entry"):
+        elements.load(path)
+    for length in (0, 10, len(whole) // 2, len(whole) - 30):
+        path.write_bytes(whole[:length])
+        with pytest.raises(FileError):
+            elements.load(path)
+
+
+def test_pictures(entry: Elements) -> None:
+    made = elements.pictures(entry)
+    assert all(p.shape == IMAGE.shape and p.dtype == np.uint8 for p in made.values())
+    row, column = np.rint(entry.points[0]).astype(int)
+    assert made["points"][row, column].tolist() == [255, 40, 40]
+    np.testing.assert_array_equal(made["mask"][entry.mask], IMAGE[entry.mask])
+
+
+def test_what_the_border_cuts_is_no_ground() -> None:
+    mask = np.zeros((80, 80), bool)
+    points = np.array([[20.0, 20], [20, 50], [50, 20], [50, 50]])
+    rows, columns = np.indices(mask.shape)
+    for row, column in points:
+        mask |= (rows - row) ** 2 + (columns - column) ** 2 <= 64
+    ragged = np.zeros_like(mask)
+    ragged[70:, 30:34] = ragged[70:74, 30:50] = True
+    inner = np.zeros_like(mask)
+    inner[32:42, 66:69] = inner[32:35, 66:78] = True
+    found = clean(
+        mask | ragged | inner, points, np.ones(4), np.ones((80, 80), np.float32), mask[12:29, 12:29], (False, False)
+    )
+    assert len(found.points) == 4
+    assert (found.mask == mask | ragged).all()
+
+
+# --- real textures ---------------------------------------------------------------------------------------------------
+
+TEXTURES = os.environ.get("TEXRS_TEXTURES", "")
+
+
+@pytest.mark.skipif(not TEXTURES, reason="TEXRS_TEXTURES names no folder of annotated textures")
+def test_s1_annotated_textures() -> None:
+    met = 0
+    for texture in annotated(Path(TEXTURES)):
+        if texture.centres is None:
+            continue
+        image = io.read(texture.image)
+        found = analyse(image, box=texture.box, background=texture.background, tag=texture.tag)
+        result = score(found.points, texture.centres, texture.box[2:], image.shape)
+        met += passes(result, recall_only="keyboard" in texture.name)
+    assert met >= 7

@@ -1,0 +1,123 @@
+"""The commands about elements, end to end: ``texrs analyse`` and ``texrs database``."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from types import SimpleNamespace
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+
+import texrs
+from texrs import elements as elements
+from texrs import samples
+from texrs.cli import main
+
+Capture = pytest.CaptureFixture[str]
+DOTS = samples.load("dots", size=(96, 96))
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in a folder that holds a picture, its mask, and a list of its centres."""
+    monkeypatch.chdir(tmp_path)
+    iio.imwrite("in.png", DOTS.image)
+    iio.imwrite("mask.png", DOTS.mask.astype(np.uint8) * 255)
+    lines = [f"{r:.2f},{c:.2f}" for r, c in DOTS.centres]
+    Path("points.csv").write_text("row,column\n" + "\n".join(lines) + "\n")
+    Path("nan.csv").write_text("1,2\nnan,3\n5,6\n")
+    Path("twice.csv").write_text("1,2\n3,4\n1,2\n")
+    Path("words.csv").write_text("1,2\nhere,there\n")
+    Path("empty.csv").write_text("\n")
+    Path("before.npz").write_bytes(b"before")
+    return tmp_path
+
+
+def test_analyse_writes_what_the_function_finds(here: Path, capsys: Capture) -> None:
+    assert main(["analyse", "in.png", "-o", "e.npz", "--mask", "mask.png", "--tag", "F=d", "--stages", "st"]) == 0
+    found = elements.load("e.npz")
+    wanted = elements.analyse(DOTS.image, mask=DOTS.mask, tag="F=d")
+    np.testing.assert_array_equal(found.points, wanted.points)
+    assert sorted(p.name for p in Path("st").iterdir()) == ["mask.png", "points.png"]
+    assert "wrote e.npz" in capsys.readouterr().err
+
+
+def test_places_may_follow_each_other(here: Path) -> None:
+    from test_elements import told
+
+    box, ground = told(DOTS)
+    places = [f"{r},{c}" for r, c in ground[:4]]
+    start = ["analyse", "in.png", "-q", "--box", ",".join(map(str, box)), "--tag", "F=d"]
+    assert main([*start, "-o", "a.npz", "--background", *places]) == 0
+    assert main([*start, "-o", "b.npz", *(x for p in places for x in ("--background", p))]) == 0
+    assert main([*start, "-o", "c.npz", "--background", " ".join(places)]) == 0
+    made = [elements.load(name) for name in ("a.npz", "b.npz", "c.npz")]
+    assert len({(m.points.tobytes(), m.mask.tobytes()) for m in made}) == 1
+
+
+def test_given_points_and_an_automatic_start(here: Path, capsys: Capture) -> None:
+    command = ["analyse", "in.png", "-o", "e.npz", "--points", "points.csv", "--mask", "mask.png", "--tag", "F=d"]
+    assert main([*command, "--similarity"]) == 0
+    found = elements.load("e.npz")
+    assert len(found.points) >= len(DOTS.centres)
+    assert found.sets is not None
+    assert main(["analyse", "in.png", "-o", "e.npz"]) == 0
+    told = capsys.readouterr().err
+    assert re.search(r"proposed box: \d+,\d+,\d+,\d+ \(\d+% sure\)", told)
+    assert "proposed tag" in told
+
+
+def test_database(here: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert main(["database", "db", "add", "in.png", "--mask", "mask.png", "--tag", "F=d", "--name", "dots"]) == 0
+    assert main(["database", "db", "add", "sample:leaves_and_flowers", "-q", "--tag", "F=d"]) == 0
+    capsys.readouterr()
+    assert main(["database", "db", "list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split("\t")[:2] for line in lines] == [["dots", "F=d"], ["leaves_and_flowers", "F=d"]]
+    monkeypatch.setattr(texrs, "splice", lambda a, b, *size, **options: SimpleNamespace(image=a.image), raising=False)
+    assert main(["database", "db", "matrix", "-o", "sheet.png", "--cell", "32", "--size", "40x40"]) == 0
+    assert iio.imread("sheet.png").shape == (108, 108, 3)
+    (here / "db" / "dots.npz").write_bytes(b"x")
+    assert main(["database", "db", "matrix", "dots", "-o", "one.png", "--cell", "32", "-q"]) == 0
+    assert "dots: made anew" in capsys.readouterr().err
+    assert iio.imread("one.png").shape == (72, 72, 3)
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        ("analyse in.png -o before.npz --box 10,20", "--box: needs ROW,COL,HEIGHT,WIDTH"),
+        ("analyse in.png -o before.npz --box 500,20,20,20", "--box: reaches from 490 to 510 along the rows"),
+        ("analyse in.png -o before.npz --background 10", "--background: needs ROW,COL"),
+        ("analyse in.png -o before.npz --background 10,nan", "--background: needs ROW,COL"),
+        ("analyse in.png -o before.npz --background 10,900", "--background: point 0, .* outside"),
+        ("analyse in.png -o before.npz --tag F=e", "--tag: allowed are F=d"),
+        ("analyse in.png -o before.npz --tag F=c --mask mask.png --box 48,48,20,20", "--tag: contradicts the mask"),
+        ("analyse in.png -o before.npz --points nan.csv", "--points: must be finite, but point 1"),
+        ("analyse in.png -o before.npz --points twice.csv", "--points: point 2, .* is there twice"),
+        ("analyse in.png -o before.npz --points words.csv", "words.csv: line 2 needs row,column, got 'here,there'"),
+        ("analyse in.png -o before.npz --points empty.csv", "empty.csv: holds no points"),
+        ("analyse in.png -o before.npz --points none.csv", "none.csv: cannot be read"),
+        ("analyse in.png -o before.npz --scales large", "--scales: needs numbers"),
+        ("analyse in.png -o before.npz --method letter", "--method: allowed are default and paper"),
+        ("analyse in.png -o before.npz --rotations 0", "--rotations: needs an integer from 1 to 72"),
+        ("analyse in.png -o before.png", "--out: needs a name that ends in .npz"),
+        ("analyse none.png -o before.npz", "none.png: there is no such file"),
+        ("database db remove", "add\\|list\\|matrix: allowed are"),
+        ("database db list", "db: there is no such folder"),
+        ("database db add", "IMAGE: add needs images"),
+        ("database in.png add in.png", "in.png: no folder"),
+        ("database db add in.png mask.png --name both", "IMAGE: --name"),
+    ],
+)
+def test_bad_input_gets_one_line_and_leaves_what_was_there(
+    here: Path, capsys: Capture, command: str, message: str
+) -> None:
+    assert main([*command.split(), "-q"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("texrs: ")
+    assert said.count("\n") == 1
+    assert re.search(message, said), said
+    assert Path("before.npz").read_bytes() == b"before"

@@ -1,0 +1,134 @@
+"""Patches stitched into textures: where they lie, what they repeat, and what the map says of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from texrs import SourceMap, samples
+from texrs.quilting import Picture, Window, calm, deal, halved, quilt, spans
+
+
+def picture(image: np.ndarray, *, mirrored: bool = False) -> Picture:
+    """Return an image, or its mirror image, as a picture made from it."""
+    source = SourceMap.identity(image.shape[:2])
+    if mirrored:
+        flipped = np.ascontiguousarray(source.coordinates[:, ::-1])
+        frame = np.array([np.diag([1, -1])], np.float32)
+        source = SourceMap(flipped, source.exemplar, source.label, frame, source.shapes)
+    colours = (source.render(image) / 255).astype(np.float32)
+    return Picture(colours, source, np.zeros(image.shape[:2], np.float32))
+
+
+@pytest.fixture(scope="module")
+def pebbles() -> np.ndarray:
+    return samples.pebbles((128, 128)).image
+
+
+def made(pictures: list[Picture], size: tuple[int, int] = (200, 240), **options: object) -> SourceMap:
+    asked = {"patch": 64, "overlap": 24, "wrap": (True, True), "shares": np.ones(1), "seed": 4} | options
+    return quilt(pictures, size, progress=lambda share: None, **asked)  # type: ignore[arg-type]
+
+
+@given(
+    length=st.integers(16, 400),
+    side=st.integers(16, 128),
+    part=st.floats(0.3, 0.9),
+    rim=st.floats(0, 0.5),
+    wrap=st.booleans(),
+)
+def test_spans_cover_an_axis(length: int, side: int, part: float, rim: float, wrap: bool) -> None:
+    patch = max(8, int(part * side))
+    found = spans(length, side, patch, int(rim * patch), wrap)
+    covered = np.zeros(length, int)
+    for span in found:
+        assert 0 < span.extent <= side
+        places = span.start + np.arange(span.extent)
+        assert wrap or places[-1] < length
+        # What it says to overlap at its beginning is covered already, and nothing behind it but what it says to.
+        inside = covered[places % length] > 0
+        expected = np.zeros(span.extent, bool)
+        expected[: span.before] = True
+        expected[span.extent - span.after :] = True
+        assert (inside == expected).all()
+        covered[places % length] += 1
+    assert covered.min() > 0
+
+
+def test_every_pixel_is_one_of_the_exemplar(pebbles: np.ndarray) -> None:
+    source = made([picture(pebbles), picture(pebbles, mirrored=True)])
+    assert source.shape == (200, 240)
+    assert source.shapes == (pebbles.shape[:2],)
+    assert (source.coordinates == np.rint(source.coordinates)).all()
+    assert source.frame is not None
+    hands = np.linalg.det(source.frames())
+    assert set(np.unique(hands)) <= {-1.0, 1.0}
+    # Where a pixel and the next one are of one piece, the step between them is that of its frame.
+    step = np.diff(source.coordinates[..., 1], axis=1)
+    same = np.diff(source.label.astype(np.int64), axis=1) == 0
+    assert (np.abs(step[same]) == 1).mean() > 0.99
+
+
+def test_no_piece_grows_to_a_copy(pebbles: np.ndarray) -> None:
+    """The exact continuation of a patch would match without a seam; four of them would be the exemplar again."""
+    assert made([picture(pebbles)]).reuse().largest < 0.3
+
+
+def test_no_mirror_image_lies_beside_its_original(pebbles: np.ndarray) -> None:
+    met = edges = 0
+    for seed in range(3):
+        source = made([picture(pebbles), picture(pebbles, mirrored=True)], seed=seed)
+        hands = np.linalg.det(source.frames()) > 0
+        for axis in range(2):
+            turned = hands != np.roll(hands, -1, axis)
+            apart = np.abs(source.coordinates - np.roll(source.coordinates, -1, axis)).max(axis=-1)
+            met, edges = met + int((apart[turned] <= 2).sum()), edges + int(turned.sum())
+    # Where nothing is refused, it is a seventh.
+    assert met < 0.08 * edges
+
+
+def test_same_seed_same_map_and_other_seeds_others(pebbles: np.ndarray) -> None:
+    one, again, other = (made([picture(pebbles)], seed=seed) for seed in (1, 1, 2))
+    assert (one.coordinates == again.coordinates).all()
+    assert (one.label == again.label).all()
+    assert (one.coordinates != other.coordinates).any(axis=-1).mean() > 0.5
+
+
+def test_a_map_of_shares_stays_where_it_is(pebbles: np.ndarray) -> None:
+    other = 255 - pebbles
+    shares = np.zeros((200, 240, 2))
+    shares[:, :120, 0] = shares[:, 120:, 1] = 1
+    first, second = picture(pebbles), picture(other)
+    size = (pebbles.shape[:2],) * 2
+    sources = [
+        SourceMap(p.source.coordinates, np.full_like(p.source.exemplar, k), p.source.label, None, size)
+        for k, p in enumerate((first, second))
+    ]
+    both = [Picture(p.colours, s, p.penalty) for p, s in zip((first, second), sources, strict=True)]
+    source = made(both, shares=shares)
+    assert (source.exemplar[:, 40:80] == 0).mean() > 0.9
+    assert (source.exemplar[:, 160:200] == 1).mean() > 0.9
+
+
+def test_shares_are_dealt_evenly() -> None:
+    rows, columns = spans(400, 128, 64, 16, True), spans(400, 128, 64, 16, True)
+    windows = [Window(r, c) for r in rows for c in columns]
+    kinds = deal(windows, (400, 400), np.array([0.75, 0.25]), 0)
+    assert np.bincount(kinds) / len(kinds) == pytest.approx([0.75, 0.25], abs=0.05)
+
+
+def test_a_calm_line_is_no_edge() -> None:
+    lines = np.random.default_rng(0).random((65, 80, 3)).astype(np.float32) * 0.1
+    lines[20:] += 0.5
+    found = calm(lines)
+    assert found
+    assert 20 not in found
+    assert min(found) >= 1
+    assert max(found) <= 64
+
+
+def test_halved() -> None:
+    image = np.arange(30, dtype=np.float32).reshape(5, 6, 1)
+    assert halved(image)[..., 0].tolist() == [[3.5, 5.5, 7.5], [15.5, 17.5, 19.5]]
