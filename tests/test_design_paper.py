@@ -11,10 +11,11 @@ import texrs
 from texrs import samples
 from texrs._arrays import to_unit
 from texrs.errors import InvalidInput
+from texrs.exemplar.symmetry import flip
 from texrs.kernels.complete import complete
 from texrs.kernels.patch_search import PatchIndex
 from texrs.papers.design.literal import X0, operation, start, stitch_layers
-from texrs.papers.design.operations import chaotic_sequence, flip
+from texrs.papers.design.operations import chaotic_sequence
 
 WEAK = -0.356261
 """A start whose first two operations are translations by nothing."""

@@ -30,8 +30,7 @@ from texrs._engine.noise import uniform
 from texrs._typing import Bools, Floats
 from texrs.kernels.patch_search import Match, PatchIndex
 from texrs.kernels.seam import Strip, cut_strips
-from texrs.source_map import SourceMap
-from texrs.source_map._pixels import Pixels
+from texrs.source_map import SourceMap, pixels_of
 
 __all__ = ["Picture", "quilt"]
 
@@ -294,7 +293,7 @@ class Quilt:
         self.place = np.zeros(size, np.uint32)
         self.label = np.zeros(size, np.uint32)
         self.pastes = 0
-        self.pixels = Pixels.of([p.source for p in pictures])
+        self.pixels = pixels_of([p.source for p in pictures])
         self.all_colours = np.concatenate([p.colours.reshape(-1, channels) for p in pictures])
         self.all_penalties = np.concatenate([p.penalty.ravel() for p in pictures])
         self.all_hands = np.concatenate([np.linalg.det(p.source.frames()).ravel() > 0 for p in pictures])

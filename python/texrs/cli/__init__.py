@@ -17,10 +17,10 @@ from typing import Annotated, Any, cast
 
 import typer
 
-import texrs as package
 from texrs import io, samples
 from texrs._arrays import as_float
 from texrs._threads import threads
+from texrs._version import __version__
 from texrs.blending import SCREENING
 from texrs.blending import blend as healed
 from texrs.cli import _elements, _files, _perspective, _pictures, _scales, _solid, _splice, _volumes
@@ -75,7 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _show_version(asked: bool) -> None:
     if asked:
-        say(f"texrs {package.__version__}")
+        say(f"texrs {__version__}")
         raise typer.Exit
 
 

@@ -18,9 +18,9 @@ from texrs._typing import Array, Bools, Floats, Progress
 from texrs.blending import blend as blended
 from texrs.completion._optimise import optimised, recovered
 from texrs.errors import InvalidInput
+from texrs.exemplar.symmetry import Flip, flip, flip_coordinates, flip_frame, mirrors
 from texrs.kernels.complete import complete as fill
 from texrs.kernels.patch_search import PatchIndex
-from texrs.papers.design.operations import Flip, flip, flip_coordinates, flip_frame, mirrors
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 

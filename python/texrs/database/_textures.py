@@ -17,6 +17,8 @@ from texrs._typing import Array, Path, Progress
 from texrs.database._folder import NAME, Folder, Record, given_again
 from texrs.elements import FORMAT, Elements, analyse, digest, load
 from texrs.errors import FileError, InvalidInput, TexrsError
+from texrs.papers.splice import splice
+from texrs.synthesis import Synthesis
 
 __all__ = ["Matrix", "TextureDatabase"]
 
@@ -200,9 +202,9 @@ class TextureDatabase:
         entry = analyse(image, progress=progress, **options)
         return self._folder.keep(name, entry.prepared() if similar else entry, record.source, record.options)
 
-    def splice(self, a: str, b: str, size: Sequence[int] | None = None, **options: Any) -> Any:
+    def splice(self, a: str, b: str, size: Sequence[int] | None = None, **options: Any) -> Synthesis:
         """Splice two textures: the elements of ``a`` in the arrangement of ``b``; see `texrs.splice`."""
-        return _splice(self.analyse(a), self.analyse(b), size, options)
+        return splice(self.analyse(a), self.analyse(b), size, **options)
 
     def matrix(
         self,
@@ -240,14 +242,14 @@ class TextureDatabase:
         if not down or not across:
             raise InvalidInput("rows, columns: no textures to splice")
         entries = {name: self.analyse(name) for name in dict.fromkeys(down + across)}
-        results: dict[tuple[str, str], Any] = {}
+        results: dict[tuple[str, str], Synthesis] = {}
         failed: dict[tuple[str, str], str] = {}
         for i, a in enumerate(down):
             for j, b in enumerate(across):
                 if progress is not None:
                     progress("matrix", (i * len(across) + j) / (len(down) * len(across)))
                 try:
-                    results[a, b] = _splice(entries[a], entries[b], size, options)
+                    results[a, b] = splice(entries[a], entries[b], size, **options)
                 except InvalidInput as error:
                     failed[a, b] = str(error)
         step = side + GAP
@@ -280,13 +282,6 @@ class TextureDatabase:
             return as_image(io.read(self.path / record.source))
         except TexrsError:
             return None
-
-
-def _splice(a: Elements, b: Elements, size: Sequence[int] | None, options: Mapping[str, Any]) -> Any:
-    import texrs
-
-    verb: Any = vars(texrs)["splice"]
-    return verb(a, b, **options) if size is None else verb(a, b, size, **options)
 
 
 def thumbnail(image: Array, side: int) -> NDArray[np.uint8]:

@@ -8,8 +8,8 @@ from html import escape
 
 import imageio.v3 as iio
 
-import texrs
 from texrs._typing import Array
+from texrs._version import __version__
 from texrs.synthesis import preview
 
 __all__ = ["code", "document", "figure", "grid", "row", "section", "tiled", "uri"]
@@ -89,7 +89,7 @@ def document(links: Sequence[tuple[str, str]], sections: Sequence[str]) -> str:
 <main>
 {body}
 </main>
-<footer>Made by <code>texrs demo</code>, version {escape(texrs.__version__)}. All results were made when this page was
+<footer>Made by <code>texrs demo</code>, version {escape(__version__)}. All results were made when this page was
 written; the same version makes the same ones.</footer>
 </body>
 </html>

@@ -7,8 +7,7 @@
 from __future__ import annotations
 
 from texrs.elements._analyse import analyse
-from texrs.elements._elements import Elements, Tag
-from texrs.elements._file import FORMAT, digest, load
+from texrs.elements._elements import FORMAT, Elements, Tag, digest, load
 from texrs.elements._pictures import pictures
 
 __all__ = ["FORMAT", "Elements", "Tag", "analyse", "digest", "load", "pictures"]

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from texrs import _rust
 from texrs._arrays import as_size
-from texrs._typing import Array, Floats
+from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
-from texrs.source_map import SourceMap
 
-__all__ = ["Warp", "from_points", "mesh"]
+__all__ = ["Triangles", "Warp", "from_points", "mesh"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,16 +22,18 @@ class Warp:
 
     Attributes
     ----------
-    source : SourceMap
-        Where each pixel comes from. Its label is 1 where a triangle was drawn and 0 in the holes, which look at the
-        pixel of the source that has their own place.
+    coordinates : (rows, columns, 2) float32
+        Where each pixel comes from; in the holes the pixel of the source that has their own place.
+    covered : (rows, columns) bool
+        Where a triangle was drawn; the others are holes.
     triangles, flipped, flipped_heavy : int
         Triangles that were drawn; those of them that were turned over, or flattened; and those turned over whose
         three corners weigh something.
 
     """
 
-    source: SourceMap
+    coordinates: Floats
+    covered: Bools
     triangles: int
     flipped: int
     flipped_heavy: int
@@ -102,12 +103,33 @@ def mesh(
     found, triangle, (drawn, flipped, heavy) = _rust.warp_mesh(
         shape, places.reshape(-1, 2), layers.reshape(-1), (out[0], out[1]), progress
     )
-    return Warp(_map(found, (triangle > 0).astype(np.uint32), out, shape, None), drawn, flipped, heavy)
+    covered = (triangle > 0).reshape(out)
+    return Warp(_filled(found.reshape(*out, 2), covered, shape), covered, drawn, flipped, heavy)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Triangles:
+    """A warped triangulation.
+
+    Attributes
+    ----------
+    coordinates : (rows, columns, 2) float32
+        Where each pixel comes from; pixels outside of all triangles keep their place.
+    triangle : (rows, columns) uint32
+        The triangle of each pixel, counted from 1; 0 outside of all.
+    frames : (triangles + 1, 2, 2) float32
+        The Jacobian of the coordinates in each triangle; the first is the identity.
+
+    """
+
+    coordinates: Floats
+    triangle: NDArray[np.uint32]
+    frames: Floats
 
 
 def from_points(
     source: Array, target: Array, shape: Sequence[int], *, size: int | Sequence[int] | None = None
-) -> SourceMap:
+) -> Triangles:
     """Warp a picture by points that move.
 
     The Delaunay triangles of the source points are drawn where their corners go.
@@ -123,9 +145,7 @@ def from_points(
 
     Returns
     -------
-    SourceMap
-        The label is the triangle, counted from 1, with its Jacobian in the table of frames. It is 0 outside of all
-        triangles, where pixels keep their place.
+    Triangles
 
     Raises
     ------
@@ -151,7 +171,8 @@ def from_points(
     edges = [(p[:, 1:] - p[:, :1]).transpose(0, 2, 1) for p in (before, after)]
     sound = np.abs(np.linalg.det(edges[1])) > 1e-9  # The others are not drawn.
     frames[1:][sound] = edges[0][sound] @ np.linalg.inv(edges[1][sound])
-    return _map(found, triangle, out, sides, frames)
+    triangle = triangle.reshape(out)
+    return Triangles(_filled(found.reshape(*out, 2), triangle > 0, sides), triangle, frames)
 
 
 def _points(points: Array, name: str) -> NDArray[np.float64]:
@@ -164,16 +185,9 @@ def _points(points: Array, name: str) -> NDArray[np.float64]:
     return array
 
 
-def _map(
-    found: Floats,
-    label: NDArray[np.uint32],
-    out: tuple[int, ...],
-    shape: tuple[int, ...],
-    frames: Floats | None,
-) -> SourceMap:
-    places = found.reshape(*out, 2)
-    label = label.reshape(out)
-    open_ = label == 0
-    if open_.any():
-        places[open_] = np.minimum(np.argwhere(open_), np.array(shape) - 1)
-    return SourceMap(places, np.zeros(out, np.uint16), label, frames, (tuple(shape),))
+def _filled(places: Floats, covered: Bools, shape: Sequence[int]) -> Floats:
+    """Let pixels of no triangle look at their own place, in place."""
+    holes = ~covered
+    if holes.any():
+        places[holes] = np.minimum(np.argwhere(holes), np.array(shape) - 1)
+    return places

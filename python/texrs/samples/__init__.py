@@ -46,14 +46,13 @@ from collections.abc import Callable
 from typing import Any
 
 from texrs.errors import InvalidInput
-
-from ._perspective import tilted_bricks, tilted_discs
-from ._photographs import PHOTOGRAPHS, photograph
-from ._regular import bricks, net, scales, weave
-from ._sample import MIN_SIDE, Sample, Tag
-from ._scattered import beans, dots, leaves_and_flowers, pebbles
-from ._solid import particles, stripes, weave_solid, wood_solid
-from ._stochastic import bark, grit
+from texrs.samples._perspective import tilted_bricks, tilted_discs
+from texrs.samples._photographs import PHOTOGRAPHS, photograph
+from texrs.samples._regular import bricks, net, scales, weave
+from texrs.samples._sample import MIN_SIDE, Sample, Tag
+from texrs.samples._scattered import beans, dots, leaves_and_flowers, pebbles
+from texrs.samples._solid import particles, stripes, weave_solid, wood_solid
+from texrs.samples._stochastic import bark, grit
 
 __all__ = [
     "MIN_SIDE",

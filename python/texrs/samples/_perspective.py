@@ -20,10 +20,10 @@ from math import cos, pi, radians, sin, sqrt, tan
 import numpy as np
 from numpy.typing import NDArray
 
-from ._noise import Floats, mix, palette, ramp
-from ._regular import lay_bricks
-from ._sample import Sample, Tag, check_size, generator
-from ._scene import Scene, relabel
+from texrs.samples._noise import Floats, mix, palette, ramp
+from texrs.samples._regular import lay_bricks
+from texrs.samples._sample import Sample, Tag, check_size, generator
+from texrs.samples._scene import Scene, relabel
 
 __all__ = ["tilted_bricks", "tilted_discs"]
 

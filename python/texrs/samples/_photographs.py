@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs.errors import InvalidInput
-
-from ._sample import Sample
+from texrs.samples._sample import Sample
 
 __all__ = ["PHOTOGRAPHS", "photograph"]
 

@@ -7,9 +7,9 @@ from math import pi
 
 import numpy as np
 
-from ._noise import Floats, mix, palette, ramp, shades
-from ._sample import Sample, check_size, generator
-from ._scene import Scene
+from texrs.samples._noise import Floats, mix, palette, ramp, shades
+from texrs.samples._sample import Sample, check_size, generator
+from texrs.samples._scene import Scene
 
 __all__ = ["bricks", "lay_bricks", "net", "scales", "weave"]
 

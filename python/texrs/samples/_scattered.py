@@ -8,9 +8,9 @@ from math import cos, pi, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from ._noise import Floats, mix, palette, ramp, scatter, shades, softest, spread
-from ._sample import Sample, check_size, generator
-from ._scene import Scene, Window
+from texrs.samples._noise import Floats, mix, palette, ramp, scatter, shades, softest, spread
+from texrs.samples._sample import Sample, check_size, generator
+from texrs.samples._scene import Scene, Window
 
 __all__ = ["beans", "dots", "leaves_and_flowers", "pebbles"]
 

@@ -14,8 +14,8 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ._noise import Floats, blur, clouds, encode, fold, light
-from ._sample import Sample, Tag
+from texrs.samples._noise import Floats, blur, clouds, encode, fold, light
+from texrs.samples._sample import Sample, Tag
 
 __all__ = ["Scene", "Window"]
 

@@ -8,8 +8,8 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from ._noise import Floats, clouds, encode, mix, palette, ramp, shades
-from ._sample import Sample, check_size, generator
+from texrs.samples._noise import Floats, clouds, encode, mix, palette, ramp, shades
+from texrs.samples._sample import Sample, check_size, generator
 
 __all__ = ["particles", "stripes", "weave_solid", "wood_solid"]
 

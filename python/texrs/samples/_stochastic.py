@@ -7,9 +7,9 @@ from math import cos, pi, sin
 
 import numpy as np
 
-from ._noise import fold, mix, palette, ramp, shades, softest, spread
-from ._sample import Sample, check_size, generator
-from ._scene import Scene
+from texrs.samples._noise import fold, mix, palette, ramp, shades, softest, spread
+from texrs.samples._sample import Sample, check_size, generator
+from texrs.samples._scene import Scene
 
 __all__ = ["bark", "grit"]
 

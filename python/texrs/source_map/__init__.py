@@ -231,7 +231,7 @@ class SourceMap:
             raise InvalidInput(f"inner: needs outputs of sizes {self.shapes}, got {[m.shape for m in maps]}")
         if any(m.shapes != maps[0].shapes for m in maps):
             raise InvalidInput("inner: all maps must look into the same exemplars")
-        inners = Pixels.of(maps)
+        inners = pixels_of(maps)
         place = np.empty(self.shape, np.uint32 if inners.count < 2**32 else np.uint64)
         rest = np.zeros_like(self.coordinates)
         for band in bands(self.shape):
@@ -268,7 +268,7 @@ class SourceMap:
             It looks into the exemplars.
 
         """
-        return cls._picked(Pixels.of(maps), place, label, None, None, maps[0].shapes, label if overwrite else None)
+        return cls._picked(pixels_of(maps), place, label, None, None, maps[0].shapes, label if overwrite else None)
 
     @classmethod
     def _picked(
@@ -382,3 +382,32 @@ class SourceMap:
             return cls(parts["coordinates"], parts["exemplar"], parts["label"], parts.get("frame"), shapes)
         except (InvalidInput, TypeError, ValueError) as error:
             raise FileError(f"{path}: is damaged ({error})") from None
+
+
+def pixels_of(maps: Sequence[SourceMap]) -> Pixels:
+    """Return the pixels of maps, one map after the other."""
+    axes = maps[0].axes
+    counts = [int(m.label.max()) + 1 if m.label.size else 0 for m in maps]
+    offsets = np.cumsum([0, *counts]).astype(np.uint64)
+    table = pixels = None
+    arrays = [m.frame_array() for m in maps]
+    if any(f is not None and f.ndim > 3 for f in arrays):
+        pixels = np.concatenate([m.frames().reshape(-1, axes, axes) for m in maps])
+    elif any(f is not None for f in arrays):
+        eye = np.eye(axes, dtype=np.float32)
+        table = np.concatenate(
+            [
+                np.broadcast_to(eye, (n, axes, axes)) if frame is None else frame[:n]
+                for frame, n in zip(arrays, counts, strict=True)
+            ]
+        )
+    return Pixels(
+        np.array([m.shape for m in maps]),
+        np.cumsum([0, *(m.label.size for m in maps[:-1])]),
+        np.concatenate([m.coordinates.reshape(-1, axes) for m in maps]),
+        np.concatenate([m.exemplar.ravel() for m in maps]),
+        np.concatenate([m.label.ravel() + o for m, o in zip(maps, offsets[:-1], strict=True)]),
+        int(offsets[-1]),
+        table,
+        pixels,
+    )

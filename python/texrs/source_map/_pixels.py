@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from texrs.source_map import SourceMap
 
 __all__ = ["Pixels", "bands", "number_pairs"]
 
@@ -32,34 +28,6 @@ class Pixels:
     """Frame of each label; none where all are the identity or some map has a frame for each pixel."""
     pixels: NDArray[np.float32] | None
     """Frame of each pixel, where some map has one."""
-
-    @classmethod
-    def of(cls, maps: Sequence[SourceMap]) -> Pixels:
-        axes = maps[0].axes
-        counts = [int(m.label.max()) + 1 if m.label.size else 0 for m in maps]
-        offsets = np.cumsum([0, *counts]).astype(np.uint64)
-        table = pixels = None
-        arrays = [m.frame_array() for m in maps]
-        if any(f is not None and f.ndim > 3 for f in arrays):
-            pixels = np.concatenate([m.frames().reshape(-1, axes, axes) for m in maps])
-        elif any(f is not None for f in arrays):
-            eye = np.eye(axes, dtype=np.float32)
-            table = np.concatenate(
-                [
-                    np.broadcast_to(eye, (n, axes, axes)) if frame is None else frame[:n]
-                    for frame, n in zip(arrays, counts, strict=True)
-                ]
-            )
-        return cls(
-            np.array([m.shape for m in maps]),
-            np.cumsum([0, *(m.label.size for m in maps[:-1])]),
-            np.concatenate([m.coordinates.reshape(-1, axes) for m in maps]),
-            np.concatenate([m.exemplar.ravel() for m in maps]),
-            np.concatenate([m.label.ravel() + o for m, o in zip(maps, offsets[:-1], strict=True)]),
-            int(offsets[-1]),
-            table,
-            pixels,
-        )
 
     @property
     def count(self) -> int:

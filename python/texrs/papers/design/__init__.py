@@ -52,11 +52,11 @@ from texrs.blending import SCREENING, visibility
 from texrs.blending import blend as blended
 from texrs.errors import InvalidInput
 from texrs.exemplar.segmentation import Children, segment
+from texrs.exemplar.symmetry import Flip, flip_coordinates, flip_frame
 from texrs.kernels.complete import complete
 from texrs.kernels.gather import gather
 from texrs.papers.design.deformation import Canvas, deform
 from texrs.papers.design.literal import Layered, start, stitch_layers
-from texrs.papers.design.operations import Flip, flip_coordinates, flip_frame
 from texrs.papers.design.source import Source, as_shares, check_moves, check_sources, to_unit_together
 from texrs.quilting import Picture, quilt
 from texrs.source_map import SourceMap

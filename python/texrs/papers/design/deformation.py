@@ -19,21 +19,10 @@ from texrs._engine.noise import uniform
 from texrs._typing import Bools, Floats, Labels
 from texrs.exemplar.components import solidity
 from texrs.exemplar.segmentation import Segmentation
+from texrs.exemplar.symmetry import Flip, flip
 from texrs.kernels.gather import gather
 from texrs.kernels.seam import cut
-from texrs.papers.design.operations import (
-    CORE,
-    RING,
-    Element,
-    Flip,
-    Heap,
-    Moves,
-    Operation,
-    Placement,
-    elements_of,
-    fit,
-    flip,
-)
+from texrs.papers.design.operations import CORE, RING, Element, Heap, Moves, Operation, Placement, elements_of, fit
 from texrs.source_map import SourceMap
 
 __all__ = ["Canvas", "deform"]

@@ -14,8 +14,9 @@ from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput
 from texrs.exemplar.regularity import direction, polarity
 from texrs.exemplar.segmentation import Segmentation
+from texrs.exemplar.symmetry import Flip, flip, mirrors
 from texrs.kernels.patch_search import PatchIndex
-from texrs.papers.design.operations import Flip, Moves, chaotic_sequence, flip, mirrors
+from texrs.papers.design.operations import Moves, chaotic_sequence
 
 __all__ = ["Source", "as_shares", "check_moves", "check_sources", "to_unit_together"]
 

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._typing import Bools
+from texrs._typing import Bools, Floats
 from texrs.kernels.warp import from_points, mesh
 from texrs.papers.splice.layout import Match, void_of, whole_shifts
-from texrs.source_map import SourceMap
 
 __all__ = ["Field", "Warped", "drawn", "previewed", "scattered"]
 
@@ -52,8 +51,8 @@ def drawn(field: Field, size: tuple[int, int], progress: Callable[[float], objec
         first = (max(top - 1, 0), max(left - 1, 0))
         part = (slice(first[0], bottom + 2), slice(first[1], right + 2))
     found = mesh(field.target[part], field.rigid[part], void=field.void[part], size=size, progress=progress)
-    there = _pixels(found.source, field.rigid[part].shape) + first
-    return Warped(there, found.source.label > 0, field.target, found.triangles, found.flipped, found.flipped_heavy)
+    there = _nearest(found.coordinates, field.rigid[part].shape) + first
+    return Warped(there, found.covered, field.target, found.triangles, found.flipped, found.flipped_heavy)
 
 
 def previewed(found: Match, size: tuple[int, int]) -> Warped:
@@ -62,7 +61,7 @@ def previewed(found: Match, size: tuple[int, int]) -> Warped:
     origin = np.array(source.origin)
     loose = from_points(source.points[found.of] - origin, found.targets, source.mask.shape, size=size)
     target = np.moveaxis(np.indices(source.mask.shape), 0, -1) + origin * 1.0
-    return Warped(_pixels(loose, source.mask.shape), loose.label > 0, target, 0, 0, 0)
+    return Warped(_nearest(loose.coordinates, source.mask.shape), loose.triangle > 0, target, 0, 0, 0)
 
 
 def scattered(found: Match, size: tuple[int, int]) -> Warped:
@@ -74,10 +73,10 @@ def scattered(found: Match, size: tuple[int, int]) -> Warped:
     start = np.concatenate([source.points - origin, rim])
     end = np.concatenate([source.points + shift, rim + origin])
     loose = from_points(start, end, (int(shape[0]), int(shape[1])), size=size)
-    below = _pixels(loose, source.mask.shape)
+    below = _nearest(loose.coordinates, source.mask.shape)
     void = void_of(source, found.of)
     ground = (source.instance == 0) & ~void
-    known = (loose.label > 0) & ground[below[..., 0], below[..., 1]]
+    known = (loose.triangle > 0) & ground[below[..., 0], below[..., 1]]
     moved = np.zeros((len(shift) + 1, 2), np.intp)
     moved[1:] = shift
     used = np.zeros(len(moved), bool)
@@ -92,7 +91,7 @@ def scattered(found: Match, size: tuple[int, int]) -> Warped:
     return Warped(there, known, target, 0, 0, 0)
 
 
-def _pixels(found: SourceMap, shape: tuple[int, ...]) -> NDArray[np.intp]:
+def _nearest(coordinates: Floats, shape: tuple[int, ...]) -> NDArray[np.intp]:
     """Return the nearest pixels, which lie inside."""
-    places = np.floor(found.coordinates + np.float32(0.5)).astype(np.intp)
+    places = np.floor(coordinates + np.float32(0.5)).astype(np.intp)
     return np.asarray(np.clip(places, 0, np.array(shape[:2]) - 1), np.intp)

@@ -1,0 +1,46 @@
+# The public names of texrs and where they live: read by type checkers, and by lazy_loader when texrs is imported.
+from . import elements, errors, exemplar, fields, io, kernels, samples, scale_maps, volume
+from ._threads import threads
+from ._version import __version__
+from .blending import blend
+from .completion import complete
+from .database import TextureDatabase
+from .elements import Elements
+from .papers.design import design
+from .papers.perspective import perspective
+from .papers.solid import solid, synthesize
+from .papers.solid.window import PlaneTexture, SolidTexture
+from .papers.splice import self_splice, splice
+from .source_map import Reuse, SourceMap
+from .synthesis import Synthesis
+from .tiling import tile
+
+__all__ = [
+    "Elements",
+    "PlaneTexture",
+    "Reuse",
+    "SolidTexture",
+    "SourceMap",
+    "Synthesis",
+    "TextureDatabase",
+    "__version__",
+    "blend",
+    "complete",
+    "design",
+    "elements",
+    "errors",
+    "exemplar",
+    "fields",
+    "io",
+    "kernels",
+    "perspective",
+    "samples",
+    "scale_maps",
+    "self_splice",
+    "solid",
+    "splice",
+    "synthesize",
+    "threads",
+    "tile",
+    "volume",
+]

@@ -1,0 +1,5 @@
+"""The version of the package: that of the compiled kernels, so that the two cannot differ."""
+
+from texrs._rust import VERSION as __version__
+
+__all__ = ["__version__"]
