@@ -204,7 +204,7 @@ if "fork" in sys.argv:
 else:
     for count in (1, 2, 7):
         with texrs.threads(count):
-            texrs.exemplar.analysis._KEPT._kept.clear()
+            texrs.exemplar.analysis._ANALYSES.clear()
             print(digest())
     print(digest())
 """

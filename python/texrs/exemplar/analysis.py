@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import hashlib
-import threading
-from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import log2
 from pathlib import Path as FilePath
-from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
 from texrs._arrays import as_image, as_int, as_wrap, to_unit
+from texrs._cache import Cache, content_hash
 from texrs._engine.appearance import Appearance
 from texrs._engine.coherence import Similarity, similar
 from texrs._engine.pyramid import halve
@@ -28,7 +25,7 @@ COARSEST = 16
 SIMILAR = 1.25
 """An exemplar repeats along an axis if its ends differ by at most this much more than neighbours within it."""
 CACHED = 256 << 20
-"""Bytes of analyses that are kept in memory, and of similarity sets."""
+"""Bytes of analyses that are kept in memory, and of similarity sets; one that is larger is kept alone."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -161,13 +158,10 @@ def analyse(
     closed = None if wrap is None else as_wrap(wrap, axes=axes)
     near = [as_int(r, "radii", 1, 8) for r in radii]
     least = as_int(coarsest, "coarsest", 2 * max(near) + 2, 1 << 16)
-    digest = hashlib.blake2b(digest_size=16, person=b"texrs.exemplar.analysis")
-    digest.update(repr((FORMAT, image.shape, image.dtype.str, closed, labels, near, least)).encode())
-    digest.update(image.data)
-    key = digest.hexdigest()
+    key = content_hash(image, FORMAT, closed, labels, near, least).hex()
     if not cache:
         return _analyse(image, axes, closed, labels, near, least, key)
-    return _KEPT.get(key, lambda: _analyse(image, axes, closed, labels, near, least, key))
+    return _ANALYSES.get_or_make(key, lambda: _analyse(image, axes, closed, labels, near, least, key))
 
 
 def _analyse(
@@ -297,38 +291,10 @@ def similarity(
 
     """
     here = analysis.levels[as_int(level, "level", 0, len(analysis.levels) - 1)]
-    return _SIMILAR.get(
+    return _SIMILARITIES.get_or_make(
         (analysis.key, level, k, n, numbers), lambda: similar(here, k=k, n=n, numbers=numbers, progress=progress)
     )
 
 
-class _Sized(Protocol):
-    @property
-    def nbytes(self) -> int: ...
-
-
-_T = TypeVar("_T", bound=_Sized)
-
-
-class _Kept(Generic[_T]):
-    """What was made lately, the oldest dropped first."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._kept: OrderedDict[object, _T] = OrderedDict()
-
-    def get(self, key: object, make: Callable[[], _T]) -> _T:
-        with self._lock:
-            if key in self._kept:
-                self._kept.move_to_end(key)
-                return self._kept[key]
-        made = make()
-        with self._lock:
-            self._kept[key] = made
-            while len(self._kept) > 1 and sum(a.nbytes for a in self._kept.values()) > CACHED:
-                self._kept.popitem(last=False)
-        return made
-
-
-_KEPT: _Kept[Analysis] = _Kept()
-_SIMILAR: _Kept[Similarity] = _Kept()
+_ANALYSES: Cache[str, Analysis] = Cache(CACHED, lambda made: min(made.nbytes, CACHED))
+_SIMILARITIES: Cache[tuple[object, ...], Similarity] = Cache(CACHED, lambda made: min(made.nbytes, CACHED))

@@ -14,8 +14,6 @@ were made. Finished parts of every stage are kept in a bounded memory, so that a
 
 from __future__ import annotations
 
-import threading
-from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -25,6 +23,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._cache import Cache
 from texrs._engine.pyramid import ONE, Region, upsample
 from texrs._typing import Bools, Progress
 from texrs.papers.solid import Grower, Places
@@ -75,39 +74,6 @@ class _Stage:
     side: int
 
 
-class _Kept:
-    """Boxes of the last stage, or of those before it; those that were not used for longest are dropped."""
-
-    def __init__(self, limit: int) -> None:
-        self.limit, self.used = limit, 0
-        self._boxes: OrderedDict[Key, Places] = OrderedDict()
-        self._lock = threading.Lock()
-
-    def get(self, key: Key) -> Places | None:
-        with self._lock:
-            found = self._boxes.get(key)
-            if found is not None:
-                self._boxes.move_to_end(key)
-            return found
-
-    def put(self, key: Key, places: Places) -> None:
-        if places.nbytes > self.limit:
-            return
-        # A view would keep all that it is a part of.
-        places = places.copy()
-        with self._lock:
-            former = self._boxes.pop(key, None)
-            self.used += places.nbytes - (0 if former is None else former.nbytes)
-            self._boxes[key] = places
-            while self.used > self.limit:
-                self.used -= self._boxes.popitem(last=False)[1].nbytes
-
-    def clear(self) -> None:
-        with self._lock:
-            self._boxes.clear()
-            self.used = 0
-
-
 class World:
     """The places of an endless texture, stage by stage."""
 
@@ -119,7 +85,9 @@ class World:
         chain = [(0, -1)] + [(v, i) for v in levels for i in range(self._step(v).passes)]
         self.stages = [_Stage(*s, large if s == chain[-1] else small) for s in chain]
         # The stages before the last are small and dear: the last one must not crowd them out.
-        self._kept = _Kept(cache_bytes // 2), _Kept(cache_bytes // 2)
+        self._kept: tuple[Cache[Key, Places], ...] = tuple(
+            Cache(cache_bytes // 2, lambda p: p.nbytes) for _ in range(2)
+        )
         self._hold = Hold(grower.image)
 
     def _step(self, level: int) -> Step:
@@ -201,7 +169,8 @@ class World:
             places = self.make(part, stage, progress)
             for step in product(*(range(n) for n in counts)):
                 cell = places[tuple(slice(i * side, (i + 1) * side) for i in step)]
-                kept.put((stage, *(a + i for a, i in zip(first, step, strict=True))), cell)
+                # A view would keep all that it is a part of.
+                kept.put((stage, *(a + i for a, i in zip(first, step, strict=True))), cell.copy())
             yield part, places
 
     def make(self, box: Region, stage: int, progress: Progress | None = None) -> Places:

@@ -15,12 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._cache import Cache
 from texrs._typing import Bools
 from texrs.elements import Elements
 from texrs.errors import InvalidInput
 from texrs.layouts import Layout, directions, match, nearest, spacing
 from texrs.papers.splice.edit import Step, edited
-from texrs.papers.splice.source import Extended, Memory, available, extend, parts_of
+from texrs.papers.splice.source import Extended, available, extend, parts_of, remember
 
 __all__ = [
     "Match",
@@ -58,9 +59,9 @@ ROOM = 1.08
 """Least distance of elements in their diameters."""
 
 
-_DIRECTIONS: Memory[tuple[float, ...]] = Memory(64)
-_LAYOUTS: Memory[Layout] = Memory(64)
-_REACHES: Memory[Points] = Memory(16)
+_DIRECTIONS: Cache[bytes, tuple[float, ...]] = Cache(64)
+_LAYOUTS: Cache[bytes, Layout] = Cache(64)
+_REACHES: Cache[bytes, Points] = Cache(16)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,7 +137,7 @@ def targets(
 def aligned(a: Elements, b: Elements) -> list[float]:
     """Return the turns, in degrees, that bring a direction in which B's points line up to one of A's; none is the first."""
     mine, theirs = (
-        t.peaks or _DIRECTIONS.get(t, None, partial(directions, np.asarray(t.points, float))) for t in (a, b)
+        t.peaks or remember(_DIRECTIONS, t, None, partial(directions, np.asarray(t.points, float))) for t in (a, b)
     )
     # Lines have no sense of direction: angles are those within a quarter turn.
     turns = {round((p - q + 90) % 180 - 90, 6) for p in mine[:3] for q in theirs[:3]}
@@ -146,7 +147,9 @@ def aligned(a: Elements, b: Elements) -> list[float]:
 def matched(a: Elements, b: Elements, size: tuple[int, int], *, align: bool, packed: bool = True) -> Match:
     """Match the elements of A with B's layout (section 4.1)."""
     mine = spacing(np.asarray(a.points, np.float64))
-    layout = _LAYOUTS.get(b, None, lambda: Layout.of(np.asarray(b.points, float), b.mask.shape, b.wrap, beyond=True))
+    layout = remember(
+        _LAYOUTS, b, None, lambda: Layout.of(np.asarray(b.points, float), b.mask.shape, b.wrap, beyond=True)
+    )
     scale = mine / layout.scale
     gain = 1.0
     if packed and a.tag == "F=d":
@@ -229,7 +232,7 @@ def apart(a: Elements, found: Match, *, rounds: int = 12, room: float = 1.0) -> 
     """
     from scipy.spatial import cKDTree
 
-    reach = _REACHES.get(a, None, lambda: reaches(a))
+    reach = remember(_REACHES, a, None, lambda: reaches(a))
     mine = reach[found.source.of[found.of]]
     at = found.targets.copy()
     far = 2 * float(mine.max()) + room

@@ -7,23 +7,21 @@ elements of disjoint foregrounds are turned back, so that none is mirrored, and 
 
 from __future__ import annotations
 
-import hashlib
-import threading
-from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import check_memory
+from texrs._cache import Cache, content_hash
 from texrs._typing import Bools, Labels
 from texrs.elements import Elements
 from texrs.errors import InvalidInput
 from texrs.layouts import Fold, Layout
 
-__all__ = ["Extended", "Memory", "Parts", "available", "extend", "parts_of"]
+__all__ = ["Extended", "Parts", "available", "extend", "parts_of", "remember"]
 
 Points = NDArray[np.float64]
 Places = NDArray[np.int32]
@@ -69,41 +67,15 @@ class Parts:
         return whole
 
 
-class Memory(Generic[T]):
-    """What was made lately of an entry's mask, points, tag and wrap; the oldest goes first."""
-
-    def __init__(self, most: int) -> None:
-        self._most = most
-        self._lock = threading.Lock()
-        self._kept: OrderedDict[bytes, T] = OrderedDict()
-
-    def get(self, entry: Elements, rest: object, make: Callable[[], T]) -> T:
-        """Return what is kept, or make it."""
-        digest = hashlib.blake2b(digest_size=16, person=b"texrs.elements")
-        digest.update(repr((entry.mask.shape, len(entry.points), entry.tag, entry.wrap, rest)).encode())
-        digest.update(np.packbits(entry.mask).data)
-        digest.update(np.ascontiguousarray(entry.points, np.float64).data)
-        key = digest.digest()
-        with self._lock:
-            if key in self._kept:
-                self._kept.move_to_end(key)
-                return self._kept[key]
-        made = make()
-        with self._lock:
-            self._kept[key] = made
-            while len(self._kept) > self._most:
-                self._kept.popitem(last=False)
-        return made
-
-    def clear(self) -> None:
-        """Forget everything."""
-        with self._lock:
-            self._kept.clear()
+def remember(cache: Cache[bytes, T], entry: Elements, rest: object, make: Callable[[], T]) -> T:
+    """Return what was made of an entry's mask, points, tag and wrap, and of the rest, made now unless it is kept."""
+    mask, points = np.packbits(entry.mask), np.asarray(entry.points, np.float64)
+    return cache.get_or_make(content_hash(mask, points, entry.mask.shape, entry.tag, entry.wrap, rest), make)
 
 
 def parts_of(entry: Elements) -> Parts:
     """Tell the elements of a disjoint foreground apart: by component, and within one by the nearest element."""
-    return _PARTS.get(entry, None, lambda: _parts(entry))
+    return remember(_PARTS, entry, None, lambda: _parts(entry))
 
 
 def _parts(entry: Elements) -> Parts:
@@ -206,12 +178,12 @@ def extend(entry: Elements, size: tuple[int, int], margin: int, *, whole: bool =
     pixel is.
     """
     rest = (size, margin, whole, exact)
-    return _EXTENDED.get(entry, rest, lambda: _extend(entry, size, margin, whole=whole, exact=exact))
+    return remember(_EXTENDED, entry, rest, lambda: _extend(entry, size, margin, whole=whole, exact=exact))
 
 
 def available(entry: Elements, size: tuple[int, int], margin: int) -> int:
     """Count the elements that `extend` finds, without what it makes of them."""
-    return _COUNTS.get(entry, (size, margin), lambda: _available(entry, size, margin))
+    return remember(_COUNTS, entry, (size, margin), lambda: _available(entry, size, margin))
 
 
 def _available(entry: Elements, size: tuple[int, int], margin: int) -> int:
@@ -236,8 +208,11 @@ def _bounds(
         folds = [Fold(*e, w) for e, w in zip(ends, entry.wrap, strict=True)]
         layout = Layout(points, (folds[0], folds[1]), 0.0)
     else:
-        layout = _FOLDED.get(
-            entry, None, lambda: Layout.of(np.asarray(entry.points, float), entry.mask.shape, entry.wrap, beyond=False)
+        layout = remember(
+            _FOLDED,
+            entry,
+            None,
+            lambda: Layout.of(np.asarray(entry.points, float), entry.mask.shape, entry.wrap, beyond=False),
         )
     return layout, np.minimum(-margin - offset, 0), np.maximum(np.array(size) + margin - offset, shape)
 
@@ -377,7 +352,7 @@ def _nearest(place: Points) -> NDArray[np.intp]:
     return np.asarray(np.floor(place + 0.5), np.intp)
 
 
-_PARTS: Memory[Parts] = Memory(16)
-_COUNTS: Memory[int] = Memory(256)
-_FOLDED: Memory[Layout] = Memory(64)
-_EXTENDED: Memory[Extended] = Memory(4)
+_PARTS: Cache[bytes, Parts] = Cache(16)
+_COUNTS: Cache[bytes, int] = Cache(256)
+_FOLDED: Cache[bytes, Layout] = Cache(64)
+_EXTENDED: Cache[bytes, Extended] = Cache(4)

@@ -6,10 +6,7 @@ what is rigid and on which points are pinned, not on where they go, so its facto
 
 from __future__ import annotations
 
-import hashlib
 import math
-import threading
-from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -17,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._cache import Cache, content_hash
 from texrs._typing import Bools
 from texrs.errors import InvalidInput
 from texrs.kernels.sparse import Cholesky
@@ -40,34 +38,18 @@ MOST = 1 << 19
 KEPT = 1 << 30
 """Bytes of factors that are kept."""
 
-_FACTORS: OrderedDict[bytes, Cholesky] = OrderedDict()
-_LOCK = threading.Lock()
+_FACTORS: Cache[bytes, Cholesky] = Cache(KEPT, lambda factor: min(factor.nbytes, KEPT))
 
 
 def factors(wanted: Mapping[bytes, Callable[[], Any]]) -> dict[bytes, Cholesky]:
     """Return the factors of matrices, kept by what they are made from; those that lack are made side by side."""
-    with _LOCK:
-        found = {key: _FACTORS[key] for key in wanted if key in _FACTORS}
+    found = {key: factor for key in wanted if (factor := _FACTORS.get(key)) is not None}
     lacking = [key for key in wanted if key not in found]
-    found |= zip(lacking, Cholesky.several([wanted[key]() for key in lacking]), strict=True) if lacking else {}
-    with _LOCK:
-        for key, made in found.items():
-            _FACTORS[key] = made
-            _FACTORS.move_to_end(key)
-        while len(_FACTORS) > len(found) and sum(f.nbytes for f in _FACTORS.values()) > KEPT:
-            _FACTORS.popitem(last=False)
+    made = Cholesky.several([wanted[key]() for key in lacking]) if lacking else []
+    for key, factor in zip(lacking, made, strict=True):
+        found[key] = factor
+        _FACTORS.put(key, factor)
     return found
-
-
-def _key(*parts: object) -> bytes:
-    digest = hashlib.blake2b(digest_size=16, person=b"texrs.splice")
-    for part in parts:
-        if isinstance(part, np.ndarray):
-            digest.update(repr((part.shape, part.dtype.str)).encode())
-            digest.update(np.ascontiguousarray(part).data)
-        else:
-            digest.update(repr(part).encode())
-    return digest.digest()
 
 
 # --- disjoint foreground: elements move whole --------------------------------------------------------------------------
@@ -111,7 +93,7 @@ def _harmonic(held: Bools, own: NDArray[np.float32]) -> NDArray[np.float64]:
     out = np.where(held, own, 0.0).astype(np.float64)
     if not free.any():
         return out
-    key = _key("carried", np.packbits(free), shape)
+    key = content_hash("carried", np.packbits(free), shape)
     solver = factors({key: lambda: _laplacian(free)})[key]
     flow = np.zeros((2, *shape))
     # What an element's pixel hands to the ground beside it; the ground itself has nothing yet.
@@ -204,7 +186,7 @@ def stretched(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upright: b
     shape = rigid.shape
     at = pins[:, 0] * shape[1] + pins[:, 1]
     out = np.empty((*shape, 2))
-    keys = [_key("stretched", np.packbits(rigid), shape, at, upright and axis, upright) for axis in (0, 1)]
+    keys = [content_hash("stretched", np.packbits(rigid), shape, at, upright and axis, upright) for axis in (0, 1)]
     # Without the decoupling both axes have one matrix.
     made = factors({keys[axis]: partial(energy, rigid, at, axis, upright=upright) for axis in (0, 1)})
     for axis in (0, 1):
