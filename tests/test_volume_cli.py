@@ -96,11 +96,13 @@ def test_wrong_requests_get_a_line_and_change_nothing(here, capsys, arguments, s
     assert {p.name: p.read_bytes() for p in here.iterdir()} == before
 
 
-def test_labels_are_painted(here, capsys):
-    marked = samples.particles((32, 32, 32)).labels
-    io.write_volume("labels.npy", marked)
+@pytest.mark.parametrize("dtype", ["bool", "uint8", "int8", "uint16", "int32"])
+def test_labels_are_painted(here, capsys, dtype):
+    marked = samples.particles((32, 32, 32)).labels % 100
+    io.write_volume("labels.npy", marked.astype(dtype))
     assert main(["slice", "labels.npy", "-o", "a.png", "--labels", "--at", "row=9"]) == 0
-    np.testing.assert_array_equal(iio.imread("a.png"), volume.paint(marked)[:, 9])
+    expected = volume.paint((marked != 0 if dtype == "bool" else marked).astype(np.int64))
+    np.testing.assert_array_equal(iio.imread("a.png"), expected[:, 9])
     assert main(["slice", "v.npy", "-o", "b.png", "--labels"]) == 2
     assert "v.npy: needs integers of shape" in capsys.readouterr().err
 

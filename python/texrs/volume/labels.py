@@ -56,9 +56,10 @@ def paint(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArray[np.uin
         raise InvalidInput(f"labels: must be at least 0, got {least}")
     if colours is None:
         table = _table(min(largest + 1, _MOST_COLOURS))
-        # Of very many labels some share a colour, though never that of the ground.
-        index = np.where(array < len(table), array, array % (_MOST_COLOURS - 1) + 1).astype(np.intp)
-        return np.ascontiguousarray(table[index])
+        if largest >= len(table):
+            # Of very many labels some share a colour, though never that of the ground.
+            array = np.where(array < len(table), array, array % (_MOST_COLOURS - 1) + 1)
+        return np.ascontiguousarray(table[array.astype(np.intp)])
     given = np.asarray(colours)
     if given.ndim != 2 or given.shape[1] != 3 or given.dtype.kind not in "ui" or given.min() < 0 or given.max() > 255:
         raise InvalidInput(f"colours: needs numbers from 0 to 255 of shape (K, 3), got {given.dtype} of {given.shape}")
