@@ -111,6 +111,24 @@ def test_labels_by_hand(pebbles):
     assert made.report["elements"] == truth.max()
 
 
+@pytest.mark.parametrize("channels", [slice(None), slice(1)], ids=["colours", "grey"])
+def test_the_segmentation_is_shown_in_colours_on_the_exemplar(pebbles, channels):
+    truth = samples.pebbles((128, 128)).labels
+    shown = texrs.design(pebbles[..., channels], 64, labels=truth, tiles=1).stages["segmentation"]
+    assert shown.shape == (128, 128, 3)
+    assert shown.dtype == np.uint8
+    outline = np.zeros(truth.shape, bool)
+    outline[1:] |= truth[1:] != truth[:-1]
+    outline[:, 1:] |= truth[:, 1:] != truth[:, :-1]
+    assert (shown[outline] == 255).all()
+    ground = (truth == 0) & ~outline
+    np.testing.assert_array_equal(shown[ground], np.broadcast_to(pebbles[..., channels], shown.shape)[ground])
+    # The colour of an element is that of no other, whatever the stone looks like.
+    tints = [(shown - 0.45 * pebbles[..., channels])[(truth == k) & ~outline] for k in range(1, truth.max() + 1)]
+    assert max(t.std(axis=0).max() for t in tints if len(t)) < 1
+    assert len({tuple(np.rint(t.mean(axis=0) / 4)) for t in tints if len(t)}) > 0.9 * len(tints)
+
+
 def test_stages_are_saved(result, tmp_path):
     names = [p.name for p in result.save_stages(tmp_path / "stages")]
     assert names[0] == "01-segmentation.png"

@@ -59,9 +59,7 @@ def _stages(workshop: Workshop) -> str:
     pictures = [figure(made.sample.image, "Example", note=_size(made.sample.image))]
     for stage, image in made.result.stages.items():
         caption, note = CAPTIONS.get(stage, (stage.capitalize(), ""))
-        flat = image.ndim == 2
-        seen = coloured(image, made.sample.image) if stage == "segmentation" else image
-        pictures.append(figure(preview(seen), caption, note=note, exact=flat))
+        pictures.append(figure(preview(image), caption, note=note, exact=image.ndim == 2))
     return code("texrs design example.png -o result.png --stages stages") + grid(pictures)
 
 
@@ -76,17 +74,14 @@ def _seeds(workshop: Workshop) -> str:
     return code("texrs design example.png -o result.png --size 200 --seed 1") + grid(pictures)
 
 
-def coloured(labels: Array, picture: Array | None = None) -> Array:
-    """Return each label a colour of its own, the background none; shade them by the picture."""
+def coloured(labels: Array) -> Array:
+    """Return each label a colour of its own, the background none."""
     count = int(labels.max()) + 1
     hues = [uniform(1, i, 0) for i in range(count)]
     palette = np.array([colorsys.hsv_to_rgb(h, 0.6, 1.0) for h in hues])
     palette[0] = 0.35
-    colours = palette[labels]
-    if picture is not None:
-        colours *= 0.45 + 0.55 * preview(picture).mean(axis=-1, keepdims=True) / 160
-    shaded: Array = np.rint(255 * np.clip(colours, 0, 1)).astype(np.uint8)
-    return shaded
+    colours: Array = np.rint(255 * palette[labels]).astype(np.uint8)
+    return colours
 
 
 def _size(image: Array) -> str:

@@ -57,6 +57,7 @@ from texrs.kernels.complete import complete
 from texrs.kernels.gather import gather
 from texrs.papers.design.deformation import Canvas, deform
 from texrs.papers.design.literal import Layered, start, stitch_layers
+from texrs.papers.design.pictures import outlined
 from texrs.papers.design.source import Source, as_shares, check_moves, check_sources, to_unit_together
 from texrs.quilting import Picture, quilt
 from texrs.source_map import SourceMap
@@ -267,7 +268,8 @@ def one(
             progress=watch,
         )
         after = visibility(composite, exemplars, image, wrap=wrap)
-    stages = {"segmentation": sources[0].parts.elements.astype(np.uint16), **pictures[0].stages, "composite": picture}
+    segmented = outlined(sources[0].parts.elements, sources[0].guide)
+    stages = {"segmentation": segmented, **pictures[0].stages, "composite": picture}
     report: dict[str, Any] = {
         "method": "paper" if sources[0].paper else "default",
         "seed": seed,
