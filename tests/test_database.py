@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import imageio.v3 as iio
 import numpy as np
@@ -123,6 +126,50 @@ def test_two_processes_may_write_at_once(tmp_path: Path) -> None:
     assert list(textures) == sorted(f"{name}{i}" for name in "ab" for i in range(4))
     assert all(len(textures[name].points) >= 3 for name in textures)
     assert not list(Path(folder).glob(".texrs-*"))
+
+
+def meet(barrier: Any) -> None:
+    """Keep the barrier of a process, at which it waits for the others."""
+    globals()["_BARRIER"] = barrier
+
+
+def add_one(folder: str, number: int, replace: bool) -> str:
+    """Add a picture at the same time as the other processes; return what was said."""
+    globals()["_BARRIER"].wait(120)
+    try:
+        TextureDatabase(folder).add(
+            np.roll(DOTS.image, number, axis=-1) // (number + 1), "one", replace=replace, **GIVEN
+        )
+    except InvalidInput as error:
+        return str(error)
+    return "ok"
+
+
+@pytest.mark.parametrize("replace", [False, True])
+def test_one_name_given_by_several_processes_at_once(tmp_path: Path, said: list[str], replace: bool) -> None:
+    context, count = get_context("spawn"), 6
+    with ProcessPoolExecutor(count, context, meet, (context.Barrier(count),)) as pool:
+        told = list(pool.map(add_one, [str(tmp_path / "db")] * count, range(count), [replace] * count))
+    textures = TextureDatabase(tmp_path / "db", say=said.append)
+    if replace:
+        assert told == ["ok"] * count
+    else:
+        assert told.count("ok") == 1
+        assert sum("name: one is there already, of another image" in t for t in told) == count - 1
+        winner = told.index("ok")
+        assert (textures["one"].image == np.roll(DOTS.image, winner, axis=-1) // (winner + 1)).all()
+    # The manifest, the entry and the pixels are of one picture.
+    assert (np.load(tmp_path / "db" / "one.npy") == textures["one"].image).all()
+    assert textures.list()[0].hash == texrs.elements.digest(textures["one"].image)
+    assert not said
+
+
+def test_a_texture_that_is_refused_leaves_no_folder(tmp_path: Path) -> None:
+    textures = TextureDatabase(tmp_path / "db")
+    with pytest.raises(InvalidInput, match="mask"):
+        textures.add(DOTS.image, "dots", mask=DOTS.mask[:10])
+    assert len(textures) == 0
+    assert not (tmp_path / "db").exists()
 
 
 def test_splices_and_their_matrix(textures: TextureDatabase, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 
 from texrs import io
+from texrs._typing import Array
 from texrs.elements import FORMAT, Elements, digest, load
-from texrs.errors import FileError, TexrsError
+from texrs.errors import FileError, InvalidInput, TexrsError
 
-__all__ = ["NAME", "Folder", "Record", "given_again"]
+__all__ = ["NAME", "Folder", "Record", "check_free", "given_again"]
 
 MANIFEST, LOCK = "manifest.json", ".lock"
 LAYOUT = 1
@@ -52,22 +53,34 @@ class Folder:
 
     def __init__(self, path: FilePath, say: Callable[[str], object] | None) -> None:
         self.path, self._say = path, say
-        try:
-            self.path.mkdir(exist_ok=True)
-        except (OSError, ValueError) as error:
-            raise FileError(f"{self.path}: no folder can be made there ({error})") from None
+        if not path.is_dir() and (path.exists() or not path.parent.is_dir()):
+            raise FileError(f"{path}: no folder can be made there")
 
-    def keep(self, name: str, entry: Elements, source: str, options: Mapping[str, Any]) -> Elements:
-        """Write an entry and what the manifest says of it."""
+    def keep(
+        self,
+        name: str,
+        entry: Elements,
+        source: str,
+        options: Mapping[str, Any],
+        *,
+        pixels: Array | None = None,
+        replace_other: bool = True,
+    ) -> Elements:
+        """Write an entry, its ``pixels`` where they are in no other file, and what the manifest says of it."""
         plain = {k: _plain(v) for k, v in options.items()}
         # With all that the manifest needs, should that be lost.
         entry = replace(entry, report={**entry.report, "database": {"source": source, "options": plain}})
         file = f"{name}.npz"
         record = _of(name, file, entry)
         with self._locked():
-            entry.save(self.path / file)
             found = self._parse()
             found = self._found() if found is None else found
+            # Another process may have taken the name while this one analysed.
+            if not replace_other:
+                check_free(found, name, record.hash)
+            if pixels is not None:
+                io.write(self.path / source, pixels)
+            entry.save(self.path / file)
             found[name] = record
             self._write(found)
         return entry
@@ -134,6 +147,7 @@ class Folder:
     def _locked(self) -> Iterator[None]:
         """Keep other processes, and threads, from changing the manifest."""
         try:
+            self.path.mkdir(exist_ok=True)
             number = os.open(self.path / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
         except OSError as error:
             raise FileError(f"{self.path}: cannot be written to ({error.strerror})") from None
@@ -153,6 +167,12 @@ class Folder:
             self._say(sentence)
         else:
             warnings.warn(sentence, stacklevel=5)
+
+
+def check_free(found: Mapping[str, Record], name: str, image: str) -> None:
+    """Check that no texture of another image has the name."""
+    if name in found and found[name].hash != image:
+        raise InvalidInput(f"name: {name} is there already, of another image; replace=True replaces it")
 
 
 def _lock(number: int) -> bool:

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from texrs import io
 from texrs._arrays import as_image, as_int, guidance
 from texrs._typing import Array, Path, Progress
-from texrs.database._folder import NAME, Folder, Record, given_again
-from texrs.elements import FORMAT, Elements, analyse, digest, load
+from texrs.database._folder import NAME, Folder, Record, check_free, given_again
 from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.papers.splice import splice
 from texrs.synthesis import Synthesis
@@ -51,13 +50,13 @@ class TextureDatabase:
     """A folder with a manifest and one file a texture.
 
     An entry is remade when its image has changed, when it is of another version, and when it is damaged, which is said.
-    Several processes may use a folder at once: files take their names when they are whole, and the manifest is
-    changed by one process at a time.
+    Several processes may use a folder at once: files take their names when they are whole, and one process at a time
+    writes a texture. Of several that add different images by one name the first to write keeps it.
 
     Parameters
     ----------
     path : path_like
-        The folder; made if it is not there, in a folder that is.
+        The folder; if it is not there it is made, in a folder that is, when the first texture is kept.
     say : callable, optional
         Called with a sentence when something had to be remade; by default a warning is given.
 
@@ -157,16 +156,20 @@ class TextureDatabase:
         if not isinstance(name, str) or not NAME.fullmatch(name):
             raise InvalidInput(f"name: letters, digits, '.', '_' and '-' are allowed, up to 100; got {name!r}")
         pixels = as_image(image) if file is None else io.read(file)
-        before = self._folder.read().get(name)
-        if before is not None and before.hash != digest(pixels) and not replace:
-            raise InvalidInput(f"name: {name} is there already, of another image; replace=True replaces it")
+        if not replace:
+            check_free(self._folder.read(), name, digest(pixels))
         entry = analyse(pixels, progress=progress, **options)
         if similarity:
             entry = entry.prepared()
         source = f"{name}.npy" if file is None else file
-        if file is None:
-            io.write(self.path / source, pixels)
-        return self._folder.keep(name, entry, source, {**options, "similarity": similarity} if similarity else options)
+        return self._folder.keep(
+            name,
+            entry,
+            source,
+            {**options, "similarity": similarity} if similarity else options,
+            pixels=pixels if file is None else None,
+            replace_other=replace,
+        )
 
     def analyse(self, name: str, *, progress: Progress | None = None) -> Elements:
         """Return an entry, made anew if its image or the version is another one, or if it is damaged.
