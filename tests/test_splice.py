@@ -156,6 +156,33 @@ def test_joints_stay_upright(edit: str) -> None:
     assert bends[True].mean() <= 0.1
 
 
+# --- elements whose centre lies beside them ----------------------------------------------------------------------------
+
+AWAY = np.hypot(*(np.indices((24, 24)) - 11.5))
+OPENED = (AWAY < 9) & (AWAY > 5) & ~((np.indices((24, 24))[0] > 12) & (np.abs(np.indices((24, 24))[1] - 11.5) < 3))
+HOLLOW = {"opened": OPENED, "ring": (AWAY < 9) & (AWAY > 5), "target": ((AWAY < 9) & (AWAY > 6)) | (AWAY < 3)}
+
+
+@pytest.mark.parametrize("tag", ["F=d", "F=c", "B=c"])
+@pytest.mark.parametrize("middle", ["of the box", "of mass"])
+@pytest.mark.parametrize("shape", HOLLOW)
+def test_a_element_moves_whole_where_its_centre_lies_beside_it(shape: str, middle: str, tag: Any) -> None:
+    one = HOLLOW[shape]
+    mask = np.tile(one, (4, 4))
+    image = np.random.default_rng(0).integers(0, 60, (*mask.shape, 3)).astype(np.uint8)
+    image[~mask] += 160
+    centre = np.argwhere(one).mean(axis=0) if middle == "of mass" else np.array([11.5, 11.5])
+    points = centre + 24.0 * np.array([[i, j] for i in range(4) for j in range(4)])
+    mine = Elements(image, points, mask, (25, 25), tag, np.ones(16))
+    result = texrs.self_splice(mine, {"op": "move", "element": 5, "by": [4, -3]})
+    assert (result.image != image).any()
+    if tag == "F=d":
+        pixels = np.argwhere(one) + 24
+        goal = pixels + np.array([4, -3])
+        assert (result.image[tuple(goal.T)] == image[tuple(pixels.T)]).all()
+        assert {m["element"] for m in result.report["matches"]} == set(range(16))
+
+
 # --- two warps, and what serves them ---------------------------------------------------------------------------------
 
 

@@ -91,21 +91,31 @@ def _parts(entry: Elements) -> Parts:
     area = np.bincount(component.ravel(), minlength=count + 1)
     usual = float(np.median(area[1:][claims[1:] > 0])) if (claims[1:] > 0).any() else float(mask.sum() / len(points))
     orphans = [c for c in range(1, count + 1) if claims[c] == 0 and area[c] >= SMALLEST * usual]
-    if orphans:
-        points = np.concatenate([points, np.array(center_of_mass(mask, component, orphans))])
-        owner = np.concatenate([owner, orphans])
-        claims[orphans] = 1
+    at = _beside(component, orphans, at, owner)
+    owner = component[at[:, 0], at[:, 1]]
+    claims = np.bincount(owner, minlength=count + 1)
+    joined: dict[int, int] = {}
+    left = [c for c in orphans if claims[c] == 0]
+    for c, middle in zip(left, np.array(center_of_mass(mask, component, left)) if left else (), strict=True):
+        away = np.hypot(*(points - middle).T)
+        if away.min() < 1:
+            # A ring around a dot is of one element with it, not a second one in the same place.
+            joined[c] = int(away.argmin())
+        else:
+            points, owner = np.concatenate([points, middle[None]]), np.append(owner, c)
+            claims[c] = 1
     # One element, one component: nothing to divide.
     number = np.zeros(count + 1, np.int32)
     number[owner[claims[owner] == 1]] = np.flatnonzero(claims[owner] == 1) + 1
+    for c, element in joined.items():
+        number[c] = element + 1
     number[0] = 0
     core = number[component]
     shared = (claims[component] > 1) & mask
     if shared.any():
         markers = np.zeros(mask.shape, np.int32)
         several = np.flatnonzero((claims[owner] > 1) & (owner > 0))
-        spots = np.clip(np.rint(points[several]).astype(np.intp), 0, shape - 1)
-        markers[spots[:, 0], spots[:, 1]] = several + 1
+        markers[at[several, 0], at[several, 1]] = several + 1
         core = np.where(shared, watershed(-distance_transform_edt(mask), markers, mask=shared), core)
     core = _parted(core.astype(np.int32))
     region = _parted(expand_labels(core, RIM).astype(np.int32))
@@ -116,6 +126,26 @@ def _parts(entry: Elements) -> Parts:
             cut[found[found > 0] - 1, axis, side] = True
     there = np.bincount(core.ravel(), minlength=len(points) + 1)[1:] > 0
     return Parts(points, region, core, cut, there)
+
+
+def _beside(component: Labels, orphans: list[int], at: NDArray[np.intp], owner: Labels) -> NDArray[np.intp]:
+    """Bring centres that lie outside of their elements, as that of a ring does, to the nearest pixel of them.
+
+    That is foreground without a centre, around which the box is that holds the centre.
+    """
+    from scipy.ndimage import distance_transform_edt, find_objects
+
+    out, outside = at.copy(), np.flatnonzero(owner == 0)
+    if not orphans or not len(outside):
+        return out
+    boxes = find_objects(component)
+    near = distance_transform_edt(~np.isin(component, orphans), return_distances=False, return_indices=True)
+    for i in outside:
+        spot = near[:, at[i, 0], at[i, 1]]
+        box = boxes[component[tuple(spot)] - 1]
+        if all(side.start <= place < side.stop for side, place in zip(box, at[i], strict=True)):
+            out[i] = spot
+    return out
 
 
 def _parted(region: Labels) -> Labels:
