@@ -44,6 +44,9 @@ def test_holes_are_filled_by_scale(files):
         assert run(files, f"complete @floor.png @hole.png -o @out.png {given} -q") == 0
         made, floor, hole = (io.read(files / n) for n in ("out.png", "floor.png", "hole.png"))
         np.testing.assert_array_equal(made[hole == 0], floor[hole == 0])
+    assert run(files, "complete @floor.png @hole.png -o @out.png --method optimise --scale @scale.npy --rim 4 -q") == 0
+    changed = (io.read(files / "out.png") != floor).any(axis=-1)
+    assert changed[hole == 0].any()
     assert run(files, "complete @clear.png alpha -o @out.png --scale @scale.npy -q") == 0
     assert (io.read(files / "out.png")[..., 3] == 255).all()
 
@@ -62,6 +65,7 @@ def test_holes_are_filled_by_scale(files):
         ("perspective @floor.png --scale @scale.npy -o @out.png --scale-weight 99", "--scale-weight: needs a number"),
         ("complete @floor.png alpha -o @out.png", "HOLE: 'alpha' needs an image with an alpha channel"),
         ("complete @floor.png @hole.png -o @out.png --method heal", "--method: allowed are 'patch' and 'optimise'"),
+        ("complete @floor.png @hole.png -o @out.png --method optimise --patch 9", "--patch: method 'optimise' has no"),
     ],
 )
 def test_bad_input_is_named(files, capsys, line, words):

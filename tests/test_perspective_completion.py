@@ -163,6 +163,18 @@ def test_any_array_and_the_same_bytes(floor):
     assert one.image.tobytes() == many.image.tobytes()
 
 
+@pytest.mark.parametrize("rim", [5, 1024])
+def test_optimisation_may_replace_a_rim(floor, rim):
+    image, scale = floor
+    hole, wide = hole_in(image.shape[:2], (60, 90, 60, 100)), hole_in(image.shape[:2], (55, 95, 55, 105))
+    wide |= rim > 5
+    result = fill(image, hole, method="optimise", scale_map=scale, rim=rim)
+    np.testing.assert_array_equal(result.source.label > 0, wide)
+    np.testing.assert_array_equal(result.image[~wide], image[~wide])
+    assert (result.image != image)[wide & ~hole].any()
+    assert result.report["replaced_outside"] == np.count_nonzero(wide & ~hole)
+
+
 def test_a_hole_that_is_empty_changes_nothing(floor):
     image, scale = floor
     result = fill(image, np.zeros(image.shape[:2], bool), scale_map=scale)
@@ -199,6 +211,7 @@ def test_an_output_that_wraps(floor):
         ),
         ({"blend": "soft"}, "blend: needs a number"),
         ({"hole": "alpha"}, "hole: 'alpha' needs an image with an alpha channel"),
+        ({"method": "optimise", "patch": 12}, "patch: method 'optimise' has no patches"),
         ({"method": "optimise", "hole": np.ones((64, 64), bool)}, "hole: covers the whole image"),
         ({"method": "optimise", "hole": np.indices((64, 64)).sum(axis=0) % 4 > 0}, "hole: leaves no part"),
     ],

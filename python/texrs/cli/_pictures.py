@@ -90,7 +90,10 @@ def complete_command(
     method: Annotated[str, typer.Option(help="patch, or optimise: windows corrected until they fit.")] = "patch",
     patch: Annotated[
         int | None,
-        typer.Option(help="Side of the patches, in pixels, at least 4.", show_default="by the picture's size"),
+        typer.Option(
+            help="Side of the patches, in pixels, at least 4; not with --method optimise.",
+            show_default="by the picture's size",
+        ),
     ] = None,
     rim: Annotated[int, typer.Option(help="Pixels around the hole that may be replaced too, to hide the seam.")] = 0,
     mirror: Annotated[

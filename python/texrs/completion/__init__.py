@@ -73,10 +73,10 @@ def complete(
         is around.
     patch : int, optional
         Side of a patch in pixels, at least 4: about the size of what repeats. By default a sixth of the shorter side,
-        12 to 32; less where no place, or few, would be free of holes.
+        12 to 32; less where no place, or few, would be free of holes. "optimise" has no patches, and refuses one.
     rim : int
-        Pixels around the hole that patches may replace too, 0 to 1024, so that the cut can run where it shows least. 0
-        leaves all that is known as it is.
+        Pixels around the hole that may be replaced too, 0 to 1024, so that the seam can run where it shows least. 0 leaves
+        all that is known as it is.
     mirror : bool, optional
         Whether patches may be mirrored; False for lit or lettered textures. By default they may unless there is a scale map:
         what is seen at an angle has an upper side.
@@ -103,7 +103,7 @@ def complete(
     ------
     InvalidInput
         A hole of another shape; a source of another dtype or other channels; nothing known to copy from; a patch larger
-        than the pictures, or with no place for it outside the hole.
+        than the pictures, with no place for it outside the hole, or given to "optimise".
 
     References
     ----------
@@ -138,6 +138,8 @@ def complete(
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
     cyclic, seed = as_wrap(wrap), as_seed(seed)
     width = as_int(rim, "rim", 0, 1024)
+    if patch is not None and method == "optimise":
+        raise InvalidInput("patch: method 'optimise' has no patches; leave it out, or take method='patch'")
     chosen = None if patch is None else as_int(patch, "patch", LEAST, min(n for shape in shapes for n in shape))
     watch = progress or (lambda stage, share: None)
 
@@ -145,13 +147,15 @@ def complete(
     places, side, count = untouched(shapes), 0, 0
     scales = scales_of(pictures, open_, scale_map, source_scale_map) if open_.any() else None
     levels: list[dict[str, object]] = []
+    wide = grown(open_, width, cyclic)
     if open_.any() and method == "optimise":
-        places, levels = optimised(pictures, open_, scales, wrap=(cyclic[0], cyclic[1]), seed=seed, progress=progress)
+        places, levels = optimised(
+            pictures, open_, scales, wide, wrap=(cyclic[0], cyclic[1]), seed=seed, progress=progress
+        )
         count = int(places.label.max())
     elif open_.any():
-        keep = ~grown(open_, width, cyclic)
         places, side, count = patched(
-            pictures, open_, scales, chosen, keep, mirror=bool(mirror), wrap=cyclic, seed=seed, watch=watch
+            pictures, open_, scales, chosen, ~wide, mirror=bool(mirror), wrap=cyclic, seed=seed, watch=watch
         )
     new = _where(places.label)
     # What is kept maps to itself; of patches every coordinate is whole.

@@ -60,12 +60,16 @@ def optimised(
     pictures: list[Array],
     open_: Bools,
     scales: list[Floats] | None,
+    wide: Bools,
     *,
     wrap: tuple[bool, bool],
     seed: int,
     progress: Progress | None,
 ) -> tuple[SourceMap, list[dict[str, object]]]:
-    """Return the source map of a picture whose holes are filled, from itself or from a second one, and what each level did."""
+    """Return the source map of a picture whose holes are filled, from itself or from a second one, and what each level did.
+
+    ``wide`` is what may be replaced: the holes and a rim around them.
+    """
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
     for name, shape in zip(("image", "source"), shapes, strict=False):
         if min(shape) < LEAST:
@@ -77,7 +81,7 @@ def optimised(
     sizes: tuple[float, ...] = (1.0,)
     wanted: tuple[float, float] | None = None
     if scales is not None:
-        asked = scales[0][open_]
+        asked = scales[0][wide]
         wanted = (float(asked.min()), float(asked.max()))
         sizes = SIZES if len(pictures) == 1 else reaching(SIZES, scales[1], wanted)
     supply = Supply.of(
@@ -96,10 +100,10 @@ def optimised(
             else "source: has no part large enough"
         )
         raise InvalidInput(f"{why} to copy from; method='patch' may find one")
-    box = around(open_, AROUND << (count - 1), 1 << (count - 1), wrap)
+    box = around(wide, AROUND << (count - 1), 1 << (count - 1), wrap)
     part = (slice(box[0], box[1]), slice(box[2], box[3]))
     size = (box[1] - box[0], box[3] - box[2])
-    closed = tuple(w and n == m for w, n, m in zip(wrap, size, open_.shape, strict=True))
+    closed = tuple(w and n == m for w, n, m in zip(wrap, size, wide.shape, strict=True))
     row, column = np.mgrid[part]
     given: NDArray[np.int32] = (
         np.stack([row, column], axis=-1).astype(np.int32) + np.array(supply.copies[0].origin, np.int32) + margin
@@ -107,12 +111,12 @@ def optimised(
     grown = supply.grow(
         Region(size, (box[0], box[2]), (closed[0], closed[1])),
         None if scales is None else np.ascontiguousarray(scales[0][part]),
-        held=(~open_[part], given),
+        held=(~wide[part], given),
         seed=seed,
         progress=progress,
     )
     which, at = supply.locate(grown.places)
-    here = open_[part]
+    here = wide[part]
     which, at = which.reshape(size)[here], at.reshape(*size, 2)[here]
     identity = SourceMap.identity(shapes[0])
     coordinates, label, exemplar = identity.coordinates.copy(), identity.label.copy(), identity.exemplar.copy()
