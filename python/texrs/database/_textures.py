@@ -15,6 +15,7 @@ from texrs import io
 from texrs._arrays import as_image, as_int, guidance
 from texrs._typing import Array, Path, Progress
 from texrs.database._folder import NAME, Folder, Record, check_free, given_again
+from texrs.elements import FORMAT, Elements, analyse, digest, load
 from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.papers.splice import splice
 from texrs.synthesis import Synthesis
