@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import imageio.v3 as iio
 import numpy as np
@@ -19,6 +20,7 @@ import typer
 import texrs
 from texrs import SourceMap, samples
 from texrs.cli import app, main
+from texrs.errors import InvalidInput
 
 Capture = pytest.CaptureFixture[str]
 COLOURS = samples.load("dots", size=(64, 64)).image
@@ -136,12 +138,12 @@ def test_several_examples_and_several_variants(here: Path, capsys: Capture) -> N
     assert not Path("bad.png").exists()
 
 
-def test_labels_by_hand_and_the_input_as_output(here: Path, capsys: Capture) -> None:
+def test_labels_by_hand(here: Path, capsys: Capture) -> None:
     labels = samples.load("dots", size=(64, 64)).labels
     assert labels is not None
     iio.imwrite("labels.png", labels.astype(np.uint8))
-    assert main(["design", "in.png", "--labels", "labels.png", *TINY, "-o", "in.png", "--stages", "s"]) == 0
-    assert iio.imread("in.png").shape == (48, 48, 3)
+    assert main(["design", "in.png", "--labels", "labels.png", *TINY, "-o", "out.png", "--stages", "s"]) == 0
+    assert iio.imread("out.png").shape == (48, 48, 3)
     assert '"children": "labels"' in Path("s/report.json").read_text()
     before = files(here)
     capsys.readouterr()
@@ -438,7 +440,7 @@ def test_apply_is_all_or_nothing(here: Path, capsys: Capture) -> None:
     for maps, out, words in (
         ("in.png small.png", "results", "small.png: number 0 needs size"),
         ("in.png small.png", "one.png", "needs a folder"),
-        ("in.png", ".", "one of the maps"),
+        ("in.png", ".", "--out: ./in.png is read as in.png, and would be lost"),
         ("in.png other/in.png", "results", "two maps have the name in.png"),
         ("in.png", "out.exr", "uint8"),
         ("in.png no.png", "results", "no.png"),
@@ -465,6 +467,104 @@ def test_apply_to_a_volume(here: Path) -> None:
     texrs.io.write_volume("v.tif", volume)
     assert main(["apply", "s.npz", "v.tif", "-o", "w.tif", "-q"]) == 0
     assert (texrs.io.read_volume("w.tif") == volume).all()
+
+
+# --- outputs that are inputs -----------------------------------------------------------------------------------------
+
+OUTPUTS_OF_ALL = ("out", "source", "stages")
+COMMAND: Any = typer.main.get_command(app)
+
+
+def parameters(command: str) -> list[Any]:
+    found: list[Any] = COMMAND.commands[command].params
+    return found
+
+
+def writes(parameter: Any) -> bool:
+    return parameter.name in OUTPUTS_OF_ALL and parameter.param_type_name == "option"
+
+
+def pairs() -> list[tuple[str, str, str]]:
+    """Return each command with each of its texts that may name a file that is read, and each of its outputs."""
+    found = []
+    for registered in app.registered_commands:
+        assert registered.name is not None
+        assert registered.callback is not None
+        given = parameters(registered.name)
+        kinds = inspect.signature(registered.callback, eval_str=True).parameters
+        texts = [p.name for p in given if "str" in str(kinds[p.name].annotation).split(", typer")[0] and not writes(p)]
+        found += [(registered.name, read, p.name) for read in texts for p in given if writes(p)]
+    return found
+
+
+def test_all_commands_are_known_to_read_and_write() -> None:
+    both = {command for command, _, _ in pairs()}
+    assert both >= {"design", "apply", "tile", "complete", "scale-map", "perspective", "solid", "synthesize", "slice"}
+    assert both >= {"splice", "self-splice", "analyse", "database"}
+    assert ("apply", "source", "out") in pairs()
+    assert ("solid", "guide", "source") in pairs()
+    assert ("design", "labels", "stages") in pairs()
+
+
+@pytest.mark.parametrize(("command", "read", "written"), pairs(), ids="-".join)
+def test_no_command_writes_over_what_it_reads(here: Path, command: str, read: str, written: str) -> None:
+    Path("st").mkdir()
+    target = "st/01-known.png" if written == "stages" else "there.npz" if written == "source" else "there.png"
+    Path(target).write_bytes(b"dear")
+    Path("symbolic.png").symlink_to(target)
+    os.link(target, "hard.png")
+    before = files(here)
+    for name in (target, "symbolic.png", "hard.png"):
+        arguments, options = [], []
+        for p in parameters(command):
+            value = name if p.name == read else ("st" if p.name == "stages" else target) if p.name == written else None
+            if value is not None or p.required:
+                values = [value or ("new.png" if p.name == "out" else "in.png")] * max(p.nargs, 1)
+                if p.param_type_name == "argument":
+                    arguments += values
+                else:
+                    options += [max(p.opts, key=len), *values]
+        with pytest.raises(InvalidInput, match=f"--{written}: {target} is read"):
+            COMMAND.main([command, *arguments, *options], standalone_mode=False)
+        assert files(here) == before
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "apply map.npz in.png -o in.png",
+        "apply map.npz in.png -o map.npz",
+        "design in.png -o ./in.png",
+        "design many-1.png -o many.png --variants 2",
+        "design in.png --labels s-1/report.json -o many.png --variants 2 --stages s",
+        "apply map.npz in.png s-1/in.png -o s-1",
+        "database db matrix -o in.png",
+        "database db matrix -o db/dots.npz",
+        "database db add db/dots.npz",
+        "self-splice in.png --edit s-1/report.json -o new.png --stages s-1",
+    ],
+)
+def test_no_name_that_a_command_makes_is_read(here: Path, capsys: Capture, command: str) -> None:
+    Path("s-1").mkdir()
+    Path("s-1/report.json").write_text("{}")
+    iio.imwrite("s-1/in.png", COLOURS)
+    SourceMap.identity((64, 64)).save("map.npz")
+    iio.imwrite("many-1.png", COLOURS)
+    mask = samples.load("dots", size=(64, 64)).mask
+    texrs.TextureDatabase("db").add("in.png", "dots", mask=mask, tag="F=d")
+    before = files(here)
+    assert main(command.split()) == 2
+    assert "is read" in complaint(capsys)
+    assert files(here) == before
+
+
+def test_a_folder_of_inputs_may_take_what_replaces_none(here: Path, capsys: Capture) -> None:
+    assert main(["tile", "in.png", "-o", "out.png", "-q", "--stages", "."]) == 0
+    assert (iio.imread("in.png") == COLOURS).all()
+    Path("gravel").mkdir()
+    assert main(["samples", "gravel", "-o", "gravel", "-q"]) == 0
+    assert main(["design", "in.png", *TINY, "-o", "many.png", "--variants", "2", "--stages", "."]) == 2
+    assert "--stages: needs a name" in complaint(capsys)
 
 
 # --- the small commands ----------------------------------------------------------------------------------------------

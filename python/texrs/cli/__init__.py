@@ -18,13 +18,11 @@ from typing import Annotated, Any, cast
 import typer
 
 from texrs import io, samples
-from texrs._arrays import as_float
-from texrs._threads import threads
-from texrs._version import __version__
+from texrs._arrays import as_float, as_int
 from texrs.blending import SCREENING
 from texrs.blending import blend as healed
 from texrs.cli import _elements, _files, _perspective, _pictures, _scales, _solid, _splice, _volumes
-from texrs.cli._console import Method, Quiet, Threads, as_method, note, run, say, watching
+from texrs.cli._console import Command, Method, Quiet, Threads, as_method, note, run, say, watching
 from texrs.cli._files import describe, named
 from texrs.errors import FileError, InvalidInput
 from texrs.exemplar.segmentation import Children
@@ -171,6 +169,9 @@ def design_command(
     shape, cyclic = _files.parse_size(size), _files.parse_wrap(wrap)
     factors = _files.parse_range(scale, name="--scale")
     _files.check_outputs(out, source, stages)
+    for number in range(0 if variants is None else as_int(variants, "--variants", 1, 4096)):
+        own = _files.variant_names(seed + number, out=out, source=source, stages=stages)
+        _files.check_apart([*exemplar, labels or ""], **own)
     shares = _files.parse_shares(weights)
     pixels = [_files.read_exemplar(name) for name in exemplar]
     marked = None if labels is None else io.read(labels)
@@ -258,7 +259,7 @@ def apply_command(
     if weight and places.axes != 2:
         raise InvalidInput("--blend: is for pictures; the source map is that of a volume")
     groups = _groups(maps, len(places.shapes))
-    targets = _targets(groups, out)
+    targets = _targets(groups, out, [source, *maps])
     read = io.read if places.axes == 2 else io.read_volume
     write = io.write if places.axes == 2 else io.write_volume
     # All results or none take their names, at the end.
@@ -373,17 +374,19 @@ def _groups(maps: Sequence[str], count: int) -> list[list[str]]:
     return [list(maps[i : i + count]) for i in range(0, len(maps), count)]
 
 
-def _targets(groups: Sequence[Sequence[str]], out: str) -> list[str]:
+def _targets(groups: Sequence[Sequence[str]], out: str, inputs: Sequence[str]) -> list[str]:
     """Name what is written: the file itself, or in a folder files of the names of the maps."""
     if len(groups) == 1 and not Path(out).is_dir():
         return [out]
     if not Path(out).is_dir():
         raise InvalidInput(f"--out: needs a folder that exists for {len(groups)} results, got {out!r}")
     targets = [os.path.join(out, Path(group[0]).name) for group in groups]
-    inputs = {os.path.realpath(path) for group in groups for path in group}
     for i, target in enumerate(targets):
-        if os.path.realpath(target) in inputs:
-            raise InvalidInput(f"--out: {target} is one of the maps; take another folder")
+        _files.check_apart(inputs, out=target)
         if target in targets[:i]:
             raise InvalidInput(f"--out: two maps have the name {Path(target).name}; write them one by one")
     return targets
+
+
+for registered in app.registered_commands:
+    registered.cls = Command

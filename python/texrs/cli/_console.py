@@ -16,11 +16,14 @@ from types import FrameType
 from typing import Annotated, Any, cast
 
 import typer
+from typer.core import TyperCommand
 
 from texrs._typing import Progress
+from texrs.cli._files import check_apart
 from texrs.errors import InvalidInput, TexrsError
 
 __all__ = [
+    "Command",
     "Method",
     "Out",
     "Quiet",
@@ -60,6 +63,8 @@ DONE, INTERNAL, BAD_INPUT = 0, 1, 2
 """Exit codes; a command that a signal ends has 128 plus the signal's number, so 130 for Ctrl-C."""
 TRACEBACK = "TEXRS_TRACEBACK"
 """Environment variable that asks for the traceback of an internal error."""
+OUTPUTS = ("out", "source", "stages")
+"""Options that say what is written; a source map that is read is an argument."""
 PAUSE = 5.0
 """Least seconds between two lines of progress of one stage."""
 PIPE = int(getattr(signal, "SIGPIPE", 13))
@@ -69,6 +74,26 @@ GRACE = 1.0
 
 # The root of what typer raises on wrong usage. It is click's class or typer's own copy of it, by typer's version.
 UsageFailure = cast(type[Exception], next(c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException"))
+
+
+class Command(TyperCommand):
+    """A command that never writes over what it reads.
+
+    Its outputs are ``--out``, ``--stages`` and ``--source``; whatever else names a file may be read.
+    """
+
+    def invoke(self, ctx: Any) -> Any:
+        """Do the command, if no output is an input."""
+        outputs = {p.name for p in self.params if p.name in OUTPUTS and p.param_type_name == "option"}
+        given = ctx.params.items()
+        inputs = [text for name, value in given if name not in outputs for text in _texts(value)]
+        check_apart(inputs, **{name: value for name, value in given if name in outputs})
+        return super().invoke(ctx)
+
+
+def _texts(value: object) -> list[str]:
+    """Return the texts among the values of a parameter."""
+    return [v for v in (value if isinstance(value, list | tuple) else [value]) if isinstance(v, str)]
 
 
 def as_method(text: str, *others: str) -> Any:

@@ -220,6 +220,8 @@ def database_command(
             raise InvalidInput(
                 "IMAGE: --name, --box, --background, --mask and --points belong to one image; add one by one"
             )
+        for image in given:
+            _files.check_apart([image], name=os.path.join(folder, f"{name or Path(image).stem}.npz"))
         textures = TextureDatabase(folder, say=complain)
         for image in given:
             sample = image.startswith(_files.SAMPLE)
@@ -241,6 +243,8 @@ def database_command(
         return
     if out is None:
         raise InvalidInput("--out: matrix needs the name of an image file")
+    kept = [os.path.join(folder, file) for record in textures.list() for file in (record.file, record.source)]
+    _files.check_apart(kept, out=out)
     _files.check_output(out)
     shape = _files.parse_size(size)
     with named(count="--threads"), threads(count), watching(quiet=quiet) as progress:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Sequence
+import stat
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +19,7 @@ from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.synthesis import Synthesis
 
 __all__ = [
+    "check_apart",
     "check_distinct",
     "check_folder",
     "check_npz",
@@ -39,6 +42,8 @@ SAMPLE = "sample:"
 """What the name of a built-in exemplar starts with."""
 LONGEST_PROBE = 2**17
 """Longer than a side may be in any format that limits it."""
+STAGE = re.compile(r"[0-9]{2,}-.*\.png|(points|mask)\.png|report\.json")
+"""Names of what is written to a folder of stages."""
 
 
 # --- values ----------------------------------------------------------------------------------------------------------
@@ -190,16 +195,22 @@ def deliver(result: Synthesis, out: str, source: str | None, stages: str | None)
 def deliver_variants(made: Sequence[Synthesis], seed: int, out: str, source: str | None, stages: str | None) -> None:
     """Write several results, each under a name that ends in its seed, and a contact sheet of them."""
     for number, result in enumerate(made):
-        where = [None if p is None else beside(p, seed + number) for p in (out, source, stages)]
-        deliver(result, str(where[0]), where[1], where[2])
+        deliver(result, **variant_names(seed + number, out=out, source=source, stages=stages))
     with output(out) as temporary:
         io.write(temporary, contact_sheet([result.image for result in made]))
 
 
-def beside(path: str, seed: int) -> str:
+def variant_names(seed: int, **paths: str | None) -> dict[str, Any]:
+    """Return the names of what is written of one of several results: each ends in its seed."""
+    for option, path in paths.items():
+        if path is not None and not Path(path).name:
+            raise InvalidInput(f"--{option}: needs a name that the seed of a variant can follow, got {path!r}")
+    return {option: None if p is None else beside(Path(p), seed) for option, p in paths.items()}
+
+
+def beside(path: Path, seed: int) -> str:
     """Return the name of one of several results."""
-    plain = Path(path)
-    return str(plain.with_name(f"{plain.stem}-{seed}{plain.suffix}"))
+    return str(path.with_name(f"{path.stem}-{seed}{path.suffix}"))
 
 
 def contact_sheet(images: Sequence[Array], side: int = 256) -> Array:
@@ -251,6 +262,33 @@ def check_folder(path: str) -> None:
         raise FileError(f"{path}: {there} is not a folder" if str(there) != path else f"{path}: is not a folder")
     if not os.access(there, os.W_OK | os.X_OK):
         raise FileError(f"{path}: the folder {there} cannot be written to")
+
+
+def check_apart(inputs: Iterable[str], **outputs: str | None) -> None:
+    """Check that no output is an input, under whatever name, nor what the pictures of the stages would replace."""
+    found = [(name, status) for name in inputs if (status := _status(name)) is not None]
+    for option, path in outputs.items():
+        if path is None:
+            continue
+        files = [path]
+        if option == "stages":
+            there = sorted(os.listdir(path)) if os.path.isdir(path) else []
+            files = [os.path.join(path, name) for name in there if STAGE.fullmatch(name)]
+        for file in files:
+            old = _status(file)
+            for name, status in found:
+                if old is not None and os.path.samestat(old, status):
+                    known = "" if name == file else f" as {name}"
+                    raise InvalidInput(f"--{option}: {file} is read{known}, and would be lost; write to another file")
+
+
+def _status(path: str) -> os.stat_result | None:
+    """Return the status of the regular file that a path leads to, if there is one."""
+    with suppress(OSError, ValueError):
+        status = os.stat(path)
+        if stat.S_ISREG(status.st_mode):
+            return status
+    return None
 
 
 def check_distinct(**paths: str | None) -> None:
