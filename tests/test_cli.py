@@ -20,6 +20,7 @@ import typer
 import texrs
 from texrs import SourceMap, samples
 from texrs.cli import app, main
+from texrs.cli._console import Stopped
 from texrs.errors import InvalidInput
 
 Capture = pytest.CaptureFixture[str]
@@ -104,7 +105,7 @@ def test_defaults_are_those_of_the_function() -> None:
     ours = {p.name: p.default for p in typer.main.get_command(app).commands["design"].params}  # type: ignore[attr-defined]
     ours |= {"scale": (0.8, 1.2), "wrap": (True, True)} if ours["scale"] == "0.8:1.2" and ours["wrap"] == "xy" else {}
     for name, parameter in inspect.signature(texrs.design).parameters.items():
-        if name not in ("exemplar", "progress"):
+        if name not in ("exemplar", "progress", "keep"):
             assert (None if ours[name] == "default" else ours[name]) == parameter.default, name
 
 
@@ -136,6 +137,39 @@ def test_several_examples_and_several_variants(here: Path, capsys: Capture) -> N
         assert main(["design", "in.png", "other.png", *TINY, "--weights", weights, "-o", "bad.png"]) == 2
         assert "weights" in capsys.readouterr().err.splitlines()[-1]
     assert not Path("bad.png").exists()
+
+
+@pytest.mark.parametrize(("error", "code"), [(Stopped(signal.SIGINT), 130), (MemoryError(), 2)], ids=["stop", "error"])
+def test_variants_that_are_made_stay_when_the_next_fails(
+    here: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException, code: int
+) -> None:
+    command = ["design", "in.png", "-q", *TINY, "--variants", "3", "--stages", "st", "--source", "s.npz"]
+    assert main([*command, "-o", "whole.png"]) == 0
+    before = files(here)
+    made = []
+
+    def one(*arguments: Any) -> Any:
+        if len(made) == 2:
+            raise error
+        made.append(make(*arguments))
+        return made[-1]
+
+    # What `design` makes one texture with; the module of its name is hidden behind the function.
+    module = sys.modules["texrs.papers.design"]
+    make = module.one
+    monkeypatch.setattr(module, "one", one)
+    command[-1], command[-3] = "t.npz", "tt"
+    assert main([*command, "-o", "out.png"]) == code
+    after = files(here)
+    expected = {"out": "whole", "t": "s", "tt": "st"}
+    for name, content in after.items():
+        if name not in before:
+            stem, dash, rest = name.partition("-")
+            assert content == before[f"{expected[stem]}{dash}{rest}"], name
+    assert {"out-0.png", "out-1.png", "t-1.npz", "tt-1/report.json"} <= set(after)
+    assert not {"out-2.png", "t-2.npz", "tt-2"} & set(after)
+    assert after["out.png"] == b"before"
+    assert not list(here.glob(".texrs*"))
 
 
 def test_labels_by_hand(here: Path, capsys: Capture) -> None:

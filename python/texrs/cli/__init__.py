@@ -169,9 +169,13 @@ def design_command(
     shape, cyclic = _files.parse_size(size), _files.parse_wrap(wrap)
     factors = _files.parse_range(scale, name="--scale")
     _files.check_outputs(out, source, stages)
-    for number in range(0 if variants is None else as_int(variants, "--variants", 1, 4096)):
-        own = _files.variant_names(seed + number, out=out, source=source, stages=stages)
-        _files.check_apart([*exemplar, labels or ""], **own)
+    where: list[dict[str, Any]] = [{"out": out, "source": source, "stages": stages}]
+    if variants is not None:
+        numbers = range(seed, seed + as_int(variants, "--variants", 1, 4096))
+        where = [_files.variant_names(number, **where[0]) for number in numbers]
+        for names in where:
+            _files.check_apart([*exemplar, labels or ""], **names)
+    places = iter(where)
     shares = _files.parse_shares(weights)
     pixels = [_files.read_exemplar(name) for name in exemplar]
     marked = None if labels is None else io.read(labels)
@@ -203,11 +207,11 @@ def design_command(
             blend=blend,
             method=as_method(method),
             progress=progress,
+            keep=lambda result: _files.deliver(result, **next(places)),
         )
-    if variants is None:
-        _files.deliver(made[0], out, source, stages)
-    else:
-        _files.deliver_variants(made, seed, out, source, stages)
+    if variants is not None:
+        with _files.output(out) as temporary:
+            io.write(temporary, _files.contact_sheet([result.image for result in made]))
     several = "" if variants is None else f"{variants} textures and their contact sheet, each "
     seconds = time.monotonic() - start
     note(f"wrote {out}: {several}{describe(made[0].image, 2)}, in {seconds:.1f} s", quiet=quiet)

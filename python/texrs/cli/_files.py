@@ -192,14 +192,6 @@ def deliver(result: Synthesis, out: str, source: str | None, stages: str | None)
             result.save_stages(stages)
 
 
-def deliver_variants(made: Sequence[Synthesis], seed: int, out: str, source: str | None, stages: str | None) -> None:
-    """Write several results, each under a name that ends in its seed, and a contact sheet of them."""
-    for number, result in enumerate(made):
-        deliver(result, **variant_names(seed + number, out=out, source=source, stages=stages))
-    with output(out) as temporary:
-        io.write(temporary, contact_sheet([result.image for result in made]))
-
-
 def variant_names(seed: int, **paths: str | None) -> dict[str, Any]:
     """Return the names of what is written of one of several results: each ends in its seed."""
     for option, path in paths.items():

@@ -101,6 +101,7 @@ def design(  # type: ignore[misc]  # the overloads leave the options to this sig
     blend: float | None = SCREENING,
     method: Method = None,
     progress: Progress | None = None,
+    keep: Callable[[Synthesis], object] | None = None,
 ) -> Synthesis | list[Synthesis]:
     """Design a large texture from one example.
 
@@ -152,6 +153,8 @@ def design(  # type: ignore[misc]  # the overloads leave the options to this sig
         ``mirror`` play no part, nor does the amount of ``blend``.
     progress : callable, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
+    keep : callable, optional
+        Called with each result as soon as it is made, so that what is made of several is not lost if the work stops.
 
     Returns
     -------
@@ -215,9 +218,11 @@ def design(  # type: ignore[misc]  # the overloads leave the options to this sig
         automatic = rotate is None
         sources.append(Source.of(guidance(picture), parts, moves, automatic=automatic, side=side, paper=paper))
         watch("segment", (number + 1) / len(pixels))
-    made = [
-        one(several, sources, shape, cyclic, shares, count, screening, (seed + k) % 2**64, watch) for k in range(total)
-    ]
+    made = []
+    for k in range(total):
+        made.append(one(several, sources, shape, cyclic, shares, count, screening, (seed + k) % 2**64, watch))
+        if keep is not None:
+            keep(made[-1])
     watch("done", 1.0)
     return made[0] if variants is None else made
 
