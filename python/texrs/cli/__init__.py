@@ -19,6 +19,8 @@ import typer
 
 from texrs import io, samples
 from texrs._arrays import as_float, as_int
+from texrs._threads import threads
+from texrs._version import __version__
 from texrs.blending import SCREENING
 from texrs.blending import blend as healed
 from texrs.cli import _elements, _files, _perspective, _pictures, _scales, _solid, _splice, _volumes
