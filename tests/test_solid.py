@@ -14,7 +14,7 @@ import texrs
 from texrs import fields, samples, volume
 from texrs._engine.pyramid import ONE
 from texrs.errors import Cancelled, FileError, InvalidInput, LimitExceeded
-from texrs.exemplar.analysis import Analysis, analyse, colours, repeats
+from texrs.exemplar.analysis import Analysis, analyse, are_labels, colours, repeats
 
 STRIPES = samples.stripes((32, 32, 32)).image
 PARTICLES = samples.particles((32, 32, 32))
@@ -91,6 +91,31 @@ def test_labels_are_classes_without_an_order():
     assert texrs.solid(marked, 20, labels=False, quality="fast").report["interpolation"] == "cubic"
     sparse = (marked * 40).astype(np.int32)
     assert set(np.unique(texrs.solid(sparse, 20, labels=True, quality="fast").image)) <= set(np.unique(sparse))
+
+
+@pytest.mark.parametrize("values", [(0, 255), (0, 128, 255), (False, True), (-7, 900), range(0, 160, 10)])
+def test_few_whole_numbers_are_labels_whatever_they_are(values):
+    """No value is invented between them, and what they are called does not count."""
+    kinds, named = len(values), np.array(values)
+    named = named.astype(
+        {"i": np.int16, "u": np.uint8, "b": bool}["u" if values[-1] in (150, 255) else named.dtype.kind]
+    )
+    turned = np.indices((32, 32, 32)).sum(axis=0) // 4 % kinds
+    made = texrs.solid(named[turned], 32, field=TURNING, quality="fast")
+    assert made.report["interpolation"] == "nearest"
+    assert set(np.unique(made.image)) <= set(values)
+    codes = colours(named[turned][..., None])
+    assert codes.shape[-1] == (1 if kinds == 2 else min(kinds, 4))
+    np.testing.assert_array_equal(codes, colours(turned.astype(np.uint16)[..., None], labels=True))
+    grown = texrs.synthesize(named[turned[5]], 40, quality="fast", field=fields.spiral(axes=2))
+    assert set(np.unique(grown.image)) <= set(values)
+
+
+def test_more_values_are_greys():
+    assert not are_labels(np.arange(17)[:, None, None])
+    assert are_labels(np.arange(16)[:, None, None])
+    assert not are_labels(np.zeros((20, 20, 1), np.uint8))
+    assert not are_labels(np.array([0.0, 1.0])[:, None, None])
 
 
 def test_every_map_in_register_follows(result):

@@ -58,7 +58,7 @@ Labels = Annotated[
     typer.Option(
         "--labels/--no-labels",
         help="Whether values are classes without an order.",
-        show_default="3 to 16 whole numbers of one channel are",
+        show_default="2 to 16 whole numbers of one channel are",
     ),
 ]
 Between = Annotated[str | None, typer.Option("--interpolation", help="cubic, linear or nearest.", show_default=False)]

@@ -129,8 +129,8 @@ def analyse(
     wrap : bool, or one an axis, optional
         Axes along which the exemplar repeats; None measures it (see `repeats`).
     labels : bool, optional
-        Whether values are classes without an order; None: where they are integers of one channel, 3 to 16 values
-        without a gap.
+        Whether values are classes without an order; None: where they are integers or bool, of one channel, with 2 to 16
+        values.
     radii : sequence of int
         Radius of the windows from the coarsest level on; the last one serves all that follow.
     coarsest : int
@@ -190,7 +190,9 @@ def colours(image: Array, labels: bool | None = None) -> Floats:
         values, index = np.unique(image[..., 0], return_inverse=True)
         if len(values) > 4096:
             raise InvalidInput(f"labels: up to 4096 classes are allowed, got {len(values)}")
-        if len(values) <= 4:
+        if len(values) == 2:
+            code = np.array([[0], [1]], np.float32)  # A second channel would say the same again.
+        elif len(values) <= 4:
             code = np.eye(len(values), dtype=np.float32)
         else:
             base = next(b for b in range(2, 9) if b**4 >= len(values))
@@ -213,15 +215,17 @@ def colours(image: Array, labels: bool | None = None) -> Floats:
 
 
 def are_labels(image: Array, labels: bool | None = None) -> bool:
-    """Return whether an exemplar's values are classes: as said, or integers of one channel, 3 to 16 without a gap."""
+    """Return whether an exemplar's values are classes: as said, or integers or bool of one channel, with 2 to 16 values.
+
+    Between so few values interpolation would invent others.
+    """
     if labels is not None:
         if labels and image.shape[-1] != 1:
             raise InvalidInput(f"labels: classes need one channel, got {image.shape[-1]}")
         return labels
     if image.dtype.kind not in "bui" or image.shape[-1] != 1:
         return False
-    values = np.unique(image)
-    return 3 <= len(values) <= 16 and int(values[-1]) - int(values[0]) == len(values) - 1
+    return 2 <= len(np.unique(image)) <= 16
 
 
 def repeats(exemplar: object, *, axes: int, levels: int = 1) -> tuple[bool, ...]:

@@ -106,7 +106,8 @@ def solid(
         "paper": the literal algorithm, kept for comparison. It has no ``quality`` and holds no points; it looks the exemplar
         up at the nearest sample unless ``interpolation`` says otherwise.
     labels : bool, optional
-        Whether values are classes without an order, looked up without interpolation; None asks the exemplar.
+        Whether values are classes without an order, looked up at the nearest sample whatever ``interpolation`` says. None:
+        where the exemplar has one channel of integers or bool, with 2 to 16 values, such as a mask of 0 and 255.
     repeat : bool, or one an axis, optional
         Axes along which the exemplar repeats; None measures it.
     held : (size) bool, optional
