@@ -6,6 +6,7 @@ from .blending import blend
 from .completion import complete
 from .database import TextureDatabase
 from .elements import Elements
+from .exemplar import Exemplar
 from .papers.design import design
 from .papers.perspective import perspective
 from .papers.solid import solid, synthesize
@@ -17,6 +18,7 @@ from .tiling import tile
 
 __all__ = [
     "Elements",
+    "Exemplar",
     "PlaneTexture",
     "Reuse",
     "SolidTexture",

@@ -1,7 +1,8 @@
 """What an exemplar is: its pixels, the channels that guide, features, labels, repeats, layers and scaled copies."""
 
+from texrs.exemplar._exemplar import Exemplar, as_exemplar
 from texrs.exemplar.analysis import Analysis, analyse, repeats
 from texrs.exemplar.regularity import Lattice
 from texrs.exemplar.segmentation import Segmentation, segment
 
-__all__ = ["Analysis", "Lattice", "Segmentation", "analyse", "repeats", "segment"]
+__all__ = ["Analysis", "Exemplar", "Lattice", "Segmentation", "analyse", "as_exemplar", "repeats", "segment"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import log2
 from pathlib import Path as FilePath
@@ -67,15 +67,35 @@ class Analysis:
         """Memory that the analysis takes, about."""
         return sum(int(np.prod(level.shape)) * 56 for level in self.levels)
 
+    def arrays(self) -> dict[str, Array]:
+        """Return the analysis as plain arrays, to be kept; `from_arrays` takes them back."""
+        return {f"{i}/{name}": value for i, level in enumerate(self.levels) for name, value in level.arrays().items()}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, Array], key: str) -> Analysis:
+        """Return the analysis whose arrays are among these.
+
+        Raises
+        ------
+        InvalidInput
+            Arrays that are missing or do not belong together.
+
+        """
+        # Single numbers come back from a file as arrays of one.
+        mine = {name: a.reshape(()) if a.size == 1 else a for name, a in arrays.items() if "/" in name}
+        count = len({name.split("/")[0] for name in mine})
+        if not count:
+            raise InvalidInput("analysis: has no levels")
+        parts = ({k.partition("/")[2]: v for k, v in mine.items() if k.startswith(f"{i}/")} for i in range(count))
+        return cls(tuple(Appearance.from_arrays(part) for part in parts), key)
+
     def save(self, path: Path) -> None:
         """Write the analysis to a .npz file; a former file is replaced only when all is written."""
         from texrs.io import atomic
 
-        arrays: dict[str, Array] = {"format": np.array(FORMAT), "key": np.frombuffer(bytes.fromhex(self.key), np.uint8)}
-        for i, level in enumerate(self.levels):
-            arrays |= {f"{i}/{name}": value for name, value in level.arrays().items()}
+        arrays = {"format": np.array(FORMAT), "key": np.frombuffer(bytes.fromhex(self.key), np.uint8)}
         with atomic(path) as temporary, FilePath(temporary).open("wb") as file:
-            np.savez(file, **arrays)  # type: ignore[arg-type]
+            np.savez(file, **arrays, **self.arrays())  # type: ignore[arg-type]
 
     @classmethod
     def load(cls, path: Path) -> Analysis:
@@ -89,19 +109,11 @@ class Analysis:
         """
         from texrs.io import read_arrays
 
-        # Single numbers come back as arrays of one.
-        arrays = {name: a.reshape(()) if a.size == 1 else a for name, a in read_arrays(path).items()}
+        arrays = read_arrays(path)
         try:
-            if int(arrays.get("format", -1)) != FORMAT:
+            if int(arrays.get("format", np.array(-1)).reshape(())) != FORMAT:
                 raise FileError(f"{path}: not an analysis of this version of texrs")
-            count = len({name.split("/")[0] for name in arrays if "/" in name})
-            levels = tuple(
-                Appearance.from_arrays({k.split("/")[1]: v for k, v in arrays.items() if k.startswith(f"{i}/")})
-                for i in range(count)
-            )
-            if not levels:
-                raise FileError(f"{path}: has no levels")
-            return cls(levels, arrays["key"].astype(np.uint8).tobytes().hex())
+            return cls.from_arrays(arrays, arrays["key"].astype(np.uint8).tobytes().hex())
         except FileError:
             raise
         except (InvalidInput, KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
@@ -167,16 +179,24 @@ def analyse(
 def _analyse(
     image: Array, axes: int, wrap: tuple[bool, ...] | None, labels: bool | None, radii: list[int], least: int, key: str
 ) -> Analysis:
-    count = max(1, int(log2(max(1, min(image.shape[:axes]) / least))) + 1)
-    pyramid = [colours(image, labels)]
-    closed = repeats(pyramid[0], axes=axes, levels=count) if wrap is None else wrap
+    count = levels_of(image.shape[:axes], least)
+    seen = colours(image, labels)
+    return analyse_colours(seen, repeats(seen, axes=axes, levels=count) if wrap is None else wrap, radii, count, key)
+
+
+def levels_of(shape: Sequence[int], coarsest: int) -> int:
+    """Return how many levels a pyramid has whose coarsest one has at least so many samples a side."""
+    return max(1, int(log2(max(1, min(shape) / coarsest))) + 1)
+
+
+def analyse_colours(seen: Floats, wrap: tuple[bool, ...], radii: Sequence[int], count: int, key: str) -> Analysis:
+    """Return the analysis of the colours that windows are compared by, at so many levels."""
+    pyramid, axes = [seen], len(wrap)
     for _ in range(count - 1):
-        pyramid.append(halve(pyramid[-1], closed, axes=axes))
+        pyramid.append(halve(pyramid[-1], wrap, axes=axes))
     pyramid.reverse()
-    levels = []
-    for i, level in enumerate(pyramid):
-        radius = radii[min(i, len(radii) - 1)]
-        levels.append(Appearance(level, axes=axes, wrap=closed, radius=radius))
+    radius = [radii[min(i, len(radii) - 1)] for i in range(count)]
+    levels = (Appearance(level, axes=axes, wrap=wrap, radius=r) for level, r in zip(pyramid, radius, strict=True))
     return Analysis(tuple(levels), key)
 
 

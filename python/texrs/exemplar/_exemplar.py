@@ -1,0 +1,345 @@
+"""The one place for what is known of an example: each fact is worked out when it is first asked for, and kept by content."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from functools import cached_property
+from pathlib import Path as FilePath
+from typing import Any, TypeVar, cast
+
+import numpy as np
+
+from texrs._arrays import as_image, as_int, as_wrap, guidance, to_unit
+from texrs._cache import Cache, content_hash
+from texrs._engine.coherence import Similarity, similar
+from texrs._typing import Array, Floats, Path
+from texrs.errors import FileError, InvalidInput
+from texrs.exemplar.analysis import COARSEST, Analysis, analyse_colours, are_labels, colours, levels_of, repeats
+
+__all__ = ["Exemplar", "as_exemplar"]
+
+T = TypeVar("T")
+
+FORMAT = 2
+CACHED = 256 << 20
+"""Bytes of facts that are kept by content; one that is larger is kept alone."""
+_SMALL = 1 << 12
+
+
+class Exemplar:
+    """An example, and what is known of it.
+
+    Every verb that grows from an example takes an array or an `Exemplar`. What a verb finds out about it, as its pyramid of
+    windows, is worked out once: it stays with the exemplar, and is kept for a while for any array of the same content.
+
+    Parameters
+    ----------
+    image : (H, W), (H, W, C), (D, H, W) or (D, H, W, C) array
+        The pixels: integers of 8, 16 or 32 bit, floats of 16, 32 or 64 bit, or bool. They are copied.
+    axes : int
+        2 for a picture, 3 for a volume.
+    labels : bool, optional
+        Whether the values are classes without an order, which are looked up without interpolation. None: where they are
+        integers of one channel, 3 to 16 values without a gap.
+    repeat : bool, or one an axis, optional
+        Axes along which the example repeats; None measures it.
+
+    Raises
+    ------
+    InvalidInput
+        Not an image or not a volume, values that are not finite, labels of several channels, or a wrong option.
+
+    See Also
+    --------
+    remember : How a further fact is added.
+
+    Examples
+    --------
+    >>> import texrs
+    >>> weave = texrs.Exemplar(texrs.samples.weave((64, 64)).image)
+    >>> weave, weave.labels
+    (<Exemplar of 64 x 64, 3 channels of uint8>, False)
+
+    """
+
+    def __init__(
+        self,
+        image: Array,
+        *,
+        axes: int = 2,
+        labels: bool | None = None,
+        repeat: bool | Sequence[bool] | None = None,
+    ) -> None:
+        self._axes = as_int(axes, "axes", 2, 3)
+        checked = as_image(image, "image", axes=self._axes)
+        if labels is not None:
+            are_labels(checked, labels)
+        self._labels = labels
+        self._repeat = None if repeat is None else as_wrap(repeat, "repeat", axes=self._axes)
+        # A copy: facts that are kept by content must not come to be of another one.
+        self._pixels = checked.copy()
+        self._pixels.flags.writeable = False
+        self._image = self._pixels if np.ndim(image) > self._axes else self._pixels[..., 0]
+        self._facts: dict[Hashable, object] = {}
+
+    def __repr__(self) -> str:
+        """Return the size, the channels and the dtype."""
+        count = self._pixels.shape[-1]
+        channels = f"{count} channel{'s' * (count > 1)} of {self._pixels.dtype}"
+        return f"<Exemplar of {' x '.join(map(str, self.shape))}, {channels}>"
+
+    # --- pixels ------------------------------------------------------------------------------------------------------
+
+    @property
+    def image(self) -> Array:
+        """The array as it was given, read-only."""
+        return self._image
+
+    @property
+    def pixels(self) -> Array:
+        """The same with its channels last, (..., C), read-only."""
+        return self._pixels
+
+    @property
+    def axes(self) -> int:
+        """2 for a picture, 3 for a volume."""
+        return self._axes
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Samples along each axis, without the channels."""
+        return self._pixels.shape[: self._axes]
+
+    @cached_property
+    def unit(self) -> Floats:
+        """The pixels in [0, 1], (..., C) float32: integers by the range of their dtype, floats beyond it by their own."""
+        return to_unit(self._pixels)
+
+    @cached_property
+    def guidance(self) -> Floats:
+        """The channels that decisions are made on: up to three in [0, 1], transparency over mid grey."""
+        return guidance(self._pixels)
+
+    @cached_property
+    def colours(self) -> Floats:
+        """The up to four channels in [0, 1] that windows are compared by; classes are corners of a cube."""
+        return colours(self._pixels, self._labels)
+
+    # --- what is measured --------------------------------------------------------------------------------------------
+
+    @cached_property
+    def labels(self) -> bool:
+        """Whether the values are classes without an order."""
+        return are_labels(self._pixels, self._labels)
+
+    @cached_property
+    def repeat(self) -> tuple[bool, ...]:
+        """Axes along which the example repeats: as given, or measured at each level of its pyramid."""
+        return self._repeats(levels_of(self.shape, COARSEST))
+
+    def analyse(self, radii: Sequence[int] = (2,), coarsest: int = COARSEST) -> Analysis:
+        """Return the pyramid, with the appearance vector of each sample's window at each level.
+
+        Parameters
+        ----------
+        radii : sequence of int
+            Radius of the windows, 1 to 8, from the coarsest level on; the last one serves all that follow.
+        coarsest : int
+            Least side of the coarsest level.
+
+        Returns
+        -------
+        Analysis
+
+        Raises
+        ------
+        InvalidInput
+            A side below 16, or windows that do not fit.
+
+        Examples
+        --------
+        >>> import texrs
+        >>> found = texrs.Exemplar(texrs.samples.stripes((32, 32, 48)).image, axes=3).analyse()
+        >>> [level.shape for level in found.levels], found.wrap
+        ([(16, 16, 24), (32, 32, 48)], (False, False, False))
+
+        """
+        _check_sides(self.shape, "exemplar", COARSEST)
+        near = tuple(as_int(r, "radii", 1, 8) for r in radii)
+        least = as_int(coarsest, "coarsest", 2 * max(near) + 2, 1 << 16)
+        count = levels_of(self.shape, least)
+        fact = ("analysis", near, least)
+        return self.remember(
+            fact, lambda: analyse_colours(self.colours, self._repeats(count), near, count, f"{self.key}{fact}")
+        )
+
+    def similarity(
+        self,
+        level: int,
+        *,
+        coarsest: int = COARSEST,
+        k: int = 3,
+        n: int = 7,
+        numbers: int = 8,
+        progress: Callable[[float], object] | None = None,
+    ) -> Similarity:
+        """Return what each sample of a level may be replaced by: the samples that look most like it.
+
+        Parameters
+        ----------
+        level : int
+            Of the analysis with windows of radius 2; 0 is the coarsest, -1 the finest.
+        coarsest : int
+            Of that analysis.
+        k : int
+            Samples of a set, 1 to 16.
+        n : int
+            Side of the box around each chosen sample from which no other is chosen; odd.
+        numbers : {8, 24}
+            How many of the leading numbers of the appearance vectors are compared.
+        progress : callable, optional
+            Called with the share that is done.
+
+        Returns
+        -------
+        Similarity
+
+        Raises
+        ------
+        InvalidInput
+            A level that is not there, or no ``k`` samples so far apart.
+        Cancelled
+            The work was stopped.
+
+        Examples
+        --------
+        >>> import texrs
+        >>> texrs.Exemplar(texrs.samples.weave((64, 64)).image).similarity(-1, k=2).sets.shape
+        (4096, 2)
+
+        """
+        levels = self.analyse(coarsest=coarsest).levels
+        number = as_int(level, "level", -len(levels), len(levels) - 1) % len(levels)
+        return self.remember(
+            ("similarity", coarsest, number, k, n, numbers),
+            lambda: similar(levels[number], k=k, n=n, numbers=numbers, progress=progress),
+        )
+
+    # --- what is kept ------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def key(self) -> str:
+        """Digest of the pixels and of what was said of them: the same key, the same facts."""
+        return content_hash(self._pixels, self._axes, self._labels, self._repeat).hex()
+
+    def remember(self, fact: Hashable, make: Callable[[], T]) -> T:
+        """Return a fact about the exemplar, worked out when it is first asked for.
+
+        It stays with the exemplar, and is kept for any other of the same content as long as there is room. To add a fact,
+        write a method that returns ``self.remember((name, *options), make)``: whatever the fact depends on, but for the
+        pixels and what the exemplar was made with, must be among the options. A fact is never changed.
+
+        Parameters
+        ----------
+        fact : hashable
+            A name and all options that it depends on.
+        make : callable
+            Works the fact out. A result with ``nbytes`` is counted by them.
+        """
+        if fact not in self._facts:
+            self._facts[fact] = _FACTS.get_or_make((self.key, fact), make)
+        return cast(T, self._facts[fact])
+
+    def save(self, path: Path) -> None:
+        """Write the exemplar and its analysis to a .npz file; a former file is replaced only when all is written.
+
+        Raises
+        ------
+        FileError
+            It cannot be written.
+
+        """
+        from texrs.io import atomic
+
+        said = [self._axes, *(-1 if s is None else int(s) for s in (self._labels, *(self._repeat or (None,))))]
+        arrays: dict[str, Any] = {"format": np.array(FORMAT), "image": self._image, "said": np.array(said, np.int8)}
+        with atomic(path) as temporary, FilePath(temporary).open("wb") as file:
+            np.savez(file, **arrays, **self.analyse().arrays())  # type: ignore[arg-type]
+
+    @classmethod
+    def load(cls, path: Path) -> Exemplar:
+        """Return the exemplar that `save` wrote, with its analysis.
+
+        Raises
+        ------
+        FileError
+            The file cannot be read, is of another version, or is damaged.
+
+        """
+        from texrs.io import read_arrays
+
+        arrays = read_arrays(path)
+        try:
+            if int(arrays.get("format", np.array(-1)).reshape(())) != FORMAT:
+                raise FileError(f"{path}: not an exemplar of this version of texrs")
+            axes, labels, *repeat = (int(s) for s in arrays["said"])
+            made = cls(
+                arrays["image"],
+                axes=axes,
+                labels=None if labels < 0 else bool(labels),
+                repeat=None if repeat == [-1] else [bool(r) for r in repeat],
+            )
+            fact = ("analysis", (2,), COARSEST)
+            analysis = Analysis.from_arrays(arrays, f"{made.key}{fact}")
+            if analysis.shape != made.shape:
+                raise InvalidInput(f"the analysis is of {analysis.shape}, the image of {made.shape}")
+        except FileError:
+            raise
+        except (InvalidInput, KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
+            raise FileError(f"{path}: is damaged ({error})") from None
+        made._facts[fact] = analysis
+        return made
+
+    def _repeats(self, levels: int) -> tuple[bool, ...]:
+        return repeats(self.colours, axes=self._axes, levels=levels) if self._repeat is None else self._repeat
+
+
+def as_exemplar(value: object, name: str = "exemplar", *, axes: int = 2, minimum: int = 1) -> Exemplar:
+    """Return an exemplar as it is, or that of an array: what every verb does with its first argument.
+
+    Parameters
+    ----------
+    value : Exemplar or array_like
+        What the user gave.
+    name : str
+        The argument's name, for messages.
+    axes : int
+        2 or 3, as the verb needs.
+    minimum : int
+        The least length of an axis.
+
+    Raises
+    ------
+    InvalidInput
+        An exemplar of other axes, not an array, or too small.
+
+    """
+    if isinstance(value, Exemplar):
+        if value.axes != axes:
+            raise InvalidInput(f"{name}: needs an Exemplar with axes={axes}, got one with axes={value.axes}")
+        _check_sides(value.shape, name, minimum)
+        return value
+    as_image(value, name, axes=axes, minimum=minimum)
+    return Exemplar(cast(Array, value), axes=axes)
+
+
+def _check_sides(shape: tuple[int, ...], name: str, minimum: int) -> None:
+    if min(shape) < minimum:
+        raise InvalidInput(f"{name}: each side must be at least {minimum}, got shape {shape}")
+
+
+def _size(fact: object) -> int:
+    return min(int(getattr(fact, "nbytes", _SMALL)), CACHED)
+
+
+_FACTS: Cache[tuple[str, Hashable], Any] = Cache(CACHED, _size)
