@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from reference import ncc as twin
-from texrs import _threads as threads
+from texrs import threads
 from texrs.errors import InvalidInput
 from texrs.kernels.ncc import Correlation
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from reference import nearest as twin
-from texrs import _threads as threads
+from texrs import threads
 from texrs import samples
 from texrs.errors import Cancelled, InvalidInput
 from texrs.kernels.nearest import Nearest

@@ -80,7 +80,7 @@ def test_the_same_for_any_number_of_threads():
     [
         (lambda: PatchIndex([]), "images: needs at least one"),
         (lambda: PatchIndex([np.zeros((9, 9)), np.zeros((9, 9, 3))]), "agree in channels"),
-        (lambda: PatchIndex(np.full((9, 9), 1e300)), "values up to"),
+        (lambda: PatchIndex(np.full((9, 9), 1e300)), "infinite as float32"),
         (
             lambda: PatchIndex(np.zeros((9, 9)), allowed=np.ones((3, 3), bool)),
             "allowed: needs shape",

@@ -313,8 +313,8 @@ def test_no_overlap_and_no_b_only_pixel():
         ({"penalty": np.full((4, 4), -1.0)}, "penalty: -1"),
         ({"penalty": np.full((4, 4), np.nan)}, "penalty: NaN"),
         ({"penalty": np.full((4, 4), 3e38)}, "penalty: too large"),
-        ({"penalty": "much"}, "penalty: not an array"),
-        ({"cost": "l2"}, "cost: needs"),
+        ({"penalty": "much"}, "penalty: needs real numbers"),
+        ({"cost": "l2"}, "cost: allowed are gradient and paper"),
         ({"wrap": "yes"}, "wrap: needs"),
         ({"old": seam.OldSeams([], [], [])}, r"old\.kept: needs 2 arrays"),
         ({"old": seam.OldSeams(*[[np.full((4, 4), -1.0)] * 2] * 3)}, "old: -1"),
@@ -356,8 +356,8 @@ def test_many_strips_are_cut_as_each_by_itself():
 @pytest.mark.parametrize(
     ("strip", "message"),
     [
-        (seam.Strip(np.zeros((4, 4)), np.zeros((4, 4)), 1), "strips: need two images"),
-        (seam.Strip(np.zeros((4, 4, 1)), np.zeros((4, 3, 1)), 1), "strips: need two images"),
+        (seam.Strip(np.zeros((4, 4)), np.zeros((4, 4)), 1), "strips: a: needs shape"),
+        (seam.Strip(np.zeros((4, 4, 1)), np.zeros((4, 3, 1)), 1), "strips: b: needs shape"),
         (seam.Strip(np.zeros((4, 4, 1)), np.full((4, 4, 1), np.nan), 1), "not finite"),
         (seam.Strip(np.zeros((4, 4, 1)), np.zeros((4, 4, 1)), 2), "axis: needs an integer from 0 to 1"),
         (seam.Strip(np.zeros((4, 4, 1)), np.zeros((4, 4, 1)), 0, np.ones((3, 4))), "penalty: needs shape"),
@@ -377,7 +377,7 @@ def test_bad_input_to_strips(strip, message):
         (np.zeros((3, 3, 2)), [np.zeros((2, 3)), 1.0], "pairwise: needs shape"),
         (np.full((3, 3, 2), np.inf), 1.0, "unary: "),
         (np.full((3, 3, 2), np.nan), 1.0, "unary: "),
-        ("none", 1.0, "unary: not an array"),
+        ("none", 1.0, "unary: needs real numbers"),
     ],
 )
 def test_bad_input_to_labels(unary, pairwise, message):

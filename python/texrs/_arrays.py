@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import numbers
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput, LimitExceeded
@@ -43,13 +46,12 @@ def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int 
     ------
     InvalidInput
         Not numbers, not finite, too small, or with the wrong number of axes.
+    LimitExceeded
+        A copy is needed, and would take more bytes than the machine has.
 
     """
-    try:
-        array = np.asarray(value)
-    except (ValueError, TypeError) as error:
-        raise InvalidInput(f"{name}: not an array of numbers ({error})") from None
-    if array.dtype == object or array.dtype.kind not in "buif":
+    array = _as_ndarray(value, name)
+    if array.dtype.kind not in "buif":
         raise InvalidInput(f"{name}: needs numbers (8, 16 or 32 bit integers, floats or bool), got dtype {array.dtype}")
     if array.dtype.kind in "ui" and array.dtype.itemsize == 8:
         raise InvalidInput(f"{name}: 64-bit integers are not image data; convert {array.dtype} to a smaller dtype")
@@ -70,10 +72,96 @@ def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int 
         )
     if array.size == 0 or min(array.shape[:axes]) < minimum:
         raise InvalidInput(f"{name}: each side must be at least {max(minimum, 1)}, got shape {array.shape[:axes]}")
-    if array.dtype.kind == "f" and not np.isfinite(array).all():
-        bad = int(array.size - np.count_nonzero(np.isfinite(array)))
-        raise InvalidInput(f"{name}: {bad} of {array.size} values are NaN or infinite; all must be finite")
-    return np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("="))
+    array = _contiguous(array, name, array.dtype.newbyteorder("="))
+    check_finite(array, name)
+    return array
+
+
+def as_array(value: object, name: str, dtype: DTypeLike, shape: Sequence[int | str] | None = None) -> Array:
+    """Check the numbers that a compiled function takes, and return them as it takes them.
+
+    Parameters
+    ----------
+    value : array_like
+        Bool, integers or floats; for an integer dtype bool or integers within its range, and for bool the same, of which
+        zero means False.
+    name : str
+        The argument's name, for messages.
+    dtype : dtype
+        Of the result.
+    shape : sequence of int or str, optional
+        The length of each axis; a word stands for any length of at least 1, and names it in messages. By default any.
+
+    Returns
+    -------
+    ndarray
+        C-contiguous, aligned, in native byte order. The very array where it is so already. Floats beyond the range of
+        ``dtype`` become infinite.
+
+    Raises
+    ------
+    InvalidInput
+        Not numbers, of another kind, out of range, or of another shape.
+    LimitExceeded
+        A copy is needed, and would take more bytes than the machine has.
+
+    Examples
+    --------
+    >>> as_array([[1, 2]], "flow", np.float32, ("rows", "columns"))
+    array([[1., 2.]], dtype=float32)
+    >>> as_array([[1, 2]], "flow", np.float32, ("rows", "columns", 3))
+    Traceback (most recent call last):
+        ...
+    texrs.errors.InvalidInput: flow: needs shape (rows, columns, 3), got (1, 2)
+
+    """
+    array, wanted = _as_ndarray(value, name), np.dtype(dtype)
+    if array.dtype.kind not in ("buif" if wanted.kind == "f" else "bui"):
+        allowed = "real numbers" if wanted.kind == "f" else "bool or integers"
+        raise InvalidInput(f"{name}: needs {allowed}, got dtype {array.dtype}")
+    if shape is not None and not _fits(array.shape, shape):
+        sides = ", ".join(map(str, shape)) + "," * (len(shape) == 1)
+        raise InvalidInput(f"{name}: needs shape ({sides}), got {array.shape}")
+    if wanted.kind in "ui" and array.size and not np.can_cast(array.dtype, wanted):
+        info, low, high = np.iinfo(wanted), int(array.min()), int(array.max())
+        if low < info.min or high > info.max:
+            raise InvalidInput(f"{name}: allowed are {info.min} to {info.max}, got {low} to {high}")
+    return _contiguous(array, name, wanted)
+
+
+def _fits(sides: tuple[int, ...], shape: Sequence[int | str]) -> bool:
+    return len(sides) == len(shape) and all(
+        side > 0 if isinstance(wanted, str) else side == wanted for side, wanted in zip(sides, shape, strict=True)
+    )
+
+
+def _as_ndarray(value: object, name: str) -> Array:
+    try:
+        return np.asarray(value)
+    except (ValueError, TypeError) as error:
+        raise InvalidInput(f"{name}: not an array of numbers ({error})") from None
+
+
+def _contiguous(array: Array, name: str, dtype: np.dtype[Any]) -> Array:
+    """Return the values in a dtype, in order and aligned; a view of less memory than it has values may be of any size."""
+    if array.dtype != dtype or not (array.flags.c_contiguous and array.flags.aligned):
+        check_memory(array.size * dtype.itemsize, name)
+    with np.errstate(over="ignore"):
+        return np.require(array, dtype, ("C", "A"))
+
+
+def check_finite(array: Array, name: str) -> None:
+    """Refuse floats that are NaN or infinite.
+
+    Raises
+    ------
+    InvalidInput
+        Some are.
+
+    """
+    if array.dtype.kind == "f" and not (finite := np.isfinite(array)).all():
+        bad = int(array.size - np.count_nonzero(finite))
+        raise InvalidInput(f"{name}: {bad} of {array.size} values are NaN or infinite as {array.dtype}; all must be finite")
 
 
 def as_kernel(array: Array) -> Array:
@@ -131,11 +219,9 @@ def as_size(
     order = ("(rows, columns)", "(planes, rows, columns)")[axes - 2]
     if isinstance(value, numbers.Integral):
         sides: tuple[Any, ...] = (value,) * axes
-    elif isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
-        sides = tuple(value)
     else:
-        raise InvalidInput(f"{name}: needs {order} as integers, got {value!r}")
-    if len(sides) != axes or not all(isinstance(s, numbers.Integral) and not isinstance(s, bool) for s in sides):
+        sides = as_tuple(value, name, axes, f"{order} as integers")
+    if not all(isinstance(s, numbers.Integral) and not isinstance(s, bool) for s in sides):
         raise InvalidInput(f"{name}: needs {order} as integers, got {value!r}")
     result = tuple(int(s) for s in sides)
     if min(result) < minimum:
@@ -165,18 +251,55 @@ def check_memory(needed: int, name: str = "size") -> None:
         raise LimitExceeded(f"{name}: needs {needed / 1e9:.1f} GB of memory, this machine has {there / 1e9:.1f} GB")
 
 
+def as_tuple(value: object, name: str, length: int, what: str) -> tuple[Any, ...]:
+    """Check a sequence of so many entries; its length is looked at first, for it may be anything."""
+    if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
+        try:
+            if len(value) == length:
+                return tuple(value)
+        except (TypeError, OverflowError):  # An array without axes, a range beyond what fits in memory.
+            pass
+    raise InvalidInput(f"{name}: needs {what}, got {value!r}")
+
+
+def as_items(value: object, name: str) -> Iterator[Any]:
+    """Check something to go through; its items are not looked at before they are asked for."""
+    if isinstance(value, Iterable) and not isinstance(value, str | bytes):
+        with suppress(TypeError):  # An array without axes.
+            return iter(value)
+    raise InvalidInput(f"{name}: needs a sequence, got {value!r}")
+
+
 def as_wrap(value: object, name: str = "wrap", *, axes: int = 2) -> tuple[bool, ...]:
     """Check a choice of cyclic axes: one bool for all, or one an axis."""
     if isinstance(value, bool | np.bool_):
         return (bool(value),) * axes
-    if (
-        isinstance(value, Sequence)
-        and not isinstance(value, str)
-        and len(value) == axes
-        and all(isinstance(v, bool | np.bool_) for v in value)
-    ):
-        return tuple(bool(v) for v in value)
-    raise InvalidInput(f"{name}: needs True, False or {axes} of them, one an axis; got {value!r}")
+    what = f"True, False or {axes} of them, one an axis"
+    sides = as_tuple(value, name, axes, what)
+    if not all(isinstance(side, bool | np.bool_) for side in sides):
+        raise InvalidInput(f"{name}: needs {what}; got {value!r}")
+    return tuple(map(bool, sides))
+
+
+def as_bool(value: object, name: str) -> bool:
+    """Check a choice of two."""
+    if not isinstance(value, bool | np.bool_):
+        raise InvalidInput(f"{name}: needs True or False, got {value!r}")
+    return bool(value)
+
+
+def as_choice(value: object, name: str, allowed: Sequence[str]) -> str:
+    """Check a choice by name."""
+    if not isinstance(value, str) or value not in allowed:
+        raise InvalidInput(f"{name}: allowed are {', '.join(allowed[:-1])} and {allowed[-1]}; got {value!r}")
+    return value
+
+
+def as_progress(value: object, name: str = "progress") -> Callable[..., object] | None:
+    """Check what is called while work goes on."""
+    if value is not None and not callable(value):
+        raise InvalidInput(f"{name}: needs a function to call, or None; got {value!r}")
+    return value
 
 
 def as_int(value: object, name: str, low: int, high: int) -> int:
@@ -188,9 +311,13 @@ def as_int(value: object, name: str, low: int, high: int) -> int:
 
 def as_float(value: object, name: str, low: float, high: float) -> float:
     """Check a number in [low, high]."""
-    if isinstance(value, bool) or not isinstance(value, numbers.Real) or not low <= float(value) <= high:
+    number = math.nan
+    if not isinstance(value, bool) and isinstance(value, numbers.Real):
+        with suppress(OverflowError):
+            number = float(value)
+    if not low <= number <= high:
         raise InvalidInput(f"{name}: needs a number from {low} to {high}, got {value!r}")
-    return float(value)
+    return number
 
 
 def as_seed(value: object, name: str = "seed") -> int:
@@ -198,11 +325,6 @@ def as_seed(value: object, name: str = "seed") -> int:
     return as_int(value, name, 0, 2**64 - 1)
 
 
-def as_mask(value: object, name: str, shape: tuple[int, ...]) -> Bools:
-    """Check a mask: bool, or integers of which zero means False, of the given shape."""
-    array = np.asarray(value)
-    if array.dtype.kind not in "bui":
-        raise InvalidInput(f"{name}: needs bool or integers, got dtype {array.dtype}")
-    if array.shape != shape:
-        raise InvalidInput(f"{name}: needs shape {shape}, got {array.shape}")
-    return np.ascontiguousarray(array != 0)
+def as_mask(value: object, name: str, shape: Sequence[int | str]) -> Bools:
+    """Check a mask, bool or integers of which zero means False, and return a copy (see `as_array`)."""
+    return np.array(as_array(value, name, np.bool_, shape))

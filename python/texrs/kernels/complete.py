@@ -1,4 +1,4 @@
-"""Fill holes with patches of exemplars: best match, cut into what is known."""
+"""Fill holes with patches of exemplars: the best match, joined to the known pixels by a minimum cut."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs import _rust
-from texrs._arrays import as_float, as_int, as_mask, as_seed, as_wrap
+from texrs._arrays import as_array, as_bool, as_float, as_int, as_mask, as_progress, as_seed, as_size, as_wrap
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.kernels.patch_search import PatchIndex
@@ -56,29 +56,34 @@ def complete(
     shown: int | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Completion:
-    """Fill the unknown pixels of a picture from the rim of the holes inwards, patch by patch.
+    """Fill the unknown pixels of a picture from the hole boundary inwards, patch by patch.
 
-    For each hole: good matches of what is known around it [1]_, less those that would repeat or mirror what lies near;
-    the three most promising are cut into the known part by a minimum cut [2]_, and the cheapest is pasted.
+    At each step: good matches of the known pixels in a window on the boundary [1]_, less those that would repeat or
+    mirror what lies near; the three most promising are joined to the known pixels by a minimum cut [2]_, and the cheapest
+    is pasted.
 
     Parameters
     ----------
-    colours : (H, W, C) array of float
-        The picture; anything finite where it is unknown.
-    known : (H, W) bool
+    colours : (H, W, C) array_like
+        The picture, of any real dtype, as float32 in the units of the exemplars; anything where it is unknown.
+    known : (H, W) array_like of bool
         False at the holes.
     index : PatchIndex
         The exemplars that patches are taken from, of C channels.
     patch : int or (rows, columns)
-        Size of a patch, at most that of the picture and of an exemplar.
-    keep : (H, W) bool, optional
-        Known pixels that no patch may be cut into; by default seams may run through all of them.
-    count, separation, ratio
-        How many matches are considered; how far apart they are, in pixels; how much worse than the best they may be.
+        Size of a patch in pixels, 1 to that of the picture, of an exemplar and of ``index.max_patch``.
+    keep : (H, W) array_like of bool, optional
+        Known pixels that no patch may replace; by default seams may run through all of them.
+    count : int
+        How many matches are considered, 1 to 1000.
+    separation : int
+        Matches in one exemplar are more than this many pixels apart, 0 to 2^31.
+    ratio : float
+        No match considered costs more than this times the best, 1 to 1e9.
     wrap : bool or (rows, columns)
         Axes along which the picture is cyclic.
     seed : int
-        Chooses patches where nothing is known.
+        0 to 2^64 - 1; chooses patches where nothing is known.
     paper : bool
         As Shen, Jin, Mao and Feng (2006) print it: holes in scan order, windows centred on them instead of those with
         the best share of known pixels, all known pixels of one weight instead of more beside the hole, the exact best
@@ -87,7 +92,7 @@ def complete(
         The image of ``index`` that the picture shows in place, if it does: what lies beside a hole is then not repeated
         or mirrored in it. Patches know of each other in any case, and which images of ``index`` are mirrors of others.
     progress : callable, optional
-        Called with the share of the holes that is filled; raising stops the work.
+        Called with the share of the holes that is filled, 0 to 1; raising stops the work.
 
     Returns
     -------
@@ -97,7 +102,9 @@ def complete(
     Raises
     ------
     InvalidInput
-        Shapes that do not agree, a patch that does not fit, or values that are not finite.
+        Shapes that do not agree, a patch that does not fit, values that are not finite or out of range.
+    Cancelled
+        The work was stopped.
 
     References
     ----------
@@ -117,16 +124,14 @@ def complete(
     True
 
     """
-    picture = np.ascontiguousarray(colours, np.float32)
-    if picture.ndim != 3:
-        raise InvalidInput(f"colours: needs shape (rows, columns, channels), got {picture.shape}")
+    if not isinstance(index, PatchIndex):
+        raise InvalidInput(f"index: needs a PatchIndex, got {type(index).__name__}")
+    picture = as_array(colours, "colours", np.float32, ("rows", "columns", "channels"))
     mask = as_mask(known, "known", picture.shape[:2])
     picture = np.where(mask[..., np.newaxis], picture, np.float32(0))
     if not np.isfinite(picture).all():
         raise InvalidInput("colours: known pixels must be finite")
-    sides = (patch, patch) if isinstance(patch, int | np.integer) else tuple(patch)
-    if len(sides) != 2:
-        raise InvalidInput(f"patch: needs a side or (rows, columns), got {patch!r}")
+    sides = as_size(patch, "patch")
     rows, columns = (as_int(s, "patch", 1, n) for s, n in zip(sides, picture.shape[:2], strict=True))
     pick = (
         as_int(count, "count", 1, 1000),
@@ -142,9 +147,9 @@ def complete(
         (rows, columns),
         pick,
         as_seed(seed),
-        bool(paper),
+        as_bool(paper, "paper"),
         None if shown is None else as_int(shown, "shown", 0, len(index.shapes) - 1),
-        progress,
+        as_progress(progress),
     )
     coordinates = np.zeros((*mask.shape, 2), np.float32)
     new = np.nonzero(label >= 0)

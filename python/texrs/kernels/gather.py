@@ -1,4 +1,4 @@
-"""Look exemplars of any dtype and any number of channels up through coordinates."""
+"""Sample exemplars of any dtype and any number of channels at coordinates."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from texrs import _rust
-from texrs._arrays import as_image, as_kernel, as_wrap
+from texrs._arrays import as_array, as_choice, as_image, as_kernel, as_wrap
 from texrs._typing import Array, Interpolation
 from texrs.errors import InvalidInput
 
@@ -29,12 +29,13 @@ def gather(
 
     Parameters
     ----------
-    exemplars : (h, w[, C]) or (d, h, w[, C]) array, or a sequence of them
-        Any real dtype; several must agree in dtype and channels, not in size.
-    coordinates : (..., 2) or (..., 3) array of float
-        (row, column) or (plane, row, column), in samples; sample centres are at the integers.
-    which : (...) array of int, optional
-        The exemplar of each pixel, when there are several.
+    exemplars : (h, w[, C]) or (d, h, w[, C]) array_like, or a list or tuple of them
+        Bool, integers of 8, 16 or 32 bit, floats of 16, 32 or 64 bit, finite; several must agree in dtype and channels,
+        not in size.
+    coordinates : (..., 2) or (..., 3) array_like
+        (row, column) or (plane, row, column), in samples, as float32; sample centres are at the integers. Finite.
+    which : (...) array_like of int, optional
+        The exemplar of each pixel, counted from 0; by default the first for all.
     interpolation : {"nearest", "linear", "cubic"}
         How values between samples are made. Integers are rounded to the nearest.
     wrap : bool or one an axis
@@ -42,7 +43,7 @@ def gather(
 
     Returns
     -------
-    (..., [C]) array
+    (..., [C]) ndarray
         In the dtype of the exemplars; with channels if they have a channel axis.
 
     Raises
@@ -62,12 +63,10 @@ def gather(
     array([50, 55], dtype=uint8)
 
     """
-    points = np.asarray(coordinates)
+    points = as_array(coordinates, "coordinates", np.float32)
     axes = points.shape[-1] if points.ndim else 0
-    if axes not in (2, 3) or points.dtype.kind not in "iuf":
-        raise InvalidInput(
-            f"coordinates: needs numbers of shape (..., 2) or (..., 3), got {points.dtype} {points.shape}"
-        )
+    if axes not in (2, 3):
+        raise InvalidInput(f"coordinates: needs shape (..., 2) or (..., 3), got {points.shape}")
     several = exemplars if isinstance(exemplars, list | tuple) else [exemplars]
     if not several:
         raise InvalidInput("exemplars: at least one is needed, got none")
@@ -79,17 +78,15 @@ def gather(
     if which is None:
         index = np.zeros(0, np.uint16)
     else:
-        index = np.asarray(which)
-        if index.shape != shape or index.dtype.kind not in "iu":
-            raise InvalidInput(f"which: needs integers of shape {shape}, got {index.dtype} {index.shape}")
-        if index.size and (index.min() < 0 or index.max() >= len(images)):
+        index = as_array(which, "which", np.uint16, shape)
+        if index.size and index.max() >= len(images):
             raise InvalidInput(f"which: allowed are 0 to {len(images) - 1}, got {index.min()} to {index.max()}")
     out = _rust.gather(
         [as_kernel(e) for e in images],
         as_wrap(wrap, axes=axes),
-        np.ascontiguousarray(index, np.uint16).reshape(-1),
-        np.ascontiguousarray(points, np.float32).reshape(-1, axes),
-        interpolation,
+        index.reshape(-1),
+        points.reshape(-1, axes),
+        as_choice(interpolation, "interpolation", ("nearest", "linear", "cubic")),
     )
     dtype = images[0].dtype
     if dtype == np.bool_:

@@ -1,13 +1,12 @@
-"""Mean-shift filtering: textures flattened, edges between regions kept."""
+"""Mean-shift filtering, which flattens textures and keeps the edges between regions."""
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 import numpy as np
 
 from texrs import _rust
-from texrs._arrays import as_float, as_image, as_int, as_wrap
+from texrs._arrays import as_float, as_image, as_int, as_progress, as_wrap
+from texrs._progress import stage
 from texrs._typing import Array, Progress
 from texrs.errors import InvalidInput
 
@@ -26,7 +25,7 @@ def mean_shift(
     wrap: bool | tuple[bool, bool] = False,
     progress: Progress | None = None,
 ) -> Array:
-    """Return every pixel the colour of the mode of its joint spatial and range density.
+    """Return an image of the modes of the joint spatial and range density, one a pixel.
 
     Each pixel moves to the mean position and colour of the pixels of a square window whose colour
     is within a range of its own, until it stays (Comaniciu and Meer [1]_, flat kernels). The
@@ -35,18 +34,18 @@ def mean_shift(
 
     Parameters
     ----------
-    image : array_like
-        Shape (H, W) or (H, W, C). Any real dtype.
+    image : (H, W) or (H, W, C) array_like
+        Any real dtype, of values up to 1e15.
     radius : int
         Half the side of the window in pixels, without the middle; 0 to 1024.
     range : float
-        Radius of the ball of colours, in the units of the image.
+        Radius of the ball of colours, in the units of the image; 0 to 1e15.
     max_iterations : int
-        Steps that a pixel takes at most. Five, as in OpenCV, are enough for most.
+        Steps that a pixel takes at most, 0 to 2^31 - 1. Five, as in OpenCV, are enough for most.
     tolerance : float, optional
-        A pixel has arrived when its rounded position stays and its colour moves by at most this. By
-        default it is enough that the position stays, as in OpenCV; a twentieth of the range goes on
-        until the colour is at its mode too, at about twice the cost.
+        A pixel has arrived when its rounded position stays and its colour moves by at most this, 0 to
+        1e15. By default it is enough that the position stays, as in OpenCV; a twentieth of the range
+        goes on until the colour is at its mode too, at about twice the cost.
     wrap : bool or (bool, bool)
         Which axes are cyclic.
     progress : callable, optional
@@ -60,7 +59,7 @@ def mean_shift(
     Raises
     ------
     InvalidInput
-        An image that is not finite, a radius or a range out of bounds.
+        Not an image, one that is not finite, or another argument out of range.
     Cancelled
         The work was stopped.
 
@@ -87,7 +86,6 @@ def mean_shift(
         raise InvalidInput(f"image: values up to {_MOST:g} are allowed, got {np.abs(given).max()}")
     ball = as_float(range, "range", 0, _MOST)
     near = _MOST if tolerance is None else as_float(tolerance, "tolerance", 0, _MOST)
-    report = None if progress is None else _staged(progress)
     found = _rust.mean_shift(
         np.ascontiguousarray(given, dtype=np.float32),
         as_int(radius, "radius", 0, 1024),
@@ -95,12 +93,8 @@ def mean_shift(
         as_int(max_iterations, "max_iterations", 0, 2**31 - 1),
         near,
         as_wrap(wrap),
-        report,
+        stage(as_progress(progress), "mean shift"),
     )
     if given.dtype.kind in "bui":
         found = np.rint(found)
     return found.astype(given.dtype, copy=False).reshape(np.asarray(image).shape)
-
-
-def _staged(progress: Progress) -> Callable[[float], object]:
-    return lambda share: progress("mean shift", share)

@@ -20,13 +20,13 @@ class Correlation:
 
     Parameters
     ----------
-    image : (H, W) or (H, W, C) array
-        Any dtype; finite.
+    image : (H, W) or (H, W, C) array_like
+        Any real dtype; finite.
 
     Raises
     ------
     InvalidInput
-        Not an image.
+        Not an image, or values beyond what float32 holds.
 
     References
     ----------
@@ -53,12 +53,12 @@ class Correlation:
         return f"Correlation(shape={self.shape})"
 
     def maps(self, template: object) -> Floats:
-        """Compare the windows of the image with a template.
+        """Return how alike a template and each window of the image are.
 
         Parameters
         ----------
-        template : (h, w) or (h, w, C) array
-            With the channels of the image.
+        template : (h, w) or (h, w, C) array_like
+            Any real dtype; finite. With the channels of the image, no larger than it.
 
         Returns
         -------
@@ -69,7 +69,7 @@ class Correlation:
         Raises
         ------
         InvalidInput
-            Larger than the image, or of other channels.
+            Not an image, larger than the image, or of other channels.
 
         """
         planes = _planes(template, "template")

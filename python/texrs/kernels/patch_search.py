@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from texrs import _rust
-from texrs._arrays import as_float, as_image, as_int, as_mask, as_size
-from texrs._typing import Array, Floats
+from texrs._arrays import as_array, as_float, as_image, as_int, as_items, as_mask, as_size, check_finite
+from texrs._typing import Floats
 from texrs.errors import InvalidInput
 
 __all__ = ["Match", "PatchIndex"]
@@ -21,20 +21,27 @@ _MOST = 2**31 - 1
 
 @dataclass(frozen=True, slots=True, order=True)
 class Match:
-    """A position and its cost; sorts by cost, then by position."""
+    """A position and its cost; sorts by cost, then by position.
+
+    Attributes
+    ----------
+    cost : float
+        Weighted sum of squared differences, in the units of the images.
+    exemplar : int
+        Which of the images, counted from 0.
+    row, column : int
+        Of the top-left corner of the patch in that image.
+
+    """
 
     cost: float
-    """Weighted sum of squared differences."""
     exemplar: int
-    """Which of the images."""
     row: int
-    """Row of the patch's top-left corner."""
     column: int
-    """Column of the patch's top-left corner."""
 
 
 class PatchIndex:
-    """Images made ready to be searched many times.
+    """An index of images, to be searched for many patches.
 
     The cost of a position is ``sum(weight * (patch - window) ** 2)`` over the pixels and channels.
     All positions are filtered by Fourier correlation as in Kwatra et al. [1]_; those that could be
@@ -44,20 +51,21 @@ class PatchIndex:
 
     Parameters
     ----------
-    images : array_like or sequence of array_like
-        One image (H, W) or (H, W, C), or a list of images that agree in channels. Any real dtype;
-        compared as float32, in the units given.
-    allowed : array_like or sequence, optional
-        Bool masks of the images' shapes (H, W): which positions (top-left corners of patches) may
-        be used. One for a single image; for a list a list, in which None allows all.
-    max_patch : int or (int, int), optional
-        Rows and columns of the largest patch that will be looked for. The smaller, the less there
-        is to compute. By default 64, or what fits into the images.
+    images : (H, W) or (H, W, C) array_like, or a list or tuple of them
+        One image, or several that agree in channels, not in size. Any real dtype; compared as
+        float32, in the units given.
+    allowed : (H, W) array_like of bool, or a list or tuple of them, optional
+        Which positions (top-left corners of patches) may be used. One mask for a single image; for
+        several images one each, in which None allows all.
+    max_patch : int or (rows, columns), optional
+        Size of the largest patch that will be looked for, in pixels. The smaller, the less there is
+        to compute. By default 64, or what fits into the images.
 
     Raises
     ------
     InvalidInput
-        No images, different numbers of channels, or a mask that does not fit its image.
+        No images, values that float32 does not hold, different numbers of channels, or a mask that
+        does not fit its image.
 
     References
     ----------
@@ -95,7 +103,7 @@ class PatchIndex:
         if not given:
             raise InvalidInput("images: needs at least one image, got none")
         name = "images" if single else "images[{}]"
-        arrays = [_floats(as_image(v, name.format(i)), name.format(i)) for i, v in enumerate(given)]
+        arrays = [_floats(v, name.format(i)) for i, v in enumerate(given)]
         channels = [a.shape[2] for a in arrays]
         if len(set(channels)) > 1:
             raise InvalidInput(f"images: must agree in channels, got {channels}")
@@ -114,7 +122,7 @@ class PatchIndex:
 
     @property
     def max_patch(self) -> tuple[int, int]:
-        """Rows and columns of the largest patch that can be looked for."""
+        """Rows and columns of the largest patch that can be looked for, in pixels."""
         rows, columns = self._index.max_patch
         return rows, columns
 
@@ -127,24 +135,24 @@ class PatchIndex:
         separation: int = 4,
         ratio: float = math.inf,
     ) -> list[Match]:
-        """Find the best positions of a patch.
+        """Return the best positions of a patch.
 
         Greedy: the best position of all, then the best one far enough from it, and so on.
 
         Parameters
         ----------
-        patch : array_like
-            Shape (p, q) or (p, q, C). Where the weight is zero anything, NaN too.
-        weight : array_like, optional
-            Shape (p, q), not negative; zero where the patch is unknown, bool allowed. By default 1
-            everywhere. If all are zero every position costs nothing, and the first ones are
-            returned.
+        patch : (p, q) or (p, q, C) array_like
+            Any real dtype, in the units of the images. Where the weight is zero anything, NaN too.
+        weight : (p, q) array_like, optional
+            Not negative; zero where the patch is unknown, bool allowed. By default 1 everywhere. If
+            all are zero every position costs nothing, and the first ones are returned.
         count : int
-            At most this many matches.
+            At most this many matches, 1 to 2^31 - 1.
         separation : int
-            Matches in one image are more than this many pixels apart, along rows or along columns.
+            Matches in one image are more than this many pixels apart, along rows or along columns;
+            0 to 2^31 - 1.
         ratio : float
-            No match costs more than this times the least cost; at least 1.
+            No match costs more than this times the least cost; at least 1, infinite allowed.
 
         Returns
         -------
@@ -155,7 +163,8 @@ class PatchIndex:
         Raises
         ------
         InvalidInput
-            A patch that fits into no image or is larger than ``max_patch``, a negative weight.
+            A patch that fits into no image or is larger than ``max_patch``, a negative weight, or
+            another argument out of range.
 
         """
         samples, weights = self._query(patch, weight)
@@ -172,19 +181,38 @@ class PatchIndex:
         separation: int = 4,
         ratio: float = math.inf,
     ) -> list[Match]:
-        """Find the best of some positions, given as (exemplar, row, column).
+        """Return the best of some positions.
 
-        Otherwise as :meth:`best`; the masks ``allowed`` play no part.
+        Parameters
+        ----------
+        patch, weight
+            As of `best`.
+        candidates : iterable of (exemplar, row, column)
+            The positions, integers; the masks ``allowed`` play no part.
+        count, separation, ratio
+            As of `best`.
+
+        Returns
+        -------
+        list of Match
+            By rising cost; fewer than ``count`` where separation, ratio or the candidates leave no
+            more.
+
+        Raises
+        ------
+        InvalidInput
+            A candidate at which the patch lies beyond its image, or what `best` refuses.
+
         """
         samples, weights = self._query(patch, weight)
-        most = (("exemplar", len(self.shapes) - 1), ("row", _MOST), ("column", _MOST))
+        most = (len(self.shapes) - 1, _MOST, _MOST)
         positions: Any = [
             # The type first: it costs a tenth of the full check, and there may be many.
             tuple(
-                n if type(n) is int and 0 <= n <= high else as_int(n, f"candidates: {name}", 0, high)
-                for n, (name, high) in zip(place, most, strict=True)
+                n if type(n) is int and 0 <= n <= high else as_int(n, "candidates", 0, high)
+                for n, high in zip(_triple(place), most, strict=True)
             )
-            for place in candidates
+            for place in as_items(candidates, "candidates")
         ]
         count, separation, ratio = _pick(count, separation, ratio)
         found = self._index.best_among(samples, weights, positions, count, separation, ratio)
@@ -193,12 +221,23 @@ class PatchIndex:
     def cost_map(self, patch: object, weight: object = None, *, exemplar: int = 0) -> Floats:
         """Return the costs of all positions in one image.
 
+        Parameters
+        ----------
+        patch, weight
+            As of `best`.
+        exemplar : int
+            Which image, counted from 0.
+
         Returns
         -------
-        ndarray
-            Float32, (H - p + 1, W - q + 1): as the filter sees them, with an error of about 1e-5
-            of the typical cost. Infinite where not allowed. :meth:`best` and :meth:`best_among`
-            give exact costs.
+        (H - p + 1, W - q + 1) float32
+            As the filter sees them, with an error of about 1e-5 of the typical cost. Infinite where
+            not allowed. `best` and `best_among` give exact costs.
+
+        Raises
+        ------
+        InvalidInput
+            An image that is not there, one that the patch does not fit into, or what `best` refuses.
 
         """
         samples, weights = self._query(patch, weight)
@@ -206,25 +245,13 @@ class PatchIndex:
         return self._index.cost_map(samples, weights, which)[0]
 
     def _query(self, patch: object, weight: object) -> tuple[Floats, Floats]:
-        try:
-            samples = np.asarray(patch)
-            weights = np.ones(samples.shape[:2]) if weight is None else np.asarray(weight)
-        except (ValueError, TypeError) as error:
-            raise InvalidInput(f"patch, weight: not arrays of numbers ({error})") from None
-        if samples.dtype.kind not in "buif" or weights.dtype.kind not in "buif":
-            raise InvalidInput(f"patch, weight: need real numbers, got dtypes {samples.dtype}, {weights.dtype}")
+        samples = as_array(patch, "patch", np.float32)
         if samples.ndim == 2:
             samples = samples[..., np.newaxis]
-        channels = self.shapes[0][2]
-        if samples.ndim != 3 or samples.shape[2] != channels or samples.size == 0:
-            raise InvalidInput(f"patch: needs shape (rows, columns, {channels}), got {samples.shape}")
-        if weights.shape != samples.shape[:2]:
-            raise InvalidInput(f"weight: needs shape {samples.shape[:2]}, got {weights.shape}")
-        with np.errstate(over="ignore"):
-            return (
-                np.ascontiguousarray(samples, dtype=np.float32),
-                np.ascontiguousarray(weights, dtype=np.float32),
-            )
+        samples = as_array(samples, "patch", np.float32, ("rows", "columns", self.shapes[0][2]))
+        shape = samples.shape[:2]
+        weights = np.ones(shape, np.float32) if weight is None else as_array(weight, "weight", np.float32, shape)
+        return samples, weights
 
 
 def _masks(allowed: object, images: int, single: bool) -> list[object]:
@@ -237,12 +264,19 @@ def _masks(allowed: object, images: int, single: bool) -> list[object]:
     return list(allowed)
 
 
-def _floats(array: Array, name: str) -> Floats:
-    with np.errstate(over="ignore"):
-        floats = np.ascontiguousarray(array, dtype=np.float32)
-    if not np.isfinite(floats).all():
-        raise InvalidInput(f"{name}: values up to {np.finfo(np.float32).max:.3g} are allowed")
+def _floats(value: object, name: str) -> Floats:
+    floats = as_array(as_image(value, name), name, np.float32)
+    check_finite(floats, name)
     return floats
+
+
+def _triple(place: Any) -> Sequence[int]:
+    try:
+        if len(place) == 3:
+            return tuple(place)
+    except (TypeError, OverflowError):
+        pass
+    raise InvalidInput(f"candidates: needs (exemplar, row, column) each, got {place!r}")
 
 
 def _pick(count: object, separation: object, ratio: object) -> tuple[int, int, float]:

@@ -1,15 +1,14 @@
-"""Screened Poisson: images made from their differences, and seamless cloning."""
+"""The screened Poisson equation: images from their gradients, and seamless cloning."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Literal, TypeAlias
 
 import numpy as np
 
 from texrs import _rust
-from texrs._arrays import as_float, as_image, as_mask, as_wrap
+from texrs._arrays import as_array, as_bool, as_float, as_image, as_mask, as_progress, as_wrap, check_finite
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 
@@ -32,7 +31,7 @@ def solve(
     mask: object = None,
     progress: Callable[[float], object] | None = None,
 ) -> Floats:
-    """Find the image with the differences wanted whose values stay near a given image.
+    """Return the image with the gradients wanted whose values stay near a given image.
 
     Minimises ``sum((v[q] - v[p] - g[p, q]) ** 2) + screening * sum((v - image) ** 2)`` over pairs
     of neighbours p, q [1]_ [2]_. A whole rectangle is solved directly, pixels under a mask by
@@ -41,20 +40,20 @@ def solve(
 
     Parameters
     ----------
-    image : array_like
-        Shape (H, W) or (H, W, C): the values to stay near, and those of all pixels that are fixed.
+    image : (H, W) or (H, W, C) array_like
+        The values to stay near, and those of all pixels that are fixed. Any real dtype; finite.
     gradient_rows, gradient_columns : array_like
         Of the image's shape: the difference wanted from each pixel to the one in the next row, and
         to the one in the next column. The last row of the one and the last column of the other
         count on periodic axes alone.
     screening : float
-        Weight of the image against the differences; 0 for the Poisson equation. Colours drift over
-        about ``screening ** -0.5`` pixels.
+        Weight of the image against the differences, at least 0; 0 for the Poisson equation. Colours
+        drift over about ``screening ** -0.5`` pixels.
     boundary : {"dirichlet", "periodic", "free"} or a pair of them
         The outermost ring of pixels keeps its values, or the axis is cyclic, or nothing lies
         beyond; for both axes, or for the rows' and the columns'.
-    mask : array_like of bool, optional
-        Shape (H, W): the pixels to solve. All others keep their values. By default all.
+    mask : (H, W) array_like of bool, optional
+        The pixels to solve. All others keep their values. By default all.
     progress : callable, optional
         Called with the share that is done, 0 to 1; raising stops the work.
 
@@ -68,14 +67,15 @@ def solve(
     ------
     InvalidInput
         Shapes that differ, values that are not finite, a negative screening, an unknown boundary.
+    Cancelled
+        The work was stopped.
 
     References
     ----------
     .. [1] P. Pérez, M. Gangnet and A. Blake, "Poisson image editing", SIGGRAPH 2003.
        :doi:`10.1145/882262.882269`
     .. [2] P. Bhat, B. Curless, M. Cohen and C. L. Zitnick, "Fourier analysis of the 2D screened
-    Poisson
-       equation for gradient domain problems", ECCV 2008. :doi:`10.1007/978-3-540-88688-4_9`
+       Poisson equation for gradient domain problems", ECCV 2008. :doi:`10.1007/978-3-540-88688-4_9`
 
     Examples
     --------
@@ -90,17 +90,16 @@ def solve(
     True
 
     """
-    given = as_image(image)
-    values = _floats(given, "image")
+    values = _floats(as_image(image), "image")
     rows = _gradient(gradient_rows, "gradient_rows", values)
     columns = _gradient(gradient_columns, "gradient_columns", values)
     solved = _rust.poisson(
         values,
         (rows, columns),
-        as_float(screening, "screening", 0, math.inf),
+        _weight(screening),
         _boundary(boundary),
         None if mask is None else as_mask(mask, "mask", values.shape[:2]),
-        progress,
+        as_progress(progress),
     )
     return _finite(solved).reshape(np.asarray(image).shape)
 
@@ -113,22 +112,30 @@ def spread(
     mask: object = None,
     progress: Callable[[float], object] | None = None,
 ) -> None:
-    """Turn what flows into each pixel into the values that carry it off, in place.
+    """Solve ``(L + screening) v = flow`` in place.
 
-    Solves ``(L + screening) v = flow``, where L is the sum of the differences of a pixel to its neighbours: what `solve`
-    adds to its image. For corrections of large pictures, where one array less counts.
+    L is the Laplacian, the sum of the differences of a pixel to its neighbours: v is what `solve` adds to its image. For
+    corrections of large pictures, where one array less counts.
 
     Parameters
     ----------
-    flow : (H, W, C) array of float32
-        Contiguous and writeable; becomes the solution, 0 where pixels are fixed.
-    screening, boundary, mask, progress
+    flow : (H, W, C) ndarray of float32
+        The divergence wanted; contiguous, writeable and finite. Becomes the solution, 0 where pixels are fixed.
+    screening : float
         As in `solve`.
+    boundary : {"dirichlet", "periodic", "free"} or a pair of them
+        As in `solve`.
+    mask : (H, W) array_like of bool, optional
+        The pixels to solve; all others are 0. By default all.
+    progress : callable, optional
+        Called with the share that is done, 0 to 1; raising stops the work.
 
     Raises
     ------
     InvalidInput
         Another kind of array, or an option that `solve` refuses.
+    Cancelled
+        The work was stopped; ``flow`` is then of no use.
 
     Examples
     --------
@@ -140,15 +147,14 @@ def spread(
     1.0
 
     """
-    given = flow.flags
-    if flow.dtype != np.float32 or flow.ndim != 3 or not (given.c_contiguous and given.writeable and given.aligned):
-        raise InvalidInput(f"flow: needs a contiguous writeable float32 array (H, W, C), got {flow.dtype} {flow.shape}")
+    if as_array(flow, "flow", np.float32, ("rows", "columns", "channels")) is not flow or not flow.flags.writeable:
+        raise InvalidInput("flow: needs a float32 array, contiguous, writeable and in native byte order")
     _rust.poisson_spread(
         flow,
-        as_float(screening, "screening", 0, math.inf),
+        _weight(screening),
         _boundary(boundary),
         None if mask is None else as_mask(mask, "mask", flow.shape[:2]),
-        progress,
+        as_progress(progress),
     )
 
 
@@ -161,20 +167,20 @@ def blend(
     mixed: bool = False,
     wrap: bool | tuple[bool, bool] = False,
 ) -> Array:
-    """Clone a part of one image into another without a seam.
+    """Return an image with a part of another cloned into it without a seam.
 
-    Under the mask the result has the differences of the source, outside it the values of the
+    Under the mask the result has the gradients of the source, outside it the values of the
     target.
 
     Parameters
     ----------
-    source, target : array_like
-        Shape (H, W) or (H, W, C), the same for both, in register. Any real dtype.
-    mask : array_like of bool
-        Shape (H, W): the pixels to take from the source.
+    source, target : (H, W) or (H, W, C) array_like
+        The same shape for both, in register. Any real dtype; finite.
+    mask : (H, W) array_like of bool
+        The pixels to take from the source.
     screening : float
-        How much the source's own values count, next to its differences: 0 lets colours go all the
-        way to those of the target, 1 all but keeps the source's.
+        How much the source's own values count, next to its gradients, at least 0: 0 lets colours go
+        all the way to those of the target, 1 all but keeps the source's.
     mixed : bool
         Take the larger of the differences of source and target at each pair of pixels, so that the
         texture of the target shows through flat parts of the source.
@@ -207,22 +213,21 @@ def blend(
     True
 
     """
-    onto, taken = as_image(target, "target"), as_image(source, "source")
+    onto, taken, both = as_image(target, "target"), as_image(source, "source"), as_bool(mixed, "mixed")
     shape = np.asarray(target).shape
     if np.asarray(source).shape != shape:
         raise InvalidInput(f"source: needs the target's shape {shape}, got {np.asarray(source).shape}")
-    inside = as_mask(mask, "mask", onto.shape[:2])
+    inside, weight = as_mask(mask, "mask", onto.shape[:2]), _weight(screening)
     values, other = (_numbers(a, n) for a, n in ((onto, "target"), (taken, "source")))
     # With v = source + c no difference is wanted of c, but where the target shows through.
-    if inside.all() and screening == 0:
+    if inside.all() and weight == 0:
         # Nothing is left of the target but its mean.
         correction = np.empty(onto.shape, np.float32)
         correction[...] = values.mean((0, 1)) - other.mean((0, 1))
     else:
         correction = _beyond(values, other, inside)
-    gradients = (_mixed(values, other, 0), _mixed(values, other, 1)) if mixed else None
+    gradients = (_mixed(values, other, 0), _mixed(values, other, 1)) if both else None
     rows, columns = ("periodic" if w else "free" for w in as_wrap(wrap))
-    weight = as_float(screening, "screening", 0, math.inf)
     solved = _rust.poisson(correction, gradients, weight, (rows, columns), inside, None)
     result = onto.copy()
     for band in _bands(len(onto)):
@@ -283,11 +288,14 @@ def _gradient(value: object, name: str, image: Floats) -> Floats:
 
 
 def _floats(array: Array, name: str) -> Floats:
-    with np.errstate(over="ignore"):
-        floats = np.ascontiguousarray(array, dtype=np.float32)
-    if array.dtype == np.float64 and not np.isfinite(floats).all():
-        raise InvalidInput(f"{name}: values up to {np.finfo(np.float32).max:.3g} are allowed")
+    floats = as_array(array, name, np.float32)
+    if array.dtype == np.float64:
+        check_finite(floats, name)
     return floats
+
+
+def _weight(screening: object) -> float:
+    return as_float(screening, "screening", 0, float(np.finfo(np.float32).max))
 
 
 def _finite(solved: Floats) -> Floats:

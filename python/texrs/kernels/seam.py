@@ -4,13 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from texrs import _rust
-from texrs._arrays import as_image, as_int, as_mask, as_wrap, to_unit
+from texrs._arrays import (
+    as_array,
+    as_bool,
+    as_choice,
+    as_float,
+    as_image,
+    as_int,
+    as_items,
+    as_tuple,
+    as_wrap,
+    to_unit,
+)
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 
@@ -21,44 +33,64 @@ Cost: TypeAlias = Literal["gradient", "paper"]
 
 @dataclass(frozen=True, slots=True)
 class Cut:
-    """Which of two images each pixel takes."""
+    """Which of two images each pixel takes.
+
+    Attributes
+    ----------
+    mask : (H, W) or (D, H, W) bool
+        True where a pixel takes B. Elsewhere it takes A where A covers it, and else neither.
+    value : float
+        Sum of the costs of the edges of the seam inside the overlap, old seams that stay included.
+    edges : int
+        Number of pairs of neighbours in the overlap that the seam parts.
+
+    """
 
     mask: Bools
-    """Shape of the canvas: True where a pixel takes B. Elsewhere it takes A where A covers it, and
-    else neither."""
     value: float
-    """Sum of the costs of the edges of the seam inside the overlap, old seams that stay
-    included."""
     edges: int
-    """Number of pairs of neighbours in the overlap that the seam parts."""
 
 
 @dataclass(frozen=True, slots=True)
 class OldSeams:
-    """Seams that A already contains; an array of the canvas' shape for each axis in each field.
+    """Seams that A already contains: costs, an array of the canvas' shape for each axis in each field.
 
     Entry ``p`` for an axis belongs to the pair of ``p`` and its next pixel ``q`` along that axis.
     Write ``M(p, q, S, T)`` for the cost of a seam between ``p``, taken from ``S``, and ``q``, taken
     from ``T``; let A show source ``S`` at ``p`` and ``T`` at ``q``.
+
+    Attributes
+    ----------
+    kept : sequence of array_like
+        ``M(p, q, S, T)``, at least 0, paid where both keep A; 0 where there is no old seam, which
+        leaves the pair its ordinary cost.
+    ab : sequence of array_like
+        ``M(p, q, S, B)``, at least 0, paid where ``p`` keeps A and ``q`` takes B.
+    ba : sequence of array_like
+        ``M(p, q, B, T)``, at least 0, paid where ``p`` takes B and ``q`` keeps A.
+
     """
 
     kept: Sequence[ArrayLike]
-    """``M(p, q, S, T)``, paid where both keep A; 0 where there is no old seam, which leaves the
-    pair its ordinary cost."""
     ab: Sequence[ArrayLike]
-    """``M(p, q, S, B)``, paid where ``p`` keeps A and ``q`` takes B."""
     ba: Sequence[ArrayLike]
-    """``M(p, q, B, T)``, paid where ``p`` takes B and ``q`` keeps A."""
 
 
 @dataclass(frozen=True, slots=True)
 class Labels:
-    """Binary labels of least energy."""
+    """Binary labels of least energy.
+
+    Attributes
+    ----------
+    mask : (H, W) or (D, H, W) bool
+        The labels; of all best labellings, that with the fewest True.
+    energy : float
+        Sum of the costs of all points and pairs.
+
+    """
 
     mask: Bools
-    """The labels; of all best labellings, that with the fewest True."""
     energy: float
-    """Sum of the costs of all points and pairs."""
 
 
 def cut(
@@ -74,13 +106,13 @@ def cut(
     cost: Cost = "gradient",
     wrap: bool | Sequence[bool] = False,
 ) -> Cut:
-    """Find where two overlapping images meet least visibly, by an exact minimum cut [1]_.
+    """Return where two overlapping images meet least visibly, by an exact minimum cut [1]_.
 
-    Pixels that one image alone covers take that image. In the overlap, pixels of a core are tied to
-    its image; else pixels beside one that only A covers take A, then those beside one that only B
-    covers take B; the others are chosen so that the costs of all pairs of neighbours that the seam
-    parts sum to the least. Where that leaves a choice, as few pixels as possible take B: in an
-    overlap without a pixel tied to B, none does.
+    Pixels that one image alone covers take that image. In the overlap, pixels of a core are hard
+    constraints: they take its image. Of the others, those beside a pixel that only A covers take A,
+    then those beside one that only B covers take B; the rest is chosen so that the costs of all
+    pairs of neighbours that the seam parts sum to the least. Where that leaves a choice, as few
+    pixels as possible take B: in an overlap without a pixel constrained to B, none does.
 
     Parameters
     ----------
@@ -88,13 +120,14 @@ def cut(
         The image that is there and the one that is added, on one canvas: (H, W) or (H, W, C); or
         volumes (D, H, W[, C]) with masks of three axes. Any dtype; brought to [0, 1] together.
         Finite everywhere.
-    mask_a, mask_b : array_like of bool
-        Which pixels each covers, (H, W) or (D, H, W).
+    mask_a, mask_b : (H, W) or (D, H, W) array_like of bool
+        Which pixels each covers.
     core_a, core_b : array_like of bool, optional
-        Pixels that must keep A or take B. Each image must cover its core.
-    penalty : array_like of float, optional
-        At least 0, shape of the masks. The cost of a pair is multiplied by one plus the mean of its
-        two penalties, which keeps seams out of things that should stay whole.
+        Hard constraints, of the masks' shape: pixels that must keep A or take B. Each image must
+        cover its core. By default none.
+    penalty : float or array_like of float, optional
+        At least 0, of the masks' shape. The cost of a pair is multiplied by one plus the mean of
+        its two penalties, which keeps seams out of things that should stay whole.
     old : OldSeams, optional
         Seams that A already contains, so that they can be covered. A seam that costs more than what
         replaces it on both sides together (which needs a cost that breaks the triangle inequality)
@@ -121,7 +154,7 @@ def cut(
     -----
     Costs are rounded to multiples of 2^-16, or coarser where the largest exceeds 2^10. Time grows
     with the bounding box of the overlap. Where one connected core of B lies on a plane, and what is
-    tied to A lies around it, the seam is a shortest closed path on the dual of the grid [2]_, found
+    constrained to A lies around it, the seam is a shortest closed path on the dual of the grid [2]_, found
     several times faster than by maximum flow; it is the same seam.
 
     References
@@ -147,7 +180,8 @@ def cut(
     2
 
     """
-    axes = np.ndim(mask_a)  # type: ignore[arg-type]
+    covered = as_array(mask_a, "mask_a", np.bool_)
+    axes = covered.ndim
     if axes not in (2, 3):
         raise InvalidInput(f"mask_a: needs shape (rows, columns) or (planes, rows, columns), got {axes} axes")
     first, second = _pair(a, b, axes)
@@ -155,10 +189,10 @@ def cut(
     mask, value, edges = _rust.seam_cut(
         first,
         second,
-        as_mask(mask_a, "mask_a", shape),
-        as_mask(mask_b, "mask_b", shape),
-        None if core_a is None else as_mask(core_a, "core_a", shape),
-        None if core_b is None else as_mask(core_b, "core_b", shape),
+        as_array(covered, "mask_a", np.bool_, shape),
+        as_array(mask_b, "mask_b", np.bool_, shape),
+        None if core_a is None else as_array(core_a, "core_a", np.bool_, shape),
+        None if core_b is None else as_array(core_b, "core_b", np.bool_, shape),
         None if penalty is None else _floats(penalty, "penalty", shape),
         None if old is None else _old(old, shape),
         _cost(cost),
@@ -176,7 +210,7 @@ def cut_strip(
     penalty: ArrayLike | None = None,
     cost: Cost = "gradient",
 ) -> Cut:
-    """Find the least visible seam from border to border of two images that overlap altogether.
+    """Return the least visible seam from border to border of two images that overlap altogether.
 
     The first line along ``axis`` takes A, the last one takes B. The seam may turn back: it is the
     exact minimum cut, found as a shortest path on the dual of the grid, hundreds of times faster
@@ -184,15 +218,15 @@ def cut_strip(
 
     Parameters
     ----------
-    a, b : array_like
-        Images of one shape, (H, W) or (H, W, C). Any dtype; brought to [0, 1] together.
+    a, b : (H, W) or (H, W, C) array_like
+        Images of one shape. Any real dtype; brought to [0, 1] together. Finite.
     axis : {0, 1}
         The axis that the seam crosses: 1 for A at the left and B at the right, 0 for A above B.
     cyclic : bool
         Whether the other axis is cyclic: the seam then closes on itself [2]_, which a seam that is
         cut open cannot do.
-    penalty : array_like of float, optional
-        As in `cut`.
+    penalty : float or (H, W) array_like of float, optional
+        At least 0, as in `cut`.
     cost : {"gradient", "paper"}
         As in `cut`.
 
@@ -210,11 +244,9 @@ def cut_strip(
     References
     ----------
     .. [1] R. Hassin, "Maximum flow in (s,t) planar networks", Information Processing Letters 13(3),
-    1981.
-       :doi:`10.1016/0020-0190(81)90120-4`
+       1981. :doi:`10.1016/0020-0190(81)90120-4`
     .. [2] J. Reif, "Minimum s-t cut of a planar undirected network in O(n log^2 n) time", SIAM
-    Journal on Computing
-       12(1), 1983. :doi:`10.1137/0212005`
+       Journal on Computing 12(1), 1983. :doi:`10.1137/0212005`
 
     Examples
     --------
@@ -229,32 +261,42 @@ def cut_strip(
     shape = first.shape[:-1]
     dear = None if penalty is None else _floats(penalty, "penalty", shape)
     crossed = as_int(axis, "axis", 0, 1)
-    [(mask, value, edges)] = _rust.seam_strips([(first, second, crossed, dear)], bool(cyclic), _cost(cost))
+    [(mask, value, edges)] = _rust.seam_strips([(first, second, crossed, dear)], as_bool(cyclic, "cyclic"), _cost(cost))
     return Cut(mask.reshape(shape), value, edges)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Strip:
-    """Two images of one shape that overlap altogether, one of many that `cut_strips` cuts."""
+    """Two images of one shape that overlap altogether, one of many that `cut_strips` cuts.
 
-    a: Array
-    """(H, W, C) of numbers about [0, 1]: costs are measured on them as they are."""
-    b: Array
+    Attributes
+    ----------
+    a, b : (H, W, C) array_like
+        Numbers about [0, 1]: costs are measured on them as they are. Finite.
+    axis : {0, 1}
+        The axis that the seam crosses.
+    penalty : float or (H, W) array_like of float, optional
+        At least 0, as in `cut`.
+
+    """
+
+    a: ArrayLike
+    b: ArrayLike
     axis: int
-    """The axis that the seam crosses."""
-    penalty: Array | None = None
-    """(H, W), as in `cut`."""
+    penalty: ArrayLike | None = None
 
 
 def cut_strips(strips: Sequence[Strip], *, cyclic: bool = False, cost: Cost = "gradient") -> list[Cut]:
-    """Cut many strips at once, in parallel, each as by `cut_strip`.
+    """Return the seams of many strips, found in parallel, each as by `cut_strip`.
 
     Parameters
     ----------
     strips : sequence of Strip
         Of any shapes.
-    cyclic, cost
+    cyclic : bool
         As in `cut_strip`, for all of them.
+    cost : {"gradient", "paper"}
+        As in `cut`, for all of them.
 
     Returns
     -------
@@ -264,7 +306,7 @@ def cut_strips(strips: Sequence[Strip], *, cyclic: bool = False, cost: Cost = "g
     Raises
     ------
     InvalidInput
-        As `cut_strip`.
+        Something else than strips, or one that `cut_strip` refuses.
 
     Examples
     --------
@@ -276,13 +318,14 @@ def cut_strips(strips: Sequence[Strip], *, cyclic: bool = False, cost: Cost = "g
 
     """
     given = []
-    for strip in strips:
-        first, second = (np.ascontiguousarray(image, np.float32) for image in (strip.a, strip.b))
-        if first.ndim != 3 or first.shape != second.shape:
-            raise InvalidInput(f"strips: need two images (rows, columns, channels), got {first.shape}, {second.shape}")
-        dear = None if strip.penalty is None else _floats(strip.penalty, "penalty", first.shape[:2])
-        given.append((first, second, as_int(strip.axis, "axis", 0, 1), dear))
-    found = _rust.seam_strips(given, bool(cyclic), _cost(cost))
+    for strip in as_items(strips, "strips"):
+        if not isinstance(strip, Strip):
+            raise InvalidInput(f"strips: needs a Strip each, got {type(strip).__name__}")
+        first = as_array(strip.a, "strips: a", np.float32, ("rows", "columns", "channels"))
+        second = as_array(strip.b, "strips: b", np.float32, first.shape)
+        dear = None if strip.penalty is None else _floats(strip.penalty, "strips: penalty", first.shape[:2])
+        given.append((first, second, as_int(strip.axis, "strips: axis", 0, 1), dear))
+    found = _rust.seam_strips(given, as_bool(cyclic, "cyclic"), _cost(cost))
     return [
         Cut(mask.reshape(one[0].shape[:2]), value, edges)
         for one, (mask, value, edges) in zip(given, found, strict=True)
@@ -295,13 +338,12 @@ def binary_labels(
     *,
     wrap: bool | Sequence[bool] = False,
 ) -> Labels:
-    """Label each point of a grid True or False so that all costs sum to the least [1]_.
+    """Return the labels, True or False, of the points of a grid whose costs sum to the least [1]_.
 
     Parameters
     ----------
-    unary : array_like of float
-        Cost of False and of True at each point, shape (H, W, 2) or (D, H, W, 2). Infinity forbids a
-        label.
+    unary : (H, W, 2) or (D, H, W, 2) array_like of float
+        Cost of False and of True at each point. Infinity forbids a label.
     pairwise : float or sequence
         Cost of neighbours that differ, at least 0: one number for all, or one entry an axis: a
         number, an array of the grid's shape (the entry of ``p`` is for ``p`` and the next point),
@@ -343,17 +385,13 @@ def binary_labels(
     array([[0, 0, 0, 0, 1, 1, 1, 1]])
 
     """
-    try:
-        costs = np.ascontiguousarray(unary, np.float32)
-    except (ValueError, TypeError) as error:
-        raise InvalidInput(f"unary: not an array of numbers ({error})") from None
+    costs = as_array(unary, "unary", np.float32)
     axes = costs.ndim - 1
     if axes not in (2, 3) or costs.shape[-1] != 2 or costs.size == 0:
         raise InvalidInput(f"unary: needs shape (rows, columns, 2) or (planes, rows, columns, 2), got {costs.shape}")
     shape = costs.shape[:-1]
-    entries = [pairwise] * axes if isinstance(pairwise, float | int) else list(pairwise)
-    if len(entries) != axes:
-        raise InvalidInput(f"pairwise: needs a number or {axes} entries, one an axis; got {len(entries)}")
+    what = f"a number or {axes} entries, one an axis"
+    entries = (pairwise,) * axes if isinstance(pairwise, Real) else as_tuple(pairwise, "pairwise", axes, what)
     both = [entry if isinstance(entry, tuple) else (entry, entry) for entry in entries]
     if any(len(entry) != 2 for entry in both):
         raise InvalidInput("pairwise: a tuple needs two entries, False before True and True before False")
@@ -363,7 +401,7 @@ def binary_labels(
 
 
 def _pair(a: object, b: object, axes: int) -> tuple[Floats, Floats]:
-    """Two images of one shape, brought to [0, 1] together."""
+    """Return two images of one shape, brought to [0, 1] together."""
     first, second = as_image(a, "a", axes=axes), as_image(b, "b", axes=axes)
     if first.shape != second.shape:
         raise InvalidInput(f"b: needs the shape of a, {first.shape}, got {second.shape}")
@@ -381,27 +419,23 @@ def _unit(image: Array) -> Floats:
     return image if image.dtype == np.float32 else to_unit(image)
 
 
-def _floats(value: ArrayLike, name: str, shape: tuple[int, ...]) -> Floats:
-    try:
-        array = np.asarray(value, np.float32)
-    except (ValueError, TypeError) as error:
-        raise InvalidInput(f"{name}: not an array of numbers ({error})") from None
-    if array.ndim and array.shape != shape:
-        raise InvalidInput(f"{name}: needs shape {shape}, got {array.shape}")
-    return np.ascontiguousarray(array if array.ndim else np.broadcast_to(array, shape))
+def _floats(value: object, name: str, shape: tuple[int, ...]) -> Floats:
+    """Return an array of floats; one number stands for all of them."""
+    if isinstance(value, Real):
+        most = float(np.finfo(np.float32).max)
+        return np.full(shape, as_float(value, name, -most, most), np.float32)
+    return as_array(value, name, np.float32, shape)
 
 
-def _old(old: OldSeams, shape: tuple[int, ...]) -> list[list[Floats]]:
+def _old(old: object, shape: tuple[int, ...]) -> list[list[Floats]]:
+    if not isinstance(old, OldSeams):
+        raise InvalidInput(f"old: needs OldSeams, got {type(old).__name__}")
     fields = []
-    for name in ("kept", "ab", "ba"):
-        arrays = list(getattr(old, name))
-        if len(arrays) != len(shape):
-            raise InvalidInput(f"old.{name}: needs {len(shape)} arrays, one an axis; got {len(arrays)}")
-        fields.append([_floats(array, f"old.{name}", shape) for array in arrays])
+    for name in ("old.kept", "old.ab", "old.ba"):
+        arrays = as_tuple(getattr(old, name[4:]), name, len(shape), f"{len(shape)} arrays, one an axis")
+        fields.append([_floats(array, name, shape) for array in arrays])
     return fields
 
 
 def _cost(cost: object) -> str:
-    if cost not in ("gradient", "paper"):
-        raise InvalidInput(f"cost: needs 'gradient' or 'paper', got {cost!r}")
-    return str(cost)
+    return as_choice(cost, "cost", ("gradient", "paper"))

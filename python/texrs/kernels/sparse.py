@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs import _rust
-from texrs._arrays import as_int
+from texrs._arrays import as_array, as_int, as_items, check_memory
 from texrs.errors import InvalidInput
 
 __all__ = ["Cholesky"]
@@ -26,15 +26,15 @@ class Cholesky:
 
     Parameters
     ----------
-    matrix : scipy.sparse matrix or array of shape (n, n)
-        Its lower triangle is read; the diagonal must be there.
+    matrix : (n, n) scipy.sparse matrix or array_like
+        Any real dtype; finite. Its lower triangle is read; the diagonal must be there.
     limit : int
-        Bytes that the factor and the work on it may take.
+        Bytes that the factor and the work on it may take, 1 to 2^62.
 
     Raises
     ------
     InvalidInput
-        Not square, not finite, or not positive definite.
+        Not a matrix of numbers, not square, not finite, or not positive definite.
     LimitExceeded
         The factor would take more than ``limit``.
 
@@ -55,27 +55,41 @@ class Cholesky:
 
     @classmethod
     def several(cls, matrices: Sequence[Any], *, limit: int = LIMIT) -> list[Cholesky]:
-        """Factor several matrices side by side; each factor is what it would be by itself.
+        """Factor several matrices in parallel; each factor is what it would be by itself.
 
         Parameters
         ----------
-        matrices : sequence of scipy.sparse matrices or arrays
-            As of the class.
+        matrices : sequence of (n, n) scipy.sparse matrices or array_like
+            Each as of the class; their sizes need not agree.
         limit : int
-            Bytes that each factor and the work on it may take.
+            Bytes that each factor and the work on it may take, 1 to 2^62.
+
+        Returns
+        -------
+        list of Cholesky
+            One a matrix, in their order.
 
         Raises
         ------
-        InvalidInput, LimitExceeded
-            As of the class.
+        InvalidInput
+            A matrix that is not square, not finite, or not positive definite.
+        LimitExceeded
+            A factor would take more than ``limit``.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> [factor.size for factor in Cholesky.several([np.eye(3), 2 * np.eye(5)])]
+        [3, 5]
 
         """
-        made = []
-        for inner in _rust.Cholesky.several([_entries(m) for m in matrices], as_int(limit, "limit", 1, 1 << 62)):
+        entries = [_entries(matrix, "matrices") for matrix in as_items(matrices, "matrices")]
+        factors = []
+        for inner in _rust.Cholesky.several(entries, as_int(limit, "limit", 1, 1 << 62)):
             factor = cls.__new__(cls)
             factor._inner = inner
-            made.append(factor)
-        return made
+            factors.append(factor)
+        return factors
 
     @property
     def size(self) -> int:
@@ -84,37 +98,52 @@ class Cholesky:
 
     @property
     def nbytes(self) -> int:
-        """Memory that the factor takes."""
+        """Bytes that the factor takes."""
         return 8 * self._inner.entries
 
     def solve(self, sides: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Solve for one right side (n) or several (n, k), and give the solutions in the same shape.
+        """Return the solutions for one right side or several.
+
+        Parameters
+        ----------
+        sides : (n,) or (n, k) array_like
+            Right sides, a column each; any real dtype.
+
+        Returns
+        -------
+        ndarray
+            Float64, of the same shape.
 
         Raises
         ------
         InvalidInput
-            Right sides of another length.
+            Not numbers, or right sides of another length.
 
         """
-        array = np.asarray(sides, np.float64)
+        array = as_array(sides, "sides", np.float64)
         if array.ndim not in (1, 2) or array.shape[0] != self.size or not array.size:
             raise InvalidInput(f"sides: needs shape ({self.size},) or ({self.size}, k), got {array.shape}")
         found = self._inner.solve(np.ascontiguousarray(array.T).reshape(-1))
         return np.ascontiguousarray(found.reshape(array.shape[::-1]).T)
 
 
-def _entries(matrix: Any) -> tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float64]]:
+def _entries(matrix: Any, name: str = "matrix") -> tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float64]]:
     """Return the lower triangle, column by column."""
-    from scipy.sparse import csc_array, tril
+    from scipy.sparse import csc_array, issparse, tril
 
-    if getattr(matrix, "ndim", 0) != 2 or matrix.shape[0] != matrix.shape[1]:
-        raise InvalidInput(f"matrix: needs shape (n, n), got {getattr(matrix, 'shape', type(matrix).__name__)}")
+    if not issparse(matrix):
+        matrix = as_array(matrix, name, np.float64)
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.shape[0]:
+        raise InvalidInput(f"{name}: needs shape (n, n), got {matrix.shape}")
+    if matrix.dtype.kind not in "buif":
+        raise InvalidInput(f"{name}: needs real numbers, got dtype {matrix.dtype}")
+    check_memory(8 * matrix.shape[0], name)
     lower = csc_array(tril(matrix, format="csc"))
     lower.sum_duplicates()
-    if lower.nnz >= 1 << 31:
-        raise InvalidInput(f"matrix: up to 2^31 entries are allowed, got {lower.nnz}")
+    if max(lower.nnz, lower.shape[0]) >= 1 << 31:
+        raise InvalidInput(f"{name}: up to 2^31 rows and entries are allowed, got {lower.shape[0]} and {lower.nnz}")
     return (
         lower.indptr.astype(np.uint32),
         lower.indices.astype(np.uint32),
-        np.ascontiguousarray(lower.data, np.float64),
+        as_array(lower.data, name, np.float64),
     )

@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from texrs import _rust
-from texrs._arrays import as_size
-from texrs._typing import Array, Bools, Floats
+from texrs._arrays import as_array, as_mask, as_progress, as_size, check_finite
+from texrs._typing import Bools, Floats
 from texrs.errors import InvalidInput
 
 __all__ = ["Triangles", "Warp", "from_points", "mesh"]
@@ -23,7 +23,7 @@ class Warp:
     Attributes
     ----------
     coordinates : (rows, columns, 2) float32
-        Where each pixel comes from; in the holes the pixel of the source that has their own place.
+        Where each pixel comes from, (row, column); in the holes the pixel of the source that has their own place.
     covered : (rows, columns) bool
         Where a triangle was drawn; the others are holes.
     triangles, flipped, flipped_heavy : int
@@ -40,71 +40,70 @@ class Warp:
 
 
 def mesh(
-    target: Array,
-    weight: Array | None = None,
+    target: ArrayLike,
+    weight: ArrayLike | None = None,
     *,
-    void: Array | None = None,
+    void: ArrayLike | None = None,
     size: int | Sequence[int] | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Warp:
-    """Move each pixel of a picture and rasterise the dense mesh between them.
+    """Move each pixel of a picture, and rasterise the dense mesh between them.
 
     Two triangles a cell, barycentric. Where several lie over each other the one whose corners weigh most is seen; of
     equals one that is not turned over, then the first.
 
     Parameters
     ----------
-    target : (H, W, 2) array
-        Where each pixel goes, (row, column).
-    weight : (H, W) bool or uint8, optional
-        Up to 254: what lies above what.
-    void : (H, W) bool, optional
-        Pixels whose triangles are not drawn.
+    target : (H, W, 2) array_like
+        Where each pixel goes, (row, column) in pixels; any real dtype, finite. H and W at least 2.
+    weight : (H, W) array_like of bool or int, optional
+        0 to 254: what lies above what; by default 0 everywhere.
+    void : (H, W) array_like of bool, optional
+        Pixels whose triangles are not drawn; by default none.
     size : int or (rows, columns), optional
-        Of the output; that of the picture by default.
+        Of the output, up to 2^28 pixels; that of the picture by default.
     progress : callable, optional
-        Called with the share that is done; raising stops the work.
+        Called with the share that is done, 0 to 1; raising stops the work.
 
     Returns
     -------
     Warp
+        The coordinates, where they are covered, and how many triangles are turned over.
 
     Raises
     ------
     InvalidInput
         Arrays of other shapes, targets that are not finite, or weights out of range.
+    LimitExceeded
+        An output of more than 2^28 pixels.
+    Cancelled
+        The work was stopped.
 
     Examples
     --------
     >>> import numpy as np
     >>> grid = np.moveaxis(np.indices((8, 8)), 0, -1).astype(float)
-    >>> moved = mesh(grid + [2.0, -1.0]).source
-    >>> moved.coordinates[5, 3].tolist(), moved.label[0, 0]
-    ([3.0, 4.0], np.uint32(0))
+    >>> warp = mesh(grid + [2.0, -1.0])
+    >>> warp.coordinates[5, 3].tolist(), bool(warp.covered[0, 0])
+    ([3.0, 4.0], False)
 
     """
-    places = np.ascontiguousarray(target, np.float64)
-    if places.ndim != 3 or places.shape[-1] != 2 or min(places.shape[:2]) < 2:
-        raise InvalidInput(f"target: needs shape (rows, columns, 2), two or more of each, got {places.shape}")
-    if not np.isfinite(places).all():
-        raise InvalidInput("target: must be finite everywhere")
+    places = as_array(target, "target", np.float64, ("rows", "columns", 2))
+    check_finite(places, "target")
     shape = (places.shape[0], places.shape[1])
-    layers = np.zeros(shape, np.uint8) if weight is None else np.asarray(weight)
-    if layers.shape != shape or layers.dtype not in (np.bool_, np.uint8):
-        raise InvalidInput(f"weight: needs bool or uint8 of shape {shape}, got {layers.dtype} {layers.shape}")
-    layers = layers.astype(np.uint8)
+    if min(shape) < 2:
+        raise InvalidInput(f"target: needs two or more rows and columns, got {shape}")
+    layers = np.zeros(shape, np.uint8) if weight is None else as_array(weight, "weight", np.uint8, shape)
     if int(layers.max()) > 254:
         raise InvalidInput("weight: up to 254 is allowed, got 255")
     if void is not None:
-        if np.shape(void) != shape:
-            raise InvalidInput(f"void: needs shape {shape}, got {np.shape(void)}")
-        layers[np.asarray(void, bool)] = 255
+        layers = np.where(as_mask(void, "void", shape), np.uint8(255), layers)
     out = as_size(shape if size is None else size)
     found, triangle, (drawn, flipped, heavy) = _rust.warp_mesh(
-        shape, places.reshape(-1, 2), layers.reshape(-1), (out[0], out[1]), progress
+        shape, places.reshape(-1, 2), layers.reshape(-1), (out[0], out[1]), as_progress(progress)
     )
     covered = (triangle > 0).reshape(out)
-    return Warp(_filled(found.reshape(*out, 2), covered, shape), covered, drawn, flipped, heavy)
+    return Warp(_fill_holes(found.reshape(*out, 2), covered, shape), covered, drawn, flipped, heavy)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,7 +113,7 @@ class Triangles:
     Attributes
     ----------
     coordinates : (rows, columns, 2) float32
-        Where each pixel comes from; pixels outside of all triangles keep their place.
+        Where each pixel comes from, (row, column); pixels outside of all triangles keep their place.
     triangle : (rows, columns) uint32
         The triangle of each pixel, counted from 1; 0 outside of all.
     frames : (triangles + 1, 2, 2) float32
@@ -128,7 +127,7 @@ class Triangles:
 
 
 def from_points(
-    source: Array, target: Array, shape: Sequence[int], *, size: int | Sequence[int] | None = None
+    source: ArrayLike, target: ArrayLike, shape: int | Sequence[int], *, size: int | Sequence[int] | None = None
 ) -> Triangles:
     """Warp a picture by points that move.
 
@@ -136,21 +135,25 @@ def from_points(
 
     Parameters
     ----------
-    source, target : (n, 2) array
-        Where the points are in the picture, and where they go; (row, column).
-    shape : (rows, columns)
+    source, target : (n, 2) array_like
+        Where the points are in the picture, and where they go; (row, column) in pixels. Any real dtype, finite; three
+        points or more.
+    shape : int or (rows, columns)
         Of the picture.
     size : int or (rows, columns), optional
-        Of the output; that of the picture by default.
+        Of the output, up to 2^28 pixels; that of the picture by default.
 
     Returns
     -------
     Triangles
+        The coordinates, and the triangle and the frame that they belong to.
 
     Raises
     ------
     InvalidInput
         Fewer than three points, all on one line, two at one place, or coordinates that are not finite.
+    LimitExceeded
+        A picture or an output of more than 2^28 pixels.
 
     Examples
     --------
@@ -161,7 +164,7 @@ def from_points(
     [15.0, 15.0]
 
     """
-    points = [_points(p, name) for p, name in ((source, "source"), (target, "target"))]
+    points = [as_array(p, name, np.float64, ("n", 2)) for p, name in ((source, "source"), (target, "target"))]
     sides = as_size(shape, "shape")
     out = sides if size is None else as_size(size)
     (found, triangle, _), corners = _rust.warp_points(points[0], points[1], (out[0], out[1]))
@@ -172,21 +175,11 @@ def from_points(
     sound = np.abs(np.linalg.det(edges[1])) > 1e-9  # The others are not drawn.
     frames[1:][sound] = edges[0][sound] @ np.linalg.inv(edges[1][sound])
     triangle = triangle.reshape(out)
-    return Triangles(_filled(found.reshape(*out, 2), triangle > 0, sides), triangle, frames)
+    return Triangles(_fill_holes(found.reshape(*out, 2), triangle > 0, sides), triangle, frames)
 
 
-def _points(points: Array, name: str) -> NDArray[np.float64]:
-    try:
-        array = np.ascontiguousarray(points, np.float64)
-    except (TypeError, ValueError):
-        raise InvalidInput(f"{name}: needs numbers, one (row, column) a point") from None
-    if array.ndim != 2 or array.shape[1] != 2:
-        raise InvalidInput(f"{name}: needs shape (n, 2), one (row, column) a point, got {array.shape}")
-    return array
-
-
-def _filled(places: Floats, covered: Bools, shape: Sequence[int]) -> Floats:
-    """Let pixels of no triangle look at their own place, in place."""
+def _fill_holes(places: Floats, covered: Bools, shape: Sequence[int]) -> Floats:
+    """Let pixels of no triangle come from their own place, in place."""
     holes = ~covered
     if holes.any():
         places[holes] = np.minimum(np.argwhere(holes), np.array(shape) - 1)
