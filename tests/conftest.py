@@ -1,7 +1,10 @@
 """What all tests share."""
 
+import os
+
 from hypothesis import settings
 
-# The same cases each time; `--hypothesis-profile=default` explores others.
 settings.register_profile("fixed", derandomize=True, deadline=None)
-settings.load_profile("fixed")
+settings.register_profile("fuzz", max_examples=2000, deadline=None, print_blob=True)
+# The same cases each time; new ones where they are asked for.
+settings.load_profile("fuzz" if os.environ.get("TEXRS_FUZZ", "0") not in ("", "0") else "fixed")

@@ -140,6 +140,8 @@ def _as_ndarray(value: object, name: str) -> Array:
         return np.asarray(value)
     except (ValueError, TypeError) as error:
         raise InvalidInput(f"{name}: not an array of numbers ({error})") from None
+    except MemoryError:
+        raise LimitExceeded(f"{name}: needs more memory than there is") from None
 
 
 def _contiguous(array: Array, name: str, dtype: np.dtype[Any]) -> Array:

@@ -82,7 +82,7 @@ def mean_shift(
 
     """
     given = as_image(image)
-    if given.dtype.kind == "f" and max(given.max(), -given.min()) > _MOST:
+    if given.dtype.kind == "f" and float(max(given.max(), -given.min())) > _MOST:
         raise InvalidInput(f"image: values up to {_MOST:g} are allowed, got {np.abs(given).max()}")
     ball = as_float(range, "range", 0, _MOST)
     near = _MOST if tolerance is None else as_float(tolerance, "tolerance", 0, _MOST)

@@ -10,7 +10,7 @@ from texrs._arrays import as_image
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 
-__all__ = ["LARGEST", "LEAST", "as_choice", "as_map", "centred"]
+__all__ = ["LARGEST", "LEAST", "as_map", "centred"]
 
 LEAST, LARGEST = 1e-3, 1e3
 """Scales that a map may hold."""
@@ -45,13 +45,6 @@ def as_map(value: object, name: str = "scale", shape: Sequence[int] | None = Non
             "1 is the normal size of an element, 2 twice that"
         )
     return np.ascontiguousarray(flat, dtype=np.float32)
-
-
-def as_choice(value: object, name: str, allowed: Sequence[str]) -> str:
-    """Check a word."""
-    if not isinstance(value, str) or value not in allowed:
-        raise InvalidInput(f"{name}: allowed are {', '.join(allowed[:-1])} and {allowed[-1]}; got {value!r}")
-    return value
 
 
 def centred(logs: Floats) -> Floats:

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from texrs._arrays import as_image, as_int, as_mask
+from texrs._arrays import as_choice, as_image, as_int, as_mask
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.scale_maps._extend import extend
-from texrs.scale_maps._maps import as_choice, centred
+from texrs.scale_maps._maps import centred
 from texrs.scale_maps._trend import Trend, as_trend, follow, gradient
 from texrs.scale_maps._windows import Lattice, smooth
 

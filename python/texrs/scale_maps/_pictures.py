@@ -8,10 +8,10 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float, as_image
+from texrs._arrays import as_choice, as_float, as_image
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
-from texrs.scale_maps._maps import as_choice, as_map
+from texrs.scale_maps._maps import as_map
 
 __all__ = ["Encoding", "decode", "encode", "picture"]
 

@@ -7,12 +7,12 @@ from typing import Literal
 
 import numpy as np
 
-from texrs._arrays import as_size
+from texrs._arrays import as_choice, as_size
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.scale_maps._angles import from_angles
 from texrs.scale_maps._extend import extend
-from texrs.scale_maps._maps import as_choice, as_map
+from texrs.scale_maps._maps import as_map
 
 __all__ = ["resample"]
 

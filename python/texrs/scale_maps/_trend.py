@@ -8,8 +8,8 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import as_choice
 from texrs._typing import Bools, Floats
-from texrs.scale_maps._maps import as_choice
 
 __all__ = ["TRENDS", "Trend", "as_trend", "follow", "gradient"]
 
