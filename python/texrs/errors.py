@@ -5,6 +5,10 @@ from __future__ import annotations
 __all__ = ["Cancelled", "FileError", "InvalidInput", "LimitExceeded", "TexrsError"]
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
 class TexrsError(Exception):
     """Root of everything that texrs raises on purpose."""
 

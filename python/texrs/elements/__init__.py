@@ -11,3 +11,7 @@ from texrs.elements._elements import FORMAT, Elements, Tag, digest, load
 from texrs.elements._pictures import pictures
 
 __all__ = ["FORMAT", "Elements", "Tag", "analyse", "digest", "load", "pictures"]
+
+
+def __dir__() -> list[str]:
+    return __all__

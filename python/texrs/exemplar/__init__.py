@@ -6,3 +6,7 @@ from texrs.exemplar.regularity import Lattice
 from texrs.exemplar.segmentation import Segmentation, segment
 
 __all__ = ["Analysis", "Exemplar", "Lattice", "Segmentation", "analyse", "as_exemplar", "repeats", "segment"]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -60,3 +60,7 @@ __all__ = [
     "spiral",
     "zigzag",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

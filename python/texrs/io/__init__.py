@@ -56,6 +56,10 @@ from texrs.io._npy import read_arrays
 __all__ = ["atomic", "read", "read_arrays", "read_volume", "write", "write_slabs", "write_surface", "write_volume"]
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
 def read(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
     """Read an image.
 

@@ -17,6 +17,10 @@ from texrs.kernels.patch_search import PatchIndex
 __all__ = ["Completion", "complete"]
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Completion:
     """A picture without holes, and where its new pixels come from.

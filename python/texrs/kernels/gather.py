@@ -14,6 +14,10 @@ from texrs.errors import InvalidInput
 __all__ = ["gather"]
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
 def gather(
     exemplars: Array | Sequence[Array],
     coordinates: Array,

@@ -12,6 +12,11 @@ from texrs.errors import InvalidInput
 
 __all__ = ["mean_shift"]
 
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 _MOST = 1e15
 
 

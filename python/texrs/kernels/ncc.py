@@ -12,6 +12,10 @@ from texrs.errors import InvalidInput
 __all__ = ["Correlation"]
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
 class Correlation:
     """An image made ready to be compared with many templates, whatever their brightness and contrast.
 

@@ -16,6 +16,11 @@ from texrs.errors import InvalidInput
 
 __all__ = ["Match", "PatchIndex"]
 
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 _MOST = 2**31 - 1
 
 

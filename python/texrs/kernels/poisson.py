@@ -14,6 +14,11 @@ from texrs.errors import InvalidInput
 
 __all__ = ["Boundary", "blend", "solve", "spread"]
 
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 Boundary: TypeAlias = Literal["dirichlet", "periodic", "free"]
 """What happens at the ends of an axis: the outermost pixels keep their values, the axis is cyclic,
 or nothing lies beyond."""

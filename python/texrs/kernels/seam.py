@@ -28,6 +28,11 @@ from texrs.errors import InvalidInput
 
 __all__ = ["Cut", "Labels", "OldSeams", "Strip", "binary_labels", "cut", "cut_strip", "cut_strips"]
 
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 Cost: TypeAlias = Literal["gradient", "paper"]
 
 

@@ -14,6 +14,11 @@ from texrs.errors import InvalidInput
 
 __all__ = ["Cholesky"]
 
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 LIMIT = 4 << 30
 """Bytes that a factor may take, unless a limit is given."""
 

@@ -16,6 +16,10 @@ from texrs.errors import InvalidInput
 __all__ = ["Triangles", "Warp", "from_points", "mesh"]
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Warp:
     """A warped mesh.

@@ -80,6 +80,11 @@ __all__ = [
     "wood_solid",
 ]
 
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 _PLANAR = (
     bark,
     beans,

@@ -55,3 +55,7 @@ __all__ = [
     "resample",
     "slant_for_ratio",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

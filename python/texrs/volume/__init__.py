@@ -59,3 +59,7 @@ __all__ = [
     "turntable",
     "two_point",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__
