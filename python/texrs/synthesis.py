@@ -1,8 +1,7 @@
-"""What a verb gives back: the picture, its source map, the stages and a report."""
+"""What a verb returns: the picture, its source map, the stages and a report."""
 
 from __future__ import annotations
 
-import io
 import json
 import re
 from collections.abc import Mapping
@@ -62,11 +61,9 @@ class Synthesis:
 
     def _repr_png_(self) -> bytes:
         """Show the image, or slices of a volume, in a notebook."""
-        import imageio.v3 as iio
+        from texrs.io._image_io import encode
 
-        buffer = io.BytesIO()
-        iio.imwrite(buffer, preview(self._flat(self.image)), extension=".png")
-        return buffer.getvalue()
+        return encode("image", preview(self._flat(self.image)), "png")
 
     def _flat(self, stage: Array) -> Array:
         """Return slices of what is as large as a volume; anything else is a picture already."""

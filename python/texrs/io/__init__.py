@@ -47,8 +47,7 @@ from texrs._arrays import MAX_PIXELS, as_int
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput
-from texrs.io import _files, _npy, _pillow, _slabs, _tiff, _volumes
-from texrs.io import _image_io as image_io
+from texrs.io import _files, _image_io, _npy, _pillow, _slabs, _tiff, _volumes
 from texrs.io._files import atomic
 from texrs.io._formats import FORMATS, VOLUMES, checked, kind_of, spacing_of
 from texrs.io._npy import read_arrays
@@ -121,8 +120,7 @@ def read(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
     if kind == "bmp":
         return _pillow.read_bmp(name, file, limit)
     with _files.speaking(name, "decoding"):
-        image = image_io.decode(file, limit=limit, name=str(name))
-        return _files.upright(image.pixels, image.orientation)
+        return _files.upright(*_image_io.decode(name, file, limit))
 
 
 def read_volume(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
@@ -381,5 +379,5 @@ def _write(path: PathLike, value: Array, axes: int, overwrite: bool, spacing: Se
         if suffix in (".jpg", ".jpeg", ".bmp"):
             file = _pillow.encode(array, ".bmp" if suffix == ".bmp" else ".jpg")
         else:
-            file = image_io.encode(array, suffix[1:], name=str(target))
+            file = _image_io.encode(target, array, suffix[1:])
         temporary.write_bytes(file)

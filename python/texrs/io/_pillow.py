@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from texrs import _rust
 from texrs._typing import Array
 from texrs.errors import FileError, LimitExceeded
 from texrs.io._files import check_size, speaking, upright
-from texrs.io._image_io import exif_orientation
 
 QUALITY = 95
 """Of JPEG files that are written; colour is not subsampled."""
@@ -140,7 +140,7 @@ def _jpeg(path: Path, file: bytes) -> _Jpeg:
             )
             header.channels = segment[9]
         if marker == 0xE1 and segment[4:10] == b"Exif\0\0":
-            header.orientation = exif_orientation(segment[10:])
+            header.orientation = _rust.exif_orientation(segment[10:])
         # Of the application's segments, only JFIF and Adobe say how pixels are coded.
         if marker == 0xEE or not (0xE1 <= marker <= 0xEF or marker == 0xFE):
             header.parts.append(segment)

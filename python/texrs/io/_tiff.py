@@ -14,7 +14,7 @@ import numpy as np
 
 from texrs._typing import Array
 from texrs.errors import FileError
-from texrs.io import _image_io as image_io
+from texrs.io import _image_io
 from texrs.io._files import check_size, load, size_of, speaking, upright
 
 _LZW, _JPEG = 5, 7
@@ -54,7 +54,7 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
         if first.compression not in tifffile.TIFF.DECOMPRESSORS:
             grey_or_rgb = first.photometric in (_WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB)
             if first.compression == _LZW and sides[0] == 1 and grey_or_rgb:
-                array = image_io.decode(load(path, limit), limit=limit, name=str(path)).pixels
+                array, _ = _image_io.decode(path, load(path, limit), limit)
                 return array.reshape(*sides, channels), orientation
             scheme = getattr(first.compression, "name", first.compression)
             raise FileError(f"{path}: is compressed by {scheme}; to read it, install the package imagecodecs")
