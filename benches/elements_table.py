@@ -14,8 +14,7 @@ import sys
 import time
 from pathlib import Path
 
-from texrs import elements as elements
-from texrs import io
+from texrs import elements, io
 from texrs.errors import TexrsError
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
@@ -23,23 +22,23 @@ from element_checks import annotated, passes, score
 
 
 def main(folder: Path, pictures: Path | None) -> None:
-    print("| texture | tag | start | elements | of | recall | inner | precision | error | mask | s | S1 |")
+    print("| texture | layout | start | elements | of | recall | inner | precision | error | mask | s | S1 |")
     print("|---|---|---|---|---|---|---|---|---|---|---|---|")
     totals = {"box": [0, 0, 0], "auto": [0, 0, 0]}
     for texture in annotated(folder):
         image = io.read(texture.image)
-        given = {"box": texture.box, "background": texture.background, "tag": texture.tag}
+        given = {"box": texture.box, "background": texture.background, "layout": texture.layout}
         for start, options in (("box", given), ("auto", {})):
             began = time.perf_counter()
             try:
                 found = elements.analyse(image, **options)
             except TexrsError as error:
-                print(f"| {texture.name} | {texture.tag} | {start} | {error} |")
+                print(f"| {texture.name} | {texture.layout} | {start} | {error} |")
                 continue
             seconds = time.perf_counter() - began
             total = totals[start]
-            total[2] += found.tag == texture.tag
-            row = [texture.name, texture.tag if start == "box" else f"{found.tag}", start, len(found.points)]
+            total[2] += found.layout == texture.layout
+            row = [texture.name, texture.layout if start == "box" else f"{found.layout}", start, len(found.points)]
             if texture.centres is None:
                 row += ["-", "-", "-", "-", "-"]
             else:
@@ -58,8 +57,8 @@ def main(folder: Path, pictures: Path | None) -> None:
             if pictures is not None:
                 for name, picture in elements.pictures(found).items():
                     io.write(pictures / f"{texture.name}-{start}-{name}.png", picture)
-    for start, (met, count, tags) in totals.items():
-        print(f"{start}: S1 met on {met} of {count}; tag right on {tags}")
+    for start, (met, count, layouts) in totals.items():
+        print(f"{start}: S1 met on {met} of {count}; layout right on {layouts}")
 
 
 if __name__ == "__main__":

@@ -20,9 +20,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 import splice_checks as checks
 import texrs
-from texrs import elements as elements
-from texrs import io, samples
-from texrs.elements import Elements
+from texrs import elements, io, samples
+from texrs.elements import Elements, Layout
 from texrs.errors import TexrsError
 from texrs.papers.splice.pictures import picture
 
@@ -44,7 +43,7 @@ def read(path: Path, *, auto: bool) -> Elements:
     x, y = box["center"]
     width, height = box["size"]
     ground = np.array(told["background_scribble"])[:, ::-1]
-    return elements.analyse(image, box=(y, x, height, width), background=ground, tag=told["tag"])
+    return elements.analyse(image, box=(y, x, height, width), background=ground, layout=told["tag"])
 
 
 def entries(folder: str | None, *, auto: bool) -> dict[str, Elements]:
@@ -66,7 +65,7 @@ def verdict(a: Elements, b: Elements, result: texrs.Synthesis) -> dict[str, floa
         "holes": result.report["holes"],
         "ground": checks.coherence(a, result)[0],
     }
-    if a.tag == "F=d":
+    if a.layout == Layout.DISJOINT:
         windows = checks.windows(a, result)
         if windows:
             found |= dict(zip(("found", "away"), checks.presence(a, result), strict=True))

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from texrs.elements import Layout
+
 TOLERANCE = 0.2
 """Distance between an element and its detection, as a share of the box along each axis."""
 
@@ -62,7 +64,7 @@ class Annotated:
 
     name: str
     image: Path
-    tag: str
+    layout: Layout
     box: tuple[float, float, float, float]
     background: Any
     centres: Any
@@ -76,7 +78,7 @@ class Annotated:
         return cls(
             path.stem,
             path.parent / given["image"],
-            given["tag"],
+            Layout(given["tag"]),
             (y, x, height, width),
             np.array(given["background_scribble"], float)[:, ::-1],
             np.array(centres, float)[:, ::-1] if centres else None,

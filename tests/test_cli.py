@@ -585,7 +585,7 @@ def test_no_name_that_a_command_makes_is_read(here: Path, capsys: Capture, comma
     SourceMap.identity((64, 64)).save("map.npz")
     iio.imwrite("many-1.png", COLOURS)
     mask = samples.load("dots", size=(64, 64)).mask
-    texrs.TextureDatabase("db").add("in.png", "dots", mask=mask, tag="F=d")
+    texrs.TextureDatabase("db").add("in.png", "dots", mask=mask, layout="disjoint")
     before = files(here)
     assert main(command.split()) == 2
     assert "is read" in complaint(capsys)

@@ -17,10 +17,11 @@ import pytest
 
 import texrs
 from texrs import TextureDatabase, samples
+from texrs.elements import ElementSearch, Layout
 from texrs.errors import FileError, InvalidInput
 
 DOTS = samples.load("dots", size=(96, 96))
-GIVEN = {"mask": DOTS.mask, "tag": "F=d"}
+GIVEN = {"mask": DOTS.mask, "layout": "disjoint"}
 
 
 @pytest.fixture
@@ -41,7 +42,7 @@ def test_what_is_added_is_kept(textures: TextureDatabase, said: list[str]) -> No
     assert "dots" in again
     assert len(again) == 1
     record = again.list()[0]
-    assert (record.tag, record.source, record.elements) == ("F=d", "dots.npy", len(again["dots"].points))
+    assert (record.layout, record.image, record.elements) == (Layout.DISJOINT, "dots.npy", len(again["dots"].points))
     assert again["dots"].sets is not None
     assert not said
 
@@ -50,11 +51,11 @@ def test_files_stay_where_they_are(tmp_path: Path, textures: TextureDatabase, sa
     file = tmp_path / "buttons.png"
     iio.imwrite(file, DOTS.image)
     before = textures.add(file, **GIVEN)
-    assert textures.list()[0].source == str(file)
+    assert textures.list()[0].image == str(file)
     assert not said
     iio.imwrite(file, DOTS.image[::-1])
     with pytest.raises(InvalidInput, match="contradicts|mask"):  # The mask of the old picture is not that of this one.
-        textures.add(file, "buttons", replace=True, mask=~DOTS.mask, tag="F=d")
+        textures.add(file, "buttons", replace=True, mask=~DOTS.mask, layout="disjoint")
     changed = textures["buttons"]
     assert said == ["buttons: made anew, for the entry is of another image"]
     assert (changed.image == DOTS.image[::-1]).all()
@@ -85,6 +86,19 @@ def test_a_damaged_entry_is_said_and_remade(textures: TextureDatabase, said: lis
     assert len(said) == 1
 
 
+def test_entries_are_remade_with_their_options(textures: TextureDatabase, said: list[str]) -> None:
+    search = ElementSearch(rotations=2, scales=[0.9, 1.0], threshold=0.5)
+    before = textures.add(DOTS.image, "turned", points=DOTS.centres, wrap=(True, False), search=search, **GIVEN)
+    kept = json.loads((textures.path / "manifest.json").read_text())["textures"]["turned"]["options"]
+    assert kept["search"] == {"rotations": 2, "scales": [0.9, 1.0], "threshold": 0.5, "channel": None, "model": None}
+    assert kept["layout"] == "disjoint"
+    (textures.path / "turned.npz").unlink()
+    after = textures["turned"]
+    assert said[0].startswith("turned: made anew")
+    assert (after.report, after.wrap, after.layout) == (before.report, before.wrap, before.layout)
+    np.testing.assert_array_equal(after.points, before.points)
+
+
 def test_an_entry_of_another_version_is_remade(textures: TextureDatabase, said: list[str]) -> None:
     manifest = textures.path / "manifest.json"
     table = json.loads(manifest.read_text())
@@ -95,7 +109,7 @@ def test_an_entry_of_another_version_is_remade(textures: TextureDatabase, said: 
     assert textures.list()[0].version == texrs.elements.FORMAT
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", '{"layout": 1}', '{"layout": 1, "textures": {"../x": {}}}', None])
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"version": 2}', '{"version": 2, "textures": {"../x": {}}}', None])
 def test_a_damaged_manifest_is_remade_from_the_entries(
     textures: TextureDatabase, said: list[str], text: str | None
 ) -> None:
@@ -117,7 +131,7 @@ def test_two_processes_may_write_at_once(tmp_path: Path) -> None:
     code = (
         "import sys, texrs; from texrs import samples\n"
         "dots = samples.load('dots', size=(64, 64)); db = texrs.TextureDatabase(sys.argv[1])\n"
-        "for i in range(4): db.add(dots.image, f'{sys.argv[2]}{i}', mask=dots.mask, tag='F=d')\n"
+        "for i in range(4): db.add(dots.image, f'{sys.argv[2]}{i}', mask=dots.mask, layout='disjoint')\n"
     )
     folder = str(tmp_path / "db")
     work = [subprocess.Popen([sys.executable, "-c", code, folder, name]) for name in "ab"]
@@ -181,8 +195,8 @@ def test_splices_and_their_matrix(textures: TextureDatabase, monkeypatch: pytest
             raise InvalidInput("a: is b")
         return SimpleNamespace(image=a.image[: (size or (96, 96))[0]])
 
-    monkeypatch.setattr(texrs, "splice", splice, raising=False)
-    textures.add(DOTS.image[:, ::-1].copy(), "other", mask=DOTS.mask[:, ::-1], tag="F=d")
+    monkeypatch.setattr("texrs.database._textures.splice", splice)
+    textures.add(DOTS.image[:, ::-1].copy(), "other", mask=DOTS.mask[:, ::-1], layout="disjoint")
     assert textures.splice("dots", "other", (40, 40), seed=3).image.shape == (40, 96, 3)
     assert calls[0][2:] == ((40, 40), {"seed": 3})
     made = textures.matrix(cell=32)
@@ -199,7 +213,10 @@ def test_splices_and_their_matrix(textures: TextureDatabase, monkeypatch: pytest
     [
         (lambda db: db.add(DOTS.image), "name: is needed for an array"),
         (lambda db: db.add(DOTS.image, "../up", **GIVEN), "name: letters, digits"),
-        (lambda db: db.add(DOTS.image[::-1], "dots", mask=DOTS.mask[::-1], tag="F=d"), "name: dots is there already"),
+        (
+            lambda db: db.add(DOTS.image[::-1], "dots", mask=DOTS.mask[::-1], layout="disjoint"),
+            "name: dots is there already",
+        ),
         (lambda db: db.add(DOTS.image, "x", boxes=3), "boxes: is no option"),
         (lambda db: db["nobody"], "name: there is no texture 'nobody'"),
         (lambda db: db.matrix(cell=3), "cell: needs an integer"),
@@ -222,6 +239,11 @@ def test_folders_that_are_none(tmp_path: Path, textures: TextureDatabase) -> Non
     (textures.path / "dots.npy").unlink()
     with pytest.raises(FileError, match="its image dots.npy is gone"):
         textures["dots"]
-    (textures.path / "manifest.json").write_text('{"layout": 9, "textures": {}}')
-    with pytest.raises(FileError, match="has layout 9"):
+    (textures.path / "manifest.json").write_text('{"version": 9, "textures": {}}')
+    with pytest.raises(FileError, match="is of version 9"):
+        textures.list()
+    (textures.path / "manifest.json").write_text('{"layout": 1, "textures": {}}')
+    with pytest.raises(
+        FileError, match="is of version 1, this texrs reads version 2; add the textures to a new folder"
+    ):
         textures.list()

@@ -9,14 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import texrs
 from element_checks import annotated, passes, score
-from texrs import _threads as threads
-from texrs import elements as elements
-from texrs import io, samples
-from texrs.elements import Elements, analyse
-from texrs.elements._clean import clean
+from texrs import elements, io, samples
+from texrs.elements import Elements, ElementSearch, Layout, analyse
 from texrs.elements._mixture import Mixture
 from texrs.elements._search import otsu
+from texrs.elements._separation import reconcile
 from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.layouts import directions
 
@@ -48,7 +47,7 @@ GROUND = [(c[0], c[1] + SPACING / 2) for c in CENTRES[[0, 7, 14, 21, 28]]]
 
 @pytest.fixture(scope="module")
 def entry() -> Elements:
-    return analyse(IMAGE, box=BOX, background=GROUND, tag="F=d")
+    return analyse(IMAGE, box=BOX, background=GROUND, layout="disjoint")
 
 
 # --- what is found ---------------------------------------------------------------------------------------------------
@@ -71,7 +70,7 @@ def test_elements_mask_and_places(entry: Elements) -> None:
 def test_samples_with_exact_centres(name: str, recall: float, overlap: float) -> None:
     sample = samples.load(name)
     box, ground = told(sample)
-    found = analyse(sample.image, box=box, background=ground, tag=sample.tag)
+    found = analyse(sample.image, box=box, background=ground, layout=sample.layout)
     result = score(found.points, sample.centres, box[2:], sample.image.shape)
     assert result.inner >= recall
     assert result.precision >= 0.95
@@ -96,7 +95,7 @@ def told(sample: samples.Sample) -> tuple:
 
 
 def test_a_mask_of_all_replaces_the_cut() -> None:
-    found = analyse(IMAGE, mask=MASK, tag="F=d")
+    found = analyse(IMAGE, mask=MASK, layout="disjoint")
     assert found.report["mask"] == "given"
     np.testing.assert_array_equal(found.mask, MASK)
     assert len(found.points) == len(CENTRES)
@@ -105,15 +104,15 @@ def test_a_mask_of_all_replaces_the_cut() -> None:
 def test_a_mask_of_one_is_a_start() -> None:
     rows, columns = np.indices(MASK.shape)
     one = MASK & (np.hypot(rows - CENTRES[8][0], columns - CENTRES[8][1]) < DISC + 2)
-    found = analyse(IMAGE, mask=one, background=GROUND, tag="F=d")
+    found = analyse(IMAGE, mask=one, background=GROUND, layout="disjoint")
     assert found.report["box"][:2] == CENTRES[8].astype(int).tolist()
-    assert analyse(IMAGE, mask=one, tag="F=d").report["proposed"] == ["background"]
+    assert analyse(IMAGE, mask=one, layout="disjoint").report["proposed"] == ["background"]
     assert score(found.points, CENTRES, BOX[2:], IMAGE.shape).recall == 1
 
 
 def test_points_that_are_listed_stay() -> None:
     listed = CENTRES[:7] + 0.25
-    found = analyse(IMAGE, points=listed, background=GROUND, tag="F=d")
+    found = analyse(IMAGE, points=listed, background=GROUND, layout="disjoint")
     np.testing.assert_array_equal(found.points, listed)
     assert found.mask[tuple(np.rint(listed).astype(int).T)].all()
 
@@ -122,7 +121,7 @@ def test_elements_that_look_like_the_ground_are_copies_of_the_box() -> None:
     grey = IMAGE[..., 1].copy()
     grey[MASK] = (grey[MASK] * 0.2 + 100).astype(np.uint8)
     grey[~MASK] = (grey[~MASK] * 0.3 + 88).astype(np.uint8)
-    found = analyse(grey, box=BOX, background=GROUND, tag="F=d")
+    found = analyse(grey, box=BOX, background=GROUND, layout="disjoint")
     assert score(found.points, CENTRES, BOX[2:], IMAGE.shape).recall > 0.8
     assert (found.mask & MASK).sum() / (found.mask | MASK).sum() > 0.6
 
@@ -139,13 +138,13 @@ def test_rotations_find_turned_elements() -> None:
         image[(abs(along) <= 12) & (abs(across) <= 4)] += 0.4
         centres.append(centre)
         angles.append(turn)
-    given = {"box": (20, 20, 11, 27), "background": [(40, 40), (80, 80), (120, 40)], "tag": "F=d", "threshold": 0.5}
-    found = analyse(image, rotations=4, **given)
+    given = {"box": (20, 20, 11, 27), "background": [(40, 40), (80, 80), (120, 40)], "layout": "disjoint"}
+    found = analyse(image, search=ElementSearch(rotations=4, threshold=0.5), **given)
     assert score(found.points, np.array(centres, float), (20, 20), image.shape).recall == 1
     assert found.angles is not None
     nearest = np.argmin(((found.points[:, None] - np.array(centres)) ** 2).sum(axis=-1), axis=1)
     np.testing.assert_array_equal(found.angles % 180, np.array(angles)[nearest])
-    assert len(analyse(image, **given).points) <= 16
+    assert len(analyse(image, search=ElementSearch(threshold=0.5), **given).points) <= 16
 
 
 def test_directions() -> None:
@@ -160,14 +159,14 @@ def test_directions() -> None:
 
 def test_the_automatic_start() -> None:
     found = analyse(IMAGE)
-    assert found.tag == "F=d"
-    assert found.report["proposed"] == ["box", "background", "tag"]
+    assert found.layout == Layout.DISJOINT
+    assert found.report["proposed"] == ["box", "background", "layout"]
     assert all(0 < sure <= 1 for sure in found.report["confidence"].values())
     assert passes(score(found.points, CENTRES, BOX[2:], IMAGE.shape))
 
 
 def test_the_letter_of_the_paper() -> None:
-    found = analyse(IMAGE, box=BOX, background=GROUND, tag="F=d", method="paper")
+    found = analyse(IMAGE, box=BOX, background=GROUND, layout="disjoint", method="paper")
     assert found.report["threshold"] == -1
     assert found.report["channel"] in range(8)
     assert len(found.points) > len(CENTRES)
@@ -181,7 +180,7 @@ def test_any_array(kind: str, entry: Elements) -> None:
         "sixteen": IMAGE.astype(np.uint16) * 257,
         "alpha": np.dstack([IMAGE, np.full(MASK.shape, 255, np.uint8)]),
     }[kind]
-    found = analyse(given, box=BOX, background=GROUND, tag="F=d")
+    found = analyse(given, box=BOX, background=GROUND, layout="disjoint")
     assert found.image.dtype == given.dtype
     assert score(found.points, CENTRES, BOX[2:], IMAGE.shape).recall == 1
     if kind != "grey":
@@ -192,7 +191,7 @@ def test_wrap() -> None:
     moved = np.roll(IMAGE, (SPACING // 2, SPACING // 2), (0, 1))
     place = (BOX[0] + SPACING // 2, BOX[1] + SPACING // 2, *BOX[2:])
     ground = [((r + SPACING / 2) % IMAGE.shape[0], (c + SPACING / 2) % IMAGE.shape[1]) for r, c in GROUND]
-    found = analyse(moved, box=place, background=ground, tag="F=d", wrap=True)
+    found = analyse(moved, box=place, background=ground, layout="disjoint", wrap=True)
     assert len(found.points) == len(CENTRES)
     assert found.wrap == (True, True)
 
@@ -200,8 +199,8 @@ def test_wrap() -> None:
 def test_same_bytes_for_any_number_of_threads() -> None:
     found = []
     for count in (1, 2, 7):
-        with threads(count):
-            made = analyse(IMAGE, box=BOX, background=GROUND, tag="F=d")
+        with texrs.threads(count):
+            made = analyse(IMAGE, box=BOX, background=GROUND, layout="disjoint")
             sets = made.similarity().sets
         found.append((made.points.tobytes(), made.mask.tobytes(), made.scores.tobytes(), sets.tobytes()))
     assert len(set(found)) == 1
@@ -226,7 +225,7 @@ def test_a_mixture_knows_its_colours() -> None:
 
 # --- bad input -------------------------------------------------------------------------------------------------------
 
-GOOD = {"box": BOX, "background": GROUND, "tag": "F=d"}
+GOOD = {"box": BOX, "background": GROUND, "layout": "disjoint"}
 HALF = np.zeros(MASK.shape, bool)
 HALF[:, :40] = True
 
@@ -248,33 +247,54 @@ HALF[:, :40] = True
         ({"background": [(5, 5), (5, 5)]}, "background: point 1, .* is there twice"),
         ({"background": [BOX[:2]]}, "background: contradicts the box"),
         ({"mask": MASK, "background": [tuple(CENTRES[3])]}, "background: contradicts the mask"),
-        ({"tag": "F=x"}, "tag: allowed are F=d"),
+        ({"layout": "F=x"}, "layout: allowed are disjoint"),
         ({"mask": HALF, "box": None, "background": None}, "box: is needed with this mask"),
-        ({"mask": HALF, "box": (80, 30, 30, 30), "background": None}, "tag: contradicts the mask: F=d means separate"),
-        ({"mask": MASK, "background": None, "tag": "F=c"}, "tag: contradicts the mask: F=c means a connected"),
+        (
+            {"mask": HALF, "box": (80, 30, 30, 30), "background": None},
+            "layout: contradicts the mask: disjoint means",
+        ),
+        (
+            {"mask": MASK, "background": None, "layout": "connected"},
+            "layout: contradicts the mask: connected means",
+        ),
         ({"mask": MASK[:5]}, "mask: needs shape"),
         ({"mask": np.ones_like(MASK)}, "mask: is all foreground"),
         ({"points": [(10, 10), (20, np.inf)]}, "points: must be finite, but point 1"),
         ({"points": [(10, 10), (20, 10), (10, 10)]}, "points: point 2, .* is there twice"),
         ({"points": [(10, 10), (20, 400)]}, "points: point 1, .* outside"),
         ({"points": [(10, 10, 3)]}, "points: needs points \\(row, column\\)"),
-        ({"rotations": 0}, "rotations: needs an integer from 1 to 72"),
-        ({"scales": []}, "scales: needs 1 to 16 numbers"),
-        ({"scales": [9.0]}, "scales\\[0\\]: needs a number"),
-        ({"threshold": 3}, "threshold: needs a number from -1 to 1"),
-        ({"channel": "third"}, "channel: allowed are"),
-        ({"model": "forest"}, "model: allowed are"),
+        ({"search": {"rotations": 0}}, "rotations: needs an integer from 1 to 72"),
+        ({"search": {"scales": []}}, "scales: needs 1 to 16 numbers"),
+        ({"search": {"scales": [9.0]}}, "scales\\[0\\]: needs a number"),
+        ({"search": {"threshold": 3}}, "threshold: needs a number from -1 to 1"),
+        ({"search": {"channel": "third"}}, "channel: allowed are"),
+        ({"search": {"model": "forest"}}, "model: allowed are"),
         ({"method": "letter"}, "method: None or 'paper' is allowed"),
     ],
 )
 def test_bad_input_gets_a_sentence(change: dict, message: str) -> None:
+    given = {**GOOD, **change}
     with pytest.raises(InvalidInput, match=message):
-        analyse(IMAGE, **{**GOOD, **change})
+        analyse(IMAGE, **{**given, "search": ElementSearch(**given.get("search", {}))})
+
+
+@pytest.mark.parametrize(("paper", "layout"), [("F=d", "disjoint"), ("F=c", "connected"), ("B=c", "jointed")])
+def test_layouts_go_by_two_names(paper: str, layout: str) -> None:
+    assert Layout(paper) is Layout(layout)
+    assert str(Layout(paper)) == layout
+    assert Elements(IMAGE, CENTRES, MASK, (19, 19), paper, np.ones(len(CENTRES))).layout is Layout(layout)
+
+
+def test_options_are_checked_where_they_are_made() -> None:
+    with pytest.raises(InvalidInput, match="search: needs a texrs.elements.ElementSearch, got dict"):
+        analyse(IMAGE, search={"rotations": 4})
+    with pytest.raises(TypeError):
+        ElementSearch(4)
 
 
 def test_too_few_elements() -> None:
     with pytest.raises(InvalidInput, match="image: [012] elements were found, at least 3 are needed; try another box"):
-        analyse(IMAGE, threshold=0.9999, method="paper", **GOOD)
+        analyse(IMAGE, search=ElementSearch(threshold=0.9999), method="paper", **GOOD)
 
 
 @pytest.mark.parametrize(
@@ -297,15 +317,15 @@ def test_nothing_to_be_found(image: np.ndarray) -> None:
 
 
 def test_an_entry_comes_back(tmp_path: Path, entry: Elements) -> None:
-    kept = entry.prepared(k=2)
+    kept = entry.with_similarity(k=2)
     kept.save(tmp_path / "e.npz")
     back = elements.load(tmp_path / "e.npz")
     for name in ("image", "points", "mask", "scores", "angles", "scales"):
         np.testing.assert_array_equal(getattr(back, name), getattr(kept, name))
-    assert (back.box, back.tag, back.peaks, back.wrap, back.report) == (
+    assert (back.box, back.layout, back.directions, back.wrap, back.report) == (
         kept.box,
-        kept.tag,
-        kept.peaks,
+        kept.layout,
+        kept.directions,
         kept.wrap,
         kept.report,
     )
@@ -323,14 +343,17 @@ def test_entries_that_cannot_be_read(tmp_path: Path, entry: Elements) -> None:
         np.savez(path, **{**parts, **change})
         return path
 
-    with pytest.raises(FileError, match="version 99, this texrs reads version"):
-        elements.load(written(texrs_elements=np.array(99)))
+    for version in (1, 99):
+        with pytest.raises(
+            FileError, match=f"version {version}, this texrs reads version 2; analyse the texture again"
+        ):
+            elements.load(written(texrs_elements=np.array(version)))
     with pytest.raises(FileError, match="damaged .*not the one that was analysed"):
         elements.load(written(image=255 - parts["image"]))
     with pytest.raises(FileError, match="damaged .*points"):
         elements.load(written(points=parts["points"][:, :1]))
-    with pytest.raises(FileError, match="damaged .*tag"):
-        elements.load(written(tag=np.frombuffer(b"F=x", np.uint8)))
+    with pytest.raises(FileError, match="damaged .*layout"):
+        elements.load(written(layout=np.frombuffer(b"F=x", np.uint8)))
     np.savez(path, other=np.zeros(3))
     with pytest.raises(FileError, match="is no entry"):
         elements.load(path)
@@ -358,7 +381,7 @@ def test_what_the_border_cuts_is_no_ground() -> None:
     ragged[70:, 30:34] = ragged[70:74, 30:50] = True
     inner = np.zeros_like(mask)
     inner[32:42, 66:69] = inner[32:35, 66:78] = True
-    found = clean(
+    found = reconcile(
         mask | ragged | inner, points, np.ones(4), np.ones((80, 80), np.float32), mask[12:29, 12:29], (False, False)
     )
     assert len(found.points) == 4
@@ -377,7 +400,7 @@ def test_s1_annotated_textures() -> None:
         if texture.centres is None:
             continue
         image = io.read(texture.image)
-        found = analyse(image, box=texture.box, background=texture.background, tag=texture.tag)
+        found = analyse(image, box=texture.box, background=texture.background, layout=texture.layout)
         result = score(found.points, texture.centres, texture.box[2:], image.shape)
         met += passes(result, recall_only="keyboard" in texture.name)
     assert met >= 7

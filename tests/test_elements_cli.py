@@ -10,9 +10,7 @@ import imageio.v3 as iio
 import numpy as np
 import pytest
 
-import texrs
-from texrs import elements as elements
-from texrs import samples
+from texrs import elements, samples
 from texrs.cli import main
 
 Capture = pytest.CaptureFixture[str]
@@ -36,9 +34,11 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_analyse_writes_what_the_function_finds(here: Path, capsys: Capture) -> None:
-    assert main(["analyse", "in.png", "-o", "e.npz", "--mask", "mask.png", "--tag", "F=d", "--stages", "st"]) == 0
+    assert (
+        main(["analyse", "in.png", "-o", "e.npz", "--mask", "mask.png", "--layout", "disjoint", "--stages", "st"]) == 0
+    )
     found = elements.load("e.npz")
-    wanted = elements.analyse(DOTS.image, mask=DOTS.mask, tag="F=d")
+    wanted = elements.analyse(DOTS.image, mask=DOTS.mask, layout="disjoint")
     np.testing.assert_array_equal(found.points, wanted.points)
     assert sorted(p.name for p in Path("st").iterdir()) == ["mask.png", "points.png"]
     assert "wrote e.npz" in capsys.readouterr().err
@@ -49,7 +49,7 @@ def test_places_may_follow_each_other(here: Path) -> None:
 
     box, ground = told(DOTS)
     places = [f"{r},{c}" for r, c in ground[:4]]
-    start = ["analyse", "in.png", "-q", "--box", ",".join(map(str, box)), "--tag", "F=d"]
+    start = ["analyse", "in.png", "-q", "--box", ",".join(map(str, box)), "--layout", "disjoint"]
     assert main([*start, "-o", "a.npz", "--background", *places]) == 0
     assert main([*start, "-o", "b.npz", *(x for p in places for x in ("--background", p))]) == 0
     assert main([*start, "-o", "c.npz", "--background", " ".join(places)]) == 0
@@ -58,7 +58,18 @@ def test_places_may_follow_each_other(here: Path) -> None:
 
 
 def test_given_points_and_an_automatic_start(here: Path, capsys: Capture) -> None:
-    command = ["analyse", "in.png", "-o", "e.npz", "--points", "points.csv", "--mask", "mask.png", "--tag", "F=d"]
+    command = [
+        "analyse",
+        "in.png",
+        "-o",
+        "e.npz",
+        "--points",
+        "points.csv",
+        "--mask",
+        "mask.png",
+        "--layout",
+        "disjoint",
+    ]
     assert main([*command, "--similarity"]) == 0
     found = elements.load("e.npz")
     assert len(found.points) >= len(DOTS.centres)
@@ -66,17 +77,21 @@ def test_given_points_and_an_automatic_start(here: Path, capsys: Capture) -> Non
     assert main(["analyse", "in.png", "-o", "e.npz"]) == 0
     told = capsys.readouterr().err
     assert re.search(r"proposed box: \d+,\d+,\d+,\d+ \(\d+% sure\)", told)
-    assert "proposed tag" in told
+    assert "proposed layout" in told
 
 
 def test_database(here: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert main(["database", "db", "add", "in.png", "--mask", "mask.png", "--tag", "F=d", "--name", "dots"]) == 0
-    assert main(["database", "db", "add", "sample:leaves_and_flowers", "-q", "--tag", "F=d"]) == 0
+    assert (
+        main(["database", "db", "add", "in.png", "--mask", "mask.png", "--layout", "disjoint", "--name", "dots"]) == 0
+    )
+    assert main(["database", "db", "add", "sample:leaves_and_flowers", "-q", "--layout", "disjoint"]) == 0
     capsys.readouterr()
     assert main(["database", "db", "list"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split("\t")[:2] for line in lines] == [["dots", "F=d"], ["leaves_and_flowers", "F=d"]]
-    monkeypatch.setattr(texrs, "splice", lambda a, b, *size, **options: SimpleNamespace(image=a.image), raising=False)
+    assert [line.split("\t")[:2] for line in lines] == [["dots", "disjoint"], ["leaves_and_flowers", "disjoint"]]
+    monkeypatch.setattr(
+        "texrs.database._textures.splice", lambda a, b, *size, **options: SimpleNamespace(image=a.image)
+    )
     assert main(["database", "db", "matrix", "-o", "sheet.png", "--cell", "32", "--size", "40x40"]) == 0
     assert iio.imread("sheet.png").shape == (108, 108, 3)
     (here / "db" / "dots.npz").write_bytes(b"x")
@@ -93,8 +108,11 @@ def test_database(here: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) 
         ("analyse in.png -o before.npz --background 10", "--background: needs ROW,COL"),
         ("analyse in.png -o before.npz --background 10,nan", "--background: needs ROW,COL"),
         ("analyse in.png -o before.npz --background 10,900", "--background: point 0, .* outside"),
-        ("analyse in.png -o before.npz --tag F=e", "--tag: allowed are F=d"),
-        ("analyse in.png -o before.npz --tag F=c --mask mask.png --box 48,48,20,20", "--tag: contradicts the mask"),
+        ("analyse in.png -o before.npz --layout F=e", "--layout: allowed are disjoint"),
+        (
+            "analyse in.png -o before.npz --layout connected --mask mask.png --box 48,48,20,20",
+            "--layout: contradicts the mask",
+        ),
         ("analyse in.png -o before.npz --points nan.csv", "--points: must be finite, but point 1"),
         ("analyse in.png -o before.npz --points twice.csv", "--points: point 2, .* is there twice"),
         ("analyse in.png -o before.npz --points words.csv", "words.csv: line 2 needs row,column, got 'here,there'"),

@@ -50,7 +50,7 @@ def test_shapes_and_types(name: str) -> None:
     assert sample.name == name
     assert sample.image.shape == (*shape, 3)
     assert sample.image.dtype == np.uint8
-    assert sample.tag in ("F=d", "F=c", "B=c", None)
+    assert sample.layout in ("disjoint", "connected", "jointed", None)
     assert (sample.centres is None) == (sample.labels is None)
     if sample.centres is not None and sample.labels is not None:
         assert sample.centres.dtype == np.float64

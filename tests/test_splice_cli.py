@@ -35,7 +35,7 @@ def test_self_splice_and_its_replay(tmp_path: Path) -> None:
 
 def test_entries_are_taken(tmp_path: Path) -> None:
     entry, out = tmp_path / "dots.npz", tmp_path / "out.png"
-    box = ["--box", "60,62,25,25", "--tag", "F=d"]
+    box = ["--box", "60,62,25,25", "--layout", "disjoint"]
     assert main(["analyse", "sample:dots", "-o", str(entry), *box, "-q"]) == 0
     assert main(["splice", str(entry), "sample:pebbles", "-o", str(out), "--size", "64", "-q"]) == 0
     assert io.read(out).shape == (64, 64, 3)

@@ -11,7 +11,7 @@ from scipy.spatial import Delaunay
 import texrs
 from texrs import layouts as matching
 from texrs import samples
-from texrs.elements import Elements
+from texrs.elements import Elements, Layout
 from texrs.papers.splice import layout, warp
 
 
@@ -70,7 +70,7 @@ def test_neighbours_in_walls_go_about_as_far() -> None:
         return float((apart / np.maximum(away, np.array(wall.box))).max())
 
     assert strain(torn) > 0.5
-    assert strain(found) < layout.EASE["B=c"] + 0.1
+    assert strain(found) < layout.EASE[Layout.JOINTED] + 0.1
     still = layout.eased(wall, layout.matched(wall, wall, (192, 192), align=True))
     assert np.ptp(still.shift, axis=0).max() < 2.0
 
@@ -80,7 +80,7 @@ def test_layouts_go_on_as_they_are(shifted: bool) -> None:
     """Beyond the border each point has the neighbours that points inside have."""
     points = lattice(7, 7, shifted=shifted, noise=0.5)
     shape = (160, 160)
-    found = matching.Layout.of(points, shape, (False, False), beyond=True)
+    found = matching.PointLayout.of(points, shape, (False, False), beyond=True)
     far = found.within(np.full(2, -60.0), np.full(2, 220.0))[0]
     inner = far[((far > -20) & (far < 180)).all(axis=1)]
     nearest = matching.nearest(inner, 6, far)[:, 1:5]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from texrs._arrays import check_memory
 from texrs.errors import InvalidInput
 
-__all__ = ["Fold", "Layout", "directions", "fold_of", "match", "nearest", "spacing"]
+__all__ = ["Fold", "PointLayout", "directions", "fold_of", "match", "nearest", "spacing"]
 
 Points = NDArray[np.float64]
 
@@ -241,7 +241,7 @@ def _misfit(points: Points, axis: int, sign: int, line: float, scale: float, inn
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Layout:
+class PointLayout:
     """A layout that goes on without end.
 
     Attributes
@@ -260,7 +260,7 @@ class Layout:
     scale: float
 
     @classmethod
-    def of(cls, points: Points, shape: Sequence[int], wrap: Sequence[bool], *, beyond: bool) -> Layout:
+    def of(cls, points: Points, shape: Sequence[int], wrap: Sequence[bool], *, beyond: bool) -> PointLayout:
         """Find how the layout of a picture goes on."""
         folds = [fold_of(points, a, (0.0, shape[a] - 1.0), wrap=wrap[a], beyond=beyond) for a in range(2)]
         return cls(points, (folds[0], folds[1]), spacing(points))

@@ -10,7 +10,7 @@ import re
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -21,7 +21,7 @@ from texrs.cli import _files
 from texrs.cli._console import Method, Quiet, Threads, as_method, complain, note, say, watching
 from texrs.cli._files import named
 from texrs.database import TextureDatabase
-from texrs.elements import Tag, analyse, pictures
+from texrs.elements import ElementSearch, analyse, pictures
 from texrs.errors import FileError, InvalidInput
 
 __all__ = ["analyse_command", "database_command"]
@@ -44,12 +44,12 @@ Places = Annotated[
         show_default="proposed",
     ),
 ]
-TagText = Annotated[
+LayoutText = Annotated[
     str | None,
     typer.Option(
-        "--tag",
-        metavar="TAG",
-        help="F=d: separate elements, F=c: a connected foreground, B=c: a connected background.",
+        "--layout",
+        metavar="LAYOUT",
+        help="disjoint: separate elements, connected: a connected foreground, jointed: elements parted by joints.",
         show_default="proposed",
     ),
 ]
@@ -80,7 +80,7 @@ Seed = Annotated[int, typer.Option(help="Chooses the samples of the colour model
 def read_options(
     box: BoxText = None,
     background: Places = None,
-    tag: TagText = None,
+    layout: LayoutText = None,
     mask: MaskFile = None,
     points: PointsFile = None,
     rotations: Rotations = 1,
@@ -96,15 +96,15 @@ def read_options(
         sizes = [float(s) for s in scales.split(":")]
     except ValueError:
         raise InvalidInput(f"--scales: needs numbers such as 0.8:1:1.25, got {scales!r}") from None
+    with named():
+        search = ElementSearch(rotations=rotations, scales=sizes, threshold=threshold)
     return {
         "box": None if box is None else _numbers(box, 4, "--box", "ROW,COL,HEIGHT,WIDTH, as in 96,92,50,50"),
         "background": _places(background or ()) or None,
-        "tag": cast(Tag | None, tag),
+        "layout": layout,
         "mask": None if mask is None else np.asarray(_files.read_hole(mask)) != 0,
         "points": None if points is None else read_points(points),
-        "rotations": rotations,
-        "scales": sizes,
-        "threshold": threshold,
+        "search": search,
         "method": how,
         "wrap": _files.parse_wrap(wrap),
         "seed": seed,
@@ -162,12 +162,12 @@ def analyse_command(
     with named(image=image, count="--threads"), threads(count), watching(quiet=quiet) as progress:
         entry = analyse(pixels, progress=progress, **options)
         if similarity:
-            entry = entry.prepared()
+            entry = entry.with_similarity()
     entry.save(out)
     if stages is not None:
         _draw(stages, entry)
     _explain(entry, quiet=quiet)
-    note(f"wrote {out}: {len(entry.points)} elements, {entry.tag}, in {time.monotonic() - start:.1f} s", quiet=quiet)
+    note(f"wrote {out}: {len(entry.points)} elements, {entry.layout}, in {time.monotonic() - start:.1f} s", quiet=quiet)
 
 
 @analysing
@@ -230,20 +230,19 @@ def database_command(
             with named(image=image, count="--threads"), threads(count), watching(quiet=quiet) as progress:
                 entry = textures.add(what, label, replace=replace, progress=progress, **options)
             _explain(entry, quiet=quiet)
-            note(f"added {image}: {len(entry.points)} elements, {entry.tag}", quiet=quiet)
+            note(f"added {image}: {len(entry.points)} elements, {entry.layout}", quiet=quiet)
         return
     if not os.path.isdir(folder):
         raise FileError(f"{folder}: there is no such folder")
     textures = TextureDatabase(folder, say=complain)
     if action == "list":
         for record in textures.list():
-            say(
-                f"{record.name}\t{record.tag}\t{record.elements} elements\tbox {','.join(map(str, record.box))}\t{record.source}"
-            )
+            box = ",".join(map(str, record.box))
+            say(f"{record.name}\t{record.layout}\t{record.elements} elements\tbox {box}\t{record.image}")
         return
     if out is None:
         raise InvalidInput("--out: matrix needs the name of an image file")
-    kept = [os.path.join(folder, file) for record in textures.list() for file in (record.file, record.source)]
+    kept = [os.path.join(folder, file) for record in textures.list() for file in (record.file, record.image)]
     _files.check_apart(kept, out=out)
     _files.check_output(out)
     shape = _files.parse_size(size)
@@ -312,7 +311,7 @@ def _explain(entry: Any, *, quiet: bool) -> None:
     """Say what was proposed, how sure that is, and what is doubtful."""
     sure = entry.report.get("confidence", {})
     for name in entry.report["proposed"]:
-        value = {"box": ",".join(map(str, entry.report["box"])), "tag": entry.tag}.get(name, "as drawn")
+        value = {"box": ",".join(map(str, entry.report["box"])), "layout": entry.layout}.get(name, "as drawn")
         note(f"proposed {name}: {value} ({sure.get(name, 0):.0%} sure)", quiet=quiet)
     for doubt in entry.report["doubts"]:
         note(f"doubtful: {doubt}", quiet=quiet)

@@ -9,7 +9,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -17,13 +17,13 @@ import numpy as np
 
 from texrs import io
 from texrs._typing import Array
-from texrs.elements import FORMAT, Elements, digest, load
+from texrs.elements import FORMAT, Elements, ElementSearch, Layout, digest, load
 from texrs.errors import FileError, InvalidInput, TexrsError
 
-__all__ = ["NAME", "Folder", "Record", "check_free", "given_again"]
+__all__ = ["NAME", "Folder", "Record", "check_free", "restore_option"]
 
 MANIFEST, LOCK = "manifest.json", ".lock"
-LAYOUT = 1
+VERSION = 2
 """Of the manifest."""
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 PATIENCE, PAUSE = 60.0, 0.05
@@ -37,11 +37,11 @@ class Record:
     name: str
     file: str
     """Of the entry, in the folder."""
-    source: str
-    """Of the image: in the folder, or elsewhere."""
+    image: str
+    """File of the image: in the folder, or elsewhere."""
     hash: str
     version: int
-    tag: str
+    layout: Layout
     box: tuple[int, ...]
     elements: int
     options: Mapping[str, Any] = field(repr=False)
@@ -60,26 +60,26 @@ class Folder:
         self,
         name: str,
         entry: Elements,
-        source: str,
+        image: str,
         options: Mapping[str, Any],
         *,
         pixels: Array | None = None,
         replace_other: bool = True,
     ) -> Elements:
-        """Write an entry, its ``pixels`` where they are in no other file, and what the manifest says of it."""
+        """Write an entry, its ``pixels`` into the file ``image`` where they are given, and what the manifest says of it."""
         plain = {k: _plain(v) for k, v in options.items()}
         # With all that the manifest needs, should that be lost.
-        entry = replace(entry, report={**entry.report, "database": {"source": source, "options": plain}})
+        entry = replace(entry, report={**entry.report, "database": {"image": image, "options": plain}})
         file = f"{name}.npz"
-        record = _of(name, file, entry)
+        record = _record_of(name, file, entry)
         with self._locked():
             found = self._parse()
-            found = self._found() if found is None else found
+            found = self._scan() if found is None else found
             # Another process may have taken the name while this one analysed.
             if not replace_other:
                 check_free(found, name, record.hash)
             if pixels is not None:
-                io.write(self.path / source, pixels)
+                io.write(self.path / image, pixels)
             entry.save(self.path / file)
             found[name] = record
             self._write(found)
@@ -92,7 +92,7 @@ class Folder:
             with self._locked():
                 found = self._parse()
                 if found is None:
-                    found = self._found()
+                    found = self._scan()
                     self.tell(f"{self.path / MANIFEST}: damaged; made anew from {len(found)} entries")
                     self._write(found)
         return found
@@ -107,32 +107,34 @@ class Folder:
             return None
         try:
             table = json.loads(text)
-            if int(table["layout"]) > LAYOUT:
+            version = int(table.get("version", 1))
+            if version != VERSION:
                 raise FileError(
-                    f"{self.path / MANIFEST}: has layout {table['layout']}, this texrs reads up to {LAYOUT}"
+                    f"{self.path / MANIFEST}: is of version {version}, this texrs reads version {VERSION}; "
+                    "add the textures to a new folder"
                 )
-            return {name: _record(name, item) for name, item in table["textures"].items()}
+            return {name: _read_record(name, item) for name, item in table["textures"].items()}
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
             return None
 
-    def _found(self) -> dict[str, Record]:
+    def _scan(self) -> dict[str, Record]:
         found = {}
         for file in sorted(self.path.glob("*.npz")):
             with suppress(TexrsError):
                 if NAME.fullmatch(file.stem):
-                    found[file.stem] = _of(file.stem, file.name, load(file))
+                    found[file.stem] = _record_of(file.stem, file.name, load(file))
         return found
 
     def _write(self, found: Mapping[str, Record]) -> None:
         table = {
-            "layout": LAYOUT,
+            "version": VERSION,
             "textures": {
                 name: {
                     "file": r.file,
-                    "source": r.source,
+                    "image": r.image,
                     "hash": r.hash,
                     "version": r.version,
-                    "tag": r.tag,
+                    "layout": r.layout,
                     "box": list(r.box),
                     "elements": r.elements,
                     "options": dict(r.options),
@@ -169,9 +171,9 @@ class Folder:
             warnings.warn(sentence, stacklevel=5)
 
 
-def check_free(found: Mapping[str, Record], name: str, image: str) -> None:
+def check_free(found: Mapping[str, Record], name: str, hash: str) -> None:
     """Check that no texture of another image has the name."""
-    if name in found and found[name].hash != image:
+    if name in found and found[name].hash != hash:
         raise InvalidInput(f"name: {name} is there already, of another image; replace=True replaces it")
 
 
@@ -192,23 +194,23 @@ def _lock(number: int) -> bool:
     return True
 
 
-def _of(name: str, file: str, entry: Elements) -> Record:
+def _record_of(name: str, file: str, entry: Elements) -> Record:
     kept = entry.report.get("database", {})
     box = tuple(int(n) for n in entry.report.get("box", (0, 0, *entry.box)))
-    source, options = str(kept.get("source", "")), dict(kept.get("options", {}))
-    return Record(name, file, source, digest(entry.image), FORMAT, entry.tag, box, len(entry.points), options)
+    image, options = str(kept.get("image", "")), dict(kept.get("options", {}))
+    return Record(name, file, image, digest(entry.image), FORMAT, entry.layout, box, len(entry.points), options)
 
 
-def _record(name: str, item: Mapping[str, Any]) -> Record:
+def _read_record(name: str, item: Mapping[str, Any]) -> Record:
     if not NAME.fullmatch(name) or FilePath(item["file"]).name != item["file"]:
         raise ValueError(name)
     return Record(
         name,
         str(item["file"]),
-        str(item["source"]),
+        str(item["image"]),
         str(item["hash"]),
         int(item["version"]),
-        str(item["tag"]),
+        Layout(item["layout"]),
         tuple(int(n) for n in item["box"]),
         int(item["elements"]),
         dict(item["options"]),
@@ -216,10 +218,12 @@ def _record(name: str, item: Mapping[str, Any]) -> Record:
 
 
 def _plain(value: Any) -> Any:
-    """Write an option as text and numbers; a mask by its runs."""
+    """Return an option as text, numbers, and lists and tables of them; a mask by its runs."""
     if isinstance(value, np.ndarray) and value.dtype.kind in "b" and value.ndim == 2:
         changes = np.flatnonzero(np.diff(value.ravel().astype(np.int8), prepend=0))
         return {"shape": list(value.shape), "changes": changes.tolist()}
+    if isinstance(value, ElementSearch):
+        return {k: _plain(v) for k, v in asdict(value).items()}
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, np.generic):
@@ -229,8 +233,10 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def given_again(value: Any) -> Any:
-    """Return an option as it was before it was written."""
+def restore_option(value: Any) -> Any:
+    """Return an option as it was before `_plain` wrote it."""
+    if isinstance(value, dict) and "shape" not in value:
+        return ElementSearch(**value)
     if isinstance(value, dict):
         rows, columns = (int(n) for n in value["shape"])
         steps = np.zeros(rows * columns, np.int8)

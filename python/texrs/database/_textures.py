@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path as FilePath
-from typing import Any
+from typing import Literal, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from texrs import io
 from texrs._arrays import as_image, as_int, guidance
 from texrs._typing import Array, Path, Progress
-from texrs.database._folder import NAME, Folder, Record, check_free, given_again
-from texrs.elements import FORMAT, Elements, analyse, digest, load
+from texrs.database._folder import NAME, Folder, Record, check_free, restore_option
+from texrs.elements import FORMAT, Elements, ElementSearch, Layout, LayoutName, analyse, digest, load
 from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.papers.splice import splice
 from texrs.synthesis import Synthesis
@@ -24,12 +24,30 @@ __all__ = ["Matrix", "TextureDatabase"]
 
 GAP = 4
 """Pixels between the pictures of a sheet."""
-OPTIONS = {"box", "mask", "background", "tag", "points", "rotations", "scales", "threshold", "channel", "model"} | {
-    "method",
-    "wrap",
-    "seed",
-}
-"""What `texrs.elements.analyse` takes, and an entry is remade with."""
+
+
+class AnalyseOptions(TypedDict, total=False):
+    """What `texrs.elements.analyse` takes, and an entry is remade with."""
+
+    box: Sequence[float] | None
+    mask: object
+    background: object
+    layout: Layout | LayoutName | None
+    points: object
+    search: ElementSearch
+    method: Literal["paper"] | None
+    wrap: bool | Sequence[bool]
+    seed: int
+
+
+class SpliceOptions(TypedDict, total=False):
+    """What `texrs.splice` takes besides two textures and a size."""
+
+    seed: int
+    method: Literal["paper", "preview"] | None
+    align: bool
+    snap_rows: bool
+    refine: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +58,7 @@ class Matrix:
     """Those that give their elements."""
     columns: tuple[str, ...]
     """Those that give their arrangement."""
-    results: Mapping[tuple[str, str], Any]
+    results: Mapping[tuple[str, str], Synthesis]
     sheet: NDArray[np.uint8]
     """All of them in a picture, the textures themselves along its left and its upper edge."""
     failed: Mapping[tuple[str, str], str]
@@ -73,9 +91,9 @@ class TextureDatabase:
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     textures = TextureDatabase(folder)
     ...     dots = samples.load("dots", size=(96, 96))
-    ...     _ = textures.add(dots.image, "dots", mask=dots.mask, tag="F=d")
-    ...     [(record.name, record.tag) for record in textures.list()]
-    [('dots', 'F=d')]
+    ...     _ = textures.add(dots.image, "dots", mask=dots.mask, layout="disjoint")
+    ...     [(record.name, str(record.layout)) for record in textures.list()]
+    [('dots', 'disjoint')]
 
     """
 
@@ -115,7 +133,7 @@ class TextureDatabase:
         replace: bool = False,
         similarity: bool = False,
         progress: Progress | None = None,
-        **options: Any,
+        **options: Unpack[AnalyseOptions],
     ) -> Elements:
         """Analyse a texture and keep it.
 
@@ -146,9 +164,11 @@ class TextureDatabase:
             The file cannot be read, or the entry not written.
 
         """
-        unknown = sorted(set(options) - OPTIONS)
+        unknown = sorted(set(options) - AnalyseOptions.__annotations__.keys())
         if unknown:
-            raise InvalidInput(f"{unknown[0]}: is no option; allowed are {', '.join(sorted(OPTIONS))}")
+            raise InvalidInput(
+                f"{unknown[0]}: is no option; allowed are {', '.join(sorted(AnalyseOptions.__annotations__))}"
+            )
         file = os.path.abspath(os.fspath(image)) if isinstance(image, str | os.PathLike) else None
         if name is None:
             if file is None:
@@ -161,12 +181,11 @@ class TextureDatabase:
             check_free(self._folder.read(), name, digest(pixels))
         entry = analyse(pixels, progress=progress, **options)
         if similarity:
-            entry = entry.prepared()
-        source = f"{name}.npy" if file is None else file
+            entry = entry.with_similarity()
         return self._folder.keep(
             name,
             entry,
-            source,
+            f"{name}.npy" if file is None else file,
             {**options, "similarity": similarity} if similarity else options,
             pixels=pixels if file is None else None,
             replace_other=replace,
@@ -196,17 +215,17 @@ class TextureDatabase:
         image = self._image(record)
         if image is None:
             if entry is None:
-                raise FileError(f"{self.path / record.file}: {reason}, and its image {record.source} is gone")
+                raise FileError(f"{self.path / record.file}: {reason}, and its image {record.image} is gone")
             return entry
         if entry is not None and digest(image) == digest(entry.image):
             return entry
         self._folder.tell(f"{name}: made anew, for the entry {reason or 'is of another image'}")
-        options = {k: given_again(v) for k, v in record.options.items()}
+        options = {k: restore_option(v) for k, v in record.options.items()}
         similar = bool(options.pop("similarity", False))
         entry = analyse(image, progress=progress, **options)
-        return self._folder.keep(name, entry.prepared() if similar else entry, record.source, record.options)
+        return self._folder.keep(name, entry.with_similarity() if similar else entry, record.image, record.options)
 
-    def splice(self, a: str, b: str, size: Sequence[int] | None = None, **options: Any) -> Synthesis:
+    def splice(self, a: str, b: str, size: Sequence[int] | None = None, **options: Unpack[SpliceOptions]) -> Synthesis:
         """Splice two textures: the elements of ``a`` in the arrangement of ``b``; see `texrs.splice`."""
         return splice(self.analyse(a), self.analyse(b), size, **options)
 
@@ -218,7 +237,7 @@ class TextureDatabase:
         size: Sequence[int] | None = None,
         cell: int = 160,
         progress: Progress | None = None,
-        **options: Any,
+        **options: Unpack[SpliceOptions],
     ) -> Matrix:
         """Splice textures with each other, as figure 8 of the paper shows it.
 
@@ -283,7 +302,7 @@ class TextureDatabase:
 
     def _image(self, record: Record) -> Array | None:
         try:
-            return as_image(io.read(self.path / record.source))
+            return as_image(io.read(self.path / record.image))
         except TexrsError:
             return None
 

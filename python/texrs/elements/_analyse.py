@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float, as_image, as_int, as_mask, as_seed, as_wrap, check_memory, guidance
+from texrs._arrays import as_image, check_memory, guidance
 from texrs._typing import Array, Bools, Floats, Progress
-from texrs.elements import _given, _mask, _start
-from texrs.elements._clean import Cleaned, add_missing, clean, components
-from texrs.elements._elements import Elements, Tag
-from texrs.elements._given import Box
-from texrs.elements._search import Channel, Found, search
+from texrs.elements import _mask
+from texrs.elements._arguments import Given, check_consistency, find_contradiction, usual_box
+from texrs.elements._elements import Elements
+from texrs.elements._layout import Layout, LayoutName
+from texrs.elements._options import ElementSearch, Settings
+from texrs.elements._proposal import Start, propose
+from texrs.elements._search import Detections, search_similar
+from texrs.elements._separation import Separation, add_missing, reconcile
 from texrs.errors import InvalidInput
 from texrs.layouts import directions, spacing
 
@@ -39,13 +43,9 @@ def analyse(
     box: Sequence[float] | None = None,
     mask: object = None,
     background: object = None,
-    tag: Tag | None = None,
+    layout: Layout | LayoutName | None = None,
     points: object = None,
-    rotations: int = 1,
-    scales: Sequence[float] = (1.0,),
-    threshold: float | None = None,
-    channel: Channel | None = None,
-    model: _mask.Model | None = None,
+    search: ElementSearch = ElementSearch(),  # noqa: B008
     method: Literal["paper"] | None = None,
     wrap: bool | Sequence[bool] = False,
     seed: int = 0,
@@ -53,7 +53,7 @@ def analyse(
 ) -> Elements:
     """Find the elements of a texture, what belongs to them and how they are connected [1]_.
 
-    Everything may be left out: then the element, the background and the tag are proposed, and the report says how sure
+    Everything may be left out: then the element, the background and the layout are proposed, and the report says how sure
     that is.
 
     Parameters
@@ -66,20 +66,13 @@ def analyse(
         The foreground: of the chosen element if it lies within the box, else of the whole image, which is then not cut.
     background : (n, 2) points or (H, W) array of bool, optional
         Places (row, column) that lie between the elements, each good for 4 pixels around, or all that is known.
-    tag : {"F=d", "F=c", "B=c"}, optional
-        Separate elements, a connected foreground, or a connected background.
+    layout : Layout or str, optional
+        Separate elements ("disjoint"), a connected foreground ("connected"), or elements parted by joints ("jointed"); the
+        paper's "F=d", "F=c" and "B=c" are accepted.
     points : (n, 2) array, optional
         The elements (row, column), instead of a search.
-    rotations : int
-        How many directions the element is looked for in, 1 to 72.
-    scales : sequence of float
-        Sizes in which it is looked for, 0.25 to 4.
-    threshold : float, optional
-        Least similarity, -1 to 1. By default what best parts the candidates in two classes (Otsu).
-    channel : {"weighted", "min-entropy"}, optional
-        The similarity of all channels by their variance, or that of the least entropy.
-    model : {"mixture", "nearest"}, optional
-        Colours as mixtures of Gaussians, or by the nearest sample.
+    search : ElementSearch
+        How the element is looked for: directions, sizes, least similarity, and how colours are modelled.
     method : {None, "paper"}
         "paper": the published algorithm, its misprints repaired: one channel, no cut, nearest samples, no cleaning.
     wrap : bool or (rows, columns)
@@ -92,13 +85,13 @@ def analyse(
     Returns
     -------
     Elements
-        Points by falling similarity, mask, tag and the directions in which the points line up.
+        Points by falling similarity, mask, layout and the directions in which the points line up.
 
     Raises
     ------
     InvalidInput
         An argument of another shape, type or range; a box outside of the image; a background that contradicts box or
-        mask; a tag that contradicts the mask; or fewer than three elements.
+        mask; a layout that contradicts the mask; or fewer than three elements.
 
     References
     ----------
@@ -107,10 +100,9 @@ def analyse(
 
     Examples
     --------
-    >>> from texrs import samples
-    >>> from texrs import elements as elements
+    >>> from texrs import elements, samples
     >>> sample = samples.load("dots", size=(128, 128))
-    >>> found = elements.analyse(sample.image, mask=sample.mask, tag="F=d")
+    >>> found = elements.analyse(sample.image, mask=sample.mask, layout="disjoint")
     >>> len(found.points) >= len(sample.centres)
     True
 
@@ -118,263 +110,172 @@ def analyse(
     pixels = as_image(image, "image", minimum=SHORTEST)
     size = (pixels.shape[0], pixels.shape[1])
     check_memory(BYTES * size[0] * size[1], "image")
-    rows, columns = as_wrap(wrap)
-    how = _How.of(method, channel, model, rotations, scales, threshold, (rows, columns), seed)
-    given = None if box is None else _given.as_box(box, size)
-    known, said = _given.as_background(background, size), _given.as_tag(tag)
-    marked = None if mask is None else as_mask(mask, "mask", size)
-    listed = None if points is None else _given.as_points(points, size, "points")
-    watch = _Watch(progress)
-    guide = guidance(pixels)
-    if guide.shape[-1] == 2:
-        guide = np.concatenate([guide, guide[..., :1]], axis=-1)
+    how = Settings.of(search, method, wrap, seed)
+    given = Given.of(size, how.wrap, box=box, layout=layout, background=background, mask=mask, points=points)
+    watch = progress or (lambda stage, share: None)
+    guide = _three_channels(guidance(pixels))
 
-    # 1. The element, the background and the tag: as said, or proposed.
-    shape: Bools | None = None
-    whole: Bools | None = None
-    if marked is not None:
-        if not marked.any() or marked.all():
-            raise InvalidInput(f"mask: is {'all' if marked.any() else 'no'} foreground")
-        given = _given.chosen(marked, given, said, components(marked, how.wrap)[0])
-        shape, whole = _shape(marked, given, how.wrap)
-    report: dict[str, Any] = {"proposed": [], "doubts": []}
-    blind = known is None and whole is None
-    if given is None or blind or said is None:
-        proposal = _start.propose(guide, how.wrap, given, known, whole, said, listed, watch.part("propose"))
-        report["proposed"] = [
-            name for name, missing in (("box", given is None), ("background", blind), ("tag", said is None)) if missing
-        ]
-        report["confidence"] = proposal.confidence
-        given, said = proposal.box, proposal.tag
-        if blind:
-            known = proposal.background & ~marked if marked is not None else proposal.background
-    _given.check_agreement(marked, known, given, said)
-    if whole is not None:
-        _agree(whole, said, how.wrap)
+    # 1. The element, the background and the layout: as said, or proposed.
+    start = propose(guide, given, how.wrap, partial(watch, "propose"))
+    _check(given, start, how)
 
-    # 2. Where the texture looks like it.
-    found = _listed(listed, size) if listed is not None else how.search(guide, given, watch.part("search"))
-    watch("separate", 0.0)
+    # 2. Where the texture looks like the element.
+    found = _detect(guide, given, start, how, partial(watch, "search"))
 
     # 3. What belongs to the elements.
-    cut = whole if whole is not None else how.cut(guide, given, found, known, said, shape)
-    result = _agreed(cut, found, given, said, shape, how, listed=listed is not None, certain=whole is not None)
-    if len(result.points) < FEWEST:
+    watch("separate", 0.0)
+    parted = _separate(guide, given, start, found, how)
+    if len(parted.points) < FEWEST:
         raise InvalidInput(
-            f"image: {len(result.points)} elements were found, at least {FEWEST} are needed; try another box, more "
+            f"image: {len(parted.points)} elements were found, at least {FEWEST} are needed; try another box, more "
             f"rotations or scales, a lower threshold (it was {found.threshold:.2f}), or give the points"
         )
-    if "box" in report["proposed"] and said == "F=d" and result.source == "cut" and not how.literal and listed is None:
-        again = _centred(pixels, result, known, how)
-        if again is not None:
-            return replace(
-                again, report={**again.report, "proposed": report["proposed"], "confidence": proposal.confidence}
-            )
-    if whole is None:
-        doubt = _given.disagreement(
-            result.mask, said, components(result.mask, how.wrap)[0], _ground(result.mask, how.wrap)
-        )
-        if doubt:
-            report["doubts"].append(doubt)
-    if not LITTLE <= result.mask.mean() <= MUCH:
-        report["doubts"].append(f"{result.mask.mean():.0%} of the image is foreground")
-    report |= {
-        "box": [*given.centre, *given.size],
-        "background": [] if known is None else _some_points(known),
-        "method": method or "default",
-        "channel": found.channel,
-        "threshold": found.threshold,
-        "detections": len(found.points),
-        "added": int((result.origin < 0).sum()),
-        "mask": "given" if whole is not None else result.source,
-        "foreground": float(result.mask.mean()),
-        "spacing": spacing(result.points),
-    }
-    picked = [found.templates[found.which[i] if i >= 0 else 0] for i in result.origin]
+    entry = _reanalyse(pixels, given, start, parted, how) or _entry(pixels, given, start, found, parted, how)
     watch("separate", 1.0)
-    return Elements(
-        pixels,
-        result.points,
-        result.mask,
-        given.size,
-        said,
-        result.scores,
-        directions(result.points),
-        how.wrap,
-        report,
-        np.array([t.angle for t in picked]),
-        np.array([t.scale for t in picked]),
+    return entry
+
+
+def _three_channels(guide: Floats) -> Floats:
+    """Return colours of two channels with the first one twice: what is compared has one or three."""
+    return np.concatenate([guide, guide[..., :1]], axis=-1) if guide.shape[-1] == 2 else guide
+
+
+def _check(given: Given, start: Start, how: Settings) -> None:
+    """Check that what is said of a texture, and what was proposed for the rest, does not contradict itself."""
+    check_consistency(given.mask, start.background, start.box, start.layout)
+    trouble = "" if given.whole is None else find_contradiction(given.whole, start.layout, how.wrap)
+    if trouble:
+        raise InvalidInput(f"layout: contradicts the mask: {trouble}")
+
+
+def _detect(guide: Floats, given: Given, start: Start, how: Settings, progress: Any) -> Detections:
+    """Find the places that look like the element, or take the points that are listed, all equally like it."""
+    if given.points is not None:
+        size = guide.shape[:2]
+        pixels = np.clip(np.floor(given.points + 0.5).astype(np.intp), 0, np.array(size) - 1)
+        ones = np.ones(len(pixels))
+        return Detections(
+            pixels, given.points, ones, np.zeros(len(pixels), np.intp), np.ones(size, np.float32), -1.0, None
+        )
+    return search_similar(
+        guide,
+        start.box.centre,
+        start.box.size,
+        wrap=how.wrap,
+        options=how.search,
+        cut=not how.literal,
+        progress=progress,
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _How:
-    """How to look, checked."""
-
-    literal: bool
-    channel: Channel
-    model: _mask.Model
-    rotations: int
-    scales: Sequence[float]
-    threshold: float | None
-    wrap: tuple[bool, bool]
-    seed: int
-
-    @classmethod
-    def of(
-        cls,
-        method: str | None,
-        channel: Channel | None,
-        model: _mask.Model | None,
-        rotations: int,
-        scales: Sequence[float],
-        threshold: float | None,
-        wrap: tuple[bool, bool],
-        seed: int,
-    ) -> _How:
-        if method not in (None, "paper"):
-            raise InvalidInput(f"method: None or 'paper' is allowed, got {method!r}")
-        literal = method == "paper"
-        channel = ("min-entropy" if literal else "weighted") if channel is None else channel
-        model = ("nearest" if literal else "mixture") if model is None else model
-        if channel not in ("weighted", "min-entropy"):
-            raise InvalidInput(f"channel: allowed are weighted and min-entropy; got {channel!r}")
-        if model not in ("mixture", "nearest"):
-            raise InvalidInput(f"model: allowed are mixture and nearest; got {model!r}")
-        turns, chance = as_int(rotations, "rotations", 1, 72), as_seed(seed)
-        if (
-            isinstance(scales, str | bytes)
-            or not isinstance(scales, Sequence | np.ndarray)
-            or not 1 <= len(scales) <= 16
-        ):
-            raise InvalidInput(f"scales: needs 1 to 16 numbers, got {scales!r}")
-        sizes = [as_float(s, f"scales[{i}]", 0.25, 4.0) for i, s in enumerate(scales)]
-        least = None if threshold is None else as_float(threshold, "threshold", -1, 1)
-        return cls(literal, channel, model, turns, sizes, least, wrap, chance)
-
-    def search(self, guide: Floats, box: Box, progress: Any) -> Found:
-        return search(
-            guide,
-            box.centre,
-            box.size,
-            wrap=self.wrap,
-            rotations=self.rotations,
-            scales=self.scales,
-            channel=self.channel,
-            threshold=self.threshold,
-            cut=not self.literal,
-            progress=progress,
-        )
-
-    def cut(
-        self, guide: Floats, box: Box, found: Found, background: Bools | None, tag: Tag, shape: Bools | None
-    ) -> Bools:
-        centres = np.concatenate([[box.centre], found.pixels])
-        ground = np.zeros(guide.shape[:2], bool) if background is None else background
-        mask = _mask.cut(
-            _mask.lab(guide),
-            centres,
-            box.size,
-            ground,
-            tag=tag,
-            shape=shape,
-            wrap=self.wrap,
-            seed=self.seed,
-            model=self.model,
-        )
-        if self.literal:
-            return mask
-        return _mask.tidy(mask, float(_mask.ellipse(box.size).sum()), net=tag != "F=d")
-
-
-def _agreed(
-    cut: Bools, found: Found, box: Box, tag: Tag, shape: Bools | None, how: _How, *, listed: bool, certain: bool
-) -> Cleaned:
-    """Make detections and mask agree, as far as the tag says how."""
-    plain = Cleaned(found.points, found.scores, np.arange(len(found.points)), cut, "cut")
+def _separate(guide: Floats, given: Given, start: Start, found: Detections, how: Settings) -> Separation:
+    """Tell the elements from the ground, and make detections and mask agree as far as the layout says how."""
+    mask = given.whole if given.whole is not None else _cut(guide, given, start, found, how)
+    plain = Separation(found.points, found.scores, np.arange(len(found.points)), mask, "cut")
     if how.literal or not len(found.points):
         return plain
-    if tag == "F=d":
-        own = shape if shape is not None else _mask.ellipse(box.size)
-        cleaned = clean(cut, found.points, found.scores, found.map, own, how.wrap, certain=certain)
+    listed = given.points is not None
+    if start.layout == Layout.DISJOINT:
+        own = given.shape if given.shape is not None else _mask.ellipse(start.box.size)
+        certain = given.whole is not None
+        agreed = reconcile(mask, found.points, found.scores, found.similarity, own, how.wrap, certain=certain)
         # What a user lists stays as it is; the mask alone follows.
-        return replace(plain, mask=cleaned.mask, source=cleaned.source) if listed else cleaned
-    at = np.clip(np.rint(found.points).astype(np.intp), 0, np.array(cut.shape) - 1)
-    if not listed and (tag == "B=c" or cut[tuple(at.T)].mean() < 0.5):
-        return add_missing(plain, found.map, how.wrap, joints=tag == "B=c")
+        return replace(plain, mask=agreed.mask, made_by=agreed.made_by) if listed else agreed
+    at = np.clip(np.rint(found.points).astype(np.intp), 0, np.array(mask.shape) - 1)
+    jointed = start.layout == Layout.JOINTED
+    if not listed and (jointed or mask[tuple(at.T)].mean() < 0.5):
+        return add_missing(plain, found.similarity, how.wrap, joints=jointed)
     return plain
 
 
-def _centred(pixels: Array, result: Cleaned, known: Bools | None, how: _How) -> Elements | None:
-    """Analyse again from the box of a usual piece of the mask: what was proposed may lie beside the middle of an element."""
+def _cut(guide: Floats, given: Given, start: Start, found: Detections, how: Settings) -> Bools:
+    """Cut the foreground out by its colours (section 3.3)."""
+    mask = _mask.cut_foreground(
+        _mask.to_lab(guide),
+        np.concatenate([[start.box.centre], found.pixels]),
+        start.box.size,
+        np.zeros(guide.shape[:2], bool) if start.background is None else start.background,
+        layout=start.layout,
+        shape=given.shape,
+        wrap=how.wrap,
+        seed=how.seed,
+        model=how.model,
+    )
+    if how.literal:
+        return mask
+    area = float(_mask.ellipse(start.box.size).sum())
+    return _mask.tidy_mask(mask, area, net=start.layout != Layout.DISJOINT)
+
+
+def _reanalyse(pixels: Array, given: Given, start: Start, parted: Separation, how: Settings) -> Elements | None:
+    """Analyse again from the box of a usual piece of the mask: what was proposed may lie beside the middle of an element.
+
+    Return None where the box was said, or where that finds far fewer elements.
+    """
+    disjoint = start.layout == Layout.DISJOINT and parted.made_by == "cut"
+    if "box" not in start.proposed or not disjoint or how.literal or given.points is not None:
+        return None
     try:
-        middle = _given.chosen(result.mask, None, "F=d", components(result.mask, how.wrap)[0])
+        middle = usual_box(parted.mask, Layout.DISJOINT, how.wrap)
         again = analyse(
             pixels,
             box=(*middle.centre, *middle.size),
-            background=known,
-            tag="F=d",
-            rotations=how.rotations,
-            scales=how.scales,
-            threshold=how.threshold,
-            channel=how.channel,
-            model=how.model,
+            background=start.background,
+            layout=Layout.DISJOINT,
+            search=how.search,
             wrap=how.wrap,
             seed=how.seed,
         )
     except InvalidInput:
         return None
-    return again if len(again.points) >= AGAIN * len(result.points) else None
+    if len(again.points) < AGAIN * len(parted.points):
+        return None
+    return replace(again, report={**again.report, "proposed": start.proposed, "confidence": start.confidence})
 
 
-class _Watch:
-    def __init__(self, progress: Progress | None) -> None:
-        self.progress = progress
-
-    def __call__(self, stage: str, share: float) -> None:
-        if self.progress is not None:
-            self.progress(stage, share)
-
-    def part(self, stage: str) -> Any:
-        return lambda share: self(stage, share)
-
-
-def _shape(mask: Bools | None, box: Box, wrap: tuple[bool, bool]) -> tuple[Bools | None, Bools | None]:
-    """Tell a mask of the chosen element, cut out with its box, from one of the whole image."""
-    if mask is None:
-        return None, None
-    inside = np.zeros(mask.shape, bool)
-    _mask.stamp(inside, np.array([box.centre]), np.ones(tuple(n + 2 for n in box.size), bool), wrap)
-    pieces, count = components(mask, wrap)
-    crossing = np.unique(pieces[mask & inside])
-    alone = not (mask & ~inside).any() or (count == 1 and not len(crossing))
-    corner = [box.centre[a] - box.size[a] // 2 for a in range(2)]
-    window = [np.arange(corner[a], corner[a] + box.size[a]) for a in range(2)]
-    own: Bools = mask[
-        np.ix_(*(w % n if c else np.clip(w, 0, n - 1) for w, n, c in zip(window, mask.shape, wrap, strict=True)))
-    ]
-    if not own.any():
-        raise InvalidInput("mask: has no foreground in the box")
-    return own, None if alone else mask
-
-
-def _agree(mask: Bools, tag: Tag, wrap: tuple[bool, bool]) -> None:
-    trouble = _given.disagreement(mask, tag, components(mask, wrap)[0], _ground(mask, wrap))
-    if trouble:
-        raise InvalidInput(f"tag: contradicts the mask: {trouble}")
+def _entry(pixels: Array, given: Given, start: Start, found: Detections, parted: Separation, how: Settings) -> Elements:
+    """Return the entry of a texture, with a report of what was found and decided."""
+    report: dict[str, Any] = {
+        "proposed": start.proposed,
+        "doubts": _doubts(given, start, parted, how),
+        "confidence": start.confidence,
+        "box": [*start.box.centre, *start.box.size],
+        "background": [] if start.background is None else _sample_places(start.background),
+        "method": "paper" if how.literal else "default",
+        "channel": found.channel,
+        "threshold": found.threshold,
+        "detections": len(found.points),
+        "added": int((parted.detection < 0).sum()),
+        "mask": "given" if given.whole is not None else parted.made_by,
+        "foreground": float(parted.mask.mean()),
+        "spacing": spacing(parted.points),
+    }
+    templates = [found.templates[found.template[i] if i >= 0 else 0] for i in parted.detection]
+    return Elements(
+        pixels,
+        parted.points,
+        parted.mask,
+        start.box.size,
+        start.layout,
+        parted.scores,
+        directions(parted.points),
+        how.wrap,
+        report,
+        np.array([t.angle for t in templates]),
+        np.array([t.scale for t in templates]),
+    )
 
 
-def _ground(mask: Bools, wrap: tuple[bool, bool]) -> Any:
-    return components(~mask, wrap)[0]
+def _doubts(given: Given, start: Start, parted: Separation, how: Settings) -> list[str]:
+    """Return what speaks against the result, in words."""
+    share = parted.mask.mean()
+    found = [] if given.whole is not None else [find_contradiction(parted.mask, start.layout, how.wrap)]
+    if not LITTLE <= share <= MUCH:
+        found.append(f"{share:.0%} of the image is foreground")
+    return [doubt for doubt in found if doubt]
 
 
-def _listed(points: NDArray[np.float64], shape: tuple[int, ...]) -> Found:
-    """Take points as they are given, all equally like the element."""
-    pixels = np.clip(np.floor(points + 0.5).astype(np.intp), 0, np.array(shape) - 1)
-    scores = np.ones(len(points))
-    return Found(pixels, points, scores, np.zeros(len(points), np.intp), np.ones(shape, np.float32), -1.0, None)
-
-
-def _some_points(marked: Bools, most: int = 64) -> list[list[int]]:
-    places = np.argwhere(marked)
+def _sample_places(marked: Bools, most: int = 64) -> list[list[int]]:
+    """Return at most about so many of the pixels that are marked, evenly spread."""
+    places: NDArray[np.intp] = np.argwhere(marked)
     return [[int(r), int(c)] for r, c in places[:: max(1, len(places) // most)]]

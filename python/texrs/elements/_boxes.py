@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from texrs._typing import Floats
-from texrs.elements._given import LEAST, Box
-from texrs.elements._mask import lab, odd
+from texrs.elements._arguments import LEAST, Box
+from texrs.elements._mask import nearest_odd, to_lab
 from texrs.exemplar.regularity import lattice
 from texrs.exemplar.segmentation import segment
 
-__all__ = ["proposed", "resized"]
+__all__ = ["propose_boxes", "resize_box"]
 
 SIGMAS = (2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)
 """Standard deviations under which blobs are looked for there, in pixels."""
@@ -22,26 +22,26 @@ LARGEST = 0.34
 """Longest side of a box as a share of the image's: three must fit."""
 
 
-def proposed(small: Floats) -> list[Box]:
+def propose_boxes(small: Floats) -> list[Box]:
     """List boxes worth trying, none twice."""
     size = (small.shape[0], small.shape[1])
-    found: list[tuple[float, float, float, float]] = [*_blobs(small), *_pieces(small), *_periods(small)]
+    found: list[tuple[float, float, float, float]] = [*_find_blobs(small), *_find_pieces(small), *_find_periods(small)]
     kept: dict[tuple[int, ...], Box] = {}
     for row, column, height, width in found:
         if min(height, width) < LEAST + 2 or height > LARGEST * size[0] or width > LARGEST * size[1]:
             continue
         centre = (int(np.floor(row + 0.5)), int(np.floor(column + 0.5)))
-        sides = (odd(height), odd(width))
+        sides = (nearest_odd(height), nearest_odd(width))
         if all(sides[a] // 2 <= centre[a] < size[a] - sides[a] // 2 for a in range(2)):
             kept[(*centre, *sides)] = Box(centre, sides)
     return list(kept.values())
 
 
-def _blobs(small: Floats) -> list[tuple[float, float, float, float]]:
+def _find_blobs(small: Floats) -> list[tuple[float, float, float, float]]:
     """Find round things: tops of the normalised Laplacian in scale and space (Lindeberg 1998)."""
     from scipy.ndimage import gaussian_laplace, maximum_filter
 
-    light = lab(small)[..., 0]
+    light = to_lab(small)[..., 0]
     stack = np.stack([-(s * s) * gaussian_laplace(light, s, mode="nearest") for s in SIGMAS])
     found = []
     for sign in (1.0, -1.0):
@@ -62,7 +62,7 @@ def _blobs(small: Floats) -> list[tuple[float, float, float, float]]:
     return found
 
 
-def _pieces(small: Floats) -> list[tuple[float, float, float, float]]:
+def _find_pieces(small: Floats) -> list[tuple[float, float, float, float]]:
     """Take pieces of a segmentation by colour, of the usual size."""
     from skimage.measure import regionprops
 
@@ -84,7 +84,7 @@ def _pieces(small: Floats) -> list[tuple[float, float, float, float]]:
     return found
 
 
-def _periods(small: Floats) -> list[tuple[float, float, float, float]]:
+def _find_periods(small: Floats) -> list[tuple[float, float, float, float]]:
     """Take the cell of the lattice that the image repeats on, at its evenest places."""
     from scipy.ndimage import gaussian_gradient_magnitude, uniform_filter
 
@@ -96,7 +96,7 @@ def _periods(small: Floats) -> list[tuple[float, float, float, float]]:
     found = []
     for share in (1.0, 0.5):
         height, width = (max(5.0, share * s) for s in sides)
-        even = uniform_filter(edges, (odd(height * 0.7), odd(width * 0.7)))
+        even = uniform_filter(edges, (nearest_odd(height * 0.7), nearest_odd(width * 0.7)))
         rows, columns = (int(s / 2) + 1 for s in (height, width))
         inner = even[rows:-rows, columns:-columns]
         if not inner.size:
@@ -107,11 +107,11 @@ def _periods(small: Floats) -> list[tuple[float, float, float, float]]:
     return found
 
 
-def resized(box: Box, size: tuple[int, ...]) -> list[Box]:
+def resize_box(box: Box, size: tuple[int, ...]) -> list[Box]:
     """List the boxes with one side a third longer or shorter, or both, that fit."""
     found = []
     for tall, wide in ((1.35, 1), (1, 1.35), (0.74, 1), (1, 0.74), (1.35, 1.35), (0.74, 0.74)):
-        sides = (odd(box.size[0] * tall + 0.5), odd(box.size[1] * wide + 0.5))
+        sides = (nearest_odd(box.size[0] * tall + 0.5), nearest_odd(box.size[1] * wide + 0.5))
         fits = all(sides[a] // 2 <= box.centre[a] < size[a] - sides[a] // 2 for a in range(2))
         if fits and min(sides) >= LEAST + 2 and all(sides[a] <= LARGEST * size[a] for a in range(2)):
             found.append(Box(box.centre, sides))

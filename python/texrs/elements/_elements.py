@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,17 +14,15 @@ from numpy.typing import NDArray
 from texrs._arrays import as_image
 from texrs._engine.coherence import Similarity
 from texrs._typing import Array, Path
+from texrs.elements._layout import Layout
 from texrs.errors import FileError, InvalidInput
 from texrs.exemplar import analysis
 from texrs.io import atomic, read_arrays
 from texrs.samples import Sample
 
-FORMAT = 1
+FORMAT = 2
 """Of the file, and of what the analysis gives: an entry of another one is made anew."""
 MARK = "texrs_elements"
-
-#: How a texture is made: separate elements on a ground, one connected figure, or elements in a connected ground (mortar).
-Tag = Literal["F=d", "F=c", "B=c"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,14 +36,14 @@ class Elements:
     points : ndarray of shape (n, 2), float64
         The centres of the elements, (row, column), in pixels.
     mask : ndarray of shape (height, width), bool
-        The foreground: True on elements (for ``B=c`` too: the mortar is where it is False).
+        The foreground: True on elements (where they are jointed too: the mortar is where it is False).
     box : tuple of int
         Height and width of an element's box, odd, in pixels.
-    tag : {"F=d", "F=c", "B=c"}
-        Disjoint foreground, connected foreground, or connected background.
+    layout : Layout
+        How the elements hang together: disjoint, connected or jointed. What a `Layout` can be made from becomes one.
     scores : ndarray of shape (n,), float64
         How alike each element is to the chosen one, -1 to 1.
-    peaks : tuple of float
+    directions : tuple of float
         The directions in which the points line up, degrees in [0, 180), strongest first; empty where they do not.
     wrap : tuple of bool
         Whether the texture repeats without a seam along rows and columns.
@@ -56,25 +54,28 @@ class Elements:
     scales : ndarray of shape (n,), float64, optional
         How many times larger each element is, as far as was looked for.
     sets : Similarity, optional
-        What `similarity` gives, where it was made to be kept.
+        What `similarity` returns, where it was made to be kept.
     """
 
     image: NDArray[Any]
     points: NDArray[np.float64]
     mask: NDArray[np.bool_]
     box: tuple[int, int]
-    tag: Tag
+    layout: Layout
     scores: NDArray[np.float64]
-    peaks: tuple[float, ...] = ()
+    directions: tuple[float, ...] = ()
     wrap: tuple[bool, bool] = (False, False)
     report: dict[str, Any] = field(default_factory=dict)
     angles: NDArray[np.float64] | None = None
     scales: NDArray[np.float64] | None = None
     sets: Similarity | None = None
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "layout", Layout(self.layout))
+
     def __repr__(self) -> str:
         rows, columns = self.image.shape[:2]
-        return f"Elements({len(self.points)} of box {self.box} in {rows} x {columns}, {self.tag})"
+        return f"Elements({len(self.points)} of box {self.box} in {rows} x {columns}, {self.layout})"
 
     @classmethod
     def of_sample(cls, sample: Sample, *, wrap: tuple[bool, bool] = (False, False)) -> Elements:
@@ -97,7 +98,7 @@ class Elements:
         >>> from texrs import samples
         >>> from texrs.elements import Elements
         >>> Elements.of_sample(samples.bricks((96, 96)))
-        Elements(3 of box (25, 47) in 96 x 96, B=c)
+        Elements(3 of box (25, 47) in 96 x 96, jointed)
 
         """
         from scipy.ndimage import find_objects
@@ -107,8 +108,8 @@ class Elements:
         found = [box for box in find_objects(sample.labels) if box is not None]
         height, width = (int(np.median([box[axis].stop - box[axis].start for box in found])) | 1 for axis in (0, 1))
         mask = sample.labels > 0 if sample.mask is None else sample.mask
-        tag: Tag = "F=d" if sample.tag is None else sample.tag
-        return cls(sample.image, sample.centres, mask, (height, width), tag, np.ones(len(sample.centres)), wrap=wrap)
+        layout = Layout(sample.layout or "disjoint")
+        return cls(sample.image, sample.centres, mask, (height, width), layout, np.ones(len(sample.centres)), wrap=wrap)
 
     def similarity(self, *, k: int = 3, progress: Callable[[float], object] | None = None) -> Similarity:
         """Return what each pixel of the texture may be replaced by: itself and the ``k - 1`` that look most like it.
@@ -117,10 +118,9 @@ class Elements:
 
         Examples
         --------
-        >>> from texrs import samples
-        >>> from texrs import elements as elements
+        >>> from texrs import elements, samples
         >>> sample = samples.load("dots", size=(64, 64))
-        >>> elements.analyse(sample.image, mask=sample.mask, tag="F=d").similarity(k=2).sets.shape
+        >>> elements.analyse(sample.image, mask=sample.mask, layout="disjoint").similarity(k=2).sets.shape
         (4096, 2)
 
         """
@@ -129,7 +129,7 @@ class Elements:
         analysed = analysis.analyse(self.image, axes=2, wrap=self.wrap, radii=(2,))
         return analysis.similarity(analysed, len(analysed.levels) - 1, k=k, progress=progress)
 
-    def prepared(self, *, k: int = 3, progress: Callable[[float], object] | None = None) -> Elements:
+    def with_similarity(self, *, k: int = 3, progress: Callable[[float], object] | None = None) -> Elements:
         """Return the entry with its similarity sets, so that they are saved with it."""
         return replace(self, sets=self.similarity(k=k, progress=progress))
 
@@ -149,10 +149,10 @@ class Elements:
             "points": self.points,
             "mask": self.mask,
             "box": np.array(self.box, np.int64),
-            "tag": _text(self.tag),
+            "layout": _text(self.layout),
             "scores": self.scores,
             # An array of no length cannot be told from a damaged one.
-            "peaks": np.array([np.nan, *self.peaks]),
+            "directions": np.array([np.nan, *self.directions]),
             "wrap": np.array(self.wrap, bool),
             "report": _text(json.dumps(self.report, allow_nan=False)),
         }
@@ -196,10 +196,9 @@ def load(path: Path) -> Elements:
         image = as_image(parts["image"])
         if _words(parts["hash"]) != digest(image):
             raise InvalidInput("its image is not the one that was analysed")
-        word, report = _words(parts["tag"]), json.loads(_words(parts["report"]))
-        tag: Tag | None = next((t for t in get_args(Tag) if t == word), None)
-        if tag is None or not isinstance(report, dict):
-            raise InvalidInput(f"tag {word!r}")
+        layout, report = Layout(_words(parts["layout"])), json.loads(_words(parts["report"]))
+        if not isinstance(report, dict):
+            raise InvalidInput("report")
         count, size = len(parts["points"]), image.shape[:2]
         shapes = {"points": (count, 2), "mask": size, "box": (2,), "scores": (count,), "wrap": (2,)}
         shapes |= {name: (count,) for name in ("angles", "scales") if name in parts}
@@ -219,9 +218,9 @@ def load(path: Path) -> Elements:
             parts["points"].astype(np.float64),
             parts["mask"],
             (rows, columns),
-            tag,
+            layout,
             parts["scores"].astype(np.float64),
-            tuple(float(p) for p in parts["peaks"][1:]),
+            tuple(float(p) for p in parts["directions"][1:]),
             (bool(parts["wrap"][0]), bool(parts["wrap"][1])),
             report,
             parts.get("angles"),

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from texrs._engine.noise import uniform
 from texrs._typing import Bools, Floats
-from texrs.elements._elements import Tag
+from texrs.elements._layout import Layout
 from texrs.elements._mixture import Mixture
+from texrs.elements._options import Model
 from texrs.kernels.seam import binary_labels
 
-__all__ = ["Model", "cut", "disc", "ellipse", "lab", "stamp", "tidy"]
+__all__ = ["cut_foreground", "disc", "ellipse", "nearest_odd", "stamp", "tidy_mask", "to_lab"]
 
-Model: TypeAlias = Literal["mixture", "nearest"]
 Wrap: TypeAlias = tuple[bool, bool]
 
 SMOOTH = 2.0
@@ -29,15 +29,15 @@ SAMPLES = 4000
 """Colours of each side that a model is made from."""
 HOLE, SPECK = 0.1, 0.25
 """Largest hole that is filled, as a share of its component, and smallest component that is kept, of the chosen element."""
-CORE, MESH, RIM, FAR = 0.8, 0.6, 0.9, 1.3
-"""Of the box: the middle, that of a mesh, what lies around it, and from where on a picture of separate elements is background."""
+CORE, MESH, OUTER, FAR = 0.8, 0.6, 0.9, 1.3
+"""Of the box: the middle, that of a mesh, what lies around it, and from where on separate elements' picture is ground."""
 WHOLE = 0.35
 """Distance from the border, as a share of the box, from which on what was found is taken as an example."""
 ALIKE = 0.3
 """Share of what may be a net, those colours least like the background, that it is learnt from."""
 
 
-def lab(guide: Floats) -> Floats:
+def to_lab(guide: Floats) -> Floats:
     """Return Lab / 100, so that a just visible difference is about 0.02."""
     from skimage.color import rgb2lab
 
@@ -74,13 +74,13 @@ def stamp(mask: Bools, points: NDArray[Any], shape: Bools, wrap: Wrap) -> None:
     mask[tuple(places[keep].T)] = True
 
 
-def cut(
+def cut_foreground(
     colours: Floats,
     centres: NDArray[Any],
     box: tuple[int, int],
     background: Bools,
     *,
-    tag: Tag,
+    layout: Layout,
     shape: Bools | None = None,
     wrap: Wrap = (False, False),
     seed: int = 0,
@@ -98,25 +98,25 @@ def cut(
         Of an element.
     background : (H, W) bool
         Known background.
-    tag : Tag
+    layout : Layout
         Elements that are no net fill the middles of their boxes.
     shape : bool, optional
         What of the chosen one's box is foreground, where it is certain.
     """
     size = background.shape
-    if tag == "B=c" and model == "mixture":
-        colours = level(colours, max(box), wrap)
+    if layout == Layout.JOINTED and model == "mixture":
+        colours = flatten_shading(colours, max(box), wrap)
     flat = colours.reshape(-1, 3).astype(np.float64)
 
-    def around(places: NDArray[Any], part: Bools) -> Bools:
+    def mark(places: NDArray[Any], part: Bools) -> Bools:
         marked = np.zeros(size, bool)
         stamp(marked, places, part, wrap)
         return marked
 
     def cost(mine: Sequence[NDArray[np.float64]], number: int) -> NDArray[np.float64]:
-        samples = np.concatenate([_some(m, SAMPLES // len(mine), seed + number) for m in mine if len(m)])
+        samples = np.concatenate([_subsample(m, SAMPLES // len(mine), seed + number) for m in mine if len(m)])
         if model == "nearest":
-            return _nearest(flat, samples)
+            return _nearest_costs(flat, samples)
         return -Mixture.fit(samples, seed=seed + number).log(flat)
 
     half = WHOLE * np.array(box)
@@ -126,32 +126,32 @@ def cut(
     centres = centres[whole.all(axis=1)]
     known = flat[background.ravel()]
     core = shape if shape is not None else ellipse(box, CORE)
-    sure = around(centres[:1], core) & ~background
-    fore, back = around(centres, core) & ~background, np.zeros(size, bool)
-    away, mesh = cost([known], 0), False
-    if tag == "F=c" and shape is None:
-        sure[:] = False
-        rim = around(centres, ~ellipse(box, RIM)) & ~background
-        mesh = bool(np.median(away[fore.ravel()]) < np.median(away[rim.ravel()]))
+    certain = mark(centres[:1], core) & ~background
+    fore, back = mark(centres, core) & ~background, np.zeros(size, bool)
+    unlikeness, mesh = cost([known], 0), False
+    if layout == Layout.CONNECTED and shape is None:
+        certain[:] = False
+        outer = mark(centres, ~ellipse(box, OUTER)) & ~background
+        mesh = bool(np.median(unlikeness[fore.ravel()]) < np.median(unlikeness[outer.ravel()]))
         if mesh:
             # The box holds a mesh of the net, whose middle is background.
-            fore, back = rim & ~fore, around(centres, ellipse(box, MESH)) & ~rim
-        unlike = away[fore.ravel()]
+            fore, back = outer & ~fore, mark(centres, ellipse(box, MESH)) & ~outer
+        unlike = unlikeness[fore.ravel()]
         fore.ravel()[np.flatnonzero(fore.ravel())[unlike < np.quantile(unlike, 1 - ALIKE)]] = False
-    elif tag == "F=d" and model == "mixture":
-        back = ~around(centres, np.ones((odd(box[0] * FAR), odd(box[1] * FAR)), bool))
+    elif layout == Layout.DISJOINT and model == "mixture":
+        back = ~mark(centres, np.ones((nearest_odd(box[0] * FAR), nearest_odd(box[1] * FAR)), bool))
     costs = [cost([known, flat[(back & ~background).ravel()]], 0), cost([flat[fore.ravel()]], 1)]
     difference = np.clip(costs[1] - costs[0], -NATS, NATS).reshape(size)
-    if model == "mixture" and (tag != "F=c" or mesh):
-        difference += np.where(around(centres, ellipse(box, MESH)), PRIOR if mesh else -PRIOR, 0)
+    if model == "mixture" and (layout != Layout.CONNECTED or mesh):
+        difference += np.where(mark(centres, ellipse(box, MESH)), PRIOR if mesh else -PRIOR, 0)
     unary = np.stack([np.maximum(-difference, 0), np.maximum(difference, 0)], axis=-1).astype(np.float32)
-    unary[sure, 0] = np.inf
+    unary[certain, 0] = np.inf
     unary[background, 1] = np.inf
-    return binary_labels(unary, _smoothness(colours, wrap, model), wrap=wrap).mask
+    return binary_labels(unary, _smoothness_costs(colours, wrap, model), wrap=wrap).mask
 
 
-def level(colours: Floats, reach: float, wrap: Wrap) -> Floats:
-    """Take away what changes slowly: the light, where elements lie everywhere alike."""
+def flatten_shading(colours: Floats, reach: float, wrap: Wrap) -> Floats:
+    """Remove what changes slowly: the light, where elements lie everywhere alike."""
     from scipy.ndimage import gaussian_filter
 
     mode = ["wrap" if w else "nearest" for w in wrap]
@@ -159,12 +159,12 @@ def level(colours: Floats, reach: float, wrap: Wrap) -> Floats:
     return np.asarray(colours - slow + slow.mean(axis=(0, 1)), np.float32)
 
 
-def odd(length: float) -> int:
+def nearest_odd(length: float) -> int:
     """Return the odd number nearest to a length, at least 3."""
     return max(3, 2 * int(np.floor(length / 2)) + 1)
 
 
-def _some(samples: NDArray[np.float64], most: int, seed: int) -> NDArray[np.float64]:
+def _subsample(samples: NDArray[np.float64], most: int, seed: int) -> NDArray[np.float64]:
     """Take at most so many, at even steps from a hashed start."""
     if len(samples) <= most:
         return samples
@@ -172,7 +172,7 @@ def _some(samples: NDArray[np.float64], most: int, seed: int) -> NDArray[np.floa
     return samples[np.minimum(at.astype(np.intp), len(samples) - 1)]
 
 
-def _nearest(colours: NDArray[np.float64], samples: NDArray[np.float64]) -> NDArray[np.float64]:
+def _nearest_costs(colours: NDArray[np.float64], samples: NDArray[np.float64]) -> NDArray[np.float64]:
     """Equation 2, its sign made right: the squared distance to the nearest sample, of colours from 0 to 255."""
     from scipy.spatial import cKDTree
 
@@ -180,7 +180,7 @@ def _nearest(colours: NDArray[np.float64], samples: NDArray[np.float64]) -> NDAr
     return found
 
 
-def _smoothness(colours: Floats, wrap: Wrap, model: Model) -> Sequence[Any]:
+def _smoothness_costs(colours: Floats, wrap: Wrap, model: Model) -> Sequence[Any]:
     """Equation 3, for pairs along each axis; its sigma is that of the picture, or 1 to the letter."""
     squares = [((colours - np.roll(colours, -1, axis)) ** 2).sum(axis=-1) for axis in range(2)]
     inner = [s if wrap[axis] else np.delete(s, -1, axis) for axis, s in enumerate(squares)]
@@ -190,7 +190,7 @@ def _smoothness(colours: Floats, wrap: Wrap, model: Model) -> Sequence[Any]:
     return [(strength * np.exp(-s * scale)).astype(np.float32) for s in squares]
 
 
-def tidy(mask: Bools, area: float, *, net: bool = False) -> Bools:
+def tidy_mask(mask: Bools, area: float, *, net: bool = False) -> Bools:
     """Fill small holes, smooth the outline by a pixel, and drop specks; ``area`` is the chosen element's.
 
     Of a net small specks alone are dropped: thin lines are what it is made of.

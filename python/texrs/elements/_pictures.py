@@ -28,10 +28,9 @@ def pictures(entry: Elements) -> dict[str, Picture]:
 
     Examples
     --------
-    >>> from texrs import samples
-    >>> from texrs import elements as elements
+    >>> from texrs import elements, samples
     >>> sample = samples.load("dots", size=(64, 64))
-    >>> sorted(elements.pictures(elements.analyse(sample.image, mask=sample.mask, tag="F=d")))
+    >>> sorted(elements.pictures(elements.analyse(sample.image, mask=sample.mask, layout="disjoint")))
     ['mask', 'points']
 
     """

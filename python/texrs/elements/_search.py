@@ -4,19 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from texrs._engine.appearance import Appearance
 from texrs._typing import Floats
-from texrs.elements._mask import odd
+from texrs.elements._mask import nearest_odd
+from texrs.elements._options import ElementSearch
 from texrs.kernels.ncc import Correlation
 
-__all__ = ["Channel", "Found", "Template", "otsu", "search", "suppress", "vectors"]
+__all__ = [
+    "Detections",
+    "Template",
+    "appearance_vectors",
+    "otsu",
+    "search_similar",
+    "suppress_non_maxima",
+]
 
-Channel: TypeAlias = Literal["weighted", "min-entropy"]
 Wrap: TypeAlias = tuple[bool, bool]
 
 CHANNELS = 8
@@ -48,7 +55,7 @@ class Template:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Found:
+class Detections:
     """The places that look like the element, best first.
 
     Attributes
@@ -59,9 +66,9 @@ class Found:
         The same, between the pixels.
     scores : (n,) float64
         Values of the map.
-    which : (n,) intp
-        The template of the bank that fits best.
-    map : (H, W) float32
+    template : (n,) intp
+        Which template of the bank fits best.
+    similarity : (H, W) float32
         Similarity to the element.
     threshold : float
         Least score; -1 where nothing was cut.
@@ -74,8 +81,8 @@ class Found:
     pixels: NDArray[np.intp]
     points: NDArray[np.float64]
     scores: NDArray[np.float64]
-    which: NDArray[np.intp]
-    map: Floats
+    template: NDArray[np.intp]
+    similarity: Floats
     threshold: float
     channel: int | None
     templates: Sequence[Template] = (Template((3, 3), (3, 3)),)
@@ -89,7 +96,7 @@ def pad(array: NDArray[Any], margin: tuple[int, int], wrap: Wrap) -> NDArray[Any
     return array
 
 
-def vectors(colours: Floats, wrap: Wrap, patches: Sequence[Floats] = ()) -> tuple[Floats, list[Floats]]:
+def appearance_vectors(colours: Floats, wrap: Wrap, patches: Sequence[Floats] = ()) -> tuple[Floats, list[Floats]]:
     """Return the appearance vectors of an image, (H, W, 8), and of patches whose margins are `RADIUS` wide.
 
     All lie on one sheet, so that the same components describe them.
@@ -114,7 +121,7 @@ def vectors(colours: Floats, wrap: Wrap, patches: Sequence[Floats] = ()) -> tupl
     return inside(0, image.shape), [inside(top, p.shape) for top, p in zip(tops, patches, strict=True)]
 
 
-def bank(box: tuple[int, int], rotations: int, scales: Sequence[float]) -> list[Template]:
+def make_bank(box: tuple[int, int], rotations: int, scales: Sequence[float]) -> list[Template]:
     """List the templates to try, the element itself first."""
     found = []
     for scale in sorted(scales, key=lambda s: abs(np.log(s))):
@@ -122,12 +129,14 @@ def bank(box: tuple[int, int], rotations: int, scales: Sequence[float]) -> list[
             angle = 360.0 * turn / rotations
             share = float(np.cos(np.deg2rad(angle)) ** 2)
             sides = (box[0] * share + box[1] * (1 - share), box[1] * share + box[0] * (1 - share))
-            inner = (odd(sides[0] * scale), odd(sides[1] * scale))
-            found.append(Template((odd(inner[0] * CONTEXT), odd(inner[1] * CONTEXT)), inner, angle, float(scale)))
+            inner = (nearest_odd(sides[0] * scale), nearest_odd(sides[1] * scale))
+            found.append(
+                Template((nearest_odd(inner[0] * CONTEXT), nearest_odd(inner[1] * CONTEXT)), inner, angle, float(scale))
+            )
     return found
 
 
-def cut_out(colours: Floats, centre: tuple[int, int], template: Template, wrap: Wrap) -> Floats:
+def extract_template(colours: Floats, centre: tuple[int, int], template: Template, wrap: Wrap) -> Floats:
     """Look at the image around an element through a turned and scaled window, with a margin of `RADIUS`."""
     from scipy.ndimage import map_coordinates
 
@@ -146,29 +155,43 @@ def cut_out(colours: Floats, centre: tuple[int, int], template: Template, wrap: 
     return np.stack(channels, axis=-1).astype(np.float32)
 
 
-def search(
+def search_similar(
     colours: Floats,
     centre: tuple[int, int],
     box: tuple[int, int],
     *,
     wrap: Wrap = (False, False),
-    rotations: int = 1,
-    scales: Sequence[float] = (1.0,),
-    channel: Channel = "weighted",
-    threshold: float | None = None,
+    options: ElementSearch = ElementSearch(),  # noqa: B008
     cut: bool = True,
     features: Floats | None = None,
     progress: Callable[[float], object] | None = None,
-) -> Found:
+) -> Detections:
     """Find the places that look like the box around ``centre``.
 
-    Who looks for many boxes gives the ``features``, what `vectors` makes of the image alone.
+    Parameters
+    ----------
+    colours : (H, W, 1 or 3) float32
+        The image, within [0, 1].
+    centre, box : (int, int)
+        Centre and sides of the element's box, pixels.
+    wrap : (bool, bool)
+        Axes along which the image repeats.
+    options : ElementSearch
+        Directions, sizes, least similarity and channel.
+    cut : bool
+        Whether candidates are cut by their scores, and such as overlap better ones dropped.
+    features : (H, W, 8) float32, optional
+        What `appearance_vectors` makes of the image alone, for who looks for many boxes.
+    progress : callable, optional
+        Called with the share that is done.
     """
-    templates = bank(box, rotations, scales)
+    templates = make_bank(box, options.rotations, options.scales)
     turned = [t for t in templates if t.angle or t.scale != 1.0]
     patches: list[Floats] = []
     if features is None or turned:
-        features, patches = vectors(colours, wrap, [cut_out(colours, centre, t, wrap) for t in turned])
+        features, patches = appearance_vectors(
+            colours, wrap, [extract_template(colours, centre, t, wrap) for t in turned]
+        )
     margin = tuple(max(t.box[axis] for t in templates) // 2 for axis in range(2))
     around = pad(features, (margin[0], margin[1]), wrap)
     variance = features.reshape(-1, CHANNELS).var(axis=0, dtype=np.float64)
@@ -187,8 +210,8 @@ def search(
         maps = correlation.maps(patch)
         first = [margin[axis] - half[axis] for axis in range(2)]
         maps = maps[first[0] : first[0] + colours.shape[0], first[1] : first[1] + colours.shape[1]]
-        if channel == "min-entropy":
-            chosen = least_entropy(maps) if chosen is None else chosen
+        if options.channel == "min-entropy":
+            chosen = choose_channel(maps) if chosen is None else chosen
             here = np.ascontiguousarray(maps[..., chosen])
         else:
             # Added in order, so that no library decides about the last bits.
@@ -203,23 +226,23 @@ def search(
         if progress is not None:
             progress((i + 1) / len(templates))
     assert best is not None
-    pixels = suppress(best, [t.inner for t in templates], which, wrap)
+    pixels = suppress_non_maxima(best, [t.inner for t in templates], which, wrap)
     scores = best[tuple(pixels.T)].astype(np.float64)
     least = -1.0
-    if threshold is not None:
-        least = threshold
+    if options.threshold is not None:
+        least = options.threshold
     elif cut and len(scores) and scores[1:].max(initial=-1) - scores[-1] > RANGE:
         least = otsu(scores[1:])
     if cut:
         # The cut needs to see what lies between elements; afterwards nothing is one that overlaps a better one.
-        apart = suppress(best, [t.inner for t in templates], which, wrap, share=APART)
+        apart = suppress_non_maxima(best, [t.inner for t in templates], which, wrap, share=APART)
         pixels, scores = apart, best[tuple(apart.T)].astype(np.float64)
     pixels, scores = pixels[scores >= least], scores[scores >= least]
-    points = pixels + subpixel(best, pixels, wrap)
-    return Found(pixels, points, scores, which[tuple(pixels.T)], best, least, chosen, templates)
+    points = pixels + offset_maxima(best, pixels, wrap)
+    return Detections(pixels, points, scores, which[tuple(pixels.T)], best, least, chosen, templates)
 
 
-def least_entropy(maps: Floats) -> int:
+def choose_channel(maps: Floats) -> int:
     """Return the channel whose map has the least entropy (section 3.2, to the letter)."""
     entropies = []
     for c in range(maps.shape[-1]):
@@ -229,7 +252,7 @@ def least_entropy(maps: Floats) -> int:
     return int(np.argmin(entropies))
 
 
-def suppress(
+def suppress_non_maxima(
     map: Floats, boxes: Sequence[tuple[int, int]], which: NDArray[np.intp], wrap: Wrap, share: float = 1.0
 ) -> NDArray[np.intp]:
     """Take local maxima, best first, and with each remove the box around it; (n, 2), in the order taken."""
@@ -269,7 +292,7 @@ def otsu(values: NDArray[np.float64]) -> float:
     return float((ordered[split] + ordered[min(split + 1, len(ordered) - 1)]) / 2)
 
 
-def subpixel(map: Floats, pixels: NDArray[np.intp], wrap: Wrap) -> NDArray[np.float64]:
+def offset_maxima(map: Floats, pixels: NDArray[np.intp], wrap: Wrap) -> NDArray[np.float64]:
     """Return the tops of the parabolas through a maximum and its neighbours, along each axis, within half a pixel."""
     offsets = np.zeros((len(pixels), 2))
     for axis in range(2):

@@ -6,26 +6,26 @@ with what it drew: where every element is, which pixels are its own, how large t
 on screen and how its frame is turned. They are what texrs is tested on and shown with, and they are
 CC0: use them as you like.
 
-====================  ====================================  ====  ==============================
-name                  what it shows                         tag   known
-====================  ====================================  ====  ==============================
-`bark`                furrowed bark                               nothing
-`beans`               touching beans of one colour          F=d   elements
-`bricks`              a wall, 21 whole vertical joints      B=c   elements
-`dots`                sewing buttons on paper               F=d   elements
-`grit`                crushed stone, several layers deep          nothing
-`leaves_and_flowers`  flowers of 5 to 8 petals on leaves    F=d   elements
-`net`                 a rope net over dark water            F=c   elements: the cells; the net
-`pebbles`             rounded stones on sand                F=d   elements
-`scales`              overlapping scales of a fish                elements
-`tilted_bricks`       a wall seen aslant                    B=c   elements, scale, frames
-`tilted_discs`        round tiles of a floor seen aslant    F=d   elements, scale, frames
-`weave`               a plain weave                               elements
-`particles`           a volume: ellipsoids of three colours  F=d   elements
-`stripes`             a volume: folded layers, 9 voxels apart        mask, frames
-`weave_solid`         a volume: layers of woven yarn              mask
-`wood_solid`          a volume: growth rings and fibres           mask
-====================  ====================================  ====  ==============================
+====================  =======================================  =========  ==============================
+name                  what it shows                            layout     known
+====================  =======================================  =========  ==============================
+`bark`                furrowed bark                                       nothing
+`beans`               touching beans of one colour             disjoint   elements
+`bricks`              a wall, 21 whole vertical joints         jointed    elements
+`dots`                sewing buttons on paper                  disjoint   elements
+`grit`                crushed stone, several layers deep                  nothing
+`leaves_and_flowers`  flowers of 5 to 8 petals on leaves       disjoint   elements
+`net`                 a rope net over dark water               connected  elements: the cells; the net
+`pebbles`             rounded stones on sand                   disjoint   elements
+`scales`              overlapping scales of a fish                        elements
+`tilted_bricks`       a wall seen aslant                       jointed    elements, scale, frames
+`tilted_discs`        round tiles of a floor seen aslant       disjoint   elements, scale, frames
+`weave`               a plain weave                                       elements
+`particles`           a volume: ellipsoids of three colours    disjoint   elements
+`stripes`             a volume: folded layers, 9 voxels apart             mask, frames
+`weave_solid`         a volume: layers of woven yarn                      mask
+`wood_solid`          a volume: growth rings and fibres                   mask
+====================  =======================================  =========  ==============================
 
 The same size and seed give the same bytes. `load` calls a generator by name, and knows the
 photographs that come with scikit-image besides.
@@ -35,7 +35,7 @@ Examples
 >>> from texrs import samples
 >>> stones = samples.pebbles((128, 128), seed=1)
 >>> stones
-Sample('pebbles', 128x128x3, known: centres, labels, mask, tag)
+Sample('pebbles', 128x128x3, known: centres, labels, mask, layout)
 >>> samples.load("coins").image.shape
 (303, 384)
 """
@@ -49,7 +49,7 @@ from texrs.errors import InvalidInput
 from texrs.samples._perspective import tilted_bricks, tilted_discs
 from texrs.samples._photographs import PHOTOGRAPHS, photograph
 from texrs.samples._regular import bricks, net, scales, weave
-from texrs.samples._sample import MIN_SIDE, Sample, Tag
+from texrs.samples._sample import MIN_SIDE, Sample
 from texrs.samples._scattered import beans, dots, leaves_and_flowers, pebbles
 from texrs.samples._solid import particles, stripes, weave_solid, wood_solid
 from texrs.samples._stochastic import bark, grit
@@ -57,7 +57,6 @@ from texrs.samples._stochastic import bark, grit
 __all__ = [
     "MIN_SIDE",
     "Sample",
-    "Tag",
     "bark",
     "beans",
     "bricks",

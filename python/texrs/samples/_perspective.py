@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from texrs.samples._noise import Floats, mix, palette, ramp
 from texrs.samples._regular import lay_bricks
-from texrs.samples._sample import Sample, Tag, check_size, generator
+from texrs.samples._sample import LayoutName, Sample, check_size, generator
 from texrs.samples._scene import Scene, relabel
 
 __all__ = ["tilted_bricks", "tilted_discs"]
@@ -33,8 +33,8 @@ _PITCH, _RADIUS = 26.0, 10.5
 def tilted_discs(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
     """Return a floor of round glazed tiles that runs away upwards.
 
-    On the plane the tiles are discs of radius 10.5 pixels on a hexagonal lattice of pitch 26. Tag
-    ``F=d``.
+    On the plane the tiles are discs of radius 10.5 pixels on a hexagonal lattice of pitch 26. The
+    layout is "disjoint".
 
     Parameters
     ----------
@@ -68,13 +68,13 @@ def tilted_discs(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
     cols = int(np.ceil(plane.extent[1] / _PITCH))
     scene = Scene((round(rows * rise), round(cols * _PITCH)), rng)
     _lay_tiles(scene, rows, cols)
-    return _view(scene, plane, "tilted_discs", tag="F=d")
+    return _view(scene, plane, "tilted_discs", layout="disjoint")
 
 
 def tilted_bricks(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
     """Return a wall of bricks that runs away obliquely.
 
-    On the plane it is the wall of `bricks`, at four fifths of its size. Tag ``B=c``.
+    On the plane it is the wall of `bricks`, at four fifths of its size. The layout is "jointed".
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def tilted_bricks(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
     across = int(np.ceil(plane.extent[1] / 80))
     scene = Scene((courses * 34, across * 80), rng)
     lay_bricks(scene, courses, across)
-    return _view(scene, plane, "tilted_bricks", tag="B=c")
+    return _view(scene, plane, "tilted_bricks", layout="jointed")
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,7 +214,7 @@ def _lay_tiles(scene: Scene, rows_of: int, cols_of: int) -> None:
             scene.paint(window, r <= 1, height, albedo, label=scene.add(middle), gloss=0.3, over=True)
 
 
-def _view(scene: Scene, plane: _Plane, name: str, *, tag: Tag) -> Sample:
+def _view(scene: Scene, plane: _Plane, name: str, *, layout: LayoutName) -> Sample:
     """Return the photograph of the lit `scene` through the map `plane`."""
     from scipy import ndimage
 
@@ -244,7 +244,7 @@ def _view(scene: Scene, plane: _Plane, name: str, *, tag: Tag) -> Sample:
         centres,
         labels,
         labels > 0,
-        tag,
+        layout,
         plane.scale().astype(np.float32),
         plane.jacobian().astype(np.float32),
     )

@@ -20,7 +20,7 @@ def bricks(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fals
     """Return a wall of bricks in running bond; the mortar is its rigid, connected background.
 
     At the default size, for every seed, exactly 21 vertical joints are wholly inside the picture:
-    three in each of the seven courses that the border does not cut. Tag ``B=c``.
+    three in each of the seven courses that the border does not cut. The layout is "jointed".
 
     Parameters
     ----------
@@ -46,8 +46,8 @@ def bricks(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fals
     --------
     >>> from texrs import samples
     >>> wall = samples.bricks()
-    >>> wall.tag, wall.image.shape
-    ('B=c', (256, 256, 3))
+    >>> wall.layout, wall.image.shape
+    ('jointed', (256, 256, 3))
     """
     rng = generator("bricks", seed)
     rows, cols = check_size(size, 2)
@@ -66,7 +66,7 @@ def bricks(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fals
             origin=(2 * _COURSE - 9, 2 * _BRICK - 28),
         )
     lay_bricks(scene, courses, across)
-    return scene.finish("bricks", tag="B=c", reach=8.0, exposure=0.9)
+    return scene.finish("bricks", layout="jointed", reach=8.0, exposure=0.9)
 
 
 def lay_bricks(scene: Scene, courses: int, across: int) -> None:
@@ -176,14 +176,14 @@ def scales(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fals
             albedo = mix(albedo, palette("b9b192")[0], 0.55 * ramp(r, 0.6, 0.85) * (1 - rim))
             label = scene.add((middle[0], middle[1]))
             scene.paint(window, r < 1.12, height.astype(np.float32), albedo, label=label, gloss=0.3)
-    return scene.finish("scales", tag=None, elevation=48.0, azimuth=115.0, exposure=0.82)
+    return scene.finish("scales", layout=None, elevation=48.0, azimuth=115.0, exposure=0.82)
 
 
 def net(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
     """Return a knotted rope net, connected, over dark water.
 
     The net is the foreground (`mask`); the elements are the cells that are seen through it, so that
-    here ``mask`` is ``labels == 0``. Tag ``F=c``.
+    here ``mask`` is ``labels == 0``. The layout is "connected".
 
     Parameters
     ----------
@@ -247,7 +247,9 @@ def net(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) 
             albedo = rope * (1 + 0.12 * turns + 0.12 * wear[rows, cols])[..., None]
             scene.paint(window, rho < 1, height.astype(np.float32), albedo, label=-1)
     _label_cells(scene, cells)
-    return scene.finish("net", tag="F=c", mask=lambda labels: labels == 0, reach=16.0, ambient=0.5, exposure=1.0)
+    return scene.finish(
+        "net", layout="connected", mask=lambda labels: labels == 0, reach=16.0, ambient=0.5, exposure=1.0
+    )
 
 
 def weave(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
@@ -316,7 +318,7 @@ def weave(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False
         scene.height[shown] = height[shown]
         scene.albedo[shown] = (tone[yarn] * shade[..., None])[shown]
         scene.label[shown] = label[shown] + 1
-    return scene.finish("weave", tag=None, reach=8.0, exposure=1.05)
+    return scene.finish("weave", layout=None, reach=8.0, exposure=1.05)
 
 
 def _strand(scene: Scene, knot: Floats, span: Floats, tone: Floats, fray: Floats, wear: Floats) -> None:

@@ -5,18 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from numbers import Integral
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from texrs.errors import InvalidInput
 
-__all__ = ["MIN_SIDE", "Sample", "Tag", "check_size", "generator"]
+__all__ = ["MIN_SIDE", "LayoutName", "Sample", "check_size", "generator"]
 
-#: What may move against what, in the words of texture design: ``F=d`` disjoint foreground,
-#: ``F=c`` connected foreground, ``B=c`` rigid connected background.
-Tag = Literal["F=d", "F=c", "B=c"]
+LayoutName: TypeAlias = Literal["disjoint", "connected", "jointed"]
+"""How elements hang together: apart on a ground, in one net, or parted by joints."""
 
 MIN_SIDE = 32
 
@@ -46,9 +45,9 @@ class Sample:
         comes back on the other side under the same label.
     mask : bool array, (H, W) or (D, H, W), or None
         The foreground. It is ``labels > 0``, except where the generator says otherwise.
-    tag : {"F=d", "F=c", "B=c"} or None
-        Disjoint foreground, connected foreground, rigid connected background; None where the
-        texture is neither.
+    layout : {"disjoint", "connected", "jointed"} or None
+        Separate elements on a ground, a connected foreground such as a net, or elements parted by joints;
+        None where the texture is none of these.
     scale_map : float32 array, (H, W), or None
         Local size of the texture: lengths are this many times the normal ones, as the square root
         of the ratio of areas. Its geometric mean is 1.
@@ -62,7 +61,7 @@ class Sample:
     centres: NDArray[np.float64] | None = None
     labels: NDArray[np.int32] | None = None
     mask: NDArray[np.bool_] | None = None
-    tag: Tag | None = None
+    layout: LayoutName | None = None
     scale_map: NDArray[np.float32] | None = None
     frames: NDArray[np.float32] | None = None
 

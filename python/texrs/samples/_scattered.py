@@ -19,7 +19,7 @@ def pebbles(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fal
     """Return rounded stones of many colours, none of which touch, on dark sand.
 
     The stones are the cells of a Voronoi diagram with rounded corners, shrunk until sand shows
-    between them. Tag ``F=d``.
+    between them. The layout is "disjoint".
 
     Parameters
     ----------
@@ -92,13 +92,13 @@ def pebbles(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fal
         albedo = mix(albedo, palette("4f463a")[0], 0.75 * (1 - ramp(t, 0.0, 0.45)))
         label = scene.add((point[0], point[1]))
         scene.paint(window, inner > 0, height, albedo, label=label, gloss=0.04, over=True)
-    return scene.finish("pebbles", tag="F=d", exposure=0.88)
+    return scene.finish("pebbles", layout="disjoint", exposure=0.88)
 
 
 def dots(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
     """Return sewing buttons of distinct colours, none of which touch, on paper.
 
-    A button is a disc of 9 to 13 pixels radius; its holes are part of it. Tag ``F=d``.
+    A button is a disc of 9 to 13 pixels radius; its holes are part of it. The layout is "disjoint".
 
     Parameters
     ----------
@@ -122,8 +122,8 @@ def dots(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
     Examples
     --------
     >>> from texrs import samples
-    >>> samples.dots((64, 64), seed=3).tag
-    'F=d'
+    >>> samples.dots((64, 64), seed=3).layout
+    'disjoint'
     """
     rng = generator("dots", seed)
     scene = Scene.around(check_size(size, 2), rng, wrap=wrap, margin=24)
@@ -157,13 +157,13 @@ def dots(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
             albedo = mix(albedo, palette("3a332b")[0], 0.9 * depth)
         label = scene.add((centre[0], centre[1]))
         scene.paint(window, r <= 1, height, albedo, label=label, gloss=0.28, over=True)
-    return scene.finish("dots", tag="F=d", soft=0.2, exposure=0.84)
+    return scene.finish("dots", layout="disjoint", soft=0.2, exposure=0.84)
 
 
 def leaves_and_flowers(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
     """Return flowers of five to eight petals, none of which touch, over a leafy ground.
 
-    The flowers are the elements, the leaves are ground. Tag ``F=d``.
+    The flowers are the elements, the leaves are ground. The layout is "disjoint".
 
     Parameters
     ----------
@@ -210,13 +210,13 @@ def leaves_and_flowers(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap:
     for centre in scatter(scene.period, rng, 44.0, 39.0):
         tone = petal_tones[rng.integers(len(petal_tones))] * rng.uniform(0.8, 1.12)
         _flower(scene, (centre[0], centre[1]), rng.uniform(14.5, 18.5), tone, crinkle)
-    return scene.finish("leaves_and_flowers", tag="F=d", reach=18.0, exposure=0.9)
+    return scene.finish("leaves_and_flowers", layout="disjoint", reach=18.0, exposure=0.9)
 
 
 def beans(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
     """Return beans of one colour that lie against and a little over each other.
 
-    A segmentation by colour merges them, since only their shading tells them apart. Tag ``F=d``.
+    A segmentation by colour merges them, since only their shading tells them apart. The layout is "disjoint".
 
     Parameters
     ----------
@@ -272,7 +272,7 @@ def beans(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False
             albedo = mix(albedo, palette("d8c3a4")[0], 0.8 * scar.astype(np.float32))
             label = scene.add((dart[0], dart[1]))
             scene.paint(window, rho < 1, height, albedo, label=label, gloss=0.4)
-    return scene.finish("beans", tag="F=d", reach=12.0, exposure=0.95)
+    return scene.finish("beans", layout="disjoint", reach=12.0, exposure=0.95)
 
 
 def _sand(scene: Scene) -> None:

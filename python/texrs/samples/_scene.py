@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs.samples._noise import Floats, blur, clouds, encode, fold, light
-from texrs.samples._sample import Sample, Tag
+from texrs.samples._sample import LayoutName, Sample
 
 __all__ = ["Scene", "Window"]
 
@@ -168,7 +168,7 @@ class Scene:
         self,
         name: str,
         *,
-        tag: Tag | None,
+        layout: LayoutName | None,
         mask: Callable[[NDArray[np.int32]], NDArray[np.bool_]] | None = None,
         truth: bool = True,
         grain: float = 0.012,
@@ -179,7 +179,7 @@ class Scene:
 
         Parameters
         ----------
-        name, tag : str
+        name, layout : str
             Of the sample.
         mask : callable, optional
             The foreground from the labels; ``labels > 0`` if not given.
@@ -198,7 +198,7 @@ class Scene:
         if not truth:
             return Sample(name, image)
         centres, labels = relabel(self._cut(self.label), self._inside())
-        return Sample(name, image, centres, labels, labels > 0 if mask is None else mask(labels), tag)
+        return Sample(name, image, centres, labels, labels > 0 if mask is None else mask(labels), layout)
 
     def _cut(self, fine: NDArray[_Number]) -> NDArray[_Number]:
         """Return the samples of the torus that are pixels of the picture."""

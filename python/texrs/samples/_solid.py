@@ -74,7 +74,7 @@ def stripes(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
 def particles(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     """Return sparse ellipsoids of three colours in grey stone, periodic along every axis.
 
-    No two touch. The colour of ``centres[i]`` is number ``i % 3`` of red, ochre, blue. Tag ``F=d``.
+    No two touch. The colour of ``centres[i]`` is number ``i % 3`` of red, ochre, blue. The layout is "disjoint".
 
     Parameters
     ----------
@@ -97,8 +97,8 @@ def particles(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     --------
     >>> from texrs import samples
     >>> sample = samples.particles((40, 32, 32))
-    >>> sample.centres.shape[1], sample.tag
-    (3, 'F=d')
+    >>> sample.centres.shape[1], sample.layout
+    (3, 'disjoint')
     """
     rng = generator("particles", seed)
     shape = check_size(size, 3)
@@ -125,7 +125,7 @@ def particles(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
         labels[index] = np.where(rho <= 1, len(centres), labels[index])
     # The border of the picture belongs to the first voxels: -0.5 <= centre < size - 0.5.
     middles = (np.array(centres) + 0.5) % box - 0.5
-    return Sample("particles", _quantise(albedo, rng), middles, labels, labels > 0, "F=d")
+    return Sample("particles", _quantise(albedo, rng), middles, labels, labels > 0, "disjoint")
 
 
 def weave_solid(size: Sequence[int] = _CUBE, *, seed: int = 0, wrap: bool = False) -> Sample:

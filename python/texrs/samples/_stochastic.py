@@ -73,7 +73,7 @@ def bark(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
     scene.albedo = mix(np.broadcast_to(palette("241b16")[0], tone.shape), tone, ramp(gap, 0.0, 3.0))
     moss = ramp(scene.noise(60, 3, gain=0.62) + 0.5 * plate, 1.3, 2.3)
     scene.albedo = mix(scene.albedo, palette("8e9078")[0], 0.65 * moss * plate)
-    return scene.finish("bark", tag=None, truth=False, azimuth=150.0, exposure=1.1)
+    return scene.finish("bark", layout=None, truth=False, azimuth=150.0, exposure=1.1)
 
 
 def grit(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
@@ -130,4 +130,4 @@ def grit(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
         tone = tones[rng.integers(len(tones))] * rng.uniform(0.65, 1.25)
         albedo = tone * (1 + np.float32(0.1) * speckle[rows, cols])[..., None]
         scene.paint(window, edge > 0, height, albedo, gloss=0.02)
-    return scene.finish("grit", tag=None, truth=False, exposure=0.95)
+    return scene.finish("grit", layout=None, truth=False, exposure=0.95)

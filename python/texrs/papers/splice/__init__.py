@@ -47,7 +47,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_seed, as_size
 from texrs._progress import stage
 from texrs._typing import Array, Bools, Progress
-from texrs.elements import Elements
+from texrs.elements import Elements, Layout
 from texrs.errors import InvalidInput
 from texrs.layouts import spacing
 from texrs.papers.splice.backward import Field, Warped, drawn, previewed, scattered
@@ -133,7 +133,7 @@ def splice(
     Examples
     --------
     >>> import texrs
-    >>> from texrs.elements import Elements
+    >>> from texrs.elements import Elements, Layout
     >>> buttons = Elements.of_sample(texrs.samples.dots((128, 128)))
     >>> stones = Elements.of_sample(texrs.samples.pebbles((128, 128)))
     >>> result = texrs.splice(buttons, stones, seed=1)
@@ -152,11 +152,11 @@ def splice(
         found = literal_match(mine, theirs, (shape[0], shape[1]), align=bool(align))
     else:
         found = matched(mine, theirs, (shape[0], shape[1]), align=bool(align))
-    if method != "paper" and mine.tag == "F=d":
+    if method != "paper" and mine.layout == Layout.DISJOINT:
         found = apart(mine, found)
     elif snap_rows:
         found = replace(found, targets=snapped(found.targets, 0.25 * spacing(found.targets)))
-    if method != "paper" and mine.tag != "F=d":
+    if method != "paper" and mine.layout != Layout.DISJOINT:
         found = eased(mine, found)
     found = trimmed(mine, found, (shape[0], shape[1]))
     watch("match", 1.0)
@@ -209,7 +209,7 @@ def self_splice(
     Examples
     --------
     >>> import texrs
-    >>> from texrs.elements import Elements
+    >>> from texrs.elements import Elements, Layout
     >>> entry = Elements.of_sample(texrs.samples.dots((96, 96)))
     >>> same = texrs.self_splice(entry, {"op": "move", "element": 0, "by": [0, 0]})
     >>> bool((same.image == entry.image).all())
@@ -248,7 +248,7 @@ def made(
         warped = previewed(found, size)
     elif method == "paper":
         warped = drawn(Field(*literal_field(a, found)), size, stage(watch, "warp"))
-    elif listed and a.tag == "F=d":
+    elif listed and a.layout == Layout.DISJOINT:
         warped = scattered(found, size)
     else:
         watch("deform", 0.0)
@@ -267,12 +267,12 @@ def made(
     frame = frames_of(full.mirrored)
     source = SourceMap(places.astype(np.float32), np.zeros(size, np.uint16), label, frame, (shape,))
     image = source.render(a.image, interpolation="nearest")
-    step = STEP if a.tag == "F=d" else coarseness(found.source.mask.shape)
+    step = STEP if a.layout == Layout.DISJOINT else coarseness(found.source.mask.shape)
     report: dict[str, Any] = {
         "method": method or "default",
         "seed": seed,
         "size": list(size),
-        "tag": a.tag,
+        "layout": a.layout.value,
         **found.report(),
         "holes": float(1 - warped.known.mean()),
         "triangles": warped.triangles,
@@ -299,18 +299,18 @@ def frames_of(mirrored: Bools) -> NDArray[np.float32] | None:
 
 
 def deform(a: Elements, found: Match) -> Field:
-    """Move every pixel of the texture, as its tag says."""
+    """Move every pixel of the texture, as its layout says."""
     source = found.source
     shape, origin = source.mask.shape, np.array(source.origin)
-    if a.tag == "F=d":
+    if a.layout == Layout.DISJOINT:
         delta = carried(*told(found))
         # Ground beside what shrinks is drawn out over the place of that: a pixel of it less is a hole of many.
         void = void_of(source, found.of, grown=int(source.own > 0))
         return Field(moved(delta, source.origin), source.instance > 0, void)
-    rigid = source.mask if a.tag == "F=c" else ~source.mask
+    rigid = source.mask if a.layout == Layout.CONNECTED else ~source.mask
     pins = np.rint(source.points[found.of]).astype(np.intp) - origin
     inside = ((pins >= 0) & (pins < np.array(shape))).all(axis=1)
-    delta = stretched(rigid, pins[inside], found.shift[inside], upright=a.tag == "B=c")
+    delta = stretched(rigid, pins[inside], found.shift[inside], upright=a.layout == Layout.JOINTED)
     return Field(moved(delta, source.origin), rigid, np.zeros(shape, bool))
 
 
@@ -337,7 +337,7 @@ def drafted(a: Elements, found: Match, warped: Warped, *, whole: bool) -> tuple[
         rows, columns = np.ogrid[: known.shape[0], : known.shape[1]]
         stays |= known & (places[..., 0] == rows - step[0]) & (places[..., 1] == columns - step[1])
     label = np.zeros(known.shape, np.uint32)
-    if whole and a.tag == "F=d":
+    if whole and a.layout == Layout.DISJOINT:
         goal = np.zeros(len(source.points) + 1, np.uint32)
         goal[found.of + 1] = np.arange(1, len(found.of) + 1)
         number = source.instance.take(there)
@@ -353,7 +353,7 @@ def drafted(a: Elements, found: Match, warped: Warped, *, whole: bool) -> tuple[
         known = known & ~drawn_out
         kinds = ((parts_of(a).region > 0) | a.mask).astype(np.uint8)
         return Draft(places, known, stays | (label > 0), kinds, np.zeros(known.shape, np.uint8), mirrored), label
-    kinds = np.asarray(~a.mask if a.tag == "B=c" else a.mask).astype(np.uint8)
+    kinds = np.asarray(~a.mask if a.layout == Layout.JOINTED else a.mask).astype(np.uint8)
     wanted = np.where(known, kinds.take(places[..., 0] * kinds.shape[1] + places[..., 1]), 255).astype(np.uint8)
     return Draft(places, known, stays | (known & (wanted == 1)), kinds, wanted, mirrored), label
 
@@ -378,7 +378,7 @@ def copied(places: NDArray[np.int32], mirrored: Bools, known: Bools) -> Bools:
 
 def matches(a: Elements, found: Match) -> list[dict[str, Any]]:
     """Return which element goes where."""
-    points = parts_of(a).points if a.tag == "F=d" else np.asarray(a.points, float)
+    points = parts_of(a).points if a.layout == Layout.DISJOINT else np.asarray(a.points, float)
     return [
         {
             "target": [round(float(v), 3) for v in goal],

@@ -58,7 +58,5 @@ def checked(entry: Elements, name: str) -> Elements:
         raise InvalidInput(f"{name}.points: two elements lie at the same place")
     if float(np.ptp(points, axis=0).max()) == 0:
         raise InvalidInput(f"{name}.points: needs elements at different places")
-    if entry.tag not in ("F=d", "F=c", "B=c"):
-        raise InvalidInput(f"{name}.tag: allowed are F=d, F=c and B=c, got {entry.tag!r}")
     as_wrap(entry.wrap, f"{name}.wrap")
     return entry

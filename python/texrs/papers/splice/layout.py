@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from texrs._cache import Cache
 from texrs._typing import Bools
-from texrs.elements import Elements
+from texrs.elements import Elements, Layout
 from texrs.errors import InvalidInput
-from texrs.layouts import Layout, directions, match, nearest, spacing
+from texrs.layouts import PointLayout, directions, match, nearest, spacing
 from texrs.papers.splice.edit import Step, edited
 from texrs.papers.splice.source import Extended, available, extend, parts_of, remember
 
@@ -52,7 +52,7 @@ SHRUNK = 0.9
 """How far what is erased moves towards its middle."""
 OFFSETS, NEARER = 6, 0.9
 """Offsets of a connected figure's layout that are tried along each axis, and how much less one must cost."""
-EASE = {"F=c": 0.45, "B=c": 0.3}
+EASE = {Layout.CONNECTED: 0.45, Layout.JOINTED: 0.3}
 """How much farther than its neighbour an element of a connected figure goes at most, in sides of its box: nets give more than
 walls."""
 ROOM = 1.08
@@ -60,7 +60,7 @@ ROOM = 1.08
 
 
 _DIRECTIONS: Cache[bytes, tuple[float, ...]] = Cache(64)
-_LAYOUTS: Cache[bytes, Layout] = Cache(64)
+_LAYOUTS: Cache[bytes, PointLayout] = Cache(64)
 _REACHES: Cache[bytes, Points] = Cache(16)
 
 
@@ -120,7 +120,7 @@ def packing(a: Elements, distances: Points) -> float:
 
 
 def targets(
-    layout: Layout, scale: float, angle: float, size: tuple[int, int], beyond: float, offset: Points | float = 0.0
+    layout: PointLayout, scale: float, angle: float, size: tuple[int, int], beyond: float, offset: Points | float = 0.0
 ) -> Points:
     """Scale and turn a layout about its centroid into the middle of an output, or beside it, and cover that and a margin."""
     turn = math.radians(angle)
@@ -137,7 +137,7 @@ def targets(
 def aligned(a: Elements, b: Elements) -> list[float]:
     """Return the turns, in degrees, that bring a direction in which B's points line up to one of A's; none is the first."""
     mine, theirs = (
-        t.peaks or remember(_DIRECTIONS, t, None, partial(directions, np.asarray(t.points, float))) for t in (a, b)
+        t.directions or remember(_DIRECTIONS, t, None, partial(directions, np.asarray(t.points, float))) for t in (a, b)
     )
     # Lines have no sense of direction: angles are those within a quarter turn.
     turns = {round((p - q + 90) % 180 - 90, 6) for p in mine[:3] for q in theirs[:3]}
@@ -148,11 +148,11 @@ def matched(a: Elements, b: Elements, size: tuple[int, int], *, align: bool, pac
     """Match the elements of A with B's layout (section 4.1)."""
     mine = spacing(np.asarray(a.points, np.float64))
     layout = remember(
-        _LAYOUTS, b, None, lambda: Layout.of(np.asarray(b.points, float), b.mask.shape, b.wrap, beyond=True)
+        _LAYOUTS, b, None, lambda: PointLayout.of(np.asarray(b.points, float), b.mask.shape, b.wrap, beyond=True)
     )
     scale = mine / layout.scale
     gain = 1.0
-    if packed and a.tag == "F=d":
+    if packed and a.layout == Layout.DISJOINT:
         gain = packing(a, scale * nearest(layout.points, 1)[:, 0])
     beyond = BEYOND * mine
     turns = aligned(a, b) if align else [0.0]
@@ -172,7 +172,7 @@ def matched(a: Elements, b: Elements, size: tuple[int, int], *, align: bool, pac
         if best is None or cost < TURN * best.cost:
             best = Match(wanted, source, of, scale * gain, angle, gain, cost)
     assert best is not None  # no turn is always among them
-    if a.tag == "F=d" or not packed:
+    if a.layout == Layout.DISJOINT or not packed:
         return best
     for offset in offsets(source.points, best.targets, mine):
         wanted = targets(layout, scale, best.angle, size, beyond, offset)
@@ -271,7 +271,7 @@ def eased(a: Elements, found: Match, *, rounds: int = 200) -> Match:
         return found
     edges = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
     first, second = np.unique(edges, axis=0).T
-    limit = EASE[a.tag] * np.maximum(np.abs(start[second] - start[first]), np.array(a.box))
+    limit = EASE[a.layout] * np.maximum(np.abs(start[second] - start[first]), np.array(a.box))
     shift = found.shift
     for _ in range(rounds):
         stretch = shift[second] - shift[first]
@@ -304,7 +304,7 @@ def reaches(a: Elements, count: int = 32) -> Points:
 
 def edited_match(a: Elements, steps: Sequence[Step]) -> tuple[Match, bool]:
     """Match a texture with its own layout, edited; also tell whether the edit only lists moved points."""
-    points = parts_of(a).points if a.tag == "F=d" else np.asarray(a.points, np.float64)
+    points = parts_of(a).points if a.layout == Layout.DISJOINT else np.asarray(a.points, np.float64)
     trial = edited(points, len(points), steps, len(a.points))
     shrink = math.prod(min(1.0, float(np.min(s.get("factor", 1.0)))) for s in steps if s["op"] == "scale")
     far = float(np.abs(trial.points - points).max()) / shrink
@@ -314,7 +314,7 @@ def edited_match(a: Elements, steps: Sequence[Step]) -> tuple[Match, bool]:
     source = extend(a, size, math.ceil(MARGIN * spacing(points) + far), whole=False, exact=shrink == 1)
     found = edited(source.points, source.own, steps, len(a.points))
     kept = found.kept.copy()
-    if a.tag == "F=d":
+    if a.layout == Layout.DISJOINT:
         shift = found.points - source.points
         cut = parts_of(a).cut[source.of]
         # The straight edge of an element that the border cuts must not come into the picture.

@@ -5,8 +5,8 @@
 - N_A and N_B differ: as many points are matched as the smaller set has.
 
 Neither picture goes on beyond its borders, so what the layouts do not cover stays a hole; distances in Eq. 4 are plain;
-all three tags minimise Eq. 5, under which two pins in one component stretch it; holes take any pixel that is not rigid; and the
-refinement may change all that it likes.
+all three layouts minimise Eq. 5, under which two pins in one component stretch it; holes take any pixel that is not
+rigid; and the refinement may change all that it likes.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Bools
-from texrs.elements import Elements
+from texrs.elements import Elements, Layout
 from texrs.errors import InvalidInput
 from texrs.layouts import nearest
 from texrs.papers.splice.layout import Match, aligned
@@ -63,13 +63,13 @@ def _mean(points: Points) -> float:
 
 
 def literal_field(a: Elements, found: Match) -> tuple[Points, Bools, Bools]:
-    """Section 4.2: Eq. 5 for every tag."""
+    """Section 4.2: Eq. 5 for every layout."""
     source = found.source
     shape, origin = source.mask.shape, np.array(source.origin)
-    rigid = ~source.mask if a.tag == "B=c" else source.mask
+    rigid = ~source.mask if a.layout == Layout.JOINTED else source.mask
     pins = np.rint(source.points[found.of]).astype(np.intp) - origin
     inside = ((pins >= 0) & (pins < np.array(shape))).all(axis=1)
-    delta = stretched(rigid, pins[inside], found.shift[inside], upright=a.tag == "B=c")
+    delta = stretched(rigid, pins[inside], found.shift[inside], upright=a.layout == Layout.JOINTED)
     grid = np.moveaxis(np.indices(shape), 0, -1) + origin
     return grid + delta, rigid, np.zeros(shape, bool)
 

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from texrs._arrays import check_memory
 from texrs._cache import Cache, content_hash
 from texrs._typing import Bools, Labels
-from texrs.elements import Elements
+from texrs.elements import Elements, Layout
 from texrs.errors import InvalidInput
-from texrs.layouts import Fold, Layout
+from texrs.layouts import Fold, PointLayout
 
 __all__ = ["Extended", "Parts", "available", "extend", "parts_of", "remember"]
 
@@ -68,9 +68,9 @@ class Parts:
 
 
 def remember(cache: Cache[bytes, T], entry: Elements, rest: object, make: Callable[[], T]) -> T:
-    """Return what was made of an entry's mask, points, tag and wrap, and of the rest, made now unless it is kept."""
+    """Return what was made of an entry's mask, points, layout and wrap, and of the rest, made now unless it is kept."""
     mask, points = np.packbits(entry.mask), np.asarray(entry.points, np.float64)
-    return cache.get_or_make(content_hash(mask, points, entry.mask.shape, entry.tag, entry.wrap, rest), make)
+    return cache.get_or_make(content_hash(mask, points, entry.mask.shape, entry.layout, entry.wrap, rest), make)
 
 
 def parts_of(entry: Elements) -> Parts:
@@ -219,7 +219,7 @@ def available(entry: Elements, size: tuple[int, int], margin: int) -> int:
 def _available(entry: Elements, size: tuple[int, int], margin: int) -> int:
     layout, low, high = _bounds(entry, size, margin, exact=False)
     places, of, flips = layout.within(low.astype(np.float64), (high - 1).astype(np.float64))
-    if entry.tag != "F=d":
+    if entry.layout != Layout.DISJOINT:
         return len(of)
     check_memory(int(np.prod(high - low)) * EACH)
     return len(_placed(entry, np.zeros(high - low, np.int32), (places - low, of, flips), None)[0])
@@ -227,22 +227,22 @@ def _available(entry: Elements, size: tuple[int, int], margin: int) -> int:
 
 def _bounds(
     entry: Elements, size: tuple[int, int], margin: int, *, exact: bool
-) -> tuple[Layout, NDArray[np.intp], NDArray[np.intp]]:
+) -> tuple[PointLayout, NDArray[np.intp], NDArray[np.intp]]:
     """Return the layout of a texture as its pixels go on, and the first pixel and the one after the last, in its own."""
     shape = np.array(entry.mask.shape)
     offset = (np.array(size) - shape) // 2  # Of the picture in the output.
-    if entry.tag == "F=d" or exact:
+    if entry.layout == Layout.DISJOINT or exact:
         # The elements that the border cuts are left out, or wanted: no pixel is in the way.
-        points = parts_of(entry).points if entry.tag == "F=d" else np.asarray(entry.points, np.float64)
+        points = parts_of(entry).points if entry.layout == Layout.DISJOINT else np.asarray(entry.points, np.float64)
         ends = [(-0.5, n - 0.5) if w else (0.0, n - 1.0) for n, w in zip(shape, entry.wrap, strict=True)]
         folds = [Fold(*e, w) for e, w in zip(ends, entry.wrap, strict=True)]
-        layout = Layout(points, (folds[0], folds[1]), 0.0)
+        layout = PointLayout(points, (folds[0], folds[1]), 0.0)
     else:
         layout = remember(
             _FOLDED,
             entry,
             None,
-            lambda: Layout.of(np.asarray(entry.points, float), entry.mask.shape, entry.wrap, beyond=False),
+            lambda: PointLayout.of(np.asarray(entry.points, float), entry.mask.shape, entry.wrap, beyond=False),
         )
     return layout, np.minimum(-margin - offset, 0), np.maximum(np.array(size) + margin - offset, shape)
 
@@ -251,7 +251,7 @@ def _extend(entry: Elements, size: tuple[int, int], margin: int, *, whole: bool,
     layout, low, high = _bounds(entry, size, margin, exact=exact)
     shape = np.array(entry.mask.shape)
     offset = (np.array(size) - shape) // 2
-    disjoint = entry.tag == "F=d"
+    disjoint = entry.layout == Layout.DISJOINT
     first, last = low + offset, high + offset
     check_memory(int(np.prod(last - first)) * EACH)
     along = [layout.folds[a].apply(np.arange(low[a], high[a], dtype=float)) for a in range(2)]
@@ -384,5 +384,5 @@ def _nearest(place: Points) -> NDArray[np.intp]:
 
 _PARTS: Cache[bytes, Parts] = Cache(16)
 _COUNTS: Cache[bytes, int] = Cache(256)
-_FOLDED: Cache[bytes, Layout] = Cache(64)
+_FOLDED: Cache[bytes, PointLayout] = Cache(64)
 _EXTENDED: Cache[bytes, Extended] = Cache(4)

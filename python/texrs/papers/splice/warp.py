@@ -164,7 +164,7 @@ def stretched(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upright: b
     Parameters
     ----------
     rigid : (H, W) bool
-        M of Table 1: the foreground of ``F=c`` and ``F=d``, the background of ``B=c``.
+        M of Table 1: the foreground where elements are connected or disjoint, the background where they are jointed.
     pins : (n, 2) int
         The pixels of C_A.
     shift : (n, 2) float64

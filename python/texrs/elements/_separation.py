@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from texrs._typing import Bools, Floats, Labels
 from texrs.elements._mask import Wrap, ellipse, stamp
 
-__all__ = ["Cleaned", "add_missing", "clean", "components"]
+__all__ = ["Separation", "add_missing", "label_components", "reconcile"]
 
 ADDED = 0.25
 """Least area of a component that is taken for an element that was not found, as a share of the usual one's."""
@@ -29,19 +29,32 @@ TRUSTED = 0.7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Cleaned:
-    """Points, their scores, which detection each was (-1 for none), and the mask."""
+class Separation:
+    """The elements of a texture, told from its ground.
+
+    Attributes
+    ----------
+    points : (n, 2) float64
+        Centres of the elements.
+    scores : (n,) float64
+        How alike each is to the chosen one.
+    detection : (n,) intp
+        Which detection each was, -1 for none.
+    mask : (H, W) bool
+        The foreground.
+    made_by : str
+        What made the mask: "cut", or "elements", copies of the chosen one.
+    """
 
     points: NDArray[np.float64]
     scores: NDArray[np.float64]
-    origin: NDArray[np.intp]
+    detection: NDArray[np.intp]
     mask: Bools
-    source: str
-    """Where the mask is from: "cut", or "elements", copies of the chosen one."""
+    made_by: str
 
 
-def components(mask: Bools, wrap: Wrap) -> tuple[Labels, int]:
-    """Return numbers to the pieces of a mask, around cyclic axes too."""
+def label_components(mask: Bools, wrap: Wrap) -> tuple[Labels, int]:
+    """Return the number of the piece that each pixel of a mask belongs to, around cyclic axes too, and how many there are."""
     from scipy.ndimage import label
 
     pieces, count = label(mask)
@@ -57,23 +70,23 @@ def components(mask: Bools, wrap: Wrap) -> tuple[Labels, int]:
     return dense[pieces].astype(np.int32), len(names) - 1
 
 
-def clean(
+def reconcile(
     mask: Bools,
     points: NDArray[np.float64],
     scores: NDArray[np.float64],
-    map: Floats,
+    similarity: Floats,
     shape: Bools,
     wrap: Wrap,
     *,
     certain: bool = False,
-) -> Cleaned:
+) -> Separation:
     """Move detections into the middle of their components, add and drop some, or make the mask of copies.
 
     ``shape`` is the chosen element's foreground within its box. A mask that is ``certain`` is never replaced.
     """
     from skimage.measure import regionprops
 
-    pieces, count = components(mask, wrap)
+    pieces, count = label_components(mask, wrap)
     at = np.clip(np.rint(points).astype(np.intp), 0, np.array(mask.shape) - 1)
     owner = pieces[tuple(at.T)]
     regions = {r.label: r for r in regionprops(pieces)}
@@ -94,7 +107,7 @@ def clean(
     if share < TRUSTED and not certain:
         copies = np.zeros(mask.shape, bool)
         stamp(copies, points, shape if shape.any() else ellipse((shape.shape[0], shape.shape[1])), wrap)
-        return Cleaned(points, scores, np.arange(len(points)), copies, "elements")
+        return Separation(points, scores, np.arange(len(points)), copies, "elements")
     kept: list[tuple[float, float, float, int]] = []
     for number, region in regions.items():
         mine = np.flatnonzero(owner == number)
@@ -111,7 +124,7 @@ def clean(
             kept.append((*place, scores[best], best))
         elif good[number] or certain:
             place = np.clip(np.rint(centre).astype(np.intp), 0, np.array(mask.shape) - 1)
-            kept.append((*centre, float(map[tuple(place)]), -1))
+            kept.append((*centre, float(similarity[tuple(place)]), -1))
     kept.sort(key=lambda p: (-p[2], p[0], p[1]))
     table = np.array(kept, np.float64).reshape(-1, 4)
     names = {int(pieces[tuple(np.clip(np.rint(p[:2]).astype(int), 0, np.array(mask.shape) - 1))]) for p in table}
@@ -121,7 +134,7 @@ def clean(
     cut = np.unique(np.concatenate(rim)) if rim else np.zeros(0, np.intp)
     cut = cut[(cut > 0) & (area[cut] >= ADDED * usual) & (area[cut] <= SWOLLEN * usual)]
     left: Bools = mask & (used | np.isin(pieces, cut))
-    return Cleaned(table[:, :2].copy(), table[:, 2].copy(), table[:, 3].astype(np.intp), left, "cut")
+    return Separation(table[:, :2].copy(), table[:, 2].copy(), table[:, 3].astype(np.intp), left, "cut")
 
 
 def _is_strip(bounds: tuple[int, ...], area: float, box: tuple[int, ...]) -> bool:
@@ -130,7 +143,7 @@ def _is_strip(bounds: tuple[int, ...], area: float, box: tuple[int, ...]) -> boo
     return side > LONG * max(box) and area / side < THIN * min(box)
 
 
-def add_missing(found: Cleaned, map: Floats, wrap: Wrap, *, joints: bool) -> Cleaned:
+def add_missing(found: Separation, similarity: Floats, wrap: Wrap, *, joints: bool) -> Separation:
     """Add the elements between joints, or the meshes of a net, that look like those that were found.
 
     A piece counts that is whole, as solid as an element, and of about the usual area. Of detections between joints those
@@ -139,7 +152,7 @@ def add_missing(found: Cleaned, map: Floats, wrap: Wrap, *, joints: bool) -> Cle
     from skimage.measure import regionprops
 
     size, least = found.mask.shape, JOINED if joints else MESHED
-    pieces, count = components(found.mask if joints else ~found.mask, wrap)
+    pieces, count = label_components(found.mask if joints else ~found.mask, wrap)
     at = np.clip(np.rint(found.points).astype(np.intp), 0, np.array(size) - 1)
     inside = np.bincount(pieces[tuple(at.T)], minlength=count + 1)
     inside[0] = 0
@@ -148,7 +161,7 @@ def add_missing(found: Cleaned, map: Floats, wrap: Wrap, *, joints: bool) -> Cle
         return found
     usual = float(np.median(areas[inside == 1]))
     if joints:
-        found = _without_bits(found, pieces, areas, usual)
+        found = _drop_fragments(found, pieces, areas, usual)
     new = []
     for region in regionprops(pieces):
         cut = any(not wrap[a] and (region.bbox[a] == 0 or region.bbox[a + 2] == size[a]) for a in range(2))
@@ -157,23 +170,23 @@ def add_missing(found: Cleaned, map: Floats, wrap: Wrap, *, joints: bool) -> Cle
             continue
         centre = _centre(region.coords, size, wrap)
         place = np.clip(np.rint(centre).astype(np.intp), 0, np.array(size) - 1)
-        new.append((*centre, float(map[tuple(place)]), -1.0))
+        new.append((*centre, float(similarity[tuple(place)]), -1.0))
     if not new:
         return found
-    table = np.concatenate([np.column_stack([found.points, found.scores, found.origin]), np.array(new)])
+    table = np.concatenate([np.column_stack([found.points, found.scores, found.detection]), np.array(new)])
     table = table[np.lexsort((table[:, 1], table[:, 0], -table[:, 2]))]
     origin = table[:, 3].astype(np.intp)
-    return Cleaned(table[:, :2].copy(), table[:, 2].copy(), origin, found.mask, found.source)
+    return Separation(table[:, :2].copy(), table[:, 2].copy(), origin, found.mask, found.made_by)
 
 
-def _without_bits(found: Cleaned, pieces: Labels, areas: NDArray[np.intp], usual: float) -> Cleaned:
+def _drop_fragments(found: Separation, pieces: Labels, areas: NDArray[np.intp], usual: float) -> Separation:
     at = np.clip(np.rint(found.points).astype(np.intp), 0, np.array(pieces.shape) - 1)
     owner = pieces[tuple(at.T)]
     bits = (owner > 0) & (areas[owner] < ADDED * usual)
     if not bits.any() or bits.mean() > 1 - TRUSTED:
         return found
     mask = found.mask & ~np.isin(pieces, owner[bits])
-    return Cleaned(found.points[~bits], found.scores[~bits], found.origin[~bits], mask, found.source)
+    return Separation(found.points[~bits], found.scores[~bits], found.detection[~bits], mask, found.made_by)
 
 
 def _centre(pixels: NDArray[np.intp], shape: tuple[int, ...], wrap: Wrap) -> NDArray[np.float64]:

@@ -1,24 +1,25 @@
-"""What a user says about a texture, checked: box, mask, background, points and tag."""
+"""What is said of a texture to `texrs.elements.analyse`, checked: box, layout, background, mask and points."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_mask
 from texrs._typing import Bools
-from texrs.elements._elements import Tag
-from texrs.elements._mask import disc, ellipse, odd
+from texrs.elements._layout import Layout
+from texrs.elements._mask import disc, ellipse, nearest_odd, stamp
+from texrs.elements._separation import label_components
 from texrs.errors import InvalidInput
 
-__all__ = ["Box", "as_background", "as_box", "as_points", "as_tag", "check_agreement", "chosen"]
+__all__ = ["Box", "Given", "as_box", "check_consistency", "find_contradiction", "usual_box"]
 
 Points = NDArray[np.float64]
 Shape = tuple[int, int]
+Wrap = tuple[bool, bool]
 
 LEAST, MOST = 3, 100_000
 """Sides of a box in pixels, and points of a list, at the least and at most."""
@@ -34,6 +35,55 @@ class Box:
 
     centre: tuple[int, int]
     size: tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Given:
+    """What is said of a texture, checked; None where nothing is.
+
+    Attributes
+    ----------
+    box : Box
+        Of one element.
+    layout : Layout
+        How its elements hang together.
+    background : (H, W) bool
+        What is no element for sure.
+    mask : (H, W) bool
+        Foreground, of the chosen element or of the whole image.
+    shape : (h, w) bool
+        The foreground in the box of the chosen element, where the mask tells.
+    whole : (H, W) bool
+        The mask, where it is that of the whole image.
+    points : (n, 2) float64
+        The elements.
+
+    """
+
+    box: Box | None
+    layout: Layout | None
+    background: Bools | None
+    mask: Bools | None
+    shape: Bools | None
+    whole: Bools | None
+    points: Points | None
+
+    @classmethod
+    def of(
+        cls, size: Shape, wrap: Wrap, *, box: object, layout: str | None, background: object, mask: object, points: object
+    ) -> Given:
+        """Check the arguments of an image of that size."""
+        place = None if box is None else as_box(box, size)
+        ground = as_background(background, size)
+        kind = None if layout is None else Layout(layout)
+        marked = None if mask is None else as_mask(mask, "mask", size)
+        listed = None if points is None else as_points(points, size, "points")
+        if marked is None:
+            return cls(place, kind, ground, None, None, None, listed)
+        if not marked.any() or marked.all():
+            raise InvalidInput(f"mask: is {'all' if marked.any() else 'no'} foreground")
+        place = usual_box(marked, kind, wrap) if place is None else place
+        return cls(place, kind, ground, marked, *split_mask(marked, place, wrap), listed)
 
 
 def as_box(value: object, shape: Shape, name: str = "box") -> Box:
@@ -56,7 +106,7 @@ def as_box(value: object, shape: Shape, name: str = "box") -> Box:
                 f"which has {side}; (row, column) is the centre"
             )
     row, column = (int(np.clip(np.floor(numbers[a] + 0.5), 0, shape[a] - 1)) for a in range(2))
-    height, width = (min(odd(numbers[a + 2]), odd(shape[a] - 1)) for a in range(2))
+    height, width = (min(nearest_odd(numbers[a + 2]), nearest_odd(shape[a] - 1)) for a in range(2))
     return Box((row, column), (height, width))
 
 
@@ -108,45 +158,48 @@ def as_background(value: object, shape: Shape) -> Bools | None:
     return marked
 
 
-def as_tag(value: object) -> Tag | None:
-    """Check a tag."""
-    if value is None:
-        return None
-    if value not in get_args(Tag):
-        raise InvalidInput(
-            f"tag: allowed are F=d (separate elements), F=c (a connected foreground) and B=c (a connected background); "
-            f"got {value!r}"
-        )
-    return value  # type: ignore[return-value]
-
-
-def chosen(mask: Bools, box: Box | None, tag: Tag | None, pieces: Any) -> Box:
-    """Return the box of the chosen element: as said, or that of the most usual piece of a mask that no border cuts."""
-    if box is not None:
-        return box
+def usual_box(mask: Bools, layout: Layout | None, wrap: Wrap) -> Box:
+    """Return the box of the most usual piece of a mask that no border cuts."""
     from skimage.measure import regionprops
 
     regions = [
         r
-        for r in regionprops(pieces)
+        for r in regionprops(label_components(mask, wrap)[0])
         if min(r.bbox[:2]) > 0 and r.bbox[2] < mask.shape[0] and r.bbox[3] < mask.shape[1] and r.area >= LEAST**2
     ]
-    if not regions or tag == "F=c":
+    if not regions or layout == Layout.CONNECTED:
         raise InvalidInput("box: is needed with this mask, no piece of which lies wholly inside the image")
     usual = float(np.median([r.area for r in regions]))
     best = min(regions, key=lambda r: (abs(np.log(r.area / usual)), r.label))
     top, left, bottom, right = best.bbox
-    return as_box(((top + bottom - 1) / 2, (left + right - 1) / 2, bottom - top, right - left), mask.shape)
+    shape = (mask.shape[0], mask.shape[1])
+    return as_box(((top + bottom - 1) / 2, (left + right - 1) / 2, bottom - top, right - left), shape)
 
 
-def check_agreement(mask: Bools | None, background: Bools | None, box: Box, tag: Tag | None) -> None:
+def split_mask(mask: Bools, box: Box, wrap: Wrap) -> tuple[Bools, Bools | None]:
+    """Return the foreground in the box of the chosen element, and the mask where it is of the whole image, else None."""
+    inside = np.zeros(mask.shape, bool)
+    stamp(inside, np.array([box.centre]), np.ones(tuple(n + 2 for n in box.size), bool), wrap)
+    count = label_components(mask, wrap)[1]
+    alone = not (mask & ~inside).any() or (count == 1 and not (mask & inside).any())
+    corner = [box.centre[a] - box.size[a] // 2 for a in range(2)]
+    window = [np.arange(corner[a], corner[a] + box.size[a]) for a in range(2)]
+    own: Bools = mask[
+        np.ix_(*(w % n if c else np.clip(w, 0, n - 1) for w, n, c in zip(window, mask.shape, wrap, strict=True)))
+    ]
+    if not own.any():
+        raise InvalidInput("mask: has no foreground in the box")
+    return own, None if alone else mask
+
+
+def check_consistency(mask: Bools | None, background: Bools | None, box: Box, layout: Layout | None) -> None:
     """Check that what was said does not contradict itself."""
     if background is None:
         return
     if mask is not None and (mask & background).any():
         row, column = np.argwhere(mask & background)[0].tolist()
         raise InvalidInput(f"background: contradicts the mask, which calls ({row}, {column}) foreground")
-    if mask is None and tag in ("F=d", "B=c"):
+    if mask is None and layout in (Layout.DISJOINT, Layout.JOINTED):
         middle = ellipse(box.size, CENTRE)
         rows, columns = np.nonzero(middle)
         places = np.stack([rows + box.centre[0] - box.size[0] // 2, columns + box.centre[1] - box.size[1] // 2])
@@ -155,21 +208,22 @@ def check_agreement(mask: Bools | None, background: Bools | None, box: Box, tag:
         if hit.any():
             row, column = places[:, inside][:, hit][:, 0].tolist()
             raise InvalidInput(
-                f"background: contradicts the box, in whose middle ({row}, {column}) lies; with the tag {tag} "
+                f"background: contradicts the box, in whose middle ({row}, {column}) lies; with the layout {layout} "
                 "the middle of an element is foreground"
             )
 
 
-def disagreement(mask: Bools, tag: Tag, pieces: Any, ground: Any) -> str:
-    """Return how a mask contradicts a tag; empty if it does not."""
+def find_contradiction(mask: Bools, layout: Layout, wrap: Wrap) -> str:
+    """Return how a mask contradicts a layout; empty if it does not."""
     if mask.all() or not mask.any():
         return f"the mask is {'all' if mask.any() else 'no'} foreground"
+    pieces, ground = (label_components(m, wrap)[0] for m in (mask, ~mask))
     share = float(np.bincount(pieces.ravel())[1:].max()) / float(mask.sum())
     rest = float(np.bincount(ground.ravel())[1:].max()) / float((~mask).sum())
-    if tag == "F=d" and share > MAIN:
-        return f"F=d means separate elements, but {share:.0%} of the foreground is in one piece"
-    if tag == "F=c" and share < MAIN:
-        return f"F=c means a connected foreground, but its largest piece is only {share:.0%} of it"
-    if tag == "B=c" and rest < MAIN:
-        return f"B=c means a connected background, but its largest piece is only {rest:.0%} of it"
+    if layout == Layout.DISJOINT and share > MAIN:
+        return f"disjoint means separate elements, but {share:.0%} of the foreground is in one piece"
+    if layout == Layout.CONNECTED and share < MAIN:
+        return f"connected means a connected foreground, but its largest piece is only {share:.0%} of it"
+    if layout == Layout.JOINTED and rest < MAIN:
+        return f"jointed means a connected background, but its largest piece is only {rest:.0%} of it"
     return ""

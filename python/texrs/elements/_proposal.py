@@ -1,31 +1,31 @@
-"""A start without a user: which element, which background, which tag, and how sure that is.
+"""A start without a user: which element, which background, which layout, and how sure that is.
 
 1. sizes: blobs of every scale, pieces of a colour segmentation, and the periods of the autocorrelation propose boxes;
 2. the element: each box is searched for in a small picture, and the one that the texture repeats best is taken;
 3. the background: what lies farthest from all that was found, of the colours that most of it has;
-4. the tag: elements that are busier and more varied than what lies between them are things on a ground; else what lies
+4. the layout: elements that are busier and more varied than what lies between them are things on a ground; else what lies
    between is a net where it stands out, and joints where it does not.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Bools, Floats
-from texrs.elements._boxes import proposed, resized
-from texrs.elements._clean import components
-from texrs.elements._elements import Tag
-from texrs.elements._given import LEAST, Box, as_box
-from texrs.elements._mask import disc, lab, odd
-from texrs.elements._search import Found, search, vectors
+from texrs.elements._arguments import LEAST, Box, Given, as_box
+from texrs.elements._boxes import propose_boxes, resize_box
+from texrs.elements._layout import Layout
+from texrs.elements._mask import disc, nearest_odd, to_lab
+from texrs.elements._search import Detections, appearance_vectors, search_similar
+from texrs.elements._separation import label_components
 from texrs.errors import InvalidInput
 from texrs.layouts import spacing
 
-__all__ = ["Proposal", "propose"]
+__all__ = ["Start", "propose"]
 
 SMALL = 224
 """Longest side of the picture in which boxes are compared."""
@@ -52,74 +52,86 @@ OPEN = 0.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Proposal:
-    """A start, and how sure each part of it is, 0 to 1."""
+class Start:
+    """What an analysis starts from: what is said of a texture, and proposals for the rest.
+
+    Attributes
+    ----------
+    box : Box
+        Of one element.
+    layout : Layout
+        How the elements hang together.
+    background : (H, W) bool, optional
+        What is no element for sure; where the foreground is known it may be unknown.
+    proposed : list of str
+        Which of them were proposed.
+    confidence : dict
+        How sure each proposal is, 0 to 1.
+
+    """
 
     box: Box
-    background: Bools
-    tag: Tag
-    confidence: dict[str, float] = field(default_factory=dict)
+    layout: Layout
+    background: Bools | None
+    proposed: list[str]
+    confidence: dict[str, float]
 
 
-def propose(
-    guide: Floats,
-    wrap: tuple[bool, bool],
-    box: Box | None,
-    background: Bools | None,
-    mask: Bools | None,
-    tag: Tag | None,
-    points: NDArray[np.float64] | None,
-    progress: Callable[[float], object],
-) -> Proposal:
+def propose(guide: Floats, given: Given, wrap: tuple[bool, bool], progress: Callable[[float], object]) -> Start:
     """Propose what is not given."""
     size = (guide.shape[0], guide.shape[1])
+    box, layout, background, points = given.box, given.layout, given.background, given.points
+    blind = background is None and given.whole is None
+    if box is not None and layout is not None and not blind:
+        return Start(box, layout, background, [], {})
+    missing = (("box", box is None), ("background", blind), ("layout", layout is None))
     sure: dict[str, float] = {}
     if box is None:
         if points is not None and len(points) > 2:
-            box = _around(points, size)
-            sure["box"] = 0.5
+            box, sure["box"] = _box_inside(points, size), 0.5
         else:
-            box, sure["box"] = _best(guide, wrap, progress)
+            box, sure["box"] = _choose_box(guide, wrap, progress)
     if points is None:
-        found = search(guide, box.centre, box.size, wrap=wrap)
-        points = found.points
+        points = search_similar(guide, box.centre, box.size, wrap=wrap).points
     progress(0.9)
-    away = _distance(size, points, box.size, wrap)
-    if tag is None:
-        tag, sure["tag"] = _tag(guide, away, points, box, mask)
-    if background is None and mask is None and "tag" in sure and tag == "F=c":
+    away = _element_distance(size, points, box.size, wrap)
+    if layout is None:
+        layout, sure["layout"] = _choose_layout(guide, away, points, given.whole)
+    if blind and "layout" in sure and layout == Layout.CONNECTED:
         # What repeats are the openings of the net: ground lies in the middle of each but the chosen one.
         middle = np.array(box.centre)
         others = points[np.abs(points - middle).max(axis=1) > max(box.size) / 2][:PLACES]
         if len(others):
             background = disc(size, others, int(np.clip(min(box.size) // 8, 1, 4)))
-            sure["background"] = sure["tag"]
-    if background is None and mask is None:
-        background, sure["background"] = _background(guide, away, box)
-    return Proposal(box, np.zeros(size, bool) if background is None else background, tag, sure)
+            sure["background"] = sure["layout"]
+    if blind and background is None:
+        background, sure["background"] = _choose_background(guide, away, box)
+    if blind and background is not None and given.mask is not None:
+        background = background & ~given.mask
+    return Start(box, layout, background, [name for name, lacks in missing if lacks], sure)
 
 
 # --- the element -------------------------------------------------------------------------------------------------------
 
 
-def _best(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[float], object]) -> tuple[Box, float]:
+def _choose_box(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[float], object]) -> tuple[Box, float]:
     """Try boxes in a small picture and take the one that explains most of it."""
     step = max(1, -(-max(guide.shape[:2]) // SMALL))
-    small = _reduced(guide, step)
-    boxes = proposed(small)
+    small = _downscale(guide, step)
+    boxes = propose_boxes(small)
     if not boxes:
         raise InvalidInput("box: none could be proposed for this image; give one, or the points")
-    light, features = lab(small)[..., 0], vectors(small, wrap)[0]
+    light, features = to_lab(small)[..., 0], appearance_vectors(small, wrap)[0]
     best: tuple[float, Box] | None = None
-    tried: list[tuple[float, Box, Found]] = []
+    tried: list[tuple[float, Box, Detections]] = []
 
     def attempt(box: Box) -> float:
         nonlocal best
         known = [value for value, other, _ in tried if other == box]
         if known:
             return known[0]
-        found = search(small, box.centre, box.size, wrap=wrap, features=features)
-        value = _worth(light, found, box)
+        found = search_similar(small, box.centre, box.size, wrap=wrap, features=features)
+        value = _score(light, found, box)
         tried.append((value, box, found))
         if best is None or value > best[0] + 1e-6:
             best = (value, box)
@@ -129,19 +141,19 @@ def _best(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[float], ob
         attempt(box)
         progress(0.5 * (number + 1) / len(boxes))
     for _, box, found in sorted(tried, key=lambda t: -t[0])[:AGAIN]:
-        moved = _centred(light, found, box)
+        moved = _recentre(light, found, box)
         if moved is not None:
             attempt(moved)
     for number, (value, box, _) in enumerate(sorted(tried, key=lambda t: -t[0])[:GROWN]):
         for _ in range(STEPS):
-            better = [(attempt(b), b) for b in resized(box, small.shape[:2])]
+            better = [(attempt(b), b) for b in resize_box(box, small.shape[:2])]
             top = max(better, key=lambda t: t[0], default=(0.0, box))
             if top[0] <= value:
                 break
             value, box = top
         progress(0.5 + 0.3 * (number + 1) / GROWN)
     assert best is not None
-    sure = _sure(light, best[1], next(f for _, b, f in tried if b == best[1]))
+    sure = _confidence(light, best[1], next(f for _, b, f in tried if b == best[1]))
     row, column = (float(c * step + (step - 1) / 2) for c in best[1].centre)
     height, width = (float(s * step) for s in best[1].size)
     whole = (guide.shape[0], guide.shape[1])
@@ -151,7 +163,7 @@ def _best(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[float], ob
     return as_box((row, column, height, width), whole), sure
 
 
-def _reduced(guide: Floats, step: int) -> Floats:
+def _downscale(guide: Floats, step: int) -> Floats:
     """Average squares of pixels."""
     rows, columns = (n // step for n in guide.shape[:2])
     cut = guide[: rows * step, : columns * step]
@@ -160,7 +172,7 @@ def _reduced(guide: Floats, step: int) -> Floats:
     )
 
 
-def _worth(light: Floats, found: Found, box: Box) -> float:
+def _score(light: Floats, found: Detections, box: Box) -> float:
     """Return how well copies of a box explain a picture.
 
     They do so by how alike they are, how clearly they stand out, how much they cover, and how much what they have in
@@ -171,26 +183,26 @@ def _worth(light: Floats, found: Found, box: Box) -> float:
     inner = found.scores[1:]
     alike = float(inner.mean())
     cover = min(1.0, len(found.scores) * box.size[0] * box.size[1] / float(light.size))
-    clear = float(inner.mean() - np.median(found.map))
-    window = _common(light, found, box, WIDE)
+    clear = float(inner.mean() - np.median(found.similarity))
+    window = _mean_window(light, found, box, WIDE)
     if window is None:
         return 0.0
     # What is alike by chance is so less often the more there is of it (Fisher's z grows with the root of the area).
     large = float(np.sqrt(box.size[0] * box.size[1] / light.size))
-    return large * alike * float(np.sqrt(cover)) * max(0.0, clear) * _closed(window, np.zeros(2), box.size) ** 2
+    return large * alike * float(np.sqrt(cover)) * max(0.0, clear) * _closure(window, np.zeros(2), box.size) ** 2
 
 
-def _sure(light: Floats, box: Box, found: Found) -> float:
+def _confidence(light: Floats, box: Box, found: Detections) -> float:
     """Return how sure a box is: how alike its copies are, and how much it holds one thing."""
-    window = _common(light, found, box, WIDE)
+    window = _mean_window(light, found, box, WIDE)
     if window is None or len(found.scores) < 4:
         return 0.1
-    return float(np.clip(found.scores[1:].mean() * _closed(window, np.zeros(2), box.size) * 1.5, 0.05, 0.95))
+    return float(np.clip(found.scores[1:].mean() * _closure(window, np.zeros(2), box.size) * 1.5, 0.05, 0.95))
 
 
-def _common(light: Floats, found: Found, box: Box, wide: float) -> Floats | None:
+def _mean_window(light: Floats, found: Detections, box: Box, wide: float) -> Floats | None:
     """Average what lies around the places that were found, where it is inside the picture."""
-    half = [odd(wide * s) // 2 for s in box.size]
+    half = [nearest_odd(wide * s) // 2 for s in box.size]
     sides = light.shape
     whole = [p for p in found.pixels.tolist() if all(half[a] <= p[a] < sides[a] - half[a] for a in range(2))]
     if not whole:
@@ -199,7 +211,7 @@ def _common(light: Floats, found: Found, box: Box, wide: float) -> Floats | None
     return np.asarray(np.mean(cuts, axis=0, dtype=np.float64), np.float32)
 
 
-def _closed(window: Floats, centre: NDArray[np.float64], size: tuple[int, int]) -> float:
+def _closure(window: Floats, centre: NDArray[np.float64], size: tuple[int, int]) -> float:
     """Return how much of what changes in a window does so outwards from a centre, 0 to 1: the outline of one thing does."""
     rows, columns = np.gradient(window)
     middle = (np.array(window.shape) - 1) / 2 + centre
@@ -216,9 +228,9 @@ def _closed(window: Floats, centre: NDArray[np.float64], size: tuple[int, int]) 
     return float(0.5 * np.abs(outward).sum() + 0.5 * abs(outward.sum())) / change
 
 
-def _centred(light: Floats, found: Found, box: Box) -> Box | None:
+def _recentre(light: Floats, found: Detections, box: Box) -> Box | None:
     """Move a box, within half of it, to where what it has in common with its copies is one thing in its middle."""
-    window = _common(light, found, box, 2.2)
+    window = _mean_window(light, found, box, 2.2)
     if window is None:
         return None
     best, move = 0.0, np.zeros(2)
@@ -229,7 +241,7 @@ def _centred(light: Floats, found: Found, box: Box) -> Box | None:
             low = [max(0, a - h) for a, h in zip(at, half, strict=True)]
             part = window[low[0] : at[0] + half[0] + 1, low[1] : at[1] + half[1] + 1]
             offset = np.array([a - lo - (n - 1) / 2 for a, lo, n in zip(at, low, part.shape, strict=True)])
-            value = _closed(part, offset, box.size)
+            value = _closure(part, offset, box.size)
             if value > best + 1e-6:
                 best, move = value, np.array([row, column])
     half_box = np.array(box.size) // 2
@@ -240,7 +252,7 @@ def _centred(light: Floats, found: Found, box: Box) -> Box | None:
     return None
 
 
-def _around(points: NDArray[np.float64], size: tuple[int, int]) -> Box:
+def _box_inside(points: NDArray[np.float64], size: tuple[int, int]) -> Box:
     """Return a box of three quarters of the spacing around the point that lies farthest inside."""
     side = max(float(LEAST), 0.75 * spacing(points))
     side = min(side, min(size) - 1.0)
@@ -249,10 +261,10 @@ def _around(points: NDArray[np.float64], size: tuple[int, int]) -> Box:
     return as_box((*centre.tolist(), side, side), size)
 
 
-# --- background and tag ----------------------------------------------------------------------------------------------
+# --- background and layout ----------------------------------------------------------------------------------------------
 
 
-def _distance(
+def _element_distance(
     size: tuple[int, int], points: NDArray[np.float64], box: tuple[int, int], wrap: tuple[bool, bool]
 ) -> Floats:
     """Return the distance of each pixel to the nearest element, in halves of its box."""
@@ -272,27 +284,29 @@ def _distance(
     return np.asarray(found.reshape(size), np.float32)
 
 
-def _tag(guide: Floats, away: Floats, points: NDArray[np.float64], box: Box, mask: Bools | None) -> tuple[Tag, float]:
-    """Choose a tag, and say how far the choice is from the other ones."""
+def _choose_layout(
+    guide: Floats, away: Floats, points: NDArray[np.float64], mask: Bools | None
+) -> tuple[Layout, float]:
+    """Choose a layout, and say how far the choice is from the other ones."""
     from scipy.spatial import cKDTree
 
     if mask is not None:
-        pieces, count = components(mask, (False, False))
+        pieces, count = label_components(mask, (False, False))
         main = float(np.bincount(pieces.ravel())[1:].max(initial=0)) / max(float(mask.sum()), 1.0)
         if main > 0.5 or count < 3:
-            return "F=c", min(1.0, main)
-        return ("F=d", 0.7) if float((~mask).mean()) > OPEN else ("B=c", 0.6)
+            return Layout.CONNECTED, min(1.0, main)
+        return (Layout.DISJOINT, 0.7) if float((~mask).mean()) > OPEN else (Layout.JOINTED, 0.6)
     if len(points) < 3:
-        return "F=d", 0.1
-    thing, contrast = _thing(lab(guide), away, points)
+        return Layout.DISJOINT, 0.1
+    thing, contrast = _compare_things(to_lab(guide), away, points)
     sure = _odds(thing / THING)
     if thing >= THING:
-        return "F=d", sure
+        return Layout.DISJOINT, sure
     near = cKDTree(points).query(points, k=2)[0][:, 1]
     spread = float(near.std() / max(float(near.mean()), 1e-9))
     # A net stands out from what is seen through it, and joints less; the less if all between them is of one size.
     net = contrast / (NET if spread < EVEN else NET / 2)
-    return ("F=c" if net >= 1 else "B=c"), sure * _odds(net)
+    return (Layout.CONNECTED if net >= 1 else Layout.JOINTED), sure * _odds(net)
 
 
 def _odds(ratio: float) -> float:
@@ -300,7 +314,7 @@ def _odds(ratio: float) -> float:
     return float(1 / (1 + min(ratio, 1 / max(ratio, 1e-9)) ** 1.5))
 
 
-def _thing(colours: Floats, away: Floats, points: NDArray[np.float64]) -> tuple[float, float]:
+def _compare_things(colours: Floats, away: Floats, points: NDArray[np.float64]) -> tuple[float, float]:
     """Return how much elements are things rather than openings, and how their lightness differs from what lies between.
 
     Openings of a net and bricks between joints are even and alike; lines, edges and colours lie between them. Of things on
@@ -324,12 +338,12 @@ def _thing(colours: Floats, away: Floats, points: NDArray[np.float64]) -> tuple[
     return busy * varied, abs(float(np.median(light[inner])) - float(np.median(light[outer])))
 
 
-def _background(guide: Floats, away: Floats, box: Box) -> tuple[Bools, float]:
+def _choose_background(guide: Floats, away: Floats, box: Box) -> tuple[Bools, float]:
     """Take the places farthest from all elements, of the colour that most of them have."""
     from scipy.ndimage import gaussian_filter, maximum_filter
 
-    colours = lab(guide)
-    reach = odd(min(box.size) / 2)
+    colours = to_lab(guide)
+    reach = nearest_odd(min(box.size) / 2)
     top = maximum_filter(away, reach) == away
     places = np.argwhere(top)
     order = np.lexsort((places[:, 1], places[:, 0], -away[tuple(places.T)]))
