@@ -1,8 +1,9 @@
 //! Kernels of texrs: new textures from one example.
 //!
-//! The rooms, from the ground up. Each knows only those above it in this list.
+//! Four layers, the lowest first; a module uses those below its own layer, and of its own layer only what the table
+//! names behind an arrow. Every kernel returns the same bytes for any number of threads.
 //!
-//! | room | noun |
+//! | foundation | |
 //! |---|---|
 //! | [`error`] | the one error type |
 //! | [`grid`] | shape, strides, wrap or clamp per axis; two and three dimensions from one source |
@@ -10,54 +11,41 @@
 //! | [`hash`] | counter-based noise: randomness belongs to the position, never to a stream |
 //! | [`fixed`] | coordinates and frames in fixed point |
 //! | [`pca`] | principal components |
-//! | [`sparse`] | symmetric positive definite systems: factored once, solved many times |
-//! | [`appearance`] | what the surroundings of each sample of an exemplar look like |
-//! | [`guide`] | what an output is asked to show beside looking like the exemplar |
-//! | [`blocks`] | a coherent start: cells filled by pieces that fit |
-//! | [`pyramid`] | from one resolution to the next |
-//! | [`optimize`] | coordinates corrected until every window is like one of the exemplar |
-//! | [`coherence`] | samples that look alike, and points that choose among those their neighbours know |
-//! | [`gather`] | an exemplar of any type looked up through coordinates |
+//!
+//! | kernels | |
+//! |---|---|
 //! | [`seam`] | minimum cuts on grids: max-flow, planar strips, binary labels |
-//! | [`mean_shift`] | joint spatial and range filtering |
-//! | [`ncc`] | how alike a template and each window of an image are |
-//! | [`nearest`] | the nearest of many vectors |
 //! | [`patch_search`] | exact best matches of a masked patch |
+//! | [`complete`] | filling holes by example -> `seam`, `patch_search` |
 //! | [`poisson`] | images from their differences, near given values |
-//! | [`complete`] | filling holes by example |
 //! | [`warp`] | where each pixel comes from, of pictures warped by moved points |
+//! | [`gather`] | an exemplar of any type looked up through coordinates |
+//! | [`ncc`] | normalised cross-correlation of a template with each window of an image |
+//! | [`mean_shift`] | joint spatial and range filtering |
+//! | [`nearest`] | the nearest of many vectors |
+//! | [`sparse`] | symmetric positive definite systems: factored once, solved many times |
 //! | [`image_io`] | 8/16-bit and float image files, with limits |
 //!
-//! `py` is the door to Python; nothing here imports it.
+//! | engine | |
+//! |---|---|
+//! | [`appearance`] | appearance vectors: what the neighbourhood of each sample of an exemplar looks like |
+//! | [`guide`] | soft constraints on an output -> `appearance` |
+//! | [`blocks`] | patch-based initialisation: cells filled by pieces that fit -> `appearance`, `guide` |
+//! | [`pyramid`] | from one resolution to the next |
+//! | [`optimize`] | coordinates corrected until every window is like one of the exemplar -> `appearance`, `guide` |
+//! | [`coherence`] | k-coherence: similarity sets, and correction among their candidates -> `appearance` |
 //!
-//! Every kernel gives the same bytes for any number of threads.
-
-pub mod error;
-pub mod fixed;
-pub mod grid;
-pub mod hash;
-pub mod image_io;
-pub mod par;
-pub mod pca;
-pub mod sparse;
-
-pub mod appearance;
-pub mod blocks;
-pub mod coherence;
-pub mod complete;
-pub mod gather;
-pub mod guide;
-pub mod mean_shift;
-pub mod ncc;
-pub mod nearest;
-pub mod optimize;
-pub mod patch_search;
-pub mod poisson;
-pub mod pyramid;
-pub mod seam;
-pub mod warp;
+//! The topmost layer, `bindings`, is the Python module `texrs._rust` (feature `python`).
 
 #[cfg(feature = "python")]
-mod py;
+mod bindings;
+mod engine;
+mod foundation;
+mod kernels;
 
-pub use error::{Error, Result};
+pub use engine::{appearance, blocks, coherence, guide, optimize, pyramid};
+pub use foundation::error::{Error, Result};
+pub use foundation::{error, fixed, grid, hash, par, pca};
+pub use kernels::{
+    complete, gather, image_io, mean_shift, ncc, nearest, patch_search, poisson, seam, sparse, warp,
+};

@@ -1,0 +1,120 @@
+//! The bindings: the only place that names pyo3 and numpy. A function here checks nothing but types, lets go of the
+//! interpreter, and calls a kernel.
+
+mod appearance;
+mod coherence;
+mod complete;
+mod gather;
+mod hash;
+mod image_io;
+mod mean_shift;
+mod ncc;
+mod nearest;
+mod patch_search;
+mod poisson;
+mod seam;
+
+mod sparse;
+mod warp;
+
+use std::cell::Cell;
+use std::time::Duration;
+
+use pyo3::prelude::*;
+
+use crate::foundation::par::{self, Monitor};
+use crate::{Error, Result};
+
+/// How often a waiting caller looks for Ctrl-C and reports progress.
+const POLL: Duration = Duration::from_millis(50);
+
+thread_local! {
+    static THREADS: Cell<usize> = const { Cell::new(0) };
+}
+
+impl From<Error> for PyErr {
+    /// The class of `texrs.errors` that bears the variant's name.
+    fn from(error: Error) -> Self {
+        let class = match &error {
+            Error::Value { .. } | Error::Shape { .. } => "InvalidInput",
+            Error::Limit { .. } => "LimitExceeded",
+            Error::File { .. } => "FileError",
+            Error::Cancelled(_) => "Cancelled",
+        };
+        Python::attach(|py| {
+            match py
+                .import("texrs.errors")
+                .and_then(|m| m.getattr(class)?.call1((error.to_string(),)))
+            {
+                Ok(instance) => PyErr::from_value(instance),
+                Err(error) => error,
+            }
+        })
+    }
+}
+
+/// Runs a kernel without the interpreter lock, in the pool of this thread's choice. Ctrl-C stops it; `progress`, if
+/// given, is called with the share that is done and stops it by raising.
+fn run<R: Send>(
+    py: Python<'_>,
+    progress: Option<Py<PyAny>>,
+    work: impl FnOnce(&Monitor) -> Result<R> + Send,
+) -> PyResult<R> {
+    let threads = THREADS.get();
+    py.detach(|| {
+        par::watch(threads, POLL, work, |monitor| {
+            Python::attach(|py| {
+                py.check_signals()?;
+                if let Some(progress) = &progress {
+                    progress.call1(py, (monitor.fraction(),))?;
+                }
+                Ok(())
+            })
+        })
+    })
+}
+
+/// Sets the number of threads that kernels called from this thread use (0: RAYON_NUM_THREADS, or all cores) and
+/// returns the former one.
+#[pyfunction]
+fn set_threads(threads: usize) -> usize {
+    THREADS.replace(threads)
+}
+
+/// Kernels of texrs. Private: use `texrs.kernels`.
+#[pymodule(gil_used = false)]
+mod _rust {
+    #[pymodule_export]
+    use super::appearance::{Appearance, upsample};
+    #[pymodule_export]
+    use super::coherence::{cohere, jitter, similar};
+    #[pymodule_export]
+    use super::complete::complete;
+    #[pymodule_export]
+    use super::gather::gather;
+    #[pymodule_export]
+    use super::hash::{philox, uniform};
+    #[pymodule_export]
+    use super::image_io::{decode_image, encode_image, exif_orientation};
+    #[pymodule_export]
+    use super::mean_shift::mean_shift;
+    #[pymodule_export]
+    use super::ncc::Correlation;
+    #[pymodule_export]
+    use super::nearest::Nearest;
+    #[pymodule_export]
+    use super::patch_search::PatchIndex;
+    #[pymodule_export]
+    use super::poisson::{poisson, poisson_spread};
+    #[pymodule_export]
+    use super::seam::{seam_cut, seam_labels, seam_strips};
+    #[pymodule_export]
+    use super::set_threads;
+    #[pymodule_export]
+    use super::sparse::Cholesky;
+    #[pymodule_export]
+    use super::warp::{warp_mesh, warp_points};
+
+    #[pymodule_export]
+    const VERSION: &str = env!("CARGO_PKG_VERSION");
+}

@@ -1,0 +1,44 @@
+//! The exemplar's colours with a rim around them, for places that are known to be near.
+
+use super::Colour;
+use crate::foundation::grid::Grid;
+
+/// Colours that can be read a little beyond the exemplar's ends: around cyclic axes, and from the border beyond others.
+#[derive(Debug, Clone)]
+pub struct Apron<const D: usize> {
+    colours: Vec<Colour>,
+    strides: [i32; D],
+    /// Position of sample zero.
+    zero: i32,
+}
+
+impl<const D: usize> Apron<D> {
+    pub(super) fn new(colours: &[Colour], grid: &Grid<D>, rim: usize) -> Self {
+        let wide = Grid::new(grid.shape().map(|n| n + 2 * rim), [false; D])
+            .expect("an exemplar that fits, so its rim does");
+        let colours = (0..wide.len())
+            .map(|i| {
+                let sample = wide.point(i);
+                let inner: [usize; D] =
+                    std::array::from_fn(|a| grid.resolve(a, sample[a] as isize - rim as isize));
+                colours[grid.index(inner)]
+            })
+            .collect();
+        let strides = wide.strides().map(|s| s as i32);
+        Self {
+            colours,
+            strides,
+            zero: strides.iter().map(|s| s * rim as i32).sum(),
+        }
+    }
+
+    /// The colour of a sample at most the rim away from the exemplar.
+    #[inline(always)]
+    pub fn colour(&self, sample: [i32; D]) -> Colour {
+        let mut at = self.zero;
+        for axis in 0..D {
+            at += sample[axis] * self.strides[axis];
+        }
+        self.colours[at as usize]
+    }
+}

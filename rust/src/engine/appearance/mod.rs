@@ -1,0 +1,493 @@
+//! Appearance vectors: what the surroundings of each sample of an exemplar look like, in few numbers.
+//!
+//! Lefebvre and Hoppe, *Appearance-space texture synthesis*, SIGGRAPH 2006. A window of (2 r + 1)^D colours, weighted
+//! by a Gaussian, is projected onto its leading principal components. All of it is integer arithmetic: colours,
+//! components and vectors have 12 bits, so a vector is the same however a window was put together, and distances are
+//! exact in any order.
+//!
+//! Distances are divided by the variance of all windows, so they mean the same for every exemplar; [`UNIT`] is
+//! the distance of two windows that have nothing to do with each other, halved.
+
+mod apron;
+mod projection;
+mod table;
+
+use crate::foundation::fixed::{BITS, ONE, Place};
+use crate::foundation::grid::Grid;
+use crate::foundation::hash::Noise;
+use crate::foundation::par;
+use crate::foundation::pca::principal;
+use crate::{Error, Result};
+
+pub use apron::Apron;
+use projection::Projection;
+pub use table::Parts;
+
+/// Numbers of an appearance vector.
+pub const KEEP: usize = 24;
+/// Channels of a colour, at most; missing ones are zero.
+pub const CHANNELS: usize = 4;
+/// Squared distance that equals the variance of all windows.
+pub const UNIT: i32 = SCALE * SCALE;
+
+/// An appearance vector, in units of the windows' standard deviation / 512.
+pub type Feature = [i16; KEEP];
+/// A vector that fills a line of the cache: what is read at random costs one access.
+#[repr(align(64))]
+#[derive(Debug, Clone, Copy)]
+struct Line(Feature);
+/// A colour, scaled so that the exemplar fills 12 bits.
+pub type Colour = [i16; CHANNELS];
+
+const SCALE: i32 = 512;
+const TOP: f32 = 2047.0;
+/// Standard deviation of the Gaussian over a window, in samples.
+const SIGMA: f64 = 2.0;
+/// Windows that the components are computed from, at most.
+const SAMPLES: usize = 6000;
+/// Variance of windows, in squared steps of a colour, below which an exemplar shows nothing.
+const FLAT: f64 = 1e-3;
+/// Numbers of a window, at most: the components come from a square matrix of this side.
+const LONGEST: usize = 2048;
+/// Numbers that fill a register.
+const LANES: usize = 16;
+/// Places that differ by less are of one piece of the exemplar: rounding moves them by half a sample.
+const SAME: i32 = ONE * 3 / 4;
+/// Points a task takes at a time.
+const CHUNK: usize = 1024;
+
+/// An exemplar at one resolution, with an appearance vector for each of its points.
+#[derive(Debug, Clone)]
+pub struct Appearance<const D: usize> {
+    grid: Grid<D>,
+    radius: usize,
+    channels: usize,
+    colours: Vec<Colour>,
+    apron: Apron<D>,
+    offsets: Vec<[i32; D]>,
+    projection: Projection,
+    features: Vec<Line>,
+    /// Median distance from a window to the nearest other one: what is near enough to be the same.
+    spacing: i32,
+}
+
+impl<const D: usize> Appearance<D> {
+    /// Analyses `colours`: points of `grid` by `channels`. A cyclic axis of the grid is one along which the exemplar
+    /// repeats.
+    pub fn new(colours: &[f32], grid: Grid<D>, channels: usize, radius: usize) -> Result<Self> {
+        if !(1..=CHANNELS).contains(&channels) || colours.len() != grid.len() * channels {
+            let mut expected = grid.shape().to_vec();
+            expected.push(channels.clamp(1, CHANNELS));
+            return Err(Error::Shape {
+                argument: "colours",
+                expected,
+                got: vec![colours.len()],
+            });
+        }
+        if let Some(bad) = colours.iter().find(|x| !x.is_finite()) {
+            return Err(Error::value("colours", format!("{bad} is not finite")));
+        }
+        let least = 2 * radius + 2;
+        let numbers = (2 * radius + 1)
+            .saturating_pow(D as u32)
+            .saturating_mul(channels);
+        if radius == 0 || numbers > LONGEST {
+            return Err(Error::value(
+                "radius",
+                format!(
+                    "{radius} with {channels} channels makes windows of {numbers} numbers, 1 to {LONGEST} are allowed"
+                ),
+            ));
+        }
+        if grid.shape().iter().any(|&n| n < least) {
+            return Err(Error::value(
+                "exemplar",
+                format!(
+                    "{:?} is too small for windows of radius {radius}: sides of at least {least} are needed",
+                    grid.shape()
+                ),
+            ));
+        }
+        let colours = quantise(colours, channels);
+        let mut this = Self {
+            grid,
+            radius,
+            channels,
+            apron: Apron::new(&colours, &grid, radius + 1),
+            colours,
+            offsets: window(radius),
+            projection: Projection::empty(),
+            features: Vec::new(),
+            spacing: 0,
+        };
+        this.projection = this.learn();
+        this.features = this.describe_all();
+        this.spacing = this.measure_spacing();
+        Ok(this)
+    }
+
+    /// The exemplar's grid; cyclic axes are those along which it repeats.
+    pub fn grid(&self) -> &Grid<D> {
+        &self.grid
+    }
+
+    /// Radius of the windows.
+    pub fn radius(&self) -> usize {
+        self.radius
+    }
+
+    /// Channels that count.
+    pub fn channels(&self) -> usize {
+        self.channels
+    }
+
+    /// The offsets of a window, in row-major order.
+    pub fn offsets(&self) -> &[[i32; D]] {
+        &self.offsets
+    }
+
+    /// Median distance from a window to the nearest other one.
+    pub fn spacing(&self) -> i32 {
+        self.spacing
+    }
+
+    /// Variance of the colours over all samples, summed over channels.
+    pub fn colour_variance(&self) -> f64 {
+        let count = self.colours.len() as f64;
+        let (mut sum, mut squares) = ([0i64; CHANNELS], 0i64);
+        for colour in &self.colours {
+            for c in 0..CHANNELS {
+                sum[c] += i64::from(colour[c]);
+                squares += i64::from(colour[c]) * i64::from(colour[c]);
+            }
+        }
+        let means: f64 = sum.iter().map(|&s| (s as f64 / count).powi(2)).sum();
+        squares as f64 / count - means
+    }
+
+    /// First and last sample along an axis whose window lies inside the exemplar.
+    #[inline(always)]
+    pub fn range(&self, axis: usize) -> [i32; 2] {
+        let last = self.grid.shape()[axis] as i32 - 1;
+        if self.grid.wrap()[axis] {
+            [0, last]
+        } else {
+            [self.radius as i32, last - self.radius as i32]
+        }
+    }
+
+    /// Row-major position of a sample whose window lies inside the exemplar, around cyclic axes.
+    #[inline(always)]
+    pub fn inside(&self, sample: [i32; D]) -> Option<usize> {
+        let (shape, wrap) = (self.grid.shape(), self.grid.wrap());
+        let mut at = 0;
+        for axis in 0..D {
+            let n = shape[axis] as i32;
+            let mut i = sample[axis];
+            if wrap[axis] {
+                if !(0..n).contains(&i) {
+                    i = i.rem_euclid(n);
+                }
+            } else {
+                let r = self.radius as i32;
+                if i < r || i >= n - r {
+                    return None;
+                }
+            }
+            at = at * n as usize + i as usize;
+        }
+        Some(at)
+    }
+
+    /// Row-major position of the sample nearest to one that may lie outside.
+    #[inline(always)]
+    pub fn clamped(&self, sample: [i32; D]) -> usize {
+        let (shape, wrap) = (self.grid.shape(), self.grid.wrap());
+        let mut at = 0;
+        for axis in 0..D {
+            let n = shape[axis] as i32;
+            let mut i = sample[axis];
+            if !(0..n).contains(&i) {
+                i = if wrap[axis] {
+                    i.rem_euclid(n)
+                } else {
+                    i.clamp(0, n - 1)
+                };
+            }
+            at = at * n as usize + i as usize;
+        }
+        at
+    }
+
+    /// A place brought to where windows lie inside the exemplar: around cyclic axes, to the border of the others.
+    #[inline(always)]
+    pub fn bring_inside(&self, mut place: Place<D>) -> Place<D> {
+        for axis in 0..D {
+            let [low, high] = self.range(axis);
+            if self.grid.wrap()[axis] {
+                place[axis] = place[axis].rem_euclid((high + 1) * ONE);
+            } else {
+                // Only from where the nearest sample is outside: fractions are kept.
+                let sample = (place[axis] + ONE / 2) >> BITS;
+                if !(low..=high).contains(&sample) {
+                    place[axis] = sample.clamp(low, high) * ONE;
+                }
+            }
+        }
+        place
+    }
+
+    /// Whether two places for one point are of one piece of the exemplar.
+    #[inline(always)]
+    pub fn same(&self, a: Place<D>, b: Place<D>) -> bool {
+        (0..D).all(|axis| {
+            let d = (a[axis] - b[axis]).abs();
+            d <= SAME
+                || self.grid.wrap()[axis] && {
+                    let n = self.grid.shape()[axis] as i32 * ONE;
+                    let d = d % n;
+                    d.min(n - d) <= SAME
+                }
+        })
+    }
+
+    /// The colours with a rim of one sample more than windows reach.
+    #[inline(always)]
+    pub fn apron(&self) -> &Apron<D> {
+        &self.apron
+    }
+
+    /// The colour at a row-major position.
+    #[inline(always)]
+    pub fn colour(&self, at: usize) -> Colour {
+        self.colours[at]
+    }
+
+    /// The appearance vector at a row-major position; zero where the window does not lie inside the exemplar.
+    #[inline(always)]
+    pub fn feature(&self, at: usize) -> &Feature {
+        &self.features[at].0
+    }
+
+    /// Room for the numbers of one window.
+    pub fn scratch(&self) -> Vec<i16> {
+        // A colour is written whole, so the last one reaches beyond the numbers that count.
+        vec![0; (self.offsets.len() * self.channels).next_multiple_of(LANES) + CHANNELS]
+    }
+
+    /// Puts the colour of the `k`-th offset into a window.
+    #[inline(always)]
+    pub fn put(&self, window: &mut [i16], k: usize, colour: Colour) {
+        window[k * self.channels..][..CHANNELS].copy_from_slice(&colour);
+    }
+
+    /// The appearance vector of a window whose colours were [`put`](Self::put) in order.
+    #[inline(always)]
+    pub fn project(&self, window: &mut [i16]) -> Feature {
+        let p = &self.projection;
+        window[p.length..p.padded].fill(0);
+        p.apply(&window[..p.padded])
+    }
+
+    fn learn(&self) -> Projection {
+        let centres = self.valid_centres();
+        let n = self.offsets.len() * self.channels;
+        let weights: Vec<f32> = self
+            .offsets
+            .iter()
+            .map(|o| {
+                let square: i32 = o.iter().map(|x| x * x).sum();
+                (-f64::from(square) / (2.0 * SIGMA * SIGMA)).exp() as f32
+            })
+            .collect();
+        let noise = Noise::new(0x5EED);
+        let count = centres.len().min(SAMPLES);
+        let mut samples = vec![0.0f32; count * n];
+        par::chunks_mut(&mut samples, CHUNK * n, |chunk, samples| {
+            let mut window = self.scratch();
+            for (i, sample) in samples.chunks_exact_mut(n).enumerate() {
+                let k = chunk * CHUNK + i;
+                let pick = if count == centres.len() {
+                    k
+                } else {
+                    noise.below(centres.len() as u64, [k as u32, 0, 0, 0]) as usize
+                };
+                self.cut(centres.get(pick), &mut window);
+                for (k, x) in sample.iter_mut().enumerate() {
+                    *x = f32::from(window[k]) * weights[k / self.channels];
+                }
+            }
+        });
+        Projection::new(&principal(&samples, n, KEEP), &weights, self.channels)
+    }
+
+    /// Writes the colours around a sample of the exemplar.
+    fn cut(&self, centre: [i32; D], window: &mut [i16]) {
+        for (k, o) in self.offsets.iter().enumerate() {
+            let mut sample = centre;
+            for axis in 0..D {
+                sample[axis] += o[axis];
+            }
+            self.put(window, k, self.colours[self.clamped(sample)]);
+        }
+    }
+
+    fn describe_all(&self) -> Vec<Line> {
+        let mut features = vec![Line([0; KEEP]); self.grid.len()];
+        par::chunks_mut(&mut features, CHUNK, |chunk, features| {
+            let mut window = self.scratch();
+            for (i, feature) in features.iter_mut().enumerate() {
+                let centre = self.grid.point(chunk * CHUNK + i).map(|x| x as i32);
+                if self.inside(centre).is_some() {
+                    self.cut(centre, &mut window);
+                    feature.0 = self.project(&mut window);
+                }
+            }
+        });
+        features
+    }
+
+    /// All samples whose windows lie inside, addressed by number.
+    pub(crate) fn valid_centres(&self) -> Centres<D> {
+        let ranges = std::array::from_fn(|axis| self.range(axis));
+        Centres { ranges }
+    }
+
+    fn measure_spacing(&self) -> i32 {
+        let centres = self.valid_centres();
+        let count = (60_000_000 / self.grid.len())
+            .clamp(60, 400)
+            .min(centres.len());
+        let noise = Noise::new(0xD157);
+        let apart = 2 * self.radius as i32 - 1;
+        let mut nearest = par::map(count, |k| {
+            let me = centres.get(noise.below(centres.len() as u64, [k as u32, 0, 0, 0]) as usize);
+            self.nearest_other(me, apart)
+        });
+        nearest.sort_unstable();
+        nearest[count / 2]
+    }
+
+    /// Distance from the window at `me` to the nearest one that is more than `apart` away on some axis.
+    #[inline(always)]
+    fn nearest_other(&self, me: [i32; D], apart: i32) -> i32 {
+        let (shape, wrap) = (self.grid.shape(), self.grid.wrap());
+        let mine = self.features[self.clamped(me)].0;
+        let columns = self.range(D - 1);
+        let lines = self.grid.len() / shape[D - 1];
+        let mut best = i32::MAX;
+        for line in 0..lines {
+            let point = self.grid.point(line * shape[D - 1]);
+            let mut near = true;
+            let mut valid = true;
+            for axis in 0..D - 1 {
+                let x = point[axis] as i32;
+                let range = self.range(axis);
+                valid &= (range[0]..=range[1]).contains(&x);
+                near &= gap(x, me[axis], shape[axis] as i32, wrap[axis]) <= apart;
+            }
+            if !valid {
+                continue;
+            }
+            for x in columns[0]..=columns[1] {
+                if near && gap(x, me[D - 1], shape[D - 1] as i32, wrap[D - 1]) <= apart {
+                    continue;
+                }
+                let other = &self.features[line * shape[D - 1] + x as usize].0;
+                best = best.min(distance(&mine, other));
+            }
+        }
+        // An exemplar so small that all windows are neighbours.
+        if best == i32::MAX { UNIT / 4 } else { best }
+    }
+}
+
+/// Squared distance of two appearance vectors.
+// Inlined between checks of bounds it is unrolled into single numbers: on its own it is a few wide instructions.
+#[inline(never)]
+pub fn distance(a: &Feature, b: &Feature) -> i32 {
+    let mut sum = 0;
+    for k in 0..KEEP {
+        // Twelve bits each, so the difference fits: products of 16 bits are what registers multiply fastest.
+        let d = a[k].wrapping_sub(b[k]);
+        sum += i32::from(d) * i32::from(d);
+    }
+    sum
+}
+
+fn gap(a: i32, b: i32, n: i32, wrap: bool) -> i32 {
+    let d = (a - b).abs();
+    if wrap { d.min(n - d) } else { d }
+}
+
+/// Samples whose windows lie inside an exemplar.
+pub(crate) struct Centres<const D: usize> {
+    ranges: [[i32; 2]; D],
+}
+
+impl<const D: usize> Centres<D> {
+    pub(crate) fn len(&self) -> usize {
+        self.ranges
+            .iter()
+            .map(|r| (r[1] - r[0] + 1) as usize)
+            .product()
+    }
+
+    pub(crate) fn get(&self, mut number: usize) -> [i32; D] {
+        let mut sample = [0; D];
+        for axis in (0..D).rev() {
+            let [low, high] = self.ranges[axis];
+            let n = (high - low + 1) as usize;
+            sample[axis] = low + (number % n) as i32;
+            number /= n;
+        }
+        sample
+    }
+}
+
+/// The offsets of a window, in row-major order.
+fn window<const D: usize>(radius: usize) -> Vec<[i32; D]> {
+    let side = 2 * radius + 1;
+    (0..side.pow(D as u32))
+        .map(|mut k| {
+            let mut offset = [0; D];
+            for axis in (0..D).rev() {
+                offset[axis] = (k % side) as i32 - radius as i32;
+                k /= side;
+            }
+            offset
+        })
+        .collect()
+}
+
+/// Colours less their mean, with the farthest at the end of 12 bits.
+fn quantise(colours: &[f32], channels: usize) -> Vec<Colour> {
+    let count = (colours.len() / channels) as f64;
+    let mut mean = [0.0f64; CHANNELS];
+    for pixel in colours.chunks_exact(channels) {
+        for (m, &x) in mean.iter_mut().zip(pixel) {
+            *m += f64::from(x) / count;
+        }
+    }
+    let mean = mean.map(|m| m as f32);
+    let mut largest = 0.0f32;
+    for pixel in colours.chunks_exact(channels) {
+        for (m, &x) in mean.iter().zip(pixel) {
+            largest = largest.max((x - m).abs());
+        }
+    }
+    let scale = if largest > 1e-6 { TOP / largest } else { 0.0 };
+    colours
+        .chunks_exact(channels)
+        .map(|pixel| {
+            let mut colour = [0; CHANNELS];
+            for ((c, &x), m) in colour.iter_mut().zip(pixel).zip(mean) {
+                *c = ((x - m) * scale).round() as i16;
+            }
+            colour
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,115 @@
+//! From the colours of a window to few numbers, in whole numbers throughout.
+
+use super::{FLAT, Feature, KEEP, LANES, SCALE, TOP};
+use crate::foundation::pca::Principal;
+
+/// From the colours of a window to its appearance vector.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Projection {
+    /// Numbers of a window, channel by channel within each point, and those of a row of the basis: filled up to
+    /// whole registers.
+    pub(super) length: usize,
+    pub(super) padded: usize,
+    pub(super) basis: Vec<i16>,
+    pub(super) bias: [i64; KEEP],
+    /// Products with the basis to vectors, in units of 2^-32.
+    pub(super) gain: i64,
+}
+
+impl Projection {
+    pub(super) fn empty() -> Self {
+        Self {
+            length: 0,
+            padded: 0,
+            basis: Vec::new(),
+            bias: [0; KEEP],
+            gain: 0,
+        }
+    }
+
+    pub(super) fn new(components: &Principal, weights: &[f32], channels: usize) -> Self {
+        let length = weights.len() * channels;
+        let padded = length.next_multiple_of(LANES);
+        let weighted: Vec<Vec<f64>> = components
+            .axes
+            .iter()
+            .map(|axis| {
+                axis.iter()
+                    .enumerate()
+                    .map(|(i, &x)| f64::from(x) * f64::from(weights[i / channels]))
+                    .collect()
+            })
+            .collect();
+        let sums = weighted.iter().map(|w| w.iter().map(|x| x.abs()).sum());
+        let longest: f64 = sums.fold(0.0, f64::max);
+        let largest = weighted
+            .iter()
+            .flatten()
+            .fold(0.0f64, |m, x| m.max(x.abs()));
+        if longest == 0.0 || components.variance <= FLAT {
+            return Self {
+                length,
+                padded,
+                basis: vec![0; padded * KEEP],
+                ..Self::empty()
+            };
+        }
+        // As fine as 16 bits a number, and sums of products within 31 bits, allow.
+        let fine = (f64::from(1 << 30) / (f64::from(TOP) * longest)).min(32767.0 / largest);
+        let mut basis = vec![0; padded * KEEP];
+        let mut bias = [0; KEEP];
+        for (k, row) in weighted.iter().enumerate() {
+            for (to, x) in basis[k * padded..].iter_mut().zip(row) {
+                *to = (x * fine).round() as i16;
+            }
+            let along: f64 = components.axes[k]
+                .iter()
+                .zip(&components.mean)
+                .map(|(&a, &m)| f64::from(a) * f64::from(m))
+                .sum();
+            bias[k] = (along * fine).round() as i64;
+        }
+        let gain = f64::from(SCALE) / (components.variance.sqrt() * fine);
+        Self {
+            length,
+            padded,
+            basis,
+            bias,
+            gain: (gain * (1i64 << 32) as f64).round() as i64,
+        }
+    }
+
+    #[allow(unsafe_code)] // measured: twice as fast as with the baseline instructions
+    #[inline]
+    pub(super) fn apply(&self, window: &[i16]) -> Feature {
+        #[cfg(target_arch = "x86_64")]
+        {
+            if is_x86_feature_detected!("avx2") {
+                // SAFETY: the CPU has the feature that the function is compiled for.
+                return unsafe { self.apply_avx2(window) };
+            }
+        }
+        self.multiply(window)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn apply_avx2(&self, window: &[i16]) -> Feature {
+        self.multiply(window)
+    }
+
+    /// Whole numbers, so the order in which a compiler adds them does not matter.
+    #[inline(always)]
+    fn multiply(&self, window: &[i16]) -> Feature {
+        let mut feature = [0; KEEP];
+        for (k, row) in self.basis.chunks_exact(self.padded).enumerate() {
+            let mut sum = 0i32;
+            for (&w, &x) in row.iter().zip(window) {
+                sum += i32::from(w) * i32::from(x);
+            }
+            let scaled = ((i64::from(sum) - self.bias[k]) * self.gain + (1 << 31)) >> 32;
+            feature[k] = scaled.clamp(-2047, 2047) as i16;
+        }
+        feature
+    }
+}

@@ -1,0 +1,96 @@
+//! An analysis taken apart into plain arrays, to be kept, and put together again.
+
+use super::{Appearance, Apron, CHANNELS, Colour, Feature, KEEP, LANES, Line, Projection, window};
+use crate::foundation::grid::Grid;
+use crate::{Error, Result};
+
+/// The arrays of an [`Appearance`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parts<const D: usize> {
+    /// Samples along each axis, and which axes are cyclic.
+    pub grid: Grid<D>,
+    /// Radius of the windows.
+    pub radius: usize,
+    /// Channels that count.
+    pub channels: usize,
+    /// A colour a sample.
+    pub colours: Vec<Colour>,
+    /// An appearance vector a sample.
+    pub features: Vec<Feature>,
+    /// Rows of the projection, each filled up to whole registers.
+    pub basis: Vec<i16>,
+    /// What the mean window projects to.
+    pub bias: [i64; KEEP],
+    /// From products to vectors, in units of 2^-32.
+    pub gain: i64,
+    /// Median distance from a window to the nearest other one.
+    pub spacing: i32,
+}
+
+impl<const D: usize> Appearance<D> {
+    /// Takes the analysis apart.
+    pub fn parts(&self) -> Parts<D> {
+        Parts {
+            grid: self.grid,
+            radius: self.radius,
+            channels: self.channels,
+            colours: self.colours.clone(),
+            features: self.features.iter().map(|line| line.0).collect(),
+            basis: self.projection.basis.clone(),
+            bias: self.projection.bias,
+            gain: self.projection.gain,
+            spacing: self.spacing,
+        }
+    }
+
+    /// Puts an analysis together again; an error where the arrays do not belong together.
+    pub fn from_parts(parts: Parts<D>) -> Result<Self> {
+        let points = parts.grid.len();
+        let known = (1..=8).contains(&parts.radius) && (1..=CHANNELS).contains(&parts.channels);
+        let length = if known {
+            (2 * parts.radius + 1).pow(D as u32) * parts.channels
+        } else {
+            0
+        };
+        let padded = length.next_multiple_of(LANES);
+        let sums_fit = parts
+            .basis
+            .chunks(padded.max(1))
+            .all(|row| row.iter().map(|&x| i64::from(x).abs()).sum::<i64>() * 2048 <= 1 << 31);
+        let within = |x: &i16| (-2047..=2047).contains(x);
+        if !known
+            || parts.grid.shape().iter().any(|&n| n < 2 * parts.radius + 2)
+            || parts.colours.len() != points
+            || parts.features.len() != points
+            || parts.basis.len() != padded * KEEP
+            || !sums_fit
+            || parts.bias.iter().any(|b| b.abs() > 1 << 31)
+            || !(0..=1 << 32).contains(&parts.gain)
+            || parts.spacing < 0
+            || !parts.colours.iter().flatten().all(within)
+            || !parts.features.iter().flatten().all(within)
+        {
+            return Err(Error::value(
+                "analysis",
+                "its arrays do not belong together",
+            ));
+        }
+        Ok(Self {
+            grid: parts.grid,
+            radius: parts.radius,
+            channels: parts.channels,
+            apron: Apron::new(&parts.colours, &parts.grid, parts.radius + 1),
+            colours: parts.colours,
+            offsets: window(parts.radius),
+            projection: Projection {
+                length,
+                padded,
+                basis: parts.basis,
+                bias: parts.bias,
+                gain: parts.gain,
+            },
+            features: parts.features.into_iter().map(Line).collect(),
+            spacing: parts.spacing,
+        })
+    }
+}

@@ -1,0 +1,145 @@
+//! A coherent start: the output divided into cells, each filled by one piece of the exemplar.
+//!
+//! The lattice is divided into cells of about `cell` points a side, with centres shifted by noise and each point given
+//! to the nearest centre, so that no seam is straight. A cell's piece is chosen to fit its neighbours: cells of even
+//! and odd parity take turns, each trying many places. The cost of a place counts how the shell just outside the cell
+//! would continue, against what lies there. Plain squared differences would favour bland pieces, which are near
+//! everything on average, so they are divided by the contrast of both.
+//!
+//! Everything is a function of the world's coordinates, within two cells for each of the `rounds`.
+
+mod cells;
+mod choose;
+
+use crate::engine::appearance::{Appearance, KEEP, distance};
+use crate::engine::guide::Guide;
+use crate::foundation::fixed::{Frames, Place, add, apply};
+use crate::foundation::grid::Region;
+use crate::foundation::hash::Noise;
+use crate::foundation::par::{self, Monitor};
+use crate::{Error, Result};
+
+use cells::Cells;
+use choose::Chooser;
+
+/// Points that a thread takes at once.
+const CHUNK: usize = 4096;
+
+/// What [`blocks`] is asked for.
+#[derive(Debug, Clone, Copy)]
+pub struct Options {
+    /// Side of a cell, in points.
+    pub cell: usize,
+    /// Half-rounds of choosing; the even and the odd cells take turns, and the first places the even ones anywhere.
+    pub rounds: usize,
+    /// Places a cell tries in a round.
+    pub candidates: usize,
+    /// How far misfits are divided by the contrast of the pieces, 0 to 1.
+    pub contrast: f64,
+    /// Cost of going on exactly where a neighbour ends, in misfits of unrelated pieces: otherwise the exemplar is copied
+    /// whole.
+    pub continuation: f64,
+    /// Cost of showing what one of the cells around shows, in the same units.
+    pub repetition: f64,
+    /// Chooses the texture.
+    pub seed: u64,
+    /// Points along borders that are there only for the others to look at: no cell is chosen that these do not hang on.
+    pub margin: usize,
+}
+
+/// Points that keep their places: none, or one flag and one place a point.
+#[derive(Debug, Clone, Copy)]
+pub struct Held<'a, const D: usize> {
+    /// Which.
+    pub points: &'a [bool],
+    /// Where they look; those of other points do not count.
+    pub places: &'a [Place<D>],
+}
+
+impl<const D: usize> Held<'_, D> {
+    /// Nothing is held.
+    pub const NONE: Self = Self {
+        points: &[],
+        places: &[],
+    };
+
+    #[inline(always)]
+    fn holds(&self, point: usize) -> bool {
+        self.points.get(point).is_some_and(|&h| h)
+    }
+}
+
+/// Gives every point of `region` a place in the exemplar.
+pub fn blocks<const D: usize>(
+    appearance: &Appearance<D>,
+    region: &Region<D>,
+    frames: Frames<'_, D>,
+    guide: Option<&Guide<'_>>,
+    held: Held<'_, D>,
+    options: &Options,
+    monitor: &Monitor,
+) -> Result<Vec<Place<D>>> {
+    if options.cell < 2 || options.candidates == 0 || options.rounds == 0 {
+        return Err(Error::value(
+            "cell",
+            format!("needs at least 2 points a cell, 1 candidate and 1 round, got {options:?}"),
+        ));
+    }
+    for n in [held.points.len(), held.places.len()] {
+        if n != held.points.len() || !(n == 0 || n == region.grid.len()) {
+            return Err(Error::Shape {
+                argument: "held",
+                expected: region.grid.shape().to_vec(),
+                got: vec![n],
+            });
+        }
+    }
+    let cells = Cells::new(region, options);
+    let noise = Noise::new(options.seed).part(1);
+    let owners = cells.owners();
+    let list = cells.list(&owners, frames);
+    let mut origins: Vec<Place<D>> = par::map(list.len(), |c| {
+        Chooser::new(appearance, &cells, &list, c).place(&noise, 0, 0)
+    });
+    let contrasts = par::map(appearance.grid().len(), |at| {
+        distance(appearance.feature(at), &[0; KEEP])
+    });
+    monitor.expect((options.rounds * list.len()) as u64);
+    let mut places = vec![[0; D]; region.grid.len()];
+    for round in 0..=options.rounds {
+        if round > 0 {
+            let even = round % 2 == 0;
+            origins = par::map(list.len(), |c| {
+                let idle =
+                    list[c].even != even || list[c].points.iter().all(|&p| held.holds(p as usize));
+                if idle || !cells.counts(c, options, round) || monitor.advance(1).is_err() {
+                    return origins[c];
+                }
+                let chooser = Chooser::new(appearance, &cells, &list, c);
+                let around = chooser.around(&places, &contrasts);
+                let asked = chooser.asked(&cells, guide, held);
+                let near: Vec<_> = cells.near(c).map(|n| origins[n]).collect();
+                let round = round as u32;
+                chooser.choose(&around, origins[c], &near, &asked, &noise, round, options)
+            });
+            monitor.check()?;
+        }
+        // Each point shows what its cell's piece has for it.
+        par::chunks_mut(&mut places, CHUNK, |chunk, places| {
+            for (i, place) in places.iter_mut().enumerate() {
+                let p = chunk * CHUNK + i;
+                *place = appearance.bring_inside(if held.holds(p) {
+                    held.places[p]
+                } else {
+                    let c = owners[p] as usize;
+                    let step = cells.step_from_centre(c, region.world(region.grid.point(p)));
+                    add(origins[c], apply(&list[c].frame, step))
+                });
+            }
+        });
+    }
+    Ok(places)
+}
+
+#[cfg(test)]
+mod tests;

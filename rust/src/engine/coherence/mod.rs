@@ -1,0 +1,152 @@
+//! k-coherence: each sample of an exemplar knows the few that look most like it, and a point of the output chooses among
+//! those that its neighbours' samples know.
+//!
+//! Tong et al., *Synthesis of bidirectional texture functions on arbitrary surfaces*, SIGGRAPH 2002; the correction in
+//! sub-passes is that of Lefebvre and Hoppe, *Parallel controllable texture synthesis*, SIGGRAPH 2005.
+//!
+//! 1. [`similar`]: the similarity set of each sample, once an exemplar;
+//! 2. [`jitter`]: coordinates displaced by noise;
+//! 3. [`correct`]: passes over a region, in which each point takes the candidate whose diagonal neighbours look most like
+//!    its own.
+//!
+//! Coordinates and vectors are whole numbers, so a cost is exact and the least is found whatever the order.
+
+mod boxes;
+mod pass;
+mod similar;
+mod tree;
+
+pub use pass::{Kinds, Options, correct};
+pub use similar::{Similarity, similar};
+
+use crate::Result;
+use crate::engine::appearance::{Appearance, KEEP};
+use crate::foundation::fixed::Place;
+use crate::foundation::grid::Region;
+use crate::foundation::hash::Noise;
+use crate::foundation::par;
+
+/// Points a task takes at a time.
+const CHUNK: usize = 1024;
+/// Numbers of a vector that are kept where few are enough: what a register holds.
+pub const FEW: usize = 8;
+/// Samples of a similarity set, at most.
+pub const LARGEST: usize = 16;
+
+/// Displaces each place that is not `held` by noise of its point in the world and of the `level`: up to `reach` along each
+/// axis, in the units of places.
+pub fn jitter<const D: usize>(
+    places: &mut [Place<D>],
+    region: &Region<D>,
+    held: &[bool],
+    reach: u32,
+    seed: u64,
+    level: u32,
+) -> Result<()> {
+    if !held.is_empty() && held.len() != places.len() {
+        return Err(crate::Error::Shape {
+            argument: "held",
+            expected: vec![places.len()],
+            got: vec![held.len()],
+        });
+    }
+    if places.len() != region.grid.len() {
+        return Err(crate::Error::Shape {
+            argument: "places",
+            expected: region.grid.shape().to_vec(),
+            got: vec![places.len()],
+        });
+    }
+    let noise = Noise::new(seed).part(4);
+    par::chunks_mut(places, CHUNK, |chunk, places| {
+        for (i, place) in places.iter_mut().enumerate() {
+            if held.get(chunk * CHUNK + i).is_some_and(|&h| h) {
+                continue;
+            }
+            let world = region.world(region.grid.point(chunk * CHUNK + i));
+            let words = noise.at(world, level);
+            for axis in 0..D {
+                let drawn = (u64::from(words[axis]) * (2 * u64::from(reach) + 1)) >> 32;
+                place[axis] = place[axis].wrapping_add((drawn as i32).wrapping_sub(reach as i32));
+            }
+        }
+    });
+    Ok(())
+}
+
+/// The first `N` numbers of the vectors of all samples whose windows lie inside, and of those one step beyond: around
+/// cyclic axes, of the border's along the others.
+struct Table<const D: usize, const N: usize> {
+    low: [i32; D],
+    strides: [i32; D],
+    vectors: Vec<[i16; N]>,
+}
+
+impl<const D: usize, const N: usize> Table<D, N> {
+    fn new(appearance: &Appearance<D>) -> Self {
+        let ranges: [[i32; 2]; D] = std::array::from_fn(|axis| appearance.range(axis));
+        let sides = ranges.map(|[low, high]| (high - low + 3) as usize);
+        let mut strides = [1; D];
+        for axis in (0..D - 1).rev() {
+            strides[axis] = strides[axis + 1] * sides[axis + 1] as i32;
+        }
+        let mut vectors = vec![[0; N]; sides.iter().product()];
+        par::chunks_mut(&mut vectors, CHUNK, |chunk, vectors| {
+            for (i, vector) in vectors.iter_mut().enumerate() {
+                let mut rest = chunk * CHUNK + i;
+                let mut sample = [0; D];
+                for axis in (0..D).rev() {
+                    let [low, high] = ranges[axis];
+                    let x = (rest % sides[axis]) as i32 + low - 1;
+                    rest /= sides[axis];
+                    // `clamped` goes around cyclic axes, whose samples all lie inside.
+                    sample[axis] = if appearance.grid().wrap()[axis] {
+                        x
+                    } else {
+                        x.clamp(low, high)
+                    };
+                }
+                *vector = first(appearance.feature(appearance.clamped(sample)));
+            }
+        });
+        Self {
+            low: ranges.map(|[low, _]| low - 1),
+            strides,
+            vectors,
+        }
+    }
+
+    /// Position of a sample that lies inside.
+    #[inline(always)]
+    fn at(&self, sample: [i32; D]) -> i32 {
+        let mut at = 0;
+        for axis in 0..D {
+            at += (sample[axis] - self.low[axis]) * self.strides[axis];
+        }
+        at
+    }
+
+    /// How far a step lies from a sample.
+    fn step(&self, step: [i32; D]) -> i32 {
+        step.iter().zip(&self.strides).map(|(s, n)| s * n).sum()
+    }
+}
+
+#[inline(always)]
+fn first<const N: usize>(vector: &[i16; KEEP]) -> [i16; N] {
+    std::array::from_fn(|k| vector[k])
+}
+
+/// Squared distance of two vectors: twelve bits each, so differences fit.
+#[inline(always)]
+fn apart<const N: usize>(a: &[i16; N], b: &[i16; N]) -> i32 {
+    let mut sum = 0;
+    for k in 0..N {
+        let d = a[k].wrapping_sub(b[k]);
+        sum += i32::from(d) * i32::from(d);
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,151 @@
+//! What an output is asked to show at its points, beside looking like the exemplar: given values, a trend, a scale.
+
+use crate::engine::appearance::{CHANNELS, Colour};
+use crate::{Error, Result};
+
+/// Samples that are drawn from, at least, as a part of all: those whose first values are nearest to the wanted one.
+const SHARE: usize = 25;
+/// First values that are as good as the wanted one.
+const ALIKE: i32 = 48;
+/// Values that 12 bits hold.
+const VALUES: i32 = 4096;
+
+/// Values of the exemplar's samples and those wanted at the points of the output, both within 12 bits.
+#[derive(Debug, Clone)]
+pub struct Guide<'a> {
+    exemplar: &'a [Colour],
+    output: Wanted<'a>,
+    /// Cost of a squared difference of one, in 1 / 256; 0 where nothing is asked. One, or one a point.
+    weight: &'a [u16],
+    /// Samples by their first value, the least first; empty where samples are drawn from anywhere.
+    order: &'a [u32],
+    /// For each first value, how many of the order have a lesser one.
+    before: Vec<u32>,
+}
+
+/// Values at the points of the output. Outputs are large, and a scale is one number.
+#[derive(Debug, Clone, Copy)]
+enum Wanted<'a> {
+    All(&'a [Colour]),
+    /// The first ones; the others are zero.
+    First(&'a [i16]),
+}
+
+impl<'a> Guide<'a> {
+    /// A guide for an exemplar of `samples` and an output of `points`: for each its four values or the first, and a
+    /// weight for each or one for all.
+    pub fn new(
+        exemplar: &'a [Colour],
+        output: &'a [i16],
+        weight: &'a [u16],
+        samples: usize,
+        points: usize,
+    ) -> Result<Self> {
+        let first = output.len() == points;
+        let values = if first { 1 } else { CHANNELS };
+        let weights = if weight.len() == 1 { 1 } else { points };
+        for (argument, expected, got) in [
+            ("guide of the exemplar", samples, exemplar.len()),
+            ("guide of the output", points * values, output.len()),
+            ("weight of the guide", weights, weight.len()),
+        ] {
+            if expected != got {
+                return Err(Error::Shape {
+                    argument,
+                    expected: vec![expected],
+                    got: vec![got],
+                });
+            }
+        }
+        let within = |x: &i16| (-2048..2048).contains(x);
+        if !exemplar.as_flattened().iter().chain(output).all(within) {
+            return Err(Error::value("guide", "values of 12 bits are allowed"));
+        }
+        Ok(Self {
+            exemplar,
+            output: if first {
+                Wanted::First(output)
+            } else {
+                Wanted::All(output.as_chunks().0)
+            },
+            weight,
+            order: &[],
+            before: Vec::new(),
+        })
+    }
+
+    /// Draws from samples near what is asked: `order` holds those that may be drawn, by their first value.
+    pub fn ordered(mut self, order: &'a [u32]) -> Result<Self> {
+        let value = |k: &u32| self.exemplar.get(*k as usize).map(|v| i32::from(v[0]));
+        if !order.iter().all(|k| value(k).is_some()) || !order.is_sorted_by_key(value) {
+            return Err(Error::value(
+                "order of the guide",
+                "needs samples of the exemplar, by their first value",
+            ));
+        }
+        if !order.is_empty() {
+            self.before = vec![0; VALUES as usize + 1];
+            for k in order {
+                let v = i32::from(self.exemplar[*k as usize][0]) + VALUES / 2;
+                self.before[v as usize + 1] += 1;
+            }
+            for v in 0..VALUES as usize {
+                self.before[v + 1] += self.before[v];
+            }
+        }
+        self.order = order;
+        Ok(self)
+    }
+
+    /// A sample drawn near what is asked at a point, by a random word; none where samples are drawn from anywhere.
+    #[inline(always)]
+    pub(crate) fn near(&self, point: usize, word: u32) -> Option<usize> {
+        if self.order.is_empty() {
+            return None;
+        }
+        let wanted = i32::from(self.wanted(point)[0]) + VALUES / 2;
+        let before = |v: i32| self.before[v.clamp(0, VALUES) as usize] as usize;
+        let (middle, half) = (before(wanted), (self.order.len() / SHARE).max(12) / 2);
+        let low = before(wanted - ALIKE).min(middle.saturating_sub(half));
+        let high = before(wanted + ALIKE + 1)
+            .max(middle + half)
+            .min(self.order.len());
+        let low = low.min(high.saturating_sub(half));
+        let pick = low + ((u64::from(word) * (high - low) as u64) >> 32) as usize;
+        Some(self.order[pick] as usize)
+    }
+
+    /// Whether anything is asked at a point.
+    pub(crate) fn asks(&self, point: usize) -> bool {
+        self.weight(point) > 0
+    }
+
+    #[inline(always)]
+    fn weight(&self, point: usize) -> u16 {
+        self.weight[point.min(self.weight.len() - 1)]
+    }
+
+    #[inline(always)]
+    fn wanted(&self, point: usize) -> Colour {
+        match self.output {
+            Wanted::All(values) => values[point],
+            Wanted::First(values) => [values[point], 0, 0, 0],
+        }
+    }
+
+    /// What it costs to show a sample at a point.
+    #[inline(always)]
+    pub(crate) fn cost(&self, point: usize, sample: usize) -> i64 {
+        let weight = self.weight(point);
+        if weight == 0 {
+            return 0;
+        }
+        let (a, b) = (&self.exemplar[sample], self.wanted(point));
+        let mut sum = 0;
+        for c in 0..CHANNELS {
+            let d = i64::from(a[c]) - i64::from(b[c]);
+            sum += d * d;
+        }
+        (sum * i64::from(weight)) >> 8
+    }
+}

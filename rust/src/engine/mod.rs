@@ -1,0 +1,8 @@
+//! The inner calls of coarse-to-fine synthesis: one resolution of an exemplar and an output, in fixed point.
+
+pub mod appearance;
+pub mod blocks;
+pub mod coherence;
+pub mod guide;
+pub mod optimize;
+pub mod pyramid;

@@ -1,0 +1,171 @@
+//! Windows of the output, in the axes of the exemplar.
+
+use super::{CHUNK, Level};
+use crate::engine::appearance::{Colour, Feature};
+use crate::foundation::fixed::{
+    BITS, Frame, Frames, ONE, Place, add, apply, identity, inverse, nearest, sub,
+};
+use crate::foundation::par;
+use std::ops::Range;
+
+/// The output's colours as they are, where frames leave everything in place: a window is a box of them. Of some points,
+/// and as many before and behind as windows reach.
+#[derive(Default)]
+pub(super) struct Seen {
+    first: usize,
+    colours: Vec<Colour>,
+}
+
+impl Seen {
+    pub(super) fn look<const D: usize>(
+        &mut self,
+        level: &Level<'_, D>,
+        places: &[Place<D>],
+        range: Range<usize>,
+    ) {
+        if !level.frames.is_identity() {
+            return;
+        }
+        let margin = level.margin();
+        self.first = range.start.saturating_sub(margin);
+        let last = places.len().min(range.end + margin);
+        self.colours.resize(last - self.first, [0; 4]);
+        let places = &places[self.first..last];
+        par::chunks_mut(&mut self.colours, CHUNK, |c, colours| {
+            for (colour, &place) in colours.iter_mut().zip(&places[c * CHUNK..]) {
+                *colour = level
+                    .appearance
+                    .colour(level.appearance.clamped(nearest(place)));
+            }
+        });
+    }
+}
+
+impl<const D: usize> Level<'_, D> {
+    /// How far apart in row-major order a point and another of its window are.
+    pub(super) fn margin(&self) -> usize {
+        let rows: usize = self.region.grid.strides().iter().sum();
+        self.appearance.radius() * rows
+    }
+}
+
+/// Where one offset of a window looks.
+struct Look<const D: usize> {
+    /// The point of the output nearest to F o, and how far away that is in row-major order.
+    step: [i32; D],
+    across: isize,
+    /// o - J step: without it turned textures come out at the wrong scale.
+    rest: Place<D>,
+}
+
+/// Looks at windows, one after the other; where to look is worked out anew only where the frame changes.
+pub(super) struct Eye<'a, const D: usize> {
+    level: &'a Level<'a, D>,
+    seen: &'a Seen,
+    window: Vec<i16>,
+    frame: Option<Frame<D>>,
+    looks: Vec<Look<D>>,
+    /// How far looks reach along each axis of the output; none where they must be checked one by one.
+    reach: Option<[usize; D]>,
+}
+
+impl<'a, const D: usize> Eye<'a, D> {
+    pub(super) fn new(level: &'a Level<'a, D>, seen: &'a Seen) -> Self {
+        let mut eye = Self {
+            level,
+            seen,
+            window: level.appearance.scratch(),
+            frame: None,
+            looks: Vec::with_capacity(level.appearance.offsets().len()),
+            reach: None,
+        };
+        if let Frames::Constant(frame) = level.frames {
+            eye.turn(frame);
+        }
+        eye
+    }
+
+    /// The appearance vector of the window around a point.
+    #[inline(always)]
+    pub(super) fn window(&mut self, places: &[Place<D>], p: usize) -> Feature {
+        let grid = &self.level.region.grid;
+        let frame = self.level.frames.at(p);
+        if self.frame != Some(frame) {
+            self.turn(frame);
+        }
+        let point = grid.point(p);
+        let interior = self.reach.is_some_and(|reach| {
+            (0..D).all(|a| point[a] >= reach[a] && point[a] + reach[a] < grid.shape()[a])
+        });
+        if !interior {
+            self.look_around(places, p, point);
+        } else if self.seen.colours.is_empty() {
+            self.look(places, p);
+        } else {
+            let appearance = self.level.appearance;
+            for (k, look) in self.looks.iter().enumerate() {
+                let at = (p - self.seen.first) as isize + look.across;
+                let colour = self.seen.colours[at as usize];
+                appearance.put(&mut self.window, k, colour);
+            }
+        }
+        self.level.appearance.project(&mut self.window)
+    }
+
+    /// Works out where windows look under a frame.
+    fn turn(&mut self, frame: Frame<D>) {
+        let appearance = self.level.appearance;
+        let strides = self.level.region.grid.strides();
+        let radius = appearance.radius() as i32;
+        let back = inverse(&frame);
+        self.looks.clear();
+        self.looks.extend(appearance.offsets().iter().map(|&o| {
+            let mut step = [0; D];
+            let mut across = 0;
+            for i in 0..D {
+                let mut x = ONE / 2;
+                for j in 0..D {
+                    x += back[i][j] * o[j];
+                }
+                step[i] = x >> BITS;
+                across += step[i] as isize * strides[i] as isize;
+            }
+            let rest = sub(o.map(|x| x * ONE), apply(&frame, step));
+            Look { step, across, rest }
+        }));
+        self.frame = Some(frame);
+        // Places lie inside, and the exemplar's rim is as wide as windows reach: what is nearer than that needs no check.
+        let near = frame == identity()
+            || frame
+                .iter()
+                .all(|row| row.iter().map(|&x| i32::from(x).abs()).sum::<i32>() / 2 < radius * ONE);
+        self.reach = near.then(|| {
+            back.map(|row| (row.iter().map(|x| x.abs()).sum::<i32>() * radius / ONE + 1) as usize)
+        });
+    }
+
+    /// Looks where everything is known to be inside.
+    #[inline(always)]
+    fn look(&mut self, places: &[Place<D>], p: usize) {
+        let appearance = self.level.appearance;
+        let apron = appearance.apron();
+        for (k, look) in self.looks.iter().enumerate() {
+            let sample = nearest(add(places[(p as isize + look.across) as usize], look.rest));
+            appearance.put(&mut self.window, k, apron.colour(sample));
+        }
+    }
+
+    /// Looks where the region or the exemplar may end: what is not there goes on as the point's own piece.
+    fn look_around(&mut self, places: &[Place<D>], p: usize, point: [usize; D]) {
+        let appearance = self.level.appearance;
+        let looks = self.looks.iter().zip(appearance.offsets());
+        for (k, (look, o)) in looks.enumerate() {
+            let place = match self.level.region.step(point, look.step) {
+                Some(q) => add(places[q], look.rest),
+                None => add(places[p], o.map(|x| x * ONE)),
+            };
+            let at = appearance.clamped(nearest(place));
+            appearance.put(&mut self.window, k, appearance.colour(at));
+        }
+    }
+}

@@ -1,0 +1,391 @@
+//! Exemplars looked up through coordinates: the last step of every synthesis.
+//!
+//! Any scalar type, any number of channels, two or three axes. A coordinate that falls on a sample gives that sample,
+//! bit for bit, whatever the interpolation; between samples the sum runs in `f64` in a fixed order. The cubic kernel
+//! (Catmull-Rom: Keys, *Cubic convolution interpolation*, IEEE ASSP 1981, a = -1/2) is clipped to the range of its taps,
+//! so that it neither rings nor leaves the range of the data, high dynamic range included.
+
+use crate::foundation::grid::Grid;
+use crate::foundation::par::{self, Monitor};
+use crate::{Error, Result};
+
+/// Output pixels a task takes at a time.
+const CHUNK: usize = 4096;
+
+/// How values between samples are made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Interpolation {
+    /// The nearest sample; half-way goes to the higher one.
+    Nearest,
+    /// Multilinear.
+    Linear,
+    /// Catmull-Rom, clipped to the range of its taps.
+    Cubic,
+}
+
+mod sealed {
+    pub trait Sealed {}
+}
+
+/// A scalar that images are made of.
+pub trait Element: Copy + Send + Sync + Default + sealed::Sealed {
+    /// Its value.
+    fn to_f64(self) -> f64;
+    /// The nearest representable value.
+    fn from_f64(value: f64) -> Self;
+}
+
+macro_rules! integer_elements {
+    ($($t:ty),*) => {$(
+        impl sealed::Sealed for $t {}
+        impl Element for $t {
+            fn to_f64(self) -> f64 { f64::from(self) }
+            fn from_f64(value: f64) -> Self {
+                // A cast goes towards zero; `f64::floor` is a call where the CPU is not known to have it.
+                let above = value + 0.5;
+                let cast = above as $t;
+                if f64::from(cast) > above { cast.saturating_sub(1) } else { cast }
+            }
+        }
+    )*};
+}
+integer_elements!(u8, i8, u16, i16, u32, i32);
+
+macro_rules! float_elements {
+    ($($t:ty),*) => {$(
+        impl sealed::Sealed for $t {}
+        impl Element for $t {
+            fn to_f64(self) -> f64 { f64::from(self) }
+            fn from_f64(value: f64) -> Self { value as $t }
+        }
+    )*};
+}
+float_elements!(f32, f64);
+
+/// One exemplar: samples in row-major order, channels last.
+#[derive(Debug, Clone, Copy)]
+pub struct Exemplar<'a, T, const D: usize> {
+    data: &'a [T],
+    grid: Grid<D>,
+    channels: usize,
+}
+
+impl<'a, T, const D: usize> Exemplar<'a, T, D> {
+    /// A view of `grid.len() * channels` samples.
+    pub fn new(data: &'a [T], grid: Grid<D>, channels: usize) -> Result<Self> {
+        if grid.len().checked_mul(channels) != Some(data.len()) {
+            let mut expected = grid.shape().to_vec();
+            expected.push(channels);
+            return Err(Error::Shape {
+                argument: "exemplar",
+                expected,
+                got: vec![data.len()],
+            });
+        }
+        Ok(Self {
+            data,
+            grid,
+            channels,
+        })
+    }
+
+    fn pixel(&self, index: usize) -> &'a [T] {
+        &self.data[index * self.channels..][..self.channels]
+    }
+}
+
+/// Fills `out` (pixels x channels) with `exemplars[which[p]]` at `coordinates[p]`.
+///
+/// `which` may be empty when there is one exemplar. Coordinates are in samples, in axis order, with sample centres at the
+/// integers; beyond an edge the exemplar wraps or repeats its edge, as its grid says.
+pub fn gather<T: Element, const D: usize>(
+    exemplars: &[Exemplar<'_, T, D>],
+    which: &[u16],
+    coordinates: &[[f32; D]],
+    interpolation: Interpolation,
+    out: &mut [T],
+    monitor: &Monitor,
+) -> Result<()> {
+    let channels = exemplars
+        .first()
+        .ok_or_else(|| Error::value("exemplars", "at least one is needed, got none"))?
+        .channels;
+    if exemplars.iter().any(|e| e.channels != channels) {
+        let all: Vec<_> = exemplars.iter().map(|e| e.channels).collect();
+        return Err(Error::value(
+            "exemplars",
+            format!("must agree in channels, got {all:?}"),
+        ));
+    }
+    if !which.is_empty() && which.len() != coordinates.len() {
+        return Err(Error::Shape {
+            argument: "exemplar",
+            expected: vec![coordinates.len()],
+            got: vec![which.len()],
+        });
+    }
+    if out.len() != coordinates.len() * channels {
+        return Err(Error::Shape {
+            argument: "out",
+            expected: vec![coordinates.len(), channels],
+            got: vec![out.len()],
+        });
+    }
+    if let Some(&bad) = which.iter().find(|&&e| usize::from(e) >= exemplars.len()) {
+        let allowed = exemplars.len();
+        return Err(Error::value(
+            "exemplar",
+            format!("index {bad}, but there are {allowed} exemplars"),
+        ));
+    }
+    if let Some(at) = coordinates
+        .iter()
+        .position(|c| c.iter().any(|x| !x.is_finite()))
+    {
+        return Err(Error::value(
+            "coordinates",
+            format!("{:?} at pixel {at} is not finite", coordinates[at]),
+        ));
+    }
+    if channels == 0 {
+        return Ok(());
+    }
+    monitor.expect(coordinates.len() as u64);
+    par::chunks_mut(out, CHUNK * channels, |chunk, out| {
+        let first = chunk * CHUNK;
+        let mut taps = Taps::default();
+        if monitor.check().is_err() {
+            return;
+        }
+        for (i, pixel) in out.chunks_exact_mut(channels).enumerate() {
+            let exemplar = &exemplars[which.get(first + i).map_or(0, |&e| usize::from(e))];
+            look_up(
+                exemplar,
+                coordinates[first + i],
+                interpolation,
+                &mut taps,
+                pixel,
+            );
+        }
+        let _ = monitor.advance((out.len() / channels) as u64);
+    });
+    monitor.check()
+}
+
+/// Samples around one coordinate at most: four along each of three axes.
+const MOST: usize = 64;
+
+/// The places and weights of the samples around one coordinate.
+struct Taps {
+    at: [(usize, f64); MOST],
+}
+
+impl Default for Taps {
+    fn default() -> Self {
+        Self {
+            at: [(0, 0.0); MOST],
+        }
+    }
+}
+
+/// From here on every `f32` is whole.
+const WHOLE: f32 = (1 << 23) as f32;
+
+/// The largest integer that is not above a number; a call of `f64::floor` costs more.
+#[inline(always)]
+fn floor(x: f64) -> isize {
+    let cast = x as isize;
+    cast.saturating_sub(isize::from(x < cast as f64))
+}
+
+#[inline(always)]
+fn look_up<T: Element, const D: usize>(
+    exemplar: &Exemplar<'_, T, D>,
+    at: [f32; D],
+    interpolation: Interpolation,
+    taps: &mut Taps,
+    out: &mut [T],
+) {
+    let grid = &exemplar.grid;
+    let whole = |x: &f32| (*x as i32) as f32 == *x || x.abs() >= WHOLE;
+    if interpolation == Interpolation::Nearest || at.iter().all(whole) {
+        let mut point = [0; D];
+        for axis in 0..D {
+            point[axis] = grid.resolve(axis, floor(f64::from(at[axis]) + 0.5));
+        }
+        out.copy_from_slice(exemplar.pixel(grid.index(point)));
+        return;
+    }
+    let clip = interpolation == Interpolation::Cubic;
+    let strides = grid.strides();
+    let mut count = 1;
+    taps.at[0] = (0, 1.0);
+    for axis in 0..D {
+        let base = floor(f64::from(at[axis]));
+        let t = f64::from(at[axis]) - base as f64;
+        let (weights, first): (&[f64], isize) = if clip {
+            (&catmull_rom(t), -1)
+        } else {
+            (&[1.0 - t, t], 0)
+        };
+        // From behind, so that what there is is read before it is replaced.
+        for (k, &weight) in weights.iter().enumerate().rev() {
+            let i = grid.resolve(axis, base.saturating_add(first + k as isize)) * strides[axis];
+            for tap in 0..count {
+                let (index, so_far) = taps.at[tap];
+                taps.at[k * count + tap] = (index + i, so_far * weight);
+            }
+        }
+        count *= weights.len();
+    }
+    let (taps, n) = (&taps.at[..count], exemplar.channels);
+    match n {
+        3 => weighted::<T, 3>(exemplar.data, n, taps, clip, out),
+        4 => weighted::<T, 4>(exemplar.data, n, taps, clip, out),
+        _ => {
+            for (channel, value) in out.chunks_exact_mut(1).enumerate() {
+                weighted::<T, 1>(&exemplar.data[channel..], n, taps, clip, value);
+            }
+        }
+    }
+}
+
+/// Weighted sums of `C` channels of pixels that lie `stride` samples apart.
+#[inline(always)]
+fn weighted<T: Element, const C: usize>(
+    data: &[T],
+    stride: usize,
+    taps: &[(usize, f64)],
+    clip: bool,
+    out: &mut [T],
+) {
+    let (mut sum, mut low, mut high) = ([0.0; C], [f64::INFINITY; C], [f64::NEG_INFINITY; C]);
+    // A tap without weight must not spread its infinity.
+    for &(index, weight) in taps.iter().filter(|tap| tap.1 != 0.0) {
+        for (c, sample) in data[index * stride..][..C].iter().enumerate() {
+            let sample = sample.to_f64();
+            sum[c] += sample * weight;
+            low[c] = if sample < low[c] { sample } else { low[c] };
+            high[c] = if sample > high[c] { sample } else { high[c] };
+        }
+    }
+    for (c, value) in out.iter_mut().enumerate() {
+        *value = T::from_f64(if clip {
+            sum[c].clamp(low[c], high[c])
+        } else {
+            sum[c]
+        });
+    }
+}
+
+fn catmull_rom(t: f64) -> [f64; 4] {
+    let (t2, t3) = (t * t, t * t * t);
+    [
+        0.5 * (-t3 + 2.0 * t2 - t),
+        0.5 * (3.0 * t3 - 5.0 * t2 + 2.0),
+        0.5 * (-3.0 * t3 + 4.0 * t2 + t),
+        0.5 * (t3 - t2),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn at<T: Element>(
+        data: &[T],
+        shape: [usize; 2],
+        wrap: bool,
+        at: [f32; 2],
+        how: Interpolation,
+    ) -> T {
+        let exemplar = Exemplar::new(data, Grid::new(shape, [wrap; 2]).unwrap(), 1).unwrap();
+        let mut out = [T::default()];
+        gather(&[exemplar], &[], &[at], how, &mut out, &Monitor::default()).unwrap();
+        out[0]
+    }
+
+    #[test]
+    fn whole_coordinates_copy_whatever_the_interpolation() {
+        let data = [1.5f32, f32::INFINITY, -3.0, 1e30];
+        for how in [
+            Interpolation::Nearest,
+            Interpolation::Linear,
+            Interpolation::Cubic,
+        ] {
+            for (i, &value) in data.iter().enumerate() {
+                assert_eq!(
+                    at(&data, [2, 2], false, [(i / 2) as f32, (i % 2) as f32], how),
+                    value
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn linear_is_exact_on_a_ramp_and_rounds_integers() {
+        let ramp: Vec<u16> = (0..16).map(|i| 10 * (i % 4) as u16).collect();
+        assert_eq!(
+            at(&ramp, [4, 4], false, [1.3, 1.25], Interpolation::Linear),
+            13
+        );
+        assert_eq!(
+            at(&ramp, [4, 4], true, [0.0, 3.5], Interpolation::Linear),
+            15
+        );
+        assert_eq!(
+            at(&ramp, [4, 4], false, [0.0, 3.5], Interpolation::Linear),
+            30
+        );
+        assert_eq!(
+            at(&ramp, [4, 4], true, [-1.0, -1.0], Interpolation::Nearest),
+            30
+        );
+    }
+
+    #[test]
+    fn refuses_what_it_cannot_look_up() {
+        let data = [0u8; 4];
+        let exemplar = Exemplar::new(&data, Grid::new([2, 2], [false; 2]).unwrap(), 1).unwrap();
+        let monitor = Monitor::default();
+        let mut out = [0u8];
+        let linear = Interpolation::Linear;
+        assert!(gather(&[exemplar], &[1], &[[0.0, 0.0]], linear, &mut out, &monitor).is_err());
+        assert!(
+            gather(
+                &[exemplar],
+                &[],
+                &[[f32::NAN, 0.0]],
+                linear,
+                &mut out,
+                &monitor
+            )
+            .is_err()
+        );
+        assert!(gather::<u8, 2>(&[], &[], &[[0.0, 0.0]], linear, &mut out, &monitor).is_err());
+        assert_eq!(at(&data, [2, 2], true, [3e30, -3e30], linear), 0);
+    }
+
+    proptest! {
+        #[test]
+        fn cubic_stays_within_the_range_of_the_data(
+            data in prop::collection::vec(-1e6f32..1e6, 25), y in -2f32..7.0, x in -2f32..7.0, wrap: bool,
+        ) {
+            let value = at(&data, [5, 5], wrap, [y, x], Interpolation::Cubic);
+            let low = data.iter().copied().fold(f32::INFINITY, f32::min);
+            let high = data.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+            prop_assert!((low..=high).contains(&value));
+        }
+
+        #[test]
+        fn three_axes_agree_with_two_on_a_single_plane(
+            data in prop::collection::vec(0u8..255, 20), y in 0f32..3.0, x in 0f32..4.0,
+        ) {
+            let exemplar = Exemplar::new(&data, Grid::new([1, 4, 5], [false; 3]).unwrap(), 1).unwrap();
+            let mut out = [0u8];
+            gather(&[exemplar], &[], &[[0.0, y, x]], Interpolation::Linear, &mut out, &Monitor::default()).unwrap();
+            prop_assert_eq!(out[0], at(&data, [4, 5], false, [y, x], Interpolation::Linear));
+        }
+    }
+}

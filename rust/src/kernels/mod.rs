@@ -1,0 +1,13 @@
+//! Nouns of the literature, each usable by itself; none knows a paper that uses it.
+
+pub mod complete;
+pub mod gather;
+pub mod image_io;
+pub mod mean_shift;
+pub mod ncc;
+pub mod nearest;
+pub mod patch_search;
+pub mod poisson;
+pub mod seam;
+pub mod sparse;
+pub mod warp;

@@ -1,0 +1,351 @@
+//! Normalised cross-correlation: how alike a template and each window of an image are, whatever their brightness and
+//! contrast.
+//!
+//! Lewis, *Fast normalized cross-correlation*, Vision Interface 1995:
+//!
+//! 1. the numerator is a product of spectra;
+//! 2. mean and variance of each window come from running sums.
+//!
+//! Departures: the template is centred, so the numerator needs no mean of the window; a window (or a template) without
+//! variance correlates with nothing, instead of dividing by zero; everything is f64 and the answer is rounded to 20
+//! bits, so that what a threshold decides hangs on no transform's last bits.
+
+use std::sync::Arc;
+
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftPlanner};
+
+use crate::foundation::par::{self, Monitor};
+use crate::{Error, Result};
+
+/// Variance of a window, as a share of its channel's, below which it shows nothing.
+const FLAT: f64 = 1e-9;
+/// Steps of a correlation's unit that answers are rounded to.
+const STEPS: f64 = (1 << 20) as f64;
+
+/// The channels of an image, made ready to be compared with many templates.
+pub struct Correlation {
+    shape: [usize; 2],
+    plan: Plan,
+    channels: Vec<Channel>,
+}
+
+struct Channel {
+    spectrum: Vec<Complex<f64>>,
+    /// Sums of values and of squares above and left of each corner.
+    sums: Vec<[f64; 2]>,
+    variance: f64,
+}
+
+impl Correlation {
+    /// Of `image`, planar: one channel of `shape` after the other.
+    pub fn new(image: &[f32], shape: [usize; 2]) -> Result<Self> {
+        let points = shape[0] * shape[1];
+        if points == 0 || image.is_empty() || !image.len().is_multiple_of(points) {
+            return Err(Error::Shape {
+                argument: "image",
+                expected: vec![1, shape[0].max(1), shape[1].max(1)],
+                got: vec![image.len()],
+            });
+        }
+        finite(image, "image")?;
+        let plan = Plan::new(shape);
+        let channels = par::map(image.len() / points, |c| {
+            let values = &image[c * points..][..points];
+            let mean = mean(values);
+            // All the same: no rounding of the mean may look like a pattern.
+            let same = values.iter().all(|&x| x == values[0]);
+            let centre = if same { f64::from(values[0]) } else { mean };
+            let centred: Vec<f64> = values.iter().map(|&x| f64::from(x) - centre).collect();
+            Channel {
+                spectrum: plan.forward(&centred, shape),
+                sums: running(&centred, shape),
+                variance: centred.iter().map(|x| x * x).sum::<f64>() / points as f64,
+            }
+        });
+        Ok(Self {
+            shape,
+            plan,
+            channels,
+        })
+    }
+
+    /// Number of channels.
+    pub fn channels(&self) -> usize {
+        self.channels.len()
+    }
+
+    /// Correlation of each channel's windows with its part of `template`, planar, of `shape`.
+    ///
+    /// Planar too: for each channel one value for each of the template's positions inside the image, -1 to 1.
+    pub fn maps(&self, template: &[f32], shape: [usize; 2], monitor: &Monitor) -> Result<Vec<f32>> {
+        let points = shape[0] * shape[1];
+        if points == 0 || template.len() != points * self.channels.len() {
+            return Err(Error::Shape {
+                argument: "template",
+                expected: vec![self.channels.len(), shape[0].max(1), shape[1].max(1)],
+                got: vec![template.len()],
+            });
+        }
+        if shape[0] > self.shape[0] || shape[1] > self.shape[1] {
+            return Err(Error::value(
+                "template",
+                format!("{shape:?} is larger than the image, {:?}", self.shape),
+            ));
+        }
+        finite(template, "template")?;
+        monitor.expect(self.channels.len() as u64);
+        let maps = par::map(self.channels.len(), |c| {
+            monitor.check()?;
+            let values = &template[c * points..][..points];
+            let mean = mean(values);
+            let centred: Vec<f64> = values.iter().map(|&x| f64::from(x) - mean).collect();
+            let map = self.map(&self.channels[c], &centred, shape);
+            monitor.advance(1)?;
+            Ok(map)
+        });
+        let mut all = Vec::with_capacity(maps.len() * points);
+        for map in maps {
+            all.extend(map?);
+        }
+        Ok(all)
+    }
+
+    fn map(&self, channel: &Channel, template: &[f64], shape: [usize; 2]) -> Vec<f32> {
+        let (points, width) = ((shape[0] * shape[1]) as f64, self.shape[1] + 1);
+        let valid = [self.shape[0] - shape[0] + 1, self.shape[1] - shape[1] + 1];
+        let energy: f64 = template.iter().map(|x| x * x).sum();
+        let flat = FLAT * channel.variance;
+        if energy <= flat * points {
+            return vec![0.0; valid[0] * valid[1]];
+        }
+        let mut spectrum = self.plan.forward(template, shape);
+        for (t, s) in spectrum.iter_mut().zip(&channel.spectrum) {
+            *t = t.conj() * s;
+        }
+        let mut map = Vec::with_capacity(valid[0] * valid[1]);
+        self.plan.inverse(&mut spectrum, valid[0], |row, line| {
+            let [above, below] = [row, row + shape[0]].map(|r| &channel.sums[r * width..][..width]);
+            for (column, &numerator) in line[..valid[1]].iter().enumerate() {
+                let end = column + shape[1];
+                let [sum, squares] = [0, 1]
+                    .map(|k| below[end][k] - below[column][k] - above[end][k] + above[column][k]);
+                let variance = squares - sum * sum / points;
+                let found = if variance > flat * points {
+                    (numerator / (variance * energy).sqrt()).clamp(-1.0, 1.0)
+                } else {
+                    0.0
+                };
+                map.push(((found * STEPS).round() / STEPS) as f32);
+            }
+        });
+        map
+    }
+}
+
+fn finite(values: &[f32], argument: &'static str) -> Result<()> {
+    match values.iter().find(|x| !x.is_finite()) {
+        Some(bad) => Err(Error::value(argument, format!("{bad} is not finite"))),
+        None => Ok(()),
+    }
+}
+
+fn mean(values: &[f32]) -> f64 {
+    values.iter().map(|&x| f64::from(x)).sum::<f64>() / values.len() as f64
+}
+
+/// One line and one column more than the values: sums over all that lies before.
+fn running(values: &[f64], shape: [usize; 2]) -> Vec<[f64; 2]> {
+    let width = shape[1] + 1;
+    let mut sums = vec![[0.0; 2]; (shape[0] + 1) * width];
+    for (row, line) in values.chunks_exact(shape[1]).enumerate() {
+        let (before, here) = sums[row * width..].split_at_mut(width);
+        let mut run = [0.0; 2];
+        for (column, &x) in line.iter().enumerate() {
+            run = [run[0] + x, run[1] + x * x];
+            here[column + 1] = [
+                before[column + 1][0] + run[0],
+                before[column + 1][1] + run[1],
+            ];
+        }
+    }
+    sums
+}
+
+/// Transforms of one size. Spectra are stored transposed, frequency of the columns first, so that both passes run over
+/// contiguous memory.
+struct Plan {
+    size: [usize; 2],
+    rows_forward: Arc<dyn RealToComplex<f64>>,
+    rows_inverse: Arc<dyn ComplexToReal<f64>>,
+    columns_forward: Arc<dyn Fft<f64>>,
+    columns_inverse: Arc<dyn Fft<f64>>,
+}
+
+impl Plan {
+    /// Windows that lie inside the image meet nothing of what comes round, so its own size is enough.
+    fn new(shape: [usize; 2]) -> Self {
+        let size = [quick(shape[0]), quick(shape[1].max(2))];
+        let (mut real, mut complex) = (RealFftPlanner::new(), FftPlanner::new());
+        Self {
+            size,
+            rows_forward: real.plan_fft_forward(size[1]),
+            rows_inverse: real.plan_fft_inverse(size[1]),
+            columns_forward: complex.plan_fft_forward(size[0]),
+            columns_inverse: complex.plan_fft_inverse(size[0]),
+        }
+    }
+
+    fn forward(&self, values: &[f64], shape: [usize; 2]) -> Vec<Complex<f64>> {
+        let [height, width] = self.size;
+        let half = width / 2 + 1;
+        let mut spectrum = vec![Complex::default(); half * height];
+        let (mut line, mut out) = (vec![0.0; width], self.rows_forward.make_output_vec());
+        let mut scratch = self.rows_forward.make_scratch_vec();
+        for (row, values) in values.chunks_exact(shape[1]).enumerate() {
+            line[..shape[1]].copy_from_slice(values);
+            line[shape[1]..].fill(0.0);
+            // Cannot fail: the lengths are those of the plan.
+            let _ = self
+                .rows_forward
+                .process_with_scratch(&mut line, &mut out, &mut scratch);
+            for (frequency, &x) in out.iter().enumerate() {
+                spectrum[frequency * height + row] = x;
+            }
+        }
+        self.columns_forward.process(&mut spectrum);
+        spectrum
+    }
+
+    /// Gives the first `rows` lines of the inverse to `take`.
+    fn inverse(
+        &self,
+        spectrum: &mut [Complex<f64>],
+        rows: usize,
+        mut take: impl FnMut(usize, &[f64]),
+    ) {
+        let [height, width] = self.size;
+        self.columns_inverse.process(spectrum);
+        let (mut line, mut given) = (vec![0.0; width], self.rows_inverse.make_input_vec());
+        let mut scratch = self.rows_inverse.make_scratch_vec();
+        let scale = 1.0 / (height * width) as f64;
+        let last = given.len() - 1;
+        for row in 0..rows {
+            for (frequency, x) in given.iter_mut().enumerate() {
+                *x = spectrum[frequency * height + row];
+            }
+            // Of a real line these are real; rounding left a trace that the transform would refuse.
+            given[0].im = 0.0;
+            given[last].im = 0.0;
+            let _ = self
+                .rows_inverse
+                .process_with_scratch(&mut given, &mut line, &mut scratch);
+            line.iter_mut().for_each(|x| *x *= scale);
+            take(row, &line);
+        }
+    }
+}
+
+/// The next even length of factors 2, 3 and 5.
+fn quick(n: usize) -> usize {
+    let mut length = n.next_multiple_of(2);
+    loop {
+        let mut rest = length;
+        for factor in [2, 3, 5] {
+            while rest.is_multiple_of(factor) {
+                rest /= factor;
+            }
+        }
+        if rest == 1 {
+            return length;
+        }
+        length += 2;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::foundation::hash::Noise;
+
+    fn noise(n: usize, seed: u64) -> Vec<f32> {
+        let noise = Noise::new(seed);
+        (0..n)
+            .map(|i| noise.uniform([i as u32, 0, 0, 0]) as f32 + 5.0)
+            .collect()
+    }
+
+    /// By definition: the correlation coefficient of a window and the template.
+    fn direct(
+        image: &[f32],
+        width: usize,
+        template: &[f32],
+        shape: [usize; 2],
+        at: [usize; 2],
+    ) -> f64 {
+        let pairs: Vec<(f64, f64)> = (0..shape[0] * shape[1])
+            .map(|k| {
+                let (r, c) = (k / shape[1], k % shape[1]);
+                let x = image[(at[0] + r) * width + at[1] + c];
+                (f64::from(x), f64::from(template[k]))
+            })
+            .collect();
+        let n = pairs.len() as f64;
+        let mean = |f: fn(&(f64, f64)) -> f64| pairs.iter().map(f).sum::<f64>() / n;
+        let (mx, mt) = (mean(|p| p.0), mean(|p| p.1));
+        let product: f64 = pairs.iter().map(|p| (p.0 - mx) * (p.1 - mt)).sum();
+        let squares = |m: f64, f: fn(&(f64, f64)) -> f64| -> f64 {
+            pairs.iter().map(|p| (f(p) - m).powi(2)).sum()
+        };
+        product / (squares(mx, |p| p.0) * squares(mt, |p| p.1)).sqrt()
+    }
+
+    #[test]
+    fn maps_are_those_of_the_definition() {
+        for (shape, window) in [([13, 17], [5, 3]), ([7, 8], [7, 8]), ([9, 1], [3, 1])] {
+            let points = shape[0] * shape[1];
+            let (image, template) = (noise(2 * points, 1), noise(2 * window[0] * window[1], 2));
+            let found = Correlation::new(&image, shape)
+                .unwrap()
+                .maps(&template, window, &Monitor::default())
+                .unwrap();
+            let valid = [shape[0] - window[0] + 1, shape[1] - window[1] + 1];
+            assert_eq!(found.len(), 2 * valid[0] * valid[1]);
+            for (i, &x) in found.iter().enumerate() {
+                let (c, at) = (i / (valid[0] * valid[1]), i % (valid[0] * valid[1]));
+                let at = [at / valid[1], at % valid[1]];
+                let template = &template[c * window[0] * window[1]..][..window[0] * window[1]];
+                let wanted = direct(
+                    &image[c * points..][..points],
+                    shape[1],
+                    template,
+                    window,
+                    at,
+                );
+                assert!((f64::from(x) - wanted).abs() < 1e-6, "{x} {wanted}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_flat_correlates_with_nothing() {
+        let mut image = noise(100, 3);
+        image[..50].fill(5.25);
+        let correlation = Correlation::new(&image, [10, 10]).unwrap();
+        let found = correlation.maps(&image[50..59], [3, 3], &Monitor::default());
+        assert!(found.unwrap()[..24].iter().all(|&x| x == 0.0));
+        let flat = correlation.maps(&[1.0; 9], [3, 3], &Monitor::default());
+        assert!(flat.unwrap().iter().all(|&x| x == 0.0));
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused() {
+        assert!(Correlation::new(&[], [0, 3]).is_err());
+        assert!(Correlation::new(&[f32::NAN; 4], [2, 2]).is_err());
+        let correlation = Correlation::new(&noise(16, 1), [4, 4]).unwrap();
+        let monitor = Monitor::default();
+        assert!(correlation.maps(&noise(25, 1), [5, 5], &monitor).is_err());
+        assert!(correlation.maps(&noise(4, 1), [3, 3], &monitor).is_err());
+    }
+}

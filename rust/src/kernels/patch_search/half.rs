@@ -1,0 +1,163 @@
+//! Good matches by way of half the resolution: a quarter of the positions, each of a quarter of the samples, at each step.
+//!
+//! What is half as large proposes positions, and those around them are scored exactly. The best match at the full
+//! resolution is nearly always among them; where a patch is chosen for other merits too, any good one will do.
+
+use std::ops::RangeInclusive;
+
+use super::{Exemplar, Index, Match, Pick, Query, check_pick, once};
+use crate::Result;
+use crate::foundation::par::{self, Monitor};
+
+/// Patches of fewer rows or columns than this say too little.
+const LEAST: usize = 8;
+/// Proposals for each match that is asked for.
+const PROPOSALS: usize = 2;
+
+impl Index {
+    /// Good matches by rising (cost, exemplar, row, column), with their exact costs: as [`Self::best`], much sooner, but
+    /// not certainly the best ones.
+    pub fn good(&self, query: &Query<'_>, pick: &Pick, monitor: &Monitor) -> Result<Vec<Match>> {
+        check_pick(pick)?;
+        let fits = |e: &Exemplar| (0..2).all(|axis| query.shape[axis] <= e.shape[axis]);
+        // What is wrong with a query is for the full search to say. The order matters: sides that fit can be multiplied.
+        let sound = query.shape.iter().all(|&n| n >= 2 * LEAST)
+            && self.exemplars.iter().any(fits)
+            && query.weight.len() == query.shape[0] * query.shape[1]
+            && query.patch.len() == query.weight.len() * self.channels;
+        let Some(half) = sound.then(|| self.half()).flatten() else {
+            return self.best(query, pick, monitor);
+        };
+        let (patch, weight) = halve_query(query, self.channels);
+        let smaller = Query {
+            patch: &patch,
+            weight: &weight,
+            shape: query.shape.map(|n| n / 2),
+        };
+        let proposals = Pick {
+            count: pick.count.saturating_mul(PROPOSALS),
+            separation: (pick.separation / 2).max(1),
+            ratio: f64::INFINITY,
+        };
+        // No place comes twice: proposals are more than a pixel apart. The most promising come first, which bounds the others.
+        let mut places = Vec::new();
+        for m in half.good(&smaller, &proposals, monitor)? {
+            let of = &self.exemplars[m.exemplar];
+            let allows = |row: usize, column: usize| {
+                row + query.shape[0] <= of.shape[0]
+                    && column + query.shape[1] <= of.shape[1]
+                    && (of.allowed.as_ref()).is_none_or(|a| a[row * of.shape[1] + column])
+            };
+            for row in stands_for(of, 0, m.row) {
+                for column in stands_for(of, 1, m.column) {
+                    if allows(row, column) {
+                        places.push([m.exemplar, row, column]);
+                    }
+                }
+            }
+        }
+        if places.is_empty() {
+            return self.best(query, pick, monitor);
+        }
+        self.best_among(query, &places, pick)
+    }
+
+    fn half(&self) -> Option<&Index> {
+        once(&self.half, || {
+            let enough = |n: &usize| *n >= 2 * LEAST;
+            let large = |e: &Exemplar| e.shape.iter().all(enough);
+            if !self.max_patch.iter().all(enough) || !self.exemplars.iter().all(large) {
+                return None;
+            }
+            let exemplars = par::map(self.exemplars.len(), |i| {
+                halve(&self.exemplars[i], self.channels)
+            });
+            let smaller = Self::new(exemplars, self.channels, self.max_patch.map(|n| n / 2));
+            smaller.ok().map(Box::new)
+        })
+        .as_deref()
+    }
+}
+
+/// The positions along an axis that one at half the resolution stands for.
+fn stands_for(whole: &Exemplar, axis: usize, at: usize) -> RangeInclusive<usize> {
+    (2 * at).saturating_sub(1)..=(2 * at + 1).min(whole.shape[axis] - 1)
+}
+
+fn halve(whole: &Exemplar, channels: usize) -> Exemplar {
+    let [rows, columns] = whole.shape.map(|n| n / 2);
+    let width = whole.shape[1] * channels;
+    let mut data = vec![0.0; rows * columns * channels];
+    let lines = data.chunks_exact_mut(columns * channels);
+    for (out, two) in lines.zip(whole.data.chunks_exact(2 * width)) {
+        let (up, down) = two.split_at(width);
+        match channels {
+            1 => halve_line::<1>(up, down, 1, out),
+            3 => halve_line::<3>(up, down, 3, out),
+            _ => halve_line::<0>(up, down, channels, out),
+        }
+    }
+    let shape = [rows, columns];
+    let allowed = whole.allowed.as_ref().map(|allowed| {
+        let mut any = Vec::with_capacity(rows * columns);
+        let mut line = vec![false; whole.shape[1]];
+        for r in 0..rows {
+            line.fill(false);
+            for row in stands_for(whole, 0, r) {
+                let of = &allowed[row * whole.shape[1]..];
+                line.iter_mut().zip(of).for_each(|(any, &one)| *any |= one);
+            }
+            let mut before = false;
+            any.extend(line.chunks_exact(2).map(|two| {
+                let last = std::mem::replace(&mut before, two[1]);
+                last | two[0] | two[1]
+            }));
+        }
+        any
+    });
+    Exemplar {
+        data,
+        shape,
+        allowed,
+    }
+}
+
+/// The means of two by two samples of two lines; of `C` channels where that is known, so that loops over them unroll.
+fn halve_line<const C: usize>(up: &[f32], down: &[f32], channels: usize, out: &mut [f32]) {
+    let n = if C == 0 { channels } else { C };
+    let places = up.chunks_exact(2 * n).zip(down.chunks_exact(2 * n));
+    for (out, (up, down)) in out.chunks_exact_mut(n).zip(places) {
+        for k in 0..n {
+            // Each is divided first: the sum of four finite numbers may not be finite.
+            out[k] = 0.25 * up[k] + 0.25 * up[k + n] + (0.25 * down[k] + 0.25 * down[k + n]);
+        }
+    }
+}
+
+/// Samples become the mean of the known ones, by their weights.
+fn halve_query(query: &Query<'_>, channels: usize) -> (Vec<f32>, Vec<f32>) {
+    let [rows, columns] = query.shape.map(|n| n / 2);
+    let mut patch = vec![0.0f32; rows * columns * channels];
+    let mut weight = vec![0.0f32; rows * columns];
+    for (i, out) in weight.iter_mut().enumerate() {
+        let (r, c) = (2 * (i / columns), 2 * (i % columns));
+        let places =
+            [(r, c), (r, c + 1), (r + 1, c), (r + 1, c + 1)].map(|(r, c)| r * query.shape[1] + c);
+        let total: f64 = places.iter().map(|&p| f64::from(query.weight[p])).sum();
+        *out = (0.25 * total) as f32;
+        for k in 0..channels {
+            let mut sum = 0.0f64;
+            for p in places {
+                if query.weight[p] > 0.0 {
+                    sum += f64::from(query.weight[p]) * f64::from(query.patch[p * channels + k]);
+                }
+            }
+            patch[i * channels + k] = if total > 0.0 {
+                (sum / total) as f32
+            } else {
+                0.0
+            };
+        }
+    }
+    (patch, weight)
+}

@@ -1,0 +1,364 @@
+//! The maps of filtered costs of one search, and how the true minimum is taken from them.
+
+use super::filter::Multiplier;
+use super::score::Prepared;
+use super::{Block, Index, Match, Pick, Query, too_dear};
+use crate::foundation::par::{self, Monitor};
+use crate::{Error, Result};
+
+/// Below this many multiplications for one of the filter's units of work, positions are scored one by one.
+const DIRECT: f64 = 1.0;
+
+/// Candidates that are scored before the best is looked at again.
+const ROUND: usize = 4096;
+
+/// Candidates that a task scores.
+const CHUNK: usize = 16;
+
+/// Buffers of one search.
+#[derive(Default)]
+pub(super) struct Workspace {
+    prepared: Prepared,
+    multipliers: Vec<Multiplier>,
+    maps: Vec<Map>,
+    candidates: Vec<Candidate>,
+    /// Those scored in earlier rounds.
+    scored: Vec<Candidate>,
+}
+
+/// The filtered costs of one block; infinite where not allowed.
+#[derive(Default)]
+pub(super) struct Map {
+    costs: Vec<f32>,
+    /// Rows and columns.
+    valid: [usize; 2],
+    least: f32,
+    /// Filtered costs are within this of the true ones (in the filter's unit), but for their own rounding.
+    absolute: f64,
+}
+
+/// A position that may be the best: exemplar, row, column.
+#[derive(Clone, Copy, Default)]
+struct Candidate {
+    at: [u32; 3],
+    cost: f64,
+}
+
+impl Workspace {
+    pub(super) fn maps(&self) -> &[Map] {
+        &self.maps
+    }
+}
+
+impl Map {
+    pub(super) fn rows(&self) -> impl Iterator<Item = &[f32]> {
+        self.costs.chunks_exact(self.valid[1].max(1))
+    }
+
+    /// How far a filtered cost may be from the true one.
+    pub(super) fn error(&self, cost: f32) -> f64 {
+        self.absolute + f64::from(f32::EPSILON) * f64::from(cost).abs()
+    }
+
+    /// Calls `f` for each position that costs at most `limit`; few do, so they are looked for in strides.
+    fn within(&self, limit: f32, mut f: impl FnMut(usize, usize)) {
+        let width = self.valid[1].max(1);
+        for (i, chunk) in self.costs.chunks(16).enumerate() {
+            let least = chunk
+                .iter()
+                .fold(f32::INFINITY, |a, &b| if b < a { b } else { a });
+            if least <= limit {
+                for (k, _) in chunk.iter().enumerate().filter(|&(_, &cost)| cost <= limit) {
+                    let at = 16 * i + k;
+                    f(at / width, at % width);
+                }
+            }
+        }
+    }
+
+    fn update(&mut self) {
+        let mut lanes = [f32::INFINITY; 16];
+        let (chunks, rest) = self.costs.as_chunks::<16>();
+        for chunk in chunks {
+            for (lane, &cost) in lanes.iter_mut().zip(chunk) {
+                *lane = if cost < *lane { cost } else { *lane };
+            }
+        }
+        let all = rest.iter().chain(&lanes);
+        self.least = all.copied().fold(f32::INFINITY, f32::min);
+    }
+}
+
+impl Index {
+    fn check_size(&self, query: &Query<'_>) -> Result<()> {
+        let [rows, columns] = query.shape;
+        if rows > self.max_patch[0] || columns > self.max_patch[1] {
+            let message = format!(
+                "({rows}, {columns}) is larger than {:?}, the largest that fits the exemplars and that the index was \
+                 made for",
+                self.max_patch
+            );
+            return Err(Error::value("patch", message));
+        }
+        Ok(())
+    }
+
+    /// Fills the maps of some blocks. A true cost is the filtered one times the first number, plus the second.
+    pub(super) fn filter(
+        &self,
+        query: &Query<'_>,
+        blocks: std::ops::Range<usize>,
+        monitor: &Monitor,
+        workspace: &mut Workspace,
+    ) -> Result<(f64, f64)> {
+        self.check_size(query)?;
+        workspace.prepared.fill(query, self.channels)?;
+        workspace.prepared.normalise(&self.mean, self.scale);
+        let prepared = &workspace.prepared;
+        let layers = self.channels + 1;
+        let mut scratch = self.scratch.take();
+        workspace
+            .multipliers
+            .resize_with(layers, Multiplier::default);
+        for (layer, multiplier) in workspace.multipliers.iter_mut().enumerate() {
+            let row = |r: usize, out: &mut [f32]| prepared.kernel_row(layer, r, out);
+            self.plan
+                .multiplier(query.shape[0], row, multiplier, &mut scratch);
+        }
+        self.scratch.give(scratch);
+
+        let multipliers = &workspace.multipliers;
+        let spectra = self.spectra();
+        let stride = 2 * self.plan.len() * layers;
+        let (unit, offset) = prepared.unit();
+        workspace.maps.resize_with(blocks.len(), Map::default);
+        par::chunks_mut(&mut workspace.maps, 1, |i, maps| {
+            let (b, map) = (blocks.start + i, &mut maps[0]);
+            let Block { exemplar, corner } = self.blocks[b];
+            let of = &self.exemplars[exemplar];
+            map.least = f32::INFINITY;
+            map.absolute = 0.0;
+            map.valid = self.plan.valid(of.shape, corner, query.shape);
+            map.costs.resize(map.valid[0] * map.valid[1], 0.0);
+            if map.costs.is_empty() || monitor.check().is_err() {
+                return;
+            }
+            let mut scratch = self.scratch.take();
+            let written = self.plan.correlate(
+                &spectra.values[b * stride..][..stride],
+                multipliers,
+                map.valid,
+                &mut map.costs,
+                &mut scratch,
+            );
+            self.scratch.give(scratch);
+            let (mut correlated, mut rounded, mut level) = (0.0, 0.0, 0.0);
+            for (layer, of) in spectra.levels[b * layers..][..layers].iter().enumerate() {
+                let kernel = prepared.kernel(layer);
+                correlated += kernel.norm * of.norm;
+                rounded += kernel.norm * of.mean.abs();
+                level += kernel.sum * of.mean;
+            }
+            let pixels = (query.shape[0] * query.shape[1]) as f64;
+            map.absolute = self.plan.epsilon(layers) * (2.0 * correlated + written)
+                + f64::from(f32::EPSILON) * (rounded * pixels.sqrt() + level.abs())
+                + offset / unit * 2f64.powi(-40)
+                + f64::from(f32::MIN_POSITIVE);
+            for cost in &mut map.costs {
+                *cost += level as f32;
+            }
+            if let Some(allowed) = &of.allowed {
+                for (r, row) in map.costs.chunks_exact_mut(map.valid[1]).enumerate() {
+                    let start = (corner[0] + r) * of.shape[1] + corner[1];
+                    for (cost, &allowed) in row.iter_mut().zip(&allowed[start..]) {
+                        if !allowed {
+                            *cost = f32::INFINITY;
+                        }
+                    }
+                }
+            }
+            map.update();
+        });
+        monitor.check()?;
+        Ok((unit, offset))
+    }
+
+    /// Fills the maps with scores instead: cheaper where there are few samples or positions.
+    fn evaluate(
+        &self,
+        query: &Query<'_>,
+        monitor: &Monitor,
+        workspace: &mut Workspace,
+    ) -> Result<()> {
+        workspace.prepared.fill(query, self.channels)?;
+        workspace.prepared.normalise(&self.mean, self.scale);
+        let prepared = &workspace.prepared;
+        let unit = prepared.largest_cost(self.scale);
+        workspace.maps.resize_with(self.blocks.len(), Map::default);
+        par::chunks_mut(&mut workspace.maps, 1, |b, maps| {
+            let map = &mut maps[0];
+            let Block { exemplar, corner } = self.blocks[b];
+            let of = &self.exemplars[exemplar];
+            map.least = f32::INFINITY;
+            map.absolute = f64::from(f32::MIN_POSITIVE);
+            map.valid = self.plan.valid(of.shape, corner, query.shape);
+            map.costs.clear();
+            if monitor.check().is_err() {
+                return;
+            }
+            for r in corner[0]..corner[0] + map.valid[0] {
+                for c in corner[1]..corner[1] + map.valid[1] {
+                    let allowed = of.allowed.as_ref().is_none_or(|a| a[r * of.shape[1] + c]);
+                    map.costs.push(if allowed {
+                        (prepared.cost(&of.data, of.shape, [r, c]) / unit) as f32
+                    } else {
+                        f32::INFINITY
+                    });
+                }
+            }
+            map.update();
+        });
+        monitor.check()
+    }
+
+    pub(super) fn search(
+        &self,
+        query: &Query<'_>,
+        pick: &Pick,
+        monitor: &Monitor,
+        workspace: &mut Workspace,
+    ) -> Result<Vec<Match>> {
+        self.check_size(query)?;
+        let [p, q] = query.shape;
+        let along = |length: usize, patch: usize| (length + 1).saturating_sub(patch);
+        let positions: usize = (self.exemplars.iter())
+            .map(|e| along(e.shape[0], p) * along(e.shape[1], q))
+            .sum();
+        if positions == 0 {
+            let message = format!(
+                "({p}, {q}) is larger than every exemplar: {:?}",
+                self.shapes()
+            );
+            return Err(Error::value("patch", message));
+        }
+        let samples = (p * q * self.channels) as f64;
+        if positions as f64 * samples * DIRECT < self.plan.work {
+            self.evaluate(query, monitor, workspace)?;
+        } else {
+            self.filter(query, 0..self.blocks.len(), monitor, workspace)?;
+        }
+        workspace.scored.clear();
+        let mut found: Vec<Match> = Vec::new();
+        while found.len() < pick.count {
+            let Some(next) = self.next(monitor, workspace)? else {
+                break;
+            };
+            if found.first().is_some_and(|f| too_dear(f, &next, pick)) {
+                break;
+            }
+            self.forbid_around(&next, pick.separation, &mut workspace.maps);
+            found.push(next);
+        }
+        Ok(found)
+    }
+
+    /// The true best of the positions that are still allowed.
+    fn next(&self, monitor: &Monitor, workspace: &mut Workspace) -> Result<Option<Match>> {
+        let Workspace {
+            prepared,
+            maps,
+            candidates,
+            scored,
+            ..
+        } = workspace;
+        let prepared = &*prepared;
+        // One position costs at most `limit`; what costs more for certain is not the best.
+        let least = maps.iter().filter(|m| m.least < f32::INFINITY);
+        let limit = least
+            .map(|m| f64::from(m.least) + m.error(m.least))
+            .fold(f64::INFINITY, f64::min);
+        if limit == f64::INFINITY {
+            return Ok(None);
+        }
+        candidates.clear();
+        for (block, map) in self.blocks.iter().zip(maps.iter()) {
+            let limit = (limit + map.error(limit as f32)) as f32;
+            let limit = (limit + f32::EPSILON * limit.abs()).next_up();
+            if map.least > limit {
+                continue;
+            }
+            map.within(limit, |r, c| {
+                let (r, c) = (block.corner[0] + r, block.corner[1] + c);
+                candidates.push(Candidate {
+                    at: [block.exemplar as u32, r as u32, c as u32],
+                    cost: f64::NAN,
+                });
+            });
+        }
+        candidates.sort_unstable_by_key(|c| c.at);
+        let mut known = scored.iter().peekable();
+        for c in candidates.iter_mut() {
+            while known.next_if(|k| k.at < c.at).is_some() {}
+            if let Some(k) = known.next_if(|k| k.at == c.at) {
+                c.cost = k.cost;
+            }
+        }
+        // In order of position, and only a lower cost replaces the best: ties go to the first. A cost of nothing cannot
+        // be improved on.
+        let mut best = Candidate {
+            cost: f64::INFINITY,
+            ..Candidate::default()
+        };
+        let mut seen = 0;
+        for round in candidates.chunks_mut(ROUND) {
+            monitor.check()?;
+            par::chunks_mut(round, CHUNK, |_, chunk| {
+                for c in chunk.iter_mut().filter(|c| c.cost.is_nan()) {
+                    let [e, row, column] = c.at.map(|x| x as usize);
+                    let of = &self.exemplars[e];
+                    c.cost = prepared.cost(&of.data, of.shape, [row, column]);
+                }
+            });
+            for &c in round.iter() {
+                if c.cost < best.cost {
+                    best = c;
+                }
+            }
+            seen += round.len();
+            if best.cost == 0.0 {
+                break;
+            }
+        }
+        candidates.truncate(seen);
+        std::mem::swap(candidates, scored);
+        let [exemplar, row, column] = best.at.map(|x| x as usize);
+        Ok(Some(Match {
+            cost: best.cost,
+            exemplar,
+            row,
+            column,
+        }))
+    }
+
+    fn forbid_around(&self, taken: &Match, separation: usize, maps: &mut [Map]) {
+        let centre = [taken.row, taken.column];
+        for (block, map) in self.blocks.iter().zip(maps) {
+            if block.exemplar != taken.exemplar {
+                continue;
+            }
+            let [rows, columns]: [std::ops::Range<usize>; 2] = std::array::from_fn(|axis| {
+                let low = centre[axis].saturating_sub(separation);
+                let high = centre[axis].saturating_add(separation).saturating_add(1);
+                let corner = block.corner[axis];
+                low.saturating_sub(corner)..high.saturating_sub(corner).min(map.valid[axis])
+            });
+            if rows.is_empty() || columns.is_empty() {
+                continue;
+            }
+            for r in rows {
+                map.costs[r * map.valid[1]..][columns.clone()].fill(f32::INFINITY);
+            }
+            map.update();
+        }
+    }
+}

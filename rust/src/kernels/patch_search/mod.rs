@@ -1,0 +1,536 @@
+//! Exact best matches of a masked, weighted patch over all positions of one or several exemplars.
+//!
+//! The cost of a position is the weighted sum of squared differences, `sum w (T - S)^2`. As in Kwatra et al.,
+//! *Graphcut textures*, SIGGRAPH 2003, section 3.1, all positions are evaluated at once by Fourier correlation:
+//! `sum w T^2 - 2 sum (w T) S + sum w S^2`.
+//!
+//! The correlation, in `f32`, is only a filter. Every position whose filtered cost is within twice the error bound of the
+//! least is scored again, in `f64` and in a fixed order, so the answer is the true minimum: the same for any
+//! number of threads, any block size and any CPU, with ties to the lowest (exemplar, row, column). Means are removed before
+//! the transforms, which is what makes the bound tight: on photographs it lets a handful of positions through.
+
+mod filter;
+mod half;
+mod maps;
+mod score;
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, OnceLock};
+
+use crate::foundation::par::{self, Monitor};
+use crate::{Error, Result};
+use filter::{Plan, Scratch};
+use maps::Workspace;
+use score::Prepared;
+
+/// What is searched: samples in row-major order, channels last.
+#[derive(Debug, Clone, Default)]
+pub struct Exemplar {
+    /// `rows * columns * channels` finite samples.
+    pub data: Vec<f32>,
+    /// Rows and columns.
+    pub shape: [usize; 2],
+    /// Which positions (top-left corners) may be used, `rows * columns`; all if absent.
+    pub allowed: Option<Vec<bool>>,
+}
+
+/// What is looked for.
+#[derive(Debug, Clone, Copy)]
+pub struct Query<'a> {
+    /// `rows * columns * channels` samples; where the weight is zero anything, NaN too.
+    pub patch: &'a [f32],
+    /// `rows * columns` weights, not negative; zero where the patch is unknown. All zero: every position costs nothing.
+    pub weight: &'a [f32],
+    /// Rows and columns.
+    pub shape: [usize; 2],
+}
+
+/// How many matches, and which.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pick {
+    /// At most this many.
+    pub count: usize,
+    /// Matches in one exemplar are more than this many pixels apart, along rows or along columns.
+    pub separation: usize,
+    /// No match costs more than this times the least.
+    pub ratio: f64,
+}
+
+impl Default for Pick {
+    /// The best one.
+    fn default() -> Self {
+        Self {
+            count: 1,
+            separation: 0,
+            ratio: f64::INFINITY,
+        }
+    }
+}
+
+/// A position and its cost.
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+pub struct Match {
+    /// Weighted sum of squared differences.
+    pub cost: f64,
+    /// Which exemplar.
+    pub exemplar: usize,
+    /// Row of the patch's top-left corner.
+    pub row: usize,
+    /// Column of the patch's top-left corner.
+    pub column: usize,
+}
+
+/// Exemplars made ready for many searches.
+pub struct Index {
+    exemplars: Vec<Exemplar>,
+    channels: usize,
+    max_patch: [usize; 2],
+    plan: Plan,
+    blocks: Vec<Block>,
+    /// Made by the first search that needs them.
+    spectra: OnceLock<Spectra>,
+    /// The same exemplars at half the resolution, if patches bear it.
+    half: OnceLock<Option<Box<Index>>>,
+    mean: Vec<f64>,
+    scale: f64,
+    workspaces: Pool<Workspace>,
+    scratch: Pool<Scratch>,
+}
+
+/// What the filter knows of the exemplars.
+struct Spectra {
+    /// Interleaved: of each block the channels, then the squares.
+    values: Vec<f32>,
+    /// Mean of each layer of each block, taken out before the transform, and the 2-norm of what is left.
+    levels: Vec<Level>,
+}
+
+#[derive(Clone, Copy, Default)]
+struct Level {
+    mean: f64,
+    norm: f64,
+}
+
+#[derive(Clone, Copy)]
+struct Block {
+    exemplar: usize,
+    corner: [usize; 2],
+}
+
+/// Buffers kept for the next taker. Never waits: a lock held elsewhere (or in the parent of a fork) means a new buffer.
+struct Pool<T>(Mutex<Vec<T>>);
+
+impl<T: Default> Pool<T> {
+    fn take(&self) -> T {
+        self.0
+            .try_lock()
+            .ok()
+            .and_then(|mut all| all.pop())
+            .unwrap_or_default()
+    }
+
+    fn give(&self, one: T) {
+        if let Ok(mut all) = self.0.try_lock() {
+            all.push(one);
+        }
+    }
+}
+
+/// What a cell holds, made now if it is empty. Made before the cell is locked: a thread of the pool that waited for the lock
+/// might be the one that has to make it. Two that come at once make the same, and the first is kept.
+fn once<T>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> &T {
+    if let Some(made) = cell.get() {
+        return made;
+    }
+    let made = make();
+    cell.get_or_init(|| made)
+}
+
+/// More samples than this in one exemplar cannot be addressed by a candidate.
+const LONGEST: usize = u32::MAX as usize;
+
+impl Index {
+    /// Makes exemplars ready to be searched for patches of up to `max_patch` rows and columns.
+    pub fn new(exemplars: Vec<Exemplar>, channels: usize, max_patch: [usize; 2]) -> Result<Self> {
+        if exemplars.is_empty() || channels == 0 {
+            let message = format!(
+                "needs an exemplar and a channel, got {} of {channels} channels",
+                exemplars.len()
+            );
+            return Err(Error::value("exemplars", message));
+        }
+        if max_patch.contains(&0) {
+            return Err(Error::value(
+                "max_patch",
+                format!("each side must be at least 1, got {max_patch:?}"),
+            ));
+        }
+        for exemplar in &exemplars {
+            check_exemplar(exemplar, channels)?;
+        }
+        let longest = |axis: usize| exemplars.iter().map(|e| e.shape[axis]).max().unwrap_or(1);
+        let max_patch = [max_patch[0].min(longest(0)), max_patch[1].min(longest(1))];
+        let shapes: Vec<_> = exemplars.iter().map(|e| e.shape).collect();
+        let plan = Plan::new(&shapes, max_patch, channels + 1);
+
+        let (mean, scale) = moments(&exemplars, channels);
+        let blocks: Vec<Block> = shapes
+            .iter()
+            .enumerate()
+            .flat_map(|(exemplar, &shape)| {
+                plan.corners(shape)
+                    .into_iter()
+                    .map(move |corner| Block { exemplar, corner })
+            })
+            .collect();
+        Ok(Self {
+            spectra: OnceLock::new(),
+            half: OnceLock::new(),
+            exemplars,
+            channels,
+            max_patch,
+            plan,
+            blocks,
+            mean,
+            scale,
+            workspaces: Pool(Mutex::default()),
+            scratch: Pool(Mutex::default()),
+        })
+    }
+
+    fn spectra(&self) -> &Spectra {
+        once(&self.spectra, || {
+            let layers = self.channels + 1;
+            let levels = par::map(self.blocks.len() * layers, |i| {
+                self.level(self.blocks[i / layers], i % layers)
+            });
+            let layer = 2 * self.plan.len();
+            let mut values = vec![0.0; layer * levels.len()];
+            par::chunks_mut(&mut values, layer, |i, out| {
+                let mut scratch = self.scratch.take();
+                let (block, l) = (self.blocks[i / layers], i % layers);
+                let rows = self.exemplars[block.exemplar].shape[0] - block.corner[0];
+                let row = |r: usize, out: &mut [f32]| {
+                    let samples = self.layer_row(block, l, r);
+                    for (out, x) in out.iter_mut().zip(samples) {
+                        *out = (x - levels[i].mean) as f32;
+                    }
+                };
+                self.plan.spectrum(rows, row, out, &mut scratch);
+                self.scratch.give(scratch);
+            });
+            Spectra { values, levels }
+        })
+    }
+
+    /// Row `r` of a layer of a block: a channel less its mean, or the sum of the squares of all, in units of the scale.
+    fn layer_row(&self, block: Block, layer: usize, r: usize) -> impl Iterator<Item = f64> {
+        let Exemplar { data, shape, .. } = &self.exemplars[block.exemplar];
+        let [first, left] = block.corner;
+        let width = self.plan.size[1].min(shape[1] - left);
+        let start = ((first + r) * shape[1] + left) * self.channels;
+        let pixels = data[start..][..width * self.channels].chunks_exact(self.channels);
+        pixels.map(move |pixel| {
+            let distance = |c: usize| (f64::from(pixel[c]) - self.mean[c]) / self.scale;
+            if layer < self.channels {
+                distance(layer)
+            } else {
+                (0..self.channels).map(|c| distance(c).powi(2)).sum()
+            }
+        })
+    }
+
+    fn level(&self, block: Block, layer: usize) -> Level {
+        let shape = self.exemplars[block.exemplar].shape;
+        let rows = self.plan.size[0].min(shape[0] - block.corner[0]);
+        let mut samples = Vec::new();
+        for r in 0..rows {
+            samples.extend(self.layer_row(block, layer, r));
+        }
+        let mean = sum(&samples, |x| x) / samples.len() as f64;
+        let squares = sum(&samples, |x| (x - mean) * (x - mean));
+        Level {
+            mean,
+            norm: 1.01 * squares.sqrt(),
+        }
+    }
+
+    /// Channels of the exemplars.
+    pub fn channels(&self) -> usize {
+        self.channels
+    }
+
+    /// Rows and columns of the exemplars.
+    pub fn shapes(&self) -> Vec<[usize; 2]> {
+        self.exemplars.iter().map(|e| e.shape).collect()
+    }
+
+    /// The exemplars, in the order in which they came.
+    pub fn exemplars(&self) -> &[Exemplar] {
+        &self.exemplars
+    }
+
+    /// The largest patch that can be looked for.
+    pub fn max_patch(&self) -> [usize; 2] {
+        self.max_patch
+    }
+
+    /// The best matches, by rising (cost, exemplar, row, column).
+    ///
+    /// Greedy: the best position of all, then the best of those far enough from the ones taken, and so on. Fewer than
+    /// `count` come back where separation, ratio or the allowed positions leave no more.
+    pub fn best(&self, query: &Query<'_>, pick: &Pick, monitor: &Monitor) -> Result<Vec<Match>> {
+        check_pick(pick)?;
+        let mut workspace = self.workspaces.take();
+        let found = self.search(query, pick, monitor, &mut workspace);
+        self.workspaces.give(workspace);
+        found
+    }
+
+    /// The cost of one position.
+    pub fn at(&self, query: &Query<'_>, exemplar: usize, row: usize, column: usize) -> Result<f64> {
+        let found = self.best_among(query, &[[exemplar, row, column]], &Pick::default())?;
+        Ok(found[0].cost)
+    }
+
+    /// [`Self::best`] among the given (exemplar, row, column); the `allowed` positions play no part.
+    pub fn best_among(
+        &self,
+        query: &Query<'_>,
+        candidates: &[[usize; 3]],
+        pick: &Pick,
+    ) -> Result<Vec<Match>> {
+        check_pick(pick)?;
+        let mut prepared = Prepared::default();
+        prepared.fill(query, self.channels)?;
+        for &[exemplar, row, column] in candidates {
+            let shape = self.exemplars.get(exemplar).map(|e| e.shape);
+            let fits = |s: [usize; 2]| {
+                row.checked_add(query.shape[0]).is_some_and(|r| r <= s[0])
+                    && column
+                        .checked_add(query.shape[1])
+                        .is_some_and(|c| c <= s[1])
+            };
+            if !shape.is_some_and(fits) {
+                let message = format!(
+                    "(exemplar, row, column) = ({exemplar}, {row}, {column}) leaves no room for a patch of {:?} \
+                     in {} exemplars of {:?}",
+                    query.shape,
+                    self.exemplars.len(),
+                    shape.unwrap_or_default()
+                );
+                return Err(Error::value("candidates", message));
+            }
+        }
+        // What is too dear next to any other is none of the matches, however dear. Bits of numbers that are not negative
+        // are ordered as they are.
+        let least = AtomicU64::new(f64::INFINITY.to_bits());
+        let mut all = par::map(candidates.len(), |i| {
+            let [exemplar, row, column] = candidates[i];
+            let e = &self.exemplars[exemplar];
+            let bound = if pick.ratio.is_finite() {
+                pick.ratio * f64::from_bits(least.load(Ordering::Relaxed))
+            } else {
+                f64::INFINITY
+            };
+            let cost = prepared.cost_within(&e.data, e.shape, [row, column], bound);
+            least.fetch_min(cost.to_bits(), Ordering::Relaxed);
+            Match {
+                cost,
+                exemplar,
+                row,
+                column,
+            }
+        });
+        all.sort_by(order);
+        let mut found: Vec<Match> = Vec::new();
+        for m in all {
+            let far = |f: &Match| {
+                f.exemplar != m.exemplar
+                    || f.row.abs_diff(m.row).max(f.column.abs_diff(m.column)) > pick.separation
+            };
+            if found.len() == pick.count || found.first().is_some_and(|f| too_dear(f, &m, pick)) {
+                break;
+            }
+            if found.iter().all(far) {
+                found.push(m);
+            }
+        }
+        Ok(found)
+    }
+
+    /// The costs of all positions of one exemplar as the filter sees them, (rows - p + 1) x (columns - q + 1), and how far
+    /// they may be from the true ones. Forbidden positions are infinite.
+    pub fn cost_map(
+        &self,
+        query: &Query<'_>,
+        exemplar: usize,
+        monitor: &Monitor,
+    ) -> Result<(Vec<f32>, f64)> {
+        let Some(e) = self.exemplars.get(exemplar) else {
+            let message = format!("{exemplar}, but there are {}", self.exemplars.len());
+            return Err(Error::value("exemplar", message));
+        };
+        let shape = e.shape;
+        if query.shape[0] > shape[0] || query.shape[1] > shape[1] {
+            let message = format!(
+                "{:?} does not fit into the exemplar of {shape:?}",
+                query.shape
+            );
+            return Err(Error::value("patch", message));
+        }
+        let mut workspace = self.workspaces.take();
+        let first = self.blocks.partition_point(|b| b.exemplar < exemplar);
+        let last = self.blocks.partition_point(|b| b.exemplar <= exemplar);
+        let unit = self.filter(query, first..last, monitor, &mut workspace);
+        let result = unit.map(|(unit, offset)| {
+            let width = shape[1] - query.shape[1] + 1;
+            let mut out = vec![0.0f32; (shape[0] - query.shape[0] + 1) * width];
+            for (block, map) in self.blocks[first..last].iter().zip(workspace.maps()) {
+                for (r, row) in map.rows().enumerate() {
+                    let start = (block.corner[0] + r) * width + block.corner[1];
+                    for (out, &cost) in out[start..][..row.len()].iter_mut().zip(row) {
+                        *out = (f64::from(cost) * unit + offset).max(0.0) as f32;
+                    }
+                }
+            }
+            let error = workspace.maps().iter().map(|m| m.error(0.0));
+            (out, error.fold(0.0, f64::max) * unit)
+        });
+        self.workspaces.give(workspace);
+        result
+    }
+}
+
+fn too_dear(first: &Match, next: &Match, pick: &Pick) -> bool {
+    // No product where the ratio is infinite: it would be NaN for a perfect match.
+    pick.ratio.is_finite() && next.cost > pick.ratio * first.cost
+}
+
+fn order(a: &Match, b: &Match) -> std::cmp::Ordering {
+    a.cost
+        .total_cmp(&b.cost)
+        .then_with(|| (a.exemplar, a.row, a.column).cmp(&(b.exemplar, b.row, b.column)))
+}
+
+/// The sum of what is made of each value, some side by side.
+fn sum(values: &[f64], of: impl Fn(f64) -> f64) -> f64 {
+    let (chunks, rest) = values.as_chunks::<8>();
+    let mut lanes = [0.0; 8];
+    for chunk in chunks {
+        for (lane, &x) in lanes.iter_mut().zip(chunk) {
+            *lane += of(x);
+        }
+    }
+    lanes.iter().sum::<f64>() + rest.iter().map(|&x| of(x)).sum::<f64>()
+}
+
+/// Mean of each channel, and a power of two above all distances from it.
+fn moments(exemplars: &[Exemplar], channels: usize) -> (Vec<f64>, f64) {
+    let mut mean = vec![0.0; channels];
+    let mut range = vec![[f32::INFINITY, f32::NEG_INFINITY]; channels];
+    let mut count = 0;
+    for e in exemplars {
+        match channels {
+            1 => tally::<8>(&e.data, channels, &mut mean, &mut range),
+            3 => tally::<24>(&e.data, channels, &mut mean, &mut range),
+            _ => tally::<0>(&e.data, channels, &mut mean, &mut range),
+        }
+        count += e.data.len() / channels;
+    }
+    mean.iter_mut().for_each(|m| *m /= count as f64);
+    let far = mean
+        .iter()
+        .zip(range)
+        .flat_map(|(m, r)| r.map(|x| (f64::from(x) - m).abs()));
+    let far = far.fold(0.0, f64::max);
+    let scale = if far > 0.0 {
+        far.log2().ceil().exp2()
+    } else {
+        1.0
+    };
+    (mean, scale)
+}
+
+/// Adds samples to the sum of each channel, and widens its range; `LANES` of them side by side, which are whole pixels, or a
+/// pixel at a time if 0: a sum alone would wait for each addition.
+fn tally<const LANES: usize>(
+    data: &[f32],
+    channels: usize,
+    sum: &mut [f64],
+    range: &mut [[f32; 2]],
+) {
+    // Samples are numbers, for which comparisons are less work than `min` and `max`.
+    let least = |a: f32, b: f32| if b < a { b } else { a };
+    let most = |a: f32, b: f32| if b > a { b } else { a };
+    let mut sums = [0.0f64; LANES];
+    let mut ranges = [[f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]];
+    let mut chunks = data.chunks_exact(if LANES == 0 { channels } else { LANES });
+    if LANES > 0 {
+        for chunk in &mut chunks {
+            for l in 0..LANES {
+                sums[l] += f64::from(chunk[l]);
+                ranges[0][l] = least(ranges[0][l], chunk[l]);
+                ranges[1][l] = most(ranges[1][l], chunk[l]);
+            }
+        }
+    }
+    for l in 0..LANES {
+        let k = l % channels;
+        sum[k] += sums[l];
+        range[k] = [
+            least(range[k][0], ranges[0][l]),
+            most(range[k][1], ranges[1][l]),
+        ];
+    }
+    let rest = if LANES > 0 { chunks.remainder() } else { data };
+    for pixel in rest.chunks_exact(channels) {
+        for (k, &x) in pixel.iter().enumerate() {
+            sum[k] += f64::from(x);
+            range[k] = [least(range[k][0], x), most(range[k][1], x)];
+        }
+    }
+}
+
+fn check_exemplar(exemplar: &Exemplar, channels: usize) -> Result<()> {
+    let [rows, columns] = exemplar.shape;
+    let pixels = rows.checked_mul(columns).filter(|&n| n > 0 && n < LONGEST);
+    if pixels.and_then(|n| n.checked_mul(channels)) != Some(exemplar.data.len()) {
+        return Err(Error::Shape {
+            argument: "exemplars",
+            expected: vec![rows, columns, channels],
+            got: vec![exemplar.data.len()],
+        });
+    }
+    // Block by block, within which nothing has to be decided.
+    let sound = |block: &[f32]| block.iter().fold(true, |all, x| all & x.is_finite());
+    let block = exemplar.data.chunks(4096).find(|block| !sound(block));
+    if let Some(bad) = block.and_then(|block| block.iter().find(|x| !x.is_finite())) {
+        return Err(Error::value(
+            "exemplars",
+            format!("all samples must be finite, got {bad}"),
+        ));
+    }
+    match &exemplar.allowed {
+        Some(allowed) if Some(allowed.len()) != pixels => Err(Error::Shape {
+            argument: "allowed",
+            expected: vec![rows, columns],
+            got: vec![allowed.len()],
+        }),
+        _ => Ok(()),
+    }
+}
+
+fn check_pick(pick: &Pick) -> Result<()> {
+    if pick.count == 0 {
+        return Err(Error::value("count", "must be at least 1, got 0"));
+    }
+    if pick.ratio.is_nan() || pick.ratio < 1.0 {
+        let message = format!("must be at least 1, got {}", pick.ratio);
+        return Err(Error::value("ratio", message));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,340 @@
+//! Screened Poisson: the image whose differences are nearest to given ones and whose values stay near a given image.
+//!
+//! Minimises `sum over edges (v_q - v_p - g_pq)^2 + screening * sum (v - I)^2` (Pérez, Gangnet and Blake, *Poisson image
+//! editing*, SIGGRAPH 2003; the screening as in Bhat et al., *Fourier analysis of the 2D screened Poisson equation*, ECCV
+//! 2008). What is solved for is the correction `v - I`: it is small, so that `f32` is enough, and nothing where values
+//! are kept.
+//!
+//! A rectangle is solved directly: a transform along the rows, then tridiagonal systems across them. Pixels under a mask
+//! are solved by conjugate gradients preconditioned with multigrid.
+
+mod multigrid;
+mod sweep;
+mod transform;
+mod wide;
+
+use crate::foundation::par::{self, Monitor};
+use crate::{Error, Result};
+use sweep::PANEL;
+use transform::Transform;
+use wide::wide;
+
+/// What happens at both ends of an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Edge {
+    /// The first and the last pixel keep their values (Dirichlet).
+    Fixed,
+    /// The last pixel is next to the first.
+    Wrap,
+    /// Nothing lies beyond (Neumann).
+    Free,
+}
+
+/// Pixels and their neighbours, and which of them keep their values.
+#[derive(Debug, Clone, Copy)]
+pub struct Domain<'a> {
+    /// Rows, columns and channels.
+    pub shape: [usize; 3],
+    /// What happens at the ends of the rows' axis and of the columns' axis.
+    pub edges: [Edge; 2],
+    /// Weight of the image against the differences, not negative.
+    pub screening: f64,
+    /// Which pixels to solve; the others keep their values.
+    pub mask: Option<&'a [bool]>,
+}
+
+/// A problem: images in row-major order, channels last.
+#[derive(Debug, Clone, Copy)]
+pub struct Problem<'a> {
+    /// The values to stay near.
+    pub image: &'a [f32],
+    /// The differences wanted to the next row and to the next column, each of the image's shape; at the end of an axis
+    /// they count only where it is cyclic. None: no difference anywhere.
+    pub gradients: Option<[&'a [f32]; 2]>,
+    /// Where.
+    pub domain: Domain<'a>,
+}
+
+/// Rows that a task takes at a time; even, since transforms take two.
+const ROWS: usize = 8;
+
+/// The solution. Without screening, and with nothing fixed, the mean of the image is kept.
+pub fn solve(problem: &Problem<'_>, monitor: &Monitor) -> Result<Vec<f32>> {
+    let Domain {
+        shape: [_, columns, channels],
+        ..
+    } = problem.domain;
+    problem.domain.check("image", problem.image.len())?;
+    for (argument, axis) in [("gradient_rows", 0), ("gradient_columns", 1)] {
+        if let Some(gradients) = problem.gradients {
+            problem.domain.check(argument, gradients[axis].len())?;
+        }
+    }
+    let width = columns * channels;
+    let mut out = vec![0.0; problem.image.len()];
+    par::chunks_mut(&mut out, ROWS * width, |chunk, out| {
+        wide(|| {
+            for (r, out) in out.chunks_exact_mut(width).enumerate() {
+                residual(problem, chunk * ROWS + r, out);
+            }
+        });
+    });
+    spread(&problem.domain, &mut out, monitor)?;
+    par::chunks_mut(&mut out, ROWS * width, |chunk, out| {
+        let image = &problem.image[chunk * ROWS * width..];
+        out.iter_mut().zip(image).for_each(|(o, i)| *o += i);
+    });
+    Ok(out)
+}
+
+/// Turns what flows into each pixel into the values that carry it off, in place: solves `(L + screening) v = flow`, L
+/// the sum of the differences to the neighbours; 0 where values are kept.
+pub fn spread(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) -> Result<()> {
+    domain.check("flow", flow.len())?;
+    let [rows, columns, _] = domain.shape;
+    if !flow.is_empty() {
+        match domain.mask {
+            Some(mask) if !mask.iter().all(|&m| m) => {
+                match inner_rectangle(mask, [rows, columns]) {
+                    Some(window) => cut_out(domain, window, flow, monitor),
+                    None => multigrid::spread(domain, mask, flow, monitor)?,
+                }
+            }
+            _ => rectangle(domain, flow, monitor),
+        }
+    }
+    monitor.check()
+}
+
+/// The rectangle (first and number of rows, of columns) that a mask is, if it is one and fixed pixels lie all around.
+fn inner_rectangle(mask: &[bool], shape: [usize; 2]) -> Option<[(usize, usize); 2]> {
+    let [rows, columns] = shape;
+    let first = mask.iter().position(|&m| m)?;
+    let last = mask.iter().rposition(|&m| m)?;
+    let (top, left) = (first / columns, first % columns);
+    let (bottom, right) = (last / columns, last % columns);
+    let inside = top > 0 && left > 0 && bottom + 1 < rows && right + 1 < columns && left <= right;
+    let whole = |(y, row): (usize, &[bool])| {
+        let expected = |x| (top..=bottom).contains(&y) && (left..=right).contains(&x);
+        row.iter().enumerate().all(|(x, &m)| m == expected(x))
+    };
+    let is_one = inside && mask.chunks_exact(columns).enumerate().all(whole);
+    is_one.then_some([(top, bottom + 1 - top), (left, right + 1 - left)])
+}
+
+/// Solves a rectangle within the image as an image of its own, with a ring of fixed pixels around it.
+fn cut_out(
+    domain: &Domain<'_>,
+    [(top, rows), (left, columns)]: [(usize, usize); 2],
+    flow: &mut [f32],
+    monitor: &Monitor,
+) {
+    let [_, width, channels] = domain.shape;
+    let inner = Domain {
+        shape: [rows + 2, columns + 2, channels],
+        edges: [Edge::Fixed; 2],
+        mask: None,
+        ..*domain
+    };
+    let line = (columns + 2) * channels;
+    let start = |r: usize| ((top - 1 + r) * width + left - 1) * channels;
+    let cut = (0..rows + 2).flat_map(|r| &flow[start(r)..][..line]);
+    let mut part: Vec<f32> = cut.copied().collect();
+    rectangle(&inner, &mut part, monitor);
+    flow.fill(0.0);
+    for (r, row) in part.chunks_exact(line).enumerate() {
+        flow[start(r)..][..line].copy_from_slice(row);
+    }
+}
+
+impl Domain<'_> {
+    /// An error unless `samples` is the size of the domain, the mask fits and the screening is a weight.
+    fn check(&self, argument: &'static str, samples: usize) -> Result<()> {
+        let [rows, columns, channels] = self.shape;
+        let pixels = rows.checked_mul(columns);
+        if pixels.and_then(|n| n.checked_mul(channels)) != Some(samples) {
+            return Err(Error::Shape {
+                argument,
+                expected: self.shape.to_vec(),
+                got: vec![samples],
+            });
+        }
+        if let Some(mask) = self.mask
+            && pixels != Some(mask.len())
+        {
+            return Err(Error::Shape {
+                argument: "mask",
+                expected: vec![rows, columns],
+                got: vec![mask.len()],
+            });
+        }
+        if !self.screening.is_finite() || self.screening < 0.0 {
+            let message = format!("must be finite and not negative, got {}", self.screening);
+            return Err(Error::value("screening", message));
+        }
+        Ok(())
+    }
+}
+
+/// Adds what flows into row `y`, channels last, by the differences that the image lacks.
+#[inline(always)]
+fn residual(problem: &Problem<'_>, y: usize, out: &mut [f32]) {
+    let Domain {
+        shape: [rows, columns, channels],
+        edges,
+        ..
+    } = problem.domain;
+    let width = columns * channels;
+    let image = problem.image;
+    let row = |r: usize| &image[r % rows * width..][..width];
+    let wanted = |axis: usize, r: usize| {
+        let rows = problem.gradients.map(|g| &g[axis][r % rows * width..]);
+        rows.map(|row| &row[..width])
+    };
+    let here = row(y);
+    let cyclic = edges[0] == Edge::Wrap;
+    if y > 0 || cyclic {
+        let before = y + rows - 1;
+        lack(out, wanted(0, before), row(before), here, 1.0);
+    }
+    if y + 1 < rows || cyclic {
+        lack(out, wanted(0, y), here, row(y + 1), -1.0);
+    }
+    // Each pixel once as the start and once as the end of a difference.
+    let beside = &here[channels..];
+    lack(out, wanted(1, y), here, beside, -1.0);
+    lack(&mut out[channels..], wanted(1, y), here, beside, 1.0);
+    if edges[1] == Edge::Wrap {
+        let last = width - channels;
+        let wanted = wanted(1, y).map(|w| &w[last..]);
+        lack(&mut out[last..], wanted, &here[last..], here, -1.0);
+        lack(out, wanted, &here[last..], here, 1.0);
+    }
+}
+
+/// Adds by how much the differences wanted exceed those from `from` to `to`.
+#[inline(always)]
+fn lack(out: &mut [f32], wanted: Option<&[f32]>, from: &[f32], to: &[f32], sign: f32) {
+    let pairs = out.iter_mut().zip(from.iter().zip(to));
+    match wanted {
+        Some(wanted) => pairs
+            .zip(wanted)
+            .for_each(|((o, (from, to)), w)| *o += sign * (w - (to - from))),
+        None => pairs.for_each(|(o, (from, to))| *o += sign * (from - to)),
+    }
+}
+
+/// Solves all that edges do not fix. Coefficients take the place of the rows that they are of, one channel after another.
+fn rectangle(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) {
+    let [height, columns, channels] = domain.shape;
+    let width = columns * channels;
+    let [top, left] = domain.edges.map(|e| usize::from(e == Edge::Fixed));
+    let (rows, slots) = (
+        height.saturating_sub(2 * top),
+        columns.saturating_sub(2 * left),
+    );
+    if rows == 0 || slots == 0 || channels == 0 {
+        return flow.fill(0.0);
+    }
+    if top > 0 {
+        flow[..width].fill(0.0);
+        flow[(height - 1) * width..].fill(0.0);
+    }
+    let inner = &mut flow[top * width..][..rows * width];
+    let transform = Transform::new(domain.edges[1], slots);
+    monitor.expect((2 * rows + slots) as u64);
+
+    // 1. Transformed along the rows, two at a time.
+    par::chunks_mut(inner, ROWS * width, |_, out| {
+        if monitor.check().is_err() {
+            return;
+        }
+        let mut scratch = transform::Scratch::default();
+        let mut lines = [vec![0.0; channels * slots], vec![0.0; channels * slots]];
+        for pair in out.chunks_mut(2 * width) {
+            for (line, row) in lines.iter_mut().zip(pair.chunks_exact(width)) {
+                for (c, line) in line.chunks_exact_mut(slots).enumerate() {
+                    let samples = row[left * channels + c..].iter().step_by(channels);
+                    line.iter_mut().zip(samples).for_each(|(l, s)| *l = *s);
+                }
+            }
+            let [a, b] = &mut lines;
+            for (a, b) in a.chunks_exact_mut(slots).zip(b.chunks_exact_mut(slots)) {
+                transform.forward(a, b, &mut scratch);
+            }
+            for (line, row) in lines.iter().zip(pair.chunks_exact_mut(width)) {
+                row[..line.len()].copy_from_slice(line);
+            }
+        }
+        let _ = monitor.advance((out.len() / width) as u64);
+    });
+
+    // 2. Systems across the rows: panel, channel, row.
+    let spectrum = &*inner;
+    let mut panels = vec![0.0f32; slots.div_ceil(PANEL) * channels * rows * PANEL];
+    let panels = panels.as_chunks_mut::<PANEL>().0;
+    par::chunks_mut(panels, channels * rows, |p, panel| {
+        if monitor.check().is_err() {
+            return;
+        }
+        let first = p * PANEL;
+        let present = PANEL.min(slots - first);
+        for (c, lines) in panel.chunks_exact_mut(rows).enumerate() {
+            for (r, line) in lines.iter_mut().enumerate() {
+                let from = &spectrum[r * width + c * slots + first..][..present];
+                match <&[f32; PANEL]>::try_from(from) {
+                    Ok(whole) => *line = *whole,
+                    Err(_) => line[..present].copy_from_slice(from),
+                }
+            }
+        }
+        let shifts = std::array::from_fn(|l| {
+            let eigenvalue = transform.eigenvalues.get(first + l);
+            eigenvalue.map_or(1.0, |e| e + domain.screening)
+        });
+        let mut scratch = sweep::Scratch::default();
+        wide(|| sweep::solve(domain.edges[0], &shifts, rows, panel, &mut scratch));
+        let _ = monitor.advance(present as u64);
+    });
+
+    // 3. Back.
+    let panels = &*panels;
+    par::chunks_mut(inner, ROWS * width, |chunk, out| {
+        if monitor.check().is_err() {
+            return;
+        }
+        let mut scratch = transform::Scratch::default();
+        let mut lines = [vec![0.0; slots], vec![0.0; slots]];
+        for (pair, out) in out.chunks_mut(2 * width).enumerate() {
+            let first = chunk * ROWS + 2 * pair;
+            let present = out.len() / width;
+            for c in 0..channels {
+                for (r, line) in lines.iter_mut().take(present).enumerate() {
+                    for (p, part) in line.chunks_mut(PANEL).enumerate() {
+                        let from = &panels[(p * channels + c) * rows + first + r];
+                        match <&mut [f32; PANEL]>::try_from(&mut *part) {
+                            Ok(whole) => *whole = *from,
+                            Err(_) => part.copy_from_slice(&from[..part.len()]),
+                        }
+                    }
+                }
+                let [a, b] = &mut lines;
+                transform.inverse(a, b, &mut scratch);
+                for (out, line) in out.chunks_exact_mut(width).zip(&lines) {
+                    let samples = out[left * channels + c..].iter_mut().step_by(channels);
+                    samples.zip(line).for_each(|(o, l)| *o = *l);
+                }
+            }
+            if left > 0 {
+                for out in out.chunks_exact_mut(width) {
+                    out[..channels].fill(0.0);
+                    out[width - channels..].fill(0.0);
+                }
+            }
+        }
+        let _ = monitor.advance((out.len() / width) as u64);
+    });
+}
+
+#[cfg(test)]
+mod tests;

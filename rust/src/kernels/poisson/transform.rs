@@ -1,0 +1,279 @@
+//! Transforms along one axis that turn its second difference into a multiplication.
+//!
+//! Sines for fixed ends, cosines for free ends, the real Fourier series for a cyclic axis; each by one complex transform
+//! of the axis's own length for two rows at a time (Press et al., *Numerical Recipes*, 12.4; Makhoul, *A fast cosine
+//! transform in one and two dimensions*, IEEE ASSP 1980).
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftPlanner};
+
+use super::Edge;
+
+/// The transform of an axis of `len` unknowns.
+pub(super) struct Transform {
+    edge: Edge,
+    len: usize,
+    forward: Arc<dyn Fft<f32>>,
+    inverse: Arc<dyn Fft<f32>>,
+    /// Sines of the folding, or half-sample rotations.
+    twiddles: Vec<Complex<f32>>,
+    /// Eigenvalue of each coefficient.
+    pub(super) eigenvalues: Vec<f64>,
+}
+
+/// Working memory of a transform.
+#[derive(Default)]
+pub(super) struct Scratch {
+    line: Vec<Complex<f32>>,
+    work: Vec<Complex<f32>>,
+}
+
+impl Transform {
+    pub(super) fn new(edge: Edge, len: usize) -> Self {
+        // Sines of n unknowns live on n + 1 steps.
+        let size = if edge == Edge::Fixed { len + 1 } else { len };
+        let mut planner = FftPlanner::new();
+        let n = size as f64;
+        let twiddles = match edge {
+            Edge::Fixed => (0..size)
+                .map(|j| Complex::new((PI * j as f64 / n).sin() as f32, 0.0))
+                .collect(),
+            Edge::Free => (0..size)
+                .map(|k| {
+                    let (sin, cos) = (PI * k as f64 / (2.0 * n)).sin_cos();
+                    Complex::new(cos as f32, sin as f32)
+                })
+                .collect(),
+            Edge::Wrap => Vec::new(),
+        };
+        let eigenvalues = (0..len)
+            .map(|slot| {
+                let turn = match edge {
+                    Edge::Fixed => PI * (slot + 1) as f64 / n,
+                    Edge::Free => PI * slot as f64 / n,
+                    Edge::Wrap => 2.0 * PI * slot.div_ceil(2) as f64 / n,
+                };
+                4.0 * (turn / 2.0).sin().powi(2)
+            })
+            .collect();
+        Self {
+            edge,
+            len,
+            forward: planner.plan_fft_forward(size),
+            inverse: planner.plan_fft_inverse(size),
+            twiddles,
+            eigenvalues,
+        }
+    }
+
+    /// Coefficients of two rows, in place.
+    pub(super) fn forward(&self, a: &mut [f32], b: &mut [f32], scratch: &mut Scratch) {
+        let Scratch { line, work } = scratch;
+        work.resize(self.forward.get_inplace_scratch_len(), Complex::default());
+        match self.edge {
+            Edge::Fixed => self.sines(a, b, 1.0, line, work),
+            Edge::Free => self.cosines(a, b, line, work),
+            Edge::Wrap => {
+                line.clear();
+                line.extend(a.iter().zip(b.iter()).map(|(&a, &b)| Complex::new(a, b)));
+                self.forward.process_with_scratch(line, work);
+                let n = self.len;
+                (a[0], b[0]) = (line[0].re, line[0].im);
+                for k in 1..n.div_ceil(2) {
+                    let (u, v) = split(line[k], line[n - k]);
+                    (a[2 * k - 1], a[2 * k]) = (u.re, u.im);
+                    (b[2 * k - 1], b[2 * k]) = (v.re, v.im);
+                }
+                if n.is_multiple_of(2) {
+                    (a[n - 1], b[n - 1]) = (line[n / 2].re, line[n / 2].im);
+                }
+            }
+        }
+    }
+
+    /// Rows of two sets of coefficients, in place.
+    pub(super) fn inverse(&self, a: &mut [f32], b: &mut [f32], scratch: &mut Scratch) {
+        let Scratch { line, work } = scratch;
+        work.resize(
+            self.forward
+                .get_inplace_scratch_len()
+                .max(self.inverse.get_inplace_scratch_len()),
+            Complex::default(),
+        );
+        let n = self.len;
+        match self.edge {
+            // The sine transform is its own inverse but for a factor.
+            Edge::Fixed => self.sines(a, b, 2.0 / (n + 1) as f32, line, work),
+            Edge::Free => {
+                line.clear();
+                let norm = 1.0 / n as f32;
+                line.push(Complex::new(a[0], b[0]) * norm);
+                // (a - i a2) + i (b - i b2), turned by half a sample.
+                let ends = a[1..].iter().zip(a[1..].iter().rev());
+                let others = b[1..].iter().zip(b[1..].iter().rev());
+                let turned = ends.zip(others).zip(&self.twiddles[1..]);
+                line.extend(
+                    turned.map(|(((a, a2), (b, b2)), t)| Complex::new(a + b2, b - a2) * *t * norm),
+                );
+                self.inverse.process_with_scratch(line, work);
+                for j in 0..n.div_ceil(2) {
+                    (a[2 * j], b[2 * j]) = (line[j].re, line[j].im);
+                }
+                for j in 0..n / 2 {
+                    let z = line[n - 1 - j];
+                    (a[2 * j + 1], b[2 * j + 1]) = (z.re, z.im);
+                }
+            }
+            Edge::Wrap => {
+                line.clear();
+                line.resize(n, Complex::default());
+                let norm = 1.0 / n as f32;
+                line[0] = Complex::new(a[0], b[0]) * norm;
+                for k in 1..n.div_ceil(2) {
+                    let u = Complex::new(a[2 * k - 1], a[2 * k]) * norm;
+                    let v = Complex::new(b[2 * k - 1], b[2 * k]) * norm;
+                    line[k] = Complex::new(u.re - v.im, u.im + v.re);
+                    line[n - k] = Complex::new(u.re + v.im, v.re - u.im);
+                }
+                if n.is_multiple_of(2) {
+                    line[n / 2] = Complex::new(a[n - 1], b[n - 1]) * norm;
+                }
+                self.inverse.process_with_scratch(line, work);
+                for ((a, b), z) in a.iter_mut().zip(b.iter_mut()).zip(line.iter()) {
+                    (*a, *b) = (z.re, z.im);
+                }
+            }
+        }
+    }
+
+    fn sines(
+        &self,
+        a: &mut [f32],
+        b: &mut [f32],
+        factor: f32,
+        line: &mut Vec<Complex<f32>>,
+        work: &mut [Complex<f32>],
+    ) {
+        line.clear();
+        line.push(Complex::default());
+        let ends = a.iter().zip(a.iter().rev());
+        let others = b.iter().zip(b.iter().rev());
+        let folded = ends.zip(others).zip(&self.twiddles[1..]);
+        line.extend(folded.map(|(((a1, a2), (b1, b2)), s)| {
+            Complex::new(
+                s.re * (a1 + a2) + 0.5 * (a1 - a2),
+                s.re * (b1 + b2) + 0.5 * (b1 - b2),
+            )
+        }));
+        self.forward.process_with_scratch(line, work);
+        // Odd coefficients are a running sum, kept in f64 so that it does not drift.
+        let (mut sum_a, mut sum_b) = (0.5 * f64::from(line[0].re), 0.5 * f64::from(line[0].im));
+        (a[0], b[0]) = (factor * sum_a as f32, factor * sum_b as f32);
+        let mirrored = line[1..].iter().zip(line[1..].iter().rev());
+        let slots = a[1..].chunks_mut(2).zip(b[1..].chunks_mut(2));
+        for ((a, b), (&z, &mirror)) in slots.zip(mirrored) {
+            let (u, v) = split(z, mirror);
+            (a[0], b[0]) = (-factor * u.im, -factor * v.im);
+            sum_a += f64::from(u.re);
+            sum_b += f64::from(v.re);
+            if let ([_, a], [_, b]) = (a, b) {
+                (*a, *b) = (factor * sum_a as f32, factor * sum_b as f32);
+            }
+        }
+    }
+
+    fn cosines(
+        &self,
+        a: &mut [f32],
+        b: &mut [f32],
+        line: &mut Vec<Complex<f32>>,
+        work: &mut [Complex<f32>],
+    ) {
+        let n = self.len;
+        line.clear();
+        line.extend((0..n.div_ceil(2)).map(|j| Complex::new(a[2 * j], b[2 * j])));
+        line.extend(
+            (0..n / 2)
+                .rev()
+                .map(|j| Complex::new(a[2 * j + 1], b[2 * j + 1])),
+        );
+        self.forward.process_with_scratch(line, work);
+        (a[0], b[0]) = (line[0].re, line[0].im);
+        let mirrored = line[1..].iter().zip(line[1..].iter().rev());
+        let slots = a[1..].iter_mut().zip(&mut b[1..]);
+        for (((a, b), (&z, &mirror)), t) in slots.zip(mirrored).zip(&self.twiddles[1..]) {
+            let (u, v) = split(z, mirror);
+            *a = u.re * t.re + u.im * t.im;
+            *b = v.re * t.re + v.im * t.im;
+        }
+    }
+}
+
+/// Spectra of the real and of the imaginary part, from a frequency of both and its mirror.
+#[inline]
+fn split(z: Complex<f32>, mirror: Complex<f32>) -> (Complex<f32>, Complex<f32>) {
+    (
+        Complex::new(0.5 * (z.re + mirror.re), 0.5 * (z.im - mirror.im)),
+        Complex::new(0.5 * (z.im + mirror.im), 0.5 * (mirror.re - z.re)),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// What the second difference makes of a row.
+    fn difference(row: &[f32], edge: Edge) -> Vec<f32> {
+        let n = row.len();
+        let at = |i: isize, own: f32| match edge {
+            Edge::Fixed => usize::try_from(i)
+                .ok()
+                .and_then(|i| row.get(i))
+                .copied()
+                .unwrap_or(0.0),
+            Edge::Free => usize::try_from(i)
+                .ok()
+                .and_then(|i| row.get(i))
+                .copied()
+                .unwrap_or(own),
+            Edge::Wrap => row[i.rem_euclid(n as isize) as usize],
+        };
+        (0..n)
+            .map(|i| {
+                let own = row[i];
+                2.0 * own - at(i as isize - 1, own) - at(i as isize + 1, own)
+            })
+            .collect()
+    }
+
+    proptest! {
+        #[test]
+        fn multiplies_by_the_eigenvalues(
+            n in 1usize..70,
+            edge in prop::sample::select(vec![Edge::Fixed, Edge::Wrap, Edge::Free]),
+            seed: u64,
+        ) {
+            let noise = crate::foundation::hash::Noise::new(seed);
+            let row = |r: u32| -> Vec<f32> { (0..n as u32).map(|i| noise.uniform([i, r, 0, 0]) as f32 - 0.5).collect() };
+            let (first, second) = (row(0), row(1));
+            let transform = Transform::new(edge, n);
+            let mut scratch = Scratch::default();
+            let (mut a, mut b) = (first.clone(), second.clone());
+            transform.forward(&mut a, &mut b, &mut scratch);
+            for (k, &l) in transform.eigenvalues.iter().enumerate() {
+                a[k] *= l as f32;
+            }
+            transform.inverse(&mut a, &mut b, &mut scratch);
+            for (x, y) in a.iter().zip(difference(&first, edge)) {
+                prop_assert!((x - y).abs() < 1e-4, "{} {}", x, y);
+            }
+            for (x, y) in b.iter().zip(&second) {
+                prop_assert!((x - y).abs() < 1e-5, "{} {}", x, y);
+            }
+        }
+    }
+}

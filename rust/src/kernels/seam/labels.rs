@@ -1,0 +1,176 @@
+//! Binary labels of least energy on a grid: a cost for each label of each point, and one for each pair of neighbours that
+//! differ (Greig, Porteous, Seheult, *Exact maximum a posteriori estimation for binary images*, J. Royal Statistical
+//! Society B 1989).
+
+use super::cost::{capacity, check_costs, check_len, finest};
+use super::links;
+use super::maxflow::{Graph, Solver};
+use crate::foundation::grid::Grid;
+use crate::foundation::par::Monitor;
+use crate::{Error, Result};
+
+/// What labels cost.
+#[derive(Debug, Clone, Copy)]
+pub struct Energy<'a, const D: usize> {
+    /// Shape, and which axes are cyclic.
+    pub grid: Grid<D>,
+    /// Costs of false and of true at each point. One of them may be infinite, which forbids it; they may be negative.
+    pub unary: &'a [[f32; 2]],
+    /// Cost where a point is false and the next one along the axis is true, at least 0; ignored where there is no next.
+    pub forward: [&'a [f32]; D],
+    /// Cost where a point is true and the next one along the axis is false.
+    pub backward: [&'a [f32]; D],
+}
+
+/// Labels of least energy.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Labels {
+    /// The label of each point; of all best labellings, that with the fewest true.
+    pub labels: Vec<bool>,
+    /// Sum of the costs of all points and pairs.
+    pub energy: f64,
+}
+
+/// The labels of least energy.
+///
+/// Costs are rounded to multiples of the power of two by which the largest pairwise cost is more than 2^25 and up to 2^26
+/// steps.
+///
+/// # Errors
+/// Arrays that do not fit, pairwise costs that are negative or not finite, unary costs that are NaN, that forbid both
+/// labels or that are minus infinity.
+pub fn least_energy<const D: usize>(energy: &Energy<'_, D>, monitor: &Monitor) -> Result<Labels> {
+    let n = energy.grid.len();
+    check_len("unary", n, energy.unary.len())?;
+    let mut largest = 0.0f32;
+    for costs in energy.forward.iter().chain(&energy.backward) {
+        check_len("pairwise", n, costs.len())?;
+        check_costs("pairwise", costs)?;
+        largest = costs.iter().fold(largest, |m, &c| m.max(c));
+    }
+    let bad = |u: &[f32; 2]| {
+        u.iter().any(|c| c.is_nan() || *c == f32::NEG_INFINITY) || u.iter().all(|c| c.is_infinite())
+    };
+    if let Some(at) = energy.unary.iter().position(bad) {
+        return Err(Error::value(
+            "unary",
+            format!(
+                "{:?} at {:?}; finite costs are allowed, and infinity for one of the labels",
+                energy.unary[at],
+                energy.grid.point(at)
+            ),
+        ));
+    }
+    let difference = |u: &[f32; 2]| f64::from(u[1]) - f64::from(u[0]);
+    let mut largest = f64::from(largest);
+    if largest == 0.0 {
+        let finite = energy.unary.iter().map(|u| difference(u).abs());
+        largest = finite.filter(|d| d.is_finite()).fold(0.0, f64::max);
+    }
+    let scale = finest(largest);
+    let rounded = |costs: &[f32]| -> Vec<i32> {
+        costs
+            .iter()
+            .map(|&c| capacity(f64::from(c), scale))
+            .collect()
+    };
+    let forward: [Vec<i32>; D] = energy.forward.map(rounded);
+    let backward: [Vec<i32>; D] = energy.backward.map(rounded);
+    // A unary cost beyond what all pairs of a point can cost decides its label whatever it is: clipping it there changes
+    // nothing, and lets users forbid a label by any large number.
+    let most = (2 * D) as f64 * f64::from(capacity(largest, scale)) + 1.0;
+    let terminal: Vec<i32> = energy
+        .unary
+        .iter()
+        .map(|u| (difference(u) * scale).clamp(-most, most).round() as i32)
+        .collect();
+    let graph = Graph {
+        grid: energy.grid,
+        terminal: &terminal,
+        forward: std::array::from_fn(|axis| &forward[axis][..]),
+        backward: std::array::from_fn(|axis| &backward[axis][..]),
+    };
+    let labels = Solver::default().min_cut(&graph, monitor)?.sink;
+    let energy = value(energy, &labels);
+    Ok(Labels { labels, energy })
+}
+
+fn value<const D: usize>(energy: &Energy<'_, D>, labels: &[bool]) -> f64 {
+    let mut sum = 0.0;
+    for (unary, &label) in energy.unary.iter().zip(labels) {
+        sum += f64::from(unary[usize::from(label)]);
+    }
+    for axis in 0..D {
+        links(&energy.grid, axis, |p, q| {
+            sum += f64::from(match (labels[p], labels[q]) {
+                (false, true) => energy.forward[axis][p],
+                (true, false) => energy.backward[axis][p],
+                _ => 0.0,
+            });
+        });
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn costs(n: usize) -> impl Strategy<Value = Vec<f32>> {
+        prop::collection::vec(0.0f32..1.0, n)
+    }
+
+    proptest! {
+        #[test]
+        fn no_labelling_is_cheaper(
+            shape in prop::array::uniform2(1usize..4),
+            wrap in any::<[bool; 2]>(),
+            unary in prop::collection::vec(prop::array::uniform2(-2.0f32..2.0), 9),
+            pairwise in costs(36),
+            size in prop::sample::select(vec![1e-6f32, 1.0, 1e6]),
+            smoothness in prop::sample::select(vec![0.0f32, 1.0]),
+        ) {
+            let grid = Grid::new(shape, wrap).unwrap();
+            let n = grid.len();
+            let unary: Vec<_> = unary[..n].iter().map(|u| u.map(|c| c * size)).collect();
+            let pairwise: Vec<f32> = pairwise.iter().map(|c| c * size * smoothness).collect();
+            let energy = Energy {
+                grid,
+                unary: &unary,
+                forward: [&pairwise[..n], &pairwise[9..9 + n]],
+                backward: [&pairwise[18..18 + n], &pairwise[27..27 + n]],
+            };
+            let found = least_energy(&energy, &Monitor::default()).unwrap();
+            let least = (0..1u32 << n)
+                .map(|bits| value(&energy, &(0..n).map(|i| bits >> i & 1 == 1).collect::<Vec<_>>()))
+                .fold(f64::INFINITY, f64::min);
+            prop_assert!((found.energy - least).abs() <= 1e-5 * f64::from(size));
+        }
+    }
+
+    #[test]
+    fn infinity_forbids_a_label() {
+        let grid = Grid::new([1, 3], [false; 2]).unwrap();
+        let unary = [[0.0, f32::INFINITY], [3.0, 0.0], [0.0, 1e30]];
+        let smooth = [2.0; 3];
+        fn energy<'a>(grid: Grid<2>, unary: &'a [[f32; 2]], smooth: &'a [f32]) -> Energy<'a, 2> {
+            Energy {
+                grid,
+                unary,
+                forward: [smooth; 2],
+                backward: [smooth; 2],
+            }
+        }
+        let found = least_energy(&energy(grid, &unary, &smooth), &Monitor::default()).unwrap();
+        assert_eq!((found.labels, found.energy), (vec![false; 3], 3.0));
+        for bad in [
+            [f32::INFINITY; 2],
+            [f32::NAN, 0.0],
+            [0.0, f32::NEG_INFINITY],
+        ] {
+            let bad = [bad; 3];
+            assert!(least_energy(&energy(grid, &bad, &smooth), &Monitor::default()).is_err());
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! Where the points of a grid lie in memory.
+
+use super::ENDS;
+use crate::foundation::grid::Grid;
+use crate::{Error, Result};
+
+/// Where points lie in memory: an axis that does not wrap is followed by one empty place, so that every neighbour exists.
+pub(super) struct Layout<const D: usize> {
+    pub(super) shape: [usize; D],
+    pub(super) cyclic: [bool; D],
+    pub(super) strides: [usize; D],
+    pub(super) first: usize,
+    pub(super) len: usize,
+}
+
+impl<const D: usize> Layout<D> {
+    pub(super) fn new(grid: Grid<D>) -> Result<Self> {
+        let (shape, cyclic) = (grid.shape(), grid.wrap());
+        let mut strides = [1usize; D];
+        let mut len = 1usize;
+        let mut first = 0;
+        for axis in (0..D).rev() {
+            strides[axis] = len;
+            if !cyclic[axis] {
+                first = first.max(len);
+            }
+            len = len.saturating_mul(shape[axis] + usize::from(!cyclic[axis]));
+        }
+        let len = len.saturating_add(first);
+        if len > i32::MAX as usize {
+            return Err(Error::Limit {
+                what: format!("a cut on a grid of shape {shape:?}"),
+                needed: format!("{len} nodes"),
+                limit: format!("{} nodes", i32::MAX),
+            });
+        }
+        Ok(Self {
+            shape,
+            cyclic,
+            strides,
+            first,
+            len,
+        })
+    }
+
+    /// Calls `f(index of the row's first point, its node, length)` for each row along the last axis.
+    pub(super) fn rows(&self, mut f: impl FnMut(usize, usize, usize)) {
+        let n = self.shape[D - 1];
+        let rows: usize = self.shape[..D - 1].iter().product();
+        for row in 0..rows {
+            let mut rest = row;
+            let mut node = self.first;
+            for axis in (0..D - 1).rev() {
+                node += rest % self.shape[axis] * self.strides[axis];
+                rest /= self.shape[axis];
+            }
+            f(row * n, node, n);
+        }
+    }
+
+    /// Bits `2 * axis` and `2 * axis + 1`: at the start, at the end of a cyclic axis.
+    pub(super) fn ends(&self, mut point: [usize; D], i: usize) -> u8 {
+        point[D - 1] = i;
+        let mut bits = 0;
+        for (axis, &p) in point.iter().enumerate() {
+            if self.cyclic[axis] {
+                bits |= u8::from(p == 0) << (2 * axis);
+                bits |= u8::from(p + 1 == self.shape[axis]) << (2 * axis + 1);
+            }
+        }
+        bits
+    }
+
+    /// Offsets of the next and the previous point along each axis, for each value of [`Self::ends`].
+    pub(super) fn offsets(&self) -> [[[i32; 2]; D]; ENDS] {
+        std::array::from_fn(|bits| {
+            std::array::from_fn(|axis| {
+                let step = self.strides[axis] as i32;
+                let around = step * (self.shape[axis] as i32 - 1);
+                [
+                    if bits >> (2 * axis + 1) & 1 == 1 {
+                        -around
+                    } else {
+                        step
+                    },
+                    if bits >> (2 * axis) & 1 == 1 {
+                        around
+                    } else {
+                        -step
+                    },
+                ]
+            })
+        })
+    }
+}

@@ -1,0 +1,159 @@
+//! Of all least seams around a core the innermost.
+//!
+//! A least seam is found together with a maximum flow across it (Miller and Naor, *Flow in planar graphs with multiple sources
+//! and sinks*, SIAM J. Computing 1995): give each face a potential that differs by at most the cost of a step at its two ends
+//! and that rises by the value of the seam once around; the differences are the flow across the edges. Then the pixels from
+//! which flow can still get to the core are inside of all least seams.
+//!
+//! 1. along the seam that was found potentials are the distances; inside of it, the shortest ways from there. Across P they
+//!    change by the value, which makes some steps negative, but no way around;
+//! 2. from the core outwards, take each pixel with residual capacity towards what is taken.
+
+use super::cylinder::Cycle;
+use super::dual::Dual;
+use super::{BREATH, EAST, NEVER, SOUTH, WEST, sides};
+use crate::Result;
+use crate::foundation::par::Monitor;
+
+impl Dual {
+    /// Which pixels are inside of the innermost least seam; `core` is inside of all. None where a potential is too large.
+    pub(super) fn innermost(
+        &mut self,
+        cycle: &Cycle,
+        core: Vec<usize>,
+        monitor: &Monitor,
+    ) -> Result<Option<Vec<bool>>> {
+        let within = sides(&cycle.crossings, self.rows, self.width);
+        self.close(&within);
+        if !self.potentials(cycle, monitor)? {
+            return Ok(None);
+        }
+        Ok(Some(self.residual(i64::from(cycle.value), core)))
+    }
+
+    /// Bars all steps between two pixels outside.
+    fn close(&mut self, within: &[bool]) {
+        let (width, columns) = (self.width, self.width + 1);
+        for l in 0..=self.rows {
+            for j in 0..width {
+                let face = &mut self.faces[(l + 1) * width + j];
+                let below = l * columns + j;
+                if l < self.rows && !within[below] && !within[below + 1] {
+                    face.south = NEVER;
+                }
+                if l > 0 && l < self.rows && !within[below + 1] && !within[below + 1 - columns] {
+                    face.east = NEVER;
+                }
+            }
+        }
+    }
+
+    /// Gives each face inside of a seam its potential, as its distance; says whether all fit.
+    fn potentials(&mut self, cycle: &Cycle, monitor: &Monitor) -> Result<bool> {
+        let (top, value) = (self.faces.len() - self.path.len(), cycle.value);
+        // Ways that wind about P lead below what they start from, by less than twice the value.
+        let base = 2 * value;
+        // Keys below the one taken last come in the next turn of the queue.
+        self.queue.reset(2 * value + self.largest, self.mean / 4);
+        self.queue.begin(base);
+        for &(f, along) in &cycle.trail {
+            let copy = f as usize >= top;
+            let (f, potential) = (self.original(f), base + along + u32::from(copy) * value);
+            let face = &mut self.faces[f as usize];
+            if potential < face.distance {
+                face.distance = potential;
+                self.queue.push(potential, f, potential);
+            }
+        }
+        let mut taken = 0usize;
+        while let Some((f, distance)) = self.queue.pop(u32::MAX) {
+            taken += 1;
+            if taken.is_multiple_of(BREATH) {
+                monitor.check()?;
+            }
+            if self.faces[f as usize].distance != distance {
+                continue;
+            }
+            for direction in 0..4 {
+                let (to, cost) = self.plain(f, direction);
+                if cost == NEVER {
+                    continue;
+                }
+                let mut next = i64::from(distance) + i64::from(cost);
+                if self.faces[f as usize].odd >> direction & 1 == 1 {
+                    next += self.winding(f, direction, to) * i64::from(value);
+                }
+                if !(0..i64::from(NEVER)).contains(&next) {
+                    return Ok(false);
+                }
+                let next = next as u32;
+                if next < self.faces[to as usize].distance {
+                    self.faces[to as usize].distance = next;
+                    self.queue.push(next, to, next);
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    /// The pixels with residual capacity towards the core, over any number of edges.
+    fn residual(&self, value: i64, core: Vec<usize>) -> Vec<bool> {
+        let (width, columns) = (self.width, self.width + 1);
+        let mut taken = vec![false; self.rows * columns];
+        for &p in &core {
+            taken[p] = true;
+        }
+        let mut waiting = core;
+        while let Some(q) = waiting.pop() {
+            let (r, c) = (q / columns, q % columns);
+            let face = |l: usize, j: usize| ((l + 1) * width + j) as u32;
+            // One who takes the step has the first pixel of the pair at the left hand; flow goes from right to left.
+            let around = [
+                (q - columns, face(r, c - 1), EAST, 1),
+                (q + columns, face(r + 1, c - 1), EAST, -1),
+                (q - 1, face(r, c - 1), SOUTH, -1),
+                (q + 1, face(r, c), SOUTH, 1),
+            ];
+            for (p, f, direction, sign) in around {
+                if taken[p] {
+                    continue;
+                }
+                let (to, cost) = self.plain(f, direction);
+                if cost == NEVER {
+                    continue;
+                }
+                let potential = |f: u32| i64::from(self.faces[f as usize].distance);
+                let mut rise = potential(to) - potential(f);
+                if self.faces[f as usize].odd >> direction & 1 == 1 {
+                    rise -= self.winding(f, direction, to) * value;
+                }
+                if i64::from(cost) + sign * rise > 0 {
+                    taken[p] = true;
+                    waiting.push(p);
+                }
+            }
+        }
+        taken
+    }
+
+    /// How often a step crosses P, from below it upwards.
+    fn winding(&self, f: u32, direction: usize, to: u32) -> i64 {
+        let downwards = |p: u32, d: usize| {
+            let k = self.place[p as usize];
+            k != NEVER && self.down[k as usize] >> d & 1 == 1
+        };
+        i64::from(downwards(to, direction ^ 2)) - i64::from(downwards(f, direction))
+    }
+
+    /// Where a step of a strip that is not cyclic leads, P or not, and its cost.
+    #[inline(always)]
+    fn plain(&self, f: u32, direction: usize) -> (u32, u32) {
+        let (at, width) = (f as usize, self.width);
+        match direction {
+            EAST => (f + 1, self.faces[at].east),
+            SOUTH => (f + width as u32, self.faces[at].south),
+            WEST => (f - 1, self.faces[at - 1].east),
+            _ => (f - width as u32, self.faces[at - width].south),
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! Shortest paths on the dual.
+
+use super::dual::Dual;
+use super::{BREATH, EAST, NEVER, NORTH, SOUTH, START, WEST};
+use crate::Result;
+use crate::foundation::par::Monitor;
+
+/// Between which seams a search stays: pixels right of all seams have cells from `left` on and below `right`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Between {
+    pub(super) left: u32,
+    pub(super) right: u32,
+}
+
+impl Between {
+    pub(super) const ALL: Self = Self {
+        left: 0,
+        right: u32::MAX,
+    };
+}
+
+impl Dual {
+    /// The shortest path from above the first row to below the last one.
+    pub(super) fn open(&mut self, monitor: &Monitor) -> Result<(u32, Vec<u32>)> {
+        let width = self.width;
+        let start: Vec<u32> = (width..2 * width).map(|f| f as u32).collect();
+        let goal = ((self.rows + 1) * width) as u32;
+        // Most shortest paths never turn back, or once: sweeps find these, in the order of memory, and leave the rest to
+        // the queue.
+        for &f in &start {
+            self.faces[f as usize].distance = 0;
+        }
+        self.sweep(true);
+        self.sweep(false);
+        let goals = goal..goal + width as u32;
+        let last = self.faces[self.nearest(goals.clone()) as usize].distance;
+        self.queue.reset(self.largest, self.mean / 4);
+        self.enqueue(last);
+        self.search::<false>(|f| f >= goal, last, Between::ALL, monitor)?;
+        let end = self.nearest(goals);
+        Ok((self.faces[end as usize].distance, self.crossings(end)))
+    }
+
+    /// Makes faces the starts of searches.
+    pub(super) fn start(&mut self, start: &[u32]) {
+        for &f in start {
+            let face = &mut self.faces[f as usize];
+            (face.distance, face.step) = (0, START);
+            self.queue.push(0, f, 0);
+        }
+    }
+
+    /// Finds the shortest paths that begin with what is in the queue, to all that is no farther than the nearest goal, or
+    /// than `last`. `LED` searches look ahead and stay between two seams.
+    pub(super) fn search<const LED: bool>(
+        &mut self,
+        goals: impl Fn(u32) -> bool,
+        mut last: u32,
+        between: Between,
+        monitor: &Monitor,
+    ) -> Result<()> {
+        let mut taken = 0usize;
+        while let Some((f, distance)) = self.queue.pop(last) {
+            taken += 1;
+            if taken.is_multiple_of(BREATH) {
+                monitor.check()?;
+            }
+            if self.faces[f as usize].distance != distance {
+                continue;
+            }
+            if goals(f) {
+                // Its bucket may hold nearer ones.
+                last = last.min(distance);
+                continue;
+            }
+            for direction in 0..4 {
+                let (to, cost) = self.neighbour(f, direction);
+                let next = distance + cost;
+                if next > last || next >= self.faces[to as usize].distance {
+                    continue;
+                }
+                let mut key = next;
+                if LED {
+                    if !self.within(f, direction, between) {
+                        continue;
+                    }
+                    if self.faces[to as usize].distance == NEVER {
+                        self.touched.push(to);
+                    }
+                    key += self.ahead[to as usize];
+                }
+                let face = &mut self.faces[to as usize];
+                face.distance = next;
+                face.step = direction as u8;
+                self.queue.push(key, to, next);
+            }
+        }
+        Ok(())
+    }
+
+    /// Carries distances along each row both ways and on to the next row, over all rows of an open strip.
+    pub(super) fn sweep(&mut self, southwards: bool) {
+        let width = self.width;
+        for i in 0..=self.rows {
+            let l = if southwards { i } else { self.rows - i };
+            let (above, rest) = self.faces[l * width..].split_at_mut(width);
+            let (row, below) = rest.split_at_mut(width);
+            let mut next = NEVER;
+            for face in row.iter_mut() {
+                face.offer(next, EAST);
+                next = face.distance + face.east;
+            }
+            let mut distance = NEVER;
+            for face in row.iter_mut().rev() {
+                face.offer(distance + face.east, WEST);
+                distance = face.distance;
+            }
+            if southwards {
+                for (face, below) in row.iter().zip(below) {
+                    below.offer(face.distance + face.south, SOUTH);
+                }
+            } else {
+                for (face, above) in row.iter().zip(above) {
+                    above.offer(face.distance + above.south, NORTH);
+                }
+            }
+        }
+    }
+
+    /// Puts the faces of an open strip from which a shorter way leads on into the queue.
+    pub(super) fn enqueue(&mut self, last: u32) {
+        let width = self.width;
+        for f in width..(self.rows + 2) * width {
+            let face = self.faces[f];
+            let (east, south) = (self.faces[f + 1], self.faces[f + width]);
+            let (west, north) = (self.faces[f - 1], self.faces[f - width]);
+            let leads_on = (face.distance + face.east < east.distance)
+                | (face.distance + face.south < south.distance)
+                | (face.distance + west.east < west.distance)
+                | (face.distance + north.south < north.distance);
+            if leads_on && face.distance <= last {
+                self.queue.push(face.distance, f as u32, face.distance);
+            }
+        }
+    }
+
+    /// The nearest of some faces, the first one of equals.
+    pub(super) fn nearest(&self, faces: impl Iterator<Item = u32>) -> u32 {
+        faces
+            .min_by_key(|&f| self.faces[f as usize].distance)
+            .expect("a dual has faces in each row and column")
+    }
+
+    /// Makes all distances unknown again.
+    pub(super) fn forget(&mut self) {
+        // A search that was led lists what it touched; others touch nearly everything.
+        if self.ahead.is_empty() || self.cell.is_empty() {
+            for face in &mut self.faces {
+                face.distance = NEVER;
+            }
+        } else {
+            for &f in &self.touched {
+                self.faces[f as usize].distance = NEVER;
+            }
+        }
+        self.touched.clear();
+    }
+}

@@ -1,0 +1,292 @@
+//! Two images of the same shape that overlap altogether: the seam from border to border that is least visible.
+//!
+//! Efros and Freeman, *Image quilting for texture synthesis and transfer*, SIGGRAPH 2001, with the seam free to turn back:
+//! the exact minimum cut (see [`super::planar`]).
+
+use super::cost::{Cost, Pair, check_costs, check_len};
+use super::planar::{LONGEST, Strip, least_seam, longest};
+use super::stitch::Stitched;
+use crate::foundation::grid::Grid;
+use crate::foundation::par::Monitor;
+use crate::{Error, Result};
+use std::borrow::Cow;
+
+/// Pixels that are looked at together for whether a seam parts any of them from others.
+const SIMILAR: usize = 64;
+
+/// Two images, and how they lie beside each other.
+#[derive(Debug, Clone, Copy)]
+pub struct Pasted<'a> {
+    /// Rows and columns of both images.
+    pub shape: [usize; 2],
+    /// Channels of both images.
+    pub channels: usize,
+    /// The image at the start of `axis`.
+    pub a: &'a [f32],
+    /// The image at the end of `axis`.
+    pub b: &'a [f32],
+    /// The axis that the seam crosses: the first line along it takes A, the last one B.
+    pub axis: usize,
+    /// Whether the other axis is cyclic, so that the seam closes.
+    pub cyclic: bool,
+    /// Costs of edges are multiplied by one plus the mean of this at their ends.
+    pub penalty: Option<&'a [f32]>,
+    /// How visible a seam is.
+    pub cost: Cost,
+}
+
+/// The least visible seam.
+///
+/// Costs are rounded to multiples of 2^-16, or coarser where a straight seam costs more than 2^13.
+///
+/// # Errors
+/// Arrays that do not fit, fewer than two pixels along `axis`, values or penalties that are not finite, negative penalties.
+pub fn cut(pasted: &Pasted<'_>, monitor: &Monitor) -> Result<Stitched> {
+    let costs = match pasted.channels {
+        1 => weigh::<1>(pasted),
+        3 => weigh::<3>(pasted),
+        _ => weigh::<0>(pasted),
+    }?;
+    let [rows, columns] = pasted.shape;
+    // The solver's rows run along the seam.
+    let (shape, across, along) = match pasted.axis {
+        1 => ([rows, columns], Cow::from(&costs[1]), Cow::from(&costs[0])),
+        _ => {
+            let [across, along] = costs.each_ref().map(|c| transposed(c, pasted.shape));
+            ([columns, rows], Cow::from(across), Cow::from(along))
+        }
+    };
+    let longest = longest(shape[1], &across, &along, f64::from);
+    if !longest.is_finite() {
+        return Err(Error::value(
+            "penalty",
+            "too large: the seam costs infinitely much",
+        ));
+    }
+    let mut scale = 65536.0;
+    while longest * scale >= (LONGEST / 2) as f64 {
+        scale *= 0.5;
+    }
+    // No cost is longer than the longest line.
+    let rounded = |costs: &[f32]| -> Vec<u32> {
+        let round = |&c: &f32| (f64::from(c) * scale + 0.5) as i32 as u32;
+        costs.iter().map(round).collect()
+    };
+    let strip = Strip {
+        rows: shape[0],
+        columns: shape[1],
+        cyclic: pasted.cyclic,
+        across: &rounded(&across),
+        along: &rounded(&along),
+    };
+    let far = least_seam(&strip, monitor)?.far;
+    let b = match pasted.axis {
+        1 => far,
+        _ => transposed(&far, shape),
+    };
+    let (mut value, mut edges) = (0.0, 0);
+    let grid = grid(pasted)?;
+    for (axis, costs) in costs.iter().enumerate() {
+        runs(&grid, axis, |s, t, len| {
+            let ends = b[s..][..len]
+                .chunks(SIMILAR)
+                .zip(b[t..][..len].chunks(SIMILAR));
+            for (i, (here, there)) in ends.enumerate().filter(|(_, (here, there))| here != there) {
+                let costs = &costs[s + i * SIMILAR..];
+                for ((here, there), &cost) in here.iter().zip(there).zip(costs) {
+                    if here != there {
+                        value += f64::from(cost);
+                        edges += 1;
+                    }
+                }
+            }
+        });
+    }
+    Ok(Stitched { b, value, edges })
+}
+
+/// Rows as columns.
+fn transposed<T: Copy + Default>(values: &[T], [rows, columns]: [usize; 2]) -> Vec<T> {
+    /// Rows taken at a time, so that what is read stays in the cache.
+    const BAND: usize = 16;
+    let mut out = vec![T::default(); values.len()];
+    for top in (0..rows).step_by(BAND) {
+        let bottom = rows.min(top + BAND);
+        for (c, out) in out.chunks_exact_mut(rows).enumerate() {
+            for (r, out) in (top..bottom).zip(&mut out[top..bottom]) {
+                *out = values[r * columns + c];
+            }
+        }
+    }
+    out
+}
+
+fn grid(pasted: &Pasted<'_>) -> Result<Grid<2>> {
+    Grid::new(
+        pasted.shape,
+        std::array::from_fn(|axis| pasted.cyclic && axis != pasted.axis),
+    )
+}
+
+/// Calls `f(p, q, n)` for runs of `n` points from `p` on whose next points along an axis lie from `q` on.
+fn runs(grid: &Grid<2>, axis: usize, mut f: impl FnMut(usize, usize, usize)) {
+    let [rows, columns] = grid.shape();
+    let closes = grid.wrap()[axis];
+    if axis == 0 {
+        let inner = (rows - 1) * columns;
+        f(0, columns, inner);
+        if closes && rows > 1 {
+            f(inner, 0, columns);
+        }
+        return;
+    }
+    for start in (0..grid.len()).step_by(columns) {
+        let last = start + columns - 1;
+        f(start, start + 1, columns - 1);
+        if closes && columns > 1 {
+            f(last, start, 1);
+        }
+    }
+}
+
+/// Costs of the edges along each axis.
+fn weigh<const C: usize>(pasted: &Pasted<'_>) -> Result<[Vec<f32>; 2]> {
+    let grid = grid(pasted)?;
+    let n = grid.len();
+    if pasted.axis > 1 {
+        return Err(Error::value("axis", format!("0 or 1, got {}", pasted.axis)));
+    }
+    if pasted.shape[pasted.axis] < 2 {
+        return Err(Error::value(
+            "a, b",
+            format!(
+                "shape {:?} has fewer than two pixels along axis {}",
+                pasted.shape, pasted.axis
+            ),
+        ));
+    }
+    let samples = n.saturating_mul(pasted.channels);
+    check_len("a", samples, pasted.a.len())?;
+    check_len("b", samples, pasted.b.len())?;
+    if let Some(penalty) = pasted.penalty {
+        check_len("penalty", n, penalty.len())?;
+        check_costs("penalty", penalty)?;
+    }
+    let pair = Pair::<C> {
+        a: pasted.a,
+        b: pasted.b,
+        channels: pasted.channels,
+    };
+    // No channels, no differences.
+    let differences = match pasted.channels {
+        0 => vec![0.0; n],
+        _ => pair.differences(),
+    };
+    // Not the place at once, so that the search takes many at a time.
+    if differences
+        .iter()
+        .fold(false, |bad, d| bad | !d.is_finite())
+    {
+        let at = differences.iter().position(|d| !d.is_finite()).unwrap_or(0);
+        return Err(Error::value(
+            "a, b",
+            format!("not finite, or too far apart, at {:?}", grid.point(at)),
+        ));
+    }
+    let mut costs = [vec![0.0; n], vec![0.0; n]];
+    for (axis, costs) in costs.iter_mut().enumerate() {
+        runs(&grid, axis, |s, t, len| {
+            let costs = &mut costs[s..][..len];
+            pair.edges(pasted.cost, s, t, &differences, costs);
+            if let Some(penalty) = pasted.penalty {
+                for (k, cost) in costs.iter_mut().enumerate() {
+                    *cost *= 1.0 + 0.5 * (penalty[s + k] + penalty[t + k]);
+                }
+            }
+        });
+    }
+    Ok(costs)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernels::seam::stitch::{Overlap, cut as cut_any};
+    use proptest::prelude::*;
+
+    proptest! {
+        /// With the borders as cores the general cut has to find the same.
+        #[test]
+        fn equals_the_general_cut(
+            shape in prop::array::uniform2(2usize..9),
+            axis in 0usize..2,
+            cyclic in any::<bool>(),
+            values in prop::collection::vec(0.0f32..1.0, 5 * 64),
+            gradient in any::<bool>(),
+        ) {
+            let n = shape[0] * shape[1];
+            let (a, b, penalty) = (&values[..2 * n], &values[128..128 + 2 * n], &values[256..256 + n]);
+            let cost = if gradient { Cost::Gradient } else { Cost::Difference };
+            let pasted = Pasted { shape, channels: 2, a, b, axis, cyclic, penalty: Some(penalty), cost };
+            let found = cut(&pasted, &Monitor::default()).unwrap();
+            let coordinate = |p: usize| if axis == 0 { p / shape[1] } else { p % shape[1] };
+            let core_a: Vec<bool> = (0..n).map(|p| coordinate(p) == 0).collect();
+            let core_b: Vec<bool> = (0..n).map(|p| coordinate(p) == shape[axis] - 1).collect();
+            let all = vec![true; n];
+            let overlap = Overlap {
+                core_a: Some(&core_a),
+                core_b: Some(&core_b),
+                penalty: Some(penalty),
+                cost,
+                ..Overlap::new(grid(&pasted).unwrap(), 2, a, b, &all, &all)
+            };
+            let general = cut_any(&overlap, &Monitor::default()).unwrap();
+            prop_assert!((found.value - general.value).abs() < 1e-3, "{} {}", found.value, general.value);
+            for p in 0..n {
+                prop_assert!(!(core_a[p] && found.b[p]) && (!core_b[p] || found.b[p]));
+            }
+        }
+    }
+
+    #[test]
+    fn refuses_what_cannot_be_cut() {
+        let pasted = Pasted {
+            shape: [3, 1],
+            channels: 1,
+            a: &[0.0; 3],
+            b: &[0.0; 3],
+            axis: 1,
+            cyclic: false,
+            penalty: None,
+            cost: Cost::Gradient,
+        };
+        let cut = |p: Pasted<'_>| cut(&p, &Monitor::default());
+        assert!(cut(pasted).is_err());
+        assert!(cut(Pasted { axis: 2, ..pasted }).is_err());
+        assert!(
+            cut(Pasted {
+                axis: 0,
+                a: &[f32::NAN; 3],
+                ..pasted
+            })
+            .is_err()
+        );
+        assert!(
+            cut(Pasted {
+                axis: 0,
+                penalty: Some(&[-1.0; 3]),
+                ..pasted
+            })
+            .is_err()
+        );
+        assert_eq!(cut(Pasted { axis: 0, ..pasted }).unwrap().edges, 1);
+        let bare = Pasted {
+            axis: 0,
+            channels: 0,
+            a: &[],
+            b: &[],
+            ..pasted
+        };
+        assert_eq!(cut(bare).unwrap().edges, 1);
+    }
+}

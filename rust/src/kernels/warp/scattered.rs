@@ -1,0 +1,108 @@
+//! Scattered points: a Delaunay triangulation of where they are, drawn where they go.
+
+use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
+
+use super::raster::{Triangle, bands};
+use super::{Point, Warped};
+use crate::foundation::par::Monitor;
+use crate::{Error, Result};
+
+/// Largest coordinate: what is drawn lies far within.
+const FAR: f64 = 1e7;
+
+struct Vertex {
+    at: Point,
+    number: usize,
+}
+
+impl HasPosition for Vertex {
+    type Scalar = f64;
+    fn position(&self) -> Point2<f64> {
+        Point2::new(self.at[1], self.at[0])
+    }
+}
+
+/// Warps by `source` points that go to `target`, into an output of `shape`; gives the corners of the triangles too.
+pub fn scattered(
+    source: &[Point],
+    target: &[Point],
+    shape: [usize; 2],
+    monitor: &Monitor,
+) -> Result<(Warped, Vec<[u32; 3]>)> {
+    if source.len() != target.len() {
+        return Err(Error::Shape {
+            argument: "target",
+            expected: vec![source.len(), 2],
+            got: vec![target.len(), 2],
+        });
+    }
+    for (argument, points) in [("source", source), ("target", target)] {
+        if let Some(p) = points
+            .iter()
+            .flatten()
+            .find(|x| x.is_nan() || x.abs() > FAR)
+        {
+            return Err(Error::value(
+                argument,
+                format!("coordinates must be finite and within 10^7, got {p}"),
+            ));
+        }
+    }
+    let mut triangulation = DelaunayTriangulation::<Vertex>::new();
+    for (number, &at) in source.iter().enumerate() {
+        let before = triangulation.num_vertices();
+        triangulation
+            .insert(Vertex { at, number })
+            .map_err(|e| Error::value("source", format!("point {number} at {at:?}: {e}")))?;
+        if triangulation.num_vertices() == before {
+            return Err(Error::value(
+                "source",
+                format!("two points lie at the same place, {at:?}"),
+            ));
+        }
+        if number % 1024 == 0 {
+            monitor.check()?;
+        }
+    }
+    let mut corners: Vec<[u32; 3]> = triangulation
+        .inner_faces()
+        .map(|face| {
+            let mut three = face.vertices().map(|v| v.data().number as u32);
+            let first = (0..3).min_by_key(|&k| three[k]).unwrap_or(0);
+            three.rotate_left(first);
+            three
+        })
+        .collect();
+    corners.sort_unstable();
+    if corners.is_empty() {
+        return Err(Error::value(
+            "source",
+            format!(
+                "needs three points that do not lie on a line, got {}",
+                source.len()
+            ),
+        ));
+    }
+    let triangles: Vec<Triangle> = corners
+        .iter()
+        .map(|three| Triangle {
+            target: three.map(|i| target[i as usize]),
+            source: three.map(|i| source[i as usize]),
+            weight: 0,
+        })
+        .collect();
+    let (places, triangle) = bands(shape, monitor, |band| {
+        for (number, t) in triangles.iter().enumerate() {
+            band.draw(number as u32 + 1, t);
+        }
+    })?;
+    let flipped = triangles.iter().filter(|t| t.turned()).count();
+    let warped = Warped {
+        places,
+        triangle,
+        drawn: triangles.len(),
+        flipped,
+        flipped_heavy: 0,
+    };
+    Ok((warped, corners))
+}
