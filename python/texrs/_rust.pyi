@@ -9,7 +9,6 @@ __all__ = [
     "Appearance",
     "Cholesky",
     "Correlation",
-    "Nearest",
     "PatchIndex",
     "cohere",
     "complete",
@@ -45,14 +44,6 @@ def gather(
     coordinates: NDArray[float32],
     interpolation: str,
 ) -> NDArray[Any]: ...
-
-@final
-class Nearest:
-    def __new__(cls, vectors: NDArray[float64]) -> Nearest: ...
-    def query(
-        self, queries: NDArray[float64], progress: Callable[[float], object] | None
-    ) -> tuple[NDArray[uint32], NDArray[float64]]: ...
-    def others(self, progress: Callable[[float], object] | None) -> tuple[NDArray[uint32], NDArray[float64]]: ...
 
 @final
 class Correlation:

@@ -4,7 +4,6 @@ mod coherence;
 mod complete;
 mod mean_shift;
 mod ncc;
-mod nearest;
 mod patch_search;
 mod poisson;
 mod seam;
@@ -64,7 +63,6 @@ criterion_group!(
     complete::bench,
     mean_shift::bench,
     ncc::bench,
-    nearest::bench,
     patch_search::bench,
     poisson::bench,
     seam::bench,

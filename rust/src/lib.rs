@@ -22,7 +22,6 @@
 //! | [`gather`] | an exemplar of any type looked up through coordinates |
 //! | [`ncc`] | normalised cross-correlation of a template with each window of an image |
 //! | [`mean_shift`] | joint spatial and range filtering |
-//! | [`nearest`] | the nearest of many vectors |
 //! | [`sparse`] | symmetric positive definite systems: factored once, solved many times |
 //! | [`image_io`] | 8/16-bit and float image files, with limits |
 //!
@@ -47,5 +46,5 @@ pub use engine::{appearance, blocks, coherence, guide, optimize, pyramid};
 pub use foundation::error::{Error, Result};
 pub use foundation::{error, fixed, grid, hash, par, pca};
 pub use kernels::{
-    complete, gather, image_io, mean_shift, ncc, nearest, patch_search, poisson, seam, sparse, warp,
+    complete, gather, image_io, mean_shift, ncc, patch_search, poisson, seam, sparse, warp,
 };

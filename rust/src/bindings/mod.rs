@@ -9,7 +9,6 @@ mod hash;
 mod image_io;
 mod mean_shift;
 mod ncc;
-mod nearest;
 mod patch_search;
 mod poisson;
 mod seam;
@@ -100,8 +99,6 @@ mod _rust {
     use super::mean_shift::mean_shift;
     #[pymodule_export]
     use super::ncc::Correlation;
-    #[pymodule_export]
-    use super::nearest::Nearest;
     #[pymodule_export]
     use super::patch_search::PatchIndex;
     #[pymodule_export]

@@ -5,7 +5,6 @@ pub mod gather;
 pub mod image_io;
 pub mod mean_shift;
 pub mod ncc;
-pub mod nearest;
 pub mod patch_search;
 pub mod poisson;
 pub mod seam;

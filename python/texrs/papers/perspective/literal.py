@@ -9,6 +9,7 @@ pixel of a window.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,9 @@ from texrs._arrays import to_unit
 from texrs._engine.pyramid import halve
 from texrs._progress import stage
 from texrs._typing import Array, Floats, Progress
-from texrs.kernels.nearest import Nearest
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 __all__ = ["Averaged", "average"]
 
@@ -117,13 +120,16 @@ class Search:
 
     e: Doubles
     bases: list[tuple[Doubles, Doubles]]
-    nearest: Nearest
+    tree: cKDTree
+    first: NDArray[np.intp]
     least: float
     columns: int
 
     @classmethod
     def of(cls, e: Doubles, scale: Doubles) -> Search:
         """Project the windows: colours to 95 % of their variance and scales to 99 %, apart (section 4.2)."""
+        from scipy.spatial import cKDTree
+
         parts, bases, variance = [], [], 0.0
         for values, share in ((e, 0.95), (scale[..., np.newaxis], 0.99)):
             windows = _windows(values, 1)
@@ -134,19 +140,21 @@ class Search:
             bases.append((mean, axes[:, ::-1][:, :keep]))
             parts.append((windows - mean) @ bases[-1][1])
             variance += float(total[-1])
-        nearest = Nearest(np.concatenate(parts, axis=1))
-        return cls(e, bases, nearest, NEAREST * max(variance, 1e-12), e.shape[1] - SIDE + 1)
+        vectors = np.concatenate(parts, axis=1)
+        # Of windows that are the same the first is found.
+        first = np.sort(np.unique(vectors, axis=0, return_index=True)[1])
+        return cls(e, bases, cKDTree(vectors[first]), first, NEAREST * max(variance, 1e-12), e.shape[1] - SIDE + 1)
 
     def step(self, x: Doubles, scale: Doubles) -> tuple[Doubles, NDArray[np.intp], float]:
         """Search the nearest window for each of the output's, then average them: a round."""
         seen = [_windows(v, SPACING) for v in (x, scale[..., np.newaxis])]
         query = np.concatenate([(w - m) @ b for w, (m, b) in zip(seen, self.bases, strict=True)], axis=1)
-        found, distance = self.nearest.query(query)
+        distance, near = self.tree.query(query)
         square = np.maximum(distance**2, self.least)
         energy = float((square ** (R / 2)).mean())  # Eq. 5
         omega = square ** ((R - 2) / 2)  # Eq. 6
         rows, columns = (_starts(n, SPACING) for n in x.shape[:2])
-        top, left = (v.reshape(len(rows), len(columns)) for v in np.divmod(found, self.columns))
+        top, left = (v.reshape(len(rows), len(columns)) for v in np.divmod(self.first[near], self.columns))
         omega = omega.reshape(len(rows), len(columns))
         excess = _excess(x, self.e)
         total, weight = np.zeros_like(x), np.zeros(x.shape[:2])
