@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from reference import coherence as twin
-from texrs import _threads as threads
 from texrs import fields, samples
 from texrs._engine.appearance import Appearance
 from texrs._engine.coherence import correct, jitter, similar
 from texrs._engine.pyramid import ONE, Region, to_fixed
+from texrs._threads import threads
 from texrs.errors import InvalidInput
 from texrs.exemplar import analysis
 

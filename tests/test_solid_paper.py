@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import texrs
-from texrs import _threads as threads
 from texrs import fields, samples, volume
 from texrs._engine.appearance import Appearance
 from texrs._engine.coherence import correct
 from texrs._engine.pyramid import ONE
+from texrs._threads import threads
 from texrs.errors import InvalidInput
 from texrs.papers.solid import literal as _solid_literal
 from texrs.papers.solid.literal import _inside
