@@ -167,11 +167,11 @@ def s6(exemplar: np.ndarray, image: np.ndarray) -> Found:
             more = over[-1] - max(over[:-1]) - 2 * float(np.std(over[:-1]))
             if more > beyond:
                 worst, beyond = float(np.exp(over[-1])), more
-    speckle = volume.isolated(seen)
+    speckle = volume.speckle(seen)
     return Found(
         {
             "planes": (worst, 0.8, 1.25),
-            "isolated": (100 * speckle, 0, 150 * volume.isolated(volume.lightness(exemplar)) + 0.1),
+            "isolated": (100 * speckle, 0, 150 * volume.speckle(volume.lightness(exemplar)) + 0.1),
         }
     )
 

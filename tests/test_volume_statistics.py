@@ -159,8 +159,8 @@ def test_seams_and_speckle():
     assert cyclic[1][47] > 2
     speckled = noise.copy()
     speckled[5::10, 5::10, 5::10] = 1
-    assert volume.isolated(noise) == 0
-    assert volume.isolated(speckled) == pytest.approx(125 / 48**3)
+    assert volume.speckle(noise) == 0
+    assert volume.speckle(speckled) == pytest.approx(125 / 48**3)
 
 
 def test_autocorrelation_of_layers(stripes):
@@ -204,16 +204,16 @@ def test_coherence_under_a_field(name):
         radius = np.hypot(away[..., 1], away[..., 2])
         places = np.stack([grid[..., 0], angle * 15, radius], -1)
         source = source_of(places, (40, 100, 40))
-        assert volume.coherent(source, 0, field).all()
+        assert volume.coherence(source, 0, field).all()
         ring = (radius[:, :, :-1] > 12) & (np.abs(np.diff(angle, axis=2)) < 1)
-        assert volume.coherent(source, 2, field)[ring].mean() > 0.95
-        assert volume.coherent(source, 2)[ring].mean() < 0.6
+        assert volume.coherence(source, 2, field)[ring].mean() > 0.95
+        assert volume.coherence(source, 2)[ring].mean() < 0.6
         return
     field = fields.zigzag(20, 30, plane="xy") if name == "zigzag" else fields.constant(np.eye(3) * 2)
     if name == "zigzag":
         # Each band a copy of its own, turned.
         places = np.einsum("...ij,...j->...i", field.jacobians(grid), grid)
-        found = volume.coherent(source_of(places, (99,) * 3), 2, field)
+        found = volume.coherence(source_of(places, (99,) * 3), 2, field)
         edges = np.arange(29) % 10 == 9
         assert found[..., ~edges].all()
         assert not found[..., edges].all()
@@ -320,8 +320,8 @@ CUBE = np.zeros((16, 16, 16), np.uint8)
         (lambda: volume.orientation_errors(CUBE, normal=(0, 0, 0)), "normal"),
         (lambda: volume.orientation_errors(CUBE, np.eye(3)), "field"),
         (lambda: volume.seam_planes(CUBE[0, 0]), "values"),
-        (lambda: volume.coherent(CUBE, 0), "source"),
-        (lambda: volume.coherent(SourceMap.identity((4, 4)), 2), "axis"),
+        (lambda: volume.coherence(CUBE, 0), "source"),
+        (lambda: volume.coherence(SourceMap.identity((4, 4)), 2), "axis"),
         (lambda: volume.cell_reuse(SourceMap.identity((4, 4)), cell=0), "cell"),
         (lambda: volume.cell_reuse(SourceMap.identity((4, 4)), fields.identity()), "field"),
     ],

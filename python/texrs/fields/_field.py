@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from texrs._arrays import as_float, as_size
 from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput
-from texrs.fields._matrices import Matrices, inverses, too_flat, transposed
+from texrs.fields._matrices import Matrices, find_flat, inverses, transpose_each
 
 LEAST_DETERMINANT = 1e-3
 """Frames of a smaller determinant are refused: they are flat, and have no inverse worth the name."""
@@ -205,7 +205,7 @@ class Field(ABC):
         for start in range(0, len(out), _BLOCK):
             index = np.unravel_index(np.arange(start, min(start + _BLOCK, len(out))), sides)
             at = np.stack([(i + o + 0.5) * spread - 0.5 for i, o in zip(index, first.tolist(), strict=True)], axis=-1)
-            part = self._checked(np.asarray(at, np.float64), jacobians)
+            part = self._evaluate_checked(np.asarray(at, np.float64), jacobians)
             out[start : start + len(at)] = part.transpose(2, 0, 1)
         return out.reshape(*sides, self.axes, self.axes)
 
@@ -253,19 +253,19 @@ class Field(ABC):
         out = np.empty((len(flat), self.axes, self.axes), np.float32)
         for start in range(0, len(flat), _BLOCK):
             part = slice(start, start + _BLOCK)
-            out[part] = self._checked(flat[part], jacobians).transpose(2, 0, 1)
+            out[part] = self._evaluate_checked(flat[part], jacobians).transpose(2, 0, 1)
         return out.reshape(*at.shape, self.axes)
 
-    def _checked(self, points: NDArray[np.float64], jacobians: bool) -> Matrices:
+    def _evaluate_checked(self, points: NDArray[np.float64], jacobians: bool) -> Matrices:
         frames = self._frames(points)
-        inverse = transposed(frames) + 0.0 if self._rigid else refuse_flat(frames, points)
+        inverse = transpose_each(frames) + 0.0 if self._rigid else refuse_flat(frames, points)
         return inverse if jacobians else frames
 
 
 def refuse_flat(frames: Matrices, places: NDArray[np.float64], name: str = "field") -> Matrices:
     """Return the inverses of frames, or raise InvalidInput that names the first place where there is none."""
     inverse, det = inverses(frames)
-    bad = too_flat(frames, inverse, det, LEAST_DETERMINANT, WORST_CONDITION)
+    bad = find_flat(frames, inverse, det, LEAST_DETERMINANT, WORST_CONDITION)
     if bad.any():
         i = int(np.flatnonzero(bad)[0])
         axes = len(frames)

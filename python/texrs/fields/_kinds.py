@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs.fields._field import Field
-from texrs.fields._matrices import Matrices, everywhere, multiply
+from texrs.fields._matrices import Matrices, multiply, repeat
 
 LETTERS = "yx", "zyx"
 """Of the axes of pictures and of volumes, in their order."""
@@ -28,7 +28,7 @@ class Constant(Field):
         return self.matrix.astype(np.float32)
 
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
-        return everywhere(self.matrix, len(points))
+        return repeat(self.matrix, len(points))
 
     def _content(self) -> tuple[Any, ...]:
         return (self.matrix,)
@@ -56,14 +56,14 @@ class Wound(Field):
         far = np.where(middle, 1.0, far)
         out, along = np.where(middle, 1.0, out / far), along / far
         length = np.sqrt(out * out + along * along)
-        frames = everywhere(np.eye(self.axes), len(points))
+        frames = repeat(np.eye(self.axes), len(points))
         r, t = self.radial, self.tangential
         frames[r, r] = frames[t, t] = out / length
         frames[t, r] = along / length
         frames[r, t] = -frames[t, r]
         if not self.angle:
             return frames
-        return multiply(frames, everywhere(turn(self.angle, r, t, self.axes), len(points)))
+        return multiply(frames, repeat(turn(self.angle, r, t, self.axes), len(points)))
 
     def _content(self) -> tuple[Any, ...]:
         return (self.centre, self.radial, self.tangential, self.angle)
@@ -118,7 +118,7 @@ class Ramp(Field):
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
         way = np.clip(points[:, self.along] / (128.0 if self.length is None else self.length), 0, 1)
         size = np.exp(np.ascontiguousarray(log(self.start) + way * log(self.stop / self.start)))
-        return everywhere(np.eye(self.axes), len(points)) * size
+        return repeat(np.eye(self.axes), len(points)) * size
 
     def _content(self) -> tuple[Any, ...]:
         return (self.start, self.stop, self.along, self.length)

@@ -21,12 +21,12 @@ _TERMS, _SQUARINGS = 9, 4
 """Of Taylor's series and afterwards: exact to 1e-10 for matrices of norms up to 5."""
 
 
-def everywhere(matrix: NDArray[np.float64], count: int) -> Matrices:
+def repeat(matrix: NDArray[np.float64], count: int) -> Matrices:
     """Return one matrix for each of so many points."""
     return np.repeat(matrix[:, :, np.newaxis], count, axis=2)
 
 
-def transposed(m: Matrices) -> Matrices:
+def transpose_each(m: Matrices) -> Matrices:
     """Return the transposes, as a view."""
     return m.transpose(1, 0, 2)
 
@@ -75,7 +75,7 @@ def inverses(m: Matrices) -> tuple[Matrices, Numbers]:
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         c /= det
     c += 0.0  # Zeros are made positive.
-    return transposed(c), det
+    return transpose_each(c), det
 
 
 def norms(m: Matrices) -> Numbers:
@@ -94,7 +94,7 @@ def rotations(m: Matrices) -> Matrices:
         for _ in range(POLAR_STEPS):
             inverse, _det = inverses(x)
             scale = np.sqrt(norms(inverse) / norms(x))
-            x = (x * scale + transposed(inverse) / scale) * 0.5
+            x = (x * scale + transpose_each(inverse) / scale) * 0.5
     return x
 
 
@@ -109,7 +109,7 @@ def exponentials(m: Matrices) -> Matrices:
     for a in range(axes):
         rest[a, a] -= mean
     rest /= 2.0**_SQUARINGS
-    one = everywhere(np.eye(axes), m.shape[2])
+    one = repeat(np.eye(axes), m.shape[2])
     out = one.copy()
     for n in range(_TERMS, 0, -1):  # Horner's rule.
         out = multiply(rest, out) / n + one
@@ -118,7 +118,7 @@ def exponentials(m: Matrices) -> Matrices:
     return np.asarray(out * np.exp(mean))
 
 
-def too_flat(m: Matrices, inverse: Matrices, det: Numbers, least: float, worst: float) -> Bools:
+def find_flat(m: Matrices, inverse: Matrices, det: Numbers, least: float, worst: float) -> Bools:
     """Return which matrices are not finite, of a determinant below ``least`` or a condition beyond ``worst``."""
     with np.errstate(invalid="ignore", over="ignore"):
         bound = norms(m) * norms(inverse)

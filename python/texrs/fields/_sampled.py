@@ -21,7 +21,7 @@ from texrs._arrays import as_size
 from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput
 from texrs.fields._field import Field, as_place, as_points, refuse_flat
-from texrs.fields._matrices import Matrices, determinants, exponentials, multiply, rotations, transposed
+from texrs.fields._matrices import Matrices, determinants, exponentials, multiply, rotations, transpose_each
 
 __all__ = ["from_array", "from_function", "interpolate"]
 
@@ -215,13 +215,13 @@ class _Scattered(Field):
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
         nearest = np.full(len(points), np.inf)
         for place in self.places:
-            nearest = np.minimum(nearest, self._squared(points, place))
+            nearest = np.minimum(nearest, self._square_distances(points, place))
         turn = np.zeros((self.axes, self.axes, len(points)))
         stretch = None if self.stretches is None else np.zeros((*self.stretches.shape[:-1], len(points)))
         total = np.zeros(len(points))
         for i, place in enumerate(self.places):
             # Relative to the nearest, so that no weight overflows on a point or vanishes far away.
-            distance = self._squared(points, place)
+            distance = self._square_distances(points, place)
             ratio = np.where(distance > 0, nearest / np.where(distance > 0, distance, 1), 1)
             weight = ratio * ratio
             total += weight
@@ -233,7 +233,7 @@ class _Scattered(Field):
             stretch /= total
         return _join(turn, stretch, points)
 
-    def _squared(self, points: NDArray[np.float64], place: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _square_distances(self, points: NDArray[np.float64], place: NDArray[np.float64]) -> NDArray[np.float64]:
         total = np.zeros(len(points))
         for a in range(self.axes):
             away = points[:, a] - place[a]
@@ -265,7 +265,7 @@ class _Function(Field):
                 f"field: the function {name} gave {frames.dtype} of shape {frames.shape} for {len(points)} points; "
                 f"numbers of shape {wanted} are needed"
             )
-        return _first(frames)
+        return _to_matrices(frames)
 
     def _content(self) -> None:
         return None
@@ -284,17 +284,17 @@ def _split(frames: Array, places: Callable[[NDArray[np.intp]], NDArray[np.float6
     turns, logs = (np.empty((axes, axes, count), np.float32) for _ in range(2))
     mirrored, uneven = 0, 0.0
     for start in range(0, count, _BLOCK):
-        part = _first(frames[start : start + _BLOCK])
+        part = _to_matrices(frames[start : start + _BLOCK])
         index = np.arange(start, start + part.shape[2])
         refuse_flat(part, places(index), "frames")
         mirrored += int((determinants(part) < 0).sum())
         turn = rotations(part)
-        stretch = multiply(transposed(turn), part).transpose(2, 0, 1)
+        stretch = multiply(transpose_each(turn), part).transpose(2, 0, 1)
         values, vectors = np.linalg.eigh((stretch + stretch.transpose(0, 2, 1)) / 2)
         log = np.log(values)
         uneven = max(uneven, float(np.ptp(log, axis=1).max()))
         turns[..., index] = turn
-        logs[..., index] = _first((vectors * log[:, np.newaxis, :]) @ vectors.transpose(0, 2, 1))
+        logs[..., index] = _to_matrices((vectors * log[:, np.newaxis, :]) @ vectors.transpose(0, 2, 1))
     if mirrored not in (0, count):
         raise InvalidInput(
             f"frames: {mirrored} of {count} frames mirror and the others do not; between them one would be flat"
@@ -317,7 +317,7 @@ def _join(turn: Matrices, stretch: NDArray[np.float64] | None, points: NDArray[n
     return turn * np.exp(stretch) if stretch.ndim == 1 else multiply(turn, exponentials(stretch))
 
 
-def _first(frames: Array) -> Matrices:
+def _to_matrices(frames: Array) -> Matrices:
     """Bring frames (..., A, A) to the order of `_matrices`, copied."""
     axes = frames.shape[-1]
     return np.array(frames.reshape(-1, axes, axes).transpose(1, 2, 0), np.float64, order="C")

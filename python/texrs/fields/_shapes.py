@@ -177,7 +177,7 @@ def circular(
     array([1., 0.], dtype=float32)
 
     """
-    return _wound(axis, radial, centre, axes, 0.0)
+    return _wind(axis, radial, centre, axes, 0.0)
 
 
 def spiral(
@@ -204,7 +204,7 @@ def spiral(
     'spiral of 15 degrees, x outwards, about (31.5, 31.5)'
 
     """
-    return _wound(axis, radial, centre, axes, _angle(angle))
+    return _wind(axis, radial, centre, axes, _angle(angle))
 
 
 def zigzag(
@@ -275,7 +275,7 @@ def scale_ramp(
     return Ramp(axes, ends[0], ends[1], along, reach)
 
 
-def _wound(axis: str, radial: str | None, centre: Sequence[float] | None, axes: int, angle: float) -> Field:
+def _wind(axis: str, radial: str | None, centre: Sequence[float] | None, axes: int, angle: float) -> Field:
     _axes(axes)
     letter = _letter(axis, "zyx", "axis")
     if axes == 2 and letter != "z":

@@ -49,7 +49,7 @@ from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput
 from texrs.io import _files, _image_io, _npy, _pillow, _slabs, _tiff, _volumes
 from texrs.io._files import atomic
-from texrs.io._formats import FORMATS, VOLUMES, checked, kind_of, spacing_of
+from texrs.io._formats import FORMATS, VOLUMES, check, kind_of, spacing_of
 from texrs.io._npy import read_arrays
 
 __all__ = ["atomic", "read", "read_arrays", "read_volume", "write", "write_slabs", "write_surface", "write_volume"]
@@ -119,8 +119,8 @@ def read(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
         return _pillow.read_gif(name, file, limit)
     if kind == "bmp":
         return _pillow.read_bmp(name, file, limit)
-    with _files.speaking(name, "decoding"):
-        return _files.upright(*_image_io.decode(name, file, limit))
+    with _files.translate_errors(name, "decoding"):
+        return _files.turn_upright(*_image_io.decode(name, file, limit))
 
 
 def read_volume(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
@@ -288,7 +288,7 @@ def write_slabs(path: PathLike, slabs: Iterable[Array], shape: Sequence[int], *,
     sides = _slabs.as_shape(shape)
     with atomic(target, overwrite=overwrite) as temporary:
         # What a slab's maker raises is its own affair and passes as it is.
-        parts = _slabs.checked((checked(slab, suffix, 3) for slab in slabs), sides)
+        parts = _slabs.check((check(slab, suffix, 3) for slab in slabs), sides)
         first = next(parts)
         whole = chain((first,), parts)
         if suffix == ".npy":
@@ -341,7 +341,7 @@ def write_surface(path: PathLike, vertices: Array, faces: Array, *, overwrite: b
         raise InvalidInput("vertices, faces: needs finite corners and at least one triangle")
     if int(triangles.min()) < 0 or int(triangles.max()) >= len(corners):
         raise InvalidInput(f"faces: name corners from 0 to {len(corners) - 1}")
-    with atomic(target, overwrite=overwrite) as temporary, _files.speaking(target, "writing"):
+    with atomic(target, overwrite=overwrite) as temporary, _files.translate_errors(target, "writing"):
         _volumes.write_stl(temporary, corners.astype(np.float32), triangles.astype(np.int64))
 
 
@@ -350,8 +350,8 @@ def _write(path: PathLike, value: Array, axes: int, overwrite: bool, spacing: Se
     suffix = ".nii.gz" if target.name.lower().endswith(".nii.gz") else target.suffix.lower()
     if suffix not in FORMATS:
         raise FileError(f"{target}: the suffix {suffix!r} is not one that is written: {', '.join(FORMATS)}")
-    array, steps = checked(value, suffix, axes), spacing_of(spacing, suffix)
-    with atomic(target, overwrite=overwrite) as temporary, _files.speaking(target, "writing"):
+    array, steps = check(value, suffix, axes), spacing_of(spacing, suffix)
+    with atomic(target, overwrite=overwrite) as temporary, _files.translate_errors(target, "writing"):
         if suffix == ".npy":
             _npy.write_npy(temporary, array)
             return

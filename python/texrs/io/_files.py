@@ -30,7 +30,7 @@ def as_path(path: PathLike) -> Path:
 
 
 @contextmanager
-def speaking(path: Path, what: str) -> Iterator[None]:
+def translate_errors(path: Path, what: str) -> Iterator[None]:
     """Turn whatever a decoder or an encoder raises into one sentence that names the file."""
     try:
         yield
@@ -76,7 +76,7 @@ def load(path: Path, limit: int) -> bytes:
     length = size_of(path)
     if length > BYTES_PER_PIXEL * limit + 2**26:
         raise LimitExceeded(f"{path}: has {length} bytes, too many for an image of {limit} pixels")
-    with speaking(path, "reading"):
+    with translate_errors(path, "reading"):
         return path.read_bytes()
 
 
@@ -98,7 +98,7 @@ def check_size(path: Path, sides: tuple[int, ...], channels: int, itemsize: int,
     return pixels
 
 
-def upright(array: Array, orientation: int) -> Array:
+def turn_upright(array: Array, orientation: int) -> Array:
     """Apply an Exif orientation, 1 (nothing to do) to 8."""
     if orientation in (5, 6, 7, 8):
         array = array.swapaxes(0, 1)

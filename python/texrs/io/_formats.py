@@ -82,7 +82,7 @@ FORMATS = {
 def kind_of(path: Path) -> str:
     """Return which format a file has, by its content."""
     _files.size_of(path)
-    with _files.speaking(path, "reading"), path.open("rb") as file:
+    with _files.translate_errors(path, "reading"), path.open("rb") as file:
         start = file.read(16)
     for magic, kind in MAGIC:
         if start.startswith(magic):
@@ -109,7 +109,7 @@ def spacing_of(spacing: Sequence[float] | None, suffix: str) -> tuple[float, ...
     return tuple(as_float(s, "spacing", 1e-12, 1e12) for s in steps)
 
 
-def checked(value: object, suffix: str, axes: int) -> Array:
+def check(value: object, suffix: str, axes: int) -> Array:
     """Return what is to be written, contiguous and in native byte order."""
     try:
         array = np.asarray(value)

@@ -15,7 +15,7 @@ from texrs._arrays import MAX_PIXELS
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, LimitExceeded
-from texrs.io._files import BYTES_PER_PIXEL, as_path, reason, size_of, speaking
+from texrs.io._files import BYTES_PER_PIXEL, as_path, reason, size_of, translate_errors
 
 MAGIC = b"\x93NUMPY"
 
@@ -27,13 +27,13 @@ _KEY = "image"
 def read_npy(path: Path, limit: int) -> Array:
     """Read an .npy file."""
     length = size_of(path)
-    with speaking(path, "reading the array"), path.open("rb") as file:
+    with translate_errors(path, "reading the array"), path.open("rb") as file:
         return _array(path, file, length, limit)
 
 
 def read_npz(path: Path, limit: int) -> Array:
     """Read the only array of an .npz file, or the one with the key "image"."""
-    with speaking(path, "reading the archive"), zipfile.ZipFile(path) as archive:
+    with translate_errors(path, "reading the archive"), zipfile.ZipFile(path) as archive:
         members = [m for m in archive.infolist() if m.filename.endswith(".npy")]
         chosen = [m for m in members if m.filename == f"{_KEY}.npy"] or members
         if len(chosen) != 1:
@@ -56,7 +56,7 @@ def read_arrays(path: PathLike, *, limit: int = MAX_PIXELS) -> dict[str, Array]:
     """
     place = as_path(path)
     length = size_of(place)
-    with speaking(place, "reading the archive"), place.open("rb") as file:
+    with translate_errors(place, "reading the archive"), place.open("rb") as file:
         if file.read(4) != b"PK\x03\x04":
             raise FileError(f"{place}: is not an .npz file of {length} bytes")
         with zipfile.ZipFile(file) as archive:

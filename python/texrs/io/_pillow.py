@@ -18,7 +18,7 @@ import numpy as np
 from texrs import _rust
 from texrs._typing import Array
 from texrs.errors import FileError, LimitExceeded
-from texrs.io._files import check_size, speaking, upright
+from texrs.io._files import check_size, translate_errors, turn_upright
 
 QUALITY = 95
 """Of JPEG files that are written; colour is not subsampled."""
@@ -31,7 +31,7 @@ def read_jpeg(path: Path, file: bytes, limit: int) -> Array:
         raise FileError(
             f"{path}: is a JPEG with {header.channels} channels (CMYK); grey and RGB are read, convert it first"
         )
-    return upright(
+    return turn_upright(
         _decode(path, header.stripped, ".jpg", header.sides, header.channels, limit),
         header.orientation,
     )
@@ -75,7 +75,7 @@ def _decode(
     pixels = check_size(path, sides, channels, 1, limit)
     import imageio.v3 as iio
 
-    with speaking(path, "decoding"), _unwarned(path, pixels):
+    with translate_errors(path, "decoding"), _silence(path, pixels):
         array = iio.imread(file, extension=suffix, plugin="pillow", index=0, mode=mode)
     if array.dtype not in (np.uint8, np.bool_) or array.ndim not in (2, 3):
         raise FileError(f"{path}: decoded to {array.dtype} of shape {array.shape}, not to an image")
@@ -83,7 +83,7 @@ def _decode(
 
 
 @contextmanager
-def _unwarned(path: Path, pixels: int) -> Iterator[None]:
+def _silence(path: Path, pixels: int) -> Iterator[None]:
     """Keep Pillow's own limit from warning of an image that the caller's limit allows."""
     from PIL import Image
 

@@ -19,7 +19,7 @@ def as_shape(shape: object) -> tuple[int, ...]:
     return tuple(int(n) for n in sides)
 
 
-def checked(slabs: Iterable[Array], shape: tuple[int, ...]) -> Iterator[Array]:
+def check(slabs: Iterable[Array], shape: tuple[int, ...]) -> Iterator[Array]:
     """Return slabs on, as long as they fit together; there is at least one."""
     done, dtype = 0, None
     for slab in slabs:

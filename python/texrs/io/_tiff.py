@@ -15,7 +15,7 @@ import numpy as np
 from texrs._typing import Array
 from texrs.errors import FileError
 from texrs.io import _image_io
-from texrs.io._files import check_size, load, size_of, speaking, upright
+from texrs.io._files import check_size, load, size_of, translate_errors, turn_upright
 
 _LZW, _JPEG = 5, 7
 _ORIENTATION = 274
@@ -34,8 +34,8 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
     length = size_of(path)
     # OME files can name other files to read; this one is all that was asked for.
     with (
-        speaking(path, "decoding"),
-        _muted(),
+        translate_errors(path, "decoding"),
+        _mute(),
         tifffile.TiffFile(path, is_ome=False) as tif,
     ):
         if not tif.series or not tif.pages:
@@ -69,13 +69,13 @@ def image_of(path: Path, planes: Array, orientation: int) -> Array:
     """Return the only plane of a file."""
     if planes.shape[0] != 1:
         raise FileError(f"{path}: holds {planes.shape[0]} planes; texrs.io.read_volume reads them as a volume")
-    return upright(planes[0, ..., 0] if planes.shape[3] == 1 else planes[0], orientation)
+    return turn_upright(planes[0, ..., 0] if planes.shape[3] == 1 else planes[0], orientation)
 
 
 def volume_of(path: Path, planes: Array, orientation: int) -> Array:
     """Return all planes of a file."""
     if orientation != 1:
-        planes = np.stack([upright(plane, orientation) for plane in planes])
+        planes = np.stack([turn_upright(plane, orientation) for plane in planes])
     return planes[..., 0] if planes.shape[3] == 1 else planes
 
 
@@ -165,7 +165,7 @@ def _colours(path: Path, array: Array, page: Any) -> Array:
 
 
 @contextmanager
-def _muted() -> Iterator[None]:
+def _mute() -> Iterator[None]:
     """Keep what tifffile logs of a corrupt file off the terminal: the error tells it."""
     mine = threading.get_ident()
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from texrs._typing import Array
 from texrs.errors import FileError
-from texrs.io._files import check_size, size_of, speaking
+from texrs.io._files import check_size, size_of, translate_errors
 
 NRRD_MAGIC = b"NRRD000"
 GZIP_MAGIC = b"\x1f\x8b"
@@ -62,7 +62,7 @@ def read_nrrd(path: Path, limit: int) -> Array:
     """Read an NRRD volume whose samples lie in the file itself, raw or compressed by gzip."""
     nrrd: Any = _library("nrrd", "pynrrd", path)
     length = size_of(path)
-    with speaking(path, "reading"), path.open("rb") as file:
+    with translate_errors(path, "reading"), path.open("rb") as file:
         # The library reads lines of any length: give it no more than a header may have.
         start = file.read(_LONGEST_HEADER)
         end = min((at + n for n, at in ((2, start.find(b"\n\n")), (4, start.find(b"\r\n\r\n"))) if at >= 0), default=-1)
@@ -136,7 +136,7 @@ def read_nifti(path: Path, limit: int, *, compressed: bool) -> Array:
     """Read a NIfTI volume in one file, of version 1 or 2."""
     nibabel: Any = _library("nibabel", "nibabel", path)
     length = size_of(path)
-    with speaking(path, "reading"), path.open("rb") as raw:
+    with translate_errors(path, "reading"), path.open("rb") as raw:
         file: BinaryIO = gzip.GzipFile(fileobj=raw) if compressed else raw  # type: ignore[assignment]
         start = file.read(540)
         if start[:4] not in NIFTI_MAGIC:

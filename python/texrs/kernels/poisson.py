@@ -230,19 +230,19 @@ def blend(
         correction = np.empty(onto.shape, np.float32)
         correction[...] = values.mean((0, 1)) - other.mean((0, 1))
     else:
-        correction = _beyond(values, other, inside)
-    gradients = (_mixed(values, other, 0), _mixed(values, other, 1)) if both else None
+        correction = _subtract_outside(values, other, inside)
+    gradients = (_mix_gradients(values, other, 0), _mix_gradients(values, other, 1)) if both else None
     rows, columns = ("periodic" if w else "free" for w in as_wrap(wrap))
     solved = _rust.poisson(correction, gradients, weight, (rows, columns), inside, None)
     result = onto.copy()
     for band in _bands(len(onto)):
         part = solved[band]
         part += other[band]
-        _put(result[band], _finite(part), inside[band])
+        _write_into(result[band], _finite(part), inside[band])
     return result.reshape(shape)
 
 
-def _beyond(values: Array, other: Array, inside: Bools) -> Floats:
+def _subtract_outside(values: Array, other: Array, inside: Bools) -> Floats:
     """Return the differences of two images outside a mask, and 0 under it."""
     result = np.empty(values.shape, np.float32)
     for band in _bands(len(values)):
@@ -253,14 +253,14 @@ def _beyond(values: Array, other: Array, inside: Bools) -> Floats:
     return result
 
 
-def _mixed(values: Array, other: Array, axis: int) -> Floats:
+def _mix_gradients(values: Array, other: Array, axis: int) -> Floats:
     """Return by how much the target's differences exceed the source's, where they are the larger ones."""
     floats = (v.astype(np.float32) for v in (other, values))
     wanted, present = (np.roll(v, -1, axis) - v for v in floats)
     return np.where(np.abs(present) > np.abs(wanted), present - wanted, np.float32(0))
 
 
-def _put(onto: Array, solved: Floats, inside: Bools) -> None:
+def _write_into(onto: Array, solved: Floats, inside: Bools) -> None:
     """Put the solution into the target under the mask, in the target's dtype."""
     if onto.dtype.kind in "ui" and onto.dtype.itemsize <= 2:
         # Outside the mask the sum of source and correction is the target exactly.

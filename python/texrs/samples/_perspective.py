@@ -236,7 +236,7 @@ def _view(scene: Scene, plane: _Plane, name: str, *, layout: LayoutName) -> Samp
     seen += np.float32(0.009) * grain
     nearest = np.rint(2 * plane.source(at)).astype(np.intp)
     raw = scene.label[nearest[..., 0] % scene.shape[0], nearest[..., 1] % scene.shape[1]]
-    centres, labels = relabel(raw, plane.picture(_once(scene, plane)))
+    centres, labels = relabel(raw, plane.picture(_unwrap(scene, plane)))
     image: NDArray[np.uint8] = np.rint(np.clip(seen, 0, 1) * 255).astype(np.uint8)
     return Sample(
         name,
@@ -250,7 +250,7 @@ def _view(scene: Scene, plane: _Plane, name: str, *, layout: LayoutName) -> Samp
     )
 
 
-def _once(scene: Scene, plane: _Plane) -> NDArray[np.float64]:
+def _unwrap(scene: Scene, plane: _Plane) -> NDArray[np.float64]:
     """Return the centroids on the plane, each at that turn of the torus nearest the picture."""
     box = np.array(scene.period, np.float64)
     middle: Floats | NDArray[np.float64] = plane.extent / 2

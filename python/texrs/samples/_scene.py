@@ -193,14 +193,14 @@ class Scene:
         fine = self.picture(grain=grain, soft=soft, **lamp)
         for axis in (0, 1):
             fine = (np.roll(fine, 1, axis) + 2 * fine + np.roll(fine, -1, axis)) / 4
-        picture = self._cut(fine)
+        picture = self._crop(fine)
         image = np.rint(np.clip(picture, 0, 1) * 255).astype(np.uint8)
         if not truth:
             return Sample(name, image)
-        centres, labels = relabel(self._cut(self.label), self._inside())
+        centres, labels = relabel(self._crop(self.label), self._inside())
         return Sample(name, image, centres, labels, labels > 0 if mask is None else mask(labels), layout)
 
-    def _cut(self, fine: NDArray[_Number]) -> NDArray[_Number]:
+    def _crop(self, fine: NDArray[_Number]) -> NDArray[_Number]:
         """Return the samples of the torus that are pixels of the picture."""
         (top, left), (height, width) = self.origin, self.size
         return np.ascontiguousarray(fine[::_FINE, ::_FINE][top : top + height, left : left + width])

@@ -86,13 +86,13 @@ def auto_mask(image: object, *, detail: float | None = None, trend: Trend = "pla
     centre, around = (_Blurs(small, seen, sigma) for sigma in sigmas)
     octaves = np.zeros(small.shape, np.float32)
     for _ in range(_ROUNDS - 1):
-        mask = (centre.at(octaves) > around.at(octaves)) & seen
-        octaves = np.log2(_measured(mask, trend, seen))
-    lighter = centre.at(octaves) - around.at(octaves)
+        mask = (centre.sample(octaves) > around.sample(octaves)) & seen
+        octaves = np.log2(_measure(mask, trend, seen))
+    lighter = centre.sample(octaves) - around.sample(octaves)
     return ((lighter if cells.cell == 1 else cells.spread(lighter)) > 0) & there
 
 
-def _measured(mask: Bools, trend: Trend, known: Bools) -> Floats:
+def _measure(mask: Bools, trend: Trend, known: Bools) -> Floats:
     try:
         return from_mask(mask, trend=trend, known=known)
     except InvalidInput:
@@ -126,17 +126,17 @@ class _Blurs:
         self._sigma = sigma
         self._kept: dict[int, Floats] = {}
 
-    def at(self, octaves: Floats) -> Floats:
+    def sample(self, octaves: Floats) -> Floats:
         """Return each pixel as its own octave has it, linear between the whole ones."""
         where = np.clip(octaves, -_RANGE, _RANGE)
         result = np.zeros_like(self._grey)
         for level in range(int(np.floor(where.min())), int(np.ceil(where.max())) + 1):
             if level not in self._kept:
-                self._kept[level] = self._blurred(self._sigma * 2.0**level)
+                self._kept[level] = self._blur_octaves(self._sigma * 2.0**level)
             result += np.maximum(0, 1 - np.abs(where - level)) * self._kept[level]
         return result
 
-    def _blurred(self, sigma: float) -> Floats:
+    def _blur_octaves(self, sigma: float) -> Floats:
         if self._known is None:
             return blur(self._grey, sigma)
         return np.asarray(blur(self._grey, sigma) / np.maximum(blur(self._known, sigma), 1e-6), np.float32)

@@ -10,7 +10,7 @@ from texrs._arrays import as_image
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 
-__all__ = ["LARGEST", "LEAST", "as_map", "centred"]
+__all__ = ["LARGEST", "LEAST", "as_map", "centre_logs"]
 
 LEAST, LARGEST = 1e-3, 1e3
 """Scales that a map may hold."""
@@ -47,6 +47,6 @@ def as_map(value: object, name: str = "scale", shape: Sequence[int] | None = Non
     return np.ascontiguousarray(flat, dtype=np.float32)
 
 
-def centred(logs: Floats) -> Floats:
+def centre_logs(logs: Floats) -> Floats:
     """Return the scales of logarithms, with a geometric mean of 1."""
     return np.asarray(np.exp(logs - np.mean(logs, dtype=np.float64)), np.float32)

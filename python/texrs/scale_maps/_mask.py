@@ -12,7 +12,7 @@ from texrs._arrays import as_choice, as_image, as_int, as_mask
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.scale_maps._extend import extend
-from texrs.scale_maps._maps import centred
+from texrs.scale_maps._maps import centre_logs
 from texrs.scale_maps._trend import Trend, as_trend, follow, gradient
 from texrs.scale_maps._windows import Lattice, smooth
 
@@ -107,14 +107,14 @@ def from_mask(
         there = None
     _refuse_bare(given, there)
     side = None if window is None else as_int(window, "window", SMALLEST, max(SMALLEST, *size))
-    logs = _literal(given, there, side) if what == "area" else _measured(given, there, what, side)
+    logs = _measure_as_printed(given, there, side) if what == "area" else _measure(given, there, what, side)
     if foreshortened:
         logs *= np.float32(2 / 3)
     if kind != "none":
         logs = follow(logs, kind, there)
     elif there is not None:
-        return extend(centred(logs), there)
-    return centred(logs)
+        return extend(centre_logs(logs), there)
+    return centre_logs(logs)
 
 
 def _refuse_bare(mask: Bools, known: Bools | None) -> None:
@@ -130,7 +130,7 @@ def _refuse_bare(mask: Bools, known: Bools | None) -> None:
         )
 
 
-def _measured(mask: Bools, known: Bools | None, what: str, window: int | None) -> Floats:
+def _measure(mask: Bools, known: Bools | None, what: str, window: int | None) -> Floats:
     """Return log S as the mask has it."""
     size = mask.shape[0], mask.shape[1]
     features, spacing, power = _features(mask, known, what)
@@ -213,7 +213,7 @@ def _middles(mask: Bools, known: Bools | None) -> NDArray[np.uint16]:
     return count
 
 
-def _literal(mask: Bools, known: Bools | None, window: int | None) -> Floats:
+def _measure_as_printed(mask: Bools, known: Bools | None, window: int | None) -> Floats:
     """Equations 1 and 2 as printed: zeros beyond the border, and larger scales where more is marked."""
     marked = (mask if known is None else mask & known).astype(np.float32)
     count = ndimage.uniform_filter(marked, window or _PAPER_WINDOW, mode="constant")

@@ -33,9 +33,9 @@ def as_points(value: object, name: str, least: int = 1) -> NDArray[np.float64]:
     except (TypeError, ValueError):
         points = np.empty(0)
     if points.ndim != 2 or points.shape[1] != 2 or not least <= len(points) <= MAX_POINTS:
-        raise InvalidInput(f"{name} needs {least} to {MAX_POINTS} points [row, column], got {_short(value)}")
+        raise InvalidInput(f"{name} needs {least} to {MAX_POINTS} points [row, column], got {_shorten(value)}")
     if not (np.abs(points) <= _FARTHEST).all():
-        raise InvalidInput(f"{name} needs points within {_FARTHEST:g} pixels, got {_short(value)}")
+        raise InvalidInput(f"{name} needs points within {_FARTHEST:g} pixels, got {_shorten(value)}")
     return points
 
 
@@ -115,7 +115,7 @@ def _numbers(region: object) -> list[float] | None:
         return None
     raise InvalidInput(
         "region needs [top, left, bottom, right], [row, column, radius] or a list of three or more points "
-        f"[row, column], got {_short(region)}"
+        f"[row, column], got {_shorten(region)}"
     )
 
 
@@ -134,6 +134,6 @@ def _polygon(points: NDArray[np.float64], size: tuple[int, ...]) -> NDArray[np.f
     return np.asarray(away - 0.5 * np.sign(away))
 
 
-def _short(value: object) -> str:
+def _shorten(value: object) -> str:
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."

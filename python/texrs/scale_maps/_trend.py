@@ -38,7 +38,7 @@ def follow(logs: Floats, trend: str, known: Bools | None = None) -> Floats:
     to the horizon nothing can be seen.
     """
     size = logs.shape
-    places = _some(np.ones(size, np.bool_) if known is None else known)
+    places = _thin_out(np.ones(size, np.bool_) if known is None else known)
     values = logs[places].astype(np.float64)
     if trend == "none":
         return np.full(size, np.median(values), np.float32)
@@ -66,7 +66,7 @@ def gradient(
     values: Floats, rows: NDArray[np.float64], columns: NDArray[np.float64], known: Bools
 ) -> tuple[float, float]:
     """Return by how much values at places grow on the whole, down and to the right."""
-    places = _some(known)
+    places = _thin_out(known)
     rows, columns = rows[places], columns[places]
     middle, reach = (rows.mean(), columns.mean()), max(1.0, float(np.ptp(rows)), float(np.ptp(columns)))
     basis = np.stack([np.ones(len(rows)), (rows - middle[0]) / reach, (columns - middle[1]) / reach], -1)
@@ -74,7 +74,7 @@ def gradient(
     return float(found[1]) / reach, float(found[2]) / reach
 
 
-def _some(known: Bools) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _thin_out(known: Bools) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the rows and columns of a lattice of known places, or of a small known part those of all."""
     step = max(1, isqrt(int(np.count_nonzero(known)) // _POINTS))
     thin = np.zeros_like(known)

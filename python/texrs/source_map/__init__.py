@@ -238,7 +238,7 @@ class SourceMap:
             near = np.floor(self.coordinates[band] + np.float32(0.5)).astype(np.int64)
             place[band] = inners.places(near, self.exemplar[band])
             rest[band] = self.coordinates[band] - near.astype(np.float32)
-        return self._picked(inners, place, self.label, self.frame_array(), rest if rest.any() else None, maps[0].shapes)
+        return self._pick(inners, place, self.label, self.frame_array(), rest if rest.any() else None, maps[0].shapes)
 
     @classmethod
     def pick(
@@ -268,10 +268,10 @@ class SourceMap:
             It looks into the exemplars.
 
         """
-        return cls._picked(pixels_of(maps), place, label, None, None, maps[0].shapes, label if overwrite else None)
+        return cls._pick(pixels_of(maps), place, label, None, None, maps[0].shapes, label if overwrite else None)
 
     @classmethod
-    def _picked(
+    def _pick(
         cls,
         inners: Pixels,
         place: NDArray[np.unsignedinteger],

@@ -11,24 +11,24 @@ Statistics, each of which can be used alone, most of them for pictures too; `com
 `autocorrelation`            of values along the axes
 `frequency`                  how fine a texture is
 `orientation_errors`         whether layers lie as a field turns them
-`seam_planes` `isolated`     traces of an algorithm: its lattice, and speckle
+`seam_planes` `speckle`      traces of an algorithm: its lattice, and speckle
 `slice_distances`            whether each slice has the values of the exemplar
-`coherent` `cell_reuse`      which parts of the exemplar are used, in how large pieces
+`coherence` `cell_reuse`     which parts of the exemplar are used, in how large pieces
 ===========================  ===============================================================
 """
 
 from texrs.volume.compare import Comparison, compare
 from texrs.volume.labels import paint, surface
 from texrs.volume.pictures import cube, oblique, slices, turntable
-from texrs.volume.reuse import CellReuse, cell_reuse, coherent
+from texrs.volume.reuse import CellReuse, cell_reuse, coherence
 from texrs.volume.statistics import Classes, Particles, classes, lightness, lineal_path, particles, two_point
 from texrs.volume.structure import (
     autocorrelation,
     frequency,
-    isolated,
     orientation_errors,
     seam_planes,
     slice_distances,
+    speckle,
     texture_normal,
 )
 
@@ -40,11 +40,10 @@ __all__ = [
     "autocorrelation",
     "cell_reuse",
     "classes",
-    "coherent",
+    "coherence",
     "compare",
     "cube",
     "frequency",
-    "isolated",
     "lightness",
     "lineal_path",
     "oblique",
@@ -54,6 +53,7 @@ __all__ = [
     "seam_planes",
     "slice_distances",
     "slices",
+    "speckle",
     "surface",
     "texture_normal",
     "turntable",

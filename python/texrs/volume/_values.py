@@ -11,15 +11,15 @@ from texrs._arrays import as_image, guidance
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 
-__all__ = ["as_direction", "as_region", "as_values", "axes_of", "colours_of", "leading", "trailing"]
+__all__ = ["as_direction", "as_region", "as_values", "axes_of", "colours_of", "drop_first", "drop_last"]
 
 
-def leading(array: Array, axis: int, step: int) -> Array:
+def drop_last(array: Array, axis: int, step: int) -> Array:
     """Return all but the last lines along an axis."""
     return array[(slice(None),) * axis + (slice(0, array.shape[axis] - step),)]
 
 
-def trailing(array: Array, axis: int, step: int) -> Array:
+def drop_first(array: Array, axis: int, step: int) -> Array:
     """Return all but the first lines along an axis."""
     return array[(slice(None),) * axis + (slice(step, None),)]
 

@@ -182,14 +182,14 @@ def compare(
     if classes is None:
         labels = _labels(first, "exemplar"), _labels(second, "output")
         kinds = int(max(a.max() for a in labels)) + 1
-        pick = tuple(range(1, kinds)) if chosen is None else _chosen(chosen, kinds)
+        pick = tuple(range(1, kinds)) if chosen is None else _choose(chosen, kinds)
         before, after = (np.asarray(a / max(kinds - 1, 1), np.float32) for a in labels)
     else:
         first, second = _one_range(first, second)
         found = statistics.classes(first, classes, axes=count)
         labels = found.of(first, axes=count), found.of(second, axes=count)
         kinds = len(found.centres)
-        pick = tuple(range(kinds // 2 + kinds % 2, kinds)) if chosen is None else _chosen(chosen, kinds)
+        pick = tuple(range(kinds // 2 + kinds % 2, kinds)) if chosen is None else _choose(chosen, kinds)
         before, after = statistics.lightness(first, axes=count), statistics.lightness(second, axes=count)
     grey = before, after
     masks = tuple(np.isin(a, pick) for a in labels)
@@ -206,7 +206,7 @@ def compare(
             structure.orientation_errors(grey[1], field, normal),
         )
         orientation = np.array([[np.median(e), np.quantile(e, 0.9)] for e in errors])
-        turned = _turned(field, second.shape[:count], normal)
+        turned = _turn_normal(field, second.shape[:count], normal)
     return Comparison(
         np.stack([np.bincount(a.ravel(), minlength=kinds) / a.size for a in labels]),
         (statistics.particles(masks[0]), statistics.particles(masks[1])),
@@ -214,7 +214,7 @@ def compare(
         np.stack([statistics.two_point(m, _REACH) for m in masks]),
         np.stack([statistics.lineal_path(m, _REACH) for m in masks]),
         np.stack([structure.autocorrelation(g, _REACH) for g in grey]),
-        (structure.isolated(grey[0]), structure.isolated(grey[1])),
+        (structure.speckle(grey[0]), structure.speckle(grey[1])),
         float(structure.slice_distances(*grey).mean()),
         np.array([seams.min(), seams.max()]),
         orientation,
@@ -223,7 +223,7 @@ def compare(
     )
 
 
-def _turned(field: Field, shape: tuple[int, ...], normal: NDArray[np.float64]) -> float:
+def _turn_normal(field: Field, shape: tuple[int, ...], normal: NDArray[np.float64]) -> float:
     """Return the mean angle between the exemplar's normal and where the field takes it."""
     lines = [np.linspace(0, n - 1, min(n, 16)) for n in shape]
     frames = field.jacobians(np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)).astype(np.float64)
@@ -247,7 +247,7 @@ def _labels(array: Array, name: str) -> Array:
     return array[..., 0].astype(np.uint8)
 
 
-def _chosen(chosen: object, kinds: int) -> tuple[int, ...]:
+def _choose(chosen: object, kinds: int) -> tuple[int, ...]:
     several = chosen if isinstance(chosen, tuple | list) else (chosen,)
     if not several:
         raise InvalidInput("chosen: needs at least one class")

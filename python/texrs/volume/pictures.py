@@ -136,7 +136,7 @@ def oblique(
     if steps.shape != (2, 3) or not np.isfinite(steps).all() or np.linalg.norm(np.cross(*steps)) < 1e-6:
         raise InvalidInput("axes: needs two directions of three numbers that are not parallel")
     if size is None:
-        low, high = _cut(steps, middle, shape)
+        low, high = _clip_ray(steps, middle, shape)
         start, sides = np.ceil(low), tuple((np.floor(high) - np.ceil(low) + 1).astype(int).tolist())
         if min(sides) < 1:
             raise InvalidInput("point, normal: this cut does not meet the volume")
@@ -359,7 +359,7 @@ def _across(normal: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([rows * (1 if rows[np.abs(rows).argmax()] > 0 else -1), columns])
 
 
-def _cut(
+def _clip_ray(
     steps: NDArray[np.float64], point: NDArray[np.float64], shape: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the least and the largest steps from the point that stay in the box."""

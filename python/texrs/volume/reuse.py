@@ -13,7 +13,7 @@ from texrs.errors import InvalidInput
 from texrs.fields import Field
 from texrs.source_map import SourceMap
 
-__all__ = ["CellReuse", "cell_reuse", "coherent"]
+__all__ = ["CellReuse", "cell_reuse", "coherence"]
 
 _CLOSE = 0.6
 """Exemplar voxels that two neighbours may be off and still go on in one piece."""
@@ -42,7 +42,7 @@ class CellReuse:
     unused: float
 
 
-def coherent(source: SourceMap, axis: int, field: Field | None = None) -> Bools:
+def coherence(source: SourceMap, axis: int, field: Field | None = None) -> Bools:
     """Return where a voxel and the next along an axis go on in one piece: max |S(p + e) - S(p) - J e| < 0.6.
 
     Parameters
@@ -62,7 +62,7 @@ def coherent(source: SourceMap, axis: int, field: Field | None = None) -> Bools:
     Examples
     --------
     >>> from texrs import SourceMap, volume
-    >>> bool(volume.coherent(SourceMap.identity((8, 8, 8)), 0).all())
+    >>> bool(volume.coherence(SourceMap.identity((8, 8, 8)), 0).all())
     True
 
     """
@@ -109,7 +109,7 @@ def cell_reuse(source: SourceMap, field: Field | None = None, *, cell: int = 8) 
     index = np.arange(count, dtype=np.int32 if count < 2**31 else np.int64).reshape(source.shape)
     starts, ends, pairs = [], [], 0
     for axis in range(source.axes):
-        joined = coherent(source, axis, field)
+        joined = coherence(source, axis, field)
         pairs += joined.size
         starts.append(np.delete(index, -1, axis)[joined])
         ends.append(np.delete(index, 0, axis)[joined])

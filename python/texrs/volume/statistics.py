@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from texrs._arrays import as_int
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
-from texrs.volume._values import as_region, colours_of, leading, trailing
+from texrs.volume._values import as_region, colours_of, drop_first, drop_last
 
 __all__ = ["Classes", "Particles", "classes", "lightness", "lineal_path", "particles", "two_point"]
 
@@ -169,7 +169,7 @@ def two_point(mask: ArrayLike, reach: int = 16) -> NDArray[np.float64]:
     out = np.full((phase.ndim, far + 1), np.nan)
     for axis in range(phase.ndim):
         for step in range(min(far + 1, phase.shape[axis])):
-            out[axis, step] = (leading(phase, axis, step) & trailing(phase, axis, step)).mean()
+            out[axis, step] = (drop_last(phase, axis, step) & drop_first(phase, axis, step)).mean()
     return out
 
 
@@ -202,7 +202,7 @@ def lineal_path(mask: ArrayLike, reach: int = 16) -> NDArray[np.float64]:
         path = phase
         for step in range(min(far + 1, phase.shape[axis])):
             if step:
-                path = leading(path, axis, 1) & trailing(phase, axis, step)
+                path = drop_last(path, axis, 1) & drop_first(phase, axis, step)
             out[axis, step] = path.mean()
     return out
 

@@ -15,15 +15,15 @@ from texrs._arrays import as_float, as_int, as_wrap
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.fields import Field
-from texrs.volume._values import as_values, leading, trailing
+from texrs.volume._values import as_values, drop_first, drop_last
 
 __all__ = [
     "autocorrelation",
     "frequency",
-    "isolated",
     "orientation_errors",
     "seam_planes",
     "slice_distances",
+    "speckle",
     "texture_normal",
 ]
 
@@ -61,7 +61,7 @@ def autocorrelation(values: ArrayLike, reach: int = 12) -> NDArray[np.float64]:
     out = np.full((v.ndim, far + 1), np.nan)
     for axis in range(v.ndim):
         for step in range(min(far + 1, v.shape[axis])):
-            out[axis, step] = (leading(v, axis, step) * trailing(v, axis, step)).mean(dtype=np.float64) / variance
+            out[axis, step] = (drop_last(v, axis, step) * drop_first(v, axis, step)).mean(dtype=np.float64) / variance
     return out
 
 
@@ -130,14 +130,14 @@ def seam_planes(values: ArrayLike, *, wrap: bool | Sequence[bool] = False) -> tu
     out = []
     for axis, cyclic in enumerate(as_wrap(wrap, axes=v.ndim)):
         others = tuple(a for a in range(v.ndim) if a != axis)
-        after = np.roll(v, -1, axis) if cyclic else trailing(v, axis, 1)
-        before = v if cyclic else leading(v, axis, 1)
+        after = np.roll(v, -1, axis) if cyclic else drop_first(v, axis, 1)
+        before = v if cyclic else drop_last(v, axis, 1)
         change = np.abs(after - before).mean(axis=others, dtype=np.float64)
         out.append(change / max(float(np.median(change)) if change.size else 0.0, 1e-30))
     return tuple(out)
 
 
-def isolated(values: ArrayLike, threshold: float = 0.35) -> float:
+def speckle(values: ArrayLike, threshold: float = 0.35) -> float:
     """Return the share of voxels (pixels) that differ from the median of their surroundings, 3 a side: speckle.
 
     Examples
@@ -146,7 +146,7 @@ def isolated(values: ArrayLike, threshold: float = 0.35) -> float:
     >>> from texrs import volume
     >>> cube = np.zeros((10, 10, 10))
     >>> cube[5, 5, 5] = 1
-    >>> volume.isolated(cube)
+    >>> volume.speckle(cube)
     0.001
 
     """
