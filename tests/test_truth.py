@@ -1,0 +1,61 @@
+"""The same bytes as before: results against the digests stored of them (see `truth`)."""
+
+import os
+
+import numpy as np
+import pytest
+
+import texrs
+from truth import elements, grown, pictures, table  # noqa: F401  # The cases enter the table.
+from truth.table import CASES, differences, witness
+
+THREADS = (1, 2, 7)
+# Analyses are kept by content, so a case's first run makes them: each number of threads comes first in its turn.
+RUNS = [(name, THREADS[(i + k) % 3]) for i, name in enumerate(sorted(CASES)) for k in range(3)]
+HOW = "if that is meant, run REGENERATE=1 python -m pytest tests/test_truth.py, and look at the diff of digests.json"
+
+
+@pytest.fixture(scope="module")
+def stored():
+    """Return the stored table; with REGENERATE=1 in the environment, write it anew first."""
+    if os.environ.get("REGENERATE") == "1":
+        table.write({name: witness(make()) for name, make in CASES.items()})
+    return table.read()
+
+
+@pytest.mark.parametrize(("name", "count"), RUNS)
+def test_results_are_the_stored_ones(name, count, stored):
+    assert name in stored, f"{name}: nothing is stored of this case; {HOW}"
+    with texrs.threads(count):
+        found = witness(CASES[name]())
+    changed = differences(stored[name], found)
+    assert not changed, "\n  ".join([f"{name} differs with {count} threads; {HOW}:", *changed])
+
+
+def test_all_that_is_stored_has_a_case(stored):
+    assert stored.keys() <= CASES.keys(), f"cases that are no more: {stored.keys() - CASES.keys()}; {HOW}"
+
+
+def test_a_digest_is_of_values_type_and_shape():
+    image = np.arange(12, dtype=np.uint16).reshape(3, 4)
+    other = image.copy()
+    other[2, 3] ^= 1
+    kinds = [image, other, image.astype(np.int16), image.reshape(4, 3), image.T]
+    digests = {table.line(each).split(table.BAR)[0] for each in kinds}
+    assert len(digests) == len(kinds)
+    assert table.line(image) == table.line(np.asfortranarray(image)) == table.line(image.astype(">u2"))
+    assert table.line(image).endswith(" | uint16 3x4 mean 5.500000")
+
+
+def test_what_differs_is_named():
+    stored = witness({"image": np.zeros(2), "report shares": (0.25, 0.75), "label": np.ones(2), "frame": None})
+    found = witness({"image": np.ones(2), "report shares": [0.25, 0.5], "label": np.ones(2), "stage": None})
+    assert differences(stored, stored) == []
+    told = differences(stored, found)
+    assert [sentence.split(":")[0] for sentence in told] == ["frame", "image", "report shares", "stage"]
+    assert "mean 0.000000, now" in told[1]
+    assert told[2].endswith("stored [0.25, 0.75], now [0.25, 0.5]")
+    # Of what is long a digest is stored, which is of all of it; of arrays, whatever their mean is printed as.
+    first, second = (witness({"log": [*range(100), last]}) for last in (1, 2))
+    assert len(differences(first, second)) == 1
+    assert differences({"image": "ab | mean 0.1"}, {"image": "ab | mean 0.2"}) == []

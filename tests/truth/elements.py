@@ -1,0 +1,235 @@
+"""What moves elements: DESIGN and SPLICE, and how elements are found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+import texrs
+from texrs import segment, texels
+from texrs.texels import Texels
+from truth.exemplars import clear, colour, deep, floats, sample
+from truth.table import Parts, case, parts_of, rounded
+
+DESIGNED = ("elements", "children", "rotate", "shares", "holes", "operations")
+
+
+@case
+def design() -> Parts:
+    result = texrs.design(colour("pebbles", 96, 104), (144, 160), seed=3)
+    return parts_of(result, report=DESIGNED, stages=("segmentation", "composite"))
+
+
+@case
+def design_of_16_bits_that_does_not_repeat() -> Parts:
+    exemplar = deep("dots", 112, 96)
+    result = texrs.design(
+        exemplar, (128, 144), wrap=False, blend=None, children="grid", tiles=3, rotate=30, translate=0.3, patch=14
+    )
+    return parts_of(result, report=DESIGNED)
+
+
+@case
+def design_on_a_lattice() -> Parts:
+    results = texrs.design(colour("net", 96, 96), (112, 128), variants=2, wrap=(True, False), tiles=2, seed=9)
+    first, second = (parts_of(each, report=DESIGNED) for each in results)
+    return first | {f"second {name}": part for name, part in second.items()}
+
+
+@case
+def design_of_marked_elements() -> Parts:
+    beans = sample("beans", 96, 96)
+    result = texrs.design(
+        beans.image,
+        (112, 112),
+        labels=beans.labels,
+        operations=3,
+        scale=(0.7, 1.4),
+        mirror=False,
+        x0=0.3,
+        chaos=1.9,
+        blend=0.01,
+    )
+    return parts_of(result, report=DESIGNED)
+
+
+@case
+def design_mixed_by_a_map_of_weights() -> Parts:
+    several = [np.asarray(clear(name, 80, size), np.float32) / 255 for name, size in (("pebbles", 96), ("grit", 80))]
+    size = (112, 128)
+    ramp = np.linspace(0, 1, size[1]) * np.ones((size[0], 1))
+    weights = np.stack([1 - ramp, ramp], axis=-1)
+    result = texrs.design(several, size, weights=weights, wrap=(False, True), tiles=2, seed=5)
+    return parts_of(result, report=DESIGNED, stages=("composite",), exact=False)
+
+
+@case
+def design_as_printed() -> Parts:
+    result = texrs.design(colour("pebbles", 96, 96, seed=1), (128, 144), method="paper", seed=2)
+    return parts_of(result, report=DESIGNED, stages=("composite",))
+
+
+# --- SPLICE ----------------------------------------------------------------------------------------------------------
+
+SPLICED = ("tag", "holes", "triangles", "flipped", "flipped_rigid", "matches")
+
+
+def entry(name: str, *size: int, seed: int = 0) -> Texels:
+    """Return what is known of a sample's elements."""
+    return Texels.of_sample(sample(name, *size, seed=seed))
+
+
+@case
+def splice_separate_elements() -> Parts:
+    result = texrs.splice(entry("dots", 128, 128), entry("pebbles", 128, 128), seed=1)
+    drawn = {f"stage {number}": picture for number, picture in enumerate(result.stages.values(), start=1)}
+    return parts_of(result, report=SPLICED) | drawn
+
+
+@case
+def splice_a_connected_figure() -> Parts:
+    result = texrs.splice(entry("net", 128, 128), entry("pebbles", 128, 128, seed=1), (112, 128), seed=1)
+    return parts_of(result, report=SPLICED, stages=("filled",))
+
+
+@case
+def splice_jointed_elements() -> Parts:
+    result = texrs.splice(entry("bricks", 128, 112), entry("dots", 128, 128, seed=1), snap_rows=True, seed=1)
+    return parts_of(result, report=SPLICED, stages=("filled",))
+
+
+@case
+def splice_as_printed() -> Parts:
+    parts: dict[str, object] = {}
+    for name in ("dots", "net", "bricks"):
+        result = texrs.splice(entry(name, 112, 112, seed=2), entry("pebbles", 112, 112), seed=4, method="paper")
+        parts |= {f"{name} {part}": value for part, value in parts_of(result, report=SPLICED).items()}
+    return parts
+
+
+@case
+def splice_in_preview() -> Parts:
+    result = texrs.splice(entry("dots", 128, 112, seed=1), entry("bricks", 128, 128), method="preview", align=False)
+    return parts_of(result, report=SPLICED)
+
+
+@case
+def splice_a_picture_of_16_bits() -> Parts:
+    result = texrs.splice(deep("dots", 80, 80, seed=3), entry("dots", 80, 96, seed=4), (96, 96), refine=False)
+    return parts_of(result, report=SPLICED)
+
+
+@case
+def splice_across_borders() -> Parts:
+    """Both textures repeat."""
+    entries = [
+        texels.analyse(known.image, mask=known.mask, tag="F=d", wrap=True)
+        for known in (sample(name, 112, 112, seed=2, wrap=True) for name in ("dots", "pebbles"))
+    ]
+    return parts_of(texrs.splice(*entries, seed=3), report=SPLICED)
+
+
+@case
+def self_splice_by_steps() -> Parts:
+    steps = [
+        {"op": "scale", "factor": [1.1, 1.0]},
+        {"op": "randomise", "amount": 0.1},
+        {"op": "rows", "by": 4},
+        {"op": "shift", "by": [3, -2]},
+        {"op": "remove", "texel": 5},
+    ]
+    result = texrs.self_splice(entry("dots", 128, 128, seed=5), steps, seed=7)
+    return parts_of(result, report=SPLICED)
+
+
+@case
+def self_splice_of_single_elements() -> Parts:
+    steps = [{"op": "move", "texel": 4, "by": [6, -9]}, {"op": "move", "texel": 1, "to": [60, 50]}]
+    return parts_of(texrs.self_splice(entry("dots", 112, 128, seed=4), steps), report=SPLICED)
+
+
+@case
+def self_splice_made_regular() -> Parts:
+    stones = entry("pebbles", 112, 112, seed=3)
+    exemplar = replace(stones, image=floats("pebbles", 112, 112, seed=3))
+    result = texrs.self_splice(exemplar, {"op": "regularise", "amount": 0.6})
+    return parts_of(result, report=SPLICED)
+
+
+# --- what they know of an exemplar -----------------------------------------------------------------------------------
+
+
+@case
+def segments() -> Parts:
+    parts: dict[str, object] = {}
+    for name, options in SEGMENTED.items():
+        found = segment.segment(colour(name, 96, 96), **options)
+        parts |= {
+            f"{name} layers": found.layers,
+            f"{name} elements": found.elements,
+            f"{name} children": found.children,
+            f"{name} lattice": found.lattice and (found.lattice.a, found.lattice.b),
+        }
+    return parts
+
+
+SEGMENTED: dict[str, dict[str, object]] = {
+    "pebbles": {},
+    "net": {},
+    "scales": {},
+    "beans": {"layers": 3},
+    "leaves_and_flowers": {"children": "components"},
+    "bark": {"children": "none", "layers": 4},
+    "grit": {},
+}
+
+
+def found_in(entry: Texels) -> Parts:
+    """Return what an analysis finds; similarities come of Fourier transforms."""
+    return {
+        "points": rounded(entry.points),
+        "mask": entry.mask,
+        "box": entry.box,
+        "tag": entry.tag,
+        "scores": rounded(entry.scores),
+        "peaks": rounded(entry.peaks),
+        "angles": rounded(entry.angles),
+        "scales": rounded(entry.scales),
+    }
+
+
+@case
+def elements_found_by_itself() -> Parts:
+    return found_in(texels.analyse(colour("net", 80, 80)))
+
+
+@case
+def elements_found_with_help() -> Parts:
+    pebbles = sample("pebbles", 96, 96, seed=6)
+    box, between = boxed(pebbles)
+    ways: dict[str, dict[str, object]] = {
+        "turned": {"box": box, "background": between, "rotations": 4, "scales": (0.8, 1.0, 1.25)},
+        "as printed": {"box": box, "background": between, "method": "paper"},
+        "listed": {"points": pebbles.centres},
+    }
+    parts: dict[str, object] = {}
+    for way, options in ways.items():
+        found = found_in(texels.analyse(pebbles.image, tag="F=d", **options))
+        parts |= {f"{way} {name}": part for name, part in found.items()}
+    return parts
+
+
+def boxed(known: texrs.samples.Sample) -> tuple[Sequence[float], np.ndarray]:
+    """Return the box around the element nearest to the middle, and some places between elements."""
+    number = np.hypot(*(known.centres - np.array(known.mask.shape) / 2).T).argmin()
+    rows, columns = np.nonzero(known.labels == number + 1)
+    box = [
+        (rows.min() + rows.max()) / 2,
+        (columns.min() + columns.max()) / 2,
+        np.ptp(rows) + 1,
+        np.ptp(columns) + 1,
+    ]
+    between = np.argwhere(known.labels == 0)
+    return [float(v) for v in box], between[:: len(between) // 12]

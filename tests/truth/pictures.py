@@ -1,0 +1,198 @@
+"""What is done with pictures as a whole: PERSPECTIVE, scale maps, tiling, completion, colours and source maps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import texrs
+from texrs import scale_maps
+from texrs.blend import blend
+from truth.exemplars import box, channels, clear, colour, deep, floats, grey, normals, sample
+from truth.table import Parts, case, parts_of, rounded
+
+# --- PERSPECTIVE -----------------------------------------------------------------------------------------------------
+
+SCALED = ("sizes", "outside", "scale_error", "levels")
+
+
+@case
+def perspective() -> Parts:
+    floor = sample("tilted_discs", 96, 96)
+    return parts_of(texrs.perspective(floor.image, floor.scale_map, (112, 144), seed=1), report=SCALED)
+
+
+@case
+def perspective_with_a_target() -> Parts:
+    wall = sample("tilted_bricks", 96, 112)
+    target = scale_maps.from_angles((96, 112), 55, 90)
+    result = texrs.perspective(
+        deep("tilted_bricks", 96, 112),
+        wall.scale_map,
+        (96, 112),
+        target=target,
+        wrap=(False, True),
+        scale_weight=2,
+        interpolation="linear",
+        seed=4,
+    )
+    return parts_of(result, report=SCALED, stages=("target",))
+
+
+@case
+def perspective_from_copies_of_given_sizes() -> Parts:
+    floor = sample("tilted_discs", 64, 80)
+    exemplar = channels("tilted_discs", 64, 80)
+    result = texrs.perspective(exemplar, floor.scale_map, (80, 80), augment_scales=(0.75, 1, 1.3))
+    return parts_of(result, report=SCALED)
+
+
+@case
+def perspective_as_printed() -> Parts:
+    floor = sample("tilted_discs", 56, 56)
+    result = texrs.perspective(floor.image, floor.scale_map, (48, 48), method="paper", seed=2)
+    return parts_of(result, report=("energies",), stages=("composite",))
+
+
+@case
+def scale_maps_measured() -> Parts:
+    floor = sample("tilted_discs", 128, 144)
+    mask = scale_maps.auto_mask(floor.image)
+    known = ~box(mask.shape, (40, 80), (50, 100))
+    measured = {
+        "boundary": scale_maps.from_mask(mask, trend="plane", foreshortened=True),
+        "skeleton": scale_maps.from_mask(mask, measure="skeleton", trend="quadratic"),
+        "count": scale_maps.from_mask(floor.mask, measure="count", trend="linear"),
+        "known": scale_maps.from_mask(floor.mask, window=40, known=known),
+        "area": scale_maps.from_mask(mask, measure="area"),
+    }
+    return {"mask": mask, **{name: rounded(scale) for name, scale in measured.items()}}
+
+
+@case
+def scale_maps_edited() -> Parts:
+    plane = scale_maps.from_angles((96, 112), 50, 70)
+    edited = scale_maps.edit(
+        plane,
+        [
+            {"op": "magnify", "region": [48, 40, 20], "factor": 1.8},
+            {"op": "minify", "region": [[5, 60], [40, 60], [30, 100]], "factor": 1.5},
+            {"op": "set", "region": [70, 60, 90, 100], "value": 0.7, "feather": 3},
+            {"op": "vary", "gain": 0.8},
+            {"op": "brush", "points": [[10, 10], [60, 30]], "radius": 6, "factor": 1.4},
+            {"op": "duplicate", "region": [48, 40, 16], "to": [30, 80], "mode": "ratio"},
+            {"op": "ramp", "region": [0, 0, 30, 30], "start": [0, 0], "end": [30, 30], "values": [0.8, 1.6]},
+            {"op": "smooth", "sigma": 2},
+        ],
+    )
+    maps = {
+        "angles": plane,
+        "camera": scale_maps.from_angles((96, 112), 50, 200, fov=50),
+        "edited": edited,
+        "stretched": scale_maps.resample(edited, (70, 150)),
+        "continued": scale_maps.resample(edited, (130, 120), "extend"),
+        "filled": scale_maps.extend(edited, ~box((96, 112), (20, 60), (30, 90))),
+    }
+    seen = {"grey": scale_maps.encode(edited), "picture": scale_maps.picture(edited, 4)}
+    return {name: rounded(scale) for name, scale in maps.items()} | seen
+
+
+# --- tile and complete -----------------------------------------------------------------------------------------------
+
+
+@case
+def tile() -> Parts:
+    result = texrs.tile(colour("pebbles", 144, 160))
+    return parts_of(result, report=("overlap", "joints"), stages=("swapped", "pieces"))
+
+
+@case
+def tile_along_columns() -> Parts:
+    return parts_of(texrs.tile(channels("grit", 96, 128), wrap=(False, True), overlap=24), report=("overlap", "joints"))
+
+
+COMPLETED = ("hole", "replaced_outside", "patch", "patches")
+
+
+@case
+def complete_with_patches() -> Parts:
+    hole = box((128, 144), (40, 90), (50, 100)) | box((128, 144), (0, 30), (120, 144))
+    result = texrs.complete(colour("pebbles", 128, 144, seed=4), hole, rim=5, blend=0.003, seed=3)
+    return parts_of(result, report=COMPLETED, stages=("known", "patches", "composite"))
+
+
+@case
+def complete_what_is_transparent() -> Parts:
+    image = clear("weave", 96, 96).copy()
+    image[box(image.shape[:2], (70, 96), (20, 60)), 3] = 0
+    return parts_of(texrs.complete(image, "alpha", wrap=True, mirror=False, patch=12), report=COMPLETED)
+
+
+@case
+def complete_by_optimising() -> Parts:
+    hole = box((112, 112), (30, 80), (30, 80))
+    result = texrs.complete(deep("bark", 112, 112), hole, method="optimise", seed=5, wrap=(True, False))
+    return parts_of(result, report=("hole", "levels"))
+
+
+@case
+def complete_with_a_scale_map() -> Parts:
+    floor = sample("tilted_discs", 128, 128, seed=1)
+    hole = box((128, 128), (50, 100), (40, 90))
+    scale = np.where(hole, np.nan, floor.scale_map)
+    parts: dict[str, object] = {}
+    for method, given in (("patch", scale), ("optimise", "auto")):
+        found = parts_of(texrs.complete(floor.image, hole, scale_map=given, method=method), report=("hole",))
+        parts |= {f"{method} {name}": part for name, part in found.items()}
+    return parts
+
+
+@case
+def complete_with_a_source() -> Parts:
+    hole = box((96, 112), (20, 70), (30, 80))
+    other = floats("pebbles", 80, 96, seed=5)
+    result = texrs.complete(floats("grit", 96, 112), hole, source=other, blend=0.001, rim=2, seed=1)
+    return parts_of(result, report=COMPLETED, stages=("patches", "composite"), exact=False)
+
+
+# --- colours and source maps -----------------------------------------------------------------------------------------
+
+
+def designed(name: str, seed: int) -> texrs.Synthesis:
+    """Return a texture with turned and mirrored elements, seams and all."""
+    return texrs.design(colour(name, 96, 96, seed=seed), (112, 128), seed=seed, blend=None, tiles=2)
+
+
+@case
+def blends() -> Parts:
+    source = designed("pebbles", 7).source
+    within = box((112, 128), (16, 100), (10, 120))
+    known = ~box((96, 96), (0, 8), (0, 96))
+    args = ("pebbles", 96, 96)
+    heights, slopes = floats(*args, seed=7), normals(*args, seed=7)
+    return {
+        "floats": rounded(blend(source, heights, wrap=True)),
+        "paper": rounded(blend(source, heights, wrap=False, screening=0)),
+        "near seams": blend(source, grey(*args, seed=7), wrap=(True, False), band=6),
+        "within": rounded(blend(source, heights, wrap=False, screening=0.01, within=within, known=known)),
+        "normals": blend(source, slopes, wrap=True, kind="normal", green="down", interpolation="linear"),
+    }
+
+
+@case
+def source_maps() -> Parts:
+    source = designed("leaves_and_flowers", 8).source
+    args = ("leaves_and_flowers", 96, 96)
+    tiled = texrs.tile(source.render(colour(*args, seed=8))).source.compose(source)
+    reuse = source.reuse()
+    return {
+        "nearest": source.render(deep(*args, seed=8), interpolation="nearest"),
+        "linear": source.render(channels(*args, seed=8), interpolation="linear"),
+        "cubic": source.render(clear(*args, seed=8)),
+        "normals": source.render(normals(*args, seed=8), kind="normal"),
+        "continues": source.continues(1, wrap=True),
+        "frames": source.frames(),
+        "composed coordinates": tiled.coordinates,
+        "composed label": tiled.label,
+        "composed frame": tiled.frame_array(),
+        "reuse": [reuse.verbatim, reuse.largest, reuse.regions],
+    }
