@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 import texrs
-from texrs import segment, texels
-from texrs.texels import Texels
+from texrs import elements as elements
+from texrs.elements import Elements
+from texrs.exemplar import segmentation as segment
 from truth.exemplars import clear, colour, deep, floats, sample
 from truth.table import Parts, case, parts_of, rounded
 
@@ -73,12 +74,12 @@ def design_as_printed() -> Parts:
 
 # --- SPLICE ----------------------------------------------------------------------------------------------------------
 
-SPLICED = ("tag", "holes", "triangles", "flipped", "flipped_rigid", "matches")
+SPLICED = ("layout", "holes", "triangles", "flipped", "flipped_rigid", "matches")
 
 
-def entry(name: str, *size: int, seed: int = 0) -> Texels:
+def entry(name: str, *size: int, seed: int = 0) -> Elements:
     """Return what is known of a sample's elements."""
-    return Texels.of_sample(sample(name, *size, seed=seed))
+    return Elements.of_sample(sample(name, *size, seed=seed))
 
 
 @case
@@ -125,7 +126,7 @@ def splice_a_picture_of_16_bits() -> Parts:
 def splice_across_borders() -> Parts:
     """Both textures repeat."""
     entries = [
-        texels.analyse(known.image, mask=known.mask, tag="F=d", wrap=True)
+        elements.analyse(known.image, mask=known.mask, layout="disjoint", wrap=True)
         for known in (sample(name, 112, 112, seed=2, wrap=True) for name in ("dots", "pebbles"))
     ]
     return parts_of(texrs.splice(*entries, seed=3), report=SPLICED)
@@ -138,7 +139,7 @@ def self_splice_by_steps() -> Parts:
         {"op": "randomise", "amount": 0.1},
         {"op": "rows", "by": 4},
         {"op": "shift", "by": [3, -2]},
-        {"op": "remove", "texel": 5},
+        {"op": "remove", "element": 5},
     ]
     result = texrs.self_splice(entry("dots", 128, 128, seed=5), steps, seed=7)
     return parts_of(result, report=SPLICED)
@@ -146,7 +147,7 @@ def self_splice_by_steps() -> Parts:
 
 @case
 def self_splice_of_single_elements() -> Parts:
-    steps = [{"op": "move", "texel": 4, "by": [6, -9]}, {"op": "move", "texel": 1, "to": [60, 50]}]
+    steps = [{"op": "move", "element": 4, "by": [6, -9]}, {"op": "move", "element": 1, "to": [60, 50]}]
     return parts_of(texrs.self_splice(entry("dots", 112, 128, seed=4), steps), report=SPLICED)
 
 
@@ -186,15 +187,15 @@ SEGMENTED: dict[str, dict[str, object]] = {
 }
 
 
-def found_in(entry: Texels) -> Parts:
+def found_in(entry: Elements) -> Parts:
     """Return what an analysis finds; similarities come of Fourier transforms."""
     return {
         "points": rounded(entry.points),
         "mask": entry.mask,
         "box": entry.box,
-        "tag": entry.tag,
+        "layout": entry.layout,
         "scores": rounded(entry.scores),
-        "peaks": rounded(entry.peaks),
+        "directions": rounded(entry.directions),
         "angles": rounded(entry.angles),
         "scales": rounded(entry.scales),
     }
@@ -202,7 +203,7 @@ def found_in(entry: Texels) -> Parts:
 
 @case
 def elements_found_by_itself() -> Parts:
-    return found_in(texels.analyse(colour("net", 80, 80)))
+    return found_in(elements.analyse(colour("net", 80, 80)))
 
 
 @case
@@ -210,13 +211,17 @@ def elements_found_with_help() -> Parts:
     pebbles = sample("pebbles", 96, 96, seed=6)
     box, between = boxed(pebbles)
     ways: dict[str, dict[str, object]] = {
-        "turned": {"box": box, "background": between, "rotations": 4, "scales": (0.8, 1.0, 1.25)},
+        "turned": {
+            "box": box,
+            "background": between,
+            "search": elements.ElementSearch(rotations=4, scales=(0.8, 1.0, 1.25)),
+        },
         "as printed": {"box": box, "background": between, "method": "paper"},
         "listed": {"points": pebbles.centres},
     }
     parts: dict[str, object] = {}
     for way, options in ways.items():
-        found = found_in(texels.analyse(pebbles.image, tag="F=d", **options))
+        found = found_in(elements.analyse(pebbles.image, layout="disjoint", **options))
         parts |= {f"{way} {name}": part for name, part in found.items()}
     return parts
 

@@ -7,7 +7,8 @@ from dataclasses import asdict
 import numpy as np
 
 import texrs
-from texrs import PlaneTexture, SolidTexture, analysis, fields, volume
+from texrs import PlaneTexture, SolidTexture, fields, volume
+from texrs.exemplar import analysis
 from truth.exemplars import box, channels, classes, clear, colour, deep, floats
 from truth.table import Parts, case, parts_of
 

@@ -6,7 +6,7 @@ import numpy as np
 
 import texrs
 from texrs import scale_maps
-from texrs.blend import blend
+from texrs.blending import blend
 from truth.exemplars import box, channels, clear, colour, deep, floats, grey, normals, sample
 from truth.table import Parts, case, parts_of, rounded
 
