@@ -15,7 +15,17 @@ __all__ = ["threads"]
 def threads(count: int | None = None) -> Iterator[None]:
     """Use ``count`` threads in the kernels that this thread calls inside the ``with`` block.
 
-    Results do not depend on it. Without a count: ``RAYON_NUM_THREADS``, or as many as there are cores.
+    Results do not depend on it.
+
+    Parameters
+    ----------
+    count : int, optional
+        1 to 1024. By default ``RAYON_NUM_THREADS``, or as many as there are cores.
+
+    Yields
+    ------
+    None
+        The former number is in force again where the block ends.
 
     Raises
     ------

@@ -42,9 +42,34 @@ class Synthesis:
     report: Mapping[str, Any] = field(default_factory=dict)
 
     def save_stages(self, folder: Path) -> list[FilePath]:
-        """Write each stage as a numbered PNG, and the report as ``report.json``; return the paths.
+        """Write each stage as a numbered PNG, and the report as ``report.json``.
 
-        Of a volume three slices through its middle are shown.
+        Parameters
+        ----------
+        folder : path_like
+            Made where it is missing; files of these names are replaced.
+
+        Returns
+        -------
+        list of pathlib.Path
+            The files, in the order of the stages. Of a volume three slices through its middle are shown.
+
+        Raises
+        ------
+        FileError
+            A file cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import numpy as np
+        >>> from texrs import SourceMap, Synthesis
+        >>> picture = np.zeros((4, 4), np.uint8)
+        >>> result = Synthesis(picture, SourceMap.identity((4, 4)), {"composite": picture})
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     [path.name for path in result.save_stages(folder)]
+        ['01-composite.png', 'report.json']
+
         """
         from texrs.io import atomic, write
 

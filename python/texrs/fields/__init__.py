@@ -21,7 +21,7 @@ x, y and z stand for the axes of columns, rows and planes.
 ===================  ==========================================================================
 
 The field is kept, not a dense array of frames: what is evaluated at a point depends on that point alone. `parse`
-makes a field of words (``zigzag:period=64,angle=30``), `names` lists them, `check` looks for singular frames before
+makes a field of a text (``zigzag:period=64,angle=30``), `names` lists them, `check` looks for singular frames before
 long work.
 """
 

@@ -64,7 +64,12 @@ class Field(ABC):
 
     @abstractmethod
     def describe(self) -> str:
-        """Say on one line what the field is.
+        """Return what the field is, in words.
+
+        Returns
+        -------
+        str
+            One line, for messages and reports.
 
         Examples
         --------
@@ -222,6 +227,11 @@ class Field(ABC):
         Field
             The field itself where nothing is open.
 
+        Raises
+        ------
+        InvalidInput
+            Another number of sides than the field has axes, or sides below 1.
+
         Examples
         --------
         >>> from texrs import fields
@@ -234,6 +244,11 @@ class Field(ABC):
 
     def inverse(self) -> Field:
         """Return the field whose frames are the inverses of these at each point.
+
+        Returns
+        -------
+        Field
+            Of the same axes.
 
         Examples
         --------

@@ -1,4 +1,4 @@
-"""Fields in words, for the command line."""
+"""Fields written as text, for the command line."""
 
 from __future__ import annotations
 
@@ -30,7 +30,12 @@ _WORDS = ("axis", "plane", "radial")
 
 
 def names() -> dict[str, str]:
-    """Return the fields that have a name in words, with their parameters and the defaults of these.
+    """Return the fields that `parse` knows, with their parameters and the defaults of these.
+
+    Returns
+    -------
+    dict of str to str
+        For each name, the text of the field as it is by default.
 
     Examples
     --------
@@ -47,7 +52,7 @@ def names() -> dict[str, str]:
 
 
 def parse(text: str, axes: int = 3, size: Sequence[int] | None = None) -> Field:
-    """Make a field of words: its name, and what differs from the defaults.
+    """Return the field that a text names, with what differs from the defaults.
 
     Parameters
     ----------
@@ -58,10 +63,15 @@ def parse(text: str, axes: int = 3, size: Sequence[int] | None = None) -> Field:
     size : sequence of int, optional
         Size of the output: sets what was left open, as `Field.over`.
 
+    Returns
+    -------
+    Field
+        The field that has that name.
+
     Raises
     ------
     InvalidInput
-        Not such words; the sentence says what is allowed.
+        Not such a text; the message says what is allowed.
 
     Examples
     --------

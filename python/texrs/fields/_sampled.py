@@ -55,6 +55,11 @@ def from_array(
     origin : sequence of float, optional
         The first voxel; by default 0.
 
+    Returns
+    -------
+    Field
+        It interpolates the array's frames.
+
     Raises
     ------
     InvalidInput
@@ -104,6 +109,11 @@ def interpolate(points: ArrayLike, frames: ArrayLike) -> Field:
     frames : array_like
         Shape (N, A, A).
 
+    Returns
+    -------
+    Field
+        It passes through the given frames.
+
     Raises
     ------
     InvalidInput
@@ -137,16 +147,21 @@ def from_function(function: Callable[[NDArray[np.float64]], ArrayLike], axes: in
     Parameters
     ----------
     function : callable
-        Takes points (N, A), float64, and gives frames (N, A, A). The frame of a point must depend on that point
+        Takes points (N, A), float64, and returns frames (N, A, A). The frame of a point must depend on that point
         alone: not on the others of a call, nor on what was asked before. To be pickled the field needs a function
         that can be pickled. Such a field has no `Field.key`.
     axes : int
         2 or 3.
 
+    Returns
+    -------
+    Field
+        It calls the function.
+
     Raises
     ------
     InvalidInput
-        Not a function. What the function raises, or what it gives that is no frames, is raised when it is called.
+        Not a function; or, when the field is evaluated, what it returns is no frames. What it raises passes.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Fields by formula."""
+"""Fields that a formula defines."""
 
 from __future__ import annotations
 
@@ -27,6 +27,16 @@ def identity(axes: int = 3) -> Field:
     axes : int
         2 or 3.
 
+    Returns
+    -------
+    Field
+        Its frame is the identity everywhere.
+
+    Raises
+    ------
+    InvalidInput
+        Another number of axes.
+
     Examples
     --------
     >>> from texrs import fields
@@ -46,6 +56,11 @@ def constant(matrix: ArrayLike) -> Field:
     matrix : array_like
         Shape (2, 2) or (3, 3); column j is where the exemplar's axis j goes.
 
+    Returns
+    -------
+    Field
+        The same frame everywhere; of two axes or of three, as the matrix.
+
     Raises
     ------
     InvalidInput
@@ -64,7 +79,7 @@ def constant(matrix: ArrayLike) -> Field:
 
 
 def slant(angle: float = 30, plane: str = "xy", *, axes: int = 3) -> Field:
-    """Turn the texture everywhere by one angle in one plane.
+    """Return the field that turns the texture everywhere by one angle in one plane.
 
     Parameters
     ----------
@@ -75,6 +90,11 @@ def slant(angle: float = 30, plane: str = "xy", *, axes: int = 3) -> Field:
         rows grow downwards.
     axes : int
         2 or 3.
+
+    Returns
+    -------
+    Field
+        The same rotation everywhere.
 
     Raises
     ------
@@ -95,14 +115,24 @@ def slant(angle: float = 30, plane: str = "xy", *, axes: int = 3) -> Field:
 
 
 def slant_3d(angle: float = 30, angle2: float = 30) -> Field:
-    """Turn the texture in the plane xy by one angle, then in the plane yz by another, so that no axis stays.
+    """Return the field that turns the texture in the plane xy, then in the plane yz, so that no axis stays.
 
     Parameters
     ----------
     angle : float
-        Degrees in xy, as in `slant`.
+        Degrees in xy, as in `slant`, within 360 either way.
     angle2 : float
-        Degrees in yz, afterwards.
+        Degrees in yz, afterwards; within 360 either way.
+
+    Returns
+    -------
+    Field
+        The same rotation everywhere, of three axes.
+
+    Raises
+    ------
+    InvalidInput
+        An angle beyond 360 degrees either way.
 
     Examples
     --------
@@ -118,7 +148,7 @@ def slant_3d(angle: float = 30, angle2: float = 30) -> Field:
 
 
 def shear(amount: float = 0.5, plane: str = "xy", *, axes: int = 3) -> Field:
-    """Lean the texture's second axis over towards its first; areas and volumes stay.
+    """Return the field that shears the texture: its second axis leans towards its first; areas and volumes stay.
 
     Parameters
     ----------
@@ -128,6 +158,16 @@ def shear(amount: float = 0.5, plane: str = "xy", *, axes: int = 3) -> Field:
         Two of "x", "y" and "z".
     axes : int
         2 or 3.
+
+    Returns
+    -------
+    Field
+        The same shear everywhere.
+
+    Raises
+    ------
+    InvalidInput
+        An amount out of range, another plane, or another number of axes.
 
     Examples
     --------
@@ -146,7 +186,7 @@ def shear(amount: float = 0.5, plane: str = "xy", *, axes: int = 3) -> Field:
 def circular(
     axis: str = "z", *, radial: str | None = None, centre: Sequence[float] | None = None, axes: int = 3
 ) -> Field:
-    """Wind the texture round an axis: one of its axes points outwards, one runs along the circles.
+    """Return the field that winds the texture round an axis: one of its axes is radial, one tangential.
 
     With d the way from the axis to a point, F e_r = d / |d|, F e_t = the same turned by a right angle towards t, and
     the third axis stays. On the axis itself F is the identity.
@@ -163,6 +203,11 @@ def circular(
         `Field.over`), the origin of an unbounded one.
     axes : int
         2 or 3.
+
+    Returns
+    -------
+    Field
+        Its frames are rotations, about the axis.
 
     Raises
     ------
@@ -188,14 +233,33 @@ def spiral(
     centre: Sequence[float] | None = None,
     axes: int = 3,
 ) -> Field:
-    """Wind the texture as `circular`, turned by an angle: what ran along circles runs along spirals.
+    """Return the field of `circular`, turned by an angle: what ran along circles runs along spirals.
 
     Parameters
     ----------
     angle : float
-        Degrees from the circles to the spirals (of equal angle, so logarithmic), outwards turning towards along.
-    axis, radial, centre, axes
-        As of `circular`.
+        Degrees from the circles to the spirals (of equal angle, so logarithmic), within 360 either way; the radial axis
+        turns towards the tangential one.
+    axis : str
+        "x", "y" or "z": what the spirals go round. A picture is wound round "z", which it lacks.
+    radial : str, optional
+        The axis of the exemplar that points outwards at an angle of 0. By default the one that follows ``axis`` in x, y,
+        z, x.
+    centre : sequence of float, optional
+        A point of the axis, (row, column) or (plane, row, column). By default the middle of a bounded output (see
+        `Field.over`), the origin of an unbounded one.
+    axes : int
+        2 or 3.
+
+    Returns
+    -------
+    Field
+        Its frames are rotations, about the axis.
+
+    Raises
+    ------
+    InvalidInput
+        An angle beyond 360 degrees either way, not such axes, or not such a centre.
 
     Examples
     --------
@@ -210,7 +274,7 @@ def spiral(
 def zigzag(
     period: float = 32, angle: float = 30, *, axis: str | None = None, plane: str = "xy", axes: int = 3
 ) -> Field:
-    """Turn the texture by an angle, and by its opposite, in bands that alternate.
+    """Return the field that turns the texture by an angle, and by its opposite, in alternate bands.
 
     Where floor(2 (p + 1/2) / period) along ``axis`` is even, the texture is turned by ``angle``, elsewhere by
     ``-angle``: lines of the exemplar that run along ``axis`` become zigzags.
@@ -220,13 +284,23 @@ def zigzag(
     period : float
         Voxels of two bands, at least 2.
     angle : float
-        Degrees, as in `slant`.
+        Degrees, as in `slant`, within 360 either way.
     axis : str, optional
         "x", "y" or "z": across the bands. By default the first of ``plane``.
     plane : str
         Two of "x", "y" and "z": what turns, as in `slant`.
     axes : int
         2 or 3.
+
+    Returns
+    -------
+    Field
+        Its frames are two rotations, in turn.
+
+    Raises
+    ------
+    InvalidInput
+        A period below 2, an angle beyond 360 degrees either way, not such an axis, or another plane.
 
     Examples
     --------
@@ -244,7 +318,7 @@ def zigzag(
 def scale_ramp(
     start: float = 1, stop: float = 2, *, axis: str = "x", length: float | None = None, axes: int = 3
 ) -> Field:
-    """Let the texture grow along an axis.
+    """Return the field whose features grow along an axis.
 
     Features are ``start`` times as large at 0 and ``stop`` times at ``length``, by equal factors over equal ways
     between, and constant beyond.
@@ -252,7 +326,7 @@ def scale_ramp(
     Parameters
     ----------
     start, stop : float
-        From 1/8 to 8.
+        Size of the features, from 1/8 to 8.
     axis : str
         "x", "y" or "z": along which they grow.
     length : float, optional
@@ -260,6 +334,16 @@ def scale_ramp(
         unbounded one.
     axes : int
         2 or 3.
+
+    Returns
+    -------
+    Field
+        Its frames are multiples of the identity.
+
+    Raises
+    ------
+    InvalidInput
+        A factor or a length out of range, or not such an axis.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""NumPy's own files, by a reader that cannot unpickle and checks the header before using memory."""
+"""NumPy's own files, by a reader that never unpickles and checks the header before using memory."""
 
 from __future__ import annotations
 
@@ -44,7 +44,19 @@ def read_npz(path: Path, limit: int) -> Array:
 
 
 def read_arrays(path: PathLike, *, limit: int = MAX_PIXELS) -> dict[str, Array]:
-    """Read all arrays of an .npz file, by key, within ``limit`` pixels each.
+    """Read all arrays of an .npz file.
+
+    Parameters
+    ----------
+    path : path_like
+        An archive of arrays of numbers, as `numpy.savez` writes it; what would have to be unpickled is refused.
+    limit : int
+        Pixels that each array may have, and a sixteenth of the bytes.
+
+    Returns
+    -------
+    dict of str to ndarray
+        By key, in the order of the file.
 
     Raises
     ------
@@ -52,6 +64,17 @@ def read_arrays(path: PathLike, *, limit: int = MAX_PIXELS) -> dict[str, Array]:
         Not there, not an archive of arrays, or damaged.
     LimitExceeded
         An array of more than ``limit`` pixels.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np
+    >>> from texrs import io
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "layers.npz")
+    ...     np.savez(path, albedo=np.zeros((2, 2, 3), np.uint8), height=np.ones((2, 2)))
+    ...     {name: array.shape for name, array in io.read_arrays(path).items()}
+    {'albedo': (2, 2, 3), 'height': (2, 2)}
 
     """
     place = as_path(path)

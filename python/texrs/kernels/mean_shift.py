@@ -40,7 +40,7 @@ def mean_shift(
     Parameters
     ----------
     image : (H, W) or (H, W, C) array_like
-        Any real dtype, of values up to 1e15.
+        Any real dtype but 64-bit integers, of values up to 1e15.
     radius : int
         Half the side of the window in pixels, without the middle; 0 to 1024.
     range : float

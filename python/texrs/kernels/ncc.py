@@ -25,7 +25,7 @@ class Correlation:
     Parameters
     ----------
     image : (H, W) or (H, W, C) array_like
-        Any real dtype; finite.
+        Any real dtype but 64-bit integers; finite.
 
     Raises
     ------
@@ -62,7 +62,7 @@ class Correlation:
         Parameters
         ----------
         template : (h, w) or (h, w, C) array_like
-            Any real dtype; finite. With the channels of the image, no larger than it.
+            Any real dtype but 64-bit integers; finite. With the channels of the image, no larger than it.
 
         Returns
         -------
@@ -74,6 +74,14 @@ class Correlation:
         ------
         InvalidInput
             Not an image, larger than the image, or of other channels.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> Correlation(np.eye(4)).maps(np.eye(2))[..., 0].round(2)
+        array([[ 1.  , -0.58,  0.  ],
+               [-0.58,  1.  , -0.58],
+               [ 0.  , -0.58,  1.  ]], dtype=float32)
 
         """
         planes = _planes(template, "template")

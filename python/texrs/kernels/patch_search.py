@@ -57,8 +57,8 @@ class PatchIndex:
     Parameters
     ----------
     images : (H, W) or (H, W, C) array_like, or a list or tuple of them
-        One image, or several that agree in channels, not in size. Any real dtype; compared as
-        float32, in the units given.
+        One image, or several that agree in channels, not in size. Any real dtype but
+        64-bit integers; compared as float32, in the units given.
     allowed : (H, W) array_like of bool, or a list or tuple of them, optional
         Which positions (top-left corners of patches) may be used. One mask for a single image; for
         several images one each, in which None allows all.
@@ -171,6 +171,13 @@ class PatchIndex:
             A patch that fits into no image or is larger than ``max_patch``, a negative weight, or
             another argument out of range.
 
+        Examples
+        --------
+        >>> import numpy as np
+        >>> index = PatchIndex(np.arange(20.0).reshape(4, 5))
+        >>> [(match.row, match.column) for match in index.best([[6, 7], [11, 12]], count=2, separation=1)]
+        [(1, 1), (1, 3)]
+
         """
         samples, weights = self._query(patch, weight)
         count, separation, ratio = _pick(count, separation, ratio)
@@ -190,12 +197,19 @@ class PatchIndex:
 
         Parameters
         ----------
-        patch, weight
-            As of `best`.
+        patch : (p, q) or (p, q, C) array_like
+            Any real dtype, in the units of the images. Where the weight is zero anything, NaN too.
+        weight : (p, q) array_like, optional
+            Not negative; zero where the patch is unknown, bool allowed. By default 1 everywhere.
         candidates : iterable of (exemplar, row, column)
             The positions, integers; the masks ``allowed`` play no part.
-        count, separation, ratio
-            As of `best`.
+        count : int
+            At most this many matches, 1 to 2^31 - 1.
+        separation : int
+            Matches in one image are more than this many pixels apart, along rows or along columns;
+            0 to 2^31 - 1.
+        ratio : float
+            No match costs more than this times the least cost; at least 1, infinite allowed.
 
         Returns
         -------
@@ -207,6 +221,13 @@ class PatchIndex:
         ------
         InvalidInput
             A candidate at which the patch lies beyond its image, or what `best` refuses.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> index = PatchIndex(np.arange(20.0).reshape(4, 5))
+        >>> index.best_among([[6, 7], [11, 12]], candidates=[(0, 0, 0), (0, 2, 1)])
+        [Match(cost=100.0, exemplar=0, row=2, column=1)]
 
         """
         samples, weights = self._query(patch, weight)
@@ -228,8 +249,10 @@ class PatchIndex:
 
         Parameters
         ----------
-        patch, weight
-            As of `best`.
+        patch : (p, q) or (p, q, C) array_like
+            Any real dtype, in the units of the images. Where the weight is zero anything, NaN too.
+        weight : (p, q) array_like, optional
+            Not negative; zero where the patch is unknown, bool allowed. By default 1 everywhere.
         exemplar : int
             Which image, counted from 0.
 
@@ -243,6 +266,13 @@ class PatchIndex:
         ------
         InvalidInput
             An image that is not there, one that the patch does not fit into, or what `best` refuses.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> PatchIndex(np.eye(3)).cost_map(np.eye(2)).round(3)
+        array([[0., 3.],
+               [3., 0.]], dtype=float32)
 
         """
         samples, weights = self._query(patch, weight)

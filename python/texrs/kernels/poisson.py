@@ -46,7 +46,7 @@ def solve(
     Parameters
     ----------
     image : (H, W) or (H, W, C) array_like
-        The values to stay near, and those of all pixels that are fixed. Any real dtype; finite.
+        The values to stay near, and those of all pixels that are fixed. Any real dtype but 64-bit integers; finite.
     gradient_rows, gradient_columns : array_like
         Of the image's shape: the difference wanted from each pixel to the one in the next row, and
         to the one in the next column. The last row of the one and the last column of the other
@@ -127,9 +127,10 @@ def spread(
     flow : (H, W, C) ndarray of float32
         The divergence wanted; contiguous, writeable and finite. Becomes the solution, 0 where pixels are fixed.
     screening : float
-        As in `solve`.
+        At least 0; 0 for the Poisson equation.
     boundary : {"dirichlet", "periodic", "free"} or a pair of them
-        As in `solve`.
+        The outermost ring of pixels is 0, or the axis is cyclic, or nothing lies beyond; for both axes, or for the rows'
+        and the columns'.
     mask : (H, W) array_like of bool, optional
         The pixels to solve; all others are 0. By default all.
     progress : callable, optional
@@ -180,7 +181,7 @@ def blend(
     Parameters
     ----------
     source, target : (H, W) or (H, W, C) array_like
-        The same shape for both, in register. Any real dtype; finite.
+        The same shape for both, in register. Any real dtype but 64-bit integers; finite.
     mask : (H, W) array_like of bool
         The pixels to take from the source.
     screening : float

@@ -231,9 +231,10 @@ def cut_strip(
         Whether the other axis is cyclic: the seam then closes on itself [2]_, which a seam that is
         cut open cannot do.
     penalty : float or (H, W) array_like of float, optional
-        At least 0, as in `cut`.
+        At least 0. The cost of a pair is multiplied by one plus the mean of its two penalties.
     cost : {"gradient", "paper"}
-        As in `cut`.
+        The cost of parting neighbours s and t. "paper": ``|A(s) - B(s)| + |A(t) - B(t)|``, summed
+        over channels. "gradient": the same over ``|A(s) - A(t)| + |B(s) - B(t)| + 0.05``.
 
     Returns
     -------
@@ -299,9 +300,9 @@ def cut_strips(strips: Sequence[Strip], *, cyclic: bool = False, cost: Cost = "g
     strips : sequence of Strip
         Of any shapes.
     cyclic : bool
-        As in `cut_strip`, for all of them.
+        Whether the axis that a seam runs along is cyclic, for all of them.
     cost : {"gradient", "paper"}
-        As in `cut`, for all of them.
+        The cost of parting neighbours, for all of them (see `cut_strip`).
 
     Returns
     -------

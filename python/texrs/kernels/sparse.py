@@ -124,6 +124,12 @@ class Cholesky:
         InvalidInput
             Not numbers, or right sides of another length.
 
+        Examples
+        --------
+        >>> import numpy as np
+        >>> Cholesky(2 * np.eye(3)).solve([2, 4, 6])
+        array([1., 2., 3.])
+
         """
         array = as_array(sides, "sides", np.float64)
         if array.ndim not in (1, 2) or array.shape[0] != self.size or not array.size:

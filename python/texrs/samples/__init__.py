@@ -103,25 +103,37 @@ _GENERATORS: dict[str, Callable[..., Sample]] = {f.__name__: f for f in (*_PLANA
 
 
 def names() -> tuple[str, ...]:
-    """Return the names of all generated samples, the pictures before the volumes.
+    """Return the names of all generated samples.
+
+    Returns
+    -------
+    tuple of str
+        The pictures before the volumes.
 
     Examples
     --------
     >>> from texrs import samples
     >>> len(samples.names()), samples.names()[-1]
     (16, 'wood_solid')
+
     """
     return tuple(_GENERATORS)
 
 
 def photographs() -> tuple[str, ...]:
-    """Return the names of the photographs; none of them is the name of a generated sample.
+    """Return the names of the photographs that come with scikit-image.
+
+    Returns
+    -------
+    tuple of str
+        None of them is the name of a generated sample.
 
     Examples
     --------
     >>> from texrs import samples
     >>> "grass" in samples.photographs()
     True
+
     """
     return PHOTOGRAPHS
 

@@ -17,7 +17,7 @@ LEAST, LARGEST = 1e-3, 1e3
 
 
 def as_map(value: object, name: str = "scale", shape: Sequence[int] | None = None) -> Floats:
-    """Check a scale map and give it in float32.
+    """Return a scale map, checked, in float32.
 
     Raises
     ------

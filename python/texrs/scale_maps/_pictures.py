@@ -37,7 +37,7 @@ def encode(scale: object, encoding: Encoding = "log2") -> NDArray[np.uint8]:
         Shape (H, W).
     encoding : {"log2", "paper"}
         ``"log2"``: 128 + 64 log2(S), equally fine for small and large, from 1/4 to 3.96. ``"paper"``: 128 S, up to 1.99.
-        What lies beyond is held at the ends.
+        Scales beyond are clipped.
 
     Returns
     -------
@@ -71,7 +71,8 @@ def decode(image: object, encoding: Encoding = "log2") -> Floats:
     image : array_like
         Shape (H, W), uint8; or uint16, of which 257 make one level. Of more channels, which must be equal, the first.
     encoding : {"log2", "paper"}
-        As in `encode`. A black pixel of the paper's, whose scale would be 0, counts as half a grey level.
+        ``"log2"``: the level is 128 + 64 log2(S). ``"paper"``: it is 128 S; a black pixel, whose scale would be 0, counts
+        as half a grey level.
 
     Returns
     -------

@@ -108,7 +108,30 @@ class SourceMap:
 
     @classmethod
     def identity(cls, shape: tuple[int, ...]) -> SourceMap:
-        """Return the map of a picture that is the exemplar itself."""
+        """Return the map of a picture that is the exemplar itself.
+
+        Parameters
+        ----------
+        shape : tuple of int
+            (rows, columns) or (planes, rows, columns).
+
+        Returns
+        -------
+        SourceMap
+            Of one patch; it looks into one exemplar of that shape.
+
+        Raises
+        ------
+        InvalidInput
+            Another number of sides.
+
+        Examples
+        --------
+        >>> from texrs import SourceMap
+        >>> SourceMap.identity((2, 3)).coordinates[1, 2]
+        array([1., 2.], dtype=float32)
+
+        """
         grid = np.stack(np.meshgrid(*(np.arange(n, dtype=np.float32) for n in shape), indexing="ij"), axis=-1)
         return cls(grid, np.zeros(shape, np.uint16), np.zeros(shape, np.uint32), None, (tuple(shape),))
 
@@ -123,11 +146,37 @@ class SourceMap:
         return self.label.ndim
 
     def frame_array(self) -> NDArray[np.float32] | None:
-        """Return `frame` as an array: none, a table by label, or dense."""
+        """Return `frame` as an array.
+
+        Returns
+        -------
+        None, (L, A, A) or (..., A, A) float32
+            None stands for the identity; a table by label; or dense.
+
+        Examples
+        --------
+        >>> from texrs import SourceMap
+        >>> SourceMap.identity((2, 3)).frame_array() is None
+        True
+
+        """
         return self.frame.lattice(self.shape) if isinstance(self.frame, Frames) else self.frame
 
     def frames(self) -> NDArray[np.float32]:
-        """Return the Jacobian of every pixel, dense: (..., A, A) float32."""
+        """Return the Jacobian J of every pixel.
+
+        Returns
+        -------
+        (..., A, A) float32
+            Dense; read-only where all are the identity.
+
+        Examples
+        --------
+        >>> from texrs import SourceMap
+        >>> SourceMap.identity((2, 3)).frames().shape
+        (2, 3, 2, 2)
+
+        """
         frame = self.frame_array()
         if frame is None:
             return np.broadcast_to(np.eye(self.axes, dtype=np.float32), (*self.shape, self.axes, self.axes))
@@ -141,7 +190,7 @@ class SourceMap:
         kind: Literal["colour", "normal"] = "colour",
         green: Literal["up", "down"] = "up",
     ) -> Array:
-        """Look a map that is in register with the exemplar up through this source map.
+        """Return what a map that is in register with the exemplar looks like through this source map.
 
         Parameters
         ----------
@@ -215,15 +264,31 @@ class SourceMap:
     def compose(self, inner: SourceMap | Sequence[SourceMap]) -> SourceMap:
         """Return the map of a picture made from pictures that were made from exemplars.
 
-        ``self`` looks into pictures whose own source maps are ``inner``, one for each of its exemplars; the result
-        looks
+        ``self`` looks into pictures whose own source maps are ``inner``, one for each of its exemplars; the result looks
         into the exemplars of ``inner`` at once: S(p) = inner(q) + J_inner (self(p) - q), where q is the pixel nearest
         to self(p), and J = J_inner J_self.
+
+        Parameters
+        ----------
+        inner : SourceMap, or a sequence of them
+            Those of the pictures that ``self`` looks into, in the order of its exemplars.
+
+        Returns
+        -------
+        SourceMap
+            Of the shape of ``self``; it looks into the exemplars of ``inner``.
 
         Raises
         ------
         InvalidInput
             Another number of maps, or of other sizes, than ``self`` looks into, or maps of different exemplars.
+
+        Examples
+        --------
+        >>> from texrs import SourceMap
+        >>> one = SourceMap.identity((2, 3))
+        >>> bool((one.compose(one).coordinates == one.coordinates).all())
+        True
 
         """
         maps = [inner] if isinstance(inner, SourceMap) else list(inner)
@@ -267,6 +332,15 @@ class SourceMap:
         SourceMap
             It looks into the exemplars.
 
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from texrs import SourceMap
+        >>> picture = SourceMap.identity((2, 3))
+        >>> place = np.array([[5, 0]], np.uint32)  # its last pixel and its first
+        >>> SourceMap.pick([picture], place, np.zeros((1, 2), np.uint32)).coordinates.tolist()
+        [[[1.0, 2.0], [0.0, 0.0]]]
+
         """
         return cls._pick(pixels_of(maps), place, label, None, None, maps[0].shapes, label if overwrite else None)
 
@@ -309,6 +383,26 @@ class SourceMap:
 
         True where S(p + e) = S(p) + J(p) e within a tenth of a sample, in one exemplar. Along an axis that does not
         wrap the last one is False. False means a seam.
+
+        Parameters
+        ----------
+        axis : int
+            From 0.
+        wrap : bool
+            Whether the last pixel of the axis is followed by the first.
+
+        Returns
+        -------
+        (...) bool
+            Of the shape of the output.
+
+        Examples
+        --------
+        >>> from texrs import SourceMap
+        >>> SourceMap.identity((2, 3)).continues(1)
+        array([[ True,  True, False],
+               [ True,  True, False]])
+
         """
         joined = self.exemplar == np.roll(self.exemplar, -1, axis)
         frame = self.frame_array()
@@ -325,7 +419,20 @@ class SourceMap:
         return result
 
     def reuse(self) -> Reuse:
-        """Measure how much is copied verbatim from the exemplars, and in how large pieces."""
+        """Return how much is copied verbatim from the exemplars, and in how large pieces.
+
+        Returns
+        -------
+        Reuse
+            Shares of the output and of the exemplar, and the number of pieces.
+
+        Examples
+        --------
+        >>> from texrs import SourceMap
+        >>> SourceMap.identity((2, 3)).reuse()
+        Reuse(verbatim=1.0, largest=1.0, regions=1)
+
+        """
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
 
@@ -344,7 +451,29 @@ class SourceMap:
         return Reuse(float(whole.mean()), largest / max(int(np.prod(s)) for s in self.shapes), int(regions))
 
     def save(self, path: Path) -> None:
-        """Write the map to an ``.npz`` file, whole or not at all."""
+        """Write the map to an ``.npz`` file, whole or not at all.
+
+        Parameters
+        ----------
+        path : path_like
+            A file that is there already is replaced.
+
+        Raises
+        ------
+        FileError
+            The file cannot be written. A former file is as it was.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> from texrs import SourceMap
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     path = pathlib.Path(folder, "map.npz")
+        ...     SourceMap.identity((2, 3)).save(path)
+        ...     SourceMap.load(path).shape
+        (2, 3)
+
+        """
         from texrs.io import atomic
 
         parts: dict[str, Any] = {
@@ -361,12 +490,32 @@ class SourceMap:
 
     @classmethod
     def load(cls, path: Path) -> SourceMap:
-        """Read a map that `save` wrote.
+        """Return the map of a file that `save` wrote.
+
+        Parameters
+        ----------
+        path : path_like
+            An ``.npz`` file.
+
+        Returns
+        -------
+        SourceMap
+            With the frames as an array.
 
         Raises
         ------
         FileError
             Not there, not a source map, damaged, or of a later version.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> from texrs import SourceMap
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     path = pathlib.Path(folder, "map.npz")
+        ...     SourceMap.identity((2, 3)).save(path)
+        ...     SourceMap.load(path).shapes
+        ((2, 3),)
 
         """
         from texrs.io import read_arrays

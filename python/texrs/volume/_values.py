@@ -7,7 +7,7 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_image, guidance
+from texrs._arrays import as_array, as_image, check_finite, guidance
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 
@@ -25,12 +25,12 @@ def drop_first(array: Array, axis: int, step: int) -> Array:
 
 
 def axes_of(image: Array) -> int:
-    """Guess how many axes are not channels: up to 4 along the last one of three are channels."""
+    """Return how many axes are taken not to be channels: up to 4 along the last one of three are channels."""
     return {2: 2, 4: 3}.get(image.ndim, 2 if image.ndim == 3 and image.shape[-1] <= 4 else 3)
 
 
 def colours_of(image: ArrayLike, name: str, axes: int | None) -> Floats:
-    """Check a picture or a volume and give its colours in [0, 1], channels last."""
+    """Return the colours of a picture or a volume in [0, 1], channels last."""
     if axes is None:
         with suppress(ValueError, TypeError):  # Of what is no array `as_image` tells.
             axes = axes_of(np.asarray(image))
@@ -41,26 +41,24 @@ def colours_of(image: ArrayLike, name: str, axes: int | None) -> Floats:
 
 
 def as_values(values: ArrayLike, name: str = "values") -> Floats:
-    """Check values of one channel, finite, in 2-D or in 3-D."""
-    array = np.asarray(values)
-    if array.dtype.kind not in "buif" or array.ndim not in (2, 3) or array.size == 0:
-        raise InvalidInput(f"{name}: needs numbers of shape (H, W) or (D, H, W), got {array.dtype} of {array.shape}")
-    out = np.ascontiguousarray(array, np.float32)
-    if not np.isfinite(out).all():
-        raise InvalidInput(f"{name}: all must be finite")
-    return out
+    """Return values of one channel, finite, in 2-D or in 3-D."""
+    array = as_array(values, name, np.float32)
+    if array.ndim not in (2, 3) or array.size == 0:
+        raise InvalidInput(f"{name}: needs shape (H, W) or (D, H, W), got {array.shape}")
+    check_finite(array, name)
+    return array
 
 
 def as_region(mask: ArrayLike) -> Bools:
-    """Check a mask in 2-D or in 3-D."""
-    array = np.asarray(mask)
-    if array.dtype.kind not in "bui" or array.ndim not in (2, 3) or array.size == 0:
-        raise InvalidInput(f"mask: needs bool of shape (H, W) or (D, H, W), got {array.dtype} of {array.shape}")
-    return np.ascontiguousarray(array != 0)
+    """Return a mask in 2-D or in 3-D."""
+    array = as_array(mask, "mask", np.bool_)
+    if array.ndim not in (2, 3) or array.size == 0:
+        raise InvalidInput(f"mask: needs shape (H, W) or (D, H, W), got {array.shape}")
+    return array
 
 
 def as_direction(value: object, name: str) -> NDArray[np.float64]:
-    """Check three numbers, for planes, rows and columns; a normal has a length."""
+    """Return three numbers, for planes, rows and columns; a normal has a length."""
     try:
         out = np.asarray(value, np.float64)
     except (TypeError, ValueError):

@@ -33,7 +33,7 @@ _LIGHT = np.array([0.86, 1.0, 0.72], np.float32)
 
 
 def slices(volume: ArrayLike, at: Sequence[int] | None = None, *, gap: int = 2) -> Array:
-    """Set three slices side by side: across the planes, the rows and the columns.
+    """Return three slices side by side: across the planes, the rows and the columns.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def oblique(
     size: int | Sequence[int] | None = None,
     interpolation: Interpolation = "linear",
 ) -> Array:
-    """Cut a volume along any plane.
+    """Return the cut of a volume along any plane.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def cube(
     elevation: float = 30,
     interpolation: Interpolation = "linear",
 ) -> NDArray[np.uint8]:
-    """Show a volume as a block of its material, seen from its front, its right and above.
+    """Return a picture of a volume as a block of its material, seen from its front, its right and above.
 
     The front is plane 0, as a picture shows it; to its right lies the last column, above it row 0.
 
@@ -226,7 +226,7 @@ def turntable(
     Parameters
     ----------
     volume : array_like
-        As of `cube`.
+        Shape (D, H, W) or (D, H, W, C). Transparency is shown over mid grey; of more than 3 channels the first ones.
     path : path_like
         With the suffix .gif; written whole or not at all.
     frames : int
@@ -234,17 +234,17 @@ def turntable(
     size : int
         Side of the picture, 16 to 1024 pixels.
     elevation : float
-        Degrees that the eye is above.
+        Degrees that the eye is above, within 90 either way.
     seconds : float
-        Of a turn.
+        Length of a turn.
     background : sequence of 3 int
         Colour around, 0 to 255 each.
     interpolation : {"linear", "cubic", "nearest"}
-        As of `cube`.
+        Between voxels; "nearest" shows each as a square.
     overwrite : bool
         Whether a file that exists may be replaced.
     progress : callable, optional
-        Called with what is done and its share.
+        Called with the name of the stage and the share that is done; raising stops the work.
 
     Raises
     ------

@@ -59,6 +59,11 @@ def coherence(source: SourceMap, axis: int, field: Field | None = None) -> Bools
     ndarray
         Bool, one shorter than the output along the axis.
 
+    Raises
+    ------
+    InvalidInput
+        Not a source map, an axis that it lacks, or a field of other axes.
+
     Examples
     --------
     >>> from texrs import SourceMap, volume
@@ -82,16 +87,26 @@ def coherence(source: SourceMap, axis: int, field: Field | None = None) -> Bools
 
 
 def cell_reuse(source: SourceMap, field: Field | None = None, *, cell: int = 8) -> CellReuse:
-    """Measure how a synthesis uses its exemplar.
+    """Return how a synthesis uses its exemplar.
 
     Parameters
     ----------
     source : SourceMap
         Of a picture or a volume, from one exemplar or several.
     field : Field, optional
-        As of `coherent`.
+        Where J is taken from; by default from the map's own frames.
     cell : int
-        Side of the exemplar's cells, in voxels. Cells that its border cuts count by what is left of them.
+        Side of the exemplar's cells, in voxels, at least 1. Cells that its border cuts count by what is left of them.
+
+    Returns
+    -------
+    CellReuse
+        How coherent the output is, and how often each part of the exemplar is used.
+
+    Raises
+    ------
+    InvalidInput
+        Not a source map, or a field of other axes.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Numbers on the materials of a picture or a volume: their colours, their shares and how their pieces lie.
+"""Statistics of the materials of a picture or a volume: their colours, their shares and how their pieces lie.
 
 Values are brought to [0, 1] by the dtype, or, of floats beyond that, by their own range (`compare` uses one range for
 both of what it compares).
@@ -37,14 +37,69 @@ class Classes:
     centres: Floats
 
     def of(self, image: ArrayLike, *, axes: int | None = None) -> NDArray[np.uint8]:
-        """Return the class of each pixel or voxel: the nearest centre; the lower one of two as near."""
+        """Return the class of each pixel or voxel: the nearest centre; the lower one of two as near.
+
+        Parameters
+        ----------
+        image : (H, W[, C]) or (D, H, W[, C]) array_like
+            Of the channels of the exemplar.
+        axes : int, optional
+            2 for a picture, 3 for a volume; by default by its shape: up to 4 along the last axis are channels.
+
+        Returns
+        -------
+        (H, W) or (D, H, W) uint8
+            Indices of `centres`.
+
+        Raises
+        ------
+        InvalidInput
+            Not a picture or a volume of finite numbers, or other channels.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from texrs import volume
+        >>> picture = np.array([[0, 255], [255, 250]], np.uint8)
+        >>> volume.classes(picture, 2).of(picture)
+        array([[0, 1],
+               [1, 1]], dtype=uint8)
+
+        """
         colours = colours_of(image, "image", axes)
         if colours.shape[-1] != self.centres.shape[1]:
             raise InvalidInput(f"image: needs {self.centres.shape[1]} colour channels, got {colours.shape[-1]}")
         return self._nearest(colours)
 
     def shares(self, image: ArrayLike, *, axes: int | None = None) -> NDArray[np.float64]:
-        """Return the share of each class, (K,); they sum to 1."""
+        """Return the share of each class.
+
+        Parameters
+        ----------
+        image : (H, W[, C]) or (D, H, W[, C]) array_like
+            Of the channels of the exemplar.
+        axes : int, optional
+            2 for a picture, 3 for a volume; by default by its shape: up to 4 along the last axis are channels.
+
+        Returns
+        -------
+        (K,) float64
+            They sum to 1.
+
+        Raises
+        ------
+        InvalidInput
+            Not a picture or a volume of finite numbers, or other channels.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from texrs import volume
+        >>> picture = np.array([[0, 255], [255, 250]], np.uint8)
+        >>> volume.classes(picture, 2).shares(picture)
+        array([0.25, 0.75])
+
+        """
         labels = self.of(image, axes=axes)
         return np.bincount(labels.ravel(), minlength=len(self.centres)) / labels.size
 
@@ -83,7 +138,7 @@ class Particles:
 
 
 def lightness(image: ArrayLike, *, axes: int | None = None) -> Floats:
-    """Return the mean of the colour channels in [0, 1], float32; transparency counts as mid grey.
+    """Return the mean of the colour channels; transparency counts as mid grey.
 
     Parameters
     ----------
@@ -91,6 +146,16 @@ def lightness(image: ArrayLike, *, axes: int | None = None) -> Floats:
         A picture or a volume, with or without channels.
     axes : int, optional
         2 for a picture, 3 for a volume; by default by its shape: up to 4 along the last axis are channels.
+
+    Returns
+    -------
+    (H, W) or (D, H, W) float32
+        In [0, 1].
+
+    Raises
+    ------
+    InvalidInput
+        Not a picture or a volume of finite numbers.
 
     Examples
     --------
@@ -105,16 +170,26 @@ def lightness(image: ArrayLike, *, axes: int | None = None) -> Floats:
 
 
 def classes(exemplar: ArrayLike, count: int = 4, *, axes: int | None = None) -> Classes:
-    """Find the colours that best stand for an exemplar's own (k-means), from dark to light.
+    """Return the colours that best stand for an exemplar's own (k-means), from dark to light.
 
     Parameters
     ----------
     exemplar : array_like
-        A picture or a volume.
+        A picture or a volume, with or without channels.
     count : int
         How many, 2 to 16. An exemplar of fewer colours has as many classes as colours.
     axes : int, optional
-        As of `lightness`.
+        2 for a picture, 3 for a volume; by default by its shape: up to 4 along the last axis are channels.
+
+    Returns
+    -------
+    Classes
+        The colours; they tell the class of any pixel.
+
+    Raises
+    ------
+    InvalidInput
+        Not a picture or a volume of finite numbers, or a count out of range.
 
     Examples
     --------
@@ -149,12 +224,17 @@ def two_point(mask: ArrayLike, reach: int = 16) -> NDArray[np.float64]:
     mask : array_like
         Bool, (H, W) or (D, H, W): where the material is.
     reach : int
-        Longest step; one that is longer than a side is NaN there.
+        Longest step in pixels, at least 1; one that is longer than a side is NaN there.
 
     Returns
     -------
     ndarray
         Shape (A, reach + 1); at step 0 the material's share.
+
+    Raises
+    ------
+    InvalidInput
+        Not a mask of two or three axes, or a reach below 1.
 
     Examples
     --------
@@ -181,12 +261,17 @@ def lineal_path(mask: ArrayLike, reach: int = 16) -> NDArray[np.float64]:
     mask : array_like
         Bool, (H, W) or (D, H, W).
     reach : int
-        Longest step; one that is longer than a side is NaN there.
+        Longest step in pixels, at least 1; one that is longer than a side is NaN there.
 
     Returns
     -------
     ndarray
         Shape (A, reach + 1); at step 0 the material's share.
+
+    Raises
+    ------
+    InvalidInput
+        Not a mask of two or three axes, or a reach below 1.
 
     Examples
     --------
@@ -208,14 +293,24 @@ def lineal_path(mask: ArrayLike, reach: int = 16) -> NDArray[np.float64]:
 
 
 def particles(mask: ArrayLike, *, least: int = 8) -> Particles:
-    """Count the connected pieces of a material, of neighbours that share a side.
+    """Return how many connected pieces a material has, of neighbours that share a side, and how large they are.
 
     Parameters
     ----------
     mask : array_like
         Bool, (H, W) or (D, H, W).
     least : int
-        Smaller pieces are grain and are not counted.
+        Pixels or voxels, at least 1; smaller pieces are grain and are not counted.
+
+    Returns
+    -------
+    Particles
+        Their number, density and sizes.
+
+    Raises
+    ------
+    InvalidInput
+        Not a mask of two or three axes.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Numbers on how the values of a picture or a volume are arranged: how fine, how turned, with which traces.
+"""Statistics of how the values of a picture or a volume are arranged: frequency, orientation, artefacts.
 
 Each takes values of one channel, such as a `lightness`, in 2-D or in 3-D.
 """
@@ -39,12 +39,17 @@ def autocorrelation(values: ArrayLike, reach: int = 12) -> NDArray[np.float64]:
     values : array_like
         (H, W) or (D, H, W), such as a `lightness`.
     reach : int
-        Longest step; one that is longer than a side is NaN there.
+        Longest step in pixels, at least 1; one that is longer than a side is NaN there.
 
     Returns
     -------
     ndarray
         Shape (A, reach + 1); 1 at step 0. One less this is the variogram over the variance.
+
+    Raises
+    ------
+    InvalidInput
+        Not finite numbers of two or three axes, or a reach below 1.
 
     Examples
     --------
@@ -66,7 +71,7 @@ def autocorrelation(values: ArrayLike, reach: int = 12) -> NDArray[np.float64]:
 
 
 def frequency(values: ArrayLike, *, window: int | None = None, whole: bool = False) -> float:
-    """Return the mean spectral frequency, in cycles a pixel: how fine a texture is.
+    """Return the mean spectral frequency of a texture, in cycles a pixel.
 
     Of each axis slice: it is cut into windows that overlap by half, under a Hann window; frequencies from 1/30 to
     0.45 are weighted by their power. The result is the mean over the slices.
@@ -80,6 +85,16 @@ def frequency(values: ArrayLike, *, window: int | None = None, whole: bool = Fal
     whole : bool
         Whether the spectrum is that of the volume, not of its slices: turning the volume does not change it, where
         slices see an oblique layer as wider.
+
+    Returns
+    -------
+    float
+        From 1/30 to 0.45; NaN where nothing changes.
+
+    Raises
+    ------
+    InvalidInput
+        Not finite numbers of two or three axes, a side below 16, or a window that is longer than a side.
 
     Examples
     --------
@@ -100,7 +115,7 @@ def frequency(values: ArrayLike, *, window: int | None = None, whole: bool = Fal
 
 
 def seam_planes(values: ArrayLike, *, wrap: bool | Sequence[bool] = False) -> tuple[NDArray[np.float64], ...]:
-    """Give, for each axis, the mean change from each plane (or line) to the next, over the median of all.
+    """Return, for each axis, the mean change from each plane (or line) to the next, over the median of all.
 
     Values far from 1 at regular places are the traces of an algorithm's lattice.
 
@@ -115,6 +130,11 @@ def seam_planes(values: ArrayLike, *, wrap: bool | Sequence[bool] = False) -> tu
     -------
     tuple of ndarray
         For each axis one number a step: number i stands for that from plane i to plane i + 1.
+
+    Raises
+    ------
+    InvalidInput
+        Not finite numbers of two or three axes, or not such a choice of axes.
 
     Examples
     --------
@@ -138,7 +158,24 @@ def seam_planes(values: ArrayLike, *, wrap: bool | Sequence[bool] = False) -> tu
 
 
 def speckle(values: ArrayLike, threshold: float = 0.35) -> float:
-    """Return the share of voxels (pixels) that differ from the median of their surroundings, 3 a side: speckle.
+    """Return the share of voxels (pixels) that differ from the median of their surroundings, 3 a side.
+
+    Parameters
+    ----------
+    values : array_like
+        (H, W) or (D, H, W), such as a `lightness`.
+    threshold : float
+        By how much they differ at least, in the units of the values, from 0.
+
+    Returns
+    -------
+    float
+        0 to 1.
+
+    Raises
+    ------
+    InvalidInput
+        Not finite numbers of two or three axes, or a negative threshold.
 
     Examples
     --------
@@ -162,10 +199,24 @@ def speckle(values: ArrayLike, threshold: float = 0.35) -> float:
 def slice_distances(exemplar: ArrayLike, values: ArrayLike, *, quantiles: int = 256) -> NDArray[np.float64]:
     """Return the Wasserstein distance of the values of each axis slice to those of the whole exemplar.
 
+    Parameters
+    ----------
+    exemplar : array_like
+        (H, W) or (D, H, W), such as a `lightness`.
+    values : array_like
+        Those of the output, (H, W) or (D, H, W).
+    quantiles : int
+        How many are compared, 2 to 2^16.
+
     Returns
     -------
     ndarray
         One number a slice, those across the first axis first; of a picture one number, of the whole.
+
+    Raises
+    ------
+    InvalidInput
+        Not finite numbers of two or three axes, or a number of quantiles out of range.
 
     Examples
     --------
@@ -186,7 +237,22 @@ def slice_distances(exemplar: ArrayLike, values: ArrayLike, *, quantiles: int = 
 
 
 def texture_normal(values: ArrayLike) -> NDArray[np.float64]:
-    """Return the direction in which an exemplar changes most, (A,): the normal of its layers.
+    """Return the direction in which an exemplar changes most, the normal of its layers.
+
+    Parameters
+    ----------
+    values : array_like
+        (H, W) or (D, H, W), such as a `lightness`.
+
+    Returns
+    -------
+    (A,) float64
+        Of length 1; its largest entry is positive.
+
+    Raises
+    ------
+    InvalidInput
+        Not finite numbers of two or three axes.
 
     Examples
     --------
