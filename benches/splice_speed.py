@@ -6,8 +6,8 @@
 The similarity sets are made beforehand. "cold": nothing else is kept; "cached": the factor and the elements' parts are. The
 system's side includes the margin. Other solvers get the same matrix, in turns with ours: SciPy's splu in its symmetric mode,
 and CHOLMOD where it is installed (pip install cvxopt; it is GPL, so a peer of this comparison and nothing else). "growth"
-analyses and splices ever larger pictures, of disjoint elements and a wall, each in a process of its own, whose peak of memory is
-told; there the similarity sets are part of a splice.
+analyses and splices ever larger pictures, of disjoint elements and a wall, each in a process of its own, whose peak of
+memory is told; there the similarity sets are part of a splice.
 """
 
 from __future__ import annotations
@@ -28,10 +28,8 @@ from texrs import samples
 from texrs.elements import Elements, analyse
 from texrs.kernels.sparse import Cholesky
 from texrs.kernels.warp import mesh
-from texrs.papers.splice import layout as _splice_layout
-from texrs.papers.splice import source as _splice_source
-from texrs.papers.splice import warp as _splice_warp
-from texrs.papers.splice.warp import energy
+from texrs.papers.splice import adjustment, extension, factors, foreground, matching
+from texrs.papers.splice.energy import energy_matrix
 
 try:
     import cvxopt
@@ -61,14 +59,14 @@ def best(
 
 
 def forget() -> None:
-    _splice_warp._FACTORS.clear()
-    _splice_source._PARTS.clear()
-    _splice_source._EXTENDED.clear()
-    _splice_source._FOLDED.clear()
-    _splice_source._COUNTS.clear()
-    _splice_layout._DIRECTIONS.clear()
-    _splice_layout._LAYOUTS.clear()
-    _splice_layout._REACHES.clear()
+    factors._FACTORS.clear()
+    foreground._FOREGROUNDS.clear()
+    extension._EXTENSIONS.clear()
+    extension._LAYOUTS.clear()
+    extension._COUNTS.clear()
+    matching._DIRECTIONS.clear()
+    matching._LAYOUTS.clear()
+    adjustment._REACHES.clear()
 
 
 def splices(sides: list[int]) -> None:
@@ -95,7 +93,7 @@ def solvers(sides: list[int]) -> None:
         assert sample.mask is not None
         assert sample.centres is not None
         at = np.rint(sample.centres).astype(np.intp)
-        matrix = energy(sample.mask, at[:, 0] * side + at[:, 1], 1, upright=False)
+        matrix = energy_matrix(sample.mask, at[:, 0] * side + at[:, 1], 1, upright=False)
         right = np.random.default_rng(0).standard_normal((side * side, 2))
         options = {"SymmetricMode": True}
         tasks: dict[str, Callable[[], object]] = {

@@ -33,8 +33,8 @@ def windows(
     half = tuple(max(2, int(share * n / 2)) for n in a.box)
     found = []
     for m in result.report["matches"]:
-        target, source = np.rint(m["target"]), np.rint(m["source"])
-        rest = (m["source"] - source) - (m["target"] - target)
+        target, source = np.rint(m["target"]), np.rint(m["point"])
+        rest = (m["point"] - source) - (m["target"] - target)
         inside = True
         for at, shape in ((target, result.image.shape), (source, a.mask.shape)):
             inside &= all(h + 3 <= x < n - h - 3 for x, h, n in zip(at, half, shape, strict=False))
@@ -107,7 +107,7 @@ def copied(a: Elements, result: Synthesis) -> tuple[float, float]:
     if not len(rigid):
         return share, 1.0
     goals = np.array([m["target"] for m in result.report["matches"]])
-    starts = np.array([m["source"] for m in result.report["matches"]])
+    starts = np.array([m["point"] for m in result.report["matches"]])
     which = number[tuple(rigid.T)] - 1
     away = (result.source.coordinates[tuple(rigid.T)] - starts[which]) - (rigid - goals[which])
     # Elements go by whole pixels.
@@ -155,7 +155,7 @@ def layout(result: Synthesis, a: Elements, b: Elements) -> dict[str, float]:
     size = np.array(number.shape)
     inside = ((goals >= a.box[0] / 2) & (goals < size - a.box[1] / 2)).all(axis=1)
     centres, wanted = [], []
-    starts = np.array([m["source"] for m in result.report["matches"]])
+    starts = np.array([m["point"] for m in result.report["matches"]])
     for k in np.flatnonzero(inside):
         pixels = np.argwhere(number == k + 1)
         if len(pixels):

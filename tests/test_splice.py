@@ -15,7 +15,8 @@ import texrs
 from texrs import samples
 from texrs.elements import Elements, Layout
 from texrs.errors import InvalidInput
-from texrs.papers.splice import warp
+from texrs.papers.splice.energy import minimise_energy
+from texrs.papers.splice.factors import _FACTORS
 
 SIZE = (192, 192)
 
@@ -144,7 +145,7 @@ def test_joints_stay_upright(edit: str) -> None:
     assert len(found) >= 15
     leans, bends = {}, {}
     for upright in (True, False):
-        delta = warp.stretched(rigid, pins, shift, upright=upright)[..., 1]
+        delta = minimise_energy(rigid, pins, shift, upright=upright)[..., 1]
         leans[upright] = np.array([abs(delta[tuple(j[0])] - delta[tuple(j[-1])]) for j in found])
         bends[upright] = np.array([bend(delta[tuple(j.T)]) for j in found])
         if upright:
@@ -166,7 +167,7 @@ HOLLOW = {"opened": OPENED, "ring": (AWAY < 9) & (AWAY > 5), "target": ((AWAY < 
 @pytest.mark.parametrize("layout", Layout)
 @pytest.mark.parametrize("middle", ["of the box", "of mass"])
 @pytest.mark.parametrize("shape", HOLLOW)
-def test_a_element_moves_whole_where_its_centre_lies_beside_it(shape: str, middle: str, layout: Layout) -> None:
+def test_an_element_moves_whole_where_its_centre_lies_beside_it(shape: str, middle: str, layout: Layout) -> None:
     one = HOLLOW[shape]
     mask = np.tile(one, (4, 4))
     image = np.random.default_rng(0).integers(0, 60, (*mask.shape, 3)).astype(np.uint8)
@@ -225,7 +226,7 @@ def test_the_literal_method(name: str) -> None:
 def test_threads_do_not_matter(a: str, b: str) -> None:
     found = []
     for count in (1, 2, 7):
-        warp._FACTORS.clear()
+        _FACTORS.clear()
         with texrs.threads(count):
             found.append(texrs.splice(ENTRIES[a], ENTRIES[b], (96, 112), seed=3).image.tobytes())
     assert found[0] == found[1] == found[2]
@@ -297,14 +298,14 @@ def test_edits_replay() -> None:
 
 
 def test_regular_layouts() -> None:
-    from texrs.papers.splice.edit import edited, lattice
+    from texrs.papers.splice.edit import apply_steps, fit_lattice
 
     skew = np.array([[20.0, 4.0], [3.0, 25.0]])
     index = np.argwhere(np.ones((6, 6)))
     noise = np.random.default_rng(0).normal(0, 0.5, (36, 2))
-    _, basis = lattice(index @ skew + noise)
+    _, basis = fit_lattice(index @ skew + noise)
     assert abs(abs(np.linalg.det(basis)) / np.linalg.det(skew) - 1) < 0.02
-    found = edited(index @ skew + noise, 36, [{"op": "regularise"}]).points
+    found = apply_steps(index @ skew + noise, 36, [{"op": "regularise"}]).points
     away = (found - found[0]) @ np.linalg.inv(basis)
     assert np.abs(away - np.rint(away)).max() < 1e-6
     assert len(np.unique(np.rint(away), axis=0)) == 36

@@ -9,10 +9,11 @@ import pytest
 from scipy.spatial import Delaunay
 
 import texrs
-from texrs import layouts as matching
-from texrs import samples
+from texrs import layouts, samples
 from texrs.elements import Elements, Layout
-from texrs.papers.splice import layout, warp
+from texrs.papers.splice import energy
+from texrs.papers.splice.adjustment import STRAIN, limit_strain
+from texrs.papers.splice.matching import Match, match_layouts
 
 
 def lattice(rows: int, columns: int, *, shifted: bool, noise: float = 0.0) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -25,9 +26,9 @@ def lattice(rows: int, columns: int, *, shifted: bool, noise: float = 0.0) -> np
 def test_many_elements_are_matched_as_few_are(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     random = np.random.default_rng(seed)
     source, target = random.random((500, 2)) * 400, random.random((400, 2)) * 400
-    dense = matching.match(source, target)
-    monkeypatch.setattr(matching, "DENSE", 0)
-    near = matching.match(source, target)
+    dense = layouts.match_points(source, target)
+    monkeypatch.setattr(layouts, "DENSE", 0)
+    near = layouts.match_points(source, target)
     assert (near[0] == dense[0]).all()
     assert near[1] == pytest.approx(dense[1])
 
@@ -35,9 +36,9 @@ def test_many_elements_are_matched_as_few_are(seed: int, monkeypatch: pytest.Mon
 def test_crowded_targets_find_sources_farther_away(monkeypatch: pytest.MonkeyPatch) -> None:
     random = np.random.default_rng(0)
     source, target = random.random((600, 2)) * 400, random.random((400, 2)) * 40
-    dense = matching.match(source, target)
-    monkeypatch.setattr(matching, "DENSE", 0)
-    assert matching.match(source, target)[1] == pytest.approx(dense[1])
+    dense = layouts.match_points(source, target)
+    monkeypatch.setattr(layouts, "DENSE", 0)
+    assert layouts.match_points(source, target)[1] == pytest.approx(dense[1])
 
 
 @pytest.mark.parametrize("upright", [True, False])
@@ -45,12 +46,12 @@ def test_large_walls_are_solved_for_at_fewer_pixels(upright: bool, monkeypatch: 
     wall = Elements.of_sample(samples.load("bricks", size=(192, 192)))
     pins = np.rint(wall.points).astype(np.intp)
     shift = np.random.default_rng(1).uniform(-3, 3, pins.shape)
-    full = warp.stretched(~wall.mask, pins, shift, upright=upright)
-    monkeypatch.setattr(warp, "MOST", 192 * 192 // 2)
-    assert warp.coarseness((192, 192)) == 2
-    assert warp.coarseness((192, 191)) == 2
-    assert warp.coarseness((96, 96)) == 1
-    half = warp.stretched(~wall.mask, pins, shift, upright=upright)
+    full = energy.minimise_energy(~wall.mask, pins, shift, upright=upright)
+    monkeypatch.setattr(energy, "MOST", 192 * 192 // 2)
+    assert energy.coarseness((192, 192)) == 2
+    assert energy.coarseness((192, 191)) == 2
+    assert energy.coarseness((96, 96)) == 1
+    half = energy.minimise_energy(~wall.mask, pins, shift, upright=upright)
     assert half.shape == full.shape
     assert np.abs(half - full).mean() < 0.5
     assert np.abs(half[pins[:, 0], pins[:, 1]] - shift).max() < 1.0
@@ -59,19 +60,19 @@ def test_large_walls_are_solved_for_at_fewer_pixels(upright: bool, monkeypatch: 
 def test_neighbours_in_walls_go_about_as_far() -> None:
     wall = Elements.of_sample(samples.load("bricks", size=(192, 192)))
     stones = Elements.of_sample(samples.load("pebbles", size=(192, 192)))
-    torn = layout.matched(wall, stones, (192, 192), align=True)
-    found = layout.eased(wall, torn)
-    start = found.source.points[found.of]
+    torn = match_layouts(wall, stones, (192, 192), align=True)
+    found = limit_strain(wall, torn)
+    start = found.starts
     corners = Delaunay(start).simplices
 
-    def strain(match: layout.Match) -> float:
+    def strain(match: Match) -> float:
         apart = np.abs(match.shift[corners] - match.shift[np.roll(corners, 1, axis=1)])
         away = np.abs(start[corners] - start[np.roll(corners, 1, axis=1)])
         return float((apart / np.maximum(away, np.array(wall.box))).max())
 
     assert strain(torn) > 0.5
-    assert strain(found) < layout.EASE[Layout.JOINTED] + 0.1
-    still = layout.eased(wall, layout.matched(wall, wall, (192, 192), align=True))
+    assert strain(found) < STRAIN[Layout.JOINTED] + 0.1
+    still = limit_strain(wall, match_layouts(wall, wall, (192, 192), align=True))
     assert np.ptp(still.shift, axis=0).max() < 2.0
 
 
@@ -80,23 +81,23 @@ def test_layouts_go_on_as_they_are(shifted: bool) -> None:
     """Beyond the border each point has the neighbours that points inside have."""
     points = lattice(7, 7, shifted=shifted, noise=0.5)
     shape = (160, 160)
-    found = matching.PointLayout.of(points, shape, (False, False), beyond=True)
+    found = layouts.PointLayout.of(points, shape, (False, False), beyond=True)
     far = found.within(np.full(2, -60.0), np.full(2, 220.0))[0]
     inner = far[((far > -20) & (far < 180)).all(axis=1)]
-    nearest = matching.nearest(inner, 6, far)[:, 1:5]
+    nearest = layouts.nearest_distances(inner, 6, far)[:, 1:5]
     assert np.median(np.abs(nearest - np.median(nearest, axis=0))) < 2.0
     assert np.percentile(nearest[:, 0], 5) > 14.0
 
 
 def test_outermost_points_do_not_make_a_layout_wider() -> None:
-    assert matching.spacing(lattice(3, 3, shifted=False), count=4) == pytest.approx(20.0)
-    assert matching.spacing(lattice(9, 9, shifted=False), count=4) == pytest.approx(20.0)
+    assert layouts.spacing(lattice(3, 3, shifted=False), count=4) == pytest.approx(20.0)
+    assert layouts.spacing(lattice(9, 9, shifted=False), count=4) == pytest.approx(20.0)
 
 
 def test_pictures_of_any_size_take_their_time_only(monkeypatch: pytest.MonkeyPatch) -> None:
     """Coarser systems and near matches go through the whole of a splice."""
-    monkeypatch.setattr(warp, "MOST", 1 << 13)
-    monkeypatch.setattr(matching, "DENSE", 0)
+    monkeypatch.setattr(energy, "MOST", 1 << 13)
+    monkeypatch.setattr(layouts, "DENSE", 0)
     wall = Elements.of_sample(samples.load("bricks", size=(128, 128)))
     stones = Elements.of_sample(samples.load("pebbles", size=(128, 128)))
     result = texrs.splice(wall, stones, seed=1)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from texrs._arrays import check_memory
 from texrs.errors import InvalidInput
 
-__all__ = ["Fold", "PointLayout", "directions", "fold_of", "match", "nearest", "spacing"]
+__all__ = ["Fold", "PointLayout", "directions", "find_fold", "match_points", "nearest_distances", "spacing"]
 
 Points = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ TIE = 1e-9
 """What a later source costs more than the one before: of equal ones the first is taken."""
 
 
-def nearest(points: Points, count: int, among: Points | None = None) -> Points:
+def nearest_distances(points: Points, count: int, among: Points | None = None) -> Points:
     """Return the distances to the ``count`` nearest points, (n, count); to others of ``points`` itself by default."""
     from scipy.spatial import cKDTree
 
@@ -66,11 +66,11 @@ def spacing(points: Points, count: int = NEIGHBOURS) -> float:
     """
     if len(points) < 3:
         raise InvalidInput(f"points: a layout needs three or more, got {len(points)}")
-    far = nearest(points, min(count, len(points) - 1))
-    return float(np.median(far.mean(axis=1)[_inner(points, far)]))
+    far = nearest_distances(points, min(count, len(points) - 1))
+    return float(np.median(far.mean(axis=1)[_mark_inner(points, far)]))
 
 
-def _inner(points: Points, far: Points) -> NDArray[np.bool_]:
+def _mark_inner(points: Points, far: Points) -> NDArray[np.bool_]:
     """Mark the points that are not the outermost, or all if there is no other: half of the neighbours of these are missing."""
     rim = INSIDE * float(np.median(far[:, 0]))
     found: NDArray[np.bool_] = ((points > points.min(axis=0) + rim) & (points < points.max(axis=0) - rim)).all(axis=1)
@@ -174,7 +174,7 @@ class Fold:
         return np.asarray(at, np.float64), turns, (at >= low) & (at <= high)
 
 
-def fold_of(points: Points, axis: int, ends: tuple[float, float], *, wrap: bool, beyond: bool) -> Fold:
+def find_fold(points: Points, axis: int, ends: tuple[float, float], *, wrap: bool, beyond: bool) -> Fold:
     """Find the lines at which a layout is reflected along an axis, so that it goes on as it is.
 
     Each line is tried at several places around the outermost points; the one is taken where those near it have neighbours
@@ -198,8 +198,8 @@ def fold_of(points: Points, axis: int, ends: tuple[float, float], *, wrap: bool,
         return Fold(ends[0] - 0.5, ends[1] + 0.5, True)
     scale = spacing(points)
     count = min(AROUND, len(points) - 1)
-    far = nearest(points, count)
-    inner = np.median(far[_inner(points, far)], axis=0)
+    far = nearest_distances(points, count)
+    inner = np.median(far[_mark_inner(points, far)], axis=0)
     lines = []
     for sign in (-1, 1):
         x = sign * points[:, axis]
@@ -236,7 +236,7 @@ def _misfit(points: Points, axis: int, sign: int, line: float, scale: float, inn
     aside = kept[near, 1 - axis]
     middle = (aside > aside.min() + 0.25 * scale) & (aside < aside.max() - 0.25 * scale)
     near = near[middle] if middle.any() else near
-    found = nearest(kept[near], len(inner) + 1, both)[:, 1:]
+    found = nearest_distances(kept[near], len(inner) + 1, both)[:, 1:]
     return float(np.abs(found - inner).mean() + 1e-3 * abs(line - float(x.max())))
 
 
@@ -262,7 +262,7 @@ class PointLayout:
     @classmethod
     def of(cls, points: Points, shape: Sequence[int], wrap: Sequence[bool], *, beyond: bool) -> PointLayout:
         """Find how the layout of a picture goes on."""
-        folds = [fold_of(points, a, (0.0, shape[a] - 1.0), wrap=wrap[a], beyond=beyond) for a in range(2)]
+        folds = [find_fold(points, a, (0.0, shape[a] - 1.0), wrap=wrap[a], beyond=beyond) for a in range(2)]
         return cls(points, (folds[0], folds[1]), spacing(points))
 
     def within(self, low: Points, high: Points) -> tuple[Points, NDArray[np.intp], NDArray[np.bool_]]:
@@ -276,13 +276,13 @@ class PointLayout:
         # Those of the picture itself come first, then by place: who is merged must not hang on the box.
         order = np.lexsort((found[:, 1], found[:, 0], turned.any(axis=1)))
         found, which, turned = found[order], which[order], turned[order]
-        kept = distinct(found, turned, MERGE * float(np.median(nearest(self.points, 1))))
+        kept = drop_duplicates(found, turned, MERGE * float(np.median(nearest_distances(self.points, 1))))
         mirrored = (turned % 2 == 1) & [not f.wrap for f in self.folds]
         return found[kept], which[kept], mirrored[kept]
 
 
-def distinct(points: Points, turn: NDArray[np.intp], apart: float) -> NDArray[np.intp]:
-    """Return the points that no earlier one of another turn is nearer to than ``apart``."""
+def drop_duplicates(points: Points, turn: NDArray[np.intp], apart: float) -> NDArray[np.intp]:
+    """Return which points no earlier one of another turn is nearer to than ``apart``."""
     from scipy.spatial import cKDTree
 
     dropped = np.zeros(len(points), bool)
@@ -294,7 +294,7 @@ def distinct(points: Points, turn: NDArray[np.intp], apart: float) -> NDArray[np
     return np.flatnonzero(~dropped)
 
 
-def match(source: Points, target: Points) -> tuple[NDArray[np.intp], float]:
+def match_points(source: Points, target: Points) -> tuple[NDArray[np.intp], float]:
     """Match each target with a source of its own at the least total squared distance (Eq. 4).
 
     Squared, for the best matching then has no crossings; of equal ones the first is taken.
@@ -314,21 +314,21 @@ def match(source: Points, target: Points) -> tuple[NDArray[np.intp], float]:
     Examples
     --------
     >>> import numpy as np
-    >>> match(np.array([[0.0, 0], [0, 10], [0, 20]]), np.array([[0.0, 19], [0, 1]]))[0].tolist()
+    >>> match_points(np.array([[0.0, 0], [0, 10], [0, 20]]), np.array([[0.0, 19], [0, 1]]))[0].tolist()
     [2, 0]
 
     """
     if len(source) < len(target):
         raise InvalidInput(f"source: needs a point for each of {len(target)} targets, got {len(source)}")
     if len(source) * len(target) <= DENSE:
-        of = _assigned(((target[:, None] - source[None]) ** 2).sum(axis=-1))
+        of = _assign(((target[:, None] - source[None]) ** 2).sum(axis=-1))
     else:
-        of = _assigned_near(source, target)
+        of = _assign_near(source, target)
     cost = ((target - source[of]) ** 2).sum(axis=-1)
     return of, float(cost.mean()) if len(target) else 0.0
 
 
-def _assigned(square: Points) -> NDArray[np.intp]:
+def _assign(square: Points) -> NDArray[np.intp]:
     """Match rows with columns, every pair of which has a cost."""
     from scipy.optimize import linear_sum_assignment
 
@@ -338,7 +338,7 @@ def _assigned(square: Points) -> NDArray[np.intp]:
     return of
 
 
-def _assigned_near(source: Points, target: Points) -> NDArray[np.intp]:
+def _assign_near(source: Points, target: Points) -> NDArray[np.intp]:
     """Match many targets, each with one of the sources near it.
 
     A matching whose every pair is among the first half of the near ones is taken: a better one would have to send a target
@@ -366,4 +366,4 @@ def _assigned_near(source: Points, target: Points) -> NDArray[np.intp]:
             return np.asarray(of, np.intp)
         count *= 2
     check_memory(3 * 8 * len(source) * len(target))
-    return _assigned(((target[:, None] - source[None]) ** 2).sum(axis=-1))
+    return _assign(((target[:, None] - source[None]) ** 2).sum(axis=-1))

@@ -70,7 +70,15 @@ class Given:
 
     @classmethod
     def of(
-        cls, size: Shape, wrap: Wrap, *, box: object, layout: str | None, background: object, mask: object, points: object
+        cls,
+        size: Shape,
+        wrap: Wrap,
+        *,
+        box: object,
+        layout: str | None,
+        background: object,
+        mask: object,
+        points: object,
     ) -> Given:
         """Check the arguments of an image of that size."""
         place = None if box is None else as_box(box, size)

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_int, as_seed
 from texrs.errors import InvalidInput
-from texrs.layouts import match, nearest, spacing
+from texrs.layouts import match_points, nearest_distances, spacing
 
-__all__ = ["Edited", "Step", "as_steps", "edited"]
+__all__ = ["EditedLayout", "Step", "apply_steps", "as_steps"]
 
 Points = NDArray[np.float64]
 Step = Mapping[str, Any]
@@ -34,7 +34,7 @@ DRAWS = 24
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Edited:
+class EditedLayout:
     """A layout after its edit.
 
     Attributes
@@ -60,57 +60,57 @@ def as_steps(edit: object, seed: int) -> list[dict[str, Any]]:
         raise InvalidInput(f"edit: needs a name, a step or a list of steps, got {type(edit).__name__}")
     found = []
     for number, step in enumerate(steps):
-        told = {"op": step} if isinstance(step, str) else step
-        if not isinstance(told, Mapping) or told.get("op") not in STEPS:
+        given = {"op": step} if isinstance(step, str) else step
+        if not isinstance(given, Mapping) or given.get("op") not in STEPS:
             raise InvalidInput(f"edit: step {number} needs an 'op' among {', '.join(STEPS)}; got {step!r}")
-        unknown = set(told) - {"op"} - STEPS[told["op"]]
+        unknown = set(given) - {"op"} - STEPS[given["op"]]
         if unknown:
             raise InvalidInput(
-                f"edit: step {number}, {told['op']}, knows no {', '.join(sorted(map(str, unknown)))}; "
-                f"allowed are {', '.join(sorted(STEPS[told['op']]))}"
+                f"edit: step {number}, {given['op']}, knows no {', '.join(sorted(map(str, unknown)))}; "
+                f"allowed are {', '.join(sorted(STEPS[given['op']]))}"
             )
-        plain = dict(told)
+        plain = dict(given)
         if plain["op"] == "randomise":
             plain["seed"] = as_seed(plain.get("seed", seed), "edit: seed")
         found.append(plain)
     return found
 
 
-def edited(points: Points, own: int, steps: Sequence[Step], named: int | None = None) -> Edited:
+def apply_steps(points: Points, originals: int, steps: Sequence[Step], nameable: int | None = None) -> EditedLayout:
     """Apply the steps to a layout.
 
     Parameters
     ----------
     points : (n, 2) array
         The elements of the picture, and after them their copies beyond its borders.
-    own : int
+    originals : int
         How many are of the picture. Copies follow where a step is a rule of places, and stay where it names elements.
     steps : sequence
-        As `as_steps` gives them.
-    named : int, optional
+        As `as_steps` returns them.
+    nameable : int, optional
         How many of those of the picture a step may name; all by default.
 
     """
     at, kept = points.copy(), np.ones(len(points), bool)
     acts: dict[str, Callable[[Step, Points, int, NDArray[np.bool_]], Points]] = {
-        "scale": _scale,
-        "shift": _shift,
-        "rows": _rows,
+        "scale": _scale_layout,
+        "shift": _shift_layout,
+        "rows": _shift_rows,
         "randomise": _randomise,
         "regularise": _regularise,
-        "move": _move,
-        "remove": _remove,
-        "points": _points,
+        "move": _move_element,
+        "remove": _remove_element,
+        "points": _take_points,
     }
     for step in steps:
-        by_name = named is not None and step["op"] in ("move", "remove", "points")
-        at = acts[step["op"]](step, at, named if by_name and named is not None else own, kept)
+        by_name = step["op"] in ("move", "remove", "points")
+        at = acts[step["op"]](step, at, nameable if by_name and nameable is not None else originals, kept)
     if not np.isfinite(at).all() or np.abs(at).max() > 1e6:
         raise InvalidInput("edit: moves elements further than 10^6 pixels")
-    return Edited(at, kept, all(step["op"] in ("move", "points") for step in steps))
+    return EditedLayout(at, kept, all(step["op"] in ("move", "points") for step in steps))
 
 
-def _pair(step: Step, name: str, default: object = None) -> NDArray[np.float64]:
+def _read_pair(step: Step, name: str, default: object = None) -> NDArray[np.float64]:
     value = step.get(name, default)
     try:
         array = np.array(value, np.float64)
@@ -121,43 +121,43 @@ def _pair(step: Step, name: str, default: object = None) -> NDArray[np.float64]:
     return np.array(np.broadcast_to(array, 2), np.float64)
 
 
-def _element(step: Step, own: int) -> int:
-    return as_int(step.get("element"), f"edit: element of {step['op']}", 0, own - 1)
+def _read_element(step: Step, originals: int) -> int:
+    return as_int(step.get("element"), f"edit: element of {step['op']}", 0, originals - 1)
 
 
-def _scale(step: Step, at: Points, own: int, kept: NDArray[np.bool_]) -> Points:
-    factor = _pair(step, "factor", 1.0)
+def _scale_layout(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) -> Points:
+    factor = _read_pair(step, "factor", 1.0)
     if (factor < 0.1).any() or (factor > 10).any():
         raise InvalidInput(f"edit: factor of scale must lie within 0.1 and 10, got {factor.tolist()}")
-    centre = at[:own].mean(axis=0)
+    centre = at[:originals].mean(axis=0)
     return np.asarray((at - centre) * factor + centre, np.float64)
 
 
-def _shift(step: Step, at: Points, own: int, kept: NDArray[np.bool_]) -> Points:
-    return at + _pair(step, "by", 0.0)
+def _shift_layout(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) -> Points:
+    return at + _read_pair(step, "by", 0.0)
 
 
-def _rows(step: Step, at: Points, own: int, kept: NDArray[np.bool_]) -> Points:
+def _shift_rows(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) -> Points:
     """Slide every other row one way, and those between the other way."""
     by = as_float(step.get("by", 0.0), "edit: by of rows", -1e4, 1e4)
     order = np.argsort(at[:, 0], kind="stable")
-    gap = 0.5 * float(np.median(nearest(at[:own], 1)))
+    gap = 0.5 * float(np.median(nearest_distances(at[:originals], 1)))
     row = np.concatenate([[0], np.cumsum(np.diff(at[order, 0]) > gap)])
-    first = row[np.flatnonzero(order < own)[0]]
+    first = row[np.flatnonzero(order < originals)[0]]
     out = at.copy()
     out[order, 1] += np.where((row - first) % 2 == 0, by, -by)
     return out
 
 
-def _randomise(step: Step, at: Points, own: int, kept: NDArray[np.bool_]) -> Points:
+def _randomise(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) -> Points:
     """Displace points by Gaussian noise in spacings, none nearer to another than a share of the least usual distance."""
     amount = as_float(step.get("amount", 0.25), "edit: amount of randomise", 0, 10)
     least = as_float(step.get("least", 0.7), "edit: least of randomise", 0, 1)
     noise = np.random.default_rng(step["seed"])
-    apart = least * float(np.percentile(nearest(at[:own], 1), 10))
-    sigma = amount * spacing(at[:own])
+    apart = least * float(np.percentile(nearest_distances(at[:originals], 1), 10))
+    sigma = amount * spacing(at[:originals])
     out = at.copy()
-    for i in range(own):
+    for i in range(originals):
         for _ in range(DRAWS):
             there = at[i] + sigma * noise.standard_normal(2)
             others = np.hypot(*(out - there).T)
@@ -168,20 +168,20 @@ def _randomise(step: Step, at: Points, own: int, kept: NDArray[np.bool_]) -> Poi
     return out
 
 
-def _regularise(step: Step, at: Points, own: int, kept: NDArray[np.bool_]) -> Points:
+def _regularise(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) -> Points:
     """Bring points to the lattice that fits them best, each to a place of its own."""
     amount = as_float(step.get("amount", 1.0), "edit: amount of regularise", 0, 1)
-    origin, basis = lattice(at[:own])
+    origin, basis = fit_lattice(at[:originals])
     span = np.linalg.inv(basis)
     index = np.rint((at - origin) @ span)
     low, high = index.min(axis=0).astype(int) - 1, index.max(axis=0).astype(int) + 1
     sites = np.stack(np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(low, high, strict=True)), indexing="ij"), -1)
     places = sites.reshape(-1, 2) @ basis + origin
-    of, _ = match(places, at)
+    of, _ = match_points(places, at)
     return at + amount * (places[of] - at)
 
 
-def lattice(points: Points) -> tuple[Points, Points]:
+def fit_lattice(points: Points) -> tuple[Points, Points]:
     """Fit a lattice by least squares: its origin, and two vectors as rows.
 
     The vectors are those differences of near points that most pairs repeat; where none is repeated they make a square
@@ -222,20 +222,20 @@ def lattice(points: Points) -> tuple[Points, Points]:
     return origin, basis
 
 
-def _move(step: Step, at: Points, own: int, kept: NDArray[np.bool_]) -> Points:
+def _move_element(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) -> Points:
     if ("by" in step) == ("to" in step):
         raise InvalidInput("edit: move needs one of 'by' and 'to'")
-    out, i = at.copy(), _element(step, own)
-    out[i] = at[i] + _pair(step, "by") if "by" in step else _pair(step, "to")
+    out, i = at.copy(), _read_element(step, originals)
+    out[i] = at[i] + _read_pair(step, "by") if "by" in step else _read_pair(step, "to")
     return out
 
 
-def _remove(step: Step, at: Points, own: int, kept: NDArray[np.bool_]) -> Points:
-    kept[_element(step, own)] = False
+def _remove_element(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) -> Points:
+    kept[_read_element(step, originals)] = False
     return at
 
 
-def _points(step: Step, at: Points, own: int, kept: NDArray[np.bool_]) -> Points:
+def _take_points(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) -> Points:
     """Take a list of points: by index where there are as many as elements, else each the element that costs least."""
     try:
         listed = np.array(step.get("points"), np.float64)
@@ -245,11 +245,11 @@ def _points(step: Step, at: Points, own: int, kept: NDArray[np.bool_]) -> Points
         raise InvalidInput("edit: points needs a list of finite [row, column]")
     if len(np.unique(listed, axis=0)) < len(listed):
         raise InvalidInput("edit: points holds one place twice")
-    if len(listed) > own:
-        raise InvalidInput(f"edit: points has {len(listed)} places for {own} elements; give as many or fewer")
+    if len(listed) > originals:
+        raise InvalidInput(f"edit: points has {len(listed)} places for {originals} elements; give as many or fewer")
     out = at.copy()
-    of = np.arange(own) if len(listed) == own else match(at[:own], listed)[0]
-    kept[:own] = False
+    of = np.arange(originals) if len(listed) == originals else match_points(at[:originals], listed)[0]
+    kept[:originals] = False
     kept[of] = True
     out[of] = listed
     return out

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
 from texrs._arrays import as_image, as_wrap
+from texrs._cache import Cache, content_hash
 from texrs._typing import Progress
 from texrs.elements import Elements, analyse
 from texrs.errors import InvalidInput
 
-__all__ = ["as_elements"]
+__all__ = ["as_elements", "remember"]
+
+T = TypeVar("T")
 
 FEWEST = 3
 SHORTEST = 16
@@ -24,14 +29,14 @@ def as_elements(value: object, name: str, progress: Progress) -> Elements:
         try:
             found = analyse(value, progress=progress)
             # In the shape that it came in.
-            return checked(replace(found, image=np.asarray(value)), name)
+            return check_entry(replace(found, image=np.asarray(value)), name)
         except InvalidInput as error:
             raise InvalidInput(f"{name}: {error}; texrs.elements.analyse takes a box, points and a mask") from None
-    return checked(value, name)
+    return check_entry(value, name)
 
 
-def checked(entry: Elements, name: str) -> Elements:
-    """Check that the parts of an entry belong together."""
+def check_entry(entry: Elements, name: str) -> Elements:
+    """Check that the parts of an entry belong together; return it with its points as floats of 64 bit."""
     image = as_image(entry.image, f"{name}.image", minimum=SHORTEST)
     shape = image.shape[:2]
     mask = np.asarray(entry.mask)
@@ -59,4 +64,10 @@ def checked(entry: Elements, name: str) -> Elements:
     if float(np.ptp(points, axis=0).max()) == 0:
         raise InvalidInput(f"{name}.points: needs elements at different places")
     as_wrap(entry.wrap, f"{name}.wrap")
-    return entry
+    return replace(entry, points=np.asarray(points, np.float64))
+
+
+def remember(cache: Cache[bytes, T], entry: Elements, rest: object, make: Callable[[], T]) -> T:
+    """Return what was made of an entry's mask, points, layout and wrap, and of the rest, made now unless it is kept."""
+    key = content_hash(np.packbits(entry.mask), entry.points, entry.mask.shape, entry.layout, entry.wrap, rest)
+    return cache.get_or_make(key, make)

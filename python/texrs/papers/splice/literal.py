@@ -17,65 +17,52 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._typing import Bools
-from texrs.elements import Elements, Layout
+from texrs.elements import Elements
 from texrs.errors import InvalidInput
-from texrs.layouts import nearest
-from texrs.papers.splice.layout import Match, aligned
+from texrs.layouts import nearest_distances
+from texrs.papers.splice.extension import extend
+from texrs.papers.splice.matching import Match, find_turns
 from texrs.papers.splice.refine import Draft
-from texrs.papers.splice.source import extend
-from texrs.papers.splice.warp import stretched
 
-__all__ = ["literal_field", "literal_fill", "literal_match"]
+__all__ = ["fill_literally", "match_literally"]
 
 Points = NDArray[np.float64]
 
 NEIGHBOURS = 5
 
 
-def literal_match(a: Elements, b: Elements, size: tuple[int, int], *, align: bool) -> Match:
-    """Section 4.1: mean distances to the nearest points become one, centroids meet, lines of points are turned together."""
+def match_literally(a: Elements, b: Elements, size: tuple[int, int], *, align: bool) -> Match:
+    """Match as section 4.1 says: mean distances to the nearest points become one, centroids meet, lines are turned together."""
     from scipy.optimize import linear_sum_assignment
 
-    source = extend(a, size, 0, whole=False, exact=True)
-    source = replace(source, points=source.points[: source.own], of=source.of[: source.own])
-    theirs = np.asarray(b.points, np.float64)
-    scale = _mean(source.points) / _mean(theirs)
+    extension = extend(a, size, 0, whole=False, exact=True)
+    count = extension.originals
+    extension = replace(extension, points=extension.points[:count], element=extension.element[:count])
+    mine, theirs = extension.points, b.points
+    scale = _mean_distance(mine) / _mean_distance(theirs)
     best: Match | None = None
-    for angle in aligned(a, b) if align else [0.0]:
+    for angle in find_turns(a, b) if align else [0.0]:
         turn = math.radians(angle)
         matrix = scale * np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
-        wanted = (theirs - theirs.mean(axis=0)) @ matrix.T + source.points.mean(axis=0)
-        cost = np.hypot(*(wanted[:, None] - source.points[None]).transpose(2, 0, 1))
+        wanted = (theirs - theirs.mean(axis=0)) @ matrix.T + mine.mean(axis=0)
+        cost = np.hypot(*(wanted[:, None] - mine[None]).transpose(2, 0, 1))
         rows, columns = linear_sum_assignment(cost)
         mean = float(cost[rows, columns].mean())
         if best is None or mean < best.cost:
-            best = Match(wanted[rows], source, columns, scale, angle, 1.0, mean)
+            best = Match(wanted[rows], extension, columns, scale, angle, 1.0, mean)
     assert best is not None  # the first turn is always tried
     return best
 
 
-def _mean(points: Points) -> float:
+def _mean_distance(points: Points) -> float:
     count = min(NEIGHBOURS, len(points) - 1)
     if count < 1:
         raise InvalidInput("a: has too few elements for a layout")
-    return float(nearest(points, count).mean())
+    return float(nearest_distances(points, count).mean())
 
 
-def literal_field(a: Elements, found: Match) -> tuple[Points, Bools, Bools]:
-    """Section 4.2: Eq. 5 for every layout."""
-    source = found.source
-    shape, origin = source.mask.shape, np.array(source.origin)
-    rigid = ~source.mask if a.layout == Layout.JOINTED else source.mask
-    pins = np.rint(source.points[found.of]).astype(np.intp) - origin
-    inside = ((pins >= 0) & (pins < np.array(shape))).all(axis=1)
-    delta = stretched(rigid, pins[inside], found.shift[inside], upright=a.layout == Layout.JOINTED)
-    grid = np.moveaxis(np.indices(shape), 0, -1) + origin
-    return grid + delta, rigid, np.zeros(shape, bool)
-
-
-def literal_fill(draft: Draft, seed: int) -> Draft:
-    """Section 4.3: holes take a pixel at random that is not rigid; then everything may change."""
+def fill_literally(draft: Draft, seed: int) -> Draft:
+    """Fill as section 4.3 says: holes take a pixel at random that is not rigid; then everything may change."""
     places, holes = draft.places.copy(), ~draft.known
     ground = np.argwhere(draft.kinds == 0)
     places[holes] = ground[np.random.default_rng(seed).integers(len(ground), size=np.count_nonzero(holes))]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_image, to_unit
 from texrs._typing import Array, Bools
 from texrs.elements import Elements
-from texrs.papers.splice.layout import Match
+from texrs.papers.splice.matching import Match
 from texrs.papers.splice.refine import Draft
 
 __all__ = ["Stages"]
@@ -29,28 +29,26 @@ class Stages(Mapping[str, Array]):
         self,
         a: Elements,
         b: Elements | None,
-        found: Match,
+        match: Match,
         target: Points,
         draft: Draft,
-        full: Draft,
+        filled: Draft,
         image: Array,
     ) -> None:
-        source = found.source
-        origin = np.array(source.origin)
+        extension = match.extension
+        origin = np.array(extension.origin)
         shown = picture(a.image)
-        self._draw: dict[str, Callable[[], Array]] = {"points of a": lambda: marked(shown, a.points, RED)}
+        self._draw: dict[str, Callable[[], Array]] = {"points of a": lambda: mark_points(shown, a.points, RED)}
         if b is not None:
-            self._draw["points of b"] = lambda: marked(picture(b.image), b.points, BLUE)
+            self._draw["points of b"] = lambda: mark_points(picture(b.image), b.points, BLUE)
         self._draw |= {
-            "mask": lambda: masked(shown, a.mask),
-            "matching": lambda: lines(
-                shown[source.table[..., 0], source.table[..., 1]],
-                source.points[found.of] - origin,
-                found.targets - origin,
+            "mask": lambda: dim_ground(shown, a.mask),
+            "matching": lambda: draw_lines(
+                shown[extension.pixel[..., 0], extension.pixel[..., 1]], match.starts - origin, match.targets - origin
             ),
-            "warped mesh": lambda: meshed(target, source.mask, draft.known.shape),
-            "before refinement": lambda: before(shown, draft),
-            "filled": lambda: shown[full.places[..., 0], full.places[..., 1]],
+            "warped mesh": lambda: draw_mesh(target, extension.mask, draft.known.shape),
+            "before refinement": lambda: show_draft(shown, draft),
+            "filled": lambda: shown[filled.places[..., 0], filled.places[..., 1]],
             "composite": lambda: image,
         }
         self._drawn: dict[str, Array] = {}
@@ -77,7 +75,7 @@ def picture(image: Array) -> Picture:
     return np.rint(colours * 255).astype(np.uint8)
 
 
-def marked(image: Picture, points: Points, colour: tuple[int, int, int]) -> Picture:
+def mark_points(image: Picture, points: Points, colour: tuple[int, int, int]) -> Picture:
     """Draw a ring around each point."""
     out = image.copy()
     angles = np.linspace(0, 2 * np.pi, 24, endpoint=False)
@@ -87,20 +85,20 @@ def marked(image: Picture, points: Points, colour: tuple[int, int, int]) -> Pict
     return out
 
 
-def masked(image: Picture, mask: Bools) -> Picture:
+def dim_ground(image: Picture, mask: Bools) -> Picture:
     """Show the ground dimmed."""
     return np.where(mask[..., None], image, (image // 3 + np.array(BLUE) // 3).astype(np.uint8)).astype(np.uint8)
 
 
-def lines(image: Picture, start: Points, end: Points) -> Picture:
+def draw_lines(image: Picture, start: Points, end: Points) -> Picture:
     """Draw from each element to its target."""
     out = (image // 2 + 100).astype(np.uint8)
     share = np.linspace(0, 1, 200)[None, :, None]
     _put(out, np.rint(start[:, None] * (1 - share) + end[:, None] * share).astype(np.intp).reshape(-1, 2), GREEN)
-    return marked(marked(out, start, RED), end, BLUE)
+    return mark_points(mark_points(out, start, RED), end, BLUE)
 
 
-def meshed(target: Points, mask: Bools, size: tuple[int, ...], step: int = 8) -> Picture:
+def draw_mesh(target: Points, mask: Bools, size: tuple[int, ...], step: int = 8) -> Picture:
     """Draw every so manieth line of the warped mesh, darker where the texture's foreground is."""
     out = np.full((*size, 3), 255, np.uint8)
     for of, places in ((mask[::step], target[::step]), (mask[:, ::step], target[:, ::step])):
@@ -109,7 +107,7 @@ def meshed(target: Points, mask: Bools, size: tuple[int, ...], step: int = 8) ->
     return out
 
 
-def before(image: Picture, draft: Draft) -> Picture:
+def show_draft(image: Picture, draft: Draft) -> Picture:
     """Show the warp, with its holes."""
     out: Picture = image[draft.places[..., 0], draft.places[..., 1]].copy()
     out[~draft.known] = HOLE

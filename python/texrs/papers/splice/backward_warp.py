@@ -1,0 +1,138 @@
+"""The backward warp of `texrs.papers.splice` (Figure 6): which pixel of the extended texture is behind each of the output.
+
+The dense mesh of the deformed texture is drawn, or, for previews and for edits that list moved points, triangles between the
+elements.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._progress import stage
+from texrs._typing import Bools, Floats, Progress
+from texrs.elements import Elements, Layout
+from texrs.kernels.warp import from_points, mesh
+from texrs.papers.splice.deformation import Deformation, deform, deform_by_energy, removal_mask, rigid_shifts
+from texrs.papers.splice.matching import Match
+
+__all__ = ["BackwardWarp", "warp_backwards"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BackwardWarp:
+    """W_BA: what of the extended texture each pixel of an output shows.
+
+    Attributes
+    ----------
+    place : (h, w, 2) intp
+        The pixel of the extension.
+    known : (h, w) bool
+        Where there is one.
+    target : (H, W, 2) float64
+        Where each pixel of the extension goes.
+    triangles, flipped, flipped_rigid : int
+        Of the dense mesh: all, those turned over, and those of them that are rigid. 0 where none was drawn.
+
+    """
+
+    place: NDArray[np.intp]
+    known: Bools
+    target: NDArray[np.float64]
+    triangles: int = 0
+    flipped: int = 0
+    flipped_rigid: int = 0
+
+
+def warp_backwards(
+    a: Elements, match: Match, size: tuple[int, int], *, method: str | None, listed: bool, progress: Progress
+) -> BackwardWarp:
+    """Deform the texture and draw it into an output of that size.
+
+    Parameters
+    ----------
+    a : Elements
+        The texture.
+    match : Match
+        Which of its elements goes where.
+    size : (int, int)
+        Rows and columns of the output.
+    method : {None, "paper", "preview"}
+        As of `texrs.splice`.
+    listed : bool
+        Whether the match is an edit that only lists moved points: then what moves changes its neighbourhood alone.
+    progress : callable
+        Called as ``progress(stage, share)``.
+
+    """
+    if method == "preview":
+        return _draw_preview(match, size)
+    if method is None and listed and a.layout == Layout.DISJOINT:
+        return _draw_elements(match, size)
+    if method == "paper":
+        return _draw_mesh(deform_by_energy(a, match), size, stage(progress, "warp"))
+    progress("deform", 0.0)
+    deformation = deform(a, match)
+    progress("deform", 1.0)
+    return _draw_mesh(deformation, size, stage(progress, "warp"))
+
+
+def _draw_mesh(
+    deformation: Deformation, size: tuple[int, int], progress: Callable[[float], object] | None
+) -> BackwardWarp:
+    """Draw the dense mesh: the rows and columns of it that come into the output."""
+    target, rigid = deformation.target, deformation.rigid
+    seen = np.ones(rigid.shape, bool)
+    for axis in range(2):
+        seen &= (target[..., axis] > -2) & (target[..., axis] < size[axis] + 1)
+    part, first = (slice(None), slice(None)), (0, 0)
+    if seen.any():
+        (top, bottom), (left, right) = (np.flatnonzero(seen.any(axis=1 - a))[[0, -1]].tolist() for a in range(2))
+        first = (max(top - 1, 0), max(left - 1, 0))
+        part = (slice(first[0], bottom + 2), slice(first[1], right + 2))
+    drawn = mesh(target[part], rigid[part], void=deformation.removed[part], size=size, progress=progress)
+    place = _nearest_pixels(drawn.coordinates, rigid[part].shape) + first
+    return BackwardWarp(place, drawn.covered, target, drawn.triangles, drawn.flipped, drawn.flipped_heavy)
+
+
+def _draw_preview(match: Match, size: tuple[int, int]) -> BackwardWarp:
+    """Draw triangles between the matched elements."""
+    extension = match.extension
+    origin = np.array(extension.origin)
+    loose = from_points(match.starts - origin, match.targets, extension.mask.shape, size=size)
+    target = np.moveaxis(np.indices(extension.mask.shape), 0, -1) + origin * 1.0
+    return BackwardWarp(_nearest_pixels(loose.coordinates, extension.mask.shape), loose.triangle > 0, target)
+
+
+def _draw_elements(match: Match, size: tuple[int, int]) -> BackwardWarp:
+    """Draw the ground as triangles between the elements, and these whole above it."""
+    extension = match.extension
+    shape, origin = np.array(extension.mask.shape), np.array(extension.origin)
+    shift = rigid_shifts(match)
+    corners = np.array([[y, x] for y in (0, shape[0] - 1) for x in (0, shape[1] - 1)], float)
+    start = np.concatenate([extension.points - origin, corners])
+    end = np.concatenate([extension.points + shift, corners + origin])
+    loose = from_points(start, end, (int(shape[0]), int(shape[1])), size=size)
+    place = _nearest_pixels(loose.coordinates, extension.mask.shape)
+    ground = (extension.instance == 0) & ~removal_mask(extension, match.assigned)
+    known = (loose.triangle > 0) & ground[place[..., 0], place[..., 1]]
+    moved = np.zeros((len(shift) + 1, 2), np.intp)
+    moved[1:] = shift
+    used = np.zeros(len(moved), bool)
+    used[match.assigned + 1] = True
+    pixels = np.argwhere(used[extension.instance])
+    goal = pixels + origin + moved[extension.instance[tuple(pixels.T)]]
+    seen = ((goal >= 0) & (goal < np.array(size))).all(axis=1)
+    place[tuple(goal[seen].T)] = pixels[seen]
+    known[tuple(goal[seen].T)] = True
+    target = np.moveaxis(np.indices(extension.mask.shape), 0, -1) + origin + moved[extension.instance] * 1.0
+    return BackwardWarp(place, known, target)
+
+
+def _nearest_pixels(coordinates: Floats, shape: tuple[int, ...]) -> NDArray[np.intp]:
+    """Return the nearest pixels, which lie inside."""
+    places = np.floor(coordinates + np.float32(0.5)).astype(np.intp)
+    return np.asarray(np.clip(places, 0, np.array(shape[:2]) - 1), np.intp)

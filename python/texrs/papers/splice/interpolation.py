@@ -1,0 +1,121 @@
+"""Harmonic interpolation of displacements: the ground between disjoint elements in `texrs.papers.splice`.
+
+The limit of Eq. 5 for lambda_G and lambda_R without bound and epsilon = 0: each element moves by its own pin alone. What
+is left is the ground, whose displacement is harmonic: no pixel moves further than the elements around it. It is so
+smooth that it is solved for at every other pixel; the rest are made even with the ones beside them.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._cache import content_hash
+from texrs._typing import Bools
+from texrs.papers.splice.factors import factorise
+
+__all__ = ["STEP", "interpolate"]
+
+STEP = 2
+"""Of the pixels between disjoint elements those are solved for whose row and column are multiples of this."""
+ROUNDS = 2
+"""Rounds in which the ground between the pixels that it is solved for is smoothed."""
+
+
+def interpolate(held: Bools, given: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Return the displacement of every pixel where some are constrained, and the rest goes along smoothly.
+
+    Parameters
+    ----------
+    held : (H, W) bool
+        Pixels whose displacement is given: elements; elsewhere is ground.
+    given : (2, H, W) float32
+        How far they move along rows and columns.
+
+    Returns
+    -------
+    (H, W, 2) float64
+
+    """
+    out = np.empty((*held.shape, 2))
+    # One for all: to fetch new memory takes longer than to compute what is in it.
+    wide = np.empty((held.shape[0] + 2, held.shape[1] + 2), np.float32)
+    for axis, coarse in enumerate(_solve_laplace(held[::STEP, ::STEP], given[:, ::STEP, ::STEP])):
+        field = _upsample(coarse, held.shape)
+        np.copyto(field, given[axis], where=held)
+        for _ in range(ROUNDS):
+            _smooth(field, wide)
+            np.copyto(field, given[axis], where=held)
+        out[..., axis] = field
+    return out
+
+
+def _solve_laplace(held: Bools, given: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Return the displacement that is at each pixel of the ground the mean of those beside it."""
+    shape, free = held.shape, ~held
+    out = np.where(held, given, 0.0).astype(np.float64)
+    if not free.any():
+        return out
+    key = content_hash("interpolate", np.packbits(free), shape)
+    solver = factorise({key: lambda: _laplacian(free)})[key]
+    flow = np.zeros((2, *shape))
+    # What an element's pixel hands to the ground beside it; the ground itself has nothing yet.
+    flow[:, :-1] += out[:, 1:]
+    flow[:, 1:] += out[:, :-1]
+    flow[:, :, :-1] += out[:, :, 1:]
+    flow[:, :, 1:] += out[:, :, :-1]
+    out[:, free] = solver.solve(flow[:, free].T).T
+    return out
+
+
+def _upsample(coarse: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """Return the pixels between those that are known at every other one."""
+    out = coarse.astype(np.float32)
+    for axis in range(2):
+        sides = (shape[0], shape[1] if axis else out.shape[1])
+        whole = np.empty(sides, np.float32)
+        c, fine = (np.moveaxis(x, axis, 0) for x in (out, whole))
+        fine[::2] = c
+        fine[1::2] = c[: shape[axis] // 2]
+        between = fine[1:-1:2]
+        np.add(c[: len(between)], c[1 : len(between) + 1], out=between)
+        between /= 2
+        out = whole
+    return out
+
+
+def _smooth(field: NDArray[np.float32], wide: NDArray[np.float32]) -> None:
+    """Set each pixel to the mean of the four beside it; beyond the border, in ``wide``, the field goes on as it is."""
+    wide[1:-1, 1:-1] = field
+    wide[0, 1:-1], wide[-1, 1:-1] = field[0], field[-1]
+    wide[1:-1, 0], wide[1:-1, -1] = field[:, 0], field[:, -1]
+    np.add(wide[:-2, 1:-1], wide[2:, 1:-1], out=field)
+    field += wide[1:-1, :-2]
+    field += wide[1:-1, 2:]
+    field *= 0.25
+
+
+def _laplacian(free: Bools) -> Any:
+    """Return the sparse matrix of the Laplace equation at the free pixels, the others being given."""
+    from scipy.sparse import coo_array
+
+    count = int(np.count_nonzero(free))
+    number = np.full(free.shape, -1, np.int64)
+    number[free] = np.arange(count)
+    degree = np.zeros(free.shape)
+    rows, columns = [], []
+    for axis in range(2):
+        d, n = (np.moveaxis(a, axis, 0) for a in (degree, number))
+        f: Bools = np.moveaxis(free, axis, 0)
+        d[:-1] += 1
+        d[1:] += 1
+        both = f[:-1] & f[1:]
+        columns.append(n[:-1][both])
+        rows.append(n[1:][both])
+    below, left = np.concatenate(rows), np.concatenate(columns)
+    own = np.arange(count)
+    values = np.concatenate([degree[free], np.full(len(below), -1.0)])
+    at = (np.concatenate([own, np.maximum(below, left)]), np.concatenate([own, np.minimum(below, left)]))
+    return coo_array((values, at), shape=(count, count)).tocsc()

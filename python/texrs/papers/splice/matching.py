@@ -1,0 +1,231 @@
+"""Which element goes where in `texrs.papers.splice`: section 4.1.
+
+The layout of B is brought to the spacing of A, turned so that lines of points agree, let go on to cover the output, and
+matched with elements of A.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._cache import Cache
+from texrs.elements import Elements, Layout
+from texrs.errors import InvalidInput
+from texrs.layouts import PointLayout, directions, match_points, nearest_distances, spacing
+from texrs.papers.splice.edit import Step, apply_steps
+from texrs.papers.splice.entry import remember
+from texrs.papers.splice.extension import Extension, count_elements, extend
+from texrs.papers.splice.foreground import split_foreground
+
+__all__ = ["Match", "element_points", "find_turns", "match_edit", "match_layouts"]
+
+Points = NDArray[np.float64]
+
+BEYOND = 0.6
+"""Targets lie up to so many spacings outside of the output."""
+MARGIN = 1.4
+"""The texture goes on for so many of its spacings beyond the output, or for more."""
+WIDEST = 8.0
+"""Spacings beyond which no element is fetched."""
+SPARE = 1.2
+"""Elements there should be for each target."""
+TURN = 0.75
+"""A turn must cost so much less than a smaller one: lattices have several that cost nearly the same."""
+OFFSETS, NEARER = 6, 0.9
+"""Offsets of a connected figure's layout that are tried along each axis, and how much less one must cost."""
+ROOM = 1.08
+"""Least distance of elements in their diameters."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Match:
+    """Which element goes where.
+
+    Attributes
+    ----------
+    targets : (n, 2) float64
+        Where elements are to be, in the output, and around it.
+    extension : Extension
+        The texture beyond its borders.
+    assigned : (n) int
+        Which of the extension's points goes to each target.
+    scale, angle, gain : float
+        What B's layout was scaled and turned (degrees) by; the part of the scale that gives elements room.
+    cost : float
+        Mean squared distance of an element from its target.
+
+    """
+
+    targets: Points
+    extension: Extension
+    assigned: NDArray[np.intp]
+    scale: float
+    angle: float
+    gain: float
+    cost: float
+
+    @property
+    def starts(self) -> Points:
+        """Where each matched element comes from, in the output."""
+        return self.extension.points[self.assigned]
+
+    @property
+    def shift(self) -> Points:
+        """How far each matched element goes."""
+        return self.targets - self.starts
+
+    def report(self) -> dict[str, Any]:
+        """Return what was decided, in JSON types."""
+        return {
+            "scale": round(self.scale, 6),
+            "angle": round(self.angle, 6),
+            "gain": round(self.gain, 6),
+            "targets": len(self.targets),
+            "candidates": len(self.extension.points),
+            "cost": round(self.cost, 6),
+        }
+
+
+def element_points(entry: Elements) -> Points:
+    """Return the elements that may be moved: also foreground that none was found for, where elements are disjoint."""
+    disjoint = entry.layout == Layout.DISJOINT
+    return split_foreground(entry).points if disjoint else entry.points
+
+
+def match_layouts(a: Elements, b: Elements, size: tuple[int, int], *, align: bool) -> Match:
+    """Match the elements of A with B's layout."""
+    unit = spacing(a.points)
+    layout = remember(_LAYOUTS, b, None, lambda: PointLayout.of(b.points, b.mask.shape, b.wrap, beyond=True))
+    scale, gain, disjoint = unit / layout.scale, 1.0, a.layout == Layout.DISJOINT
+    if disjoint:
+        gain = _room_gain(a, scale * nearest_distances(layout.points, 1)[:, 0])
+    beyond = BEYOND * unit
+    turns = find_turns(a, b) if align else [0.0]
+    asked = [_place_targets(layout, scale * gain, angle, size, beyond) for angle in turns]
+    if not all(len(wanted) for wanted in asked):
+        raise InvalidInput("b: its layout has no point within the output")
+    most = max(len(wanted) for wanted in asked)
+    extension = _extend_until(a, size, unit, SPARE * most)
+    if len(extension.points) < most:
+        raise InvalidInput(
+            f"a: {len(extension.points)} of its elements lie within reach, {most} are needed; "
+            "take a smaller size or a larger picture"
+        )
+    best: Match | None = None
+    for angle, wanted in zip(turns, asked, strict=True):
+        assigned, cost = match_points(extension.points, wanted)
+        if best is None or cost < TURN * best.cost:
+            best = Match(wanted, extension, assigned, scale * gain, angle, gain, cost)
+    assert best is not None  # no turn is always among them
+    if disjoint:
+        return best
+    for offset in _find_offsets(extension.points, best.targets, unit):
+        wanted = _place_targets(layout, scale, best.angle, size, beyond, offset)
+        if 0 < len(wanted) <= len(extension.points):
+            assigned, cost = match_points(extension.points, wanted)
+            if cost < NEARER * best.cost:
+                best = replace(best, targets=wanted, assigned=assigned, cost=cost)
+    return best
+
+
+def find_turns(a: Elements, b: Elements) -> list[float]:
+    """Return the turns, in degrees, that bring a direction in which B's points line up to one of A's; none is the first."""
+    mine, theirs = (t.directions or remember(_DIRECTIONS, t, None, partial(directions, t.points)) for t in (a, b))
+    # Lines have no sense of direction: angles are those within a quarter turn.
+    turns = {round((p - q + 90) % 180 - 90, 6) for p in mine[:3] for q in theirs[:3]}
+    return [0.0, *sorted(turns - {0.0}, key=lambda t: (abs(t), t))]
+
+
+def _room_gain(a: Elements, distances: Points) -> float:
+    """Return what a layout must grow by so that disjoint elements have room; ``distances``: to the nearest, at A's spacing."""
+    parts = split_foreground(a)
+    area = np.bincount(parts.core.ravel(), minlength=len(parts.points) + 1)[1:][parts.whole]
+    if not len(area):
+        return 1.0
+    # Not the largest and the nearest: the few that still collide are pushed apart, and the rest stay dense.
+    diameter = 2 * math.sqrt(float(np.percentile(area, 75)) / math.pi)
+    return max(1.0, ROOM * diameter / max(float(np.percentile(distances, 25)), 1e-9))
+
+
+def _place_targets(
+    layout: PointLayout,
+    scale: float,
+    angle: float,
+    size: tuple[int, int],
+    beyond: float,
+    offset: Points | float = 0.0,
+) -> Points:
+    """Scale and turn a layout about its centroid into the middle of an output, or beside it, and cover that and a margin."""
+    turn = math.radians(angle)
+    matrix = scale * np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
+    centre, middle = layout.points.mean(axis=0), (np.array(size) - 1) / 2 + offset
+    low, high = np.full(2, -beyond), np.array(size) - 1 + beyond
+    box = np.array([[y, x] for y in (low[0], high[0]) for x in (low[1], high[1])])
+    back = (box - middle) @ np.linalg.inv(matrix).T + centre
+    found = layout.within(back.min(axis=0), back.max(axis=0))[0]
+    moved = (found - centre) @ matrix.T + middle
+    return np.asarray(moved[((moved >= low) & (moved <= high)).all(axis=1)], np.float64)
+
+
+def _find_offsets(points: Points, wanted: Points, unit: float) -> Points:
+    """Return the few offsets of a layout, within half a spacing, at which its points lie nearest to elements.
+
+    What is connected is bent the less the less far its elements go, and where in a layout the output lies is nobody's wish.
+    """
+    from scipy.spatial import cKDTree
+
+    steps = (np.arange(OFFSETS) - OFFSETS // 2) * (unit / OFFSETS)
+    tried = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+    tree = cKDTree(points)
+    costs = [float((tree.query(wanted + offset)[0] ** 2).mean()) for offset in tried]
+    return np.asarray(tried[np.argsort(costs, kind="stable")[:3]], np.float64)
+
+
+def _extend_until(a: Elements, size: tuple[int, int], unit: float, needed: float) -> Extension:
+    """Let a texture go on so far that it has as many elements as are needed, or nearly without end."""
+    margin = MARGIN
+    while count_elements(a, size, math.ceil(margin * unit)) < needed and margin < WIDEST:
+        margin *= 1.4
+    return extend(a, size, math.ceil(margin * unit))
+
+
+# --- edits -----------------------------------------------------------------------------------------------------------
+
+
+def match_edit(a: Elements, steps: Sequence[Step]) -> tuple[Match, bool]:
+    """Match a texture with its own layout, edited; also tell whether the edit only lists moved points."""
+    points = element_points(a)
+    trial = apply_steps(points, len(points), steps, len(a.points))
+    shrink = math.prod(min(1.0, float(np.min(s.get("factor", 1.0)))) for s in steps if s["op"] == "scale")
+    far = float(np.abs(trial.points - points).max()) / shrink
+    size = (a.mask.shape[0], a.mask.shape[1])
+    if far > 4 * max(size):
+        raise InvalidInput(f"edit: moves elements by up to {far:.0f} pixels, four times the picture's size is allowed")
+    extension = extend(a, size, math.ceil(MARGIN * spacing(points) + far), whole=False, exact=shrink == 1)
+    edited = apply_steps(extension.points, extension.originals, steps, len(a.points))
+    kept = edited.kept.copy()
+    if a.layout == Layout.DISJOINT:
+        shift = edited.points - extension.points
+        cut = split_foreground(a).cut[extension.element]
+        # The straight edge of an element that the border cuts must not come into the picture.
+        # But where all goes one way the picture is moved as it is.
+        together = bool((np.ptp(shift, axis=0) < 1e-9).all())
+        inwards = (cut[:, :, 0] & (shift > 0.5)) | (cut[:, :, 1] & (shift < -0.5))
+        kept[: extension.originals] &= together | ~inwards[: extension.originals].any(axis=1)
+    assigned = np.flatnonzero(kept)
+    if not len(assigned):
+        raise InvalidInput("edit: leaves no element")
+    moved = edited.points[assigned]
+    cost = float(((moved - extension.points[assigned]) ** 2).sum(axis=1).mean())
+    return Match(moved, extension, assigned, 1.0, 0.0, 1.0, cost), edited.listed
+
+
+_DIRECTIONS: Cache[bytes, tuple[float, ...]] = Cache(64)
+_LAYOUTS: Cache[bytes, PointLayout] = Cache(64)
