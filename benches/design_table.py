@@ -116,7 +116,7 @@ def row(name: str, image: np.ndarray, records: dict[str, Any], results: list[Any
     cells = [
         f"{name} {image.shape[1]}x{image.shape[0]}",
         str(report["elements"]),
-        report["children"] + (", not turned" if report.get("rotate") == 0 else ""),
+        report["kind"] + (", not turned" if report.get("rotate") == 0 else ""),
         *(cell(records[n]) for n in HEAD),
         "pass" if not failed else f"fails {', '.join(failed)}",
         f"{seconds:.1f}",
@@ -151,7 +151,7 @@ def main() -> None:
     options = parser.parse_args()
     folder = os.environ.get("TEXRS_TEXTURES")
     textures = in_folder(Path(folder), options.crop) if folder else generated(options.crop)
-    head = ("texture", "elements", "children", *HEAD, "verdict", "seconds")
+    head = ("texture", "elements", "kind", *HEAD, "verdict", "seconds")
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     print(*lines, sep="\n", flush=True)
     for name, image, labels in textures:

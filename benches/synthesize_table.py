@@ -26,6 +26,7 @@ import evaluators
 import texrs
 
 SIDE = 256
+STILL = texrs.DeformationOptions(operations=0, mirror=False)
 
 
 def middle(image: np.ndarray) -> np.ndarray:
@@ -64,7 +65,7 @@ def results(image: np.ndarray, options: argparse.Namespace) -> Iterator[tuple[st
     for seed in range(1, options.seeds + 1):
         yield "texrs", seed, texrs.synthesize(image, size, seed=seed, quality=options.quality).image
         if options.peers:
-            plain = texrs.design(image, size, seed=seed, operations=0, tiles=1, mirror=False, blend=None)
+            plain = texrs.design(image, size, seed=seed, tiles=1, deformation=STILL, blend=None)
             yield "quilting", seed, plain.image
     if options.resynthesizer:
         yield "resynthesizer", 1, by_resynthesizer(options.resynthesizer, image)

@@ -14,10 +14,11 @@ import texrs
 from texrs.demo import _html as html
 
 CROP, SEED = 256, 7
+STILL = texrs.DeformationOptions(operations=0, mirror=False)
 BUILT_IN = ("pebbles", "leaves_and_flowers", "beans", "dots", "tilted_discs", "bark")
 WAYS = {
     "texrs.design": {},
-    "plain quilting (nothing deformed)": {"operations": 0, "tiles": 1, "mirror": False, "blend": None},
+    "plain quilting (nothing deformed)": {"deformation": STILL, "tiles": 1, "blend": None},
     "as printed (method=paper)": {"method": "paper"},
 }
 

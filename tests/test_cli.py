@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import inspect
 import io
 import os
@@ -55,25 +56,20 @@ def complaint(capture: Capture) -> str:
 
 
 def test_design_writes_what_the_function_makes(here: Path, capsys: Capture) -> None:
-    options = "--seed 3 --wrap x --layers 2 --children grid --translate 0.1 --rotate 20 --scale 0.9:1.1 --no-mirror"
-    more = "--x0 0.3 --chaos 1.9 --patch 12 --tiles 2 --operations 1 --stages stages --source source.npz -o out.png"
+    options = "--seed 3 --wrap x --layers 2 --kind grid --translate 0.1 --rotate 20 --scale 0.9:1.1 --no-mirror"
+    more = "--start 0.3 --growth-rate 1.9 --patch 12 --tiles 2 --operations 1 --stages stages --source source.npz -o out.png"
     assert main(["design", "in.png", "--size", "40x56", *options.split(), *more.split()]) == 0
     expected = texrs.design(
         COLOURS,
         (40, 56),
         seed=3,
         wrap=(False, True),
-        layers=2,
-        children="grid",
-        translate=0.1,
-        rotate=20.0,
-        scale=(0.9, 1.1),
-        mirror=False,
-        x0=0.3,
-        chaos=1.9,
+        elements=texrs.ElementOptions(layers=2, kind="grid"),
+        deformation=texrs.DeformationOptions(
+            operations=1, translate=0.1, rotate=20.0, scale=(0.9, 1.1), mirror=False, start=0.3, growth_rate=1.9
+        ),
         patch=12,
         tiles=2,
-        operations=1,
     )
     assert (iio.imread("out.png") == expected.image).all()
     assert (SourceMap.load("source.npz").coordinates == expected.source.coordinates).all()
@@ -104,9 +100,11 @@ def test_same_command_same_bytes(here: Path, capsys: Capture) -> None:
 def test_defaults_are_those_of_the_function() -> None:
     ours = {p.name: p.default for p in typer.main.get_command(app).commands["design"].params}  # type: ignore[attr-defined]
     ours |= {"scale": (0.8, 1.2), "wrap": (True, True)} if ours["scale"] == "0.8:1.2" and ours["wrap"] == "xy" else {}
-    for name, parameter in inspect.signature(texrs.design).parameters.items():
-        if name not in ("exemplar", "progress", "keep"):
-            assert (None if ours[name] == "default" else ours[name]) == parameter.default, name
+    theirs = {name: parameter.default for name, parameter in inspect.signature(texrs.design).parameters.items()}
+    theirs |= dataclasses.asdict(theirs.pop("elements")) | dataclasses.asdict(theirs.pop("deformation"))
+    for name, default in theirs.items():
+        if name not in ("exemplar", "progress"):
+            assert (None if ours[name] == "default" else ours[name]) == default, name
 
 
 def test_several_examples_and_several_variants(here: Path, capsys: Capture) -> None:
@@ -154,10 +152,10 @@ def test_variants_that_are_made_stay_when_the_next_fails(
         made.append(make(*arguments))
         return made[-1]
 
-    # What `design` makes one texture with; the module of its name is hidden behind the function.
+    # What each texture is made with; the module of its name is hidden behind the function.
     module = sys.modules["texrs.papers.design"]
-    make = module.one
-    monkeypatch.setattr(module, "one", one)
+    make = module.make_texture
+    monkeypatch.setattr(module, "make_texture", one)
     command[-1], command[-3] = "t.npz", "tt"
     assert main([*command, "-o", "out.png"]) == code
     after = files(here)
@@ -178,7 +176,7 @@ def test_labels_by_hand(here: Path, capsys: Capture) -> None:
     iio.imwrite("labels.png", labels.astype(np.uint8))
     assert main(["design", "in.png", "--labels", "labels.png", *TINY, "-o", "out.png", "--stages", "s"]) == 0
     assert iio.imread("out.png").shape == (48, 48, 3)
-    assert '"children": "labels"' in Path("s/report.json").read_text()
+    assert '"kind": "labels"' in Path("s/report.json").read_text()
     before = files(here)
     capsys.readouterr()
     assert main(["design", "in.png", "--labels", "in.png", *TINY, "-o", "out.png"]) == 2
@@ -290,13 +288,13 @@ ARGUMENTS: dict[str, str] = {
     "scale words": "design in.png --scale a:b",
     "scale three": "design in.png --scale 0.8:1:1.2",
     "scale NaN": "design in.png --scale nan:1",
-    "chaos": "design in.png --chaos inf",
-    "fixed point": "design in.png --x0 0.5",
-    "x0": "design in.png --x0 1",
+    "growth rate": "design in.png --growth-rate inf",
+    "fixed point": "design in.png --start 0.5",
+    "start": "design in.png --start 1",
     "tiles": "design in.png --tiles 0",
     "threads": "design in.png --threads 0",
     "threads many": "design in.png --threads 99999",
-    "children": "design in.png --children some",
+    "kind": "design in.png --kind some",
     "layers": "design in.png --layers 99",
     "patch": "design in.png --patch 3",
     "blend": "design in.png --blend -1",
@@ -365,7 +363,7 @@ def test_outputs_are_checked_before_the_work(
 ) -> None:
     Path("folder.png").mkdir()
     before = files(here)
-    monkeypatch.setattr("texrs.cli.design", None)  # Would be an internal error.
+    monkeypatch.setattr("texrs.cli.design_variants", None)  # Would be an internal error.
     assert main(["design", "in.png", "-o", name]) == 2
     assert OUTPUTS[name] in complaint(capsys)
     assert main(["design", "in.png", "-o", "out.jpg", "--size", "65501x16"]) == 2
@@ -401,7 +399,7 @@ def test_failures_in_the_work(
     def fail(*args: object, **options: object) -> None:
         raise error
 
-    monkeypatch.setattr("texrs.cli.design", fail)
+    monkeypatch.setattr("texrs.cli.design_variants", fail)
     monkeypatch.setattr("texrs.cli._console.os.dup2", lambda *descriptors: None)
     before = files(here)
     assert main(["design", "in.png", "-o", "out.png", "--source", "s.npz", "--stages", "st"]) == code
@@ -413,7 +411,7 @@ def test_failures_in_the_work(
 
 
 def test_traceback_on_request(here: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("texrs.cli.design", None)
+    monkeypatch.setattr("texrs.cli.design_variants", None)
     monkeypatch.setenv("TEXRS_TRACEBACK", "1")
     assert main(["design", "in.png", "-o", "out.png"]) == 1
     assert "Traceback" in capsys.readouterr().err

@@ -69,9 +69,9 @@ def test_tile_writes_what_the_function_makes(here: Path, capsys: Capture, argume
 
 
 def test_complete_writes_what_the_function_makes(here: Path, capsys: Capture) -> None:
-    options = "--patch 10 --rim 2 --no-mirror --wrap x --seed 4 --stages stages --source s.npz"
+    options = "--patch 10 --boundary 2 --no-mirror --wrap x --seed 4 --stages stages --source s.npz"
     assert main(["complete", "in.png", "hole.png", "-o", "out.png", *options.split()]) == 0
-    expected = texrs.complete(COLOURS, HOLE, patch=10, rim=2, mirror=False, wrap=(False, True), seed=4)
+    expected = texrs.complete(COLOURS, HOLE, patch=10, boundary=2, mirror=False, wrap=(False, True), seed=4)
     assert (iio.imread("out.png") == expected.image).all()
     assert (SourceMap.load("s.npz").label == expected.source.label).all()
     assert (iio.imread("stages/01-known.png")[HOLE] == COLOURS[~HOLE].min()).all()
@@ -83,7 +83,7 @@ def test_complete_writes_what_the_function_makes(here: Path, capsys: Capture) ->
 def test_complete_from_another_picture_and_apply(here: Path) -> None:
     command = ["complete", "in.png", "hole.png", "--source-image", "other.png", "-o", "out.png", "--source", "s.npz"]
     assert main([*command, "-q"]) == 0
-    expected = texrs.complete(COLOURS, HOLE, source=iio.imread("other.png")).image
+    expected = texrs.complete(COLOURS, HOLE, exemplar=iio.imread("other.png")).image
     assert (iio.imread("out.png") == expected).all()
     assert main(["apply", "s.npz", "in.png", "other.png", "-o", "again.png", "-q"]) == 0
     assert (iio.imread("again.png") == expected).all()
@@ -119,7 +119,7 @@ def test_defaults_are_those_of_the_functions() -> None:
         ours = {p.name: p.default for p in command.params}
         ours["wrap"] = {"xy": (True, True), "none": False}[ours["wrap"]]
         for option, parameter in inspect.signature(function).parameters.items():
-            if option not in ("image", "hole", "source", "scale_map", "source_scale_map", "method", "progress"):
+            if option not in ("image", "hole", "exemplar", "scale_map", "exemplar_scale_map", "method", "progress"):
                 assert ours[option] == parameter.default, option
 
 
@@ -159,7 +159,7 @@ REFUSED = {
     "complete in.png lines.png": "lines.png: leaves no 4 x 4 pixels",
     "complete in.png hole.png --patch 65": "--patch: needs an integer from 4 to 64, got 65",
     "complete in.png hole.png --patch 60": "--patch: 60 has no place",
-    "complete in.png hole.png --rim -1": "--rim: needs",
+    "complete in.png hole.png --boundary -1": "--boundary: needs",
     "complete in.png hole.png --seed -1": "--seed: needs",
     "complete in.png hole.png --wrap yes": "--wrap: allowed are",
     "complete in.png hole.png --source-image hole.png": "hole.png: needs the dtype and channels of the image",

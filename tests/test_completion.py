@@ -9,8 +9,9 @@ import pytest
 
 import texrs
 from texrs import samples
-from texrs.completion import PLACES, corners
+from texrs.completion import PLACES
 from texrs.errors import Cancelled, InvalidInput
+from texrs.exemplar.patches import mark_corners
 
 PEBBLES = samples.pebbles((96, 112)).image
 
@@ -52,28 +53,28 @@ def test_holes_at_the_border_are_filled_across_it():
     np.testing.assert_array_equal(result.image, whole)
 
 
-@pytest.mark.parametrize("rim", [0, 3])
+@pytest.mark.parametrize("boundary", [0, 3])
 @pytest.mark.parametrize(
     "hole", [HOLE, disc((96, 112), (0, 0), 0.5), np.random.default_rng(0).random((96, 112)) < 0.01]
 )
-def test_known_pixels_stay_and_unknown_ones_are_not_copied(hole, rim):
-    result = texrs.complete(PEBBLES, hole, rim=rim, seed=3)
+def test_known_pixels_stay_and_unknown_ones_are_not_copied(hole, boundary):
+    result = texrs.complete(PEBBLES, hole, boundary=boundary, seed=3)
     row, column = places(result)
     assert not hole[row, column].any()
     own = (row == np.indices(row.shape)[0]) & (column == np.indices(row.shape)[1])
     assert not own[hole].any()
-    far = texrs.complete(PEBBLES, hole, rim=0).source.label == 0
+    far = texrs.complete(PEBBLES, hole, boundary=0).source.label == 0
     assert (far == ~hole).all()
     kept = result.source.label == 0
     assert own[kept].all()
-    assert (result.report["replaced_outside"] > 0) == (rim > 0)
+    assert (result.report["replaced_outside"] > 0) == (boundary > 0)
     np.testing.assert_array_equal(result.image, PEBBLES[row, column])
 
 
-def test_rim_is_not_exceeded():
+def test_the_boundary_is_not_exceeded():
     from scipy.ndimage import binary_dilation
 
-    result = texrs.complete(PEBBLES, HOLE, rim=4)
+    result = texrs.complete(PEBBLES, HOLE, boundary=4)
     assert (result.source.label[~binary_dilation(HOLE, np.ones((3, 3)), 4)] == 0).all()
 
 
@@ -129,7 +130,7 @@ def test_empty_hole_gives_the_image():
     np.testing.assert_array_equal(result.image, PEBBLES)
     assert result.source.reuse().regions == 1
     assert result.report["patches"] == 0
-    assert texrs.complete(PEBBLES, none, source=PEBBLES[:20]).source.shapes == ((96, 112), (20, 112))
+    assert texrs.complete(PEBBLES, none, exemplar=PEBBLES[:20]).source.shapes == ((96, 112), (20, 112))
 
 
 # --- another picture -------------------------------------------------------------------------------------------------
@@ -139,7 +140,7 @@ def test_empty_hole_gives_the_image():
 def test_source_is_the_second_exemplar(dtype):
     other = np.ascontiguousarray(samples.beans((64, 80)).image.astype(dtype))
     image = PEBBLES.astype(dtype)
-    result = texrs.complete(image, HOLE, source=other)
+    result = texrs.complete(image, HOLE, exemplar=other)
     assert result.source.shapes == ((96, 112), (64, 80))
     np.testing.assert_array_equal(result.source.exemplar, HOLE.astype(np.uint16))
     np.testing.assert_array_equal(result.source.render([image, other]), result.image)
@@ -150,10 +151,10 @@ def test_source_is_the_second_exemplar(dtype):
 
 def test_whole_image_from_a_source():
     everywhere = np.ones((40, 50), bool)
-    result = texrs.complete(np.full((40, 50, 3), np.nan, np.float32), everywhere, source=PEBBLES.astype(np.float32))
+    result = texrs.complete(np.full((40, 50, 3), np.nan, np.float32), everywhere, exemplar=PEBBLES.astype(np.float32))
     assert (result.source.exemplar == 1).all()
     assert result.image.shape == (40, 50, 3)
-    seeds = [texrs.complete(PEBBLES, np.ones((96, 112)) > 0, source=PEBBLES, seed=s).image for s in (1, 1, 2)]
+    seeds = [texrs.complete(PEBBLES, np.ones((96, 112)) > 0, exemplar=PEBBLES, seed=s).image for s in (1, 1, 2)]
     assert (seeds[0] == seeds[1]).all()
     assert (seeds[0] != seeds[2]).any()
 
@@ -161,7 +162,7 @@ def test_whole_image_from_a_source():
 def test_sources_of_floats_are_compared_in_one_range():
     ramp = np.tile(np.linspace(0, 10, 48, dtype=np.float32), (48, 1))
     hole = disc((48, 48))
-    result = texrs.complete(ramp, hole, source=ramp * 2)
+    result = texrs.complete(ramp, hole, exemplar=ramp * 2)
     # In a range of its own the doubled ramp would look like the ramp itself.
     assert np.abs(result.image - ramp)[hole].mean() < 1
 
@@ -207,7 +208,7 @@ def test_smaller_patches_where_few_places_are_free():
     grid[::9], grid[:, ::9] = True, True
     result = texrs.complete(PEBBLES, grid)
     assert result.report["patch"] == 8
-    assert corners(~grid, 8).sum() >= PLACES > corners(~grid, 9).sum()
+    assert mark_corners(~grid, 8).sum() >= PLACES > mark_corners(~grid, 9).sum()
     dense = np.zeros((96, 112), bool)
     dense[::5], dense[:, ::5] = True, True
     assert texrs.complete(PEBBLES, dense).report["patch"] == 4
@@ -222,7 +223,7 @@ def test_corners():
         for r in range(14 - side + 1):
             for c in range(11 - side + 1):
                 expected[r, c] = free[r : r + side, c : c + side].all()
-        np.testing.assert_array_equal(corners(free, side), expected)
+        np.testing.assert_array_equal(mark_corners(free, side), expected)
 
 
 # --- errors and running ----------------------------------------------------------------------------------------------
@@ -242,19 +243,24 @@ NAN = np.where(np.arange(96 * 112).reshape(96, 112) == 5, np.nan, 1.0)
             PEBBLES,
             np.ones_like(HOLE),
             {},
-            "hole: covers the whole image, so there is nothing to copy from; give a source",
+            "hole: covers the whole image, so there is nothing to copy from; give an exemplar",
         ),
-        (PEBBLES, EVERY_THIRD, {}, "hole: leaves no 4 x 4 pixels in one piece to copy from; give a source"),
+        (PEBBLES, EVERY_THIRD, {}, "hole: leaves no 4 x 4 pixels in one piece to copy from; give an exemplar"),
         (PEBBLES, HOLE, {"patch": 3}, "patch: needs an integer from 4 to 96, got 3"),
         (PEBBLES, HOLE, {"patch": 97}, "patch: needs an integer from 4 to 96, got 97"),
         (PEBBLES, HOLE, {"patch": 60}, "patch: 60 has no place in the image that is free of holes; at most 42 has one"),
-        (PEBBLES, EVERY_THIRD, {"patch": 12}, "nor has any other; give a source"),
-        (PEBBLES, HOLE, {"patch": 40, "source": PEBBLES[:30]}, "patch: needs an integer from 4 to 30, got 40"),
-        (PEBBLES, HOLE, {"source": PEBBLES[..., 0]}, "source: needs the dtype and channels of the image, uint8 and 3"),
-        (PEBBLES, HOLE, {"source": PEBBLES / 255}, "got float64 and 3"),
-        (PEBBLES, HOLE, {"source": PEBBLES[:3]}, "source: each side must be at least 4"),
+        (PEBBLES, EVERY_THIRD, {"patch": 12}, "nor has any other; give an exemplar"),
+        (PEBBLES, HOLE, {"patch": 40, "exemplar": PEBBLES[:30]}, "patch: needs an integer from 4 to 30, got 40"),
+        (
+            PEBBLES,
+            HOLE,
+            {"exemplar": PEBBLES[..., 0]},
+            "exemplar: needs the dtype and channels of the image, uint8 and 3",
+        ),
+        (PEBBLES, HOLE, {"exemplar": PEBBLES / 255}, "got float64 and 3"),
+        (PEBBLES, HOLE, {"exemplar": PEBBLES[:3]}, "exemplar: each side must be at least 4"),
         (PEBBLES, HOLE, {"method": "heal"}, "method: allowed are 'patch' and 'optimise', got 'heal'"),
-        (PEBBLES, HOLE, {"rim": -1}, "rim: needs an integer from 0"),
+        (PEBBLES, HOLE, {"boundary": -1}, "boundary: needs an integer from 0"),
         (PEBBLES, HOLE, {"mirror": 1}, "mirror: needs True or False"),
         (PEBBLES, HOLE, {"seed": -1}, "seed: needs"),
         (PEBBLES, HOLE, {"wrap": "xy"}, "wrap: needs"),
@@ -275,7 +281,7 @@ def test_the_image_is_not_changed():
     np.testing.assert_array_equal(image, PEBBLES)
     np.testing.assert_array_equal(hole, HOLE)
     everywhere, before = np.ones((96, 112), bool), image.copy()
-    texrs.complete(image, everywhere, source=PEBBLES)
+    texrs.complete(image, everywhere, exemplar=PEBBLES)
     np.testing.assert_array_equal(image, before)
 
 
@@ -296,7 +302,7 @@ def test_same_bytes_for_any_number_of_threads():
     made = []
     for count in (1, 2, 7):
         with texrs.threads(count):
-            made.append(texrs.complete(PEBBLES, HOLE, rim=2, seed=9))
+            made.append(texrs.complete(PEBBLES, HOLE, boundary=2, seed=9))
     for other in made[1:]:
         assert other.image.tobytes() == made[0].image.tobytes()
         assert other.source.coordinates.tobytes() == made[0].source.coordinates.tobytes()

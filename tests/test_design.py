@@ -1,17 +1,22 @@
 """DESIGN, end to end: honest stages, exact look-up, the same bytes for any number of threads."""
 
+import inspect
 import os
 import subprocess
 import sys
+from dataclasses import FrozenInstanceError
+from typing import get_overloads
 
 import numpy as np
 import pytest
 
 import texrs
-from texrs import samples
+from texrs import DeformationOptions, ElementOptions, samples
 from texrs.errors import Cancelled, InvalidInput, LimitExceeded
-from texrs.exemplar.segmentation import segment
-from texrs.papers.design.operations import Moves, Operation, chaotic_sequence, elements_of, place
+from texrs.exemplar import segment
+from texrs.papers.design.elements import measure_elements, place
+from texrs.papers.design.logistic_map import iterate
+from texrs.papers.design.operations import Moves, Operation
 
 
 @pytest.fixture(scope="module")
@@ -95,8 +100,8 @@ def test_elements_really_move(pebbles, result):
 
 def test_an_image_without_elements_takes_the_grid_and_says_so():
     made = texrs.design(samples.grit().image, 128, tiles=1)
-    assert made.report["children"] == "grid"
-    assert made.report["children_reason"]
+    assert made.report["kind"] == "grid"
+    assert made.report["reason"]
 
 
 def test_a_constant_image_gives_a_constant_result():
@@ -106,15 +111,16 @@ def test_a_constant_image_gives_a_constant_result():
 
 def test_labels_by_hand(pebbles):
     truth = samples.pebbles((128, 128)).labels
-    made = texrs.design(pebbles, 128, labels=truth, tiles=1)
-    assert made.report["children"] == "labels"
+    made = texrs.design(pebbles, 128, elements=ElementOptions(labels=truth), tiles=1)
+    assert made.report["kind"] == "labels"
     assert made.report["elements"] == truth.max()
 
 
 @pytest.mark.parametrize("channels", [slice(None), slice(1)], ids=["colours", "grey"])
 def test_the_segmentation_is_shown_in_colours_on_the_exemplar(pebbles, channels):
     truth = samples.pebbles((128, 128)).labels
-    shown = texrs.design(pebbles[..., channels], 64, labels=truth, tiles=1).stages["segmentation"]
+    marked = ElementOptions(labels=truth)
+    shown = texrs.design(pebbles[..., channels], 64, elements=marked, tiles=1).stages["segmentation"]
     assert shown.shape == (128, 128, 3)
     assert shown.dtype == np.uint8
     outline = np.zeros(truth.shape, bool)
@@ -138,22 +144,22 @@ def test_stages_are_saved(result, tmp_path):
 # --- deformation -----------------------------------------------------------------------------------------------------
 
 
-def test_chaotic_reference_values():
+def test_reference_values_of_the_logistic_map():
     expected = [194, 41, 241, 202, 67, 219, 123, 135, 111, 157, 60, 226]
-    assert [int(h) for h in chaotic_sequence(0.76234783, count=12)] == expected
+    assert [int(h) for h in iterate(0.76234783, count=12)] == expected
 
 
-@pytest.mark.parametrize("x0", [0.0, 0.5, -0.5, 1.0, -1.0, 0.5**0.5, 1.5, float("nan")])
-def test_absorbing_starts_are_refused(x0):
-    with pytest.raises(InvalidInput, match="^x0"):
-        chaotic_sequence(x0)
+@pytest.mark.parametrize("start", [0.0, 0.5, -0.5, 1.0, -1.0, 0.5**0.5, 1.5, float("nan")])
+def test_absorbing_starts_are_refused(start):
+    with pytest.raises(InvalidInput, match="^start"):
+        iterate(start)
 
 
 def test_drawn_operations_obey_their_limits():
-    moves = Moves(2, 0.12, 60.0, (0.8, 1.2), True, None, 2.0)
+    moves = Moves(DeformationOptions(rotate=60))
     counts = dict.fromkeys("TRMS", 0)
     for element in range(200):
-        for operation in moves.draw(moves.values(1, 0, element), (False, False), 100):
+        for operation in moves.draw_operations(moves.draw_values(1, 0, element), (False, False), 100):
             counts[operation.kind] += 1
             if operation.kind == "T":
                 assert abs(operation.amount) <= 12
@@ -162,8 +168,9 @@ def test_drawn_operations_obey_their_limits():
             if operation.kind == "S":
                 assert 0.8 <= operation.amount <= 1.2
     assert min(counts.values()) >= 40
-    still = Moves(2, 0.12, 0.0, (1.0, 1.0), False, None, 2.0)
-    kinds = {o.kind for e in range(50) for o in still.draw(still.values(1, 0, e), (False, False), 100)}
+    still = Moves(DeformationOptions(rotate=0, scale=(1, 1), mirror=False))
+    drawn = [still.draw_operations(still.draw_values(1, 0, e), (False, False), 100) for e in range(50)]
+    kinds = {o.kind for operations in drawn for o in operations}
     assert kinds <= {"T"}
 
 
@@ -175,7 +182,7 @@ def test_what_is_lit_from_one_side_is_not_mirrored():
         ("bark", samples.bark((192, 192)).image),
         ("noise", noise),
     ):
-        made = texrs.design(example, 192, seed=2, variants=3)
+        made = list(texrs.design_variants(example, 3, 192, seed=2))
         log = [entry for result in made for tile in result.report["operations"] for entry in tile]
         mirrors[name] = {tuple(entry["mirror"]) for entry in log if "mirror" in entry}
         assert name == "noise" or not any(o[0] == "M" for entry in log for o in entry.get("operations") or [])
@@ -184,17 +191,17 @@ def test_what_is_lit_from_one_side_is_not_mirrored():
 
 
 def test_elements_at_the_border_slide_along_it():
-    moves = Moves(2, 0.3, 60.0, (0.8, 1.2), True, None, 2.0)
+    moves = Moves(DeformationOptions(translate=0.3, rotate=60))
     for element in range(50):
-        for operation in moves.draw(moves.values(1, 0, element), (True, False), 100):
+        for operation in moves.draw_operations(moves.draw_values(1, 0, element), (True, False), 100):
             assert (operation.kind, operation.axis) == ("T", 1)
-        assert moves.draw(moves.values(1, 0, element), (True, True), 100) == []
+        assert moves.draw_operations(moves.draw_values(1, 0, element), (True, True), 100) == []
 
 
 def test_a_placed_element_keeps_its_shape():
     labels = np.zeros((60, 60), np.int32)
     labels[20:32, 24:44] = 1
-    element = elements_of(labels)[0]
+    element = measure_elements(labels)[0]
     turned = place(element, [Operation("R", 90.0, 0)], (60, 60))
     assert turned is not None
     rows, columns = np.nonzero(turned.distance > 0)
@@ -206,7 +213,7 @@ def test_a_placed_element_keeps_its_shape():
 def test_segmentation_finds_the_pebbles():
     sample = samples.pebbles()
     found = segment(sample.image)
-    assert found.children == "components"
+    assert found.kind == "components"
     whole = [np.bincount(sample.labels[found.elements == i]).argmax() for i in range(1, found.count + 1)]
     share = [
         (sample.labels[found.elements == i] == truth).mean() for i, truth in enumerate(whole, start=1) if truth > 0
@@ -296,19 +303,7 @@ PICTURE = np.zeros((32, 32, 3), np.uint8)
         ((PICTURE,), {"seed": 1.5}, "seed"),
         ((PICTURE,), {"wrap": "xy"}, "wrap"),
         ((PICTURE,), {"wrap": (True,)}, "wrap"),
-        ((PICTURE,), {"layers": 0}, "layers"),
-        ((PICTURE,), {"children": "cells"}, "children"),
-        ((PICTURE,), {"labels": np.zeros((3, 3), int)}, "labels"),
-        ((PICTURE,), {"labels": np.full((32, 32), -1)}, "labels"),
         ((PICTURE,), {"tiles": 0}, "tiles"),
-        ((PICTURE,), {"operations": 9}, "operations"),
-        ((PICTURE,), {"translate": 0.6}, "translate"),
-        ((PICTURE,), {"rotate": float("nan")}, "rotate"),
-        ((PICTURE,), {"scale": (1.2, 0.8)}, "scale"),
-        ((PICTURE,), {"scale": 1.0}, "scale"),
-        ((PICTURE,), {"mirror": "no"}, "mirror"),
-        ((PICTURE,), {"x0": 0.5}, "x0"),
-        ((PICTURE,), {"chaos": 2.5}, "chaos"),
         ((PICTURE,), {"patch": 64}, "patch"),
         ((PICTURE,), {"blend": -0.1}, "blend"),
         ((PICTURE,), {"blend": "strong"}, "blend"),
@@ -317,6 +312,111 @@ PICTURE = np.zeros((32, 32, 3), np.uint8)
 def test_bad_input_names_the_argument(arguments, options, names):
     with pytest.raises(InvalidInput, match=f"^{names}"):
         texrs.design(*arguments, **options)
+
+
+@pytest.mark.parametrize(
+    ("kind", "options"),
+    [
+        (ElementOptions, {"layers": 0}),
+        (ElementOptions, {"layers": 17}),
+        (ElementOptions, {"layers": 2.5}),
+        (ElementOptions, {"kind": "cells"}),
+        (ElementOptions, {"kind": None}),
+        (ElementOptions, {"labels": np.zeros((32, 32))}),
+        (ElementOptions, {"labels": np.full((32, 32), -1)}),
+        (ElementOptions, {"labels": "by hand"}),
+        (ElementOptions, {"labels": [np.zeros((32, 32), int), np.zeros((32, 32))]}),
+        (DeformationOptions, {"operations": 9}),
+        (DeformationOptions, {"translate": 0.6}),
+        (DeformationOptions, {"rotate": float("nan")}),
+        (DeformationOptions, {"rotate": 181}),
+        (DeformationOptions, {"scale": (1.2, 0.8)}),
+        (DeformationOptions, {"scale": 1.0}),
+        (DeformationOptions, {"scale": "12"}),
+        (DeformationOptions, {"scale": (0.4, 1)}),
+        (DeformationOptions, {"mirror": "no"}),
+        (DeformationOptions, {"start": 0.5}),
+        (DeformationOptions, {"start": 1}),
+        (DeformationOptions, {"growth_rate": 2.5}),
+    ],
+)
+def test_options_are_checked_when_they_are_made(kind, options):
+    (name,) = options
+    with pytest.raises(InvalidInput, match=f"^{name}"):
+        kind(**options)
+
+
+def test_options_are_frozen_and_keyword_only():
+    for kind, field in ((ElementOptions, "layers"), (DeformationOptions, "operations")):
+        with pytest.raises(TypeError):
+            kind(2)
+        with pytest.raises(FrozenInstanceError):
+            setattr(kind(), field, 3)
+
+
+@pytest.mark.parametrize("verb", [texrs.design, texrs.design_variants, texrs.complete, texrs.tile, texrs.blend])
+def test_a_type_checker_knows_every_option(verb):
+    """Overloads or ``**options`` would let a misspelt one pass."""
+    assert not get_overloads(verb)
+    parameters = inspect.signature(verb).parameters.values()
+    assert all(p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD) for p in parameters)
+    assert all(p.annotation not in (p.empty, "Any", "object") for p in parameters)
+
+
+def test_variants_are_checked_at_once_and_made_when_they_are_asked_for():
+    with pytest.raises(InvalidInput, match="^count"):
+        texrs.design_variants(PICTURE, 0)
+    with pytest.raises(InvalidInput, match="^tiles"):
+        texrs.design_variants(PICTURE, 2, tiles=0)
+    seen = []
+    found = texrs.design_variants(
+        samples.pebbles((64, 64)).image, 2, 64, seed=2**64 - 1, tiles=1, progress=lambda *told: seen.append(told)
+    )
+    assert not seen
+    first = next(found)
+    assert ("done", 1.0) not in seen
+    assert seen.count(("segment", 1.0)) == 1
+    second = next(found)
+    assert (first.report["seed"], second.report["seed"]) == (2**64 - 1, 0)
+    assert seen[-1] == ("done", 1.0)
+    assert seen.count(("segment", 1.0)) == 1
+    with pytest.raises(StopIteration):
+        next(found)
+
+
+def test_variants_are_those_of_their_seeds(pebbles):
+    made = list(texrs.design_variants(pebbles, 2, 96, seed=7, tiles=1))
+    for seed, result in enumerate(made, start=7):
+        np.testing.assert_array_equal(result.image, texrs.design(pebbles, 96, seed=seed, tiles=1).image)
+
+
+def test_an_exemplar_is_analysed_once(pebbles, monkeypatch):
+    """What is known of it stays with it, and is kept for arrays of the same content."""
+    from texrs.exemplar import _exemplar
+
+    calls = []
+    monkeypatch.setattr(_exemplar, "segment", lambda *given, **options: calls.append(1) or segment(*given, **options))
+    fresh = np.roll(pebbles, 17, axis=0)
+    exemplar = texrs.Exemplar(fresh)
+    made = [texrs.design(e, 96, tiles=1).image for e in (exemplar, exemplar, fresh.copy())]
+    assert len(calls) == 1
+    assert all((image == made[0]).all() for image in made)
+    texrs.design(exemplar, 96, tiles=1, elements=ElementOptions(layers=3))
+    assert len(calls) == 2
+
+
+@pytest.mark.parametrize(
+    ("options", "names"),
+    [
+        ({"elements": {"layers": 2}}, "elements"),
+        ({"deformation": 2}, "deformation"),
+        ({"elements": ElementOptions(labels=np.zeros((3, 3), int))}, "labels"),
+        ({"elements": ElementOptions(labels=[np.zeros((32, 32), int)] * 2)}, "labels"),
+    ],
+)
+def test_options_that_do_not_fit_the_exemplar_are_refused(options, names):
+    with pytest.raises(InvalidInput, match=f"^{names}"):
+        texrs.design(PICTURE, **options)
 
 
 def test_a_size_beyond_the_limit_is_refused_at_once():
@@ -329,4 +429,4 @@ def test_what_needs_more_memory_than_there_is_is_refused_before_anything_is_made
         raise AssertionError("work has begun")
 
     with pytest.raises(LimitExceeded, match=r"^size: needs .* GB of memory"):
-        texrs.design(np.zeros((32, 32, 64)), (16384, 16384), variants=4096, progress=progress)
+        texrs.design(np.zeros((32, 32, 64)), (16384, 16384), progress=progress)

@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 
 import texrs
-from texrs import samples
+from texrs import DeformationOptions, samples
 from texrs.errors import InvalidInput
-from texrs.papers.design.operations import Heap, Moves, chaotic_sequence, elements_of, fit, place
+from texrs.papers.design.elements import fit, measure_elements, place
+from texrs.papers.design.heaps import Heap
+from texrs.papers.design.logistic_map import iterate
+from texrs.papers.design.operations import Moves
 
-FREE = Moves(2, 0.12, 60.0, (0.8, 1.2), True, None, 2.0)
+FREE = Moves(DeformationOptions(rotate=60))
 
 
 def bars(*angles):
@@ -24,26 +27,26 @@ def bars(*angles):
     return labels
 
 
-# --- the chaotic sequence --------------------------------------------------------------------------------------------
+# --- the logistic map -----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    "x0", [0, 0.5, -0.5, 1, -1, 0.5**0.5, -(0.5**0.5), 1.5, float("nan"), float("inf"), "half", None]
+    "start", [0, 0.5, -0.5, 1, -1, 0.5**0.5, -(0.5**0.5), 1.5, float("nan"), float("inf"), "half", None]
 )
-def test_starts_that_lead_nowhere_are_refused(x0):
-    with pytest.raises(InvalidInput, match="^x0"):
-        chaotic_sequence(x0)
+def test_starts_that_lead_nowhere_are_refused(start):
+    with pytest.raises(InvalidInput, match="^start"):
+        iterate(start)
 
 
-@pytest.mark.parametrize("chaos", [-0.1, 2.001, 4, float("nan"), "strong"])
-def test_a_lambda_outside_0_to_2_is_refused(chaos):
-    with pytest.raises(InvalidInput, match="^chaos"):
-        chaotic_sequence(0.3, chaos)
+@pytest.mark.parametrize("growth_rate", [-0.1, 2.001, 4, float("nan"), "strong"])
+def test_a_lambda_outside_0_to_2_is_refused(growth_rate):
+    with pytest.raises(InvalidInput, match="^growth_rate"):
+        iterate(0.3, growth_rate)
 
 
-@pytest.mark.parametrize("chaos", [0, 0.5, 1, 2])
-def test_a_lambda_within_0_to_2_is_taken(chaos):
-    values = chaotic_sequence(0.3, chaos, 100)
+@pytest.mark.parametrize("growth_rate", [0, 0.5, 1, 2])
+def test_a_lambda_within_0_to_2_is_taken(growth_rate):
+    values = iterate(0.3, growth_rate, 100)
     assert values.shape == (100,)
     assert ((values >= 0) & (values <= 255)).all()
 
@@ -53,8 +56,8 @@ def test_a_lambda_within_0_to_2_is_taken(chaos):
 
 def test_a_turned_element_takes_the_place_of_its_like():
     labels = bars(0, 40, 90)
-    elements = elements_of(labels)
-    heap = Heap.of(elements, labels)
+    elements = measure_elements(labels)
+    heap = Heap.measure(elements, labels)
     for site, element in enumerate(elements):
         taken = heap.take_place(site, FREE, 0, 0)
         assert taken is not None
@@ -71,7 +74,7 @@ def test_unlike_elements_stay():
     labels = bars(0, 40)
     labels[labels == 2] = 0
     labels[20:40, 65:85] = 2
-    heap = Heap.of(elements_of(labels), labels)
+    heap = Heap.measure(measure_elements(labels), labels)
     assert heap.take_place(0, FREE, 0, 0) is None
     assert heap.take_place(1, FREE, 0, 0) is None
 
@@ -79,27 +82,27 @@ def test_unlike_elements_stay():
 @pytest.mark.parametrize(
     "moves",
     [
-        Moves(0, 0.12, 60.0, (0.8, 1.2), True, None, 2.0),
-        Moves(2, 0.0, 60.0, (0.8, 1.2), True, None, 2.0),
-        Moves(2, 0.12, 0.0, (0.8, 1.2), True, None, 2.0),
+        Moves(DeformationOptions(operations=0, rotate=60)),
+        Moves(DeformationOptions(translate=0, rotate=60)),
+        Moves(DeformationOptions(rotate=0)),
     ],
     ids=["no operations", "no translation", "no rotation"],
 )
 def test_elements_of_a_heap_do_only_what_they_may(moves):
     labels = bars(0, 60)
-    assert Heap.of(elements_of(labels), labels).take_place(0, moves, 0, 0) is None
+    assert Heap.measure(measure_elements(labels), labels).take_place(0, moves, 0, 0) is None
 
 
 def test_an_element_at_the_border_neither_goes_nor_gives_way():
     labels = bars(0, 0)
     labels[25:35, :12] = 1
-    heap = Heap.of(elements_of(labels), labels)
+    heap = Heap.measure(measure_elements(labels), labels)
     assert [heap.take_place(site, FREE, 0, 0) for site in range(2)] == [None, None]
 
 
 def test_elements_of_one_pixel_and_of_all_pixels_are_measured():
     for labels in (np.pad([[1]], 5), np.ones((6, 7), int)):
-        (element,) = elements_of(labels.astype(np.int32))
+        (element,) = measure_elements(labels.astype(np.int32))
         assert np.isfinite(element.axes).all()
         assert place(element, [], labels.shape) is not None
 
@@ -117,10 +120,10 @@ def test_heaps_move_without_holes_to_speak_of():
 
 def test_on_a_lattice_elements_move_by_its_shifts_alone():
     weave = samples.weave((160, 160)).image
-    found = texrs.exemplar.segmentation.segment(weave)
+    found = texrs.exemplar.segment(weave)
     assert found.lattice is not None
     made = texrs.design(weave, 96, tiles=2, seed=2)
-    assert "lattice" in made.report["children_reason"]
+    assert "lattice" in made.report["reason"]
     assert (made.report["rotate"], made.report["holes"]) == (0, [0, 0])
     lattice = np.array([found.lattice.a, found.lattice.b], float).T
     entries = [entry for log in made.report["operations"] for entry in log[1:] if any(entry.get("place", []))]
@@ -137,7 +140,7 @@ def test_mirrors_keep_to_the_axes_that_allow_them():
         axes: {
             (o.kind, o.axis if o.kind == "M" else 0)
             for e in range(99)
-            for o in replace(FREE, axes=axes).draw(FREE.values(0, 0, e), (False, False), 99)
+            for o in replace(FREE, axes=axes).draw_operations(FREE.draw_values(0, 0, e), (False, False), 99)
         }
         for axes in ((True, True), (False, True), (True, False), (False, False))
     }
@@ -149,15 +152,15 @@ def test_mirrors_keep_to_the_axes_that_allow_them():
 
 
 def test_shifts_are_mirrored_with_the_picture():
-    moves = Moves(2, 0.12, 0.0, (1.0, 1.0), False, None, 2.0, ((3, 5), (-2, 7)))
-    assert moves.flipped((True, False)).shifts == ((-3, 5), (2, 7))
-    assert moves.flipped((False, True)).shifts == ((3, -5), (-2, -7))
+    moves = Moves(DeformationOptions(rotate=0, scale=(1, 1), mirror=False), ((3, 5), (-2, 7)))
+    assert moves.mirror((True, False)).shifts == ((-3, 5), (2, 7))
+    assert moves.mirror((False, True)).shifts == ((3, -5), (-2, -7))
     drawn = {
-        tuple((o.kind, o.amount, o.axis) for o in moves.draw(moves.values(0, 0, e), (False, False), 99))
+        tuple((o.kind, o.amount, o.axis) for o in moves.draw_operations(moves.draw_values(0, 0, e), (False, False), 99))
         for e in range(99)
     }
     assert drawn == {(("T", 3.0, 0), ("T", 5.0, 1)), (("T", -2.0, 0), ("T", 7.0, 1))}
-    assert moves.draw(moves.values(0, 0, 1), (True, False), 99) == []
+    assert moves.draw_operations(moves.draw_values(0, 0, 1), (True, False), 99) == []
 
 
 def test_elements_keep_out_of_what_others_occupy():
@@ -166,10 +169,10 @@ def test_elements_keep_out_of_what_others_occupy():
     labels = np.zeros((96, 96), np.int32)
     for number, (r, c) in enumerate([(24, 24), (24, 50), (50, 24), (50, 50), (74, 74)], start=1):
         labels[(rows - r) ** 2 + (columns - c) ** 2 < 100] = number
-    moves = Moves(2, 0.3, 60.0, (0.8, 1.2), True, None, 2.0)
+    moves = Moves(DeformationOptions(translate=0.3, rotate=60))
     moved = 0
     for seed in range(8):
-        for element in elements_of(labels):
+        for element in measure_elements(labels):
             fitted = fit(element, labels, moves, seed, 0)
             assert fitted is not None
             operations, placement = fitted

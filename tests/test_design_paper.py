@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import texrs
-from texrs import samples
+from texrs import DeformationOptions, ElementOptions, samples
 from texrs._arrays import to_unit
 from texrs.errors import InvalidInput
 from texrs.exemplar.symmetry import flip
 from texrs.kernels.complete import complete
 from texrs.kernels.patch_search import PatchIndex
-from texrs.papers.design.literal import X0, operation, start, stitch_layers
-from texrs.papers.design.operations import chaotic_sequence
+from texrs.papers.design.literal import START, choose_operation, choose_start, stitch_layers
+from texrs.papers.design.logistic_map import iterate
 
 WEAK = -0.356261
 """A start whose first two operations are translations by nothing."""
@@ -47,36 +47,41 @@ def nearest(a, b):
 
 
 def test_reference_operations():
-    values = chaotic_sequence(X0, count=12)
+    values = iterate(START, count=12)
     assert [int(h) for h in values] == [194, 41, 241, 202, 67, 219, 123, 135, 111, 157, 60, 226]
-    assert " ".join(f"{operation(h, 100).kind}{int(h) % 10}" for h in values) == "T4 R1 R1 M2 S7 R9 S3 R5 R1 S7 T0 M6"
+    assert (
+        " ".join(f"{choose_operation(h, 100).kind}{int(h) % 10}" for h in values)
+        == "T4 R1 R1 M2 S7 R9 S3 R5 R1 S7 T0 M6"
+    )
 
 
 def test_the_worked_example():
     """h(k) = 37 gives n = 7, m = 3: scale by 0.91."""
-    assert (operation(37, 100).kind, operation(37, 100).amount) == ("S", 0.91)
+    assert (choose_operation(37, 100).kind, choose_operation(37, 100).amount) == ("S", 0.91)
 
 
 def test_scale_sees_two_numbers_and_never_enlarges():
-    drawn = [(h, operation(h, 100)) for h in range(256)]
+    drawn = [(h, choose_operation(h, 100)) for h in range(256)]
     assert {h % 10 for h, chosen in drawn if chosen.kind == "S"} == {3, 7}
     assert {chosen.amount for _, chosen in drawn if chosen.kind == "S"} == {0.8, 0.91}
 
 
 def test_extents_and_directions():
-    assert operation(194, 100).amount == 20
-    assert operation(41, 100).amount == -9
-    assert {operation(h, 100).axis for h in range(0, 256, 10)} == {0, 1}
-    shifts = {tuple(np.sign(operation(h, 100).shift())) for h in range(256) if operation(h, 100).kind == "T"}
+    assert choose_operation(194, 100).amount == 20
+    assert choose_operation(41, 100).amount == -9
+    assert {choose_operation(h, 100).axis for h in range(0, 256, 10)} == {0, 1}
+    shifts = {
+        tuple(np.sign(choose_operation(h, 100).shift())) for h in range(256) if choose_operation(h, 100).kind == "T"
+    }
     assert shifts >= {(0, 1), (0, -1), (1, 0), (-1, 0)}
-    assert max(abs(operation(h, 100).amount) for h in range(256) if operation(h, 100).kind == "R") == 81
+    assert max(abs(choose_operation(h, 100).amount) for h in range(256) if choose_operation(h, 100).kind == "R") == 81
 
 
 def test_the_first_variant_starts_as_printed_and_others_elsewhere():
-    assert start(None, 2.0, 5, 0, 0) == X0
-    assert start(0.3, 2.0, 5, 0, 0) == 0.3
-    others = {start(None, 2.0, seed, 0, number) for seed in range(3) for number in range(1, 4)}
-    assert len(others | {X0}) == 10
+    assert choose_start(None, 2.0, 5, 0, 0) == START
+    assert choose_start(0.3, 2.0, 5, 0, 0) == 0.3
+    others = {choose_start(None, 2.0, seed, 0, number) for seed in range(3) for number in range(1, 4)}
+    assert len(others | {START}) == 10
 
 
 # --- layers ----------------------------------------------------------------------------------------------------------
@@ -90,14 +95,14 @@ def test_layers_are_moved_whole():
     assert whole.covered.all()
     np.testing.assert_array_equal(whole.colours, picture)
     np.testing.assert_array_equal(whole.label, layers)
-    moved = stitch_layers(picture, layers, X0, 2.0)
+    moved = stitch_layers(picture, layers, START, 2.0)
     # T4 moves the ground by 8 pixels to the right; R1 turns the square by 9 degrees, into what the ground left open.
     assert (~moved.covered[:, :8]).all()
     assert 0 < (moved.label == 1).sum() <= 100
 
 
 def test_a_layer_over_others_altogether_is_lost():
-    """Nothing ties the minimum cut to it: the reason for the cores of the default."""
+    """Nothing ties the minimum cut to it: the reason for the hard constraints of the default."""
     picture = np.random.default_rng(0).random((40, 40, 3)).astype(np.float32)
     layers = np.zeros((40, 40), np.int32)
     layers[4:10, 15:25] = 1
@@ -108,8 +113,8 @@ def test_a_layer_over_others_altogether_is_lost():
     assert (stitch_layers(picture, layers, float(found[0]), 2.0).label == 0).all()
 
 
-def chosen(x0):
-    return [operation(h, 40) for h in chaotic_sequence(x0, count=2)]
+def chosen(start):
+    return [choose_operation(h, 40) for h in iterate(start, count=2)]
 
 
 def test_whole_layers_leave_large_holes(result, pebbles):
@@ -122,10 +127,10 @@ def test_whole_layers_leave_large_holes(result, pebbles):
 
 def test_it_can_hand_back_its_input_and_the_default_does_not(pebbles):
     unit = to_unit(pebbles)
-    literal = texrs.design(pebbles, 128, seed=1, tiles=1, x0=WEAK, method="paper")
+    literal = texrs.design(pebbles, 128, seed=1, tiles=1, deformation=DeformationOptions(start=WEAK), method="paper")
     assert nearest(literal.stages["completed"], unit) < 0.01
-    for x0 in (None, WEAK, 0.3, -0.61):
-        default = texrs.design(pebbles, 128, seed=1, tiles=1, x0=x0)
+    for start in (None, WEAK, 0.3, -0.61):
+        default = texrs.design(pebbles, 128, seed=1, tiles=1, deformation=DeformationOptions(start=start))
         # In a heap few stones move, so a single variant keeps much of its input; the texture does not.
         assert nearest(default.stages["completed"], unit) > 0.05
         assert nearest(default.image, pebbles) >= 0.4
@@ -138,12 +143,8 @@ def test_options_of_elements_play_no_part(pebbles, result):
         seed=1,
         tiles=2,
         method="paper",
-        children="grid",
-        operations=0,
-        translate=0.0,
-        rotate=10.0,
-        scale=(1.0, 1.0),
-        mirror=False,
+        elements=ElementOptions(kind="grid"),
+        deformation=DeformationOptions(operations=0, translate=0.0, rotate=10.0, scale=(1.0, 1.0), mirror=False),
         blend=0.5,
     )
     np.testing.assert_array_equal(other.image, result.image)
@@ -179,7 +180,7 @@ def test_the_source_map_renders_the_composite(pebbles, result):
     np.testing.assert_array_equal(result.source.render(pebbles), result.stages["composite"])
 
 
-def test_unscreened_poisson_acts_and_keeps_the_rim(result):
+def test_unscreened_poisson_acts_and_keeps_the_border(result):
     before, after = result.report["seams"]["before"], result.report["seams"]["after"]
     assert after["outliers"] < before["outliers"]
     assert after["mean"] < before["mean"]
@@ -187,7 +188,7 @@ def test_unscreened_poisson_acts_and_keeps_the_rim(result):
     for axis in range(2):
         for line in (0, -1):
             np.testing.assert_array_equal(np.take(result.image, line, axis), np.take(composite, line, axis))
-    plain = texrs.blending.blend(result.source, samples.pebbles((128, 128)).image, wrap=False, screening=0)
+    plain = texrs.blend(result.source, samples.pebbles((128, 128)).image, wrap=False, screening=0)
     np.testing.assert_array_equal(result.image, plain)
 
 
@@ -199,7 +200,7 @@ def test_screening_keeps_the_colours(result, pebbles):
         shift = image.astype(float) - result.stages["composite"]
         return np.abs(gaussian_filter(shift, (12, 12, 0))).max()
 
-    screened = texrs.blending.blend(result.source, pebbles, wrap=False)
+    screened = texrs.blend(result.source, pebbles, wrap=False)
     assert drift(screened) < 0.5 * drift(result.image)
 
 
@@ -211,7 +212,7 @@ def test_other_seeds_give_other_textures(pebbles, result):
 
 def test_layers_by_hand_and_several_exemplars(pebbles):
     labels = (samples.pebbles((128, 128)).labels > 0).astype(int)
-    made = texrs.design(pebbles, 96, labels=labels, tiles=1, method="paper")
+    made = texrs.design(pebbles, 96, elements=ElementOptions(labels=labels), tiles=1, method="paper")
     assert len(made.report["operations"][0]) == 2
     two = texrs.design([pebbles, 255 - pebbles], 96, tiles=1, method="paper")
     assert min(two.report["shares"]) > 0

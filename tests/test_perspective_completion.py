@@ -83,7 +83,7 @@ def test_a_second_picture_gives_elements_of_the_size_that_belongs_there(floor, m
     hole = hole_in(image.shape[:2], (40, 110, 45, 115))
     # Another floor of the same kind, in which the other end is large.
     other, theirs = (np.ascontiguousarray(a[::-1]) for a in checks.floor((170, 190), seed=3))
-    result = fill(image, hole, method=method, source=other, scale_map=scale, source_scale_map=theirs)
+    result = fill(image, hole, method=method, exemplar=other, scale_map=scale, exemplar_scale_map=theirs)
     np.testing.assert_array_equal(result.image[~hole], image[~hole])
     assert (result.source.exemplar == hole).all()
     bare = np.where(hole[..., np.newaxis], 0, image).astype(np.uint8)
@@ -92,7 +92,7 @@ def test_a_second_picture_gives_elements_of_the_size_that_belongs_there(floor, m
     size = np.ones(image.shape[:2]) if frame is None else 1 / frame[result.source.label][..., 0, 0]
     shown = result.source.render([scale, theirs], interpolation="linear") * size
     wrong = np.abs(np.log(shown / scale))[hole]
-    plain = fill(image, hole, method=method, source=other)
+    plain = fill(image, hole, method=method, exemplar=other)
     without = np.abs(np.log(plain.source.render([scale, theirs], interpolation="linear") / scale))[hole]
     assert np.median(wrong) < 0.12
     assert np.median(wrong) < 0.7 * np.median(without)
@@ -102,7 +102,7 @@ def test_a_source_from_the_front_is_resized(floor):
     image, scale = floor
     hole = hole_in(image.shape[:2], (20, 140, 45, 115))
     flat, _ = checks.floor((160, 160), seed=3, span=(1, 1))
-    result = fill(image, hole, method="optimise", source=flat, scale_map=scale)
+    result = fill(image, hole, method="optimise", exemplar=flat, scale_map=scale)
     size = 1 / result.source.frame_array()[result.source.label][..., 0, 0]
     assert np.corrcoef(np.log(size[hole]), np.log(scale[hole]))[0, 1] > 0.8
 
@@ -112,7 +112,7 @@ def test_all_of_a_picture_from_another():
     image, everything = np.zeros((64, 80, 3), np.uint8), np.ones((64, 80), bool)
     ramp = np.linspace(0.7, 1.5, 64, dtype=np.float32)[:, np.newaxis].repeat(80, axis=1)
     result = texrs.complete(
-        image, everything, source=other, scale_map=ramp, source_scale_map=theirs, method="optimise", blend=1e-4
+        image, everything, exemplar=other, scale_map=ramp, exemplar_scale_map=theirs, method="optimise", blend=1e-4
     )
     assert result.source.exemplar.all()
     assert result.image.std() > 20
@@ -137,8 +137,8 @@ def test_blending_takes_the_light_of_the_picture(method, box):
     image = data.grass()[:160, :160]
     hole = hole_in(image.shape, box)
     dark = (data.grass()[200:360, 200:360] * 0.7).astype(np.uint8)
-    plain = fill(image, hole, method=method, source=dark)
-    light = fill(image, hole, method=method, source=dark, blend=1e-4)
+    plain = fill(image, hole, method=method, exemplar=dark)
+    light = fill(image, hole, method=method, exemplar=dark, blend=1e-4)
     np.testing.assert_array_equal(light.image[~hole], image[~hole])
     np.testing.assert_array_equal(light.stages["composite"], plain.image)
     np.testing.assert_array_equal(light.source.coordinates, plain.source.coordinates)
@@ -163,12 +163,12 @@ def test_any_array_and_the_same_bytes(floor):
     assert one.image.tobytes() == many.image.tobytes()
 
 
-@pytest.mark.parametrize("rim", [5, 1024])
-def test_optimisation_may_replace_a_rim(floor, rim):
+@pytest.mark.parametrize("boundary", [5, 1024])
+def test_optimisation_may_replace_the_boundary(floor, boundary):
     image, scale = floor
     hole, wide = hole_in(image.shape[:2], (60, 90, 60, 100)), hole_in(image.shape[:2], (55, 95, 55, 105))
-    wide |= rim > 5
-    result = fill(image, hole, method="optimise", scale_map=scale, rim=rim)
+    wide |= boundary > 5
+    result = fill(image, hole, method="optimise", scale_map=scale, boundary=boundary)
     np.testing.assert_array_equal(result.source.label > 0, wide)
     np.testing.assert_array_equal(result.image[~wide], image[~wide])
     assert (result.image != image)[wide & ~hole].any()
@@ -195,18 +195,21 @@ def test_an_output_that_wraps(floor):
         ({"scale_map": "guess"}, "scale_map: allowed are 'auto'"),
         ({"scale_map": np.ones((3, 3))}, "scale_map: needs shape"),
         ({"scale_map": np.zeros((64, 64))}, "scale_map: |scale: "),
-        ({"source_scale_map": np.ones((40, 40))}, "source_scale_map: needs a source"),
+        ({"exemplar_scale_map": np.ones((40, 40))}, "exemplar_scale_map: needs an exemplar"),
         (
             {
                 "scale_map": np.ones((64, 64)),
-                "source": np.zeros((40, 40), np.uint8),
-                "source_scale_map": np.ones((30, 40)),
+                "exemplar": np.zeros((40, 40), np.uint8),
+                "exemplar_scale_map": np.ones((30, 40)),
             },
-            "source_scale_map: needs shape",
+            "exemplar_scale_map: needs shape",
         ),
-        ({"method": "optimise", "source": np.zeros((12, 40), np.uint8)}, "source: method 'optimise' needs at least 16"),
         (
-            {"hole": np.ones((64, 64), bool), "scale_map": "auto", "source": np.zeros((40, 40), np.uint8)},
+            {"method": "optimise", "exemplar": np.zeros((12, 40), np.uint8)},
+            "exemplar: method 'optimise' needs at least 16",
+        ),
+        (
+            {"hole": np.ones((64, 64), bool), "scale_map": "auto", "exemplar": np.zeros((40, 40), np.uint8)},
             "scale_map: 'auto' measures what is known",
         ),
         ({"blend": "soft"}, "blend: needs a number"),

@@ -8,9 +8,11 @@ import pytest
 from texrs import samples
 from texrs._rust import set_threads
 from texrs.errors import InvalidInput
-from texrs.exemplar.components import Shapes, creases, find, lightness_and_colour, solidity, whole
-from texrs.exemplar.regularity import direction, lattice, polarity
-from texrs.exemplar.segmentation import segment
+from texrs.exemplar import ElementOptions, segment
+from texrs.exemplar.components import fill_crescents, find_elements
+from texrs.exemplar.evidence import measure_creases, to_lab
+from texrs.exemplar.regularity import find_lattice, measure_direction, measure_polarity
+from texrs.exemplar.shapes import Shapes, measure_solidity
 
 
 def unit(image):
@@ -34,7 +36,7 @@ def matched(found, truth, share=0.7):
 def test_elements_are_the_elements_that_were_drawn(name, share):
     sample = getattr(samples, name)((256, 256))
     found = segment(sample.image)
-    assert (found.children, found.reason) == ("components", "")
+    assert (found.kind, found.reason) == ("components", "")
     assert matched(found.elements, sample.labels) >= share * sample.labels.max()
     # Nothing is found twice: most elements are an element, or a few that could not be parted.
     assert found.count <= 1.1 * sample.labels.max()
@@ -48,8 +50,8 @@ def test_touching_discs_are_parted_where_the_crease_is():
         shade = 0.35 + 0.5 * np.sqrt(np.maximum(height, 0))
         over = (height > 0) & (shade > light)
         light[over], truth[over] = shade[over], label
-    lab = lightness_and_colour(np.repeat(light[..., None], 3, -1).astype(np.float32))
-    found = find((light > 0.2).astype(np.int32), creases(lab))
+    lab = to_lab(np.repeat(light[..., None], 3, -1).astype(np.float32))
+    found = find_elements((light > 0.2).astype(np.int32), measure_creases(lab))
     assert found.max() == 2
     assert matched(found, truth, 0.9) == 2
 
@@ -58,7 +60,7 @@ def test_a_mark_on_a_thing_is_part_of_it():
     rows, columns = np.mgrid[:60, :60]
     far = np.hypot(rows - 30, columns - 30)
     ring = ((far < 20) & (far > 8)).astype(np.int32)
-    found = find(ring, np.zeros((60, 60), np.float32))
+    found = find_elements(ring, np.zeros((60, 60), np.float32))
     assert found.max() == 1
     assert found[30, 30] == 1
 
@@ -68,10 +70,10 @@ def test_the_lit_part_of_a_thing_stands_for_it():
     far = np.hypot(rows - 30, columns - 30)
     crescent = (far < 20) & (np.hypot(rows - 26, columns - 24) > 16)
     elements = crescent.astype(np.int32)
-    assert whole(elements).sum() > 1.3 * crescent.sum()
+    assert fill_crescents(elements).sum() > 1.3 * crescent.sum()
     # Not over another element.
     elements[20:24, 20:24] = 2
-    assert (whole(elements) == elements).all()
+    assert (fill_crescents(elements) == elements).all()
 
 
 def test_hulls_come_out_at_most_two_per_cent_too_large():
@@ -80,11 +82,11 @@ def test_hulls_come_out_at_most_two_per_cent_too_large():
     labels[10:50, 5:35] = 1
     labels[np.hypot(rows - 45, columns - 80) < 30] = 2
     labels[np.abs(rows - 45) + np.abs(columns - 150) < 35] = 3
-    assert 0.96 < solidity(np.where(labels == 1, 1, 0)) <= 1
-    assert (Shapes.of(labels).solidity()[1:] > 0.93).all()
+    assert 0.96 < measure_solidity(np.where(labels == 1, 1, 0)) <= 1
+    assert (Shapes.of(labels).measure_solidity()[1:] > 0.93).all()
     corner = np.zeros((90, 200), np.int32)
     corner[10:50, 10:20] = corner[40:50, 10:60] = 1
-    assert solidity(corner) == pytest.approx(800 / 1400, abs=0.03)
+    assert measure_solidity(corner) == pytest.approx(800 / 1400, abs=0.03)
 
 
 # --- against nonsense ------------------------------------------------------------------------------------------------
@@ -105,39 +107,39 @@ def blotched_cloth():
 )
 def test_nonsense_takes_the_grid_and_says_why(image):
     found = segment(image)
-    assert found.children == "grid"
+    assert found.kind == "grid"
     assert found.reason
     # What was asked for is given.
-    assert segment(image, children="components").children == "components"
+    assert segment(image, ElementOptions(kind="components")).kind == "components"
 
 
 def test_a_constant_image_has_no_elements_and_takes_the_grid():
     found = segment(np.full((64, 64, 3), 128, np.uint8))
-    assert (found.children, found.layers.max(), found.lattice) == ("grid", 0, None)
+    assert (found.kind, found.layers.max(), found.lattice) == ("grid", 0, None)
     assert found.reason == "elements cover 0% of the image, less than 5%"
-    assert segment(np.full((64, 64), 7.0), children="components").count == 0
+    assert segment(np.full((64, 64), 7.0), ElementOptions(kind="components")).count == 0
 
 
 def test_one_element_is_found():
     rows, columns = np.mgrid[:64, :64]
     image = np.where(np.hypot(rows - 30, columns - 34) < 14, 230, 20).astype(np.uint8)
     found = segment(image)
-    assert (found.children, found.count) == ("components", 1)
+    assert (found.kind, found.count) == ("components", 1)
     assert abs(int((found.elements > 0).sum()) - int((image > 100).sum())) < 60
 
 
 def test_fewer_layers_are_made_where_there_are_fewer_colours():
     image = np.zeros((48, 48, 3), np.uint8)
     image[12:24, 12:24] = 255
-    assert segment(image, layers=16).layers.max() == 1
-    assert segment(image, layers=1).layers.max() == 0
+    assert segment(image, ElementOptions(layers=16)).layers.max() == 1
+    assert segment(image, ElementOptions(layers=1)).layers.max() == 0
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 9), (9, 1), (2, 40), (23, 24), (40, 40, 2), (40, 40, 4), (40, 40, 7)])
-@pytest.mark.parametrize("children", ["auto", "components", "grid", "none"])
-def test_any_shape(shape, children):
+@pytest.mark.parametrize("kind", ["auto", "components", "grid", "none"])
+def test_any_shape(shape, kind):
     image = np.random.default_rng(0).integers(0, 256, shape).astype(np.uint8)
-    found = segment(image, children=children)
+    found = segment(image, ElementOptions(kind=kind))
     assert found.elements.shape == found.layers.shape == shape[:2]
     assert found.elements.dtype == found.layers.dtype == np.int32
 
@@ -145,10 +147,10 @@ def test_any_shape(shape, children):
 def test_labels_by_hand_are_kept():
     labels = np.zeros((40, 40), np.int64)
     labels[5:10, 5:10], labels[20:30, 20:30] = 70, 4
-    found = segment(samples.weave((40, 40)).image, labels=labels)
-    assert (found.children, found.count, found.lattice) == ("labels", 2, None)
+    found = segment(samples.weave((40, 40)).image, ElementOptions(labels=labels))
+    assert (found.kind, found.count, found.lattice) == ("labels", 2, None)
     assert (np.unique(found.elements[labels > 0]) == [1, 2]).all()
-    assert segment(np.zeros((40, 40)), labels=labels > 0).count == 1
+    assert segment(np.zeros((40, 40)), ElementOptions(labels=labels > 0)).count == 1
 
 
 PICTURE = np.zeros((32, 32, 3), np.uint8)
@@ -162,8 +164,8 @@ PICTURE = np.zeros((32, 32, 3), np.uint8)
         (PICTURE, {"layers": 0}, "layers"),
         (PICTURE, {"layers": 17}, "layers"),
         (PICTURE, {"layers": 2.5}, "layers"),
-        (PICTURE, {"children": "cells"}, "children"),
-        (PICTURE, {"children": None}, "children"),
+        (PICTURE, {"kind": "cells"}, "kind"),
+        (PICTURE, {"kind": None}, "kind"),
         (PICTURE, {"labels": np.zeros((31, 32), int)}, "labels"),
         (PICTURE, {"labels": np.zeros((32, 32, 1), int)}, "labels"),
         (PICTURE, {"labels": np.zeros((32, 32))}, "labels"),
@@ -173,7 +175,7 @@ PICTURE = np.zeros((32, 32, 3), np.uint8)
 )
 def test_bad_input_names_the_argument(image, options, names):
     with pytest.raises(InvalidInput, match=f"^{names}"):
-        segment(image, **options)
+        segment(image, ElementOptions(**options))
 
 
 def test_the_same_bytes_for_any_number_of_threads():
@@ -199,17 +201,17 @@ def test_regular_things_lie_on_a_lattice(name):
     found = segment(getattr(samples, name)((256, 256)).image)
     assert found.lattice is not None
     assert "lattice" in found.reason
-    assert direction(unit(samples.bricks((256, 256)).image)) > 0.3
+    assert measure_direction(unit(samples.bricks((256, 256)).image)) > 0.3
 
 
 @pytest.mark.parametrize("name", ["dots", "pebbles", "beans", "grit", "leaves_and_flowers", "bark"])
 def test_scattered_things_do_not(name):
-    assert lattice(unit(getattr(samples, name)((256, 256)).image)) is None
+    assert find_lattice(unit(getattr(samples, name)((256, 256)).image)) is None
 
 
 def test_the_periods_of_a_tiling_are_found():
     tile = np.random.default_rng(3).random((20, 28, 1)).astype(np.float32)
-    found = lattice(np.tile(tile, (9, 7, 1)))
+    found = find_lattice(np.tile(tile, (9, 7, 1)))
     assert found is not None
     assert {tuple(map(abs, found.a)), tuple(map(abs, found.b))} == {(20, 0), (0, 28)}
     assert is_in((40, 56), found)
@@ -224,42 +226,42 @@ def test_direction_sees_one_direction_and_two_at_right_angles():
     stripes = np.sin(0.5 * (rows + 0.3 * columns))
     squares = (np.sin(0.4 * rows) > 0) ^ (np.sin(0.4 * columns) > 0)
     noise = np.random.default_rng(0).random((128, 128))
-    assert direction(stripes[..., None].astype(np.float32)) > 0.95
-    assert direction(squares[..., None].astype(np.float32)) > 0.5
-    assert direction(noise[..., None].astype(np.float32)) < 0.15
-    assert direction(np.zeros((128, 128, 1), np.float32)) == 0
+    assert measure_direction(stripes[..., None].astype(np.float32)) > 0.95
+    assert measure_direction(squares[..., None].astype(np.float32)) > 0.5
+    assert measure_direction(noise[..., None].astype(np.float32)) < 0.15
+    assert measure_direction(np.zeros((128, 128, 1), np.float32)) == 0
 
 
 @pytest.mark.parametrize(("name", "axes"), [("beans", (0, 1)), ("grit", (0, 1)), ("scales", (0, 1)), ("bark", (1,))])
 def test_what_is_lit_from_one_side_differs_from_its_mirror_image(name, axes):
     picture = unit(getattr(samples, name)((256, 256)).image)
-    found = polarity(picture)
+    found = measure_polarity(picture)
     assert all(found[axis] > 10 for axis in axes)
     # Lit from the other side it differs as much.
-    assert np.allclose(polarity(picture[::-1]), found, rtol=0.05)
-    assert np.allclose(polarity(np.swapaxes(picture, 0, 1)), (found[1], found[0], found[2]), rtol=0.05)
+    assert np.allclose(measure_polarity(picture[::-1]), found, rtol=0.05)
+    assert np.allclose(measure_polarity(np.swapaxes(picture, 0, 1)), (found[1], found[0], found[2]), rtol=0.05)
 
 
 def test_what_is_oblique_is_like_itself_turned_round():
     rows, columns = np.mgrid[:256, :256]
     noise = np.random.default_rng(2).normal(size=(256, 256))
-    found = polarity((np.sin(0.5 * rows + 0.3 * columns) + 0.5 * noise)[..., None].astype(np.float32))
+    found = measure_polarity((np.sin(0.5 * rows + 0.3 * columns) + 0.5 * noise)[..., None].astype(np.float32))
     assert max(found[:2]) < 5 < found[2]
 
 
 def test_what_has_no_side_does_not():
     noise = np.random.default_rng(1).random((256, 256, 3)).astype(np.float32)
-    assert max(polarity(noise)) < 5
-    assert polarity(np.full((128, 128, 1), 0.5, np.float32)) == (0, 0, 0)
-    assert polarity(noise[:16, :16]) == (0, 0, 0)
+    assert max(measure_polarity(noise)) < 5
+    assert measure_polarity(np.full((128, 128, 1), 0.5, np.float32)) == (0, 0, 0)
+    assert measure_polarity(noise[:16, :16]) == (0, 0, 0)
 
 
 def test_further_layers_are_taken_where_they_find_more() -> None:
     """The stones as dark as the ground are missed by two layers."""
     sample = samples.pebbles((192, 192))
-    assert segment(sample.image).count > 1.3 * segment(sample.image, layers=2).count
+    assert segment(sample.image).count > 1.3 * segment(sample.image, ElementOptions(layers=2)).count
     flowers = samples.leaves_and_flowers((192, 192)).image
-    assert segment(flowers).count == segment(flowers, layers=2).count
+    assert segment(flowers).count == segment(flowers, ElementOptions(layers=2)).count
 
 
 def test_progress_rises_and_stops_the_work():

@@ -6,8 +6,8 @@ from .blending import blend
 from .completion import complete
 from .database import TextureDatabase
 from .elements import Elements
-from .exemplar import Exemplar
-from .papers.design import design
+from .exemplar import ElementOptions, Exemplar
+from .papers.design import DeformationOptions, design, design_variants
 from .papers.perspective import perspective
 from .papers.solid import solid, synthesize
 from .papers.solid.window import PlaneTexture, SolidTexture
@@ -17,6 +17,8 @@ from .synthesis import Synthesis
 from .tiling import tile
 
 __all__ = [
+    "DeformationOptions",
+    "ElementOptions",
     "Elements",
     "Exemplar",
     "PlaneTexture",
@@ -29,6 +31,7 @@ __all__ = [
     "blend",
     "complete",
     "design",
+    "design_variants",
     "elements",
     "errors",
     "exemplar",

@@ -21,9 +21,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from texrs._arrays import as_image, as_int, as_wrap, guidance
+from texrs._arrays import as_int, as_wrap
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.errors import InvalidInput
+from texrs.exemplar import Exemplar, as_exemplar
 from texrs.kernels.seam import cut_strip
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
@@ -42,7 +43,7 @@ AXES = ("rows", "columns")
 
 
 def tile(
-    image: Array,
+    image: Array | Exemplar,
     *,
     wrap: bool | Sequence[bool] = (True, True),
     overlap: int | Sequence[int] | None = None,
@@ -52,7 +53,7 @@ def tile(
 
     Parameters
     ----------
-    image : (H, W) or (H, W, C) array
+    image : (H, W) or (H, W, C) array, or Exemplar
         The picture, any real dtype, at least 2 pixels along an axis that wraps.
     wrap : bool or (rows, columns)
         Axes along which the result repeats.
@@ -91,20 +92,18 @@ def tile(
     True
 
     """
-    pixels = as_image(image, "image")
-    cyclic = as_wrap(wrap)
-    shape = (pixels.shape[0], pixels.shape[1])
+    exemplar, cyclic = as_exemplar(image, "image"), as_wrap(wrap)
+    picture, shape = exemplar.image, (exemplar.shape[0], exemplar.shape[1])
     ranges = as_overlaps(overlap, shape, cyclic)
     watch = progress or (lambda stage, share: None)
 
-    guide = guidance(pixels)
     source = SourceMap.identity(shape)
     joints: dict[int, Joint] = {}
     # Columns before rows, as in the paper.
     for axis in (1, 0):
         if cyclic[axis]:
             joint = join(
-                source.render(guide),
+                source.render(exemplar.guidance),
                 axis,
                 ranges[axis],
                 closed=bool(joints),
@@ -112,11 +111,11 @@ def tile(
             )
             source = joint.source.compose(source)
             joints[axis] = joint
-    result = source.render(image)
+    result = source.render(picture)
     watch("done", 1.0)
     shift = [joints[a].split if a in joints else 0 for a in range(2)]
     stages = {
-        "swapped": np.roll(np.asarray(image), (-shift[0], -shift[1]), (0, 1)),
+        "swapped": np.roll(picture, (-shift[0], -shift[1]), (0, 1)),
         "pieces": (source.label * 85).astype(np.uint8),
         "composite": result,
     }

@@ -65,7 +65,7 @@ def d5(exemplar: np.ndarray, images: Sequence[np.ndarray], report: Mapping[str, 
                     mirrored = example[::rows, ::columns]
                     in_place.append(ratio(float(np.abs(part - mirrored[:height, :width]).mean()), usual))
                     moved.append(ratio(best_shift(part, mirrored), usual))
-    own = repeats(example) if report and "lattice" in report["children_reason"] else 1.0
+    own = repeats(example) if report and "lattice" in report["reason"] else 1.0
     return D5(pairs, min(in_place), min(moved), own=own)
 
 
@@ -243,9 +243,9 @@ def d8(
     its own; and where elements lie on a lattice: there the half of one and the half of another make one, whole to the
     eye, but two to the labels.
     """
-    if report and "lattice" in report["children_reason"]:
+    if report and "lattice" in report["reason"]:
         labels = None
-    elif report and labels is None and (report["children"] == "grid" or report["elements"] < FEWEST):
+    elif report and labels is None and (report["kind"] == "grid" or report["elements"] < FEWEST):
         return D8(np.nan, np.nan, 0, False)
     if labels is not None:
         where = np.clip(np.rint(source.coordinates).astype(int), 0, np.array(labels.shape) - 1)

@@ -27,8 +27,8 @@ from texrs.cli import _elements, _files, _perspective, _pictures, _scales, _soli
 from texrs.cli._console import Command, Method, Quiet, Threads, as_method, note, run, say, watching
 from texrs.cli._files import describe, named
 from texrs.errors import FileError, InvalidInput
-from texrs.exemplar.segmentation import Children
-from texrs.papers.design import design
+from texrs.exemplar.segmentation import ElementOptions, Kind
+from texrs.papers.design import DeformationOptions, design_variants
 from texrs.source_map import SourceMap
 
 __all__ = ["main"]
@@ -122,7 +122,7 @@ def design_command(
     layers: Annotated[
         int | None, typer.Option(help="Colour layers of the example, 1 to 16; by default as many as find its elements.")
     ] = None,
-    children: Annotated[
+    kind: Annotated[
         str, typer.Option(metavar="KIND", help="Elements of the layers: auto, components, grid or none.")
     ] = "auto",
     labels: Annotated[
@@ -142,11 +142,10 @@ def design_command(
         str, typer.Option(metavar="LEAST:LARGEST", help="Range of scaling, within 0.5 and 2.")
     ] = "0.8:1.2",
     mirror: Annotated[bool, typer.Option("--mirror/--no-mirror", help="Whether anything may be mirrored.")] = True,
-    x0: Annotated[
-        float | None,
-        typer.Option("--x0", help="Start of the chaotic sequence, inside (-1, 1).", show_default="from the seed"),
+    start: Annotated[
+        float | None, typer.Option(help="Start of the logistic map, inside (-1, 1).", show_default="from the seed")
     ] = None,
-    chaos: Annotated[float, typer.Option(help="Lambda of the chaotic sequence, 0 to 2.")] = 2.0,
+    growth_rate: Annotated[float, typer.Option(help="Lambda of the logistic map, 0 to 2.")] = 2.0,
     patch: Annotated[
         int | None,
         typer.Option(help="Side of the patches that fill holes, in pixels.", show_default="by the example's size"),
@@ -167,7 +166,7 @@ def design_command(
     quiet: Quiet = False,
 ) -> None:
     """Design a texture of any size from one example."""
-    start = time.monotonic()
+    began = time.monotonic()
     shape, cyclic = _files.parse_size(size), _files.parse_wrap(wrap)
     factors = _files.parse_range(scale, name="--scale")
     _files.check_outputs(out, source, stages)
@@ -177,7 +176,6 @@ def design_command(
         where = [_files.variant_names(number, **where[0]) for number in numbers]
         for names in where:
             _files.check_apart([*exemplar, labels or ""], **names)
-    places = iter(where)
     shares = _files.parse_shares(weights)
     pixels = [_files.read_exemplar(name) for name in exemplar]
     marked = None if labels is None else io.read(labels)
@@ -187,35 +185,38 @@ def design_command(
         threads(count),
         watching(quiet=quiet) as progress,
     ):
-        made = design(
+        found = design_variants(
             pixels if len(pixels) > 1 else pixels[0],
+            1 if variants is None else variants,
             shape,
             seed=seed,
-            variants=1 if variants is None else variants,
             wrap=cyclic,
             weights=shares,
-            layers=layers,
-            children=cast(Children, children),
-            labels=marked,
+            elements=ElementOptions(layers=layers, kind=cast(Kind, kind), labels=marked),
+            deformation=DeformationOptions(
+                operations=operations,
+                translate=translate,
+                rotate=rotate,
+                scale=factors,
+                mirror=mirror,
+                start=start,
+                growth_rate=growth_rate,
+            ),
             tiles=tiles,
-            operations=operations,
-            translate=translate,
-            rotate=rotate,
-            scale=factors,
-            mirror=mirror,
-            x0=x0,
-            chaos=chaos,
             patch=patch,
             blend=blend,
             method=as_method(method),
             progress=progress,
-            keep=lambda result: _files.deliver(result, **next(places)),
         )
+        made = []
+        for result, names in zip(found, where, strict=True):
+            _files.deliver(result, **names)
+            made.append(result)
     if variants is not None:
         with _files.output(out) as temporary:
             io.write(temporary, _files.contact_sheet([result.image for result in made]))
     several = "" if variants is None else f"{variants} textures and their contact sheet, each "
-    seconds = time.monotonic() - start
+    seconds = time.monotonic() - began
     note(f"wrote {out}: {several}{describe(made[0].image, 2)}, in {seconds:.1f} s", quiet=quiet)
 
 

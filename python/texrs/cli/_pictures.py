@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import Annotated
+from typing import Annotated, Literal, cast
 
 import numpy as np
 import typer
@@ -95,7 +95,9 @@ def complete_command(
             show_default="by the picture's size",
         ),
     ] = None,
-    rim: Annotated[int, typer.Option(help="Pixels around the hole that may be replaced too, to hide the seam.")] = 0,
+    boundary: Annotated[
+        int, typer.Option(help="Pixels around the hole that may be replaced too, to hide the seam.")
+    ] = 0,
     mirror: Annotated[
         bool | None,
         typer.Option("--mirror/--no-mirror", help="Whether patches may be mirrored.", show_default="not with --scale"),
@@ -127,18 +129,18 @@ def complete_command(
     other = None if source_image is None else _files.read_exemplar(source_image)
     # In the hole anything may stand that the format of the result cannot hold.
     _files.check_output(out, np.nan_to_num(pixels), pixels.shape[:2])
-    names = {"image": image, "hole": "HOLE" if hole == "alpha" else hole, "source": str(source_image)}
-    names |= {"scale_map": str(scale), "source_scale_map": source_scale or "--source-scale", "count": "--threads"}
+    names = {"image": image, "hole": "HOLE" if hole == "alpha" else hole, "exemplar": str(source_image)}
+    names |= {"scale_map": str(scale), "exemplar_scale_map": source_scale or "--source-scale", "count": "--threads"}
     with named(**names), threads(count), watching(quiet=quiet) as progress:
         result = complete(
             pixels,
             mask,
-            source=other,
+            exemplar=other,
             scale_map=scaled,
-            source_scale_map=theirs,
-            method=method,
+            exemplar_scale_map=theirs,
+            method=cast(Literal["patch", "optimise"], method),
             patch=patch,
-            rim=rim,
+            boundary=boundary,
             mirror=mirror,
             blend=blend,
             wrap=cyclic,

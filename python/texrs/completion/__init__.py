@@ -1,7 +1,7 @@
 """Holes in a picture filled with patches of what is around them, or of another picture.
 
 J. Shen, X. Jin, X. Mao and J. Feng, "Completion-based texture design using deformation", 2006, section 3.4: patches
-that fit what is known around a hole, each cut into it, and the one with the cheapest cut pasted; here from the rim of
+that fit what is known around a hole, each cut into it, and the one with the cheapest cut pasted; here from the boundary of
 the hole inwards, where the paper goes in scan order. A verb of its own, for any picture: `texrs.papers.design` fills its
 own holes in the same way.
 """
@@ -9,18 +9,20 @@ own holes in the same way.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_image, as_int, as_mask, as_seed, as_wrap, guidance
 from texrs._typing import Array, Bools, Floats, Progress
-from texrs.blending import blend as blended
+from texrs.blending import blend as correct_colours
 from texrs.completion._optimise import optimised, recovered
 from texrs.errors import InvalidInput
-from texrs.exemplar.symmetry import Flip, flip, flip_coordinates, flip_frame, mirrors
+from texrs.exemplar import Exemplar, as_exemplar
+from texrs.exemplar.patches import index_patches, mark_corners
+from texrs.exemplar.symmetry import ALL, NONE, Flip, flip_coordinates, flip_frame
 from texrs.kernels.complete import complete as fill
-from texrs.kernels.patch_search import PatchIndex
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
@@ -36,15 +38,15 @@ PLACES = 64
 
 
 def complete(
-    image: Array,
+    image: Array | Exemplar,
     hole: Array | str,
     *,
-    source: Array | None = None,
+    exemplar: Array | Exemplar | None = None,
     scale_map: Array | str | None = None,
-    source_scale_map: Array | str | None = None,
-    method: str = "patch",
+    exemplar_scale_map: Array | str | None = None,
+    method: Literal["patch", "optimise"] = "patch",
     patch: int | None = None,
-    rim: int = 0,
+    boundary: int = 0,
     mirror: bool | None = None,
     blend: float | None = None,
     wrap: bool | Sequence[bool] = False,
@@ -55,35 +57,36 @@ def complete(
 
     Parameters
     ----------
-    image : (H, W) or (H, W, C) array
+    image : (H, W) or (H, W, C) array, or Exemplar
         The picture, any real dtype, at least 4 pixels a side. What it holds in the hole does not matter; it may be NaN.
     hole : (H, W) bool or integers, or "alpha"
         True, or not zero, where the picture is to be filled; "alpha": where its last channel of two or four is 0.
-    source : (h, w) or (h, w, C) array, optional
+    exemplar : (h, w) or (h, w, C) array, or Exemplar, optional
         Another picture to copy from, of the same dtype and channels; by default what is known of ``image``.
     scale_map : {None, "auto"} or (H, W) float array, optional
-        For pictures taken at an angle: how large the elements are at each pixel (`texrs.scale_maps`), so that the hole is filled
-        with elements of the size that belongs there [2]_. "auto" measures it. In the hole it may be NaN; it is continued.
-    source_scale_map : {None, "auto"} or (h, w) float array, optional
-        How large they are in ``source``, in the units of ``scale_map``. None: 1 everywhere, as in a picture taken from the
+        For pictures taken at an angle: how large the elements are at each pixel (`texrs.scale_maps`), so that the hole is
+        filled with elements of the size that belongs there [2]_. "auto" measures it. In the hole it may be NaN; it is
+        continued.
+    exemplar_scale_map : {None, "auto"} or (h, w) float array, optional
+        How large they are in ``exemplar``, in the units of ``scale_map``. None: 1 everywhere, as in a picture taken from the
         front; measured maps have a geometric mean of 1.
     method : {"patch", "optimise"}
         How: "patch", patches that fit what is around, cut in [1]_; "optimise", windows corrected until each is like one of the
-        picture, or of ``source``, resized where there is a scale map [2]_: for large holes, where patches would repeat what
+        picture, or of ``exemplar``, resized where there is a scale map [2]_: for large holes, where patches would repeat what
         is around.
     patch : int, optional
         Side of a patch in pixels, at least 4: about the size of what repeats. By default a sixth of the shorter side,
         12 to 32; less where no place, or few, would be free of holes. "optimise" has no patches, and refuses one.
-    rim : int
-        Pixels around the hole that may be replaced too, 0 to 1024, so that the seam can run where it shows least. 0 leaves
-        all that is known as it is.
+    boundary : int
+        Width in pixels of the hole's boundary, which may be replaced too, 0 to 1024, so that the seam can run where it shows
+        least. 0 leaves all that is known as it is.
     mirror : bool, optional
         Whether patches may be mirrored; False for lit or lettered textures. By default they may unless there is a scale map:
         what is seen at an angle has an upper side.
     blend : float, optional
-        Weight of the values when colours of what is filled are corrected so that seams disappear: the smaller, the wider the
-        correction; 0.003 is good for the picture's own colours, less where a ``source`` has other light. None or 0: no
-        correction. See `texrs.blending.blend`, which corrects other maps in the same way, ``within`` the hole.
+        Weight of the values, 0 to 1e6, when colours of what is filled are corrected so that seams disappear: the smaller,
+        the wider the correction; 0.003 is good for the picture's own colours, less where an ``exemplar`` has other light.
+        None or 0: no correction. See `texrs.blend`, which corrects other maps in the same way, ``within`` the hole.
     wrap : bool or (rows, columns)
         Axes along which the picture is cyclic, so that a hole at its border is also filled from across.
     seed : int
@@ -95,14 +98,14 @@ def complete(
     -------
     Synthesis
         The filled image, in the dtype and with the channels of the picture. Its source map looks into the picture, or
-        into ``[image, source]``; pixels that are kept map to themselves, and none maps into the hole. To render a
+        into ``[image, exemplar]``; pixels that are kept map to themselves, and none maps into the hole. To render a
         picture that is NaN in the hole through it, put any number there. The stages are ``"known"``, ``"patches"``
         (each in a shade of its own) and ``"composite"``, the result before ``blend``.
 
     Raises
     ------
     InvalidInput
-        A hole of another shape; a source of another dtype or other channels; nothing known to copy from; a patch larger
+        A hole of another shape; an exemplar of another dtype or other channels; nothing known to copy from; a patch larger
         than the pictures, with no place for it outside the hole, or given to "optimise".
 
     References
@@ -126,38 +129,38 @@ def complete(
     """
     if method not in ("patch", "optimise"):
         raise InvalidInput(f"method: allowed are 'patch' and 'optimise', got {method!r}")
-    if source_scale_map is not None and (source is None or scale_map is None):
-        raise InvalidInput("source_scale_map: needs a source, and a scale_map whose units it shares")
+    if exemplar_scale_map is not None and (exemplar is None or scale_map is None):
+        raise InvalidInput("exemplar_scale_map: needs an exemplar, and a scale_map whose units it shares")
     mirror = scale_map is None if mirror is None else mirror
     if not isinstance(mirror, bool | np.bool_):
         raise InvalidInput(f"mirror: needs True or False, got {mirror!r}")
     screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
-    pictures, open_ = check_pictures(
-        image, transparent(image) if isinstance(hole, str) and hole == "alpha" else hole, source
-    )
+    picture = image.image if isinstance(image, Exemplar) else image
+    asked = mark_transparent(picture) if isinstance(hole, str) and hole == "alpha" else hole
+    pictures, open_ = check_pictures(picture, asked, exemplar)
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
     cyclic, seed = as_wrap(wrap), as_seed(seed)
-    width = as_int(rim, "rim", 0, 1024)
+    width = as_int(boundary, "boundary", 0, 1024)
     if patch is not None and method == "optimise":
         raise InvalidInput("patch: method 'optimise' has no patches; leave it out, or take method='patch'")
     chosen = None if patch is None else as_int(patch, "patch", LEAST, min(n for shape in shapes for n in shape))
     watch = progress or (lambda stage, share: None)
 
     watch("complete", 0.0)
-    places, side, count = untouched(shapes), 0, 0
-    scales = scales_of(pictures, open_, scale_map, source_scale_map) if open_.any() else None
+    places, side, count = map_untouched(shapes), 0, 0
+    scales = recover_scales(pictures, open_, scale_map, exemplar_scale_map) if open_.any() else None
     levels: list[dict[str, object]] = []
-    wide = grown(open_, width, cyclic)
+    wide = widen(open_, width, cyclic)
     if open_.any() and method == "optimise":
         places, levels = optimised(
             pictures, open_, scales, wide, wrap=(cyclic[0], cyclic[1]), seed=seed, progress=progress
         )
         count = int(places.label.max())
     elif open_.any():
-        places, side, count = patched(
+        places, side, count = fill_with_patches(
             pictures, open_, scales, chosen, ~wide, mirror=bool(mirror), wrap=cyclic, seed=seed, watch=watch
         )
-    new = _where(places.label)
+    new = find_places(places.label)
     # What is kept maps to itself; of patches every coordinate is whole.
     result = pictures[0].copy()
     if method == "optimise":
@@ -169,7 +172,7 @@ def complete(
     if screening and count:
         known = [~open_, *(np.ones(s, bool) for s in shapes[1:])]
         replaced = places.label > 0
-        result = blended(
+        result = correct_colours(
             places, pictures, wrap=cyclic, screening=screening, within=replaced, known=known, progress=progress
         )
     watch("done", 1.0)
@@ -179,7 +182,7 @@ def complete(
     shades = np.zeros(open_.shape, np.uint8)
     shades[new] = 55 + places.label[new] * 67 % 200
     stages = {"known": bare, "patches": shades, "composite": composite}
-    report = {
+    report: dict[str, object] = {
         "method": method,
         "seed": seed,
         "hole": float(open_.mean()),
@@ -196,7 +199,7 @@ def complete(
     return Synthesis(result, places, stages, report)
 
 
-def transparent(image: object) -> Bools:
+def mark_transparent(image: object) -> Bools:
     """Return what is wholly transparent in a picture as its hole."""
     pixels = np.asarray(image)
     if pixels.ndim != 3 or pixels.shape[2] not in (2, 4):
@@ -209,18 +212,18 @@ def transparent(image: object) -> Bools:
     return hole
 
 
-def scales_of(pictures: Sequence[Array], open_: Bools, own: object, of_source: object) -> list[Floats] | None:
-    """Return the scale maps of the picture and of its source, if scales count."""
+def recover_scales(pictures: Sequence[Array], open_: Bools, own: object, of_exemplar: object) -> list[Floats] | None:
+    """Return the scale maps of the picture and of the one to copy from, if scales count."""
     scale = recovered(pictures[0], open_, own)
     if scale is None or len(pictures) == 1:
         return None if scale is None else [scale]
     shape = (pictures[1].shape[0], pictures[1].shape[1])
-    other = recovered(pictures[1], np.zeros(shape, bool), of_source, "source_scale_map")
+    other = recovered(pictures[1], np.zeros(shape, bool), of_exemplar, "exemplar_scale_map")
     return [scale, np.ones(shape, np.float32) if other is None else other]
 
 
-def check_pictures(image: object, hole: object, source: object | None) -> tuple[list[Array], Bools]:
-    """Return the picture with its hole painted over, the source if there is one, and the hole."""
+def check_pictures(image: object, hole: object, exemplar: object | None) -> tuple[list[Array], Bools]:
+    """Return the picture with its hole painted over, the one to copy from if there is one, and the hole."""
     array = np.asarray(image)
     mask = None
     if array.ndim in (2, 3) and array.dtype.kind in "buif" and array.size:
@@ -231,14 +234,15 @@ def check_pictures(image: object, hole: object, source: object | None) -> tuple[
         array[mask] = array[first] if not mask[first] else 0
     pixels = as_image(array, "image", minimum=LEAST)
     mask = as_mask(hole, "hole", pixels.shape[:2]) if mask is None else mask
-    if source is None:
+    if exemplar is None:
         if mask.all():
-            raise InvalidInput("hole: covers the whole image, so there is nothing to copy from; give a source")
+            raise InvalidInput("hole: covers the whole image, so there is nothing to copy from; give an exemplar")
         return [pixels.reshape(array.shape)], mask
-    other = as_image(source, "source", minimum=LEAST)
+    known = as_exemplar(exemplar, minimum=LEAST)
+    other = known.pixels
     if other.dtype != pixels.dtype or other.shape[-1] != pixels.shape[-1]:
         raise InvalidInput(
-            f"source: needs the dtype and channels of the image, {pixels.dtype} and {pixels.shape[-1]}; "
+            f"exemplar: needs the dtype and channels of the image, {pixels.dtype} and {pixels.shape[-1]}; "
             f"got {other.dtype} and {other.shape[-1]}"
         )
     if mask.all():
@@ -246,13 +250,13 @@ def check_pictures(image: object, hole: object, source: object | None) -> tuple[
     return [pixels.reshape(array.shape), other.reshape(other.shape[: array.ndim])], mask
 
 
-def untouched(shapes: tuple[tuple[int, ...], ...]) -> SourceMap:
+def map_untouched(shapes: tuple[tuple[int, ...], ...]) -> SourceMap:
     """Return the source map of a picture of which nothing is replaced yet."""
     identity = SourceMap.identity(shapes[0])
     return SourceMap(identity.coordinates, identity.exemplar, identity.label, None, shapes)
 
 
-def patched(
+def fill_with_patches(
     pictures: Sequence[Array],
     open_: Bools,
     scales: Sequence[Floats] | None,
@@ -264,25 +268,20 @@ def patched(
     seed: int,
     watch: Progress,
 ) -> tuple[SourceMap, int, int]:
-    """Fill a hole with patches, and give the source map, the side of the patches and how many there are."""
-    guides = guides_of(pictures)
+    """Fill a hole with patches, and return the source map, the side of the patches and how many there are."""
+    guides = guide_together(pictures)
     if scales is not None:
         pairs = zip(guides, scales, strict=True)
         guides = [np.concatenate([g, SCALED * np.log(s)[..., np.newaxis]], axis=-1) for g, s in pairs]
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
-    flips = mirrors(mirror)
+    mirrors = ALL if mirror else (NONE,)
     itself = len(pictures) == 1
     free = ~open_ if itself else np.ones(shapes[-1], bool)
-    side = patch_side(free, chosen, min(n for shape in shapes for n in shape))
-    index = PatchIndex(
-        [flip(guides[-1], f) for f in flips],
-        allowed=[corners(flip(free, f), side) for f in flips],
-        max_patch=side,
-    )
+    side = choose_side(free, chosen, min(n for shape in shapes for n in shape))
     filled = fill(
         guides[0],
         ~open_,
-        index,
+        index_patches(guides[-1], side, mirrors, free),
         patch=side,
         keep=keep,
         wrap=wrap,
@@ -290,11 +289,11 @@ def patched(
         shown=0 if itself else None,
         progress=lambda share: watch("complete", share),
     )
-    places = pasted(untouched(shapes), filled.label, filled.source, filled.coordinates, flips)
+    places = paste(map_untouched(shapes), filled.label, filled.source, filled.coordinates, mirrors)
     return places, side, len(filled.source)
 
 
-def guides_of(pictures: Sequence[Array]) -> list[Floats]:
+def guide_together(pictures: Sequence[Array]) -> list[Floats]:
     """Return the colours that patches are compared by, brought to [0, 1] together."""
     pixels = [as_image(p) for p in pictures]
     if len(pixels) == 1:
@@ -308,38 +307,24 @@ def guides_of(pictures: Sequence[Array]) -> list[Floats]:
     return found
 
 
-def patch_side(free: Bools, chosen: int | None, largest: int) -> int:
+def choose_side(free: Bools, chosen: int | None, largest: int) -> int:
     """Return the side of the patches: the one asked for, or the usual one, smaller where few places are free for it."""
     if chosen is not None:
-        if not corners(free, chosen).any():
-            fits = next((s for s in range(chosen - 1, LEAST - 1, -1) if corners(free, s).any()), None)
-            hint = f"at most {fits} has one" if fits else "nor has any other; give a source"
+        if not mark_corners(free, chosen).any():
+            fits = next((s for s in range(chosen - 1, LEAST - 1, -1) if mark_corners(free, s).any()), None)
+            hint = f"at most {fits} has one" if fits else "nor has any other; give an exemplar"
             raise InvalidInput(f"patch: {chosen} has no place in the image that is free of holes; {hint}")
         return chosen
     usual = min(largest, max(12, min(32, min(free.shape) // 6)))
     for side in range(usual, LEAST - 1, -1):
-        if np.count_nonzero(corners(free, side)) >= PLACES:
+        if np.count_nonzero(mark_corners(free, side)) >= PLACES:
             return side
-    if not corners(free, LEAST).any():
-        raise InvalidInput(f"hole: leaves no {LEAST} x {LEAST} pixels in one piece to copy from; give a source")
+    if not mark_corners(free, LEAST).any():
+        raise InvalidInput(f"hole: leaves no {LEAST} x {LEAST} pixels in one piece to copy from; give an exemplar")
     return LEAST
 
 
-def corners(free: Bools, side: int) -> Bools:
-    """Mark the top-left corners of the patches that are free of holes."""
-    found = np.zeros(free.shape, bool)
-    whole, width = free, 1
-    while width < side:
-        # Two overlapping squares of `width` make one that is larger by `step`.
-        step = min(width, side - width)
-        whole = whole[step:] & whole[:-step]
-        whole = whole[:, step:] & whole[:, :-step]
-        width += step
-    found[: whole.shape[0], : whole.shape[1]] = whole
-    return found
-
-
-def grown(mask: Bools, width: int, wrap: Sequence[bool]) -> Bools:
+def widen(mask: Bools, width: int, wrap: Sequence[bool]) -> Bools:
     """Widen a mask by so many pixels, around the edges of axes that wrap."""
     if not width:
         return mask
@@ -351,27 +336,27 @@ def grown(mask: Bools, width: int, wrap: Sequence[bool]) -> Bools:
     return mask
 
 
-def _where(marked: Array) -> tuple[NDArray[np.intp], ...]:
+def find_places(marked: Array) -> tuple[NDArray[np.intp], ...]:
     """Return the places of what is not zero, as `np.nonzero`, which looks at each axis apart, in a tenth of its time."""
     return np.unravel_index(np.flatnonzero(marked), marked.shape)
 
 
-def pasted(
+def paste(
     kept: SourceMap,
     label: NDArray[np.int32],
     origin: NDArray[np.int64],
     coordinates: Floats,
-    flips: Sequence[Flip],
+    mirrors: Sequence[Flip],
 ) -> SourceMap:
     """Return the map of a picture in which patches are pasted: those of the last exemplar, each in one of its mirrors."""
-    new = _where(label >= 0)
+    new = find_places(label >= 0)
     places, exemplar = kept.coordinates.copy(), kept.exemplar.copy()
     which, found = origin[label[new]], coordinates[new]
     rows, columns = kept.shapes[-1]
-    for number, mirror in enumerate(flips):
+    for number, mirror in enumerate(mirrors):
         here = which == number
         found[here] = flip_coordinates(found[here], mirror, (rows, columns))
     places[new] = found
     exemplar[new] = len(kept.shapes) - 1
-    frames = np.stack([np.eye(2, dtype=np.float32), *(flip_frame(flips[o]) for o in origin)])
+    frames = np.stack([np.eye(2, dtype=np.float32), *(flip_frame(mirrors[o]) for o in origin)])
     return SourceMap(places, exemplar, (label + 1).astype(np.uint32), frames, kept.shapes)

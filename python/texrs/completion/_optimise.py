@@ -71,7 +71,7 @@ def optimised(
     ``wide`` is what may be replaced: the holes and a rim around them.
     """
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
-    for name, shape in zip(("image", "source"), shapes, strict=False):
+    for name, shape in zip(("image", "exemplar"), shapes, strict=False):
         if min(shape) < LEAST:
             raise InvalidInput(f"{name}: method 'optimise' needs at least {LEAST} pixels a side, got {shape}")
     count = min(levels_of(shape, SETTINGS) for shape in shapes)
@@ -97,7 +97,7 @@ def optimised(
         why = (
             "hole: leaves no part of the image that is free"
             if len(pictures) == 1
-            else "source: has no part large enough"
+            else "exemplar: has no part large enough"
         )
         raise InvalidInput(f"{why} to copy from; method='patch' may find one")
     box = around(wide, AROUND << (count - 1), 1 << (count - 1), wrap)

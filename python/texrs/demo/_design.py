@@ -11,6 +11,7 @@ from texrs._engine.noise import uniform
 from texrs._typing import Array
 from texrs.demo._html import code, figure, grid, row, tiled
 from texrs.demo._workshop import Section, Workshop
+from texrs.papers.design import DeformationOptions
 from texrs.synthesis import preview
 
 __all__ = ["RESULTS", "SEEDS", "STAGES", "coloured"]
@@ -19,8 +20,12 @@ SHOWN: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("pebbles", "Rounded stones on sand", {}),
     ("leaves_and_flowers", "Flowers on leaves", {}),
     ("beans", "Touching beans of one colour", {}),
-    ("bark", "Furrowed bark, upright: rotate=0", {"rotate": 0.0}),
-    ("bricks", "A wall: no rotation, no scaling", {"rotate": 0.0, "scale": (1.0, 1.0), "translate": 0.05}),
+    ("bark", "Furrowed bark, upright: rotate=0", {"deformation": DeformationOptions(rotate=0)}),
+    (
+        "bricks",
+        "A wall: no rotation, no scaling",
+        {"deformation": DeformationOptions(rotate=0, scale=(1, 1), translate=0.05)},
+    ),
     ("gravel", "A grey photograph", {}),
 )
 

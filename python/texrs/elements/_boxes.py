@@ -7,8 +7,8 @@ import numpy as np
 from texrs._typing import Floats
 from texrs.elements._arguments import LEAST, Box
 from texrs.elements._mask import nearest_odd, to_lab
-from texrs.exemplar.regularity import lattice
-from texrs.exemplar.segmentation import segment
+from texrs.exemplar.regularity import find_lattice
+from texrs.exemplar.segmentation import ElementOptions, segment
 
 __all__ = ["propose_boxes", "resize_box"]
 
@@ -66,7 +66,7 @@ def _find_pieces(small: Floats) -> list[tuple[float, float, float, float]]:
     """Take pieces of a segmentation by colour, of the usual size."""
     from skimage.measure import regionprops
 
-    elements = segment(small, children="components").elements
+    elements = segment(small, ElementOptions(kind="components")).elements
     rows, columns = elements.shape
     inner = [
         r for r in regionprops(elements) if r.bbox[0] > 0 and r.bbox[1] > 0 and r.bbox[2] < rows and r.bbox[3] < columns
@@ -88,7 +88,7 @@ def _find_periods(small: Floats) -> list[tuple[float, float, float, float]]:
     """Take the cell of the lattice that the image repeats on, at its evenest places."""
     from scipy.ndimage import gaussian_gradient_magnitude, uniform_filter
 
-    regular = lattice(small)
+    regular = find_lattice(small)
     if regular is None:
         return []
     sides = [max(abs(regular.a[axis]), abs(regular.b[axis])) * 0.8 for axis in range(2)]

@@ -3,9 +3,19 @@
 from texrs.exemplar._exemplar import Exemplar, as_exemplar
 from texrs.exemplar.analysis import Analysis, analyse, repeats
 from texrs.exemplar.regularity import Lattice
-from texrs.exemplar.segmentation import Segmentation, segment
+from texrs.exemplar.segmentation import ElementOptions, Segmentation, segment
 
-__all__ = ["Analysis", "Exemplar", "Lattice", "Segmentation", "analyse", "as_exemplar", "repeats", "segment"]
+__all__ = [
+    "Analysis",
+    "ElementOptions",
+    "Exemplar",
+    "Lattice",
+    "Segmentation",
+    "analyse",
+    "as_exemplar",
+    "repeats",
+    "segment",
+]
 
 
 def __dir__() -> list[str]:

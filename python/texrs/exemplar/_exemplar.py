@@ -12,9 +12,12 @@ import numpy as np
 from texrs._arrays import as_image, as_int, as_wrap, guidance, to_unit
 from texrs._cache import Cache, content_hash
 from texrs._engine.coherence import Similarity, similar
-from texrs._typing import Array, Floats, Path
+from texrs._typing import Array, Floats, Path, Progress
 from texrs.errors import FileError, InvalidInput
 from texrs.exemplar.analysis import COARSEST, Analysis, analyse_colours, are_labels, colours, levels_of, repeats
+from texrs.exemplar.regularity import measure_direction
+from texrs.exemplar.segmentation import ElementOptions, Segmentation, segment
+from texrs.exemplar.symmetry import Flip, find_mirrors
 
 __all__ = ["Exemplar", "as_exemplar"]
 
@@ -223,6 +226,47 @@ class Exemplar:
         return self.remember(
             ("similarity", coarsest, number, k, n, numbers),
             lambda: similar(levels[number], k=k, n=n, numbers=numbers, progress=progress),
+        )
+
+    @property
+    def mirrors(self) -> tuple[Flip, ...]:
+        """The mirror images that a picture is like, itself first: (rows mirrored, columns mirrored) of each."""
+        return self.remember("mirrors", lambda: find_mirrors(self.guidance))
+
+    @property
+    def directedness(self) -> float:
+        """How much the edges of a picture agree in direction, or in two at right angles: 0 not at all, 1 wholly."""
+        return self.remember("directedness", lambda: measure_direction(self.guidance))
+
+    def segment(self, options: ElementOptions = ElementOptions(), *, progress: Progress | None = None) -> Segmentation:
+        """Return the background and the elements of a picture, and the lattice that they may lie on.
+
+        Parameters
+        ----------
+        options : ElementOptions
+            How elements are found.
+        progress : callable, optional
+            Called as ``progress("segment", share)`` along the way; raising stops the work.
+
+        Returns
+        -------
+        Segmentation
+            Its arrays are read-only.
+
+        Raises
+        ------
+        InvalidInput
+            A volume, or labels of another shape.
+
+        Examples
+        --------
+        >>> import texrs
+        >>> texrs.Exemplar(texrs.samples.dots((64, 64)).image).segment(texrs.ElementOptions(kind="grid")).count
+        18
+
+        """
+        return self.remember(
+            ("segmentation", options.key), lambda: segment(self._pixels, options, progress=progress).freeze()
         )
 
     # --- what is kept ------------------------------------------------------------------------------------------------

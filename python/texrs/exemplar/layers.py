@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from texrs._typing import Bools, Floats, Labels
 from texrs.kernels.mean_shift import mean_shift
 
-__all__ = ["Regions", "smooth_on_grain"]
+__all__ = ["Regions", "mark_smooth"]
 
 SPATIAL_RADIUS, RANGE_RADIUS = 6, 14 / 255
 """Of the mean-shift filter: pixels, and colour units of [0, 1]."""
@@ -55,7 +55,7 @@ class Regions:
 
     def layers(self, count: int) -> Labels:
         """Assign each pixel to one of ``count`` layers, the largest first."""
-        layer = _weighted_k_means(self.colour, self.area, min(count, len(self.area)))
+        layer = _cluster(self.colour, self.area, min(count, len(self.area)))
         share = np.bincount(layer, self.area)
         order = np.argsort(-share, kind="stable")
         rank = np.empty(len(order), np.int32)
@@ -64,7 +64,7 @@ class Regions:
         return result
 
 
-def _weighted_k_means(points: NDArray[np.float64], weight: NDArray[np.float64], count: int) -> NDArray[np.intp]:
+def _cluster(points: NDArray[np.float64], weight: NDArray[np.float64], count: int) -> NDArray[np.intp]:
     """Cluster weighted points; starts at the heaviest and then the farthest ones, so it needs no randomness."""
     centres = points[[int(np.argmax(weight))]]
     while len(centres) < count:
@@ -85,7 +85,7 @@ def _weighted_k_means(points: NDArray[np.float64], weight: NDArray[np.float64], 
     return np.unique(nearest, return_inverse=True)[1]
 
 
-def smooth_on_grain(rgb: Floats) -> Bools | None:
+def mark_smooth(rgb: Floats) -> Bools | None:
     """Mark what is smooth where the rest is of fine grain, as stones are on sand; None where there are no two such kinds.
 
     The amount of grain is relative to the lightness: of one material in light and in shade it is the same.

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from texrs._typing import Floats
 
-__all__ = ["Lattice", "direction", "lattice"]
+__all__ = ["Lattice", "find_lattice", "measure_direction", "measure_polarity"]
 
 Vector = tuple[int, int]
 
@@ -50,7 +50,7 @@ class Lattice:
         return [(int(v[0]), int(v[1])) for v in found if v @ v <= reach**2 + 0.5]
 
 
-def lattice(guide: Floats) -> Lattice | None:
+def find_lattice(guide: Floats) -> Lattice | None:
     """Find the lattice that an image repeats on, by the correlation of its lightness, or of its edges, with itself."""
     from scipy.ndimage import gaussian_filter
 
@@ -63,13 +63,13 @@ def lattice(guide: Floats) -> Lattice | None:
         return None
     rows, columns = np.gradient(gaussian_filter(light, 1.0))
     edges = np.hypot(rows, columns)
-    found = [_fit(_correlation(picture)) for picture in (light, np.minimum(edges, np.quantile(edges, 0.95)))]
+    found = [_fit_lattice(_correlate(picture)) for picture in (light, np.minimum(edges, np.quantile(edges, 0.95)))]
     believed = [each for each in found if each is not None and each.correlation >= REGULAR]
     # Edges are told apart less well than colours: two of them may be half a period apart.
     return believed[0] if believed else None
 
 
-def _correlation(picture: Floats) -> Floats:
+def _correlate(picture: Floats) -> Floats:
     """Correlate a picture with itself, without its slow changes; the middle is no shift at all."""
     from scipy.fft import irfft2, next_fast_len, rfft2
     from scipy.ndimage import gaussian_filter, uniform_filter
@@ -86,7 +86,7 @@ def _correlation(picture: Floats) -> Floats:
     return np.asarray(near / overlap / variance, np.float32)
 
 
-def _fit(correlation: Floats) -> Lattice | None:
+def _fit_lattice(correlation: Floats) -> Lattice | None:
     """Find the lattice of the highest mean correlation; of those nearly as high, the one of the smallest cell."""
     from scipy.ndimage import maximum_filter
 
@@ -106,7 +106,7 @@ def _fit(correlation: Floats) -> Lattice | None:
             cell = abs(int(a[0] * b[1] - a[1] * b[0]))
             if cell < 0.3 * np.hypot(*a) * np.hypot(*b) or cell < SHORTEST**2:
                 continue
-            mean = _mean(tolerant, a, b, reach)
+            mean = _average(tolerant, a, b, reach)
             if mean > 0 and all(_dips(correlation, v, reach) for v in (a, b)):
                 found[(int(a[0]), int(a[1])), (int(b[0]), int(b[1]))] = (mean, cell)
     if not found:
@@ -128,7 +128,7 @@ def _reduce(one: NDArray[np.intp], other: NDArray[np.intp]) -> tuple[NDArray[np.
     return a, b
 
 
-def _mean(correlation: Floats, a: NDArray[np.intp], b: NDArray[np.intp], reach: NDArray[np.intp]) -> float:
+def _average(correlation: Floats, a: NDArray[np.intp], b: NDArray[np.intp], reach: NDArray[np.intp]) -> float:
     """Average over the places of a lattice; 0 for fewer than four, which prove nothing."""
     most = int(np.hypot(*reach) * 2 / max(1.0, float(np.hypot(*a)))) + 1
     times = np.arange(-most, most + 1)
@@ -148,7 +148,7 @@ def _dips(correlation: Floats, vector: NDArray[np.intp], reach: NDArray[np.intp]
     return bool(along.min() < DIP * along[-1])
 
 
-def direction(guide: Floats) -> float:
+def measure_direction(guide: Floats) -> float:
     """Return how much an image's edges agree in direction: 0 not at all, 1 wholly.
 
     The larger of two measures: of one direction (the structure tensor), as in bark, and of two at right angles (its
@@ -167,7 +167,7 @@ def direction(guide: Floats) -> float:
     return float(max(abs(second.sum()), abs(fourth.sum())) / total)
 
 
-def polarity(guide: Floats) -> tuple[float, float, float]:
+def measure_polarity(guide: Floats) -> tuple[float, float, float]:
     """Return how surely an image differs from its mirror images, in standard errors.
 
     Three values: by what a mirror along rows turns round, by what one along columns does, and by what either does and both
@@ -189,12 +189,12 @@ def polarity(guide: Floats) -> tuple[float, float, float]:
         energy = squares[0] + squares[1]
         cubes = energy * np.sqrt(energy)
         for axis, slope in enumerate((rows, columns)):
-            along[axis] = max(along[axis], *(_sureness(slope * square, cubes) for square in squares))
-        along[2] = max(along[2], _sureness(rows * columns, energy))
+            along[axis] = max(along[axis], *(_measure_oddness(slope * square, cubes) for square in squares))
+        along[2] = max(along[2], _measure_oddness(rows * columns, energy))
     return along[0], along[1], along[2]
 
 
-def _sureness(odd: Floats, scale: Floats) -> float:
+def _measure_oddness(odd: Floats, scale: Floats) -> float:
     """Return the mean of values over that of a scale, in standard errors, which equal parts of the image show."""
     rows, columns = (n // BLOCKS for n in odd.shape)
     parts = [v[: BLOCKS * rows, : BLOCKS * columns].reshape(BLOCKS, rows, BLOCKS, columns) for v in (odd, scale)]

@@ -7,41 +7,87 @@ background, split where they touch; where nothing speaks for them, a jittered gr
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_image, as_int, to_unit
+from texrs._cache import content_hash
 from texrs._engine.noise import uniform
 from texrs._typing import Array, Floats, Labels, Progress
 from texrs.errors import InvalidInput
-from texrs.exemplar import components as _elements
-from texrs.exemplar.layers import Regions, smooth_on_grain
-from texrs.exemplar.regularity import Lattice, lattice
+from texrs.exemplar.backgrounds import USUAL_LAYERS, find_foreground
+from texrs.exemplar.components import fill_crescents
+from texrs.exemplar.layers import Regions
+from texrs.exemplar.regularity import Lattice, find_lattice
+from texrs.exemplar.shapes import mark_outlines
 
-__all__ = ["Children", "Segmentation", "segment"]
+__all__ = ["ElementOptions", "Kind", "Segmentation", "segment"]
 
-Children: TypeAlias = Literal["auto", "components", "grid", "none"]
+Kind: TypeAlias = Literal["auto", "components", "grid", "none"]
+Marks: TypeAlias = NDArray[np.integer[Any]] | NDArray[np.bool_]
 
-LEAST_COVERED, LARGEST, SPREAD = 0.05, 0.25, 1.6
-"""Elements cover at least this share of the image, each at most this one, and their areas vary by at most so many means."""
-WHOLE, INSIDE, OUTSIDE, HEAP = 0.79, 1.6, 1.5, 0.6
-"""Least solidity; least contrast across outlines over that inside; over that of the background, unless they lie in a heap,
-which covers at least this share of the image and has a background of gaps."""
-CONVINCING = 0.83
-"""Score of elements from which on no other background is tried."""
-USUAL_LAYERS, MOST_LAYERS = 2, 4
-"""Layers by default, and at most unless asked for."""
-APART, CLEARLY, SAME_SIZE = 0.45, 1.15, 0.6
-"""Share of the image that elements which lie apart cover at most; how many times more of it further layers must bring; least
-ratio of median areas of elements that are of the same size."""
-SMOOTH_GROUND = 0.6
-"""Share of the ground that may be smooth where the ground is taken to be of fine grain."""
 GRID_SHARE = 1 / 6
 """Side of a grid cell, as a share of the exemplar's shorter side."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ElementOptions:
+    """How the elements of an exemplar are found.
+
+    Attributes
+    ----------
+    layers : int, optional
+        Number of colour layers, 1 to 16. Fewer are made where the image has fewer colours. By default two, or three or
+        four where these find clearly more elements of the same size that lie apart; where the ground is of fine grain,
+        what is smooth belongs to the layer above it.
+    kind : {"auto", "components", "grid", "none"}
+        "components": connected pieces of the layers above the background. "grid": jittered cells of 1/6 of the side,
+        for images without separate elements. "none": whole layers. "auto": components, or the grid where nothing
+        speaks for them: they cover less than 5 % of the image or one more than 25 %, they are ragged, of all sizes,
+        or their outlines stand out neither from what they hold nor from what lies around them.
+    labels : (H, W) array of int, or a list of one an exemplar, optional
+        Elements marked by hand, 0 = background. Replaces the whole segmentation.
+
+    Raises
+    ------
+    InvalidInput
+        A field of another type or out of range; the message names it.
+
+    Examples
+    --------
+    >>> ElementOptions(layers=3)
+    ElementOptions(layers=3, kind='auto', labels=None)
+
+    """
+
+    layers: int | None = None
+    kind: Kind = "auto"
+    labels: Marks | Sequence[Marks] | None = None
+
+    def __post_init__(self) -> None:
+        if self.layers is not None:
+            as_int(self.layers, "layers", 1, 16)
+        if self.kind not in ("auto", "components", "grid", "none"):
+            raise InvalidInput(f"kind: allowed are auto, components, grid and none; got {self.kind!r}")
+        for marks in self.labels if isinstance(self.labels, list | tuple) else [self.labels]:
+            found = np.asarray(0 if marks is None else marks)
+            if found.dtype.kind not in "biu":
+                raise InvalidInput(f"labels: needs integers, got {found.dtype} {found.shape}")
+            if found.size and int(found.min()) < 0:
+                raise InvalidInput(f"labels: 0 is the background and elements count from 1, got {int(found.min())}")
+
+    @property
+    def key(self) -> Hashable:
+        """What tells these options from others: the labels by their content."""
+        return self.layers, self.kind, None if self.labels is None else content_hash(np.asarray(self.labels))
+
+    def select(self, number: int) -> ElementOptions:
+        """Return the options of one of several exemplars, which may each have labels of its own."""
+        return replace(self, labels=self.labels[number]) if isinstance(self.labels, list | tuple) else self
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +100,7 @@ class Segmentation:
         The layer of each pixel; 0 is the background.
     elements : (H, W) int32
         The element of each pixel, from 1; 0 is the background.
-    children : {"components", "grid", "none", "labels"}
+    kind : {"components", "grid", "none", "labels"}
         How the elements were found.
     reason : str
         Why the grid was taken when components were asked for automatically, and what keeps elements in their places;
@@ -66,7 +112,7 @@ class Segmentation:
 
     layers: Labels
     elements: Labels
-    children: str
+    kind: str
     reason: str
     lattice: Lattice | None = None
 
@@ -75,16 +121,22 @@ class Segmentation:
         """Number of elements."""
         return int(self.elements.max())
 
-    def depth(self, reach: float) -> Floats:
+    @property
+    def nbytes(self) -> int:
+        """Memory that the arrays take."""
+        return self.layers.nbytes + self.elements.nbytes
+
+    def freeze(self) -> Segmentation:
+        """Make the arrays read-only, so that the segmentation can be shared, and return it."""
+        self.layers.flags.writeable = self.elements.flags.writeable = False
+        return self
+
+    def measure_depth(self, reach: float) -> Floats:
         """Return how deep inside an element each pixel is: 0 at its outline and outside, 1 from ``reach`` pixels on."""
         from scipy.ndimage import distance_transform_edt
 
         labels = np.pad(self.elements, 1, mode="edge")
-        outline = np.zeros(labels.shape, bool)
-        for axis in range(2):
-            change = np.diff(labels, axis=axis) != 0
-            outline |= np.pad(change, [(0, int(a == axis)) for a in range(2)])
-            outline |= np.pad(change, [(int(a == axis), 0) for a in range(2)])
+        outline = mark_outlines(labels)
         if not outline.any():
             return np.asarray(self.elements > 0, np.float32)
         distance = distance_transform_edt(~outline)[1:-1, 1:-1]
@@ -92,12 +144,7 @@ class Segmentation:
 
 
 def segment(
-    image: Array,
-    *,
-    layers: int | None = None,
-    children: Children = "auto",
-    labels: NDArray[np.integer] | None = None,
-    progress: Progress | None = None,
+    image: Array, options: ElementOptions = ElementOptions(), *, progress: Progress | None = None
 ) -> Segmentation:
     """Segment an exemplar into a background and elements.
 
@@ -105,17 +152,8 @@ def segment(
     ----------
     image : (H, W) or (H, W, C) array
         The exemplar, any dtype; the first three channels count, or the first one when there are two.
-    layers : int, optional
-        Number of colour layers, 1 to 16. Fewer are made where the image has fewer colours. By default two, or three or
-        four where these find clearly more elements of the same size that lie apart; where the ground is of fine grain,
-        what is smooth belongs to the layer above it.
-    children : {"auto", "components", "grid", "none"}
-        "components": connected pieces of the layers above the background. "grid": jittered cells of 1/6 of the side,
-        for images without separate elements. "none": whole layers. "auto": components, or the grid where nothing
-        speaks for them: they cover less than 5 % of the image or one more than 25 %, they are ragged, of all sizes,
-        or their outlines stand out neither from what they hold nor from what lies around them.
-    labels : (H, W) array of int, optional
-        Elements marked by hand, 0 = background. Replaces the whole segmentation.
+    options : ElementOptions
+        How elements are found.
     progress : callable, optional
         Called as ``progress("segment", share)`` along the way, with a rising share; raising stops the work. The longest
         step between two calls is scikit-image's merge of regions: 0.7 s for 1024 x 1024 pixels, growing with these.
@@ -128,173 +166,71 @@ def segment(
     Raises
     ------
     InvalidInput
-        An argument of another shape, type or range.
+        An image or labels of another shape or type.
 
     Examples
     --------
     >>> from texrs import samples
-    >>> from texrs.exemplar import segmentation as segment
-    >>> bool(segment.segment(samples.dots().image).count > 10)
+    >>> from texrs.exemplar import ElementOptions, segment
+    >>> bool(segment(samples.dots().image).count > 10)
     True
+    >>> segment(samples.dots().image, ElementOptions(kind="grid")).count
+    18
 
     """
     pixels = as_image(image)
     height, width = pixels.shape[:2]
-    most = USUAL_LAYERS if layers is None else as_int(layers, "layers", 1, 16)
-    if children not in ("auto", "components", "grid", "none"):
-        raise InvalidInput(f"children: allowed are auto, components, grid and none; got {children!r}")
-    if labels is not None:
-        return _from_labels(labels, (height, width))
-    rgb = _colours(to_unit(pixels))
-    watch = _Watch(progress)
+    if options.labels is not None:
+        return number_marks(options.labels, (height, width))
+    rgb = take_colours(to_unit(pixels))
+    watch = Steps(progress)
     regions = Regions.of(rgb, watch)
-    found = regions.layers(most)
-    if children == "none":
-        return Segmentation(found, found.copy(), "none", "")
-    regular = lattice(rgb)
-    reasons = [f"elements keep to {regular}"] if regular else []
-    if children != "grid":
-        seen = _Seen.of(rgb)
-        found, elements, trouble = _best_background(found, seen, watch)
-        if layers is None:
-            smooth = None if trouble or (elements > 0).mean() > APART else _smooth_too(rgb, seen, found, elements)
-            if smooth is not None:
-                found, elements = smooth
-            else:
-                found, elements, trouble = _more_layers(regions, seen, found, elements, trouble, watch)
-        if children == "components" or not trouble:
-            return Segmentation(found, _elements.whole(elements), "components", "; ".join(reasons), regular)
-        reasons.insert(0, trouble)
-    return Segmentation(found, _grid(height, width), "grid", "; ".join(reasons), regular)
+    if options.kind == "none":
+        whole = regions.layers(options.layers or USUAL_LAYERS)
+        return Segmentation(whole, whole.copy(), "none", "")
+    lattice = find_lattice(rgb)
+    reasons = [f"elements keep to {lattice}"] if lattice else []
+    if options.kind == "grid":
+        layers = regions.layers(options.layers or USUAL_LAYERS)
+    else:
+        layers, elements, fault = find_foreground(rgb, regions, options.layers, watch)
+        if options.kind == "components" or not fault:
+            return Segmentation(layers, fill_crescents(elements), "components", "; ".join(reasons), lattice)
+        reasons.insert(0, fault)
+    return Segmentation(layers, draw_cells(height, width), "grid", "; ".join(reasons), lattice)
 
 
-class _Watch:
+class Steps:
     """Reports a share that comes nearer to the whole with each call: nobody knows how many steps there will be."""
 
     def __init__(self, progress: Progress | None) -> None:
         self.progress, self.left = progress, 1.0
 
     def __call__(self) -> None:
+        """Report a step."""
         self.left *= 0.9
         if self.progress is not None:
             self.progress("segment", 1 - self.left)
 
 
-def _from_labels(labels: NDArray[np.integer], shape: tuple[int, int]) -> Segmentation:
-    given = np.asarray(labels)
-    if given.shape != shape or given.dtype.kind not in "biu":
-        raise InvalidInput(f"labels: needs integers of shape {shape}, got {given.dtype} {given.shape}")
-    if given.size and int(given.min()) < 0:
-        raise InvalidInput(f"labels: 0 is the background and elements count from 1, got {int(given.min())}")
-    values, dense = np.unique(given, return_inverse=True)
-    dense = dense.reshape(shape).astype(np.int32)
-    if values[0] != 0:
-        dense += 1
-    return Segmentation((dense > 0).astype(np.int32), dense.astype(np.int32), "labels", "")
+def number_marks(labels: Marks | Sequence[Marks], shape: tuple[int, int]) -> Segmentation:
+    """Return the segmentation that elements marked by hand are, numbered without gaps."""
+    marks = np.asarray(labels)
+    if marks.shape != shape or marks.dtype.kind not in "biu":
+        raise InvalidInput(f"labels: needs integers of shape {shape}, got {marks.dtype} {marks.shape}")
+    values, dense = np.unique(marks, return_inverse=True)
+    elements = dense.reshape(shape).astype(np.int32) + np.int32(values[0] != 0)
+    return Segmentation((elements > 0).astype(np.int32), elements, "labels", "")
 
 
-def _colours(unit: Floats) -> Floats:
+def take_colours(unit: Floats) -> Floats:
     """Return three colour channels in [0, 1]: those there are, or the first of them three times."""
     chosen = unit[..., :3] if unit.shape[-1] >= 3 else np.repeat(unit[..., :1], 3, axis=-1)
     return np.ascontiguousarray(chosen)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Seen:
-    """What elements are found by, beside their layers."""
-
-    crease: Floats
-    contrast: Floats
-
-    @classmethod
-    def of(cls, rgb: Floats) -> _Seen:
-        lab = _elements.lightness_and_colour(rgb)
-        return cls(_elements.creases(lab), _elements.contrast(lab))
-
-    def elements(self, layers: Labels) -> tuple[Labels, _elements.Evidence]:
-        """Find the elements of the layers above 0, and what speaks for them."""
-        found = _elements.find(layers, self.crease)
-        return found, _elements.evidence(found, self.crease, self.contrast)
-
-
-def _best_background(layers: Labels, seen: _Seen, watch: Callable[[], object]) -> tuple[Labels, Labels, str]:
-    """Take as the background the layer that leaves the most convincing elements; put it first.
-
-    Gives the layers, the elements and why they cannot be trusted, which is empty if they can.
-    """
-    best: tuple[float, Labels, Labels, str] | None = None
-    for background in range(int(layers.max()) + 1):
-        swapped = np.where(layers == background, 0, np.where(layers < background, layers + 1, layers)).astype(np.int32)
-        watch()
-        elements, evidence = seen.elements(swapped)
-        watch()
-        trouble = _trouble(evidence)
-        score = evidence.solidity - 0.05 * background - (1.0 if trouble else 0.0)
-        if best is None or score > best[0] + 1e-9:
-            best = (score, swapped, elements, trouble)
-        if score >= CONVINCING:
-            break
-    assert best is not None
-    return best[1:]
-
-
-def _more_layers(
-    regions: Regions,
-    seen: _Seen,
-    layers: Labels,
-    elements: Labels,
-    trouble: str,
-    watch: Callable[[], object],
-) -> tuple[Labels, Labels, str]:
-    """Add layers as long as they find clearly more elements of the same size, which lie apart.
-
-    Two layers see the light stones on a dark ground, and not those that are as dark as the ground.
-    """
-    for count in range(USUAL_LAYERS + 1, MOST_LAYERS + 1):
-        if trouble or (elements > 0).mean() > APART:
-            break
-        more = _best_background(regions.layers(count), seen, watch)
-        area, before = (np.bincount(e.ravel())[1:] for e in (more[1], elements))
-        alike = len(area) > 0 and SAME_SIZE <= np.median(area) / np.median(before) <= 1 / SAME_SIZE
-        if more[2] or area.sum() > APART * elements.size or not alike or area.sum() < CLEARLY * before.sum():
-            break
-        layers, elements, trouble = more
-    return layers, elements, trouble
-
-
-def _smooth_too(rgb: Floats, seen: _Seen, layers: Labels, elements: Labels) -> tuple[Labels, Labels] | None:
-    """Add what is smooth on a ground of fine grain, as stones as dark as their sand; None where that is not clearly more."""
-    smooth = smooth_on_grain(rgb)
-    # Where there is no grain at all, only outlines are not smooth.
-    if smooth is None or smooth[layers == 0].mean() > SMOOTH_GROUND:
-        return None
-    more = (smooth | (layers > 0)).astype(np.int32)
-    found, evidence = seen.elements(more)
-    if _trouble(evidence) or (found > 0).sum() < CLEARLY * (elements > 0).sum():
-        return None
-    return more, found
-
-
-def _trouble(evidence: _elements.Evidence) -> str:
-    """Return why elements cannot be trusted; empty if they can."""
-    e = evidence
-    if e.covered < LEAST_COVERED:
-        return f"elements cover {e.covered:.0%} of the image, less than {LEAST_COVERED:.0%}"
-    if e.largest > LARGEST:
-        return f"one element covers {e.largest:.0%} of the image, more than {LARGEST:.0%}"
-    if e.solidity < WHOLE:
-        return f"elements fill only {e.solidity:.0%} of their convex hulls, less than {WHOLE:.0%}"
-    if e.inside < INSIDE:
-        return f"contrast across outlines is only {e.inside:.2f} times that inside elements, less than {INSIDE}"
-    if e.covered < HEAP and e.outside < OUTSIDE:
-        return f"contrast across outlines is only {e.outside:.2f} times that of the background, less than {OUTSIDE}"
-    if e.spread > SPREAD:
-        return f"the areas of elements vary by {e.spread:.2f} of their mean, more than {SPREAD}"
-    return ""
-
-
-def _grid(height: int, width: int) -> Labels:
-    """Cut the image into jittered Voronoi cells; every other cell, as on a chequerboard, is an element."""
+def draw_cells(height: int, width: int) -> Labels:
+    """Cut an image into jittered Voronoi cells; every other cell, as on a chequerboard, is an element."""
     from scipy.spatial import KDTree
 
     side = max(6.0, GRID_SHARE * min(height, width))

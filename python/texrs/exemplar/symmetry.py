@@ -1,22 +1,35 @@
-"""Mirror images of an exemplar: pixels, coordinates and frames."""
+"""Mirror images of an exemplar: which of them are like it, and their pixels, coordinates and frames."""
 
 from __future__ import annotations
 
+import math
 from typing import TypeAlias
 
 import numpy as np
 
 from texrs._typing import Array, Floats
+from texrs.exemplar.regularity import measure_polarity
 
-__all__ = ["Flip", "flip", "flip_coordinates", "flip_frame", "mirrors"]
+__all__ = ["ALL", "NONE", "Flip", "find_mirrors", "flip", "flip_coordinates", "flip_frame"]
 
 Flip: TypeAlias = tuple[bool, bool]
 """Whether an image is mirrored along its rows' axis and along its columns' axis."""
 
 
-def mirrors(allowed: bool) -> list[Flip]:
-    """Return the mirrors that may be used, none first."""
-    return [(False, False), (True, False), (False, True), (True, True)] if allowed else [(False, False)]
+NONE: Flip = (False, False)
+ALL: tuple[Flip, ...] = (NONE, (True, False), (False, True), (True, True))
+"""The mirror images of an exemplar, itself first."""
+
+POLAR = 5.0
+"""How surely, in standard errors, an exemplar differs from a mirror image of itself from which on it is not mirrored so."""
+
+
+def find_mirrors(guide: Floats) -> tuple[Flip, ...]:
+    """Return the mirror images that an exemplar is like, itself first: one lit from the left is not lit from the right."""
+    rows, columns, oblique = measure_polarity(guide)
+    # Each mirror turns two of the three round, which are evidence apart from each other.
+    odd = {(True, False): (rows, oblique), (False, True): (columns, oblique), (True, True): (rows, columns)}
+    return tuple(f for f in ALL if f == NONE or math.hypot(*odd[f]) < POLAR)
 
 
 def flip(array: Array, axes: Flip) -> Array:

@@ -1,4 +1,4 @@
-"""DESIGN as printed: whole colour layers, each moved once by the literal generator (``method="paper"``).
+"""DESIGN as printed: whole colour layers, each moved once by the printed generator (``method="paper"``).
 
 Sections 3.3 and 3.4 of Shen, Jin, Mao and Feng 2006, with their misprints repaired:
 
@@ -15,23 +15,23 @@ with the operation: it is even for every T and odd for every R.)
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 
 from texrs._engine.noise import uniform
 from texrs._typing import Bools, Floats, Labels
 from texrs.errors import InvalidInput
 from texrs.kernels.gather import gather
 from texrs.kernels.seam import cut
-from texrs.papers.design.operations import Operation, U, V, chaotic_sequence
+from texrs.papers.design.canvas import Draft
+from texrs.papers.design.logistic_map import iterate
+from texrs.papers.design.operations import Operation, U, V
+from texrs.papers.design.plan import Plan
 from texrs.source_map import SourceMap
 
-__all__ = ["X0", "Layered", "operation", "start", "stitch_layers"]
+__all__ = ["START", "choose_operation", "choose_start", "move_layers", "stitch_layers"]
 
-X0 = 0.76234783
-"""Start of the chaotic sequence of the first variant (section 3.3)."""
+START = 0.76234783
+"""Start of the logistic map for the first tile (section 3.3)."""
 XI = 0.13
 """Of the scaling extent e = xi n (section 3.3)."""
 SCALE = (0.8, 1.2)
@@ -40,8 +40,8 @@ FARTHEST, WIDEST = 0.5, 90.0
 """What u would stand for: translation as a share of the shorter side, rotation in degrees."""
 
 
-def operation(value: float, side: int) -> Operation:
-    """Choose O(m) and its extent from one chaotic value (section 3.3, step 2).
+def choose_operation(value: float, side: int) -> Operation:
+    """Choose O(m) and its extent from one value of the logistic map (section 3.3, step 2).
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def operation(value: float, side: int) -> Operation:
 
     Examples
     --------
-    >>> operation(37, 100)
+    >>> choose_operation(37, 100)
     Operation(kind='S', amount=0.91, axis=1)
 
     """
@@ -74,34 +74,28 @@ def operation(value: float, side: int) -> Operation:
     return Operation(kind, amount, axis)
 
 
-def start(x0: float | None, chaos: float, seed: int, which: int, number: int) -> float:
-    """Return the start of the sequence of a variant of an exemplar: the paper's for the first one, others by the seed."""
+def move_layers(plan: Plan, seed: int, which: int, tile: int) -> Draft:
+    """Move the layers of an exemplar, each by one operation, and stitch them."""
+    options = plan.moves.options
+    start = choose_start(options.start, options.growth_rate, seed, which, tile)
+    return stitch_layers(plan.guide, plan.parts.elements, start, options.growth_rate)
+
+
+def choose_start(start: float | None, growth_rate: float, seed: int, which: int, number: int) -> float:
+    """Return the start of the logistic map for a tile of an exemplar: the paper's for the first one, others by the seed."""
     if (which, number) == (0, 0):
-        return X0 if x0 is None else x0
+        return START if start is None else start
     for attempt in range(64):
         drawn = 2 * uniform(seed, which, number, attempt, 5) - 1
         try:
-            chaotic_sequence(drawn, chaos)
+            iterate(drawn, growth_rate)
         except InvalidInput:
             continue
         return drawn
-    return X0
+    return START
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Layered:
-    """Layers stitched: colours, where they come from, and what is covered (the mask of Eq. 4)."""
-
-    colours: Floats
-    coordinates: Floats
-    label: NDArray[np.uint32]
-    covered: Bools
-    frames: list[NDArray[np.float64]]
-    """The Jacobian of each label."""
-    log: list[dict[str, object]]
-
-
-def stitch_layers(picture: Floats, layers: Labels, x0: float, chaos: float) -> Layered:
+def stitch_layers(picture: Floats, layers: Labels, start: float, growth_rate: float) -> Draft:
     """Move each layer by one operation and cut it into those before it, at the plain cost of Eq. 3.
 
     A layer that lies wholly over others is lost: nothing ties the minimum cut to it.
@@ -112,23 +106,24 @@ def stitch_layers(picture: Floats, layers: Labels, x0: float, chaos: float) -> L
         The exemplar.
     layers : (H, W) int32
         The layer of each pixel, from 0.
-    x0, chaos : float
-        Of the chaotic sequence (Eq. 2).
+    start, growth_rate : float
+        Of the logistic map (Eq. 2).
 
     Returns
     -------
-    Layered
+    Draft
         What is covered, and how.
 
     """
     shape = layers.shape
     count = int(layers.max()) + 1
-    values = chaotic_sequence(x0, chaos, count)
+    values = iterate(start, growth_rate, count)
     whole = SourceMap.identity(shape)
-    made = Layered(np.zeros_like(picture), whole.coordinates.copy(), whole.label, np.zeros(shape, bool), [], [])
+    covered = np.zeros(shape, bool)
+    made = Draft(np.zeros_like(picture), whole.coordinates.copy(), whole.label, covered, [], (False, False), [])
     centre, last = (np.array(shape) - 1) / 2, np.array(shape) - 1
     for layer in range(count):
-        chosen = operation(values[layer], min(shape))
+        chosen = choose_operation(values[layer], min(shape))
         inverse = np.asarray(np.linalg.inv(chosen.matrix()), np.float64)
         places: Floats = (centre + (whole.coordinates - centre - chosen.shift()) @ inverse.T).astype(np.float32)
         inside = np.all((places >= 0) & (places <= last), axis=-1)
@@ -143,5 +138,5 @@ def stitch_layers(picture: Floats, layers: Labels, x0: float, chaos: float) -> L
         made.label[taken] = layer
         made.covered[taken] = True
         made.frames.append(inverse)
-        made.log.append({"element": layer, "operations": [[chosen.kind, round(chosen.amount, 3), chosen.axis]]})
+        made.log.append({"element": layer, "operations": [chosen.describe()]})
     return made

@@ -16,7 +16,7 @@ from texrs._engine.coherence import correct, jitter
 from texrs._engine.pyramid import ONE, Region, upsample
 from texrs._progress import stage
 from texrs._typing import Bools, Progress
-from texrs.completion import corners
+from texrs.exemplar.patches import mark_corners
 from texrs.exemplar.analysis import COARSEST, Analysis, analyse, similarity
 from texrs.kernels.complete import complete
 from texrs.kernels.patch_search import PatchIndex
@@ -106,7 +106,7 @@ def _patches(
     """Fill the holes with patches of the ground alone, or give nothing where it has no place for a patch."""
     guide = guidance(as_image(image))
     for side in range(int(np.clip(scale / 2, 6, 24)), 3, -1):
-        allowed = corners(ground, side)
+        allowed = mark_corners(ground, side)
         if np.count_nonzero(allowed) >= 32:
             break
     else:

@@ -1,0 +1,163 @@
+"""Which of an exemplar's layers is the background, and which further layers hold elements.
+
+Each layer is tried as the background, and the one that leaves the most convincing elements is taken. Layers are added as long
+as they find more elements of the same size, and so is what is smooth on a ground of fine grain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from texrs._typing import Floats, Labels
+from texrs.exemplar.components import find_elements
+from texrs.exemplar.evidence import Evidence, measure_contrast, measure_creases, to_lab, weigh_evidence
+from texrs.exemplar.layers import Regions, mark_smooth
+
+__all__ = ["USUAL_LAYERS", "Features", "find_foreground"]
+
+LEAST_COVERED, LARGEST, SPREAD = 0.05, 0.25, 1.6
+"""Elements cover at least this share of the image, each at most this one, and their areas vary by at most so many means."""
+WHOLE, INSIDE, OUTSIDE, HEAP = 0.79, 1.6, 1.5, 0.6
+"""Least solidity; least contrast across outlines over that inside; over that of the background, unless they lie in a heap,
+which covers at least this share of the image and has a background of gaps."""
+CONVINCING = 0.83
+"""Score of elements from which on no other background is tried."""
+USUAL_LAYERS, MOST_LAYERS = 2, 4
+"""Layers by default, and at most unless asked for."""
+APART, CLEARLY, SAME_SIZE = 0.45, 1.15, 0.6
+"""Share of the image that elements which lie apart cover at most; how many times more of it further layers must bring; least
+ratio of median areas of elements that are of the same size."""
+SMOOTH_GROUND = 0.6
+"""Share of the ground that may be smooth where the ground is taken to be of fine grain."""
+
+
+def find_foreground(
+    rgb: Floats, regions: Regions, layers: int | None, watch: Callable[[], object]
+) -> tuple[Labels, Labels, str]:
+    """Find the layers of an image and the elements in them.
+
+    Parameters
+    ----------
+    rgb : (H, W, 3) float32
+        The image, in [0, 1].
+    regions : Regions
+        Its regions of one colour.
+    layers : int, optional
+        Number of layers; by default as many as find its elements.
+    watch : callable
+        Called along the way.
+
+    Returns
+    -------
+    layers, elements : (H, W) int32
+        The background is 0 in both.
+    fault : str
+        Why the elements cannot be trusted; empty if they can.
+
+    """
+    features = Features.of(rgb)
+    found, elements, fault = choose_background(regions.layers(layers or USUAL_LAYERS), features, watch)
+    if layers is None:
+        smooth = None if fault or (elements > 0).mean() > APART else add_smooth(rgb, features, found, elements)
+        if smooth is not None:
+            return *smooth, ""
+        return add_layers(regions, features, found, elements, fault, watch)
+    return found, elements, fault
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Features:
+    """What elements are found by, beside their layers: creases and contrasts."""
+
+    crease: Floats
+    contrast: Floats
+
+    @classmethod
+    def of(cls, rgb: Floats) -> Features:
+        """Measure an image, (H, W, 3) in [0, 1]."""
+        lab = to_lab(rgb)
+        return cls(measure_creases(lab), measure_contrast(lab))
+
+    def find(self, layers: Labels) -> tuple[Labels, Evidence]:
+        """Find the elements of the layers above 0, and what speaks for them."""
+        found = find_elements(layers, self.crease)
+        return found, weigh_evidence(found, self.crease, self.contrast)
+
+
+def choose_background(layers: Labels, features: Features, watch: Callable[[], object]) -> tuple[Labels, Labels, str]:
+    """Take as the background the layer that leaves the most convincing elements; put it first.
+
+    Returns the layers, the elements and why they cannot be trusted, which is empty if they can.
+    """
+    best: tuple[float, Labels, Labels, str] | None = None
+    for background in range(int(layers.max()) + 1):
+        swapped = np.where(layers == background, 0, np.where(layers < background, layers + 1, layers)).astype(np.int32)
+        watch()
+        elements, evidence = features.find(swapped)
+        watch()
+        fault = find_fault(evidence)
+        score = evidence.solidity - 0.05 * background - (1.0 if fault else 0.0)
+        if best is None or score > best[0] + 1e-9:
+            best = (score, swapped, elements, fault)
+        if score >= CONVINCING:
+            break
+    assert best is not None
+    return best[1:]
+
+
+def add_layers(
+    regions: Regions,
+    features: Features,
+    layers: Labels,
+    elements: Labels,
+    fault: str,
+    watch: Callable[[], object],
+) -> tuple[Labels, Labels, str]:
+    """Add layers as long as they find clearly more elements of the same size, which lie apart.
+
+    Two layers see the light stones on a dark ground, and not those that are as dark as the ground.
+    """
+    for count in range(USUAL_LAYERS + 1, MOST_LAYERS + 1):
+        if fault or (elements > 0).mean() > APART:
+            break
+        more = choose_background(regions.layers(count), features, watch)
+        area, before = (np.bincount(e.ravel())[1:] for e in (more[1], elements))
+        alike = len(area) > 0 and SAME_SIZE <= np.median(area) / np.median(before) <= 1 / SAME_SIZE
+        if more[2] or area.sum() > APART * elements.size or not alike or area.sum() < CLEARLY * before.sum():
+            break
+        layers, elements, fault = more
+    return layers, elements, fault
+
+
+def add_smooth(rgb: Floats, features: Features, layers: Labels, elements: Labels) -> tuple[Labels, Labels] | None:
+    """Add what is smooth on a ground of fine grain, as stones as dark as their sand; None where that is not clearly more."""
+    smooth = mark_smooth(rgb)
+    # Where there is no grain at all, only outlines are not smooth.
+    if smooth is None or smooth[layers == 0].mean() > SMOOTH_GROUND:
+        return None
+    more = (smooth | (layers > 0)).astype(np.int32)
+    found, evidence = features.find(more)
+    if find_fault(evidence) or (found > 0).sum() < CLEARLY * (elements > 0).sum():
+        return None
+    return more, found
+
+
+def find_fault(evidence: Evidence) -> str:
+    """Return why elements cannot be trusted; empty if they can."""
+    e = evidence
+    if e.covered < LEAST_COVERED:
+        return f"elements cover {e.covered:.0%} of the image, less than {LEAST_COVERED:.0%}"
+    if e.largest > LARGEST:
+        return f"one element covers {e.largest:.0%} of the image, more than {LARGEST:.0%}"
+    if e.solidity < WHOLE:
+        return f"elements fill only {e.solidity:.0%} of their convex hulls, less than {WHOLE:.0%}"
+    if e.inside < INSIDE:
+        return f"contrast across outlines is only {e.inside:.2f} times that inside elements, less than {INSIDE}"
+    if e.covered < HEAP and e.outside < OUTSIDE:
+        return f"contrast across outlines is only {e.outside:.2f} times that of the background, less than {OUTSIDE}"
+    if e.spread > SPREAD:
+        return f"the areas of elements vary by {e.spread:.2f} of their mean, more than {SPREAD}"
+    return ""

@@ -1,0 +1,89 @@
+"""What speaks for elements being things: their outlines stand out, and they are whole, few of them large, and of one size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from texrs._typing import Bools, Floats, Labels
+from texrs.exemplar.shapes import mark_outlines, measure_solidity
+
+__all__ = ["Evidence", "measure_contrast", "measure_creases", "to_lab", "weigh_evidence"]
+
+CREASE = 1.5
+"""Standard deviation in pixels of the Gaussian under which creases are looked for."""
+CONTRAST, CLEAR = 2.0, 2
+"""Standard deviation of the Gaussian under which contrasts are looked for, and how far inside is away from an outline."""
+
+
+def to_lab(rgb: Floats) -> Floats:
+    """Return CIE Lab, its lightness in 0..1."""
+    from skimage.color import rgb2lab
+
+    return np.asarray(rgb2lab(rgb), np.float32) / np.float32(100)
+
+
+def measure_creases(lab: Floats) -> Floats:
+    """Return how deep a dark line each pixel lies on: the larger curvature of the lightness, where it is positive."""
+    from scipy.ndimage import gaussian_filter
+
+    light = lab[..., 0]
+    rows, columns, mixed = (gaussian_filter(light, CREASE, order=o) for o in ((2, 0), (0, 2), (1, 1)))
+    largest = (rows + columns) / 2 + np.hypot((rows - columns) / 2, mixed)
+    return np.asarray(np.maximum(largest, 0) * CREASE**2, np.float32)
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """What speaks for elements being things."""
+
+    covered: float
+    """Share of the image."""
+    largest: float
+    """Share of the image that the largest one covers."""
+    spread: float
+    """Standard deviation of their areas over the mean."""
+    solidity: float
+    """Share of their convex hulls that they fill: gaps between things fill little of theirs."""
+    inside: float
+    """How many times stronger contrasts are, or creases deeper, along outlines than inside."""
+    outside: float
+    """How many times stronger contrasts are along outlines than in the background."""
+
+
+def measure_contrast(lab: Floats) -> Floats:
+    """Return how much colours change at each pixel, in Lab."""
+    from scipy.ndimage import gaussian_filter
+
+    square = np.zeros(lab.shape[:2], np.float32)
+    for channel in range(3):
+        for axis in range(2):
+            order = [int(axis == a) for a in range(2)]
+            slope = gaussian_filter(lab[..., channel], CONTRAST, order=order)
+            square += slope * slope
+    return np.sqrt(square)
+
+
+def weigh_evidence(elements: Labels, crease: Floats, contrast: Floats) -> Evidence:
+    """Weigh elements against the image that they were found in."""
+    from scipy.ndimage import maximum_filter
+
+    outline = mark_outlines(elements)
+    far = ~maximum_filter(outline, 2 * CLEAR + 1)
+    covered = elements > 0
+    edge, within, around = outline & covered, far & covered, far & ~covered
+
+    def ratio(values: Floats, place: Bools) -> float:
+        level = float(values[place].mean()) if place.any() else 0.0
+        return float(values[edge].mean()) / max(level, 1e-6) if edge.any() else 0.0
+
+    area = np.bincount(elements.ravel())[1:]
+    return Evidence(
+        covered=float(covered.mean()),
+        largest=float(area.max(initial=0)) / elements.size,
+        spread=float(area.std() / area.mean()) if len(area) else 0.0,
+        solidity=measure_solidity(elements),
+        inside=max(ratio(contrast, within), ratio(maximum_filter(crease, 3), within)),
+        outside=ratio(contrast, around),
+    )

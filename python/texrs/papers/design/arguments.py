@@ -1,0 +1,164 @@
+"""The arguments of `texrs.design`, checked before any work begins."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_float, as_int, as_seed, as_size, as_wrap, check_memory, to_unit
+from texrs._typing import Array, Progress
+from texrs.errors import InvalidInput
+from texrs.exemplar import ElementOptions, Exemplar, as_exemplar
+from texrs.papers.design.options import DeformationOptions
+
+__all__ = ["Arguments", "Exemplars", "Method", "Size", "Weights", "check_arguments"]
+
+Exemplars: TypeAlias = Array | Exemplar | Sequence[Array | Exemplar]
+Size: TypeAlias = int | Sequence[int] | None
+Weights: TypeAlias = Sequence[float] | Array | None
+Method: TypeAlias = Literal["paper"] | None
+
+MINIMUM_SIDE = 16
+"""An exemplar with a shorter side holds no texture to speak of."""
+SPARE = 500_000_000
+"""Bytes that do not grow with the result."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arguments:
+    """What is asked of `texrs.design`."""
+
+    exemplars: list[Exemplar]
+    guides: list[Exemplar]
+    """The same on one scale, which decisions are made on."""
+    size: tuple[int, int]
+    seeds: list[int]
+    wrap: tuple[bool, bool]
+    shares: NDArray[np.float64]
+    """Of each exemplar: (n,) for the whole, or (rows, columns, n)."""
+    elements: ElementOptions
+    deformation: DeformationOptions
+    tiles: int
+    side: int | None
+    """Of the patches that fill holes."""
+    screening: float
+    literal: bool
+    """Whether the paper is followed to the letter."""
+    watch: Progress
+
+    @property
+    def shapes(self) -> tuple[tuple[int, ...], ...]:
+        """Height and width of each exemplar."""
+        return tuple(e.shape for e in self.exemplars)
+
+    @property
+    def images(self) -> list[Array]:
+        """The exemplars as they were given."""
+        return [e.image for e in self.exemplars]
+
+
+def check_arguments(
+    exemplar: Exemplars,
+    count: int,
+    size: Size,
+    *,
+    seed: int,
+    wrap: bool | Sequence[bool],
+    weights: Weights,
+    elements: ElementOptions,
+    deformation: DeformationOptions,
+    tiles: int,
+    patch: int | None,
+    blend: float | None,
+    method: Method,
+    progress: Progress | None,
+) -> Arguments:
+    """Check the arguments of `texrs.design_variants`."""
+    several: list[Any] = list(exemplar) if isinstance(exemplar, list | tuple) else [exemplar]
+    exemplars = [as_exemplar(e, minimum=MINIMUM_SIDE) for e in several]
+    for name, value, kind in (("elements", elements, ElementOptions), ("deformation", deformation, DeformationOptions)):
+        if not isinstance(value, kind):
+            raise InvalidInput(f"{name}: needs {kind.__name__}(...), got {value!r}")
+    check_together(exemplars, elements.labels)
+    rows, columns = as_size(size if size is not None else [2 * n for n in exemplars[0].shape], minimum=MINIMUM_SIDE)
+    first, cyclic = as_seed(seed), as_wrap(wrap)
+    shares = as_shares(weights, len(exemplars), (rows, columns))
+    if method not in (None, "paper"):
+        raise InvalidInput(f"method: None or 'paper' is allowed, got {method!r}")
+    arguments = Arguments(
+        exemplars,
+        scale_together(exemplars),
+        (rows, columns),
+        [(first + k) % 2**64 for k in range(as_int(count, "count", 1, 4096))],
+        (cyclic[0], cyclic[1]),
+        shares,
+        elements,
+        deformation,
+        as_int(tiles, "tiles", 1, 64),
+        None if patch is None else as_int(patch, "patch", 4, min(min(e.shape) for e in exemplars)),
+        as_float(0.0 if blend is None else blend, "blend", 0, 1e6),
+        method == "paper",
+        progress or (lambda stage, share: None),
+    )
+    check_memory(count_bytes(arguments))
+    return arguments
+
+
+def count_bytes(arguments: Arguments) -> int:
+    """Return the bytes that a texture takes: the source map is 14 a pixel, 18 while it is made; the picture is kept twice."""
+    pixels = arguments.exemplars[0].pixels
+    kept = 14 + 2 * pixels.shape[-1] * pixels.itemsize
+    return int(math.prod(arguments.size) * (max(18, kept) + 24 * arguments.literal) + arguments.shares.nbytes + SPARE)
+
+
+def check_together(exemplars: Sequence[Exemplar], labels: object) -> None:
+    """Check that exemplars can be mixed."""
+    if not exemplars:
+        raise InvalidInput("exemplar: at least one is needed, got none")
+    kinds = [(e.pixels.dtype.name, e.pixels.shape[-1]) for e in exemplars]
+    if len(set(kinds)) > 1:
+        raise InvalidInput(f"exemplar: several must agree in dtype and channels, got {kinds}")
+    if isinstance(labels, list | tuple) and len(labels) != len(exemplars):
+        raise InvalidInput(f"labels: needs one an exemplar, {len(exemplars)}, got {len(labels)}")
+    if labels is not None and not isinstance(labels, list | tuple) and len(exemplars) > 1:
+        raise InvalidInput("labels: needs a list of one an exemplar when there are several")
+
+
+def scale_together(exemplars: list[Exemplar]) -> list[Exemplar]:
+    """Return exemplars whose values are brought to [0, 1] on one scale; integers are by themselves."""
+    if len(exemplars) == 1 or exemplars[0].pixels.dtype.kind != "f":
+        return exemplars
+    pixels = [e.pixels for e in exemplars]
+    flat = to_unit(np.concatenate([p.reshape(-1, p.shape[-1]) for p in pixels]))
+    ends = np.cumsum([p.shape[0] * p.shape[1] for p in pixels])[:-1]
+    return [Exemplar(part.reshape(p.shape)) for part, p in zip(np.split(flat, ends), pixels, strict=True)]
+
+
+def as_shares(weights: object, count: int, size: tuple[int, ...]) -> NDArray[np.float64]:
+    """Check the shares of the exemplars: (count,) for the whole, or (rows, columns, count) over the texture."""
+    if weights is None:
+        return np.full(count, 1 / count)
+    try:
+        array = np.asarray(weights, np.float64)
+    except (TypeError, ValueError):
+        raise InvalidInput(f"weights: needs numbers, got {weights!r}") from None
+    if array.shape == size and np.asarray(weights).dtype.kind in "iu":
+        if array.min() < 0 or array.max() >= count:
+            raise InvalidInput(
+                f"weights: a map of exemplars holds 0 to {count - 1}, got {array.min()} to {array.max()}"
+            )
+        return np.eye(count)[array.astype(np.intp)]
+    if array.shape not in ((count,), (*size, count)):
+        raise InvalidInput(
+            f"weights: needs one an exemplar, {count}, a map of exemplars {size} of integers, "
+            f"or weights {(*size, count)}; got shape {array.shape}"
+        )
+    if not np.isfinite(array).all() or array.min() < 0 or (array.sum(axis=-1) <= 0).any():
+        raise InvalidInput("weights: must be finite, not negative, and positive somewhere in each place")
+    shares: NDArray[np.float64] = array / array.sum(axis=-1, keepdims=True)
+    return shares

@@ -1,0 +1,121 @@
+"""The canvas that deformed elements are stitched on by graph cut: section 3.4, Eq. 3 and 4 of `texrs.papers.design`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Bools, Floats, Labels
+from texrs.exemplar.symmetry import Flip
+from texrs.kernels.gather import gather
+from texrs.kernels.seam import cut
+from texrs.papers.design.elements import CONTEXT, INNER, Element, Placement
+from texrs.source_map import SourceMap
+
+__all__ = ["Canvas", "Draft"]
+
+AGREEMENT = 0.6
+"""Largest mean difference between the surroundings of an element and those that it comes to, in standard deviations."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Draft:
+    """A tile whose holes are still open: colours, where they come from, and what is covered (the mask of Eq. 4)."""
+
+    colours: Floats
+    coordinates: Floats
+    """Where each pixel comes from, in the mirror image of the exemplar."""
+    label: NDArray[np.uint32]
+    covered: Bools
+    frames: list[NDArray[np.float64]]
+    """The Jacobian of each label."""
+    mirror: Flip
+    """The mirror image of the exemplar that it was made from."""
+    log: list[dict[str, Any]]
+    """What was done to each element."""
+
+
+@dataclass(slots=True, eq=False)
+class Canvas:
+    """A picture in the making: colours, where they come from, and what is covered (the mask of Eq. 4)."""
+
+    colours: Floats
+    coordinates: Floats
+    label: NDArray[np.uint32]
+    covered: Bools
+    hard: Bools
+    """Hard constraints: what is for certain of the elements that are placed."""
+    occupied: Labels
+    """Elements that others keep out of."""
+    frames: list[NDArray[np.float64]]
+    """The Jacobian of each label."""
+
+    @classmethod
+    def start_on_background(cls, picture: Floats, labels: Labels, still: frozenset[int], free: bool) -> Canvas:
+        """Start from the background: everything but the elements that move and the pixel around them."""
+        from scipy.ndimage import binary_dilation, binary_erosion
+
+        rest = np.isin(labels, sorted(still))
+        start = SourceMap.identity(labels.shape)
+        covered: Bools = ~binary_dilation((labels > 0) & ~rest, np.ones((3, 3), bool)) | rest
+        hard: Bools = binary_erosion(rest, np.ones((3, 3), bool), iterations=int(INNER), border_value=1)
+        # Where elements lie apart, an element keeps out of places that others may still leave: then it can always stay.
+        occupied = labels.copy() if free else np.where(hard, labels, 0)
+        return cls(picture.copy(), start.coordinates, start.label, covered, hard, occupied, [np.eye(2)])
+
+    @classmethod
+    def start_on_picture(cls, picture: Floats) -> Canvas:
+        """Start from the whole picture, which any element may cover."""
+        start = SourceMap.identity(picture.shape[:2])
+        everywhere = np.ones(picture.shape[:2], bool)
+        nothing = np.zeros(picture.shape[:2], np.int32)
+        return cls(picture.copy(), start.coordinates, start.label, everywhere, ~everywhere, nothing, [np.eye(2)])
+
+    def suits(self, picture: Floats, placement: Placement) -> bool:
+        """Return whether the context band of an element is much like what it comes to lie on."""
+        band = (placement.distance < 0) & (placement.distance > -CONTEXT) & placement.inside
+        if not band.any():
+            return False
+        there = gather(picture, placement.coordinates, interpolation="nearest")
+        difference = np.abs(there - self.colours[placement.window]).mean(axis=-1)[band].mean()
+        return bool(difference < AGREEMENT * picture.std(axis=(0, 1)).mean())
+
+    def open_remains(self, labels: Labels, element: Element, label: int) -> None:
+        """Open what is left of an element whose place another one has taken, but for a border of a pixel."""
+        from scipy.ndimage import binary_opening
+
+        low = np.maximum(element.origin.astype(int), 0)
+        high = element.origin.astype(int) + element.distance.shape
+        window = (slice(low[0], high[0]), slice(low[1], high[1]))
+        left = (labels[window] == element.label) & (self.label[window] != label)
+        self.covered[window] &= ~binary_opening(left, np.ones((2, 2), bool))
+
+    def stitch(self, picture: Floats, labels: Labels, placement: Placement, element: int) -> None:
+        """Cut an element and its context band into the canvas (Eq. 3)."""
+        window, hard = placement.window, placement.hard
+        # Of its surroundings only background comes along: pieces of other elements would be torn ones.
+        ground = gather(labels, placement.coordinates, interpolation="nearest") == 0
+        offered = ((placement.distance > -1) | ((placement.distance > -CONTEXT) & ground)) & placement.inside
+        colours = gather(picture, placement.coordinates, interpolation="cubic")
+        known = self.covered[window]
+        taken = offered
+        if (offered & known).any():
+            old_hard = self.hard[window] & known & ~hard
+            # Divided by the local gradient, costs would lead the seam along strong edges, where what is left of it shows.
+            seam = cut(self.colours[window], colours, known, offered, core_a=old_hard, core_b=hard, cost="paper")
+            taken = seam.mask & offered
+        self.colours[window][taken] = colours[taken]
+        self.coordinates[window][taken] = placement.coordinates[taken]
+        self.label[window][taken] = len(self.frames)
+        self.covered[window] |= taken
+        self.hard[window] |= hard
+        self.occupied[self.occupied == element] = 0
+        self.occupied[window][(placement.distance > 0) & placement.inside] = element
+        self.frames.append(placement.frame)
+
+    def finish(self, mirror: Flip, log: list[dict[str, Any]]) -> Draft:
+        """Return the draft of a tile."""
+        return Draft(self.colours, self.coordinates, self.label, self.covered, self.frames, mirror, log)

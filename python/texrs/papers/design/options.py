@@ -1,0 +1,80 @@
+"""How `texrs.design` deforms elements: what a user may choose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from texrs._arrays import as_float, as_int
+from texrs.errors import InvalidInput
+from texrs.papers.design.logistic_map import iterate
+
+__all__ = ["DeformationOptions"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DeformationOptions:
+    """How the elements of an exemplar are deformed (section 3.3 of the paper).
+
+    Attributes
+    ----------
+    operations : int
+        Deformations that are combined on each element, 0 to 8.
+    translate : float
+        Longest translation, as a share of the exemplar's shorter side, 0 to 0.5. In a heap and on a lattice elements go as
+        far as the next place that fits, unless this is 0.
+    rotate : float, optional
+        Largest rotation in degrees, 0 to 180; 0 for textures lit from one side or with letters. By default 60, but 0
+        where the example has directions of its own (bark, brickwork), no separate elements, or a lattice.
+    scale : (float, float)
+        Least and largest scaling, within 0.5 to 2.
+    mirror : bool
+        Whether elements, backgrounds and patches may be mirrored; False for lettered textures. Where the example plainly
+        differs from its mirror image, as lit from one side, it is not mirrored along that axis in any case.
+    start : float, optional
+        Start of the logistic map (Eq. 2), within (-1, 1); the seed draws one for each element by default.
+    growth_rate : float
+        The lambda of the logistic map (Eq. 2), 0 to 2; below about 1.4 its sequence is periodic.
+
+    Raises
+    ------
+    InvalidInput
+        A field of another type or out of range, or a start that the logistic map does not leave; the message names it.
+
+    Examples
+    --------
+    >>> DeformationOptions(rotate=20, mirror=False).rotate
+    20.0
+
+    """
+
+    operations: int = 2
+    translate: float = 0.12
+    rotate: float | None = None
+    scale: tuple[float, float] = (0.8, 1.2)
+    mirror: bool = True
+    start: float | None = None
+    growth_rate: float = 2.0
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.scale, Sequence) or isinstance(self.scale, str) or len(self.scale) != 2:
+            raise InvalidInput(f"scale: needs (least, largest), got {self.scale!r}")
+        low, high = (as_float(s, "scale", 0.5, 2) for s in self.scale)
+        if low > high:
+            raise InvalidInput(f"scale: the least comes first, got {self.scale!r}")
+        if not isinstance(self.mirror, bool | np.bool_):
+            raise InvalidInput(f"mirror: needs True or False, got {self.mirror!r}")
+        values: dict[str, object] = {
+            "operations": as_int(self.operations, "operations", 0, 8),
+            "translate": as_float(self.translate, "translate", 0, 0.5),
+            "rotate": None if self.rotate is None else as_float(self.rotate, "rotate", 0, 180),
+            "scale": (low, high),
+            "mirror": bool(self.mirror),
+            "growth_rate": as_float(self.growth_rate, "growth_rate", 0, 2),
+        }
+        if self.start is not None:
+            iterate(self.start, self.growth_rate)
+        for name, value in values.items():
+            object.__setattr__(self, name, value)

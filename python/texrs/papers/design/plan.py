@@ -1,0 +1,99 @@
+"""What the options of `texrs.design` decide of an exemplar: its elements, how they may move, and what holes are filled from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from texrs._typing import Floats
+from texrs.exemplar import Exemplar
+from texrs.exemplar.patches import index_patches, mark_corners
+from texrs.exemplar.segmentation import Segmentation
+from texrs.exemplar.symmetry import NONE, Flip
+from texrs.kernels.patch_search import PatchIndex
+from texrs.papers.design.operations import Moves
+from texrs.papers.design.options import DeformationOptions
+
+__all__ = ["Plan", "make_plan"]
+
+ROTATE, DIRECTED = 60.0, 0.25
+"""Largest rotation by default, in degrees, and the directedness from which on nothing is turned."""
+BACKGROUND_PLACES = 64
+"""Places for a patch of pure background from which on holes are filled with background alone."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """An exemplar, analysed: made once, and used by all tiles of all textures."""
+
+    guide: Floats
+    parts: Segmentation
+    index: PatchIndex
+    """What holes are filled from, in each of the mirror images."""
+    mirrors: tuple[Flip, ...]
+    """The mirror images that may be used."""
+    moves: Moves
+    side: int
+    """Of a patch that fills holes, in pixels."""
+    literal: bool
+    """Whether the paper is followed to the letter."""
+
+
+def make_plan(
+    exemplar: Exemplar, parts: Segmentation, options: DeformationOptions, *, side: int | None, literal: bool = False
+) -> Plan:
+    """Settle what depends on the exemplar: mirrors, rotations, the side of a patch, and what holes are filled from.
+
+    Parameters
+    ----------
+    exemplar : Exemplar
+        A picture.
+    parts : Segmentation
+        Its elements.
+    options : DeformationOptions
+        What is asked for.
+    side : int, optional
+        Of a patch, in pixels; by default about the size of an element.
+    literal : bool
+        Whether the paper is followed to the letter.
+
+    """
+    if literal:
+        parts, options = replace(parts, kind="none", lattice=None), replace(options, mirror=False)
+    guide, extent = exemplar.guidance, side or choose_side(min(exemplar.shape))
+    mirrors = exemplar.mirrors if options.mirror else (NONE,)
+    moves = settle_moves(exemplar, parts, options, mirrors)
+    return Plan(guide, parts, choose_patches(guide, parts, mirrors, extent), mirrors, moves, extent, literal)
+
+
+def settle_moves(
+    exemplar: Exemplar, parts: Segmentation, options: DeformationOptions, mirrors: Sequence[Flip]
+) -> Moves:
+    """Return what elements may do: on a lattice nothing but move along it, and with directions of their own not turn."""
+    axes = ((True, False) in mirrors, (False, True) in mirrors)
+    if parts.lattice:
+        shifts = parts.lattice.shifts(options.translate * min(exemplar.shape)) if options.translate else []
+        return Moves(replace(options, rotate=0.0, scale=(1.0, 1.0), mirror=False), tuple(shifts), axes)
+    if parts.kind == "grid":
+        # Cells are no elements: turned or scaled they would show their outline, and mirrored they would meet the mirror
+        # image of what they show.
+        return Moves(replace(options, rotate=0.0, scale=(1.0, 1.0), mirror=False), (), axes)
+    if options.rotate is None:
+        options = replace(options, rotate=ROTATE if exemplar.directedness < DIRECTED else 0.0)
+    return Moves(options, (), axes)
+
+
+def choose_side(shorter: int) -> int:
+    """Return the default side of a completion patch, by the shorter side of an exemplar: about the size of an element."""
+    return min(shorter, max(12, min(32, shorter // 6)))
+
+
+def choose_patches(guide: Floats, parts: Segmentation, mirrors: Sequence[Flip], side: int) -> PatchIndex:
+    """Return the index of the patches that holes are filled from: of background alone, if there is enough of it."""
+    if parts.kind in ("components", "labels"):
+        free = parts.elements == 0
+        if np.count_nonzero(mark_corners(free, side)) >= BACKGROUND_PLACES:
+            return index_patches(guide, side, mirrors, free)
+    return index_patches(guide, side, mirrors)

@@ -1,0 +1,86 @@
+"""Tiles: deformed exemplars whose holes are filled by example, section 3.4 of `texrs.papers.design`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Array, Floats
+from texrs.exemplar.symmetry import flip_coordinates, flip_frame
+from texrs.kernels.complete import complete
+from texrs.kernels.gather import gather
+from texrs.papers.design.canvas import Draft
+from texrs.papers.design.plan import Plan
+from texrs.source_map import SourceMap
+
+__all__ = ["Tile", "fill_holes"]
+
+CANDIDATES = 5
+"""Matches of a hole that are cut in; the cheapest is kept."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tile:
+    """A deformed and completed texture of the exemplar's size."""
+
+    source: SourceMap
+    colours: Floats
+    holes: float
+    """Share of it that was open."""
+    log: list[dict[str, Any]]
+    """What was done to each element."""
+    stages: dict[str, Array]
+
+
+def fill_holes(draft: Draft, plan: Plan, shapes: tuple[tuple[int, ...], ...], which: int, seed: int) -> Tile:
+    """Fill what a draft leaves open with patches of the exemplar, each cut into what is known around it.
+
+    Parameters
+    ----------
+    draft : Draft
+        Deformed elements or layers.
+    plan : Plan
+        The exemplar, and what holes are filled from.
+    shapes : tuple of (h, w)
+        Of all exemplars.
+    which : int
+        The one of the draft.
+    seed : int
+        Chooses patches where nothing is known.
+
+    Returns
+    -------
+    Tile
+        Its source map looks into the exemplars.
+
+    """
+    shape = (plan.guide.shape[0], plan.guide.shape[1])
+    holes = ~draft.covered
+    coordinates = flip_coordinates(draft.coordinates, draft.mirror, shape)
+    label = draft.label
+    frames: list[NDArray[np.floating]] = [flip_frame(draft.mirror) @ f for f in draft.frames]
+    if holes.any():
+        filled = complete(
+            draft.colours,
+            draft.covered,
+            plan.index,
+            patch=plan.side,
+            seed=seed,
+            count=1 if plan.literal else CANDIDATES,
+            paper=plan.literal,
+            shown=plan.mirrors.index(draft.mirror),
+        )
+        pasted = filled.label >= 0
+        origin = np.where(pasted, filled.source[filled.label], -1)
+        for k, mirror in enumerate(plan.mirrors):
+            coordinates[origin == k] = flip_coordinates(filled.coordinates[origin == k], mirror, shape)
+        label = np.where(pasted, len(frames) + filled.label, label).astype(np.uint32)
+        frames += [flip_frame(plan.mirrors[k]) for k in filled.source]
+    source = SourceMap(coordinates, np.full(shape, which, np.uint16), label, np.array(frames, np.float32), shapes)
+    colours = gather(plan.guide, coordinates, interpolation="cubic")
+    deformed = np.where(holes[..., np.newaxis], np.float32(0), draft.colours)
+    stages = {"deformed": deformed, "holes": holes, "completed": colours}
+    return Tile(source, colours, float(holes.mean()), draft.log, stages)
