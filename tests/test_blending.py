@@ -1,4 +1,4 @@
-"""Seams healed: known answers, values kept where there is nothing to heal, any map, strip and number of threads."""
+"""Seams that disappear: known answers, values kept where there is nothing to heal, any map, strip and number of threads."""
 
 import os
 import subprocess
@@ -9,7 +9,8 @@ import pytest
 
 import texrs
 from texrs import samples
-from texrs.blending import _seams, _strips, _values, _visibility, blend, visibility
+from texrs.blending import _seams, _values, _visibility, blend, measure_visibility
+from texrs.blending._correction import divide_strips
 from texrs.errors import InvalidInput
 from texrs.source_map import SourceMap
 
@@ -187,7 +188,7 @@ def test_normals_stay_unit_vectors(patchwork, exemplar):
     healed = blend(patchwork, normals.astype(np.float32), wrap=True, kind="normal")
     np.testing.assert_allclose(np.linalg.norm(healed, axis=-1), 1, atol=1e-5)
     rendered = patchwork.render(normals.astype(np.float32), kind="normal")
-    at, after = _seams.seams(patchwork, 1, True)
+    at, after = _seams.list_seams(patchwork, 1, True)
     assert np.abs(healed[after] - healed[at]).mean() < 0.5 * np.abs(rendered[after] - rendered[at]).mean()
     coded = np.rint((normals + 1) / 2 * 255).astype(np.uint8)
     eight = blend(patchwork, coded, wrap=True, kind="normal")
@@ -265,8 +266,8 @@ def test_strips_give_the_whole(monkeypatch, patchwork, exemplar, wrap):
     image = exemplar.astype(np.float32)
     whole = blend(tall, image, wrap=wrap, screening=0.04)
     monkeypatch.setattr(_values, "STRIP", 100 * 128)
-    assert len(list(_strips(tall.shape, wrap, 0.04))) == 5
-    assert len(list(_strips(tall.shape, wrap, 0.0))) == 1
+    assert len(list(divide_strips(tall.shape, wrap, 0.04))) == 5
+    assert len(list(divide_strips(tall.shape, wrap, 0.0))) == 1
     np.testing.assert_allclose(blend(tall, image, wrap=wrap, screening=0.04), whole, atol=0.02)
 
 
@@ -307,19 +308,19 @@ def test_work_can_be_watched_and_stopped(monkeypatch, patchwork, exemplar):
 def test_visibility_does_not_depend_on_bands(monkeypatch, patchwork, exemplar, wrap):
     image = patchwork.render(exemplar)
     monkeypatch.setattr(_values, "BAND", 96)
-    whole = visibility(patchwork, exemplar, image, wrap=wrap)
+    whole = measure_visibility(patchwork, exemplar, image, wrap=wrap)
     pair = (wrap, wrap) if isinstance(wrap, bool) else wrap
-    assert whole.edges == sum(len(_seams.seams(patchwork, axis, pair[axis])[0][0]) for axis in range(2))
+    assert whole.edges == sum(len(_seams.list_seams(patchwork, axis, pair[axis])[0][0]) for axis in range(2))
     for rows in (1, 7, 64):
         monkeypatch.setattr(_values, "BAND", rows)
-        banded = visibility(patchwork, exemplar, image, wrap=wrap)
+        banded = measure_visibility(patchwork, exemplar, image, wrap=wrap)
         assert banded.edges == whole.edges
         assert banded.outliers == whole.outliers
         assert abs(banded.mean - whole.mean) < 1e-9
     # Every fourth row of the picture, every second of the exemplar.
     monkeypatch.setattr(_values, "BAND", 1)
     monkeypatch.setattr(_visibility, "LOOK", 96 * 128 // 4)
-    sampled = visibility(patchwork, exemplar, image, wrap=wrap)
+    sampled = measure_visibility(patchwork, exemplar, image, wrap=wrap)
     assert 0 < sampled.edges < whole.edges
     assert abs(sampled.mean - whole.mean) < 0.2 * whole.mean
 
@@ -362,7 +363,7 @@ def test_seams_disappear(designed):
     assert after["outliers"] < before["outliers"]
     assert after["mean"] <= 1.5
     assert after["outliers"] <= 0.03
-    assert visibility(result.source, sample, result.image, wrap=True).outliers == after["outliers"]
+    assert measure_visibility(result.source, sample, result.image, wrap=True).outliers == after["outliers"]
 
 
 def test_away_from_seams_differences_stay(designed):
@@ -373,7 +374,7 @@ def test_away_from_seams_differences_stay(designed):
     before, after = (i.astype(float) for i in (result.stages["composite"], result.image))
     near = np.zeros(result.source.shape, bool)
     for axis in range(2):
-        at, beyond = _seams.seams(result.source, axis, True)
+        at, beyond = _seams.list_seams(result.source, axis, True)
         near[at] = near[beyond] = True
     far = distance_transform_edt(~near) > 3
     errors = np.concatenate(
@@ -422,4 +423,21 @@ def test_volumes_and_other_sizes_are_refused(patchwork):
     with pytest.raises(InvalidInput, match="^exemplars"):
         blend(patchwork, np.zeros((10, 10)), wrap=True)
     with pytest.raises(InvalidInput, match="^image"):
-        visibility(patchwork, np.zeros((64, 64)), np.zeros((3, 3)), wrap=True)
+        measure_visibility(patchwork, np.zeros((64, 64)), np.zeros((3, 3)), wrap=True)
+
+
+def test_the_public_name_is_the_function():
+    """The module of the same room must not hide it."""
+    assert texrs.blend is blend
+    whole = SourceMap.identity((12, 16))
+    apart = np.where(np.arange(16)[:, np.newaxis] < 8, whole.coordinates, whole.coordinates[:, ::-1])
+    source = SourceMap(apart.astype(np.float32), whole.exemplar, whole.label, None, whole.shapes)
+    image = np.random.default_rng(0).integers(0, 256, (12, 16, 3)).astype(np.uint8)
+    within, known = np.zeros((12, 16), bool), np.ones((12, 16), bool)
+    within[:, 8:] = True
+    known[:, 0] = False
+    plain, healed = source.render(image), texrs.blend(source, image, wrap=False, within=within, known=known)
+    np.testing.assert_array_equal(healed[~within], plain[~within])
+    assert (healed[within] != plain[within]).any()
+    everywhere = texrs.blend(source, image, wrap=False, within=within)
+    assert (healed != everywhere).any()

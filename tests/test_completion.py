@@ -285,6 +285,14 @@ def test_the_image_is_not_changed():
     np.testing.assert_array_equal(image, before)
 
 
+def test_exemplars_stand_for_their_arrays():
+    other = samples.pebbles((64, 80), seed=5).image
+    made = texrs.complete(texrs.Exemplar(PEBBLES), HOLE, exemplar=texrs.Exemplar(other))
+    np.testing.assert_array_equal(made.image, texrs.complete(PEBBLES, HOLE, exemplar=other).image)
+    with pytest.raises(InvalidInput, match="^exemplar: needs an Exemplar with axes=2"):
+        texrs.complete(PEBBLES, HOLE, exemplar=texrs.Exemplar(np.zeros((8, 8, 8), np.uint8), axes=3))
+
+
 def test_progress_and_cancel():
     seen = []
     texrs.complete(PEBBLES, HOLE, progress=lambda stage, share: seen.append((stage, share)))

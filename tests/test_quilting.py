@@ -8,7 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from texrs import SourceMap, samples
-from texrs.quilting import Picture, Window, calm, deal, halved, quilt, spans
+from texrs.quilting import Picture, quilt
+from texrs.quilting._finder import halve
+from texrs.quilting._quilt import find_calm_lines
+from texrs.quilting._windows import Window, deal_exemplars, divide_axis
 
 
 def picture(image: np.ndarray, *, mirrored: bool = False) -> Picture:
@@ -36,12 +39,12 @@ def made(pictures: list[Picture], size: tuple[int, int] = (200, 240), **options:
     length=st.integers(16, 400),
     side=st.integers(16, 128),
     part=st.floats(0.3, 0.9),
-    rim=st.floats(0, 0.5),
+    share=st.floats(0, 0.5),
     wrap=st.booleans(),
 )
-def test_spans_cover_an_axis(length: int, side: int, part: float, rim: float, wrap: bool) -> None:
+def test_spans_cover_an_axis(length: int, side: int, part: float, share: float, wrap: bool) -> None:
     patch = max(8, int(part * side))
-    found = spans(length, side, patch, int(rim * patch), wrap)
+    found = divide_axis(length, side, patch, int(share * patch), wrap)
     covered = np.zeros(length, int)
     for span in found:
         assert 0 < span.extent <= side
@@ -113,22 +116,22 @@ def test_a_map_of_shares_stays_where_it_is(pebbles: np.ndarray) -> None:
 
 
 def test_shares_are_dealt_evenly() -> None:
-    rows, columns = spans(400, 128, 64, 16, True), spans(400, 128, 64, 16, True)
+    rows, columns = divide_axis(400, 128, 64, 16, True), divide_axis(400, 128, 64, 16, True)
     windows = [Window(r, c) for r in rows for c in columns]
-    kinds = deal(windows, (400, 400), np.array([0.75, 0.25]), 0)
+    kinds = deal_exemplars(windows, (400, 400), np.array([0.75, 0.25]), 0)
     assert np.bincount(kinds) / len(kinds) == pytest.approx([0.75, 0.25], abs=0.05)
 
 
 def test_a_calm_line_is_no_edge() -> None:
     lines = np.random.default_rng(0).random((65, 80, 3)).astype(np.float32) * 0.1
     lines[20:] += 0.5
-    found = calm(lines)
+    found = find_calm_lines(lines)
     assert found
     assert 20 not in found
     assert min(found) >= 1
     assert max(found) <= 64
 
 
-def test_halved() -> None:
+def test_halve() -> None:
     image = np.arange(30, dtype=np.float32).reshape(5, 6, 1)
-    assert halved(image)[..., 0].tolist() == [[3.5, 5.5, 7.5], [15.5, 17.5, 19.5]]
+    assert halve(image)[..., 0].tolist() == [[3.5, 5.5, 7.5], [15.5, 17.5, 19.5]]

@@ -228,3 +228,8 @@ def test_same_bytes_for_any_number_of_threads():
     for other in made[1:]:
         assert other.image.tobytes() == made[0].image.tobytes()
         assert other.source.coordinates.tobytes() == made[0].source.coordinates.tobytes()
+
+
+def test_an_exemplar_is_tiled_as_its_array():
+    image = picture("pebbles", 96)
+    np.testing.assert_array_equal(texrs.tile(texrs.Exemplar(image)).image, texrs.tile(image).image)

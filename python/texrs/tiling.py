@@ -124,7 +124,7 @@ def tile(
         "size": list(source.shape),
         "wrap": list(cyclic),
         "overlap": [joints[a].overlap if a in joints else 0 for a in range(2)],
-        "joints": {AXES[a]: joint.report() for a, joint in joints.items()},
+        "joints": {AXES[a]: joint.describe() for a, joint in joints.items()},
     }
     return Synthesis(result, source, stages, report)
 
@@ -169,7 +169,7 @@ class Joint:
     tried: int
     """Overlaps that were cut."""
 
-    def report(self) -> dict[str, object]:
+    def describe(self) -> dict[str, object]:
         """Say what was done."""
         return {
             "split": self.split,
@@ -207,15 +207,15 @@ def join(
     values = []
     for number, m in enumerate(overlaps):
         progress(number / len(overlaps))
-        values.append(seam(guide, axis, m, closed=closed)[0])
+        values.append(cut_seam(guide, axis, m, closed=closed)[0])
     enough = min(values) * (1 + SLACK)
     overlap = next(m for m, value in zip(overlaps, values, strict=True) if value <= enough)
-    value, edges, mask = seam(guide, axis, overlap, closed=closed)
-    at = calm(guide, axis, overlap)
-    return Joint(swapped(guide.shape[:2], axis, at, mask), at, overlap, value, edges, len(overlaps))
+    value, edges, mask = cut_seam(guide, axis, overlap, closed=closed)
+    at = find_calm_line(guide, axis, overlap)
+    return Joint(swap_halves(guide.shape[:2], axis, at, mask), at, overlap, value, edges, len(overlaps))
 
 
-def seam(guide: Floats, axis: int, overlap: int, *, closed: bool) -> tuple[float, int, Bools]:
+def cut_seam(guide: Floats, axis: int, overlap: int, *, closed: bool) -> tuple[float, int, Bools]:
     """Cut from the end of the picture to its beginning: cost, pairs parted, and where the beginning is taken."""
     lines = np.moveaxis(guide, axis, 0)
     end, start = (np.moveaxis(part, 0, axis) for part in (lines[len(lines) - overlap :], lines[:overlap]))
@@ -227,7 +227,7 @@ def seam(guide: Floats, axis: int, overlap: int, *, closed: bool) -> tuple[float
     return found.value, found.edges, found.mask
 
 
-def calm(guide: Floats, axis: int, overlap: int) -> int:
+def find_calm_line(guide: Floats, axis: int, overlap: int) -> int:
     """Return the line nearest to the middle that differs from the one before no more than lines usually do.
 
     It becomes the first one. Half of the picture, as printed, may be the edge of something, which would then lie along
@@ -241,7 +241,7 @@ def calm(guide: Floats, axis: int, overlap: int) -> int:
     return next((line for line in near if jumps[line - 1] <= np.median(jumps)), half)
 
 
-def swapped(shape: tuple[int, ...], axis: int, split: int, mask: Bools) -> SourceMap:
+def swap_halves(shape: tuple[int, ...], axis: int, split: int, mask: Bools) -> SourceMap:
     """Return the map of a picture whose part from ``split`` on comes first, joined to the rest along a cut."""
     side, overlap = shape[axis], mask.shape[axis]
     size = tuple(n - overlap if a == axis else n for a, n in enumerate(shape))

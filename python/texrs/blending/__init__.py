@@ -1,4 +1,4 @@
-"""Seams healed: the colours of a composite corrected so that its differences are those of the exemplar.
+"""Seams that disappear: the colours of a composite corrected so that its differences are those of the exemplar.
 
 Section 3.6 (Eq. 5 and 6) of Shen, Jin, Mao and Feng, "Completion-based texture design using deformation", 2006, after
 Agarwala et al., "Interactive digital photomontage", SIGGRAPH 2004. As printed, the differences wanted are those of the
@@ -11,30 +11,25 @@ material: colours, heights, normals, in any dtype.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_image, as_int, as_mask, as_wrap
-from texrs._typing import Array, Bools, Floats, Interpolation, Progress
-from texrs.blending import _values
-from texrs.blending._seams import Look, Seam, around, rows_of
+from texrs._typing import Array, Floats, Interpolation, Progress
+from texrs.blending._correction import divide_strips, solve_correction
+from texrs.blending._seams import Look, Seam, take_rows
 from texrs.blending._values import Samples
-from texrs.blending._visibility import Visibility, visibility
+from texrs.blending._visibility import Visibility, measure_visibility
 from texrs.errors import InvalidInput
-from texrs.kernels.poisson import Boundary, spread
 from texrs.source_map import SourceMap
 
-__all__ = ["SCREENING", "Visibility", "blend", "visibility"]
+__all__ = ["SCREENING", "Visibility", "blend", "measure_visibility"]
 
 SCREENING = 0.15
 """Weight of the values: with less, rare colours drift by three grey levels and more, with this by two; seams show 1 to
 2 % more than with 0.1."""
-REACH = 9.0
-"""Strips overlap by this over the root of the screening, in pixels: corrections fall to exp(-9) there."""
 
 
 def blend(
@@ -116,15 +111,14 @@ def blend(
     Two parts of a ramp meet in a step of 40. The ramp goes on across it:
 
     >>> import numpy as np
-    >>> from texrs import SourceMap
-    >>> from texrs.blending import blend
+    >>> import texrs
     >>> ramp = np.tile(np.uint8(2) * np.arange(60, dtype=np.uint8), (16, 1))
-    >>> whole = SourceMap.identity((16, 60))
+    >>> whole = texrs.SourceMap.identity((16, 60))
     >>> places = np.concatenate([whole.coordinates[:, :20], whole.coordinates[:, 40:]], axis=1)
-    >>> source = SourceMap(places, whole.exemplar[:, :40], whole.label[:, :40], None, whole.shapes)
+    >>> source = texrs.SourceMap(places, whole.exemplar[:, :40], whole.label[:, :40], None, whole.shapes)
     >>> int(np.diff(source.render(ramp)[8].astype(int)).max())
     42
-    >>> int(np.diff(blend(source, ramp, wrap=False)[8].astype(int)).max())
+    >>> int(np.diff(texrs.blend(source, ramp, wrap=False)[8].astype(int)).max())
     10
 
     """
@@ -137,31 +131,31 @@ def blend(
     result = source.render(exemplars, interpolation=interpolation, kind=kind, green=green)
     several = list(exemplars) if isinstance(exemplars, list | tuple) else [exemplars]
     shown = None if known is None else as_known(known, source.shapes)
-    samples = Samples.of([as_image(e) for e in several], kind)
+    samples = Samples.scale([as_image(e) for e in several], kind)
     if samples is None or interpolation == "nearest":
         return result
     # Seen with a channel axis; what is written to it is written to the result.
     pixels = result.reshape((*source.shape, -1))
-    strips = list(_strips(source.shape, cyclic[0], weight))
-    groups = samples.groups(len(strips), math.prod(source.shape), kind)
+    strips = list(divide_strips(source.shape, cyclic[0], weight))
+    groups = samples.group_channels(len(strips), math.prod(source.shape), kind)
     steps = [(part, channels) for part in strips for channels in groups]
     seen: list[Seam] = []
     for number, (part, channels) in enumerate(steps):
-        around = (part.cyclic, cyclic[1])
+        closed = (part.cyclic, cyclic[1])
         if channels == groups[0]:
-            look = Look(samples, shown, rows_of(source, part.rows), interpolation, kind, green)
-            seen = [look.across(axis, around[axis]) for axis in range(2)]
+            look = Look(samples, shown, take_rows(source, part.rows), interpolation, kind, green)
+            seen = [look.find_seams(axis, closed[axis]) for axis in range(2)]
         if any(len(seam.lack) for seam in seen):
-            report = None if progress is None else _share(progress, number, len(steps))
+            report = None if progress is None else _scale_progress(progress, number, len(steps))
             marked = None if inside is None else inside[part.rows]
-            correction = _correction(look.source.shape, seen, channels, around, weight, width, marked, report)
+            correction = solve_correction(look.source.shape, seen, channels, closed, weight, width, marked, report)
             samples.correct(pixels[part.kept], correction[part.inner], channels, kind)
         if progress is not None:
             progress("blend", (number + 1) / len(steps))
     return result
 
 
-def _share(progress: Progress, number: int, steps: int) -> Callable[[float], object]:
+def _scale_progress(progress: Progress, number: int, steps: int) -> Callable[[float], object]:
     return lambda share: progress("blend", (number + share) / steps)
 
 
@@ -171,85 +165,3 @@ def as_known(value: object, shapes: Sequence[tuple[int, ...]]) -> list[Floats]:
     if len(several) != len(shapes):
         raise InvalidInput(f"known: needs a mask for each of {len(shapes)} exemplars, got {len(several)}")
     return [as_mask(k, "known", shape).astype(np.float32) for k, shape in zip(several, shapes, strict=True)]
-
-
-# --- the correction --------------------------------------------------------------------------------------------------
-
-
-def _correction(
-    shape: tuple[int, ...],
-    seen: Sequence[Seam],
-    channels: slice,
-    wrap: tuple[bool, bool],
-    screening: float,
-    band: int | None,
-    within: Bools | None,
-    progress: Callable[[float], object] | None,
-) -> Floats:
-    """Solve for what must be added to some channels of the composite, (H, W, C) in [0, 1].
-
-    With v = I + c the differences wanted of c are g less those of I: nothing but at seams.
-    """
-    flow = np.zeros((*shape, channels.stop - channels.start), np.float32)
-    near = np.zeros(shape if band is not None else (0, 0), bool)
-    for seam in seen:
-        flow[seam.at] -= seam.lack[:, channels]
-        flow[seam.after] += seam.lack[:, channels]
-        if band is not None:
-            near[seam.at] = near[seam.after] = True
-    free = within is not None and not within.all()
-    rows, columns = (_boundary(w, free) for w in wrap)
-    mask = within
-    if band is not None:
-        close = _close(near, band, wrap)
-        mask = close if within is None else close & within
-    spread(flow, screening=screening, boundary=(rows, columns), mask=mask, progress=progress)
-    return flow
-
-
-def _boundary(wrap: bool, free: bool) -> Boundary:
-    return "periodic" if wrap else "free" if free else "dirichlet"
-
-
-def _close(near: Bools, band: int, wrap: tuple[bool, bool]) -> Bools:
-    """Mark what is at most ``band`` pixels from a marked pixel, around cyclic axes."""
-    from scipy.ndimage import distance_transform_edt
-
-    pads = [min(band, n) if w else 0 for n, w in zip(near.shape, wrap, strict=True)]
-    padded = np.pad(near, [(p, p) for p in pads], mode="wrap")
-    close = distance_transform_edt(~padded) <= band
-    result: Bools = close[pads[0] : pads[0] + near.shape[0], pads[1] : pads[1] + near.shape[1]]
-    return result
-
-
-# --- strips ----------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Strip:
-    """Rows that are solved together."""
-
-    rows: slice | NDArray[np.intp]
-    kept: slice
-    """The rows whose result is kept."""
-    inner: slice
-    """Where they lie among ``rows``."""
-    cyclic: bool
-
-
-def _strips(shape: tuple[int, ...], wrap: bool, screening: float) -> Iterator[Strip]:
-    """Divide a picture into strips of rows, each with a margin in which corrections from beyond it die out."""
-    height, width = shape
-    margin = math.ceil(REACH / math.sqrt(screening)) if screening > 0 else height
-    rows = max(_values.STRIP // width, 2 * margin)
-    whole = height * width <= _values.STRIP or rows + 2 * margin >= height
-    if whole or (rows + 2 * margin) * width > 4 * _values.STRIP:
-        yield Strip(slice(0, height), slice(0, height), slice(0, height), wrap)
-        return
-    for start in range(0, height, rows):
-        stop = min(start + rows, height)
-        first, last = start - margin, stop + margin
-        if not wrap:
-            first, last = max(first, 0), min(last, height)
-        inner = slice(start - first, stop - first)
-        yield Strip(around(first, last, height), slice(start, stop), inner, False)

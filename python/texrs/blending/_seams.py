@@ -12,7 +12,7 @@ from texrs._typing import Array, Bools, Floats, Interpolation
 from texrs.blending._values import Samples
 from texrs.source_map import SourceMap
 
-__all__ = ["Look", "Seam", "around", "rows_of", "seams"]
+__all__ = ["Look", "Seam", "list_seams", "take_rows", "wrap_rows"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,10 +26,10 @@ class Look:
     kind: Literal["colour", "normal"]
     green: Literal["up", "down"]
 
-    def beside(self, at: tuple[Array, ...], axis: int, step: int) -> tuple[Floats, Bools]:
+    def look_beside(self, at: tuple[Array, ...], axis: int, step: int) -> tuple[Floats, Bools]:
         """Return what the sources of pixels show ``step`` pixels on along an axis, and whether the exemplar has that."""
         source = self.source
-        frames = _frames(source, at)
+        frames = _list_frames(source, at)
         places = source.coordinates[at] + np.float32(step) * frames[..., axis]
         which = source.exemplar[at]
         # Coordinates of a mirrored or turned copy carry rounding.
@@ -47,15 +47,15 @@ class Look:
             inside = inside & (np.abs(row.render(self.known, interpolation=self.interpolation)[0] - 1) < 1e-3)
         return shown[0], inside
 
-    def across(self, axis: int, wrap: bool) -> Seam:
+    def find_seams(self, axis: int, wrap: bool) -> Seam:
         """Return the seams that cross an axis: the differences wanted less those of the picture."""
-        at, after = seams(self.source, axis, wrap)
+        at, after = list_seams(self.source, axis, wrap)
         if not len(at[0]):
             return Seam(at, after, np.zeros((0, self.samples.channels), np.float32))
-        here, _ = self.beside(at, axis, 0)
-        there, _ = self.beside(after, axis, 0)
-        ahead, forward = self.beside(at, axis, 1)
-        behind, backward = self.beside(after, axis, -1)
+        here, _ = self.look_beside(at, axis, 0)
+        there, _ = self.look_beside(after, axis, 0)
+        ahead, forward = self.look_beside(at, axis, 1)
+        behind, backward = self.look_beside(after, axis, -1)
         known = forward.astype(np.float32) + backward
         total = (ahead - here) * forward[:, np.newaxis] + (there - behind) * backward[:, np.newaxis]
         return Seam(at, after, total / np.maximum(known, 1)[:, np.newaxis] - (there - here))
@@ -71,7 +71,7 @@ class Seam:
     """What the differences from ``at`` to ``after`` lack, (n, C) in [0, 1]."""
 
 
-def seams(source: SourceMap, axis: int, wrap: bool) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+def list_seams(source: SourceMap, axis: int, wrap: bool) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
     """Return the pixels before the seams that cross an axis, and those after them, each as (rows, columns)."""
     parted = ~source.continues(axis, wrap=wrap)
     if not wrap:
@@ -81,7 +81,7 @@ def seams(source: SourceMap, axis: int, wrap: bool) -> tuple[tuple[Array, ...], 
     return at, after
 
 
-def _frames(source: SourceMap, at: tuple[Array, ...]) -> NDArray[np.float32]:
+def _list_frames(source: SourceMap, at: tuple[Array, ...]) -> NDArray[np.float32]:
     """Return the Jacobians of some pixels, (n, 2, 2)."""
     frame = source.frame_array()
     if frame is None:
@@ -89,12 +89,12 @@ def _frames(source: SourceMap, at: tuple[Array, ...]) -> NDArray[np.float32]:
     return frame[source.label[at]] if frame.ndim == 3 else frame[at]
 
 
-def around(first: int, last: int, height: int) -> slice | NDArray[np.intp]:
+def wrap_rows(first: int, last: int, height: int) -> slice | NDArray[np.intp]:
     """Return rows of a picture that is cyclic, without a copy where they do not cross its end."""
     return slice(first, last) if first >= 0 and last <= height else np.arange(first, last) % height
 
 
-def rows_of(source: SourceMap, rows: slice | NDArray[np.intp]) -> SourceMap:
+def take_rows(source: SourceMap, rows: slice | NDArray[np.intp]) -> SourceMap:
     """Take some rows of a source map."""
     frame = source.frame_array()
     frame = frame if frame is None or frame.ndim == 3 else frame[rows]

@@ -11,7 +11,7 @@ import numpy as np
 from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput
 
-__all__ = ["STRIP", "Samples", "bands_of"]
+__all__ = ["STRIP", "Samples", "divide_rows"]
 
 STRIP = 2**22
 """Pixels that are solved at once; up to four times as many where corrections reach far."""
@@ -33,33 +33,33 @@ class Samples:
     """Range of each channel."""
 
     @classmethod
-    def of(cls, given: Sequence[Array], kind: str) -> Samples | None:
+    def scale(cls, exemplars: Sequence[Array], kind: str) -> Samples | None:
         """Scale them; None where no values between theirs make sense."""
-        dtype, channels = given[0].dtype, given[0].shape[-1]
+        dtype, channels = exemplars[0].dtype, exemplars[0].shape[-1]
         if kind == "normal":
             top = float(np.iinfo(dtype).max) if dtype.kind in "ui" else 1.0
-            low = -top if dtype.kind != "u" and min(float(e[..., :3].min()) for e in given) < 0 else 0.0
+            low = -top if dtype.kind != "u" and min(float(e[..., :3].min()) for e in exemplars) < 0 else 0.0
             high, channels = top, 3
         else:
             if dtype.kind in "bi":
                 return None
             channels -= channels in (2, 4)
-            low = min(float(e[..., :channels].min()) for e in given)
-            high = max(float(e[..., :channels].max()) for e in given)
+            low = min(float(e[..., :channels].min()) for e in exemplars)
+            high = max(float(e[..., :channels].max()) for e in exemplars)
         if high <= low:
             return None
         if not math.isfinite(high - low):
             raise InvalidInput(f"exemplars: the range of values is too large, {low:g} to {high:g}")
         return cls(
-            [_scaled(e[..., :channels], low, high) for e in given],
+            [_scale(e[..., :channels], low, high) for e in exemplars],
             low,
             high - low,
             channels,
-            np.min([e[..., :channels].min(axis=(0, 1)) for e in given], axis=0),
-            np.max([e[..., :channels].max(axis=(0, 1)) for e in given], axis=0),
+            np.min([e[..., :channels].min(axis=(0, 1)) for e in exemplars], axis=0),
+            np.max([e[..., :channels].max(axis=(0, 1)) for e in exemplars], axis=0),
         )
 
-    def groups(self, strips: int, pixels: int, kind: str) -> list[slice]:
+    def group_channels(self, strips: int, pixels: int, kind: str) -> list[slice]:
         """Return the channels that are solved together: all, but one by one where a large picture is one strip."""
         if strips > 1 or pixels <= STRIP or kind == "normal":
             return [slice(0, self.channels)]
@@ -68,7 +68,7 @@ class Samples:
     def correct(self, pixels: Array, correction: Floats, channels: slice, kind: str) -> None:
         """Add a correction to channels of pixels in the exemplar's own values, in place."""
         exact = np.dtype("f4" if pixels.dtype.itemsize <= 2 else "f8")
-        for rows in bands_of(len(pixels)):
+        for rows in divide_rows(len(pixels)):
             mine = pixels[rows, :, channels]
             value = mine.astype(exact) + correction[rows].astype(exact) * self.span
             if kind == "normal":
@@ -80,14 +80,14 @@ class Samples:
             mine[...] = np.rint(value) if pixels.dtype.kind in "ui" else value
 
 
-def _scaled(image: Array, low: float, high: float) -> Floats:
+def _scale(image: Array, low: float, high: float) -> Floats:
     """Bring ``low`` to ``high`` to [0, 1], a band of rows at a time."""
     result = np.empty(image.shape, np.float32)
-    for rows in bands_of(len(image)):
+    for rows in divide_rows(len(image)):
         result[rows] = (image[rows].astype(np.float64) - low) / (high - low)
     return result
 
 
-def bands_of(rows: int) -> Iterator[slice]:
+def divide_rows(rows: int) -> Iterator[slice]:
     """Divide rows so that what is made of them in float64 stays small."""
     return (slice(first, min(first + BAND, rows)) for first in range(0, rows, BAND))

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_image, as_wrap
 from texrs._typing import Array
-from texrs.blending._seams import around, rows_of, seams
-from texrs.blending._values import bands_of
+from texrs.blending._seams import list_seams, take_rows, wrap_rows
+from texrs.blending._values import divide_rows
 from texrs.errors import InvalidInput
 from texrs.source_map import SourceMap
 
-__all__ = ["Visibility", "visibility"]
+__all__ = ["Visibility", "measure_visibility"]
 
 LOOK = 2**22
 """Pixels whose seams are measured, and four times as many as those of an exemplar that they are compared with."""
@@ -42,7 +42,7 @@ class Visibility:
     outliers: float
 
 
-def visibility(
+def measure_visibility(
     source: SourceMap, exemplars: Array | Sequence[Array], image: Array, *, wrap: bool | Sequence[bool]
 ) -> Visibility:
     """Measure how visible the seams of a picture are.
@@ -72,8 +72,8 @@ def visibility(
     --------
     >>> import numpy as np
     >>> from texrs import SourceMap
-    >>> from texrs.blending import visibility
-    >>> visibility(SourceMap.identity((8, 8)), np.eye(8), np.eye(8), wrap=False)
+    >>> from texrs.blending import measure_visibility
+    >>> measure_visibility(SourceMap.identity((8, 8)), np.eye(8), np.eye(8), wrap=False)
     Visibility(edges=0, mean=0.0, outliers=0.0)
 
     """
@@ -83,16 +83,16 @@ def visibility(
     if pixels.shape[:2] != source.shape:
         raise InvalidInput(f"image: needs the size of the source map, {source.shape}, got {pixels.shape[:2]}")
     count = min(3, pixels.shape[-1] - (pixels.shape[-1] == 2))
-    own = np.concatenate([_steps(e[..., :count], axis) for e in several for axis in range(2)])
+    own = np.concatenate([_measure_steps(e[..., :count], axis) for e in several for axis in range(2)])
     height, width = source.shape
     across = []
-    for band in list(bands_of(height))[:: -(-height * width // LOOK)]:
+    for band in list(divide_rows(height))[:: -(-height * width // LOOK)]:
         # With the row after it, for the differences that leave the band.
         last = min(band.stop + 1, height + cyclic[0])
-        rows = around(band.start, last, height)
-        piece, shown = rows_of(source, rows), pixels[rows, :, :count]
+        rows = wrap_rows(band.start, last, height)
+        piece, shown = take_rows(source, rows), pixels[rows, :, :count]
         for axis in range(2):
-            at, after = seams(piece, axis, axis == 1 and cyclic[1])
+            at, after = list_seams(piece, axis, axis == 1 and cyclic[1])
             own_row = at[0] < band.stop - band.start
             before, beyond = (shown[i[0][own_row], i[1][own_row]].astype(np.float64) for i in (at, after))
             across.append(np.abs(beyond - before).mean(axis=-1))
@@ -103,7 +103,7 @@ def visibility(
     return Visibility(len(difference), float(difference.mean() / own.mean()), float(outliers))
 
 
-def _steps(image: Array, axis: int) -> NDArray[np.float64]:
+def _measure_steps(image: Array, axis: int) -> NDArray[np.float64]:
     """Return the sizes of an exemplar's differences along an axis; of rows spread over a large one."""
     every = -(-image.shape[0] * image.shape[1] // (LOOK // 4))
     before = image[::every] if axis == 1 else image[:-1:every]

@@ -22,7 +22,7 @@ NECK = 1.25
 """How many times wider than the neck between them two parts must be to be split there."""
 LINE, LEAST_LINE = 0.5, 12
 """Depth of a crease at which a piece may be split, as a share of the median along outlines, and its least area in pixels."""
-CORE = 0.7
+MARKER = 0.7
 """Share of its greatest depth from which on a pixel is certain to belong to a part."""
 PARTED, CONVEXITY, DEEP = 0.5, 6.0, 0.7
 """Evidence below which parts are joined, the weight in it of the solidity that is lost by joining them, and the depth,
@@ -98,9 +98,9 @@ def split_touching(mask: Bools, crease: Floats) -> Labels:
     parts = watershed(-distance, seeds, mask=mask).astype(np.int32)
     peak = np.maximum(_greatest(distance, parts, count), 1e-6)
     inside = distance / peak[parts]
-    cores = np.where(inside > CORE, parts, 0)
+    markers = np.where(inside > MARKER, parts, 0)
     relief = crease / np.float32(typical)
-    parts = watershed(relief - inside, cores, mask=mask).astype(np.int32)
+    parts = watershed(relief - inside, markers, mask=mask).astype(np.int32)
     pieces, _ = ndimage.label(mask, SQUARE)
     missed = mask & (parts == 0)
     parts[missed] = pieces[missed] + count

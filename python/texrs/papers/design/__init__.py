@@ -48,7 +48,8 @@ from texrs.papers.design.deformation import deform_elements
 from texrs.papers.design.literal import move_layers
 from texrs.papers.design.options import DeformationOptions
 from texrs.papers.design.plan import Plan, make_plan
-from texrs.papers.design.texture import correct_colours, describe, draw_stages, stitch_tiles
+from texrs.papers.design.report import describe, draw_stages
+from texrs.papers.design.texture import correct_colours, stitch_tiles
 from texrs.papers.design.tiles import fill_holes
 from texrs.synthesis import Synthesis
 

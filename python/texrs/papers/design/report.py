@@ -1,0 +1,65 @@
+"""What is shown and said of a texture: pictures of the stages, and the report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from texrs._typing import Array
+from texrs.papers.design.arguments import Arguments
+from texrs.papers.design.plan import Plan
+from texrs.papers.design.tiles import Tile
+from texrs.source_map import SourceMap
+from texrs.volume import paint
+
+__all__ = ["describe", "draw_stages"]
+
+
+def draw_stages(plan: Plan, tile: Tile, picture: Array) -> dict[str, Array]:
+    """Return pictures of the stages, in their order."""
+    return {"segmentation": draw_elements(plan), **tile.stages, "composite": picture}
+
+
+TINT = 0.55
+"""Share of an element's own colour where the exemplar is seen through it."""
+
+
+def draw_elements(plan: Plan) -> Array:
+    """Return the exemplar with its elements in a colour each, between white lines."""
+    guide, elements = plan.guide, plan.parts.elements
+    seen = guide if guide.shape[-1] == 3 else np.repeat(guide[..., :1], 3, axis=-1)
+    tinted = (1 - TINT) * seen + TINT / 255 * paint(elements)
+    picture = np.where(elements[..., np.newaxis] > 0, tinted, seen)
+    picture[1:][elements[1:] != elements[:-1]] = 1
+    picture[:, 1:][elements[:, 1:] != elements[:, :-1]] = 1
+    drawn: Array = np.rint(255 * np.clip(picture, 0, 1)).astype(np.uint8)
+    return drawn
+
+
+def describe(
+    plans: Sequence[Plan],
+    tiles: Sequence[Tile],
+    composite: SourceMap,
+    seams: dict[str, Any],
+    arguments: Arguments,
+    seed: int,
+) -> dict[str, Any]:
+    """Return the report of a texture: JSON types only."""
+    first = plans[0]
+    return {
+        "method": "paper" if arguments.literal else "default",
+        "seed": seed,
+        "size": list(arguments.size),
+        "wrap": list(arguments.wrap),
+        "elements": sum(p.parts.count for p in plans),
+        "kind": first.parts.kind,
+        "reason": first.parts.reason,
+        "rotate": first.moves.rotate,
+        "shares": [int(np.count_nonzero(composite.exemplar == which)) for which in range(len(plans))],
+        "holes": [t.holes for t in tiles],
+        "blend": arguments.screening,
+        "seams": seams,
+        "operations": [t.log for t in tiles],
+    }

@@ -1,0 +1,97 @@
+"""Patches of pictures stitched into a texture of any size.
+
+Raster order after Efros and Freeman, "Image quilting", SIGGRAPH 2001: each patch is cut into what lies there along one
+least seam for each neighbour. On a cyclic axis the last patch meets the first one again, so it is chosen and cut to fit both
+its neighbours.
+
+Departures, with their reasons:
+
+- Each seam is the exact minimum cut of its strip, which may turn back, and not a row-by-row recurrence.
+- Costs are plain differences. Divided by the local gradient, as Kwatra et al. have it, they lead the seams along strong
+  edges, and what is left of the seams shows there (gradient at seams 1.3 to 1.9 times the usual, 1.1 to 1.7 without).
+- A patch is charged for showing what others show already, and for going on where a neighbour ends. A charge that
+  multiplies the match would let the exact continuation of a neighbour, whose match costs nothing, win for ever.
+- A patch that shows the mirror image of what it overlaps is refused: along the axis of a mirror the two meet without a
+  seam, and the eye sees nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._engine.noise import uniform
+from texrs.kernels.patch_search import Match
+from texrs.quilting._finder import Finder
+from texrs.quilting._quilt import Picture, Quilt
+from texrs.quilting._windows import Window, deal_exemplars, divide_axis
+from texrs.source_map import SourceMap
+
+__all__ = ["Picture", "quilt"]
+
+
+def quilt(
+    pictures: Sequence[Picture],
+    size: tuple[int, int],
+    *,
+    patch: int,
+    overlap: int,
+    wrap: tuple[bool, bool],
+    shares: NDArray[np.float64],
+    seed: int,
+    progress: Callable[[float], object],
+) -> SourceMap:
+    """Stitch patches of pictures into a texture.
+
+    Parameters
+    ----------
+    pictures : sequence of Picture
+        What patches are taken from.
+    size : (rows, columns)
+        Size of the texture.
+    patch, overlap : int
+        Side of a patch and overlap of neighbours, in pixels, the overlap at most half the patch; it grows so that
+        patches divide the texture evenly.
+    wrap : (bool, bool)
+        Axes along which the texture is cyclic.
+    shares : (exemplars,) or (rows, columns, exemplars) float64
+        Share of the texture that each exemplar gets, on the whole or place by place.
+    seed : int
+        Chooses the first patch, and the exemplars.
+    progress : callable
+        Called with the share that is done.
+
+    Returns
+    -------
+    SourceMap
+        It looks into the exemplars.
+
+    """
+    sides = [min(p.colours.shape[axis] for p in pictures) for axis in range(2)]
+    rows, columns = (divide_axis(size[a], sides[a], min(patch, sides[a]), overlap, wrap[a]) for a in range(2))
+    shape = (rows[0].extent, columns[0].extent)
+    members = [[i for i, p in enumerate(pictures) if p.kind == kind] for kind in range(shares.shape[-1])]
+    colours = [p.colours for p in pictures]
+    finders = [Finder(colours, mine, shape) for mine in members]
+    canvas = Quilt(pictures, size)
+    windows = [Window(r, c) for r in rows for c in columns]
+    wanted = deal_exemplars(windows, size, shares, seed)
+    for number, window in enumerate(windows):
+        progress(number / len(windows))
+        if number == 0:
+            mine = members[wanted[number]]
+            which = mine[int(uniform(seed, 0, 0, 0, 3) * len(mine))]
+            free = [n - m + 1 for n, m in zip(pictures[which].colours.shape, shape, strict=False)]
+            row, column = (int(uniform(seed, 1 + axis, 0, 0, 3) * n) for axis, n in enumerate(free))
+            canvas.lay_first(window, Match(0.0, which, row, column))
+        else:
+            canvas.paste(window, finders[wanted[number]])
+    progress(1.0)
+    if shares.ndim == 1:
+        # A cyclic texture may begin anywhere. Beside a map of shares it stays where it is.
+        for axis in range(2):
+            if wrap[axis]:
+                canvas.roll(axis, uniform(seed, axis, 0, 0, 6))
+    return canvas.finish()

@@ -1,0 +1,60 @@
+"""What fits where a patch of a quilt is to lie: looked for at half the size, then exactly around the few that are taken."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from texrs._typing import Bools, Floats
+from texrs.kernels.patch_search import Match, PatchIndex
+
+__all__ = ["Finder", "halve"]
+
+POOL = 48
+"""Matches that are looked at for what they repeat."""
+
+
+class Finder:
+    """Finds matches in some of the pictures: everywhere at half their size, then exactly around the few that are taken."""
+
+    def __init__(self, pictures: Sequence[Floats], members: Sequence[int], patch: tuple[int, int]) -> None:
+        colours = [pictures[i] for i in members]
+        self.members = members
+        self.shapes = [(c.shape[0] - patch[0], c.shape[1] - patch[1]) for c in colours]
+        self.whole = PatchIndex(colours, max_patch=patch)
+        self.half = PatchIndex([halve(c) for c in colours], max_patch=(patch[0] // 2, patch[1] // 2))
+
+    def find_pool(self, colours: Floats, known: Bools) -> list[Match]:
+        """Return matches of a patch that are apart, to within a pixel."""
+        weight = halve(known[..., np.newaxis].astype(np.float32))[..., 0] == 1
+        found = self.half.best(halve(colours), weight, count=POOL, separation=max(1, min(weight.shape) // 16))
+        pool = []
+        for m in found:
+            row, column = (
+                min(2 * at, most) for at, most in zip((m.row, m.column), self.shapes[m.exemplar], strict=True)
+            )
+            pool.append(Match(m.cost, m.exemplar, row, column))
+        return pool
+
+    def refine(self, matches: Sequence[Match], colours: Floats, known: Bools) -> list[Match]:
+        """Return the best match within a pixel of each of some of the pool, in one of all pictures."""
+        near = []
+        for m in matches:
+            rows, columns = (
+                range(max(0, at - 1), min(most, at + 1) + 1)
+                for at, most in zip((m.row, m.column), self.shapes[m.exemplar], strict=True)
+            )
+            near.append([(m.exemplar, row, column) for row in rows for column in columns])
+        every = sorted({place for places in near for place in places})
+        scored = self.whole.best_among(colours, known, candidates=every, count=len(every), separation=0)
+        ranks = {(m.exemplar, m.row, m.column): rank for rank, m in enumerate(scored)}
+        best = (scored[min(ranks[place] for place in places)] for places in near)
+        return [Match(b.cost, self.members[b.exemplar], b.row, b.column) for b in best]
+
+
+def halve(image: Floats) -> Floats:
+    """Return an image at half its size, each pixel the mean of four; an odd last line is left out."""
+    rows, columns = (n // 2 * 2 for n in image.shape[:2])
+    fours = [image[i:rows:2, j:columns:2] for i in range(2) for j in range(2)]
+    return np.asarray(sum(fours) * np.float32(0.25), np.float32)

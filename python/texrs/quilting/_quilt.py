@@ -1,0 +1,194 @@
+"""A quilt in the making: patches cut in one by one, the one that shows and repeats the least."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Bools, Floats
+from texrs.kernels.patch_search import Match
+from texrs.kernels.seam import Strip, cut_strips
+from texrs.quilting._finder import Finder
+from texrs.quilting._windows import Window
+from texrs.source_map import SourceMap, pixels_of
+
+__all__ = ["Picture", "Quilt", "find_calm_lines"]
+
+CANDIDATES = 3
+"""Matches of the pool that are cut in."""
+REPETITION, GOOD, ON_LATTICE = 10.0, 0.1, 1.5
+"""Charge for showing what all other patches show, in units of a match that is better than all but this share: where few
+places fit, as between things on plain ground, others would tear what they are put on. And on a lattice, where all places are
+much alike and must meet exactly, in units of a typical match."""
+CONTINUATION = 2.0
+"""Charge for going on with the piece of the exemplar that lies there already, in units of a typical match."""
+CELL = 8
+"""Use is counted in cells of so many pixels a side, and overlaps are compared on as many rows and columns."""
+CALM, RUN = 64, 9
+"""Lines that are looked at for a calm one; pixels of a line that make a visible piece of an edge."""
+MIRRORED, NEAR = 0.02, 8.0
+"""Share of its overlap on which a patch may show the mirror image of what lies there, within so many pixels: a cell, or the
+axis of a mirror could lie between two lines that are compared."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """What patches are taken from: a picture made from one exemplar."""
+
+    colours: Floats
+    """(h, w, C)"""
+    source: SourceMap
+    penalty: Floats
+    """(h, w): how much dearer a seam is at a pixel; its cost is multiplied by one more than this."""
+    regular: bool = False
+    """Whether it repeats on a lattice."""
+
+    @property
+    def kind(self) -> int:
+        """The exemplar it was made from."""
+        return int(self.source.exemplar[0, 0])
+
+
+class Quilt:
+    """The texture in the making.
+
+    The pixels of all pictures stand in one row; what a texture shows at a pixel is a place in that row.
+    """
+
+    def __init__(self, pictures: Sequence[Picture], size: tuple[int, int]) -> None:
+        channels = pictures[0].colours.shape[2]
+        self.pictures = pictures
+        self.size = size
+        self.place = np.zeros(size, np.uint32)
+        self.label = np.zeros(size, np.uint32)
+        self.pastes = 0
+        self.pixels = pixels_of([p.source for p in pictures])
+        self.all_colours = np.concatenate([p.colours.reshape(-1, channels) for p in pictures])
+        self.all_penalties = np.concatenate([p.penalty.ravel() for p in pictures])
+        self.all_hands = np.concatenate([np.linalg.det(p.source.frames()).ravel() > 0 for p in pictures])
+        self.cells = np.concatenate([number_cells(p.source).ravel() for p in pictures])
+        self.used = np.zeros(int(self.cells.max()) + 1)
+
+    def box(self, match: Match, window: Window) -> tuple[slice, slice]:
+        """Return the part of a picture that a match copies."""
+        return slice(match.row, match.row + window.rows.extent), slice(
+            match.column, match.column + window.columns.extent
+        )
+
+    def list_places(self, matches: Sequence[Match], window: Window, step: int = 1) -> NDArray[np.uint32]:
+        """Return the places in the row that matches copy, or of each ``step``-th row and column: (matches, rows, columns)."""
+        which = [m.exemplar for m in matches]
+        rows, columns = (np.arange(0, n, step) for n in window.shape)
+        width, first = self.pixels.shapes[which, 1], self.pixels.first[which]
+        corner = first + np.array([m.row for m in matches]) * width + [m.column for m in matches]
+        lines = corner[:, np.newaxis] + np.multiply.outer(width, rows)
+        return np.asarray(lines[..., np.newaxis] + columns, np.uint32)
+
+    def lay_first(self, window: Window, match: Match) -> None:
+        """Lay the first patch."""
+        self._lay(window, match, np.ones(window.shape, bool))
+
+    def paste(self, window: Window, finder: Finder) -> None:
+        """Cut the most promising matches into what is there, and keep the one that shows and repeats the least."""
+        old, known = self.place[window.index(self.size)], window.mark_known()
+        colours = self.all_colours.take(old, axis=0)
+        pool = finder.find_pool(colours, known)
+        shown = self.list_places(
+            [Match(m.cost, finder.members[m.exemplar], m.row, m.column) for m in pool], window, CELL
+        )
+        good, usual = np.quantile([m.cost for m in pool], (GOOD, 0.5)).tolist()
+        usual = usual or 1.0
+        regular = self.pictures[finder.members[0]].regular
+        charges = (ON_LATTICE if regular else REPETITION * (good or usual) / usual) * self.measure_repetition(shown)
+        continued, mirrored = self.measure_likeness(shown, known, old)
+        charges += CONTINUATION * continued
+        free = np.flatnonzero(mirrored <= MIRRORED) if (mirrored <= MIRRORED).any() else np.arange(len(pool))
+        best = sorted(free.tolist(), key=lambda k: pool[k].cost / usual + charges[k])[:CANDIDATES]
+        exact = finder.refine([pool[k] for k in best], colours, known)
+        seams = self.cut(window, colours, self.all_penalties.take(old), exact)
+        usual = float(np.median([value for value, _ in seams])) or 1.0
+        chosen = min(range(len(best)), key=lambda i: seams[i][0] / usual + charges[best[i]])
+        self._lay(window, exact[chosen], seams[chosen][1])
+
+    def _lay(self, window: Window, match: Match, mask: Bools) -> None:
+        at, [places] = window.index(self.size), self.list_places([match], window)
+        self.place[at] = np.where(mask, places, self.place[at])
+        self.label[at] = np.where(mask, np.uint32(self.pastes), self.label[at])
+        self.used[np.unique(self.cells[places[::CELL, ::CELL]])] += 1
+        self.pastes += 1
+
+    def cut(
+        self, window: Window, colours: Floats, penalty: Floats, matches: Sequence[Match]
+    ) -> list[tuple[float, Bools]]:
+        """Cut matches in along one seam for each overlap: what the seams cost, and where each match is taken."""
+        bands, strips = window.list_overlaps(), []
+        for match in matches:
+            picture, box = self.pictures[match.exemplar], self.box(match, window)
+            fresh, dear = picture.colours[box], picture.penalty[box]
+            for axis, after, band in bands:
+                sides = (colours[band], fresh[band]) if after else (fresh[band], colours[band])
+                strips.append(Strip(*sides, axis, dear[band] + penalty[band]))
+        cuts = iter(cut_strips(strips, cost="paper"))
+        found = []
+        for _ in matches:
+            taken, value = np.ones(window.shape, bool), 0.0
+            for _, after, band in bands:
+                seam = next(cuts)
+                taken[band] &= seam.mask == after
+                value += seam.value
+            found.append((value, taken))
+        return found
+
+    def measure_likeness(
+        self, shown: NDArray[np.uint32], known: Bools, old: NDArray[np.uint32]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the shares of its overlap on which each match shows what lies there, and the mirror image of it."""
+        seen = known[::CELL, ::CELL]
+        there, here = old[::CELL, ::CELL][seen], shown[:, seen]
+        near = self.pixels.exemplar[here] == self.pixels.exemplar[there]
+        for axis in range(2):
+            place = self.pixels.coordinates[:, axis]
+            near &= np.abs(place[here] - place[there]) <= NEAR
+        turned = self.all_hands[here] != self.all_hands[there]
+        return (near & ~turned).mean(axis=1), (near & turned).mean(axis=1)
+
+    def measure_repetition(self, shown: NDArray[np.uint32]) -> NDArray[np.float64]:
+        """Return how much of each match others show: 0 nothing, 1 what they all do."""
+        shares: NDArray[np.float64] = self.used[self.cells[shown]].mean(axis=(1, 2)) / self.pastes
+        return shares
+
+    def roll(self, axis: int, chance: float) -> None:
+        """Let a cyclic axis begin at one of the calm lines, so that the border of the texture does not follow an edge."""
+        lines = np.moveaxis(self.place, axis, 0)
+        found = find_calm_lines(self.all_colours[lines[: CALM + 1]])
+        start = found[int(chance * len(found))]
+        # One after the other, so that no more than one is there twice.
+        self.place = np.roll(self.place, -start, axis)
+        self.label = np.roll(self.label, -start, axis)
+
+    def finish(self) -> SourceMap:
+        """Return the map into the exemplars; the quilt is used up."""
+        return SourceMap.pick([p.source for p in self.pictures], self.place, self.label, overwrite=True)
+
+
+def number_cells(source: SourceMap) -> NDArray[np.int64]:
+    """Return the number of the cell of the exemplars that each pixel shows."""
+    which = int(source.exemplar[0, 0])
+    first = sum((h // CELL + 1) * (w // CELL + 1) for h, w in source.shapes[:which])
+    cell = np.clip(source.coordinates, 0, np.array(source.shapes[which]) - 1).astype(np.int64) // CELL
+    numbers: NDArray[np.int64] = first + cell[..., 0] * (source.shapes[which][1] // CELL + 1) + cell[..., 1]
+    return numbers
+
+
+def find_calm_lines(lines: Floats) -> list[int]:
+    """Return the lines that differ from the one before them as usual, rather less than more, and no more at their worst."""
+    from scipy.ndimage import uniform_filter1d
+
+    jumps = np.abs(np.diff(lines, axis=0)).mean(axis=-1)
+    whole, worst = jumps.mean(axis=1), uniform_filter1d(jumps, RUN, axis=1).max(axis=1)
+    usual = (whole >= np.quantile(whole, 0.25)) & (whole <= np.median(whole)) & (worst <= np.median(worst))
+    found = np.flatnonzero(usual) if usual.any() else [np.argmin(whole)]
+    return [1 + int(line) for line in found]

@@ -1,0 +1,112 @@
+"""Where the patches of a quilt lie, and which exemplar each is taken from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._engine.noise import uniform
+from texrs._typing import Bools
+
+__all__ = ["Span", "Window", "deal_exemplars", "divide_axis"]
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """The part of an axis that a patch covers, and its overlaps with patches that lie there already."""
+
+    start: int
+    extent: int
+    before: int
+    """Overlap in pixels at its beginning."""
+    after: int
+    """Overlap at its end: not 0 only for the last one of a cyclic axis."""
+
+
+def divide_axis(length: int, side: int, patch: int, overlap: int, wrap: bool) -> list[Span]:
+    """Divide an axis evenly into overlapping patches, none longer than ``side``."""
+    if not wrap and length <= side:
+        return [Span(0, length, 0, 0)]
+    step = max(1, patch - overlap)
+    if wrap:
+        count = max(2, math.ceil(length / step))
+        # Only the last patch may meet the first one again.
+        most = 2 * (length // count) if count > 2 else length
+        extent = min(side, math.ceil(length / count) + overlap, most)
+        starts = [length * i // count for i in range(count)]
+    else:
+        count = max(2, math.ceil((length - overlap) / step))
+        extent = patch
+        starts = [(length - patch) * i // (count - 1) for i in range(count)]
+    before = [0] + [a + extent - b for a, b in pairwise(starts)]
+    after = [0] * (count - 1) + [starts[-1] + extent - length]
+    return [Span(*values) for values in zip(starts, [extent] * count, before, after, strict=True)]
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """Where a patch lies."""
+
+    rows: Span
+    columns: Span
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the patch."""
+        return self.rows.extent, self.columns.extent
+
+    def list_overlaps(self) -> list[tuple[int, bool, tuple[slice, slice]]]:
+        """Return the overlaps: the axis that the seam crosses, whether the patch lies after it, and where it is."""
+        whole = slice(None)
+        found = []
+        for axis, span in enumerate((self.rows, self.columns)):
+            for width, part, after in (
+                (span.before, slice(0, span.before), True),
+                (span.after, slice(span.extent - span.after, None), False),
+            ):
+                if width:
+                    found.append((axis, after, (part, whole) if axis == 0 else (whole, part)))
+        return found
+
+    def mark_known(self) -> Bools:
+        """Mark what other patches cover."""
+        known = np.zeros(self.shape, bool)
+        for _, _, band in self.list_overlaps():
+            known[band] = True
+        return known
+
+    def index(self, size: tuple[int, int]) -> Any:
+        """Return the index of its pixels in a texture of this size, around the edges."""
+        ends = [s.start + s.extent <= n for s, n in zip((self.rows, self.columns), size, strict=True)]
+        if all(ends):
+            return tuple(slice(s.start, s.start + s.extent) for s in (self.rows, self.columns))
+        places = ((s.start + np.arange(s.extent)) % n for s, n in zip((self.rows, self.columns), size, strict=True))
+        return np.ix_(*places)
+
+
+def deal_exemplars(
+    windows: Sequence[Window], size: tuple[int, int], shares: NDArray[np.float64], seed: int
+) -> list[int]:
+    """Return the exemplar of each patch, so that every one gets its share.
+
+    Always taking the best match would let one win everywhere: it matches itself best.
+    """
+    count = shares.shape[-1]
+    order = sorted(range(len(windows)), key=lambda i: uniform(seed, i, 0, 0, 5))
+    due, kinds = np.zeros(count), [0] * len(windows)
+    for i in order:
+        here = shares
+        if shares.ndim == 3:
+            # What the middle of the patch asks for: its borders are shared with its neighbours.
+            spans_of = (windows[i].rows, windows[i].columns)
+            here = shares[tuple((s.start + s.extent // 2) % n for s, n in zip(spans_of, size, strict=True))]
+        due += here
+        kinds[i] = int(np.argmax(np.where(here > 0, due, -np.inf)))
+        due[kinds[i]] -= 1
+    return kinds
