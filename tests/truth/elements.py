@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 import texrs
-from texrs import elements as elements
+from texrs import DeformationOptions, ElementOptions, elements
 from texrs.elements import Elements
-from texrs.exemplar import segmentation as segment
+from texrs.exemplar import segment
 from truth.exemplars import clear, colour, deep, floats, sample
 from truth.table import Parts, case, parts_of, rounded
 
-DESIGNED = ("elements", "children", "rotate", "shares", "holes", "operations")
+DESIGNED = ("elements", "kind", "rotate", "shares", "holes", "operations")
 
 
 @case
@@ -27,14 +27,21 @@ def design() -> Parts:
 def design_of_16_bits_that_does_not_repeat() -> Parts:
     exemplar = deep("dots", 112, 96)
     result = texrs.design(
-        exemplar, (128, 144), wrap=False, blend=None, children="grid", tiles=3, rotate=30, translate=0.3, patch=14
+        exemplar,
+        (128, 144),
+        wrap=False,
+        blend=None,
+        elements=ElementOptions(kind="grid"),
+        tiles=3,
+        deformation=DeformationOptions(rotate=30, translate=0.3),
+        patch=14,
     )
     return parts_of(result, report=DESIGNED)
 
 
 @case
 def design_on_a_lattice() -> Parts:
-    results = texrs.design(colour("net", 96, 96), (112, 128), variants=2, wrap=(True, False), tiles=2, seed=9)
+    results = texrs.design_variants(colour("net", 96, 96), 2, (112, 128), wrap=(True, False), tiles=2, seed=9)
     first, second = (parts_of(each, report=DESIGNED) for each in results)
     return first | {f"second {name}": part for name, part in second.items()}
 
@@ -45,12 +52,8 @@ def design_of_marked_elements() -> Parts:
     result = texrs.design(
         beans.image,
         (112, 112),
-        labels=beans.labels,
-        operations=3,
-        scale=(0.7, 1.4),
-        mirror=False,
-        x0=0.3,
-        chaos=1.9,
+        elements=ElementOptions(labels=beans.labels),
+        deformation=DeformationOptions(operations=3, scale=(0.7, 1.4), mirror=False, start=0.3, growth_rate=1.9),
         blend=0.01,
     )
     return parts_of(result, report=DESIGNED)
@@ -166,24 +169,24 @@ def self_splice_made_regular() -> Parts:
 def segments() -> Parts:
     parts: dict[str, object] = {}
     for name, options in SEGMENTED.items():
-        found = segment.segment(colour(name, 96, 96), **options)
+        found = segment(colour(name, 96, 96), options)
         parts |= {
             f"{name} layers": found.layers,
             f"{name} elements": found.elements,
-            f"{name} children": found.children,
+            f"{name} kind": found.kind,
             f"{name} lattice": found.lattice and (found.lattice.a, found.lattice.b),
         }
     return parts
 
 
-SEGMENTED: dict[str, dict[str, object]] = {
-    "pebbles": {},
-    "net": {},
-    "scales": {},
-    "beans": {"layers": 3},
-    "leaves_and_flowers": {"children": "components"},
-    "bark": {"children": "none", "layers": 4},
-    "grit": {},
+SEGMENTED = {
+    "pebbles": ElementOptions(),
+    "net": ElementOptions(),
+    "scales": ElementOptions(),
+    "beans": ElementOptions(layers=3),
+    "leaves_and_flowers": ElementOptions(kind="components"),
+    "bark": ElementOptions(kind="none", layers=4),
+    "grit": ElementOptions(),
 }
 
 

@@ -116,7 +116,7 @@ COMPLETED = ("hole", "replaced_outside", "patch", "patches")
 @case
 def complete_with_patches() -> Parts:
     hole = box((128, 144), (40, 90), (50, 100)) | box((128, 144), (0, 30), (120, 144))
-    result = texrs.complete(colour("pebbles", 128, 144, seed=4), hole, rim=5, blend=0.003, seed=3)
+    result = texrs.complete(colour("pebbles", 128, 144, seed=4), hole, boundary=5, blend=0.003, seed=3)
     return parts_of(result, report=COMPLETED, stages=("known", "patches", "composite"))
 
 
@@ -150,7 +150,7 @@ def complete_with_a_scale_map() -> Parts:
 def complete_with_a_source() -> Parts:
     hole = box((96, 112), (20, 70), (30, 80))
     other = floats("pebbles", 80, 96, seed=5)
-    result = texrs.complete(floats("grit", 96, 112), hole, source=other, blend=0.001, rim=2, seed=1)
+    result = texrs.complete(floats("grit", 96, 112), hole, exemplar=other, blend=0.001, boundary=2, seed=1)
     return parts_of(result, report=COMPLETED, stages=("patches", "composite"), exact=False)
 
 
