@@ -15,7 +15,6 @@ from pathlib import Path
 
 import texrs
 from texrs import fields, io, samples
-from texrs.exemplar.analysis import analyse
 
 
 def measured(name: str, work: Callable[[], object]) -> None:
@@ -38,8 +37,9 @@ def main() -> None:
     parser.add_argument("--volume", type=int, default=0)
     asked = parser.parse_args()
     exemplar, picture = samples.particles().image, samples.load("weave").image
-    analyse(exemplar, axes=3)
-    analyse(picture, axes=2)
+    exemplar, picture = texrs.Exemplar(exemplar, axes=3), texrs.Exemplar(picture)
+    exemplar.analyse()
+    picture.analyse()
     for field in (None, fields.circular(), fields.zigzag()):
         texture = texrs.SolidTexture(exemplar, field=field, seed=1)
         name = "none" if field is None else field.describe().split(",")[0].split(" of")[0]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import texrs
 from reference import coherence as twin
 from texrs import fields, samples
 from texrs._engine.appearance import Appearance
@@ -10,7 +11,6 @@ from texrs._engine.coherence import correct, jitter, similar
 from texrs._engine.pyramid import ONE, Region, to_fixed
 from texrs._threads import threads
 from texrs.errors import InvalidInput
-from texrs.exemplar import analysis
 
 
 def exemplar(axes, wrap=False):
@@ -120,8 +120,8 @@ def test_arrays_that_do_not_belong_together():
 
 
 def test_sets_are_kept_with_the_analysis():
-    found = analysis.analyse(samples.weave((64, 64)).image, axes=2)
-    assert analysis.similarity(found, 0) is analysis.similarity(found, 0)
-    assert analysis.similarity(found, 0) is not analysis.similarity(found, 0, n=5)
+    found = texrs.Exemplar(samples.weave((64, 64)).image)
+    assert found.similarity(0) is found.similarity(0)
+    assert found.similarity(0) is not found.similarity(0, n=5)
     with pytest.raises(InvalidInput, match="level"):
-        analysis.similarity(found, 9)
+        found.similarity(9)

@@ -1,16 +1,22 @@
-"""texrs.growth: copies of an exemplar, where they lie and what may be copied of them."""
+"""texrs.growth and the atlas that it grows from: where copies lie, what may be copied of them, and the levels."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from reference import supply as reference
+from reference import growth as reference
 from texrs import samples
-from texrs._engine.appearance import Appearance, Guide
+from texrs._arrays import guidance
+from texrs._engine.appearance import Appearance, Corrected, Demand
 from texrs._engine.pyramid import ONE, Region, to_fixed
 from texrs.errors import InvalidInput
-from texrs.exemplar.atlas import weights_of
-from texrs.growth import RADIUS, Settings, Supply
-from texrs.growth.balance import Balance, tones_of
+from texrs.exemplar.analysis import count_levels
+from texrs.exemplar.atlas import RADIUS, Atlas, find_tones, resampling_matrix
+from texrs.growth import FROM_ATLAS, Surroundings, Windows, from_draft, grow, grow_from_atlas
+from texrs.growth.balance import Balance
+from texrs.growth.constraints import Asked
+from texrs.growth.scales import Scales
 
 
 @pytest.fixture(scope="module")
@@ -19,23 +25,28 @@ def floor():
 
 
 @pytest.fixture(scope="module")
-def supply(floor):
-    return Supply.of(floor.image, np.asarray(floor.scale_map, np.float32), (1.0, 0.64, 1.25))
+def atlas(floor):
+    return atlas_of(floor.image, np.asarray(floor.scale_map, np.float32), (1.0, 0.64, 1.25))
+
+
+def atlas_of(image, scale=None, sizes=(1.0,), *, coarsest=32, **options):
+    """Return the atlas of an image, of as many levels as its size gives."""
+    return Atlas.of(guidance(image), scale, sizes, levels=count_levels(image.shape[:2], coarsest), **options)
 
 
 @pytest.mark.parametrize(("n", "m"), [(40, 40), (40, 26), (40, 50), (7, 19), (33, 5)])
 def test_resizing_is_that_of_the_twin(n, m):
     line = np.random.default_rng(n).random(n)
-    np.testing.assert_allclose(weights_of(n, m) @ line, reference.resized(line, m), atol=1e-6)
+    np.testing.assert_allclose(resampling_matrix(n, m) @ line, reference.resized(line, m), atol=1e-6)
 
 
-def test_copies_do_not_overlap_and_are_found_again(supply):
-    taken = np.zeros(supply.levels[-1].appearance.shape, int)
-    for number, copy in enumerate(supply.copies):
+def test_copies_do_not_overlap_and_are_found_again(atlas):
+    taken = np.zeros(atlas.levels[-1].appearance.shape, int)
+    for number, copy in enumerate(atlas.copies):
         (top, left), (rows, columns) = copy.origin, copy.shape
         taken[top : top + rows, left : left + columns] += 1
         corners = np.array([[0, 0], [rows - 1, columns - 1]]) + copy.origin
-        which, at = supply.locate((corners * ONE).astype(np.int32).ravel())
+        which, at = atlas.locate((corners * ONE).astype(np.int32).ravel())
         assert (which == number).all()
         # The outer edges of a copy are those of the exemplar.
         np.testing.assert_allclose(at[0], 0.5 / np.array(copy.factor) - 0.5, atol=1e-4)
@@ -46,9 +57,9 @@ def test_copies_do_not_overlap_and_are_found_again(supply):
 def test_what_is_barred_is_that_of_the_twin(floor):
     known = np.ones((96, 80), bool)
     known[30:41, 20:33] = False
-    supply = Supply.of(floor.image, None, known=known)
-    for number, level in enumerate(supply.levels):
-        spacing = 1 << (len(supply.levels) - 1 - number)
+    atlas = atlas_of(floor.image, known=known)
+    for number, level in enumerate(atlas.levels):
+        spacing = 1 << (len(atlas.levels) - 1 - number)
         shape = level.appearance.shape
         twin = reference.free(known, shape, spacing, RADIUS)
         barred = level.values.reshape(*shape, 4)[..., 3] > 0
@@ -59,23 +70,25 @@ def test_what_is_barred_is_that_of_the_twin(floor):
 def test_nothing_barred_is_shown(floor):
     known = np.ones((96, 80), bool)
     known[20:60, 20:60] = False
-    supply = Supply.of(floor.image, None, known=known)
-    grown = supply.grow(Region.whole((64, 64)), None, seed=1)
-    at = np.rint(supply.locate(grown.places)[1]).astype(int)
+    atlas = atlas_of(floor.image, known=known)
+    grown = grow_from_atlas(atlas, Region.whole((64, 64)), None, seed=1)
+    at = np.rint(atlas.locate(grown.places)[1]).astype(int)
     assert known[at[:, 0], at[:, 1]].all()
 
 
-def test_what_is_held_stays(floor, supply):
+def test_what_is_held_stays(atlas):
     held = np.zeros((32, 48), bool)
     held[:, :20] = True
     given = np.stack(np.mgrid[:32, :48], axis=-1).astype(np.int32) + 16
-    grown = supply.grow(Region.whole((32, 48)), np.ones((32, 48), np.float32), held=(held, given), seed=1)
+    ones = np.ones((32, 48), np.float32)
+    grown = grow_from_atlas(atlas, Region.whole((32, 48)), ones, held=Surroundings(held, given), seed=1)
     np.testing.assert_array_equal(grown.places.reshape(32, 48, 2)[held], given[held] * ONE)
 
 
-def test_a_flat_exemplar_has_a_supply():
+def test_a_flat_exemplar_has_an_atlas():
     flat = np.full((40, 40, 1), 9, np.uint8)
-    grown = Supply.of(flat, None, settings=Settings(passes=(2, 2, 2))).grow(Region.whole((20, 20)), None)
+    settings = replace(FROM_ATLAS, passes=(2, 2, 2))
+    grown = grow_from_atlas(atlas_of(flat), Region.whole((20, 20)), None, settings=settings)
     assert len(grown.places) == 800
 
 
@@ -85,9 +98,9 @@ def test_an_order_that_is_none_is_refused(order):
     region = Region.whole((16, 16))
     values = np.zeros((1024, 4), np.int16)
     values[:, 0] = np.arange(1024)
-    guide = Guide(values.ravel(), np.zeros(1024, np.int16), np.ones(256, np.uint16), np.array(order, np.uint32))
+    guide = Demand(values.ravel(), np.zeros(1024, np.int16), np.ones(256, np.uint16), np.array(order, np.uint32))
     with pytest.raises(InvalidInput, match="order of the guide"):
-        exemplar.blocks(region, to_fixed(None, region), guide=guide)
+        exemplar.blocks(region, to_fixed(None, region), demand=guide)
 
 
 def test_held_blocks_need_a_place_each():
@@ -103,13 +116,13 @@ def scales_of(values, order=None):
     mine[:, 0] = values[0]
     asked = np.asarray(values[1], np.int16)
     order = np.arange(len(mine)) if order is None else order
-    return Guide(mine.ravel(), asked, np.array([1264], np.uint16), order.astype(np.uint32))
+    return Demand(mine.ravel(), asked, np.array([1264], np.uint16), order.astype(np.uint32))
 
 
 def test_shares_are_those_of_samples_of_the_scales_that_are_asked_for():
     # Three quarters of the output ask for scales whose samples are dark, a quarter for those of bright ones.
     guide = scales_of((np.repeat([0, 500], [90, 10]), np.repeat([0, 500], [30, 10])))
-    tones = tones_of(np.repeat(np.float32([0.1, 0.9]), [90, 10])[:, np.newaxis], guide.order)
+    tones = find_tones(np.repeat(np.float32([0.1, 0.9]), [90, 10])[:, np.newaxis], guide.order)
     shares = Balance.of(tones, guide).shares
     np.testing.assert_allclose(shares[0, [0, -1]], [0.75, 0.25])
     assert shares.sum() == pytest.approx(1)
@@ -123,7 +136,7 @@ def test_shares_are_those_of_samples_of_the_scales_that_are_asked_for():
 
 def test_what_is_in_excess_becomes_dearer_and_what_is_missing_cheaper():
     guide = scales_of((np.zeros(100), np.zeros(50)))
-    tones = tones_of(np.repeat(np.float32([0, 1]), 50)[:, np.newaxis], guide.order)
+    tones = find_tones(np.repeat(np.float32([0, 1]), 50)[:, np.newaxis], guide.order)
     balance = Balance.of(tones, guide)
     balance.note(np.zeros(100, np.int32), (1, 100), 0.2)  # All points show the first sample.
     np.testing.assert_allclose(balance.costs[0, [0, -1]], [0.2, -0.2])
@@ -138,8 +151,59 @@ def test_balanced_colours_are_nearer_to_the_exemplars(floor):
     scale, far = np.asarray(floor.scale_map, np.float32), []
     mine = np.sort(floor.image.reshape(-1, 3), axis=0)
     for balance in (0.0, 0.2):
-        supply = Supply.of(floor.image, scale, settings=Settings(coarsest=16, balance=balance))
-        grown = supply.grow(Region.whole((96, 80)), scale, seed=3)
-        shown = supply.source(grown.places, (96, 80)).render(floor.image, interpolation="nearest")
+        atlas = atlas_of(floor.image, scale, coarsest=16, tones=balance > 0)
+        settings = replace(FROM_ATLAS, balance=balance)
+        grown = grow_from_atlas(atlas, Region.whole((96, 80)), scale, settings=settings, seed=3)
+        shown = atlas.source(grown.places, (96, 80)).render(floor.image, interpolation="nearest")
         far.append(np.abs(np.sort(shown.reshape(-1, 3), axis=0).astype(float) - mine).mean())
     assert far[1] < 0.7 * far[0]
+
+
+# --- the levels ------------------------------------------------------------------------------------------------------
+
+
+def test_any_start_and_any_corrector_can_be_handed_in():
+    """A draft that a corrector leaves alone comes out as it went in, upsampled; each level is asked for what it is to hold."""
+    told = []
+
+    def leave(places, level, region, frames, asked, progress):
+        told.append((level, region.shape, asked.held is None))
+        return Corrected(places, level, 0.25)
+
+    def ask(level, region, spacing):
+        held = np.zeros(region.points, bool)
+        held[0] = True
+        return Asked(held=held, given=np.zeros(2 * region.points, np.int32)) if spacing == 1 else Asked()
+
+    region, copy = Region.whole((14, 20)), np.indices((14, 20)).transpose(1, 2, 0).astype(np.int32) + 40
+    draft = ((copy[::2, ::2] * ONE) >> 1).reshape(-1)
+    start = from_draft(1, lambda here: draft.copy())
+    made = grow(
+        region,
+        3,
+        start,
+        leave,
+        lambda here, step: to_fixed(None, here),
+        ask=ask,
+        show=lambda places, here, spacing: places.reshape(*here.shape, 2),
+    )
+    copy[0, 0] = 0
+    np.testing.assert_array_equal(made.places.reshape(14, 20, 2), copy * ONE)
+    assert told == [(1, (7, 10), True), (2, (14, 20), False)]
+    assert list(made.stages) == ["level 2"]
+    assert [done.report() for done in made.levels] == [
+        {"shape": [7, 10], "passes": 1, "changed": 0.25},
+        {"shape": [14, 20], "passes": 2, "changed": 0.25},
+    ]
+
+
+def test_passes_with_a_balance_are_those_in_parts(floor):
+    """The corrector looks at the colours every other pass, and what it did adds up."""
+    scale = np.asarray(floor.scale_map, np.float32)
+    atlas = atlas_of(floor.image, scale, tones=True)
+    settings = replace(FROM_ATLAS, passes=(5, 3, 2), balance=1e-12)
+    grown = grow_from_atlas(atlas, Region.whole((48, 40)), scale[:48, :40], settings=settings, seed=3)
+    assert [done.passes for done in grown.levels] == [5, 2]
+    windows = Windows(tuple(level.appearance for level in atlas.levels), replace(settings, settled=0.0), 3)
+    whole = windows.grow(Region.whole((48, 40)), ask=Scales(atlas, settings, scale[:48, :40]).at)
+    np.testing.assert_array_equal(grown.places, whole.places)

@@ -13,8 +13,8 @@ import pytest
 import texrs
 from texrs import fields, samples, volume
 from texrs._engine.pyramid import ONE
-from texrs.errors import Cancelled, FileError, InvalidInput, LimitExceeded
-from texrs.exemplar.analysis import Analysis, analyse, are_labels, colours, repeats
+from texrs.errors import Cancelled, InvalidInput, LimitExceeded
+from texrs.exemplar.analysis import are_labels, code_colours, measure_repeat
 
 STRIPES = samples.stripes((32, 32, 32)).image
 PARTICLES = samples.particles((32, 32, 32))
@@ -85,12 +85,15 @@ def test_labels_are_classes_without_an_order():
     assert set(np.unique(made.image)) <= set(range(5))
     # Another name for each class changes nothing.
     renamed = np.array([3, 0, 4, 1, 2], np.uint8)
-    codes = colours(marked[..., None])
+    codes = code_colours(marked[..., None])
     assert all(len(np.unique(codes[marked == k], axis=0)) == 1 for k in range(5))
     assert texrs.solid(renamed[marked], 32, field=TURNING, quality="fast").image.shape == made.image.shape
-    assert texrs.solid(marked, 20, labels=False, quality="fast").report["interpolation"] == "cubic"
+    assert (
+        texrs.solid(texrs.Exemplar(marked, axes=3, labels=False), 20, quality="fast").report["interpolation"] == "cubic"
+    )
     sparse = (marked * 40).astype(np.int32)
-    assert set(np.unique(texrs.solid(sparse, 20, labels=True, quality="fast").image)) <= set(np.unique(sparse))
+    sparse = texrs.Exemplar(sparse, axes=3, labels=True)
+    assert set(np.unique(texrs.solid(sparse, 20, quality="fast").image)) <= set(np.unique(sparse.image))
 
 
 @pytest.mark.parametrize("values", [(0, 255), (0, 128, 255), (False, True), (-7, 900), range(0, 160, 10)])
@@ -104,9 +107,9 @@ def test_few_whole_numbers_are_labels_whatever_they_are(values):
     made = texrs.solid(named[turned], 32, field=TURNING, quality="fast")
     assert made.report["interpolation"] == "nearest"
     assert set(np.unique(made.image)) <= set(values)
-    codes = colours(named[turned][..., None])
+    codes = code_colours(named[turned][..., None])
     assert codes.shape[-1] == (1 if kinds == 2 else min(kinds, 4))
-    np.testing.assert_array_equal(codes, colours(turned.astype(np.uint16)[..., None], labels=True))
+    np.testing.assert_array_equal(codes, code_colours(turned.astype(np.uint16)[..., None], labels=True))
     grown = texrs.synthesize(named[turned[5]], 40, quality="fast", field=fields.spiral(axes=2))
     assert set(np.unique(grown.image)) <= set(values)
 
@@ -194,13 +197,13 @@ def test_volumes_close_along_the_axes_that_wrap(size, wrap):
 
 def test_exemplars_that_repeat_are_found_by_measurement():
     whole = samples.particles((64, 64, 64)).image
-    assert repeats(whole, axes=3) == (True, True, True)
-    assert repeats(whole[:, 5:], axes=3) == (True, False, True)
-    assert repeats(np.roll(whole, 9, 1), axes=3) == (True, True, True)
-    assert repeats(STRIPES, axes=3) != (True, True, True)
+    assert measure_repeat(whole, axes=3) == (True, True, True)
+    assert measure_repeat(whole[:, 5:], axes=3) == (True, False, True)
+    assert measure_repeat(np.roll(whole, 9, 1), axes=3) == (True, True, True)
+    assert measure_repeat(STRIPES, axes=3) != (True, True, True)
     around = texrs.solid(whole, 40, seed=4)
     assert around.report["repeats"] == [True, True, True]
-    bounded = texrs.solid(whole, 40, seed=4, repeat=False)
+    bounded = texrs.solid(texrs.Exemplar(whole, axes=3, repeat=False), 40, seed=4)
     assert bounded.report["repeats"] == [False, False, False]
     # Where it repeats, pieces go on across its end: all of it can be used.
     ends = (around.source.coordinates >= 63).any(axis=-1).mean()
@@ -229,7 +232,7 @@ if "fork" in sys.argv:
 else:
     for count in (1, 2, 7):
         with texrs.threads(count):
-            texrs.exemplar.analysis._ANALYSES.clear()
+            texrs.exemplar._exemplar._FACTS.clear()
             print(digest())
     print(digest())
 """
@@ -262,46 +265,16 @@ def test_another_seed_is_another_texture(field):
     assert (one.coordinates != other.coordinates).any(axis=-1).mean() > 0.9
 
 
-# --- analyses --------------------------------------------------------------------------------------------------------
+# --- exemplars -------------------------------------------------------------------------------------------------------
 
 
-def test_analyses_are_kept_and_taken_back(tmp_path):
-    first = analyse(STRIPES, axes=3)
-    assert analyse(STRIPES.copy(), axes=3) is first
-    assert analyse(STRIPES, axes=3, cache=False) is not first
-    other = STRIPES.copy()
-    other[0, 0, 0, 0] ^= 1
-    assert analyse(other, axes=3).key != first.key
-    first.save(tmp_path / "a.npz")
-    again = Analysis.load(tmp_path / "a.npz")
-    assert (again.key, again.shape, again.wrap) == (first.key, first.shape, first.wrap)
-    one, two = (texrs.solid(STRIPES, 24, analysis=a, seed=2).source.coordinates for a in (first, again))
-    np.testing.assert_array_equal(one, two)
-
-
-def test_damaged_analyses_are_refused(tmp_path):
-    path = tmp_path / "a.npz"
-    analyse(STRIPES, axes=3).save(path)
-    with np.load(path) as file:
-        arrays = {name: file[name] for name in file.files}
-    whole = path.read_bytes()
-    damages = {
-        "cut off": lambda: path.write_bytes(whole[: len(whole) // 2]),
-        "of another version": lambda: np.savez(path, **{**arrays, "format": np.array(99)}),
-        "without an array": lambda: np.savez(path, **{k: v for k, v in arrays.items() if k != "0/basis"}),
-        "of other sizes": lambda: np.savez(path, **{**arrays, "1/features": arrays["1/features"][:-24]}),
-        "out of range": lambda: np.savez(path, **{**arrays, "0/colours": arrays["0/colours"] * 0 + 30000}),
-        "without levels": lambda: np.savez(path, format=arrays["format"], key=arrays["key"]),
-        "not one": lambda: path.write_bytes(b"nothing of the kind"),
-    }
-    for damage in damages.values():
-        damage()
-        with pytest.raises(FileError) as caught:
-            Analysis.load(path)
-        assert str(path) in str(caught.value)
-        assert "\n" not in str(caught.value)
-    with pytest.raises(FileError):
-        Analysis.load(tmp_path / "none.npz")
+def test_an_exemplar_is_as_good_as_its_array(tmp_path):
+    known = texrs.Exemplar(STRIPES, axes=3)
+    known.save(tmp_path / "a.npz")
+    made = [texrs.solid(e, 24, seed=2) for e in (STRIPES, known, texrs.Exemplar.load(tmp_path / "a.npz"))]
+    for other in made[1:]:
+        np.testing.assert_array_equal(other.image, made[0].image)
+        assert other.report == made[0].report
 
 
 # --- maps, reports, stages -------------------------------------------------------------------------------------------
@@ -373,7 +346,7 @@ def test_progress_is_told_and_raising_stops_at_each_stage():
 
 
 def test_memory_is_refused_before_it_is_taken():
-    analyse(STRIPES, axes=3)
+    texrs.Exemplar(STRIPES, axes=3).analyse()
     tracemalloc.start()
     try:
         for size, options in (
@@ -394,6 +367,12 @@ def test_memory_is_refused_before_it_is_taken():
 NAN = STRIPES.astype(np.float32)
 NAN[3, 4, 5, 0] = np.nan
 SIZED = np.ones((20, 20, 20), bool)
+MANY = texrs.Exemplar(np.arange(32**3, dtype=np.int32).reshape(32, 32, 32), axes=3, labels=True)
+
+
+def held(mask, **what):
+    """Return the option that holds some voxels."""
+    return {"constraints": texrs.Constraints(mask=mask, **what)}
 
 
 @pytest.mark.parametrize(
@@ -428,28 +407,24 @@ SIZED = np.ones((20, 20, 20), bool)
         (STRIPES, {"quality": "best"}, "quality: allowed are preserve, fast, optimise; got 'best'"),
         (STRIPES, {"quality": None}, "quality: allowed are"),
         (STRIPES, {"method": "default"}, "method: None or 'paper' is allowed"),
-        (STRIPES, {"labels": True}, "labels: classes need one channel, got 3"),
-        (np.arange(32**3, dtype=np.int32).reshape(32, 32, 32), {"labels": True}, "labels: up to 4096 classes"),
-        (STRIPES, {"repeat": "xyz"}, "needs True, False or 3"),
+        (texrs.Exemplar(WEAVE), {}, "exemplar: needs an Exemplar with axes=3, got one with axes=2"),
+        (texrs.Exemplar(STRIPES[:15], axes=3), {}, "exemplar: each side must be at least 16"),
+        (MANY, {}, "labels: up to 4096 classes"),
         (STRIPES, {"interpolation": "best"}, "interpolation: "),
         (STRIPES, {"memory_limit": 0}, "memory_limit: needs a positive number"),
         (STRIPES, {"memory_limit": "1G"}, "memory_limit: needs a positive number"),
-        (STRIPES, {"held": SIZED}, "held: needs either values or coordinates"),
-        (STRIPES, {"values": STRIPES}, "held: needed with values or coordinates"),
-        (STRIPES, {"held": SIZED[:9], "values": STRIPES}, "held: needs shape (20, 20, 20)"),
-        (STRIPES, {"held": SIZED * 0.5, "values": STRIPES}, "held: needs bool or integers"),
-        (STRIPES, {"held": SIZED, "values": STRIPES}, "values: needs uint8 of shape (20, 20, 20, 3)"),
-        (STRIPES, {"held": SIZED, "values": np.zeros((20, 20, 20, 3))}, "values: needs uint8"),
+        (STRIPES, held(SIZED[:9], values=STRIPES), "mask: needs shape (20, 20, 20)"),
+        (STRIPES, held(SIZED * 0.5, values=STRIPES), "mask: needs bool or integers"),
+        (STRIPES, held(SIZED, values=STRIPES), "values: needs uint8 of shape (20, 20, 20, 3)"),
+        (STRIPES, held(SIZED, values=np.zeros((20, 20, 20, 3))), "values: needs uint8"),
         (
             NAN[8:24, 8:24, 8:24],
-            {"size": 20, "held": SIZED, "values": np.full((20, 20, 20, 3), np.inf, np.float32)},
-            "values: those of held points must be finite",
+            held(SIZED, values=np.full((20, 20, 20, 3), np.inf, np.float32)),
+            "values: those of given points must be finite",
         ),
-        (STRIPES, {"held": SIZED, "coordinates": np.full((20, 20, 20, 3), 32.0)}, "coordinates: those of held points"),
-        (STRIPES, {"held": SIZED, "coordinates": np.full((20, 20, 20, 3), np.nan)}, "coordinates: those of held"),
-        (STRIPES, {"held": SIZED, "coordinates": np.zeros((20, 20, 20, 2))}, "coordinates: needs numbers of shape"),
-        (STRIPES, {"analysis": analyse(GREY[:20], axes=3)}, "analysis: is of an exemplar of (20, 32, 32)"),
-        (STRIPES, {"analysis": "a.npz"}, "analysis: needs an Analysis"),
+        (STRIPES, held(SIZED, coordinates=np.full((20, 20, 20, 3), 32.0)), "coordinates: those of given points"),
+        (STRIPES, held(SIZED, coordinates=np.full((20, 20, 20, 3), np.nan)), "coordinates: those of given points"),
+        (STRIPES, held(SIZED, coordinates=np.zeros((20, 20, 20, 2))), "coordinates: needs numbers of shape"),
     ],
 )
 def test_bad_input_gets_a_sentence(exemplar, options, says):

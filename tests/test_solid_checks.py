@@ -14,7 +14,6 @@ import solid_checks as checks
 import texrs
 from texrs import fields, samples
 from texrs._engine.pyramid import ONE, Region, to_fixed, upsample
-from texrs.exemplar.analysis import analyse
 from texrs.source_map import SourceMap
 
 FIELDS = {
@@ -110,9 +109,9 @@ def test_turned_exemplars_are_what_the_frame_says():
 # --- what must fail --------------------------------------------------------------------------------------------------
 
 
-def grown(image, size, *, contrast=1.0, hysteresis=2.0, votes=(0, 0, 0), blocks=True, field=None):
+def grown(image, size, *, contrast=1.0, acceptance=2.0, votes=(0, 0, 0), blocks=True, field=None):
     """Grow a volume by the kernels alone: the default, or without a part of it."""
-    analysis = analyse(image, axes=3)
+    analysis = texrs.Exemplar(image, axes=3).analyse()
     regions = [Region.whole((size,) * 3)]
     while len(regions) < len(analysis.levels):
         regions.insert(0, regions[0].parents())
@@ -132,8 +131,8 @@ def grown(image, size, *, contrast=1.0, hysteresis=2.0, votes=(0, 0, 0), blocks=
             frames,
             passes=(8, 6, 6)[level],
             reach=(2, 2, 1)[level],
-            hysteresis=hysteresis,
-            unity=0.2,
+            acceptance=acceptance,
+            coherence=0.2,
             vote=votes[level],
             settled=0.005,
             seed=0x9E3779B97F4A7C15 * (level + 1) % 2**64,
@@ -161,7 +160,7 @@ def test_the_kernels_alone_make_the_default():
 ABLATIONS = {
     "each voxel starts anywhere": {"blocks": False},
     "bland blocks are not handicapped": {"contrast": 0.0},
-    "all windows vote, and small gains count": {"votes": (2, 2, 2), "hysteresis": 0.1},
+    "all windows vote, and small gains count": {"votes": (2, 2, 2), "acceptance": 0.1},
 }
 
 

@@ -111,7 +111,8 @@ def test_maps_to_follow_come_from_files(here: Path, capsys: Capture) -> None:
     io.write("theirs.tif", ramp[::-1, :48])
     arguments = "--size 64x48 --guide mine.tif theirs.tif --guide-weight 2 --quality fast -q"
     assert main(["synthesize", "in.png", "-o", "out.png", *arguments.split()]) == 0
-    expected = texrs.synthesize(PICTURE, (64, 48), guide=(ramp, ramp[::-1, :48]), guide_weight=2, quality="fast")
+    guide = texrs.Guide(exemplar=ramp, output=ramp[::-1, :48], weight=2)
+    expected = texrs.synthesize(PICTURE, (64, 48), guide=guide, quality="fast")
     np.testing.assert_array_equal(iio.imread("out.png"), expected.image)
     assert (
         main(["synthesize", "in.png", "-o", "no.png", "--size", "32", "--guide", "mine.tif", "theirs.tif", "-q"]) == 2
@@ -138,15 +139,14 @@ def test_defaults_are_those_of_the_functions(command: str, verb: object) -> None
         "field",
         "seed",
         "quality",
-        "held",
-        "values",
-        "labels",
         "interpolation",
         "memory_limit",
         "guide",
-        "guide_weight",
     ):
         assert ours[name] == theirs[name], name
+    assert ours["guide_weight"] == texrs.Guide(exemplar=0, output=0).weight
+    assert ours["labels"] == inspect.signature(texrs.Exemplar).parameters["labels"].default
+    assert (ours["held"], ours["values"]) == (None, theirs["constraints"])
     for name, (said, meant) in words.items():
         assert (ours[name], theirs[name]) == (said, meant)
 

@@ -52,7 +52,8 @@ def pasted_edge(held, values, quality="preserve"):
 @pytest.mark.parametrize("quality", ["preserve", "fast"])
 def test_held_values_stay_and_their_surroundings_agree(boxed, quality):
     held, values = boxed
-    made = texrs.solid(STRIPES, held.shape, seed=3, held=held, values=values, quality=quality)
+    given = texrs.Constraints(mask=held, values=values)
+    made = texrs.solid(STRIPES, held.shape, seed=3, constraints=given, quality=quality)
     assert made.report["held"] == held.sum()
     np.testing.assert_array_equal(made.image[held], values[held])
     np.testing.assert_array_equal(made.image[~held], made.stages["composite"][~held])
@@ -69,7 +70,8 @@ def test_held_coordinates_stay_and_their_surroundings_agree(boxed):
     held, values = boxed
     places = np.full((*held.shape, 3), np.nan, np.float32)
     places[held] = np.argwhere(held) - (10, 12, 8) + 9
-    made = texrs.solid(STRIPES, held.shape, seed=3, held=held, coordinates=places)
+    given = texrs.Constraints(mask=held, coordinates=places)
+    made = texrs.solid(STRIPES, held.shape, seed=3, constraints=given)
     np.testing.assert_array_equal(made.source.coordinates[held], places[held])
     np.testing.assert_array_equal(made.image, made.stages["composite"])
     np.testing.assert_array_equal(made.image[held], values[held])
@@ -81,10 +83,12 @@ def test_held_pixels_of_pictures_and_of_labels():
     held[5:25, 30:] = True
     grey = WEAVE[..., 0]
     values = np.pad(grey[:40, :44], ((0, 0), (0, 0)))
-    made = texrs.synthesize(grey, held.shape, held=held.astype(np.uint8), values=values[..., None])
+    given = texrs.Constraints(mask=held.astype(np.uint8), values=values[..., None])
+    made = texrs.synthesize(grey, held.shape, constraints=given)
     np.testing.assert_array_equal(made.image[held], values[held])
     classes = (grey // 52).astype(np.uint8)
-    made = texrs.synthesize(classes, held.shape, held=held, values=classes[:40, :44], labels=True)
+    given = texrs.Constraints(mask=held, values=classes[:40, :44])
+    made = texrs.synthesize(texrs.Exemplar(classes, labels=True), held.shape, constraints=given)
     np.testing.assert_array_equal(made.image[held], classes[:40, :44][held])
 
 
@@ -99,7 +103,7 @@ def test_a_map_is_followed(axes):
     ramp, wanted = np.linspace(0, 1, side).reshape(column), np.linspace(1, 0, size).reshape(column)
     image = (np.random.default_rng(0).random((side,) * axes) * 0.3 + ramp).astype(np.float32)
     verb = texrs.synthesize if axes == 2 else texrs.solid
-    made = verb(image, size, seed=1, guide=(ramp, wanted))
+    made = verb(image, size, seed=1, guide=texrs.Guide(exemplar=ramp, output=wanted))
     assert made.report["guided"]
     assert np.corrcoef(made.image.reshape(size, -1).mean(axis=1), wanted.reshape(-1))[0, 1] > 0.95
     free = verb(image, size, seed=1)
@@ -107,16 +111,51 @@ def test_a_map_is_followed(axes):
     assert np.corrcoef(free.image.reshape(size, -1).mean(axis=1), wanted.reshape(-1))[0, 1] < 0.8
 
 
+MAP = np.zeros((64, 64))
+VALUES = texrs.Constraints(mask=np.ones((40, 40), bool), values=np.zeros((40, 40)))
+
+
 @pytest.mark.parametrize(
     ("more", "says"),
     [
-        ({"guide": np.zeros((2, 40, 40))[0]}, "guide: needs two maps"),
-        ({"guide": (np.zeros((7, 1)), np.zeros((40, 40)))}, r"guide: the map of the exemplar needs finite numbers"),
-        ({"guide": (np.zeros((64, 64)), np.full((40, 40), np.nan))}, "guide: the map of the output"),
-        ({"guide": (0.0, 0.0), "guide_weight": -1}, "guide_weight"),
-        ({"guide": (0.0, 0.0), "method": "paper"}, "guide: the paper's method"),
+        ({"guide": (MAP, MAP[:40, :40])}, "guide: needs a texrs.Guide, got tuple"),
+        ({"constraints": MAP}, "constraints: needs a texrs.Constraints, got ndarray"),
+        (
+            {"guide": texrs.Guide(exemplar=np.zeros((7, 1)), output=0)},
+            "guide: the map of the exemplar needs finite numbers",
+        ),
+        (
+            {"guide": texrs.Guide(exemplar=0, output=MAP)},
+            "guide: the map of the output needs finite numbers that broadcast",
+        ),
+        ({"guide": texrs.Guide(exemplar=0, output=0), "constraints": VALUES}, "guide: cannot be followed where values"),
+        ({"guide": texrs.Guide(exemplar=0.0, output=0.0), "method": "paper"}, "guide: the paper's method"),
     ],
 )
 def test_wrong_maps_get_a_sentence(more, says):
     with pytest.raises(InvalidInput, match=says):
         texrs.synthesize(np.random.default_rng(0).random((64, 64)), 40, **more)
+
+
+@pytest.mark.parametrize(
+    ("kind", "options", "says"),
+    [
+        (
+            texrs.Guide,
+            {"exemplar": 0, "output": np.full((40, 40), np.nan)},
+            "guide: the map of the output needs finite",
+        ),
+        (texrs.Guide, {"exemplar": "up", "output": 0}, "guide: the map of the exemplar needs finite numbers"),
+        (texrs.Guide, {"exemplar": 0, "output": [[1], [1, 2]]}, "guide: the map of the output needs finite numbers"),
+        (texrs.Guide, {"exemplar": 0, "output": 0, "weight": -1}, "weight: needs a number from 0 to 100"),
+        (texrs.Constraints, {"mask": MAP > 0}, "constraints: needs either values or coordinates"),
+        (
+            texrs.Constraints,
+            {"mask": MAP > 0, "values": MAP, "coordinates": MAP},
+            "constraints: needs either values or",
+        ),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_at_once(kind, options, says):
+    with pytest.raises(InvalidInput, match=says):
+        kind(**options)

@@ -57,7 +57,15 @@ def test_passes_are_those_of_the_twin(axes, kind, wrap):
     frames = to_fixed(FIELDS[kind](axes), region)
     twin = Twin(appearance.arrays(), region, frames)
     start = scattered(appearance, region)
-    options = {"passes": 2, "first": 5, "reach": 2, "hysteresis": 0.5, "unity": 0.3, "vote": 1, "seed": (7 << 40) + 3}
+    options = {
+        "passes": 2,
+        "first": 5,
+        "reach": 2,
+        "acceptance": 0.5,
+        "coherence": 0.3,
+        "vote": 1,
+        "seed": (7 << 40) + 3,
+    }
     found = appearance.correct(start, region, frames, **options)
     before, between, after = twin.correct(start, **options)
     np.testing.assert_array_equal(found.places.reshape(-1, axes), after)
@@ -70,8 +78,8 @@ def test_passes_are_those_of_the_twin(axes, kind, wrap):
     "options",
     [
         {"reach": 1, "vote": 0},
-        {"reach": 2, "vote": 0, "hysteresis": 0.0},
-        {"reach": 1, "vote": 2, "hysteresis": 100.0},
+        {"reach": 2, "vote": 0, "acceptance": 0.0},
+        {"reach": 1, "vote": 2, "acceptance": 100.0},
         {"reach": 2, "vote": 1, "exhaustive": True},
     ],
 )

@@ -13,7 +13,7 @@ from texrs._engine.pyramid import ONE
 from texrs._threads import threads
 from texrs.errors import InvalidInput
 from texrs.papers.solid import literal as _solid_literal
-from texrs.papers.solid.literal import _inside
+from texrs.papers.solid.literal import bring_inside
 
 SIZE = 64
 
@@ -78,8 +78,9 @@ def test_labels_thin_volumes_and_other_channels():
 
 def test_what_it_does_not_do():
     weave = samples.weave((64, 64)).image
-    with pytest.raises(InvalidInput, match="held: the paper's method knows none"):
-        texrs.synthesize(weave, 32, method="paper", held=np.ones((32, 32), bool), values=weave[:32, :32])
+    given = texrs.Constraints(mask=np.ones((32, 32), bool), values=weave[:32, :32])
+    with pytest.raises(InvalidInput, match="constraints: the paper's method knows none"):
+        texrs.synthesize(weave, 32, method="paper", constraints=given)
     with pytest.raises(InvalidInput, match="method: None or 'paper'"):
         texrs.synthesize(weave, 32, method="su")
     with pytest.raises(ValueError, match="stop"):
@@ -93,7 +94,12 @@ def stop(_stage, _share):
 def test_coordinates_that_leave_come_back_on_the_other_side():
     exemplar = Appearance(np.random.default_rng(0).random((20, 24)), axes=2, wrap=(False, True))
     places = np.array([17, 23, 18, 24, 1, -1, 2, 0], np.int32) * ONE
-    assert (_inside(places, exemplar, 0).reshape(4, 2) // ONE).tolist() == [[17, 23], [2, 0], [17, -1 % 24], [2, 0]]
+    assert (bring_inside(places, exemplar, 0).reshape(4, 2) // ONE).tolist() == [
+        [17, 23],
+        [2, 0],
+        [17, -1 % 24],
+        [2, 0],
+    ]
 
 
 # --- what it fails, and the default does not -------------------------------------------------------------------------

@@ -13,7 +13,6 @@ from texrs import fields, samples, volume
 from texrs._engine.pyramid import Region, to_fixed
 from texrs._typing import Array
 from texrs.errors import InvalidInput, LimitExceeded
-from texrs.exemplar.analysis import analyse
 from texrs.papers.solid import world
 from texrs.papers.solid.settings import ON_DEMAND
 
@@ -179,12 +178,12 @@ def test_bad_options() -> None:
         ({"field": fields.circular(axes=2)}, "field: needs 3 axes"),
         ({"cache_bytes": -1}, "cache_bytes"),
         ({"interpolation": "best"}, "interpolation"),
-        ({"analysis": analyse(PLANE, axes=2)}, "analysis"),
-        ({"analysis": 3}, "analysis"),
         ({"seed": -1}, "seed"),
     ):
         with pytest.raises(InvalidInput, match=says):
             texrs.SolidTexture(SOLID, **options)  # type: ignore[arg-type]
+    with pytest.raises(InvalidInput, match="exemplar: needs an Exemplar with axes=3"):
+        texrs.SolidTexture(texrs.Exemplar(PLANE))
     with pytest.raises(InvalidInput, match="origin"):
         texture().window((0, 0), 8)
     with pytest.raises(LimitExceeded):
@@ -238,8 +237,9 @@ def test_the_source_map_knows_the_field_where_the_window_lies() -> None:
 
 def test_classes_stay_classes_and_progress_can_stop() -> None:
     labels = (SOLID[..., 0] > 100).astype(np.uint8) + (SOLID[..., 0] > 180)
-    t = texrs.SolidTexture(labels)
-    assert set(np.unique(t[0:16, 0:16, 0:16])) <= {0, 1, 2}
+    for exemplar in (labels, texrs.Exemplar(labels * 7.0, axes=3, labels=True)):
+        t = texrs.SolidTexture(exemplar)
+        assert set(np.unique(t[0:16, 0:16, 0:16])) <= set(np.unique(t.exemplar.image))
 
     def stop(stage: str, share: float) -> None:
         raise KeyboardInterrupt

@@ -7,6 +7,7 @@ from .completion import complete
 from .database import TextureDatabase
 from .elements import Elements
 from .exemplar import ElementOptions, Exemplar
+from .growth.constraints import Constraints, Guide
 from .papers.design import DeformationOptions, design, design_variants
 from .papers.perspective import perspective
 from .papers.solid import solid, synthesize
@@ -17,10 +18,12 @@ from .synthesis import Synthesis
 from .tiling import tile
 
 __all__ = [
+    "Constraints",
     "DeformationOptions",
     "ElementOptions",
     "Elements",
     "Exemplar",
+    "Guide",
     "PlaneTexture",
     "Reuse",
     "SolidTexture",

@@ -163,7 +163,9 @@ def check_finite(array: Array, name: str) -> None:
     """
     if array.dtype.kind == "f" and not (finite := np.isfinite(array)).all():
         bad = int(array.size - np.count_nonzero(finite))
-        raise InvalidInput(f"{name}: {bad} of {array.size} values are NaN or infinite as {array.dtype}; all must be finite")
+        raise InvalidInput(
+            f"{name}: {bad} of {array.size} values are NaN or infinite as {array.dtype}; all must be finite"
+        )
 
 
 def as_kernel(array: Array) -> Array:

@@ -97,7 +97,7 @@ class Twin:
         scaled = [((s - b) * self.gain + (1 << 31)) >> 32 for s, b in zip(sums, self.bias, strict=True)]
         return np.clip(scaled, -2047, 2047)
 
-    def improve(self, places, p, reach, limit, unity, number, seed, exhaustive):
+    def improve(self, places, p, reach, limit, coherence, number, seed, exhaustive):
         """Return the best of a point's own match, those of its neighbours, and some that are drawn."""
         feature = self.window(places, p)
 
@@ -127,7 +127,7 @@ class Twin:
                         proposals.append((far, place, there))
 
         def apart(place):
-            return unity * sum(not self.same(other, place) for far, other, _ in proposals if far == 1)
+            return coherence * sum(not self.same(other, place) for far, other, _ in proposals if far == 1)
 
         least += apart(best)
         for _, place, there in proposals:
@@ -179,15 +179,15 @@ class Twin:
         first=0,
         exhaustive=False,
         reach=2,
-        hysteresis=2.0,
-        unity=0.0,
+        acceptance=2.0,
+        coherence=0.0,
         vote=0,
         seed=0,
         held=None,
     ):
         """Return the places after each pass."""
         now = self.bring_inside(places.astype(np.int64).reshape(-1, self.axes))
-        limit, alone = int(hysteresis * self.spacing), int(unity * self.spacing)
+        limit, alone = int(acceptance * self.spacing), int(coherence * self.spacing)
         done = [now]
         changed = [np.ones(len(now), bool)] * 2
         for number in range(first, first + passes):

@@ -14,14 +14,14 @@ from texrs._engine.pyramid import Region
 from texrs._typing import Array
 from texrs.errors import InvalidInput
 
-__all__ = ["Appearance", "Corrected", "Guide"]
+__all__ = ["Appearance", "Corrected", "Demand"]
 
 Report = Callable[[float], object]
 
 _PARTS = ("colours", "features", "basis", "bias", "gain", "spacing")
 
 
-class Guide(NamedTuple):
+class Demand(NamedTuple):
     """What an output is asked to show at its points, beside looking like the exemplar.
 
     Attributes
@@ -189,7 +189,7 @@ class Appearance:
         margin: int = 0,
         held: NDArray[np.bool_] | None = None,
         given: NDArray[np.int32] | None = None,
-        guide: Guide | None = None,
+        demand: Demand | None = None,
         progress: Report | None = None,
     ) -> NDArray[np.int32]:
         """Fill the cells of a region with pieces of the exemplar that fit each other.
@@ -221,9 +221,9 @@ class Appearance:
         held : (points) bool, optional
             Points that keep their places, around which the others are chosen.
         given : (points * A) int32, optional
-            The places of the points that are held; those of others do not count.
-        guide : Guide, optional
-            What else is asked.
+            The places of the held points; those of others do not count.
+        demand : Demand, optional
+            What else the points are to show.
         progress : callable, optional
             Called with the share that is done; raising stops the work.
 
@@ -254,7 +254,7 @@ class Appearance:
             as_int(margin, "margin", 0, 1 << 20),
             np.zeros(0, np.bool_) if held is None else np.ascontiguousarray(held.reshape(-1)),
             np.zeros(0, np.int32) if given is None else given,
-            guide,
+            demand,
             progress,
         )
 
@@ -268,13 +268,13 @@ class Appearance:
         first: int = 0,
         exhaustive: bool = False,
         reach: int = 2,
-        hysteresis: float = 2.0,
-        unity: float = 0.0,
+        acceptance: float = 2.0,
+        coherence: float = 0.0,
         vote: int = 0,
         settled: float = 0.0,
         seed: int = 0,
         held: NDArray[np.bool_] | None = None,
-        guide: Guide | None = None,
+        demand: Demand | None = None,
         overwrite: bool = False,
         progress: Report | None = None,
     ) -> Corrected:
@@ -294,9 +294,9 @@ class Appearance:
             Whether to compare each window with all of the exemplar's in each pass: for small exemplars.
         reach : int
             How far the neighbours are whose matches are tried, 1 or 2.
-        hysteresis : float
+        acceptance : float
             How much better than the present a drawn match must be, in units of `spacing`, 0 to 100: what is good enough stays.
-        unity : float
+        coherence : float
             What each neighbour costs whose piece of the exemplar is another, in units of `spacing`, 0 to 100: pieces
             stay whole where several fit equally well.
         vote : int
@@ -309,7 +309,7 @@ class Appearance:
             Points that keep their places.
         overwrite : bool
             Write the result over ``places``, which saves 4 bytes for each of their numbers.
-        guide, progress
+        demand, progress
             As of `blocks`.
 
         Returns
@@ -341,12 +341,12 @@ class Appearance:
             as_int(first, "first", 0, 1 << 20),
             exhaustive,
             as_int(reach, "reach", 1, 2),
-            as_float(hysteresis, "hysteresis", 0, 100),
-            as_float(unity, "unity", 0, 100),
+            as_float(acceptance, "acceptance", 0, 100),
+            as_float(coherence, "coherence", 0, 100),
             as_int(vote, "vote", 0, self.radius),
             as_float(settled, "settled", 0, 1),
             as_seed(seed),
-            guide,
+            demand,
             progress,
         )
         return Corrected(places, passes, changed)

@@ -178,7 +178,7 @@ def correct(
         places,
         region.place,
         frames,
-        _held(held),
+        _flat(held),
         _kinds(kinds),
         as_int(passes, "passes", 0, 1000),
         _numbers(similarity.numbers),
@@ -232,7 +232,7 @@ def jitter(
     _check(places, region)
     most = round(as_float(reach, "reach", 0, 65536) * ONE)
     return _rust.jitter(
-        places, region.place, _held(held), most, as_seed(seed), as_int(level, "level", 0, (1 << 32) - 1)
+        places, region.place, _flat(held), most, as_seed(seed), as_int(level, "level", 0, (1 << 32) - 1)
     )
 
 
@@ -242,7 +242,7 @@ def _numbers(numbers: int) -> int:
     return int(numbers)
 
 
-def _held(held: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
+def _flat(held: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
     return np.zeros(0, np.bool_) if held is None else np.ascontiguousarray(held.reshape(-1))
 
 

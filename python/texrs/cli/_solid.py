@@ -18,6 +18,8 @@ from texrs.cli._console import Method, Out, Quiet, Source, Stages, Threads, as_m
 from texrs.cli._files import describe, named
 from texrs.cli._volumes import read_field, read_volume
 from texrs.errors import InvalidInput
+from texrs.exemplar import Exemplar
+from texrs.growth import Constraints, Guide
 from texrs.papers.solid import solid, synthesize
 from texrs.synthesis import Synthesis
 
@@ -152,6 +154,8 @@ def _grow(
     held: str | None,
     values: str | None,
     guide: tuple[str, str] | None,
+    guide_weight: float,
+    labels: bool | None,
     interpolation: str | None,
     method: str,
     memory_limit: str | None,
@@ -175,18 +179,23 @@ def _grow(
     sides = shape or tuple(2 * n for n in example.shape[:axes])
     _files.check_output(out, example, sides)
     frames = None if field is None else read_field(field, sides)
-    names = {"exemplar": name, "held": str(held), "values": str(values)}
-    names |= {"count": "--threads", "memory_limit": "--memory-limit", "guide_weight": "--guide-weight"}
+    names = {"exemplar": name, "image": name, "mask": str(held), "values": str(values), "constraints": "--held"}
+    names |= {"count": "--threads", "memory_limit": "--memory-limit", "weight": "--guide-weight"}
     names |= {"guide": "--guide " + " ".join(guide or ())}
     with named(**names), threads(count), watching(quiet=quiet) as progress:
+        given = maps = None
+        if held is not None and values is not None:
+            given = Constraints(mask=_read_mask(held, axes), values=_read_like(values, example, axes))
+        if guide is not None:
+            mine, theirs = (_read_map(path, axes) for path in guide)
+            maps = Guide(exemplar=mine, output=theirs, weight=guide_weight)
         result = verb(
-            example,
+            example if labels is None else Exemplar(example, axes=axes, labels=labels),
             sides,
             field=frames,
             wrap=cyclic,
-            held=None if held is None else _read_mask(held, axes),
-            values=None if values is None else _read_like(values, example, axes),
-            guide=None if guide is None else (_read_map(guide[0], axes), _read_map(guide[1], axes)),
+            constraints=given,
+            guide=maps,
             interpolation=cast(Interpolation | None, interpolation),
             method=how,
             memory_limit=limit,

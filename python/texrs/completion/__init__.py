@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_float, as_image, as_int, as_mask, as_seed, as_wrap, guidance
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.blending import blend as correct_colours
-from texrs.completion._optimise import optimised, recovered
+from texrs.completion._optimise import optimise, recover_scale
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
 from texrs.exemplar.patches import index_patches, mark_corners
@@ -152,7 +152,7 @@ def complete(
     levels: list[dict[str, object]] = []
     wide = widen(open_, width, cyclic)
     if open_.any() and method == "optimise":
-        places, levels = optimised(
+        places, levels = optimise(
             pictures, open_, scales, wide, wrap=(cyclic[0], cyclic[1]), seed=seed, progress=progress
         )
         count = int(places.label.max())
@@ -214,11 +214,11 @@ def mark_transparent(image: object) -> Bools:
 
 def recover_scales(pictures: Sequence[Array], open_: Bools, own: object, of_exemplar: object) -> list[Floats] | None:
     """Return the scale maps of the picture and of the one to copy from, if scales count."""
-    scale = recovered(pictures[0], open_, own)
+    scale = recover_scale(pictures[0], open_, own)
     if scale is None or len(pictures) == 1:
         return None if scale is None else [scale]
     shape = (pictures[1].shape[0], pictures[1].shape[1])
-    other = recovered(pictures[1], np.zeros(shape, bool), of_exemplar, "exemplar_scale_map")
+    other = recover_scale(pictures[1], np.zeros(shape, bool), of_exemplar, "exemplar_scale_map")
     return [scale, np.ones(shape, np.float32) if other is None else other]
 
 

@@ -6,6 +6,7 @@ is known, continued into the hole, and the hole synthesised with the rest as the
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,19 +14,30 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from texrs import scale_maps
-from texrs._arrays import as_image
+from texrs._arrays import as_image, guidance
 from texrs._engine.pyramid import Region
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.errors import InvalidInput
-from texrs.growth import LEAST, RADIUS, Settings, Supply, levels_of, reaching
+from texrs.exemplar.analysis import count_levels
+from texrs.exemplar.atlas import RADIUS, Atlas, extend_sizes
+from texrs.growth import FROM_ATLAS, Surroundings, grow_from_atlas
 from texrs.scale_maps._maps import as_map
 from texrs.source_map import SourceMap
 
-SETTINGS = Settings(passes=(24, 12, 6), hysteresis=1.0, unity=0.3, continuation=0.0, repetition=0.1, exhaustive=True)
+__all__ = ["optimise", "recover_scale"]
+
+SETTINGS = replace(
+    FROM_ATLAS,
+    passes=(24, 12, 6),
+    acceptance=1.0,
+    coherence=0.3,
+    continuation=0.0,
+    repetition=0.1,
+    exhaustive=1 << 24,
+)
 """What goes on across a hole counts more than that nothing rare is lost, and a copy of what is beside it is no fault."""
-
-__all__ = ["optimised", "recovered"]
-
+LEAST = 16
+"""Least side of a picture."""
 AROUND = 12
 """Points of the coarsest level around a hole that are looked at with it."""
 SIZES = (1.0, 0.8, 1.25)
@@ -34,7 +46,7 @@ NOWHERE = 1e6
 """Scale of what is not to be copied: none that is ever wanted."""
 
 
-def recovered(picture: Array, open_: Bools, given: object, name: str = "scale_map") -> Floats | None:
+def recover_scale(picture: Array, open_: Bools, given: object, name: str = "scale_map") -> Floats | None:
     """Return the scale map of a picture with holes: measured, or given, and continued into the holes where it is not."""
     if given is None:
         return None
@@ -56,7 +68,7 @@ def recovered(picture: Array, open_: Bools, given: object, name: str = "scale_ma
     return as_map(scale, name, open_.shape)
 
 
-def optimised(
+def optimise(
     pictures: list[Array],
     open_: Bools,
     scales: list[Floats] | None,
@@ -74,48 +86,42 @@ def optimised(
     for name, shape in zip(("image", "exemplar"), shapes, strict=False):
         if min(shape) < LEAST:
             raise InvalidInput(f"{name}: method 'optimise' needs at least {LEAST} pixels a side, got {shape}")
-    count = min(levels_of(shape, SETTINGS) for shape in shapes)
+    count = min(count_levels(shape, SETTINGS.coarsest) for shape in shapes)
     # Windows may not leave a copy, but those of known pixels at the border do.
     margin = RADIUS << (count - 1)
-    ground, free, scale = _ground(pictures, open_, scales, margin)
+    ground, free, scale = _lay_out(pictures, open_, scales, margin)
     sizes: tuple[float, ...] = (1.0,)
     wanted: tuple[float, float] | None = None
     if scales is not None:
         asked = scales[0][wide]
         wanted = (float(asked.min()), float(asked.max()))
-        sizes = SIZES if len(pictures) == 1 else reaching(SIZES, scales[1], wanted)
-    supply = Supply.of(
-        ground,
-        scale,
-        sizes,
-        wanted=wanted,
-        known=free,
-        levels=count,
-        settings=SETTINGS,
-    )
-    if not supply.free:
+        sizes = SIZES if len(pictures) == 1 else extend_sizes(SIZES, scales[1], wanted)
+    atlas = Atlas.of(guidance(ground), scale, sizes, levels=count, wanted=wanted, known=free)
+    if not atlas.usable:
         why = (
             "hole: leaves no part of the image that is free"
             if len(pictures) == 1
             else "exemplar: has no part large enough"
         )
         raise InvalidInput(f"{why} to copy from; method='patch' may find one")
-    box = around(wide, AROUND << (count - 1), 1 << (count - 1), wrap)
+    box = find_box(wide, AROUND << (count - 1), 1 << (count - 1), wrap)
     part = (slice(box[0], box[1]), slice(box[2], box[3]))
     size = (box[1] - box[0], box[3] - box[2])
     closed = tuple(w and n == m for w, n, m in zip(wrap, size, wide.shape, strict=True))
     row, column = np.mgrid[part]
     given: NDArray[np.int32] = (
-        np.stack([row, column], axis=-1).astype(np.int32) + np.array(supply.copies[0].origin, np.int32) + margin
+        np.stack([row, column], axis=-1).astype(np.int32) + np.array(atlas.copies[0].origin, np.int32) + margin
     )
-    grown = supply.grow(
+    grown = grow_from_atlas(
+        atlas,
         Region(size, (box[0], box[2]), (closed[0], closed[1])),
         None if scales is None else np.ascontiguousarray(scales[0][part]),
-        held=(~wide[part], given),
+        settings=SETTINGS,
+        held=Surroundings(~wide[part], given),
         seed=seed,
         progress=progress,
     )
-    which, at = supply.locate(grown.places)
+    which, at = atlas.locate(grown.places)
     here = wide[part]
     which, at = which.reshape(size)[here], at.reshape(*size, 2)[here]
     identity = SourceMap.identity(shapes[0])
@@ -123,12 +129,13 @@ def optimised(
     coordinates[part][here] = at - (margin if len(pictures) == 1 else (shapes[0][0] + 2 * margin, 0))
     label[part][here] = which + 1
     exemplar[part][here] = len(pictures) - 1
-    frames = [np.eye(2), *(np.diag([1 / f for f in c.factor]) for c in supply.copies)]
-    frame = np.array(frames, np.float32) if len(supply.copies) > 1 else None
-    return SourceMap(coordinates, exemplar, label, frame, shapes), grown.report
+    frames = [np.eye(2), *(np.diag([1 / f for f in c.factor]) for c in atlas.copies)]
+    frame = np.array(frames, np.float32) if len(atlas.copies) > 1 else None
+    levels = [done.report() for done in grown.levels]
+    return SourceMap(coordinates, exemplar, label, frame, shapes), levels
 
 
-def _ground(
+def _lay_out(
     pictures: list[Array], open_: Bools, scales: list[Floats] | None, margin: int
 ) -> tuple[Array, Bools, Floats | None]:
     """Return the picture, with a source below it, what of them may be copied, and their scales.
@@ -136,7 +143,7 @@ def _ground(
     Beside a source the picture is there for what is around the hole to look like, and nothing is copied from it.
     """
     wide = ((margin, margin), (margin, margin))
-    image = np.pad(_painted(as_image(pictures[0]), open_), (*wide, (0, 0)), mode="symmetric")
+    image = np.pad(_paint_over(as_image(pictures[0]), open_), (*wide, (0, 0)), mode="symmetric")
     if len(pictures) == 1:
         scale = None if scales is None else np.pad(scales[0], wide, mode="edge")
         return image, np.pad(~open_, wide), scale
@@ -152,7 +159,7 @@ def _ground(
     return np.concatenate(parts), free, scale
 
 
-def around(open_: Bools, margin: int, step: int, wrap: tuple[bool, bool]) -> tuple[int, int, int, int]:
+def find_box(open_: Bools, margin: int, step: int, wrap: tuple[bool, bool]) -> tuple[int, int, int, int]:
     """Return the part of a picture that a filling looks at: rows from, to, columns from, to; all of an axis that wraps."""
     found: list[int] = []
     for axis, closed in enumerate(wrap):
@@ -165,7 +172,7 @@ def around(open_: Bools, margin: int, step: int, wrap: tuple[bool, bool]) -> tup
     return found[0], found[1], found[2], found[3]
 
 
-def _painted(image: Array, open_: Bools) -> Array:
+def _paint_over(image: Array, open_: Bools) -> Array:
     """Paint over holes with the nearest known colours, which is what windows at their rim see."""
     nearest: Any = ndimage.distance_transform_edt(open_, return_distances=False, return_indices=True)
     painted: Array = image[tuple(nearest)]

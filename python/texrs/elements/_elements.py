@@ -16,7 +16,7 @@ from texrs._engine.coherence import Similarity
 from texrs._typing import Array, Path
 from texrs.elements._layout import Layout
 from texrs.errors import FileError, InvalidInput
-from texrs.exemplar import analysis
+from texrs.exemplar import Exemplar
 from texrs.io import atomic, read_arrays
 from texrs.samples import Sample
 
@@ -126,8 +126,7 @@ class Elements:
         """
         if self.sets is not None and self.sets.k == k:
             return self.sets
-        analysed = analysis.analyse(self.image, axes=2, wrap=self.wrap, radii=(2,))
-        return analysis.similarity(analysed, len(analysed.levels) - 1, k=k, progress=progress)
+        return Exemplar(self.image, repeat=self.wrap).similarity(-1, k=k, progress=progress)
 
     def with_similarity(self, *, k: int = 3, progress: Callable[[float], object] | None = None) -> Elements:
         """Return the entry with its similarity sets, so that they are saved with it."""

@@ -1,7 +1,7 @@
 """What an exemplar is: its pixels, the channels that guide, features, labels, repeats, layers and scaled copies."""
 
 from texrs.exemplar._exemplar import Exemplar, as_exemplar
-from texrs.exemplar.analysis import Analysis, analyse, repeats
+from texrs.exemplar.analysis import Analysis
 from texrs.exemplar.regularity import Lattice
 from texrs.exemplar.segmentation import ElementOptions, Segmentation, segment
 
@@ -11,9 +11,7 @@ __all__ = [
     "Exemplar",
     "Lattice",
     "Segmentation",
-    "analyse",
     "as_exemplar",
-    "repeats",
     "segment",
 ]
 

@@ -14,7 +14,15 @@ from texrs._cache import Cache, content_hash
 from texrs._engine.coherence import Similarity, similar
 from texrs._typing import Array, Floats, Path, Progress
 from texrs.errors import FileError, InvalidInput
-from texrs.exemplar.analysis import COARSEST, Analysis, analyse_colours, are_labels, colours, levels_of, repeats
+from texrs.exemplar.analysis import (
+    COARSEST,
+    Analysis,
+    analyse_colours,
+    are_labels,
+    code_colours,
+    count_levels,
+    measure_repeat,
+)
 from texrs.exemplar.regularity import measure_direction
 from texrs.exemplar.segmentation import ElementOptions, Segmentation, segment
 from texrs.exemplar.symmetry import Flip, find_mirrors
@@ -32,8 +40,9 @@ _SMALL = 1 << 12
 class Exemplar:
     """An example, and what is known of it.
 
-    Every verb that grows from an example takes an array or an `Exemplar`. What a verb finds out about it, as its pyramid of
-    windows, is worked out once: it stays with the exemplar, and is kept for a while for any array of the same content.
+    Every verb that grows from an example takes an array or an `Exemplar`. What a verb finds out about it, as its
+    pyramid of windows, is worked out once: it stays with the exemplar, and is kept for a while for any array of the
+    same content.
 
     Parameters
     ----------
@@ -42,8 +51,8 @@ class Exemplar:
     axes : int
         2 for a picture, 3 for a volume.
     labels : bool, optional
-        Whether the values are classes without an order, which are looked up without interpolation. None: where they are
-        integers of one channel, 3 to 16 values without a gap.
+        Whether the values are classes without an order, looked up at the nearest sample whatever the interpolation.
+        None: where they are one channel of integers or bool, with 2 to 16 values, such as a mask of 0 and 255.
     repeat : bool, or one an axis, optional
         Axes along which the example repeats; None measures it.
 
@@ -62,6 +71,7 @@ class Exemplar:
     >>> weave = texrs.Exemplar(texrs.samples.weave((64, 64)).image)
     >>> weave, weave.labels
     (<Exemplar of 64 x 64, 3 channels of uint8>, False)
+    >>> pictures = [texrs.synthesize(weave, 96, seed=seed) for seed in range(2)]  # analysed once
 
     """
 
@@ -126,7 +136,7 @@ class Exemplar:
     @cached_property
     def colours(self) -> Floats:
         """The up to four channels in [0, 1] that windows are compared by; classes are corners of a cube."""
-        return colours(self._pixels, self._labels)
+        return code_colours(self._pixels, self._labels)
 
     # --- what is measured --------------------------------------------------------------------------------------------
 
@@ -138,7 +148,7 @@ class Exemplar:
     @cached_property
     def repeat(self) -> tuple[bool, ...]:
         """Axes along which the example repeats: as given, or measured at each level of its pyramid."""
-        return self._repeats(levels_of(self.shape, COARSEST))
+        return self._measure(count_levels(self.shape, COARSEST))
 
     def analyse(self, radii: Sequence[int] = (2,), coarsest: int = COARSEST) -> Analysis:
         """Return the pyramid, with the appearance vector of each sample's window at each level.
@@ -170,10 +180,9 @@ class Exemplar:
         _check_sides(self.shape, "exemplar", COARSEST)
         near = tuple(as_int(r, "radii", 1, 8) for r in radii)
         least = as_int(coarsest, "coarsest", 2 * max(near) + 2, 1 << 16)
-        count = levels_of(self.shape, least)
-        fact = ("analysis", near, least)
+        count = count_levels(self.shape, least)
         return self.remember(
-            fact, lambda: analyse_colours(self.colours, self._repeats(count), near, count, f"{self.key}{fact}")
+            ("analysis", near, least), lambda: analyse_colours(self.colours, self._measure(count), near, count)
         )
 
     def similarity(
@@ -279,9 +288,9 @@ class Exemplar:
     def remember(self, fact: Hashable, make: Callable[[], T]) -> T:
         """Return a fact about the exemplar, worked out when it is first asked for.
 
-        It stays with the exemplar, and is kept for any other of the same content as long as there is room. To add a fact,
-        write a method that returns ``self.remember((name, *options), make)``: whatever the fact depends on, but for the
-        pixels and what the exemplar was made with, must be among the options. A fact is never changed.
+        It stays with the exemplar, and is kept for any other of the same content as long as there is room. To add a
+        fact, write a method that returns ``self.remember((name, *options), make)``: whatever the fact depends on, but
+        for the pixels and what the exemplar was made with, must be among the options. A fact is never changed.
 
         Parameters
         ----------
@@ -333,19 +342,18 @@ class Exemplar:
                 labels=None if labels < 0 else bool(labels),
                 repeat=None if repeat == [-1] else [bool(r) for r in repeat],
             )
-            fact = ("analysis", (2,), COARSEST)
-            analysis = Analysis.from_arrays(arrays, f"{made.key}{fact}")
+            analysis = Analysis.from_arrays(arrays)
             if analysis.shape != made.shape:
                 raise InvalidInput(f"the analysis is of {analysis.shape}, the image of {made.shape}")
         except FileError:
             raise
         except (InvalidInput, KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
             raise FileError(f"{path}: is damaged ({error})") from None
-        made._facts[fact] = analysis
+        made._facts["analysis", (2,), COARSEST] = analysis
         return made
 
-    def _repeats(self, levels: int) -> tuple[bool, ...]:
-        return repeats(self.colours, axes=self._axes, levels=levels) if self._repeat is None else self._repeat
+    def _measure(self, levels: int) -> tuple[bool, ...]:
+        return measure_repeat(self.colours, axes=self._axes, levels=levels) if self._repeat is None else self._repeat
 
 
 def as_exemplar(value: object, name: str = "exemplar", *, axes: int = 2, minimum: int = 1) -> Exemplar:

@@ -1,44 +1,47 @@
-"""One sheet for several sizes of an exemplar: which parts, where they lie, their colours and what is barred."""
+"""An atlas: copies of an exemplar in several sizes, side by side in one array, analysed at every resolution.
+
+Where an exemplar's elements have many sizes, little of it has the one that is wanted at a point. Copies of it,
+enlarged and reduced, add to that: each has the scale map of its own. Windows that leave a copy, or touch what must
+not be copied, are barred.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, log2
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
-from scipy.sparse import csr_array
 
+from texrs._engine.appearance import Appearance
+from texrs._engine.pyramid import ONE, halve
 from texrs._typing import Array, Bools, Floats
 from texrs.kernels.gather import gather
+from texrs.source_map import SourceMap
 
-__all__ = [
-    "Copy",
-    "box_of",
-    "coded",
-    "extent",
-    "fill",
-    "ordered",
-    "packed",
-    "reaching",
-    "resized",
-    "touched",
-    "values_of",
-    "weights_of",
-]
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+__all__ = ["BINS", "LARGEST", "RADIUS", "SMALLEST", "Atlas", "AtlasLevel", "Copy", "code_logs", "extend_sizes"]
 
 RADIUS = 2
 """Of a window."""
 NAT = 512
-"""Units of a scale's natural logarithm in the 12 bits of a guide."""
+"""Units of a scale's natural logarithm in the 12 bits of a demand."""
 STEP = 1.25
 """From one size of a copy to the next."""
 SMALLEST, LARGEST = 1 / 8, 4.0
 """Sizes that copies may have."""
 BARRED = 2047
-"""What a barred sample shows in the fourth value of the guide, and no output asks for."""
+"""What a barred sample shows in the fourth value of a demand, and no output asks for."""
+RESIZED = 0.1
+"""What it costs to be taken from a copy of another size, as a share of what a scale costs that is as far off."""
+BINS = 16
+"""Of a histogram of colours."""
+BAND = 1 << 15
+"""Places that are located at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +55,7 @@ class Copy:
     first : (int, int)
         First sample of the exemplar.
     origin, shape : (int, int)
-        Where in the sheet it lies.
+        Where in the atlas it lies.
     """
 
     factor: tuple[float, float]
@@ -61,7 +64,136 @@ class Copy:
     shape: tuple[int, int]
 
 
-def reaching(sizes: Sequence[float], scale: Floats, wanted: tuple[float, float]) -> tuple[float, ...]:
+@dataclass(frozen=True, slots=True, eq=False)
+class AtlasLevel:
+    """An atlas at one resolution.
+
+    Attributes
+    ----------
+    appearance : Appearance
+        Its windows.
+    values : (samples * 4) int16
+        The logarithm of each sample's scale, and of its copy's size; nothing; whether it is barred.
+    order : (any) uint32
+        The samples that are not barred, by their scale.
+    tones : (channels, samples) uint8, optional
+        The bin of each sample in the histogram of each channel.
+
+    """
+
+    appearance: Appearance
+    values: NDArray[np.int16]
+    order: NDArray[np.uint32]
+    tones: NDArray[np.uint8] | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Atlas:
+    """Copies of an exemplar, packed and analysed.
+
+    Attributes
+    ----------
+    shape : (int, int)
+        Of the exemplar.
+    copies : tuple of Copy
+        Where each lies; the first is the exemplar as it is.
+    levels : tuple of AtlasLevel
+        From the coarsest on.
+
+    """
+
+    shape: tuple[int, int]
+    copies: tuple[Copy, ...]
+    levels: tuple[AtlasLevel, ...]
+
+    @classmethod
+    def of(
+        cls,
+        colours: Floats,
+        scale: Floats | None,
+        sizes: Sequence[float] = (1.0,),
+        *,
+        levels: int,
+        wanted: tuple[float, float] | None = None,
+        known: Bools | None = None,
+        tones: bool = False,
+    ) -> Atlas:
+        """Return the atlas of an exemplar.
+
+        Parameters
+        ----------
+        colours : (H, W, C) float32
+            What decisions are made on (`texrs.Exemplar.guidance`).
+        scale : (H, W) float32, optional
+            Its scale map; None where sizes do not count.
+        sizes : sequence of float
+            Of the copies, 1 for the exemplar as it is, which comes first.
+        levels : int
+            How many resolutions.
+        wanted : (float, float), optional
+            Least and largest scale that is asked for: of other copies than the first only what has them is kept.
+        known : (H, W) bool, optional
+            What may be copied; None is all.
+        tones : bool
+            Whether to tell the bins of colours, at all levels but the finest.
+        """
+        shape, block = (colours.shape[0], colours.shape[1]), 1 << (levels - 1)
+        logs = np.zeros(shape, np.float32) if scale is None else np.log(scale).astype(np.float32)
+        parts = [(size, find_box(logs, size, wanted, block)) for size in sizes]
+        copies = pack([p for p in parts if p[1] is not None], block)
+        packed = np.zeros((*measure(copies, block), colours.shape[-1]), np.float32)
+        free = np.zeros(packed.shape[:2], bool)
+        for copy in copies:
+            (top, left), (rows, columns) = copy.origin, copy.shape
+            tall, wide = (-rows % block, -columns % block)
+            packed[top : top + rows + tall, left : left + columns + wide] = np.pad(
+                resize(colours, copy), ((0, tall), (0, wide), (0, 0)), mode="symmetric"
+            )
+            free[top : top + rows, left : left + columns] = True if known is None else pick_known(known, copy)
+        fill_gaps(packed, copies, block)
+        made = []
+        for k in range(levels):
+            if k:
+                packed = halve(packed)
+            values = code_values(copies, logs, free, packed.shape[:2], 1 << k)
+            order = sort_by_scale(values)
+            bins = find_tones(packed, order) if tones and k > 0 and order.size > 0 else None
+            made.append(AtlasLevel(Appearance(packed, axes=2, radius=RADIUS), values, order, bins))
+        return cls(shape, copies, tuple(reversed(made)))
+
+    @property
+    def usable(self) -> bool:
+        """Whether there is anything to copy from at every level."""
+        return all(level.order.size for level in self.levels)
+
+    def locate(self, places: NDArray[np.int32]) -> tuple[NDArray[np.uint32], Floats]:
+        """Return the copy, and the place in the exemplar, of places in the atlas, in units of 1/4096 of a sample."""
+        sample = places.reshape(-1, 2)
+        which, found = np.zeros(len(sample), np.uint32), np.empty((len(sample), 2), np.float32)
+        owner = np.zeros([n + 1 for n in self.levels[-1].appearance.shape], np.uint32)
+        for number, copy in enumerate(self.copies):
+            (top, left), (rows, columns) = copy.origin, copy.shape
+            owner[top : top + rows, left : left + columns] = number
+        factor = np.array([c.factor for c in self.copies], np.float32)
+        origin = np.array([c.origin for c in self.copies], np.float32)
+        first = np.array([c.first for c in self.copies], np.float32)
+        for start in range(0, len(sample), BAND):
+            part = slice(start, start + BAND)
+            at = (sample[part] / np.float32(ONE)).astype(np.float32, copy=False)
+            near = np.rint(at).astype(np.intp)
+            here = which[part] = owner[near[:, 0], near[:, 1]]
+            found[part] = (at - origin[here] + np.float32(0.5)) / factor[here] - np.float32(0.5) + first[here]
+        return which, found
+
+    def source(self, places: NDArray[np.int32], shape: tuple[int, ...]) -> SourceMap:
+        """Return the source map of places: labels tell the copies, frames their sizes."""
+        which, at = self.locate(places)
+        inverse = np.array([np.diag([1 / f for f in c.factor]) for c in self.copies], np.float32)
+        frame = inverse if len(self.copies) > 1 else None
+        return SourceMap(at.reshape(*shape, 2), np.zeros(shape, np.uint16), which.reshape(shape), frame, (self.shape,))
+
+
+def extend_sizes(sizes: Sequence[float], scale: Floats, wanted: tuple[float, float]) -> tuple[float, ...]:
     """Return sizes of copies with more of them added until they reach the least and the largest scale that is wanted."""
     found = list(sizes)
     # What is wanted at the ends should not hang on the ends of the exemplar alone.
@@ -73,7 +205,7 @@ def reaching(sizes: Sequence[float], scale: Floats, wanted: tuple[float, float])
     return tuple(found)
 
 
-def box_of(
+def find_box(
     logs: Floats, factor: float, wanted: tuple[float, float] | None, least: int
 ) -> tuple[int, int, int, int] | None:
     """Return the part of the exemplar that has wanted scales when resized: rows from, to, columns from, to."""
@@ -97,7 +229,7 @@ def box_of(
     return box[0], box[1], box[2], box[3]
 
 
-def packed(parts: Sequence[tuple[float, tuple[int, int, int, int] | None]], block: int) -> tuple[Copy, ...]:
+def pack(parts: Sequence[tuple[float, tuple[int, int, int, int] | None]], block: int) -> tuple[Copy, ...]:
     """Lay copies on shelves, the highest first; the order of the copies stays."""
     sizes = []
     for factor, box in parts:
@@ -119,25 +251,28 @@ def packed(parts: Sequence[tuple[float, tuple[int, int, int, int] | None]], bloc
     )
 
 
-def extent(copies: Sequence[Copy], block: int) -> tuple[int, int]:
+def measure(copies: Sequence[Copy], block: int) -> tuple[int, int]:
+    """Return the rows and columns that copies take, in whole blocks."""
     ends = [[-(-(o + n) // block) * block for o, n in zip(c.origin, c.shape, strict=True)] for c in copies]
     return max(e[0] for e in ends), max(e[1] for e in ends)
 
 
-def fill(sheet: Floats, copies: Sequence[Copy], block: int) -> None:
+def fill_gaps(packed: Floats, copies: Sequence[Copy], block: int) -> None:
     """Fill what no copy covers with colours of the first: what is constant would count as texture."""
-    empty = np.ones(sheet.shape[:2], bool)
+    empty = np.ones(packed.shape[:2], bool)
     for copy in copies:
         (top, left), (rows, columns) = copy.origin, copy.shape
         empty[top : top + rows + -rows % block, left : left + columns + -columns % block] = False
     if empty.any():
         (top, left), (rows, columns) = copies[0].origin, copies[0].shape
         row, column = np.nonzero(empty)
-        sheet[row, column] = sheet[top + row % rows, left + column % columns]
+        packed[row, column] = packed[top + row % rows, left + column % columns]
 
 
-def weights_of(n: int, m: int) -> csr_array:
+def resampling_matrix(n: int, m: int) -> csr_array:
     """Return the matrix that resamples n samples to m by cubic convolution, widened where that reduces them."""
+    from scipy.sparse import csr_array
+
     stretch = max(1.0, n / m)
     centre = (np.arange(m) + 0.5) * n / m - 0.5
     reach = ceil(2 * stretch)
@@ -151,7 +286,7 @@ def weights_of(n: int, m: int) -> csr_array:
     return csr_array((weight.ravel().astype(np.float32), (row.ravel(), column.ravel())), shape=(m, n))
 
 
-def resized(colours: Floats, copy: Copy) -> Floats:
+def resize(colours: Floats, copy: Copy) -> Floats:
     """Return the colours of a copy."""
     ends = [f + round(n / k) for f, n, k in zip(copy.first, copy.shape, copy.factor, strict=True)]
     part = colours[copy.first[0] : ends[0], copy.first[1] : ends[1]]
@@ -159,14 +294,16 @@ def resized(colours: Floats, copy: Copy) -> Floats:
         return part
     for axis in range(2):
         line = np.moveaxis(part, axis, 0)
-        matrix = weights_of(line.shape[0], copy.shape[axis])
+        matrix = resampling_matrix(line.shape[0], copy.shape[axis])
         flat = matrix @ line.reshape(line.shape[0], -1)
         part = np.moveaxis(flat.reshape(-1, *line.shape[1:]), 0, axis)
     return np.ascontiguousarray(np.clip(part, 0, 1), np.float32)
 
 
-def touched(known: Bools, copy: Copy) -> Bools:
+def pick_known(known: Bools, copy: Copy) -> Bools:
     """Return which samples of a copy are made of known ones alone."""
+    from scipy import ndimage
+
     reach = [2 * max(1.0, 1 / f) for f in copy.factor]
     lines = []
     for axis in range(2):
@@ -178,10 +315,12 @@ def touched(known: Bools, copy: Copy) -> Bools:
     return picked
 
 
-def values_of(
-    copies: Sequence[Copy], logs: Floats, free: Bools, shape: tuple[int, ...], spacing: int, penalty: float
+def code_values(
+    copies: Sequence[Copy], logs: Floats, free: Bools, shape: tuple[int, ...], spacing: int
 ) -> NDArray[np.int16]:
-    """Return what the guide compares at the samples of a level."""
+    """Return what a demand compares at the samples of a level."""
+    from scipy import ndimage
+
     values = np.zeros((*shape, 4), np.int16)
     values[..., 3] = BARRED
     # A sample of the level is made of those that it stands for and one more step on each side.
@@ -200,12 +339,12 @@ def values_of(
         ]
         grid = np.stack(np.meshgrid(*at, indexing="ij"), axis=-1).astype(np.float32)
         size = np.float32(np.log(copy.factor).mean())
-        values[here][..., 0] = coded(gather(logs, grid, interpolation="linear") + size)
-        values[here][..., 1] = round(float(size) * NAT * penalty**0.5)
+        values[here][..., 0] = code_logs(gather(logs, grid, interpolation="linear") + size)
+        values[here][..., 1] = round(float(size) * NAT * RESIZED**0.5)
     return values.reshape(-1)
 
 
-def ordered(values: NDArray[np.int16]) -> NDArray[np.uint32]:
+def sort_by_scale(values: NDArray[np.int16]) -> NDArray[np.uint32]:
     """Return the samples that are not barred, by their scale."""
     scale, barred = values[0::4], values[3::4] > 0
     if barred.all():
@@ -214,5 +353,14 @@ def ordered(values: NDArray[np.int16]) -> NDArray[np.uint32]:
     return np.asarray(order[~barred[order]], np.uint32)
 
 
-def coded(logs: Array) -> NDArray[np.int16]:
+def find_tones(packed: Floats, order: NDArray[np.uint32]) -> NDArray[np.uint8]:
+    """Return the bin of each sample in the histogram of each channel, which spans those in ``order``."""
+    flat = packed.reshape(-1, packed.shape[-1])
+    low, high = flat[order].min(axis=0), flat[order].max(axis=0)
+    place = (flat - low) * (BINS / np.maximum(high - low, np.float32(1e-6)))
+    return np.ascontiguousarray(np.clip(place, 0, BINS - 1).T.astype(np.uint8))
+
+
+def code_logs(logs: Array) -> NDArray[np.int16]:
+    """Return the logarithms of scales in the 12 bits of a demand."""
     return np.asarray(np.clip(np.rint(logs * NAT), -2048, 2047), np.int16)

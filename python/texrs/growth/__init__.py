@@ -1,11 +1,32 @@
-"""Exemplars in several sizes, packed side by side: what an output takes its elements from.
+"""The coarse-to-fine engine: textures grown by corrected coordinates, in two and three dimensions.
 
-Where an exemplar's elements have many sizes, little of it has the one that is wanted at a point. Copies of it, enlarged and
-reduced, add to that: each has the scale map of its own. They are packed into one sheet and analysed at every resolution;
-windows that leave a copy, or touch what must not be copied, are barred.
+`texrs.growth.engine` is the loop over the levels, which takes a start, a corrector, and what is asked of the output
+beside the texture; `windows` is the engine's own start and corrector; `start` holds the other starts, `constraints`
+what may be asked, `scales` growth from an atlas of scaled copies, `balance` what keeps its colours in balance, and
+`settings` the numbers.
 """
 
-from texrs.exemplar.atlas import LARGEST, RADIUS, SMALLEST, Copy, reaching
-from texrs.growth.supply import LEAST, Grown, Settings, Supply, levels_of
+from texrs.growth.constraints import Conditions, Constraints, Guide, Surroundings
+from texrs.growth.engine import Grown, Start, grow
+from texrs.growth.scales import FROM_ATLAS, grow_from_atlas, to_finest
+from texrs.growth.settings import EVERY, Settings
+from texrs.growth.start import from_draft, from_patches
+from texrs.growth.windows import Windows
 
-__all__ = ["LARGEST", "LEAST", "RADIUS", "SMALLEST", "Copy", "Grown", "Settings", "Supply", "levels_of", "reaching"]
+__all__ = [
+    "EVERY",
+    "FROM_ATLAS",
+    "Conditions",
+    "Constraints",
+    "Grown",
+    "Guide",
+    "Settings",
+    "Start",
+    "Surroundings",
+    "Windows",
+    "from_draft",
+    "from_patches",
+    "grow",
+    "grow_from_atlas",
+    "to_finest",
+]

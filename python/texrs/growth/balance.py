@@ -1,9 +1,9 @@
 """Colours in balance: what an output shows too often becomes dear, and what it shows too seldom cheap.
 
-W. Dong, N. Zhou and J.-C. Paul, "Perspective-aware texture analysis and synthesis", 2008, Eq. 8, weighs a sample by how much
-its colour is in excess in the output as it is. Here that excess is added up from pass to pass. Such sums are the
-multipliers of a constraint, so they grow until the output's histograms are those that were asked for: not the exemplar's,
-but those of its samples weighted to the scales that the output has.
+W. Dong, N. Zhou and J.-C. Paul, "Perspective-aware texture analysis and synthesis", 2008, Eq. 8, weighs a sample by
+how much its colour is in excess in the output as it is. Here that excess is added up from pass to pass. Such sums are
+the multipliers of a constraint, so they grow until the output's histograms are those that were asked for: not the
+exemplar's, but those of its samples weighted to the scales that the output has.
 """
 
 from __future__ import annotations
@@ -13,30 +13,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._engine.appearance import Guide
+from texrs._engine.appearance import Demand
 from texrs._engine.pyramid import ONE
-from texrs._typing import Array, Floats
+from texrs._typing import Array
+from texrs.exemplar.atlas import BINS
 
-__all__ = ["Balance", "tones_of"]
+__all__ = ["Balance"]
 
-BINS = 16
-"""Of a histogram."""
 BANDS = 12
 """Parts of the range of the wanted scales, within each of which the exemplar's samples count alike."""
 NARROWEST = 51
-"""Least width of such a part, a tenth in the units of a guide's scales: a target may be constant."""
+"""Least width of such a part, a tenth in the units of wanted scales: a target may be constant."""
 SLAB = 1 << 15
 """Points that are looked at at once."""
 UNRELATED = 2 * 512**2
 """Cost of windows that have nothing to do with each other."""
-
-
-def tones_of(sheet: Floats, order: NDArray[np.uint32]) -> NDArray[np.uint8]:
-    """Return the bin of each sample in the histogram of each channel, (channels, samples): of those in ``order`` it spans all."""
-    flat = sheet.reshape(-1, sheet.shape[-1])
-    low, high = flat[order].min(axis=0), flat[order].max(axis=0)
-    place = (flat - low) * (BINS / np.maximum(high - low, np.float32(1e-6)))
-    return np.ascontiguousarray(np.clip(place, 0, BINS - 1).T.astype(np.uint8))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,22 +40,22 @@ class Balance:
     costs: Array
 
     @classmethod
-    def of(cls, tones: NDArray[np.uint8], guide: Guide) -> Balance:
-        """Ask for the histograms of the samples that may be copied, weighted to the scales that a guide asks for.
+    def of(cls, tones: NDArray[np.uint8], demand: Demand) -> Balance:
+        """Return a balance that asks for the histograms of the samples that may be copied, weighted to the wanted scales.
 
         Parameters
         ----------
         tones : (channels, samples) uint8
-            As of `tones_of`.
-        guide : Guide
+            The bin of each sample in the histogram of each channel.
+        demand : Demand
             The scales of samples, and of points one number each; its order holds what may be copied.
         """
-        weight = _weights(guide.exemplar[0::4][guide.order].astype(np.int64), guide.output.astype(np.int64))
-        shares = [np.bincount(tone[guide.order], weight, BINS) for tone in tones]
-        return cls(tones, guide.order, np.stack(shares), np.zeros((len(tones), BINS)))
+        weight = _weights(demand.exemplar[0::4][demand.order].astype(np.int64), demand.output.astype(np.int64))
+        shares = [np.bincount(tone[demand.order], weight, BINS) for tone in tones]
+        return cls(tones, demand.order, np.stack(shares), np.zeros((len(tones), BINS)))
 
     def note(self, places: NDArray[np.int32], shape: tuple[int, ...], step: float) -> None:
-        """Add the excess of what an output shows, in places of a sheet of a shape, to the costs."""
+        """Add the excess of what an output shows, in places of an atlas of a shape, to the costs."""
         points = places.reshape(-1, 2)
         counts = np.zeros(self.costs.shape)
         for start in range(0, len(points), SLAB):
@@ -74,15 +65,15 @@ class Balance:
         excess = (counts / len(points) - self.shares) / np.maximum(self.shares, 1 / BINS)
         self.costs[...] += step * np.clip(excess, -1, 1)
 
-    def onto(self, guide: Guide) -> Guide:
-        """Let a guide ask for cheap colours, too: a cost is the square of a value of the sample, where points ask for 0."""
+    def onto(self, demand: Demand) -> Demand:
+        """Return a demand for cheap colours, too: a cost is the square of a value of the sample, where points ask for 0."""
         cost = np.zeros(self.tones.shape[1])
         for tone, each in zip(self.tones, self.costs, strict=True):
             cost += each[tone]
         cost = np.maximum(cost - cost[self.order].min(), 0)
-        values = guide.exemplar.copy()
-        values[2::4] = np.minimum(np.rint(np.sqrt(cost * UNRELATED * 256 / int(guide.weight[0]))), 2047)
-        return guide._replace(exemplar=values)
+        values = demand.exemplar.copy()
+        values[2::4] = np.minimum(np.rint(np.sqrt(cost * UNRELATED * 256 / int(demand.weight[0]))), 2047)
+        return demand._replace(exemplar=values)
 
 
 def _weights(mine: NDArray[np.int64], asked: NDArray[np.int64]) -> Array:

@@ -15,14 +15,16 @@ Departures, with their reasons:
 - The start is hashed coherent blocks that fit each other, drawn from where the exemplar has about the wanted scale; single
   pixels of that scale are noise, which the averages of the paper turn to haze.
 - The scale is a cost of showing a sample at a point, (log S_e - log S_o)^2, not a channel of windows, whose values hardly
-  differ within a window; ratios of scales are what is seen, so logarithms are compared. The output's map stays as asked.
+  differ within a window; ratios of scales are what is seen, so logarithms are compared. The output's map stays as
+  asked.
 - What is optimised are coordinates, so that the last word is a copy, not a weighted mean: nothing blurs.
 - A point changes for a drawn match only if that gains more than twice the exemplar's own spacing, and the start is balanced
   for contrast. Both keep what is rare.
 - The histograms of Eq. 8 are those of the exemplar's samples weighted to the target's scales, and what is in excess of them
-  becomes dearer from pass to pass, not for one alone (`texrs.growth`): colours differ by scale, and drift without it.
-- Resized copies of the exemplar add to the supply of a scale. A ramp finds only a strip of the exemplar for each of its
-  rows, and repeats it; and what is larger or smaller than all of the exemplar is not there at all.
+  becomes dearer from pass to pass, not for one alone (`texrs.growth.balance`): colours differ by scale, and drift
+  without it.
+- An atlas of resized copies of the exemplar adds to what there is of a scale. A ramp finds only a strip of the exemplar
+  for each of its rows, and repeats it; and what is larger or smaller than all of the exemplar is not there at all.
 
 ``method="paper"`` leaves the departures out (`texrs.papers.perspective.literal`).
 """
@@ -31,40 +33,34 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from typing import Any, Literal, TypeAlias
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from texrs import scale_maps
-from texrs._arrays import as_float, as_image, as_seed, as_size, as_wrap
 from texrs._engine.pyramid import Region
-from texrs._typing import Array, Floats, Interpolation, Progress
-from texrs.errors import InvalidInput
-from texrs.growth import LARGEST, LEAST, SMALLEST, Settings, Supply, reaching
-from texrs.papers.perspective.literal import SIDE, average
-from texrs.scale_maps._maps import as_map
+from texrs._typing import Array, Interpolation, Progress
+from texrs.exemplar import Exemplar
+from texrs.exemplar.analysis import count_levels
+from texrs.exemplar.atlas import Atlas
+from texrs.growth import FROM_ATLAS, grow_from_atlas, to_finest
+from texrs.growth.engine import Places
+from texrs.papers.perspective.literal import average_windows
+from texrs.papers.perspective.request import Method, Request
+from texrs.papers.perspective.sizes import Outside, Sizes, bring_within, choose_sizes
 from texrs.source_map import SourceMap
 from texrs.source_map._pixels import bands
 from texrs.synthesis import Synthesis
 
 __all__ = ["perspective"]
 
-Method: TypeAlias = Literal["paper"] | None
-Sizes: TypeAlias = Literal["auto"] | bool | Sequence[float]
-
-SETTINGS = Settings(weights=(4.0, 1.5, 0.5), balance=0.05)
+SETTINGS = replace(FROM_ATLAS, weights=(4.0, 1.5, 0.5), balance=0.05)
 """Where elements of all sizes lie side by side, the wanted one must be chosen at the coarsest level: later ones hardly move.
 Costs of colours that grow faster wash away what is rare: drops on paint."""
-FACTORS = (1.0, 0.8, 0.64, 1.25, 1.5625)
-"""Sizes of the copies that add to the supply, the exemplar first."""
-PLENTY = 0.75
-"""Samples of about the wanted scale for each point of the output at which the exemplar alone will do."""
-ALIKE = 0.1
-"""Natural logarithm of a ratio of scales that are about the same."""
 
 
 def perspective(
-    exemplar: Array,
+    exemplar: Array | Exemplar,
     scale_map: Array,
     size: int | Sequence[int],
     *,
@@ -81,7 +77,7 @@ def perspective(
 
     Parameters
     ----------
-    exemplar : (H, W) or (H, W, C) array
+    exemplar : (H, W) or (H, W, C) array, or Exemplar
         Any real dtype and channels; each side at least 16.
     scale_map : (H, W) float array
         How large the exemplar's elements are at each pixel, positive; only ratios count (`texrs.scale_maps`).
@@ -91,7 +87,8 @@ def perspective(
         How large they are to be at each pixel of the result, in the units of ``scale_map``. None stretches
         ``scale_map`` to the size (`texrs.scale_maps.resample`).
     method : {None, "paper"}
-        "paper": the literal algorithm, kept for comparison: averages, and slow.
+        Which algorithm. "paper": the literal one, kept for comparison: averages, and slow. It does not wrap, and
+        takes up to four channels.
     scale_weight : float
         How much the scale counts beside looking like the exemplar, 0 to 16. At 1 another scale by a factor of 1.6 costs
         as much as surroundings that have nothing to do with each other; 0 synthesises without regard to scales.
@@ -102,11 +99,11 @@ def perspective(
     wrap : bool or (rows, columns)
         Axes along which the result is to repeat; the target must do so, too.
     seed : int
-        Chooses the texture.
+        Chooses the texture, 0 to 2^64 - 1; the same seed gives the same bytes.
     interpolation : {"nearest", "linear", "cubic"}
         Between the exemplar's samples, where it is resized.
     progress : callable, optional
-        Called with the stage and the share of it that is done; raising stops the work.
+        Called as ``progress(stage, share)`` with the stage and the share of it that is done; raising stops the work.
 
     Returns
     -------
@@ -136,152 +133,91 @@ def perspective(
     ((96, 128, 3), True)
 
     """
-    image = as_image(exemplar, "exemplar", minimum=LEAST)
-    mine = as_map(scale_map, "scale_map", image.shape[:2])
-    sides = as_size(size)
-    shape = (sides[0], sides[1])
-    wanted = scale_maps.resample(mine, shape) if target is None else as_map(target, "target", shape)
-    closed = as_wrap(wrap)
-    check_wrap(wanted, closed, target is None)
-    strength, seed = as_float(scale_weight, "scale_weight", 0, 16), as_seed(seed)
-    if method not in (None, "paper"):
-        raise InvalidInput(f"method: None or 'paper' is allowed, got {method!r}")
-    if interpolation not in ("nearest", "linear", "cubic"):
-        raise InvalidInput(f"interpolation: allowed are nearest, linear and cubic; got {interpolation!r}")
-    if method == "paper":
-        return literal(exemplar, mine, wanted, closed, strength, seed, progress)
-    sizes = factors_for(mine, wanted, augment_scales)
-    wanted, outside = clamped(mine, wanted, sizes)
-    if outside["share"] > 0 and strength > 0:
-        warnings.warn(_sentence(outside, sizes), stacklevel=2)
-    reached = (float(wanted.min()), float(wanted.max()))
-    supply = Supply.of(image, mine, sizes, wanted=reached, settings=SETTINGS)
-    grown = supply.grow(Region.whole(shape, closed), wanted, strength=strength, seed=seed, progress=progress)
-    source, levels, between = supply.source(grown.places, shape), grown.report, grown.stages
-    del grown  # Its places take as much memory as all the rest.
-    composite = source.render(exemplar, interpolation=interpolation)
-    stages = {"target": wanted}
-    for name, (places, points) in between.items():
-        stages[name] = supply.source(places, points).render(exemplar, interpolation="nearest")
-    report: dict[str, Any] = {
-        "method": "default",
-        "seed": seed,
-        "scale_weight": strength,
-        "sizes": [round(float(np.sqrt(np.prod(c.factor))), 4) for c in supply.copies],
-        "outside": outside,
-        "scale_error": scale_error(supply, source, mine, wanted),
-        "wrap": list(closed),
-        "interpolation": interpolation,
-        "levels": levels,
-    }
-    return Synthesis(composite, source, stages | {"composite": composite}, report)
-
-
-def literal(
-    exemplar: Array,
-    scale: Floats,
-    target: Floats,
-    wrap: Sequence[bool],
-    weight: float,
-    seed: int,
-    progress: Progress | None,
-) -> Synthesis:
-    """Do what the paper prints; the composite shows what the averages were made of."""
-    image = as_image(exemplar, "exemplar")
-    if any(wrap):
-        raise InvalidInput("wrap: the paper's method knows none; leave out wrap, or method='paper'")
-    if image.shape[-1] > 4:
-        raise InvalidInput(f"exemplar: the paper's method takes up to 4 channels, got {image.shape[-1]}")
-    if min(*image.shape[:2], *target.shape) < 2 * SIDE:
-        raise InvalidInput(f"size: the paper's method needs at least {2 * SIDE} pixels a side, got {target.shape}")
-    made = average(image, scale, target, weight=weight, seed=seed, progress=progress)
-    shape = (target.shape[0], target.shape[1])
-    source = SourceMap(
-        made.coordinates, np.zeros(shape, np.uint16), np.zeros(shape, np.uint32), None, (image.shape[:2],)
+    asked = Request.check(
+        exemplar,
+        scale_map,
+        size,
+        target=target,
+        method=method,
+        scale_weight=scale_weight,
+        augment_scales=augment_scales,
+        wrap=wrap,
+        seed=seed,
+        interpolation=interpolation,
     )
-    composite = source.render(exemplar, interpolation="nearest")
-    report = {"method": "paper", "seed": seed, "scale_weight": weight, "energies": made.energies}
-    return Synthesis(made.image.reshape(composite.shape), source, {"target": target, "composite": composite}, report)
+    if asked.method == "paper":
+        return average_windows(asked, progress)
+    sizes = choose_sizes(asked.scale, asked.target, asked.sizes)
+    wanted, outside = bring_within(asked.scale, asked.target, sizes)
+    if outside.share > 0 and asked.strength > 0:
+        warnings.warn(outside.sentence(sizes), stacklevel=2)
+    asked = replace(asked, target=wanted)
+    atlas = make_atlas(asked, sizes)
+    source, stages, levels = grow_coordinates(asked, atlas, progress)
+    composite = source.render(asked.exemplar.image, interpolation=asked.interpolation)
+    report = describe(asked, atlas, source, outside, levels)
+    return Synthesis(composite, source, {"target": wanted, **stages, "composite": composite}, report)
 
 
-def check_wrap(target: Floats, wrap: Sequence[bool], stretched: bool) -> None:
-    """Refuse a target whose ends do not meet where the output is to repeat."""
-    for axis, closed in enumerate(wrap):
-        if not closed:
-            continue
-        logs = np.log(target)
-        inner = float(np.abs(np.diff(logs, axis=axis)).max(initial=0.0))
-        across = float(np.abs(np.take(logs, 0, axis) - np.take(logs, -1, axis)).max())
-        if across > 2 * inner + 0.02:
-            name = ("rows", "columns")[axis]
-            way = "give a target that repeats" if stretched else "make it repeat"
-            raise InvalidInput(
-                f"wrap: the target's first and last {name} differ by a factor of {np.exp(across):.2f}, so the result "
-                f"cannot repeat along {name}; {way}, or leave wrap off along {name}"
-            )
-
-
-def factors_for(scale: Floats, target: Floats, asked: Sizes) -> tuple[float, ...]:
-    """Return the sizes of the copies, the exemplar's own first."""
-    if isinstance(asked, bool | np.bool_):
-        if not asked:
-            return (1.0,)
-    elif not (isinstance(asked, str) and asked == "auto"):
-        return _given(asked)
-    elif supplied(scale, target) >= PLENTY:
-        return (1.0,)
-    return reaching(FACTORS, scale, (float(target.min()), float(target.max())))
-
-
-def _given(asked: object) -> tuple[float, ...]:
-    if isinstance(asked, Sequence) and not isinstance(asked, str) and 1 <= len(asked) <= 16:
-        sizes = [as_float(s, "augment_scales", SMALLEST, LARGEST) for s in asked]
-        # The exemplar itself is always there.
-        return (1.0, *dict.fromkeys(s for s in sizes if s != 1))
-    raise InvalidInput(f"augment_scales: needs 'auto', True, False or up to 16 sizes from 1/8 to 4, got {asked!r}")
-
-
-def supplied(scale: Floats, target: Floats) -> float:
-    """Return how many samples of about the wanted scale the exemplar has for each point, where it has the fewest."""
-    mine, theirs = np.sort(np.log(scale), axis=None), np.log(target).ravel()
-    bins = np.arange(theirs.min(), theirs.max() + ALIKE, ALIKE)
-    asked = np.histogram(theirs, np.append(bins, bins[-1] + ALIKE))[0]
-    middle = bins + ALIKE / 2
-    there = np.searchsorted(mine, middle + ALIKE) - np.searchsorted(mine, middle - ALIKE)
-    counts = asked > theirs.size // 200
-    return float((there[counts] / asked[counts]).min(initial=np.inf))
-
-
-def clamped(scale: Floats, target: Floats, sizes: Sequence[float]) -> tuple[Floats, dict[str, float]]:
-    """Bring a target to the scales that the copies have, and tell how much of it was beyond them."""
-    low, high = float(scale.min()) * min(sizes), float(scale.max()) * max(sizes)
-    slack = 1 + 1e-3
-    beyond = (target < low / slack) | (target > high * slack)
-    if beyond.all():
-        raise InvalidInput(
-            f"target: asks for scales from {target.min():.3g} to {target.max():.3g} where the exemplar, in all its sizes, "
-            f"has {low:.3g} to {high:.3g}; give a target within these, or larger or smaller augment_scales"
-        )
-    factor = max(low / float(target.min()), float(target.max()) / high, 1.0)
-    share = float(beyond.mean())
-    return np.clip(target, low, high), {"share": round(share, 6), "factor": round(factor if share else 1.0, 4)}
-
-
-def _sentence(outside: dict[str, float], sizes: Sequence[float]) -> str:
-    way = "augment_scales='auto' would resize it" if len(sizes) == 1 else "nor have its resized copies"
-    return (
-        f"target: {outside['share']:.1%} of it asks for scales that the exemplar has not, by a factor of up to "
-        f"{outside['factor']:.2f}; they were brought to those that it has ({way})"
+def make_atlas(asked: Request, sizes: Sequence[float]) -> Atlas:
+    """Analyse copies of the exemplar in the sizes that are of use."""
+    return Atlas.of(
+        asked.exemplar.guidance,
+        asked.scale,
+        sizes,
+        levels=count_levels(asked.exemplar.shape, SETTINGS.coarsest),
+        wanted=(float(asked.target.min()), float(asked.target.max())),
+        tones=True,
     )
 
 
-def scale_error(supply: Supply, source: SourceMap, scale: Floats, target: Floats) -> float:
+def grow_coordinates(
+    asked: Request, atlas: Atlas, progress: Progress | None
+) -> tuple[SourceMap, dict[str, Array], list[dict[str, Any]]]:
+    """Return the source map of steps 3 and 4, pictures of the stages, and what was done at each level."""
+
+    def show(places: Places, region: Region, spacing: int) -> Array:
+        source = atlas.source(to_finest(places, spacing), region.shape)
+        return source.render(asked.exemplar.image, interpolation="nearest")
+
+    grown = grow_from_atlas(
+        atlas,
+        Region.whole(asked.target.shape, asked.wrap),
+        asked.target,
+        settings=SETTINGS,
+        strength=asked.strength,
+        seed=asked.seed,
+        show=show,
+        progress=progress,
+    )
+    # Its places take as much memory as all the rest: they go with this function.
+    return atlas.source(grown.places, asked.target.shape), dict(grown.stages), [d.report() for d in grown.levels]
+
+
+def measure_scale_error(asked: Request, atlas: Atlas, source: SourceMap) -> float:
     """Return the median of |log S_e(S(p)) - log S_o(p)|: how well the synthesiser chose by scale."""
-    sizes = np.log([c.factor for c in supply.copies]).mean(axis=1).astype(np.float32)
-    shown = source.render(scale, interpolation="linear")
-    for band in bands(target.shape):
+    sizes = np.log([c.factor for c in atlas.copies]).mean(axis=1).astype(np.float32)
+    shown = source.render(asked.scale, interpolation="linear")
+    for band in bands(asked.target.shape):
         part = shown[band]
         np.log(part, out=part)
         part += sizes[source.label[band]]
-        part -= np.log(target[band])
+        part -= np.log(asked.target[band])
     return round(float(np.median(np.abs(shown, out=shown), overwrite_input=True)), 5)
+
+
+def describe(
+    asked: Request, atlas: Atlas, source: SourceMap, outside: Outside, levels: list[dict[str, Any]]
+) -> dict[str, Any]:
+    """Return the report: JSON types."""
+    return {
+        "method": "default",
+        "seed": asked.seed,
+        "scale_weight": asked.strength,
+        "sizes": [round(float(np.sqrt(np.prod(c.factor))), 4) for c in atlas.copies],
+        "outside": {"share": outside.share, "factor": outside.factor},
+        "scale_error": measure_scale_error(asked, atlas, source),
+        "wrap": list(asked.wrap),
+        "interpolation": asked.interpolation,
+        "levels": levels,
+    }

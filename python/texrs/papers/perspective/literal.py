@@ -1,9 +1,9 @@
 """PERSPECTIVE as printed: window averages, re-weighted, with the scale as one more channel (section 4).
 
-Kept for comparison. What the paper leaves open: windows of 8 x 8 at three resolutions, every second one; the scale as wide as
-the colours together; histograms of 16 bins, in units of an even spread, counted anew in each round. Distances are kept from
-zero, where Eq. 6 has no weight; and Eq. 8 is read as a sum over histograms (its k is not the number of bins), for each
-pixel of a window.
+Kept for comparison. What the paper leaves open: windows of 8 x 8 at three resolutions, every second one; the scale as
+wide as the colours together; histograms of 16 bins, in units of an even spread, counted anew in each round. Distances
+are kept from zero, where Eq. 6 has no weight; and Eq. 8 is read as a sum over histograms (its k is not the number of
+bins), for each pixel of a window.
 """
 
 from __future__ import annotations
@@ -21,8 +21,12 @@ from texrs._typing import Array, Floats, Progress
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
+from texrs.errors import InvalidInput
+from texrs.papers.perspective.request import Request
+from texrs.source_map import SourceMap
+from texrs.synthesis import Synthesis
 
-__all__ = ["Averaged", "average"]
+__all__ = ["Averaged", "average", "average_windows"]
 
 SIDE, SPACING = 8, 2
 ROUNDS = (20, 10, 6)
@@ -44,6 +48,25 @@ class Averaged:
     energies: list[list[float]]
 
 
+def average_windows(asked: Request, progress: Progress | None) -> Synthesis:
+    """Do what the paper prints; the composite shows what the averages were made of."""
+    image, target = asked.exemplar.pixels, asked.target
+    if any(asked.wrap):
+        raise InvalidInput("wrap: the paper's method knows none; leave out wrap, or method='paper'")
+    if image.shape[-1] > 4:
+        raise InvalidInput(f"exemplar: the paper's method takes up to 4 channels, got {image.shape[-1]}")
+    if min(*image.shape[:2], *target.shape) < 2 * SIDE:
+        raise InvalidInput(f"size: the paper's method needs at least {2 * SIDE} pixels a side, got {target.shape}")
+    made = average(image, asked.scale, target, weight=asked.strength, seed=asked.seed, progress=progress)
+    shape = (target.shape[0], target.shape[1])
+    source = SourceMap(
+        made.coordinates, np.zeros(shape, np.uint16), np.zeros(shape, np.uint32), None, (image.shape[:2],)
+    )
+    composite = source.render(asked.exemplar.image, interpolation="nearest")
+    report = {"method": "paper", "seed": asked.seed, "scale_weight": asked.strength, "energies": made.energies}
+    return Synthesis(made.image.reshape(composite.shape), source, {"target": target, "composite": composite}, report)
+
+
 def average(
     image: Array, scale: Floats, target: Floats, *, weight: float, seed: int, progress: Progress | None
 ) -> Averaged:
@@ -58,7 +81,7 @@ def average(
     at: NDArray[np.intp] | None = None
     for number in reversed(range(len(exemplars))):
         e = np.asarray(exemplars[number], np.float64)
-        x = scattered(e, scales[number], targets[number], seed) if x is None else doubled(x, targets[number].shape)
+        x = scatter(e, scales[number], targets[number], seed) if x is None else double(x, targets[number].shape)
         rounds = ROUNDS[len(exemplars) - 1 - number]
         report = stage(progress, f"level {len(exemplars) - number} of {len(exemplars)}")
         spread = weight * e.reshape(-1, e.shape[-1]).std(axis=0).sum() / max(float(scales[number].std()), 1e-6)
@@ -72,10 +95,10 @@ def average(
         energies.append(found)
     assert x is not None
     assert at is not None
-    return Averaged(brought_back(x, image), np.asarray(at, np.float32), energies)
+    return Averaged(bring_back(x, image), np.asarray(at, np.float32), energies)
 
 
-def brought_back(x: Doubles, like: Array) -> Array:
+def bring_back(x: Doubles, like: Array) -> Array:
     """Return colours within [0, 1] in the dtype and range of an image: the inverse of `to_unit`."""
     if like.dtype == np.bool_:
         return x >= 0.5
@@ -90,7 +113,7 @@ def brought_back(x: Doubles, like: Array) -> Array:
     return x.astype(like.dtype)
 
 
-def scattered(e: Doubles, scale: Floats, target: Floats, seed: int) -> Doubles:
+def scatter(e: Doubles, scale: Floats, target: Floats, seed: int) -> Doubles:
     """Return each point the colour of one that is drawn from those of about its scale: the nearest 4 in 100, at least 12."""
     order = np.argsort(scale, axis=None, kind="stable")
     some = min(order.size, max(12, order.size // 25))
@@ -103,7 +126,7 @@ def scattered(e: Doubles, scale: Floats, target: Floats, seed: int) -> Doubles:
     return picked
 
 
-def doubled(x: Doubles, shape: tuple[int, ...]) -> Doubles:
+def double(x: Doubles, shape: tuple[int, ...]) -> Doubles:
     """Return an image at twice the resolution, linear between its pixels."""
     for axis, n in enumerate(shape):
         place = np.clip((np.arange(n) + 0.5) / 2 - 0.5, 0, x.shape[axis] - 1)
@@ -189,7 +212,7 @@ def _bins(colour: Doubles) -> NDArray[np.intp]:
 
 
 def _excess(x: Doubles, e: Doubles) -> Doubles:
-    """Give, for each channel and bin, how much more often the output shows it, in units of an even spread."""
+    """Return, for each channel and bin, how much more often the output shows it, in units of an even spread."""
     counts = [
         [np.bincount(_bins(v[..., c]).ravel(), minlength=BINS) / v[..., c].size for c in range(e.shape[-1])]
         for v in (x, e)

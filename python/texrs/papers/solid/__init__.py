@@ -4,11 +4,13 @@ Y.-L. Su, C.-C. Chang, Z.-C. Shih and W.-K. Tai, "Vector-field-based deformation
 synthesis" (appearance vectors, similarity sets and a pyramid of corrections after Lefebvre and Hoppe, SIGGRAPH 2005
 and 2006). The flow:
 
-1. analyse the exemplar: a pyramid, and appearance vectors at each level (section 3.1; `texrs.exemplar.analysis`);
+1. analyse the exemplar: a pyramid, and appearance vectors at each level (section 3.1; `texrs.Exemplar.analyse`);
 2. start at the coarsest level;
 3. at each finer level, upsample the coordinates with the field's Jacobian (Eq. 1 and 2), and
 4. correct them by the windows around each point, warped by the field (Eq. 3 and 4);
 5. look the exemplar up through the coordinates.
+
+Steps 2 to 4 are the coarse-to-fine engine of `texrs.growth`.
 
 Departures, with their reasons:
 
@@ -35,37 +37,31 @@ Departures, with their reasons:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_image, as_seed, as_size, as_wrap
-from texrs._engine.appearance import Corrected
-from texrs._engine.pyramid import ONE, Region, to_fixed, upsample
-from texrs._progress import stage
+from texrs._engine.pyramid import ONE, Region
 from texrs._typing import Array, Interpolation, Progress
-from texrs.errors import InvalidInput
-from texrs.exemplar.analysis import COARSEST, Analysis, analyse, are_labels
+from texrs.exemplar import Exemplar
+from texrs.exemplar.analysis import COARSEST
 from texrs.fields import Field
-from texrs.papers.solid.constraints import Hold
+from texrs.growth import Constraints, Grown, Guide, Start, Windows, from_patches
+from texrs.growth.engine import Places
 from texrs.papers.solid.gate import Trial, trial_region
-from texrs.papers.solid.limits import check_memory
-from texrs.papers.solid.literal import grow as grow_literally
-from texrs.papers.solid.patches import stitch
-from texrs.papers.solid.settings import Quality, Settings, settings_of
+from texrs.papers.solid.literal import grow_as_printed
+from texrs.papers.solid.request import Method, Request
+from texrs.papers.solid.settings import QUALITIES, Quality
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
 __all__ = ["solid", "synthesize"]
 
-Method: TypeAlias = Literal["paper"] | None
-Places: TypeAlias = NDArray[np.int32]
-
 
 def solid(
-    exemplar: Array,
+    exemplar: Array | Exemplar,
     size: int | Sequence[int],
     *,
     field: Field | None = None,
@@ -73,15 +69,9 @@ def solid(
     wrap: bool | Sequence[bool] = False,
     quality: Quality = "preserve",
     method: Method = None,
-    labels: bool | None = None,
-    repeat: bool | Sequence[bool] | None = None,
-    held: Array | None = None,
-    values: Array | None = None,
-    coordinates: Array | None = None,
-    guide: tuple[ArrayLike, ArrayLike] | None = None,
-    guide_weight: float = 1.0,
+    constraints: Constraints | None = None,
+    guide: Guide | None = None,
     interpolation: Interpolation | None = None,
-    analysis: Analysis | None = None,
     memory_limit: int | None = None,
     progress: Progress | None = None,
 ) -> Synthesis:
@@ -89,58 +79,48 @@ def solid(
 
     Parameters
     ----------
-    exemplar : (D, H, W) or (D, H, W, C) array
-        Any real dtype and channels; each side at least 16.
+    exemplar : (D, H, W) or (D, H, W, C) array, or Exemplar
+        Any real dtype and channels; each side at least 16. `texrs.Exemplar`, with ``axes=3``, says whether its values
+        are labels and along which axes it repeats, which are measured otherwise.
     size : int or (int, int, int)
         Planes, rows and columns of the result.
     field : Field, optional
-        How the texture is turned and scaled at each voxel (`texrs.fields`); none leaves it as it is.
+        How the texture is turned and scaled at each voxel (`texrs.fields`), with three axes; none leaves it as it is.
     seed : int
-        Chooses the texture.
-    wrap : bool or one an axis
-        Axes along which the result is to repeat.
+        Chooses the texture, 0 to 2^64 - 1; the same seed gives the same bytes.
+    wrap : bool or (bool, bool, bool)
+        Axes along which the result is to repeat: planes, rows, columns.
     quality : {"preserve", "fast", "optimise"}
-        "preserve" keeps what is rare. "fast" does a third of the work. "optimise" straightens lattices and walls; it is
-        checked on a trial, and "preserve" is done instead, and reported, where it would lose anything.
+        How much work is done. "preserve" keeps what is rare. "fast" does a third of the work. "optimise" straightens
+        lattices and walls; it is checked on a trial, and "preserve" is done instead, and reported, where it would
+        lose anything.
     method : {None, "paper"}
-        "paper": the literal algorithm, kept for comparison. It has no ``quality`` and holds no points; it looks the exemplar
-        up at the nearest sample unless ``interpolation`` says otherwise.
-    labels : bool, optional
-        Whether values are classes without an order, looked up at the nearest sample whatever ``interpolation`` says. None:
-        where the exemplar has one channel of integers or bool, with 2 to 16 values, such as a mask of 0 and 255.
-    repeat : bool, or one an axis, optional
-        Axes along which the exemplar repeats; None measures it.
-    held : (size) bool, optional
-        Voxels that are given: by ``values`` or by ``coordinates``.
-    values : (size[, C]) array, optional
-        What held voxels show, exactly, in the exemplar's dtype; other voxels are ignored.
-    coordinates : (size, 3) array, optional
-        Where held voxels look in the exemplar.
-    guide : (array_like, array_like), optional
-        Two maps of finite numbers that broadcast to the exemplar's axes and to ``size``: each voxel looks for a place where the
-        exemplar's map says about what the output's does. For exemplars with a trend, such as grains that grow downwards.
-    guide_weight : float
-        How much that counts beside looking like the exemplar, 0 to 100: at 1 a third of the range of the exemplar's map costs
-        as much as surroundings that have nothing to do with each other.
+        Which algorithm. "paper": the literal one, kept for comparison. It has no ``quality``, takes no constraints
+        and no guide, and looks the exemplar up at the nearest sample unless ``interpolation`` says otherwise.
+    constraints : Constraints, optional
+        Voxels that are given, by their values or by where they look in the exemplar (`texrs.Constraints`).
+    guide : Guide, optional
+        A map that the result is to follow, for exemplars with a trend, such as grains that grow downwards
+        (`texrs.Guide`).
     interpolation : {"nearest", "linear", "cubic"}, optional
-        Between the exemplar's samples; None is "nearest" for labels, else "cubic".
-    analysis : Analysis, optional
-        Of the same exemplar (`texrs.exemplar.analysis.analyse`); None makes it, or takes it from memory.
+        Between the exemplar's samples, in the last look-up. None is "cubic". Labels are looked up at the nearest
+        sample whatever it says.
     memory_limit : int, optional
         Bytes that the work may take; None is 8 GiB.
     progress : callable, optional
-        Called with the stage and the share of it that is done; raising stops the work.
+        Called as ``progress(stage, share)`` with the stage and the share of it that is done; raising stops the work.
 
     Returns
     -------
     Synthesis
-        The volume, its source map with the field, pictures of the middle plane at each level, and a report.
+        The volume, in the exemplar's dtype; its source map, whose frame is the field; as stages, pictures of the
+        middle plane at each level; and a report.
 
     Raises
     ------
     InvalidInput
-        An exemplar that is too small or not finite, a field of other axes or singular somewhere, held voxels without
-        what they hold, or an option out of its range.
+        An exemplar that is too small or not finite, a field of other axes or singular somewhere, constraints or maps
+        of other shapes, or an option out of its range.
     LimitExceeded
         The work would take more memory than allowed.
     Cancelled
@@ -166,12 +146,25 @@ def solid(
     ((40, 40, 40, 3), dtype('uint8'))
 
     """
-    options = locals() | {"axes": 3, "interpolation": interpolation or ("nearest" if method == "paper" else "cubic")}
-    return _verb(**options)
+    request = Request.check(
+        exemplar,
+        size,
+        axes=3,
+        field=field,
+        seed=seed,
+        wrap=wrap,
+        quality=quality,
+        method=method,
+        constraints=constraints,
+        guide=guide,
+        interpolation=interpolation,
+        memory_limit=memory_limit,
+    )
+    return grow_texture(request, progress)
 
 
 def synthesize(
-    exemplar: Array,
+    exemplar: Array | Exemplar,
     size: int | Sequence[int],
     *,
     field: Field | None = None,
@@ -179,15 +172,9 @@ def synthesize(
     wrap: bool | Sequence[bool] = False,
     quality: Quality = "preserve",
     method: Method = None,
-    labels: bool | None = None,
-    repeat: bool | Sequence[bool] | None = None,
-    held: Array | None = None,
-    values: Array | None = None,
-    coordinates: Array | None = None,
-    guide: tuple[ArrayLike, ArrayLike] | None = None,
-    guide_weight: float = 1.0,
+    constraints: Constraints | None = None,
+    guide: Guide | None = None,
     interpolation: Interpolation | None = None,
-    analysis: Analysis | None = None,
     memory_limit: int | None = None,
     progress: Progress | None = None,
 ) -> Synthesis:
@@ -195,26 +182,62 @@ def synthesize(
 
     Parameters
     ----------
-    exemplar : (H, W) or (H, W, C) array
-        Any real dtype and channels; each side at least 16.
+    exemplar : (H, W) or (H, W, C) array, or Exemplar
+        Any real dtype and channels; each side at least 16. `texrs.Exemplar` says whether its values are labels and
+        along which axes it repeats, which are measured otherwise.
     size : int or (int, int)
         Rows and columns of the result.
+    field : Field, optional
+        How the texture is turned and scaled at each pixel (`texrs.fields`), with two axes; none leaves it as it is.
+    seed : int
+        Chooses the texture, 0 to 2^64 - 1; the same seed gives the same bytes.
+    wrap : bool or (bool, bool)
+        Axes along which the result is to repeat: rows, columns.
+    quality : {"preserve", "fast", "optimise"}
+        How much work is done. "preserve" keeps what is rare. "fast" does a third of the work. "optimise" straightens
+        lattices and walls; it is checked on a trial, and "preserve" is done instead, and reported, where it would
+        lose anything.
+    method : {None, "paper"}
+        Which algorithm. "paper": the literal one, kept for comparison. It has no ``quality``, takes no constraints
+        and no guide, and looks the exemplar up at the nearest sample unless ``interpolation`` says otherwise.
+    constraints : Constraints, optional
+        Pixels that are given, by their values or by where they look in the exemplar (`texrs.Constraints`).
+    guide : Guide, optional
+        A map that the result is to follow, for exemplars with a trend, such as grains that grow downwards
+        (`texrs.Guide`).
     interpolation : {"nearest", "linear", "cubic"}, optional
-        Between the exemplar's samples; None is "nearest" for labels, else "cubic".
-    field, seed, wrap, quality, method, labels, repeat, analysis, memory_limit, progress
-        As of `solid`, with two axes for three.
-    held, values, coordinates, guide, guide_weight
-        Likewise.
+        Between the exemplar's samples, in the last look-up. None is "cubic". Labels are looked up at the nearest
+        sample whatever it says.
+    memory_limit : int, optional
+        Bytes that the work may take; None is 8 GiB.
+    progress : callable, optional
+        Called as ``progress(stage, share)`` with the stage and the share of it that is done; raising stops the work.
 
     Returns
     -------
     Synthesis
-        The picture, its source map with the field, the stages, and a report.
+        The picture, in the exemplar's dtype; its source map, whose frame is the field; pictures of the stages; and a
+        report.
 
     Raises
     ------
-    InvalidInput, LimitExceeded, Cancelled
-        As of `solid`.
+    InvalidInput
+        An exemplar that is too small or not finite, a field of other axes or singular somewhere, constraints or maps
+        of other shapes, or an option out of its range.
+    LimitExceeded
+        The work would take more memory than allowed.
+    Cancelled
+        The work was stopped.
+
+    See Also
+    --------
+    solid : The same in three dimensions.
+    texrs.PlaneTexture : Any window of an unbounded picture.
+
+    References
+    ----------
+    .. [1] Y.-L. Su, C.-C. Chang, Z.-C. Shih and W.-K. Tai, "Vector-field-based deformations for three-dimensional
+       texture synthesis".
 
     Examples
     --------
@@ -225,254 +248,109 @@ def synthesize(
     (96, 128, 3)
 
     """
-    options = locals() | {"axes": 2, "interpolation": interpolation or ("nearest" if method == "paper" else "cubic")}
-    return _verb(**options)
+    request = Request.check(
+        exemplar,
+        size,
+        axes=2,
+        field=field,
+        seed=seed,
+        wrap=wrap,
+        quality=quality,
+        method=method,
+        constraints=constraints,
+        guide=guide,
+        interpolation=interpolation,
+        memory_limit=memory_limit,
+    )
+    return grow_texture(request, progress)
 
 
-def _verb(
-    *,
-    exemplar: Array,
-    size: int | Sequence[int],
-    axes: int,
-    field: Field | None,
-    seed: int,
-    wrap: bool | Sequence[bool],
-    quality: Quality,
-    method: Method,
-    labels: bool | None,
-    repeat: bool | Sequence[bool] | None,
-    held: Array | None,
-    values: Array | None,
-    coordinates: Array | None,
-    guide: tuple[ArrayLike, ArrayLike] | None,
-    guide_weight: float,
-    interpolation: Interpolation,
-    analysis: Analysis | None,
-    memory_limit: int | None,
-    progress: Progress | None,
-) -> Synthesis:
-    image = as_image(exemplar, "exemplar", axes=axes, minimum=COARSEST)
-    region = Region.whole(as_size(size, axes=axes), as_wrap(wrap, axes=axes))
-    if method not in (None, "paper"):
-        raise InvalidInput(f"method: None or 'paper' is allowed, got {method!r}")
-    if quality == "optimise" and min(region.shape) < COARSEST:
-        quality = "preserve"  # What is so thin cannot be judged by a trial.
-    if method == "paper" and (held is not None or guide is not None):
-        what = "held" if held is not None else "guide"
-        raise InvalidInput(f"{what}: the paper's method knows none; leave out {what}, or method='paper'")
-    settings, seed = settings_of(quality), as_seed(seed)
-    if method == "paper":
-        settings = settings_of("preserve")  # Windows of 5^D.
-    checked = as_field(field, axes)
-    if checked is not None:
-        checked = checked.over(region.shape)
-    check_memory(image, region, checked, memory_limit)
-    hold = Hold.of(image, region.shape, held, values, coordinates).following(guide, guide_weight, region.shape)
-    if analysis is None:
-        analysis = analyse(image, axes=axes, wrap=repeat, labels=labels, radii=settings.radii)
-    elif not isinstance(analysis, Analysis):
-        raise InvalidInput(f"analysis: needs an Analysis, got {type(analysis).__name__}")
-    elif analysis.shape != image.shape[:axes]:
-        raise InvalidInput(f"analysis: is of an exemplar of {analysis.shape}, not {image.shape[:axes]}")
-    grower = Grower(image, analysis, checked, settings, seed)
-    trial = None
-    if method == "paper":
-        grown = Grown(*grow_literally(analysis, checked, seed, region, grower.picture, progress))
+def grow_texture(asked: Request, progress: Progress | None) -> Synthesis:
+    """Follow the paper: analyse the exemplar, grow coordinates from coarse to fine, and look the exemplar up through them."""
+    quality, trial = asked.quality, None
+    show = partial(show_places, asked.exemplar.pixels)
+    if asked.method == "paper":
+        grown = grow_as_printed(asked.exemplar, asked.field, asked.seed, asked.region, show, progress)
     else:
         if quality == "optimise":
-            grower, trial = gated(grower, region, labels, repeat, progress)
-        grown = grower.grow(region, hold, progress)
+            trial = try_optimise(asked, progress)
+            quality = "optimise" if trial.accepted else "preserve"
+        windows = analyse(asked, quality)
+        start = choose_start(asked, quality)
+        grown = windows.grow(asked.region, start=start, ask=asked.conditions.at, show=show, progress=progress)
     source = SourceMap(
-        (grown.places.reshape(*region.shape, axes) / np.float32(ONE)).astype(np.float32, copy=False),
-        np.zeros(region.shape, np.uint16),
-        np.zeros(region.shape, np.uint32),
-        checked,
-        (image.shape[:axes],),
+        as_coordinates(grown.places, asked.region),
+        np.zeros(asked.region.shape, np.uint16),
+        np.zeros(asked.region.shape, np.uint32),
+        asked.field,
+        (asked.exemplar.shape,),
     )
-    how: Interpolation = "nearest" if are_labels(image, labels) else interpolation
-    composite = source.render(exemplar, interpolation=how)
-    report = {
-        "method": method or "default",
-        "quality": None if method else quality if trial is None or trial.accepted else "preserve",
-        "trial": None if trial is None else trial.report(),
-        "seed": seed,
-        "field": None if checked is None else checked.describe(),
-        "repeats": list(analysis.wrap),
-        "interpolation": how,
-        "held": hold.count,
-        "guided": hold.followed is not None,
-        "levels": grown.report,
-    }
-    return Synthesis(hold.shown(composite), source, grown.stages | {"composite": composite}, report)
+    composite = source.render(asked.exemplar.image, interpolation=asked.interpolation)
+    last = {f"level {len(asked.exemplar.analyse().levels)}": show(grown.places, asked.region, 1)}
+    stages = {**grown.stages, **last, "composite": composite}
+    return Synthesis(asked.conditions.show(composite), source, stages, describe(asked, quality, trial, grown))
 
 
-def as_field(field: object, axes: int) -> Field | None:
-    """Check a field; the identity is none."""
-    if field is None:
+def analyse(asked: Request, quality: Quality) -> Windows:
+    """Step 1: the exemplar's pyramid of windows, and how much is done at each level."""
+    settings = QUALITIES[quality]
+    levels = asked.exemplar.analyse(settings.radii).levels
+    if len(levels) == 1:
+        settings = replace(settings, exhaustive=0)  # The coarsest level is the finest, too.
+    return Windows(levels, settings, asked.seed, asked.field)
+
+
+def choose_start(asked: Request, quality: Quality) -> Start | None:
+    """Step 2: start from stitched patches in pictures that nothing turns or guides; none is the patch-based initialisation."""
+    free = asked.field is None and asked.conditions.free
+    # Of what is thinner there is nothing to cut.
+    if quality != "preserve" or not free or asked.exemplar.axes != 2 or min(asked.region.shape) < COARSEST:
         return None
-    if not isinstance(field, Field):
-        raise InvalidInput(f"field: needs a field of texrs.fields, got {type(field).__name__}")
-    if field.axes != axes:
-        raise InvalidInput(f"field: needs {axes} axes, got one of {field.axes}")
-    still = field.constant is not None and np.array_equal(field.constant, np.eye(axes, dtype=np.float32))
-    return None if still else field
+    return from_patches(asked.exemplar.guidance, len(asked.exemplar.analyse().levels) - 1, asked.seed)
 
 
-def gated(
-    grower: Grower,
-    region: Region,
-    labels: bool | None,
-    repeat: bool | Sequence[bool] | None,
-    progress: Progress | None,
-) -> tuple[Grower, Trial]:
-    """Try "optimise" on a part of the output, and give the grower that serves: it, or "preserve"."""
-    part = trial_region(region, grower.image)
-    tried = grower.grow(part, Hold(grower.image), None if progress is None else lambda n, s: progress(f"trial: {n}", s))
-    axes = len(part.shape)
-    coordinates = (tried.places.reshape(*part.shape, axes) / np.float32(ONE)).astype(np.float32, copy=False)
-    trial = Trial.of(grower.image, coordinates, grower.field)
-    if trial.accepted:
-        return grower, trial
-    settings = settings_of("preserve")
-    analysis = analyse(grower.image, axes=axes, wrap=repeat, labels=labels, radii=settings.radii)
-    return Grower(grower.image, analysis, grower.field, settings, grower.seed), trial
+def try_optimise(asked: Request, progress: Progress | None) -> Trial:
+    """Grow the middle of the output by "optimise", and judge it."""
+    part = trial_region(asked.region, asked.exemplar.pixels)
+    told = None if progress is None else lambda name, share: progress(f"trial: {name}", share)
+    tried = analyse(asked, "optimise").grow(part, progress=told)
+    return Trial.of(asked.exemplar.pixels, as_coordinates(tried.places, part), asked.field)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Grown:
-    """Places of a region, what was done at each level, and pictures of it."""
-
-    places: Places
-    report: list[dict[str, Any]]
-    stages: dict[str, Array]
+def as_coordinates(places: Places, region: Region) -> Array:
+    """Return places in fixed point as coordinates (..., A) float32."""
+    shape = (*region.shape, len(region.shape))
+    return (places.reshape(shape) / np.float32(ONE)).astype(np.float32, copy=False)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Grower:
-    """Grows regions from an analysed exemplar: steps 2 to 4."""
+def show_places(image: Array, places: Places, region: Region, spacing: int) -> Array:
+    """Return a picture of places: all of a picture, the middle plane of a volume, through the exemplar itself."""
+    axes = len(region.shape)
+    shown = places.reshape(*region.shape, axes)
+    if axes == 3:
+        shown = shown[region.shape[0] // 2]
+    fine = (np.rint(shown / np.float32(ONE)) + 0.5) * spacing - 0.5
+    at = tuple(np.clip(np.rint(fine[..., a]).astype(np.intp), 0, image.shape[a] - 1) for a in range(axes))
+    return image[at]
 
-    image: Array
-    analysis: Analysis
-    field: Field | None
-    settings: Settings
-    seed: int
 
-    def grow(self, region: Region, hold: Hold, progress: Progress | None = None) -> Grown:
-        """Grow a bounded region, whose borders are free."""
-        regions = [region]
-        for _ in self.analysis.levels[1:]:
-            regions.insert(0, regions[0].parents())
-        places: Places | None = None
-        report: list[dict[str, Any]] = []
-        stages: dict[str, Array] = {}
-        first = 0
-        if self.stitches(region, hold):
-            first = len(regions) - 1
-            places = stitch(self.image, region, self.seed, stage(progress, "patches"))
-            stages["patches"] = self.picture(places, region, first)
-        for level, here in enumerate(regions[first:], start=first):
-            frames = self.frames(level, here)
-            if level == first and places is not None:
-                pass
-            elif places is None:
-                places = self.start(here, frames, hold, progress)
-                stages["blocks"] = self.picture(places, here, level)
-            else:
-                places = upsample(places, regions[level - 1], here, frames)
-            places, passes, changed = self.correct(places, level, here, frames, hold, progress)
-            stages[f"level {level + 1}"] = self.picture(places, here, level)
-            report.append(
-                {
-                    "shape": list(here.shape),
-                    "spacing": round(self.analysis.levels[level].spacing, 6),
-                    "passes": passes,
-                    "changed": round(changed, 6),
-                }
-            )
-        assert places is not None  # there is at least one level
-        return Grown(places, report, stages)
-
-    def stitches(self, region: Region, hold: Hold) -> bool:
-        """Return whether to start from patches stitched along minimum cuts: in pictures that nothing turns or guides."""
-        free = self.field is None and not hold.count and hold.followed is None
-        # Of what is thinner there is nothing to cut.
-        return self.settings.stitch and free and len(region.shape) == 2 and min(region.shape) >= COARSEST
-
-    def spacing(self, level: int) -> int:
-        """Voxels from one point of a level to the next."""
-        return 1 << (len(self.analysis.levels) - 1 - level)
-
-    def frames(self, level: int, region: Region) -> NDArray[np.int16]:
-        """Jacobians at the points of a level, of their places in the world: averages of turned frames would shrink."""
-        return to_fixed(self.field, region, self.spacing(level))
-
-    def start(
-        self,
-        region: Region,
-        frames: NDArray[np.int16],
-        hold: Hold,
-        progress: Progress | None = None,
-        *,
-        margin: int = 0,
-    ) -> Places:
-        """Step 2: coherent blocks; a margin will be cut off."""
-        s, coarsest = self.settings, self.analysis.levels[0]
-        places = coarsest.blocks(
-            region,
-            frames,
-            cell=s.cell,
-            rounds=s.rounds,
-            candidates=s.candidates,
-            contrast=s.contrast,
-            continuation=s.continuation,
-            repetition=s.repetition,
-            seed=self.seed,
-            margin=margin,
-            guide=hold.guide(coarsest, region, self.spacing(0)),
-            progress=stage(progress, "blocks"),
-        )
-        return hold.place(places, region, self.spacing(0))
-
-    def correct(
-        self,
-        places: Places,
-        level: int,
-        region: Region,
-        frames: NDArray[np.int16],
-        hold: Hold,
-        progress: Progress | None = None,
-        *,
-        first: int = 0,
-        passes: int | None = None,
-    ) -> Corrected:
-        """Step 4: windows, matches, votes."""
-        here = self.analysis.levels[level]
-        step = self.settings.at(level, len(self.analysis.levels))
-        return here.correct(
-            hold.place(places, region, self.spacing(level)),
-            region,
-            frames,
-            passes=step.passes if passes is None else passes,
-            first=first,
-            exhaustive=step.exhaustive,
-            reach=step.reach,
-            hysteresis=self.settings.hysteresis,
-            unity=self.settings.unity,
-            vote=min(step.vote, here.radius),
-            settled=self.settings.settled,
-            # The noise of a level is its own.
-            seed=(self.seed + 0x9E3779B97F4A7C15 * (level + 1)) % (1 << 64),
-            held=hold.fixed(region, self.spacing(level)),
-            guide=hold.guide(here, region, self.spacing(level)),
-            progress=stage(progress, f"level {level + 1} of {len(self.analysis.levels)}"),
-        )
-
-    def picture(self, places: Places, region: Region, level: int) -> Array:
-        """Show places of a level: all of a picture, the middle plane of a volume, through the exemplar itself."""
-        axes = len(region.shape)
-        shown = places.reshape(*region.shape, axes)
-        if axes == 3:
-            shown = shown[region.shape[0] // 2]
-        fine = (np.rint(shown / np.float32(ONE)) + 0.5) * self.spacing(level) - 0.5
-        at = tuple(np.clip(np.rint(fine[..., a]).astype(np.intp), 0, self.image.shape[a] - 1) for a in range(axes))
-        return self.image[at]
+def describe(asked: Request, quality: Quality, trial: Trial | None, grown: Grown) -> dict[str, Any]:
+    """Return the report: JSON types."""
+    if asked.method == "paper":
+        levels = [{"shape": list(done.shape), "passes": done.passes} for done in grown.levels]
+    else:
+        known = asked.exemplar.analyse(QUALITIES[quality].radii).levels[-len(grown.levels) :]
+        spacing = ({"spacing": round(here.spacing, 6)} for here in known)
+        levels = [{"shape": None, **own, **done.report()} for own, done in zip(spacing, grown.levels, strict=True)]
+    return {
+        "method": asked.method or "default",
+        "quality": None if asked.method else quality,
+        "trial": None if trial is None else trial.report(),
+        "seed": asked.seed,
+        "field": None if asked.field is None else asked.field.describe(),
+        "repeats": list(asked.exemplar.repeat),
+        "interpolation": asked.interpolation,
+        "held": asked.conditions.count,
+        "guided": asked.conditions.maps is not None,
+        "levels": levels,
+    }

@@ -10,15 +10,18 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_image, as_int, as_seed, as_size
+from texrs._arrays import as_int, as_seed, as_size
 from texrs._engine.pyramid import ONE, Region
 from texrs._typing import Array, Interpolation, Progress
 from texrs.errors import InvalidInput
-from texrs.exemplar.analysis import COARSEST, Analysis, analyse, are_labels
+from texrs.exemplar import Exemplar, as_exemplar
+from texrs.exemplar.analysis import COARSEST
 from texrs.fields import Field
+from texrs.growth import Windows
+from texrs.growth.engine import Places
 from texrs.kernels.gather import gather
-from texrs.papers.solid import Grower, Places, as_field
 from texrs.papers.solid.limits import check_memory
+from texrs.papers.solid.request import as_field, as_interpolation
 from texrs.papers.solid.settings import ON_DEMAND
 from texrs.papers.solid.world import World
 from texrs.source_map import SourceMap
@@ -39,48 +42,35 @@ class _Texture:
     """What pictures and volumes without borders have in common."""
 
     axes: ClassVar[int]
-    _smooth: ClassVar[Interpolation]
 
     def __init__(
         self,
-        exemplar: Array,
+        exemplar: Array | Exemplar,
         *,
         field: Field | None = None,
         seed: int = 0,
-        labels: bool | None = None,
-        repeat: bool | Sequence[bool] | None = None,
         interpolation: Interpolation | None = None,
-        analysis: Analysis | None = None,
         cache_bytes: int = 256 << 20,
         memory_limit: int | None = None,
     ) -> None:
-        image = as_image(exemplar, "exemplar", axes=self.axes, minimum=COARSEST)
-        if interpolation not in (None, "nearest", "linear", "cubic"):
-            raise InvalidInput(f"interpolation: allowed are nearest, linear, cubic or None; got {interpolation!r}")
+        known = as_exemplar(exemplar, axes=self.axes, minimum=COARSEST)
+        self._exemplar, self._how = known, as_interpolation(interpolation, known, "cubic")
         self._field, self._seed = as_field(field, self.axes), as_seed(seed)
         limit = as_int(cache_bytes, "cache_bytes", 0, 1 << 48)
-        check_memory(image, Region.whole((1,) * self.axes), self._field, memory_limit)
-        if analysis is None:
-            analysis = analyse(image, axes=self.axes, wrap=repeat, labels=labels, radii=ON_DEMAND.radii)
-        elif not isinstance(analysis, Analysis):
-            raise InvalidInput(f"analysis: needs one of texrs.exemplar.analysis, got {type(analysis).__name__}")
-        elif analysis.shape != image.shape[: self.axes]:
-            raise InvalidInput(f"analysis: is of an exemplar of {analysis.shape}, not {image.shape[: self.axes]}")
-        self._image = image if np.ndim(exemplar) > self.axes else image[..., 0]
-        self._how: Interpolation = "nearest" if are_labels(image, labels) else interpolation or self._smooth
+        check_memory(known.pixels, Region.whole((1,) * self.axes), self._field, memory_limit)
         self._memory_limit = memory_limit
-        self._analysis = analysis
-        self._world = World(Grower(image, analysis, self._field, ON_DEMAND, self._seed), limit)
+        levels = known.analyse(ON_DEMAND.radii).levels
+        self._world = World(Windows(levels, ON_DEMAND, self._seed, self._field), limit)
+
+    @property
+    def exemplar(self) -> Exemplar:
+        """What it is made from, and what is known of that."""
+        return self._exemplar
 
     @property
     def field(self) -> Field | None:
         """The field; none where it leaves everything in place."""
         return self._field
-
-    @property
-    def analysis(self) -> Analysis:
-        """What is known of the exemplar."""
-        return self._analysis
 
     @property
     def cached(self) -> int:
@@ -93,7 +83,7 @@ class _Texture:
 
     def __repr__(self) -> str:
         """Say what the texture is."""
-        shape = " x ".join(map(str, self._analysis.shape))
+        shape = " x ".join(map(str, self._exemplar.shape))
         how = "" if self._field is None else f", {self._field.describe()}"
         return f"<unbounded texture from {shape}, seed {self._seed}{how}>"
 
@@ -145,7 +135,7 @@ class _Texture:
             np.zeros(region.shape, np.uint16),
             np.zeros(region.shape, np.uint32),
             field,
-            (self._analysis.shape,),
+            (self._exemplar.shape,),
         )
         image = self._show(places)
         report = {
@@ -153,7 +143,7 @@ class _Texture:
             "seed": self._seed,
             "origin": list(start),
             "field": None if self._field is None else self._field.describe(),
-            "repeats": list(self._analysis.wrap),
+            "repeats": list(self._exemplar.repeat),
             "interpolation": self._how,
         }
         return Synthesis(image, source, {"composite": image}, report)
@@ -195,17 +185,18 @@ class _Texture:
         return Region(as_size(tuple(shape), axes=self.axes), tuple(origin), (False,) * self.axes), single
 
     def _check(self, region: Region) -> None:
-        check_memory(self._image.reshape(*self._analysis.shape, -1), region, self._field, self._memory_limit)
+        check_memory(self._exemplar.pixels, region, self._field, self._memory_limit)
 
     def _show(self, places: Places) -> Array:
         """Look the exemplar up, a band of points at a time."""
-        channels = self._image.shape[self.axes :]
-        out = np.empty((*places.shape[:-1], *channels), self._image.dtype)
+        image = self._exemplar.image
+        channels = image.shape[self.axes :]
+        out = np.empty((*places.shape[:-1], *channels), image.dtype)
         flat, shown = places.reshape(-1, self.axes), out.reshape(-1, *channels)
         for start in range(0, len(flat), _BAND):
             part = slice(start, start + _BAND)
             at = flat[part] / np.float32(ONE)
-            shown[part] = gather(self._image, at.astype(np.float32, copy=False), interpolation=self._how)
+            shown[part] = gather(image, at.astype(np.float32, copy=False), interpolation=self._how)
         return out
 
 
@@ -217,17 +208,18 @@ class PlaneTexture(_Texture):
 
     Parameters
     ----------
-    exemplar : (H, W) or (H, W, C) array
-        Any real dtype and channels; each side at least 16.
+    exemplar : (H, W) or (H, W, C) array, or Exemplar
+        Any real dtype and channels; each side at least 16. `texrs.Exemplar` says whether its values are labels and
+        along which axes it repeats, which are measured otherwise.
     field : Field, optional
-        How the texture is turned and scaled at each point of the world (`texrs.fields`), as it stands: a centre or a
-        length that was left open is that of the unbounded field.
+        How the texture is turned and scaled at each point of the world (`texrs.fields`), with two axes, as it stands:
+        a centre or a length that was left open is that of the unbounded field. None leaves it as it is.
     seed : int
-        Chooses the texture.
-    labels, repeat, interpolation, analysis
-        As of `texrs.synthesize`.
+        Chooses the texture, 0 to 2^64 - 1; the same seed gives the same bytes.
+    interpolation : {"nearest", "linear", "cubic"}, optional
+        Between the exemplar's samples. None is "cubic". Labels are looked up at the nearest sample whatever it says.
     cache_bytes : int
-        Of finished places that are kept.
+        Memory for finished parts, 0 or more: a neighbour of what has been seen is then cheap.
     memory_limit : int, optional
         Bytes that one window may take; None is 8 GiB.
 
@@ -235,6 +227,8 @@ class PlaneTexture(_Texture):
     ------
     InvalidInput
         An exemplar that is too small or not finite, a field of other axes, or an option out of its range.
+    LimitExceeded
+        The exemplar alone would take more memory than allowed.
 
     Examples
     --------
@@ -248,7 +242,6 @@ class PlaneTexture(_Texture):
     """
 
     axes = 2
-    _smooth = "cubic"
 
 
 class SolidTexture(_Texture):
@@ -259,15 +252,27 @@ class SolidTexture(_Texture):
 
     Parameters
     ----------
-    exemplar : (D, H, W) or (D, H, W, C) array
-        Any real dtype and channels; each side at least 16.
-    field, seed, labels, repeat, interpolation, analysis, cache_bytes, memory_limit
-        As of `PlaneTexture`, with three axes for two.
+    exemplar : (D, H, W) or (D, H, W, C) array, or Exemplar
+        Any real dtype and channels; each side at least 16. `texrs.Exemplar`, with ``axes=3``, says whether its values
+        are labels and along which axes it repeats, which are measured otherwise.
+    field : Field, optional
+        How the texture is turned and scaled at each point of the world (`texrs.fields`), with three axes, as it
+        stands: a centre or a length that was left open is that of the unbounded field. None leaves it as it is.
+    seed : int
+        Chooses the texture, 0 to 2^64 - 1; the same seed gives the same bytes.
+    interpolation : {"nearest", "linear", "cubic"}, optional
+        Between the exemplar's samples. None is "cubic". Labels are looked up at the nearest sample whatever it says.
+    cache_bytes : int
+        Memory for finished parts, 0 or more: a neighbour of what has been seen is then cheap.
+    memory_limit : int, optional
+        Bytes that one window may take; None is 8 GiB.
 
     Raises
     ------
     InvalidInput
-        As of `PlaneTexture`.
+        An exemplar that is too small or not finite, a field of other axes, or an option out of its range.
+    LimitExceeded
+        The exemplar alone would take more memory than allowed.
 
     Examples
     --------
@@ -281,7 +286,6 @@ class SolidTexture(_Texture):
     """
 
     axes = 3
-    _smooth = "cubic"
 
     def slice(
         self,
@@ -302,13 +306,13 @@ class SolidTexture(_Texture):
         point : sequence of 3 float
             (plane, row, column) of the picture's middle, in voxels of the world.
         normal : sequence of 3 float, optional
-            Direction that the cut is across, as of `texrs.volume.oblique`.
+            Direction that the cut is across, (plane, row, column), of any length.
         axes : (2, 3) array_like, optional
             Instead of ``normal``: the steps of the picture's rows and of its columns, in voxels.
         size : int or (rows, columns)
             Of the picture.
         progress : callable, optional
-            As of `window`.
+            Called with the stage and the share of it that is done; raising stops the work.
 
         Returns
         -------
@@ -339,7 +343,8 @@ class SolidTexture(_Texture):
         reach = np.abs(middle) + np.abs(steps).T @ np.array(sides)
         if reach.max() >= FAR:
             raise InvalidInput(f"point, axes, size: the slice must lie within {FAR} of the origin")
-        out = np.empty((*sides, *self._image.shape[3:]), self._image.dtype)
+        image = self._exemplar.image
+        out = np.empty((*sides, *image.shape[3:]), image.dtype)
         for top in range(0, sides[0], TILE):
             for left in range(0, sides[1], TILE):
                 rows, columns = (
@@ -347,7 +352,7 @@ class SolidTexture(_Texture):
                 )
                 at = middle + rows[:, np.newaxis, np.newaxis] * steps[0] + columns[:, np.newaxis] * steps[1]
                 places = self._between(at.reshape(-1, 3), progress)
-                shown = gather(self._image, places, interpolation=self._how)
+                shown = gather(image, places, interpolation=self._how)
                 out[top : top + TILE, left : left + TILE] = shown.reshape(len(rows), len(columns), *out.shape[2:])
         return out
 

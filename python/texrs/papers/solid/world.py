@@ -4,12 +4,13 @@ What a point becomes hangs only on what is near it, so a texture without borders
 work is a chain of stages: the blocks, then one pass of the correction after the other, each on the lattice of its
 level. A box of a stage is made from a box of the stage before that is larger by what one point can see, its reach:
 
-    blocks      2 e + rounds (2 e + 1), where e is the farthest that a point lies from the centre of its cell
-    pass        vote + max(n, w), where n is how far the neighbours are that propose, and w = max_i [ r sum_j |F_ij| + 1/2 ]
+    blocks      2 e + rounds (2 e + 1), where e is the farthest that a point lies from the centre of its cell pass
+    vote + max(n, w), where n is how far the neighbours are that propose, and w = max_i [ r sum_j |F_ij| + 1/2 ]
                 how far a window of radius r looks along an axis of the output, over all frames F in sight
 
-Places within the reach of a box's border are wrong and are cut off; those that are left are the same in whatever box they
-were made. Finished parts of every stage are kept in a bounded memory, so that a neighbour of what has been seen is cheap.
+Places within the reach of a box's border are wrong and are cut off; those that are left are the same in whatever box
+they were made. Finished parts of every stage are kept in a bounded memory, so that a neighbour of what has been seen
+is cheap.
 """
 
 from __future__ import annotations
@@ -26,9 +27,9 @@ from numpy.typing import NDArray
 from texrs._cache import Cache
 from texrs._engine.pyramid import ONE, Region, upsample
 from texrs._typing import Bools, Progress
-from texrs.papers.solid import Grower, Places
-from texrs.papers.solid.constraints import Hold
-from texrs.papers.solid.settings import Step
+from texrs.growth import Windows
+from texrs.growth.constraints import NOTHING
+from texrs.growth.engine import Places
 
 __all__ = ["World", "blocks_reach", "window_reach"]
 
@@ -77,38 +78,35 @@ class _Stage:
 class World:
     """The places of an endless texture, stage by stage."""
 
-    def __init__(self, grower: Grower, cache_bytes: int) -> None:
-        self.grower = grower
-        self.axes = len(grower.analysis.shape)
-        levels = range(len(grower.analysis.levels))
+    def __init__(self, windows: Windows, cache_bytes: int) -> None:
+        self.windows = windows
+        self.axes = len(windows.levels[-1].shape)
         small, large = _SIDES[self.axes]
-        chain = [(0, -1)] + [(v, i) for v in levels for i in range(self._step(v).passes)]
+        chain = [(0, -1)] + [(v, i) for v in range(len(windows.levels)) for i in range(windows.step(v).passes)]
         self.stages = [_Stage(*s, large if s == chain[-1] else small) for s in chain]
         # The stages before the last are small and dear: the last one must not crowd them out.
         self._kept: tuple[Cache[Key, Places], ...] = tuple(
             Cache(cache_bytes // 2, lambda p: p.nbytes) for _ in range(2)
         )
-        self._hold = Hold(grower.image)
-
-    def _step(self, level: int) -> Step:
-        return self.grower.settings.at(level, len(self.grower.analysis.levels))
 
     @property
     def cached(self) -> int:
+        """Bytes of finished places that are kept."""
         return sum(kept.used for kept in self._kept)
 
     def clear(self) -> None:
+        """Forget what is kept."""
         for kept in self._kept:
             kept.clear()
 
     def reach(self, stage: int, window: int) -> int:
         """Return how many points away a stage can see in the one before; windows look so far."""
         if stage == 0:
-            settings = self.grower.settings
+            settings = self.windows.settings
             return blocks_reach(settings.cell, settings.rounds, settings.repetition)
         here = self.stages[stage]
-        step = self._step(here.level)
-        radius = self.grower.analysis.levels[here.level].radius
+        step = self.windows.step(here.level)
+        radius = self.windows.levels[here.level].radius
         return min(step.vote, radius) + max(step.reach, window)
 
     def read(self, box: Region, progress: Progress | None = None, stage: int = -1) -> Places:
@@ -157,7 +155,7 @@ class World:
             if (places := kept.get((stage, *index))) is not None:
                 missing[tuple(at)] = False
                 yield self._box(index, (1,) * self.axes, side), places
-        radius = self.grower.analysis.levels[self.stages[stage].level].radius
+        radius = self.windows.levels[self.stages[stage].level].radius
         boxes = list(_boxes(missing, side, self.reach(stage, radius)))
         if len(boxes) > 1 and self.stages[stage].level:
             # What the coarsest level sees beyond each box is larger than the box.
@@ -175,11 +173,11 @@ class World:
 
     def make(self, box: Region, stage: int, progress: Progress | None = None) -> Places:
         """Grow a box of a stage from the one before."""
-        here, grower = self.stages[stage], self.grower
+        here, windows = self.stages[stage], self.windows
         if stage == 0:
             margin = self.reach(0, 0)
             region = box.grown(margin)
-            places = grower.start(region, grower.frames(0, region), self._hold, progress, margin=margin)
+            places = windows.initialise(region, windows.frames(0, region), NOTHING, progress, margin=margin)
         else:
             region, frames = self._seen(box, stage)
             if here.level and here.number == 0:
@@ -188,8 +186,8 @@ class World:
                 places = upsample(below, parents, region, frames)
             else:
                 places = self.read(region, progress, stage - 1).reshape(-1)
-            places = grower.correct(
-                places, here.level, region, frames, self._hold, progress, first=here.number, passes=1
+            places = windows.correct(
+                places, here.level, region, frames, NOTHING, progress, first=here.number, passes=1
             ).places
         return places.reshape(*region.shape, self.axes)[box.inside(region)]
 
@@ -199,11 +197,11 @@ class World:
         How far one must look hangs on the frames in sight, so the region grows until it holds what they ask for.
         """
         level = self.stages[stage].level
-        radius = self.grower.analysis.levels[level].radius
-        window = radius if self.grower.field is None else int(radius * self.axes**0.5 + 0.5)
+        radius = self.windows.levels[level].radius
+        window = radius if self.windows.field is None else int(radius * self.axes**0.5 + 0.5)
         while True:
             region = box.grown(self.reach(stage, window))
-            frames = self.grower.frames(level, region)
+            frames = self.windows.frames(level, region)
             needed = window_reach(frames, radius)
             if needed <= window:
                 return region, frames
@@ -216,7 +214,7 @@ class World:
         region = self._box((first + np.array(low)).tolist(), (last - first).tolist(), self.stages[stage].side)
         while self.stages[stage].level:
             here = self.stages[stage]
-            region = region.grown(self.reach(stage, self.grower.analysis.levels[here.level].radius))
+            region = region.grown(self.reach(stage, self.windows.levels[here.level].radius))
             if here.number == 0:
                 region = region.parents()
             stage -= 1

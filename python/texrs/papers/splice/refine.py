@@ -12,12 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_image, guidance
+from texrs._engine.appearance import Corrected
 from texrs._engine.coherence import correct, jitter
-from texrs._engine.pyramid import ONE, Region, upsample
+from texrs._engine.pyramid import ONE, Region, to_fixed
 from texrs._progress import stage
 from texrs._typing import Bools, Progress
+from texrs.exemplar import Exemplar
+from texrs.exemplar.analysis import COARSEST
 from texrs.exemplar.patches import mark_corners
-from texrs.exemplar.analysis import COARSEST, Analysis, analyse, similarity
+from texrs.growth import from_draft, grow
+from texrs.growth.constraints import Asked
 from texrs.kernels.complete import complete
 from texrs.kernels.patch_search import PatchIndex
 
@@ -28,8 +32,8 @@ Kinds = NDArray[np.uint8]
 
 BITS = ONE.bit_length() - 1
 """Of places, after the point."""
-JITTER = 2.0
-"""Pixels that places of what is not rigid are displaced by before they are corrected."""
+JITTER = 1.0
+"""Samples of a level that places of what is not rigid are displaced by before they are corrected."""
 PASSES = 2
 WIDE = 1.0
 """A hole wider than so many spacings is filled with patches; less is grown over from its rim."""
@@ -103,7 +107,7 @@ def fill(image: NDArray[np.generic], draft: Draft, scale: float, seed: int, prog
 def _patches(
     image: NDArray[np.generic], draft: Draft, ground: Bools, scale: float, seed: int, progress: Progress | None
 ) -> Draft | None:
-    """Fill the holes with patches of the ground alone, or give nothing where it has no place for a patch."""
+    """Return the draft with its holes filled by patches of the ground alone; none where it has no place for a patch."""
     guide = guidance(as_image(image))
     for side in range(int(np.clip(scale / 2, 6, 24)), 3, -1):
         allowed = mark_corners(ground, side)
@@ -128,23 +132,16 @@ def _patches(
     return replace(draft, places=places, known=np.ones_like(new), mirrored=draft.mirrored & draft.known[..., None])
 
 
-def analysed(image: NDArray[np.generic], wrap: tuple[bool, bool]) -> Analysis:
-    """Analyse the texture at the two resolutions of the refinement."""
-    least = max(COARSEST, min(image.shape[:2]) // 2 - 1)
-    return analyse(image, axes=2, wrap=wrap, labels=False, coarsest=least)
-
-
 def refined_places(
     image: NDArray[np.generic],
     wrap: tuple[bool, bool],
     draft: Draft,
     seed: int,
     progress: Progress | None,
-    *,
-    reach: float = JITTER,
-    passes: int = PASSES,
 ) -> Places:
-    """Correct the places of what may change, first at half the resolution, then at the full one.
+    """Return corrected places of what may change: at half the resolution first, then at the full one.
+
+    The engine of `texrs.growth` starts from the draft, and its corrector is `Refinement`.
 
     Returns
     -------
@@ -152,23 +149,18 @@ def refined_places(
         Pixels of the texture.
 
     """
-    analysis = analysed(image, wrap)
-    levels = analysis.levels[-2:]
-    size = draft.fixed.shape
-    fine = Region.whole(size)
-    places = draft.places.astype(np.int32, copy=False) << BITS
-    if len(levels) == 2:
-        coarse = fine.parents()
-        pick = tuple(slice(None, None, 2) for _ in size)
-        # The coarse sample that lies between this pixel and the next, at (S + 1/2) / 2 - 1/2.
-        half = (places[pick] - ONE // 2) >> 1
-        kinds = _halved(draft.kinds)
-        half = _corrected(analysis, 0, half, coarse, sampled(draft, pick, kinds), reach / 2, passes, seed, progress)
-        grown = upsample(half.reshape(-1), coarse, fine, frames(draft.mirrored)).reshape(*size, 2)
-        places = np.where(draft.fixed[..., None], places, grown)
-    found = _corrected(analysis, 1, places, fine, draft, reach / 2, passes, seed, progress)
+    refinement = Refinement.of(image, wrap, draft, seed)
+    grown = grow(
+        Region.whole(draft.fixed.shape),
+        refinement.levels,
+        from_draft(0, refinement.begin),
+        refinement.correct,
+        refinement.frames,
+        ask=refinement.at,
+        progress=progress,
+    )
     # Of whole numbers a shift, which rounds down as well, takes a tenth of the time of a division.
-    result = (found + ONE // 2) >> BITS
+    result = (grown.places.reshape(draft.places.shape) + ONE // 2) >> BITS
     for axis, n in enumerate(image.shape[:2]):
         along = result[..., axis]
         along[...] = along % n if wrap[axis] else along.clip(0, n - 1)
@@ -176,58 +168,96 @@ def refined_places(
     return result
 
 
-def _halved(kinds: Kinds) -> Kinds:
+@dataclass(frozen=True, slots=True, eq=False)
+class Refinement:
+    """What the engine does for a draft: pixels that are not rigid are jittered, and choose among similar ones of their kind.
+
+    Attributes
+    ----------
+    exemplar : Exemplar
+        The texture.
+    draft : Draft
+        The picture.
+    seed : int
+        Of the jitter.
+    coarsest : int
+        Least side of the texture at half its resolution.
+    levels : int
+        Two, or one where the texture is too small to be halved.
+
+    """
+
+    exemplar: Exemplar
+    draft: Draft
+    seed: int
+    coarsest: int
+    levels: int
+
+    @classmethod
+    def of(cls, image: NDArray[np.generic], wrap: tuple[bool, bool], draft: Draft, seed: int) -> Refinement:
+        """Analyse the texture at the resolutions of the refinement."""
+        exemplar = Exemplar(image, labels=False, repeat=wrap)
+        coarsest = max(COARSEST, min(exemplar.shape) // 2 - 1)
+        count = len(exemplar.analyse(coarsest=coarsest).levels)
+        return cls(exemplar, draft, seed, coarsest, count)
+
+    def begin(self, region: Region) -> Places:
+        """Return the draft at the first level."""
+        places = self.draft.places.astype(np.int32, copy=False) << BITS
+        if self.levels == 1:
+            return places.reshape(-1)
+        # The coarse sample that lies between this pixel and the next, at (S + 1/2) / 2 - 1/2.
+        return np.ascontiguousarray((places[::2, ::2] - ONE // 2) >> 1).reshape(-1)
+
+    def frames(self, region: Region, spacing: int) -> NDArray[np.int16]:
+        """Return the Jacobian of each pixel: 1 or -1 along each axis."""
+        mirrored = self.draft.mirrored[::spacing, ::spacing]
+        if not mirrored.any():
+            return to_fixed(None, region)
+        out = np.zeros((region.points, 2, 2), np.int16)
+        for axis in range(2):
+            out[:, axis, axis] = np.where(mirrored[..., axis].ravel(), -ONE, ONE)
+        return out
+
+    def at(self, level: int, region: Region, spacing: int) -> Asked:
+        """Return what is rigid; at the first level it has its places already."""
+        held = self.draft.fixed[::spacing, ::spacing].ravel()
+        return Asked(held=held, given=None if level == 0 else (self.draft.places << BITS).reshape(-1))
+
+    def correct(
+        self,
+        places: Places,
+        level: int,
+        region: Region,
+        frames: NDArray[np.int16],
+        asked: Asked,
+        progress: Progress | None,
+    ) -> Corrected:
+        """One level: jitter what is not rigid, then choose among similar samples of the right kind."""
+        here = self.exemplar.analyse(coarsest=self.coarsest).levels[level]
+        apart = max(3, 2 * int(APART * min(here.shape)) + 1)
+        sets = self.exemplar.similarity(level, coarsest=self.coarsest, k=K, n=apart)
+        spacing = 1 << (self.levels - 1 - level)
+        kinds, wanted = self.draft.kinds, self.draft.wanted[::spacing, ::spacing]
+        still = asked.held | (wanted.ravel() == 1) if asked.held is not None else None
+        number = level + 2 - self.levels
+        found = correct(
+            here,
+            sets,
+            jitter(places, region, JITTER, seed=self.seed, level=number, held=still),
+            region,
+            frames,
+            passes=PASSES,
+            held=asked.held,
+            kinds=(kinds if spacing == 1 else _halve_kinds(kinds), wanted),
+            progress=stage(progress, f"refine {number + 1} of 2"),
+        )
+        return Corrected(found, PASSES, 0.0)
+
+
+def _halve_kinds(kinds: Kinds) -> Kinds:
     """Return the kinds of the coarser texture: ground where all that it is made from is."""
     rows, columns = (n // 2 * 2 for n in kinds.shape)
     four = kinds[:rows, :columns].reshape(rows // 2, 2, columns // 2, 2)
     found: Kinds = four.max(axis=(1, 3))
     return found
-
-
-def sampled(draft: Draft, pick: tuple[slice, ...], kinds: Kinds) -> Draft:
-    """Return what is asked of every other pixel."""
-    return Draft(
-        draft.places[pick], draft.known[pick], draft.fixed[pick], kinds, draft.wanted[pick], draft.mirrored[pick]
-    )
-
-
-def frames(mirrored: Bools) -> NDArray[np.int16]:
-    """Return the Jacobian of each pixel: 1 or -1 along each axis."""
-    if not mirrored.any():
-        return np.asarray(np.eye(2)[None] * ONE, np.int16)
-    out = np.zeros((mirrored.shape[0] * mirrored.shape[1], 2, 2), np.int16)
-    for axis in range(2):
-        out[:, axis, axis] = np.where(mirrored[..., axis].ravel(), -ONE, ONE)
-    return out
-
-
-def _corrected(
-    analysis: Analysis,
-    level: int,
-    places: Places,
-    region: Region,
-    draft: Draft,
-    reach: float,
-    passes: int,
-    seed: int,
-    progress: Progress | None,
-) -> Places:
-    """One level: jitter what is not rigid, then choose among similar samples of the right kind."""
-    number = len(analysis.levels) - 2 + level if len(analysis.levels) > 1 else 0
-    here = analysis.levels[number]
-    apart = 2 * int(APART * min(here.shape)) + 1
-    sets = similarity(analysis, number, k=K, n=max(3, apart))
-    still = draft.fixed | (draft.wanted == 1)
-    flat = np.ascontiguousarray(places).reshape(-1)
-    found = correct(
-        here,
-        sets,
-        jitter(flat, region, reach, seed=seed, level=level, held=still),
-        region,
-        frames(draft.mirrored),
-        passes=passes,
-        held=draft.fixed.ravel(),
-        kinds=(draft.kinds, draft.wanted),
-        progress=stage(progress, f"refine {level + 1} of 2"),
-    )
-    return found.reshape(*region.shape, 2)

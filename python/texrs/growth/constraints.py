@@ -1,0 +1,399 @@
+"""What is asked of an output beside the texture: points that are given, and a map to follow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from texrs._arrays import as_float, as_mask
+from texrs._engine.appearance import Demand
+from texrs._engine.pyramid import ONE, Region
+from texrs._typing import Array, Bools, Floats
+from texrs.errors import InvalidInput
+from texrs.growth.balance import Balance
+from texrs.kernels.gather import gather
+
+__all__ = ["NOTHING", "Asked", "Conditions", "Constraints", "Guide", "Pins", "Surroundings", "means"]
+
+WEIGHT = 1500
+"""Cost of another colour than the given one, in 1/256: a tenth of the range costs about as much as windows that have
+nothing to do with each other."""
+FOLLOW = 150
+"""The same of a map that is followed: there a third of the range costs as much."""
+
+
+# --- what a caller asks ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Constraints:
+    """Points of an output that are given, by what they show or by where they look.
+
+    Attributes
+    ----------
+    mask : (size) bool or int array
+        The points that are given: those that are not 0.
+    values : (size[, C]) array, optional
+        What given points show, exactly, in the exemplar's dtype and channels; those of other points are ignored.
+    coordinates : (size, A) array, optional
+        Where given points look in the exemplar, instead: (row, column) or (plane, row, column) in samples, not beyond
+        its first and last ones. Others are ignored, and may be NaN.
+
+    Raises
+    ------
+    InvalidInput
+        Neither values nor coordinates, or both.
+
+    Examples
+    --------
+    A picture that goes on from a piece of its exemplar:
+
+    >>> import numpy as np
+    >>> import texrs
+    >>> weave = texrs.samples.weave((64, 64)).image
+    >>> mask = np.zeros((64, 96), bool)
+    >>> mask[:, :20] = True
+    >>> left = texrs.Constraints(mask=mask, values=np.pad(weave, ((0, 0), (0, 32), (0, 0))))
+    >>> made = texrs.synthesize(weave, (64, 96), constraints=left)
+    >>> bool((made.image[:, :20] == weave[:, :20]).all())
+    True
+
+    """
+
+    mask: Array
+    values: Array | None = None
+    coordinates: Array | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what does not say what the points are to show."""
+        if (self.values is None) == (self.coordinates is None):
+            raise InvalidInput("constraints: needs either values or coordinates of the points that mask marks")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Guide:
+    """Two maps, of which the exemplar's is to show what the output's says: for exemplars with a trend.
+
+    Attributes
+    ----------
+    exemplar : array_like
+        Finite numbers that broadcast to the exemplar's axes: what there is at each sample, such as how deep it lies.
+    output : array_like
+        Finite numbers, in the same units, that broadcast to the size of the output: what each point is to look for.
+    weight : float
+        How much that counts beside looking like the exemplar, 0 to 100: at 1 a third of the range of the exemplar's
+        map costs as much as surroundings that have nothing to do with each other.
+
+    Raises
+    ------
+    InvalidInput
+        Maps that are not finite numbers, or a weight out of its range.
+
+    Examples
+    --------
+    What grows brighter downwards, grown the other way round:
+
+    >>> import numpy as np
+    >>> import texrs
+    >>> ramp = np.linspace(0, 1, 64)[:, np.newaxis]
+    >>> image = np.random.default_rng(0).random((64, 64)) * 0.3 + ramp
+    >>> made = texrs.synthesize(image, 96, guide=texrs.Guide(exemplar=ramp, output=np.linspace(1, 0, 96)[:, np.newaxis]))
+    >>> bool(made.image[:20].mean() > made.image[-20:].mean())
+    True
+
+    """
+
+    exemplar: ArrayLike
+    output: ArrayLike
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Check what can be checked without a size."""
+        as_float(self.weight, "weight", 0, 100)
+        for name, given in (("exemplar", self.exemplar), ("output", self.output)):
+            try:
+                values = np.asarray(given)
+            except (ValueError, TypeError):
+                values = np.asarray(None)
+            if values.dtype.kind not in "biuf" or not np.isfinite(values).all():
+                raise InvalidInput(
+                    f"guide: the map of the {name} needs finite numbers, got {values.dtype} {values.shape}"
+                )
+
+
+# --- what is asked of a level ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Asked:
+    """What is asked of the points of one level.
+
+    Attributes
+    ----------
+    demand : Demand, optional
+        What they are to show.
+    held : (points) bool, optional
+        Points that keep their places.
+    given : (points * A) int32, optional
+        The places of these, in units of 1/4096 of a sample; none where they have them already.
+    surrounds : bool
+        Whether the start is told of held points, and grows from them.
+    balance : Balance, optional
+        What keeps the colours of the output in balance.
+
+    """
+
+    demand: Demand | None = None
+    held: Bools | None = None
+    given: NDArray[np.int32] | None = None
+    surrounds: bool = False
+    balance: Balance | None = None
+
+    def place(self, places: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Return places with those that are given put in."""
+        if self.held is None or self.given is None:
+            return places
+        return np.where(np.repeat(self.held, len(places) // len(self.held)), self.given, places)
+
+
+NOTHING = Asked()
+
+
+class Held(Protocol):
+    """Points of the output that keep their places."""
+
+    def at(self, region: Region, spacing: int) -> tuple[Bools, NDArray[np.int32]]:
+        """Return which points of a level keep their places, (points) bool, and these, (points * A) int32."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pins:
+    """Scattered points: a point of a level that stands for any of them is held, and shows what the first one does.
+
+    ``mask`` is (size) bool, ``coordinates`` (size, A) float32.
+    """
+
+    mask: Bools
+    coordinates: Floats
+
+    def at(self, region: Region, spacing: int) -> tuple[Bools, NDArray[np.int32]]:
+        """Return which points of a level keep their places, and these."""
+        axes = len(region.shape)
+        held, places = np.zeros(region.points, bool), np.zeros((region.points, axes), np.int32)
+        # Of several the last to be written is the first.
+        at = np.argwhere(self.mask)[::-1]
+        theirs = self.coordinates[self.mask][::-1]
+        index = np.ravel_multi_index(tuple(np.minimum(at // spacing, np.array(region.shape) - 1).T), region.shape)
+        held[index] = True
+        places[index] = np.rint(((theirs + 0.5) / spacing - 0.5) * ONE).astype(np.int32)
+        return held, places.reshape(-1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surroundings:
+    """What lies around a hole: a point of a level is held that stands for such points in the main.
+
+    Were a point free that stands for as many known as unknown ones, nothing would tell coarse levels what has to go
+    on there. ``mask`` is (size) bool, ``places`` (size, A) int32: the samples that points show.
+    """
+
+    mask: Bools
+    places: NDArray[np.int32]
+
+    def at(self, region: Region, spacing: int) -> tuple[Bools, NDArray[np.int32]]:
+        """Return which points of a level keep their places, and these."""
+        share = means(self.mask.astype(np.float32), region.shape, spacing)
+        starts = [np.minimum(np.arange(n) * spacing, m - 1) for n, m in zip(region.shape, self.mask.shape, strict=True)]
+        first = self.places[np.ix_(*starts)].astype(np.float64)
+        return (share >= 0.5).reshape(-1), np.asarray(np.rint(first.reshape(-1) * ONE / spacing), np.int32)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Conditions:
+    """Constraints and a guide, checked for an exemplar and a size: what is asked of each level of an output.
+
+    Attributes
+    ----------
+    image : (..., C) array
+        The exemplar.
+    mask : (size) bool, optional
+        The points that are given.
+    values : (size, C) array, optional
+        What these show.
+    pins : Pins, optional
+        Where these look.
+    maps : (Floats, Floats), optional
+        The guide: the exemplar's map and the output's, 0 to 1.
+    weight : int
+        Of the guide, in 1/256.
+
+    """
+
+    image: Array
+    mask: Bools | None = None
+    values: Array | None = None
+    pins: Pins | None = None
+    maps: tuple[Floats, Floats] | None = None
+    weight: int = 0
+
+    @classmethod
+    def of(
+        cls, image: Array, shape: tuple[int, ...], constraints: Constraints | None, guide: Guide | None
+    ) -> Conditions:
+        """Check what a caller asks of an output of a shape.
+
+        Raises
+        ------
+        InvalidInput
+            Constraints or maps of other shapes or types, coordinates beyond the exemplar, or a guide beside values.
+
+        """
+        for given, kind, name in ((constraints, Constraints, "constraints"), (guide, Guide, "guide")):
+            if given is not None and not isinstance(given, kind):
+                raise InvalidInput(f"{name}: needs a texrs.{kind.__name__}, got {type(given).__name__}")
+        mask = values = pins = maps = None
+        if constraints is not None:
+            mask = as_mask(constraints.mask, "mask", shape)
+            if constraints.coordinates is not None:
+                pins = Pins(mask, _check_coordinates(constraints.coordinates, mask, image))
+                values = gather(image, pins.coordinates, interpolation="nearest")
+            else:
+                values = _check_values(constraints.values, mask, image)
+        if guide is not None:
+            if values is not None and pins is None:
+                raise InvalidInput(
+                    "guide: cannot be followed where values are given; give coordinates, or leave one out"
+                )
+            maps = _check_maps(guide, image.shape[: len(shape)], shape)
+        return cls(image, mask, values, pins, maps, 0 if guide is None else round(FOLLOW * guide.weight))
+
+    @property
+    def count(self) -> int:
+        """Number of given points."""
+        return 0 if self.mask is None else int(self.mask.sum())
+
+    @property
+    def free(self) -> bool:
+        """Whether nothing is asked."""
+        return not self.count and self.maps is None
+
+    def show(self, composite: Array) -> Array:
+        """Return the picture with the values that are given, exactly."""
+        if self.mask is None or self.values is None or self.pins is not None:
+            return composite
+        result = composite.copy()
+        result[self.mask] = self.values[self.mask].reshape(result[self.mask].shape)
+        return result
+
+    def at(self, level: int, region: Region, spacing: int) -> Asked:
+        """Return what is asked of a level."""
+        held, given = (None, None) if self.pins is None else self.pins.at(region, spacing)
+        return Asked(self._demand(region, spacing), held, given)
+
+    def _demand(self, region: Region, spacing: int) -> Demand | None:
+        """Ask for the guide's map, or for the mean of the values that a point of the level stands for."""
+        if self.maps is not None and self.weight:
+            mine, theirs = self.maps
+            points = _pooled(np.ones((*theirs.shape[:-1], 1), np.float32), region, spacing)
+            wished = np.asarray(_pooled(theirs, region, spacing) / np.maximum(points, 1), np.float32)
+            everywhere = np.full(region.points, self.weight, np.uint16)
+            return Demand(_coded(_shrunk(mine, spacing)), _coded(wished), everywhere)
+        if self.mask is None or self.values is None or not self.mask.any():
+            return None
+        wanted = _channels(self.values, self.image)
+        total = _pooled(wanted * self.mask[..., np.newaxis], region, spacing)
+        count = _pooled(self.mask[..., np.newaxis].astype(np.float32), region, spacing)
+        mean = np.asarray(total / np.maximum(count, 1), np.float32)
+        weight = np.where(count[..., 0] > 0, WEIGHT, 0).astype(np.uint16)
+        small = _shrunk(_channels(self.image, self.image), spacing)
+        return Demand(_coded(small), _coded(mean), weight.reshape(-1))
+
+
+def means(values: Array, shape: tuple[int, ...], spacing: int) -> Array:
+    """Return the mean of the points of the output that each point of a level stands for; the last stands for what is left."""
+    total, count = values, np.ones((1, 1))
+    for axis, n in enumerate(shape):
+        starts = np.minimum(np.arange(n) * spacing, values.shape[axis] - 1)
+        total = np.add.reduceat(total, starts, axis=axis)
+        size = np.diff([*starts, values.shape[axis]])
+        count = count * np.expand_dims(size, 1 - axis)
+    return np.asarray(total / np.maximum(count, 1))
+
+
+# --- checks ----------------------------------------------------------------------------------------------------------
+
+
+def _check_coordinates(given: Array, mask: Bools, image: Array) -> Floats:
+    axes = mask.ndim
+    places, wanted = np.asarray(given), (*mask.shape, axes)
+    if places.dtype.kind not in "iuf" or places.shape != wanted:
+        raise InvalidInput(f"coordinates: needs numbers of shape {wanted}, got {places.dtype} {places.shape}")
+    inside = (places >= 0) & (places <= np.array(image.shape[:axes]) - 1)
+    if not inside[mask].all():
+        raise InvalidInput("coordinates: those of given points must lie inside the exemplar and be finite")
+    return np.where(mask[..., np.newaxis], places, 0).astype(np.float32)
+
+
+def _check_values(given: object, mask: Bools, image: Array) -> Array:
+    values, wanted = np.asarray(given), (*mask.shape, image.shape[-1])
+    if values.dtype != image.dtype or values.shape not in (wanted, wanted[:-1] if wanted[-1] == 1 else wanted):
+        raise InvalidInput(
+            f"values: needs {image.dtype} of shape {wanted}, as the exemplar has, got {values.dtype} {values.shape}"
+        )
+    values = values.reshape(wanted)
+    if values.dtype.kind == "f" and not np.isfinite(values[mask]).all():
+        raise InvalidInput("values: those of given points must be finite")
+    return np.where(mask[..., np.newaxis], values, np.zeros((), values.dtype))
+
+
+def _check_maps(guide: Guide, mine: tuple[int, ...], theirs: tuple[int, ...]) -> tuple[Floats, Floats]:
+    maps = []
+    for given, name, shape in ((guide.exemplar, "exemplar", mine), (guide.output, "output", theirs)):
+        try:
+            maps.append(np.broadcast_to(np.asarray(given), shape).astype(np.float64))
+        except ValueError:
+            raise InvalidInput(
+                f"guide: the map of the {name} needs finite numbers that broadcast to {shape}, got {np.shape(given)}"
+            ) from None
+    low, span = maps[0].min(), float(np.ptp(maps[0])) or 1.0
+    first, second = (np.asarray(np.clip((m - low) / span, 0, 1)[..., np.newaxis], np.float32) for m in maps)
+    return first, second
+
+
+# --- from level to level ---------------------------------------------------------------------------------------------
+
+
+def _channels(values: Array, image: Array) -> Floats:
+    """Return up to four channels in units of the exemplar's range."""
+    low = image.reshape(-1, image.shape[-1]).min(axis=0).astype(np.float64)
+    span = float((image.reshape(-1, image.shape[-1]).max(axis=0) - low).max()) or 1.0
+    return np.asarray((values[..., :4].astype(np.float64) - low[:4]) / span, np.float32)
+
+
+def _coded(values: Floats) -> NDArray[np.int16]:
+    """Return values in [0, 1] as four numbers of 12 bits each."""
+    flat = values.reshape(-1, values.shape[-1])
+    out = np.zeros((len(flat), 4), np.int16)
+    out[:, : flat.shape[1]] = np.clip(np.rint(flat * 2047), -2048, 2047)
+    return out.reshape(-1)
+
+
+def _pooled(values: Floats, region: Region, spacing: int) -> Floats:
+    """Sum values of the output over the points of a level."""
+    for axis, n in enumerate(region.shape):
+        starts = np.minimum(np.arange(n) * spacing, values.shape[axis] - 1)
+        values = np.add.reduceat(values, starts, axis=axis)
+    return values
+
+
+def _shrunk(exemplar: Floats, spacing: int) -> Floats:
+    """Return the mean of the samples that a sample of a level stands for; those that are left at the ends are left out."""
+    axes = exemplar.ndim - 1
+    trimmed = exemplar[tuple(slice(0, n // spacing * spacing) for n in exemplar.shape[:axes])]
+    for axis in range(axes):
+        line = np.moveaxis(trimmed, axis, 0)
+        trimmed = np.moveaxis(line.reshape(-1, spacing, *line.shape[1:]).mean(axis=1), 0, axis)
+    return np.ascontiguousarray(trimmed, np.float32)

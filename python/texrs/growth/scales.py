@@ -1,0 +1,130 @@
+"""Growth from an atlas: elements of the sizes that a map asks for, their colours in balance, around what is held."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._engine.appearance import Demand
+from texrs._engine.pyramid import ONE, Region
+from texrs._typing import Floats, Progress
+from texrs.exemplar.atlas import Atlas, code_logs
+from texrs.growth.balance import Balance
+from texrs.growth.constraints import Asked, Held, means
+from texrs.growth.engine import Grown, Show
+from texrs.growth.settings import Settings
+from texrs.growth.windows import Windows
+
+__all__ = ["FROM_ATLAS", "Scales", "grow_from_atlas", "to_finest"]
+
+FROM_ATLAS = Settings(passes=(12, 8, 4), reaches=(2, 2, 2), coarsest=32, rounds=6, candidates=1024)
+"""Where much of an atlas has not the wanted scale, more is tried, and coarser levels have more to tell apart."""
+
+WEIGHT = 1264
+"""Cost of another scale than the wanted one, in 1/256: at a factor of 1.6 as much as windows that have nothing to do
+with each other."""
+SLAB = 1 << 15
+"""Points of the target that are looked at at once."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scales:
+    """Asks for the scales of a target, for copies of the exemplar's own size, and for nothing that is barred.
+
+    Attributes
+    ----------
+    atlas : Atlas
+        What is copied from.
+    settings : Settings
+        Their weights and balance count.
+    target : (rows, columns) float32, optional
+        The scales that are wanted; none where sizes do not count.
+    strength : float
+        How much they count.
+    held : Held, optional
+        Points that are given, by the samples of the atlas that they show.
+
+    """
+
+    atlas: Atlas
+    settings: Settings
+    target: Floats | None = None
+    strength: float = 1.0
+    held: Held | None = None
+
+    def at(self, level: int, region: Region, spacing: int) -> Asked:
+        """Return what is asked of a level."""
+        here = self.atlas.levels[level]
+        share = self.settings.at(level, len(self.atlas.levels)).weight * self.strength
+        weight = np.array([min(round(WEIGHT * share), 65535)], np.uint16)
+        demand = Demand(here.values, self._wanted(region, spacing), weight, here.order)
+        held, given = (None, None) if self.held is None else self.held.at(region, spacing)
+        balance = None if here.tones is None or not weight[0] else Balance.of(here.tones, demand)
+        return Asked(demand, held, given, True, balance)
+
+    def _wanted(self, region: Region, spacing: int) -> NDArray[np.int16]:
+        """Return the mean logarithm of the target at each point, (points)."""
+        asked = np.zeros(region.shape, np.int16)
+        if self.target is not None:
+            thick = max(1, SLAB // (spacing * self.target.shape[1]))
+            for first in range(0, len(asked), thick):
+                band = asked[first : first + thick]
+                # The last point of a closed axis stands for what is left.
+                last = (first + thick) * spacing if first + thick < len(asked) else len(self.target)
+                logs = np.log(self.target[min(first * spacing, len(self.target) - 1) : last])
+                band[...] = code_logs(means(logs, band.shape, spacing))
+        return asked.reshape(-1)
+
+
+def grow_from_atlas(
+    atlas: Atlas,
+    region: Region,
+    target: Floats | None,
+    *,
+    settings: Settings = FROM_ATLAS,
+    strength: float = 1.0,
+    held: Held | None = None,
+    seed: int = 0,
+    show: Show | None = None,
+    progress: Progress | None = None,
+) -> Grown:
+    """Grow a region whose points ask for the scales of a target.
+
+    Parameters
+    ----------
+    atlas : Atlas
+        What is copied from.
+    region : Region
+        What to fill.
+    target : (rows, columns) float32, optional
+        The scales that are wanted.
+    settings : Settings
+        How much work is done.
+    strength : float
+        How much the scales count.
+    held : Held, optional
+        Points that are given.
+    seed : int
+        Chooses the texture.
+    show : callable, optional
+        Makes pictures of the stages.
+    progress : callable, optional
+        Called with the stage and the share of it that is done.
+
+    Returns
+    -------
+    Grown
+        Its places are those of the atlas.
+
+    """
+    windows = Windows(tuple(level.appearance for level in atlas.levels), settings, seed)
+    scales = Scales(atlas, settings, target, strength, held)
+    return windows.grow(region, ask=scales.at, show=show, progress=progress)
+
+
+def to_finest(places: NDArray[np.int32], spacing: int) -> NDArray[np.int32]:
+    """Return places of a level, whose points are so many pixels apart, as places of the finest: whole samples."""
+    at = (np.rint(places / np.float32(ONE)) + 0.5) * spacing - 0.5
+    return np.asarray(np.rint(at * ONE), np.int32)

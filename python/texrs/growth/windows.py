@@ -1,0 +1,154 @@
+"""The engine's own start and corrector: windows of the output made like those of the exemplar, by settings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._engine.appearance import Appearance, Corrected
+from texrs._engine.pyramid import Region, to_fixed
+from texrs._progress import stage
+from texrs._typing import Frames, Progress
+from texrs.growth.constraints import Asked
+from texrs.growth.engine import Ask, Grown, Places, Show, Start, grow, nothing
+from texrs.growth.settings import Settings, Step
+
+__all__ = ["Windows"]
+
+TURN = 2
+"""Passes, of which each corrects every other point, between two looks at the balance of colours."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Windows:
+    """Grows places from an analysed exemplar by its windows.
+
+    Attributes
+    ----------
+    levels : tuple of Appearance
+        The exemplar, from the coarsest level on.
+    settings : Settings
+        How much work is done.
+    seed : int
+        Chooses the texture.
+    field : Frames, optional
+        How the texture is turned and scaled; none leaves it as it is.
+
+    """
+
+    levels: tuple[Appearance, ...]
+    settings: Settings
+    seed: int
+    field: Frames | None = None
+
+    def grow(
+        self,
+        region: Region,
+        *,
+        start: Start | None = None,
+        ask: Ask = nothing,
+        show: Show | None = None,
+        progress: Progress | None = None,
+    ) -> Grown:
+        """Grow a bounded region, whose borders are free, from a start: `initialise` unless another is given."""
+        first = start or Start(0, self.initialise, "blocks")
+        frames = partial(to_fixed, self.field)
+        return grow(region, len(self.levels), first, self.correct, frames, ask=ask, show=show, progress=progress)
+
+    def step(self, level: int) -> Step:
+        """Return what is done at a level."""
+        return self.settings.at(level, len(self.levels))
+
+    def frames(self, level: int, region: Region) -> NDArray[np.int16]:
+        """Return the Jacobians at the points of a level."""
+        # Those of their places in the world: averages of turned frames would shrink.
+        return to_fixed(self.field, region, 1 << (len(self.levels) - 1 - level))
+
+    def initialise(
+        self,
+        region: Region,
+        frames: NDArray[np.int16],
+        asked: Asked,
+        progress: Progress | None = None,
+        *,
+        margin: int = 0,
+    ) -> Places:
+        """Return patch-based places of the coarsest level, of hashed blocks that fit each other; a margin will be cut off."""
+        s = self.settings
+        return self.levels[0].blocks(
+            region,
+            frames,
+            cell=s.cell,
+            rounds=s.rounds,
+            candidates=s.candidates,
+            contrast=s.contrast,
+            continuation=s.continuation,
+            repetition=s.repetition,
+            seed=self.seed,
+            margin=margin,
+            held=asked.held if asked.surrounds else None,
+            given=asked.given if asked.surrounds else None,
+            demand=asked.demand,
+            progress=stage(progress, "blocks"),
+        )
+
+    def correct(
+        self,
+        places: Places,
+        level: int,
+        region: Region,
+        frames: NDArray[np.int16],
+        asked: Asked,
+        progress: Progress | None = None,
+        *,
+        first: int = 0,
+        passes: int | None = None,
+    ) -> Corrected:
+        """Return places corrected by windows, matches and votes: in so many passes, counted from a first one."""
+        here, step, s = self.levels[level], self.step(level), self.settings
+        wanted = step.passes if passes is None else passes
+        advance = stage(progress, f"level {level + 1} of {len(self.levels)}")
+        demand, balance = asked.demand, asked.balance
+        turn = wanted if balance is None else TURN
+        found, done, made = Corrected(places, 0, 0.0), 0, 0
+        while done < wanted:
+            if balance is not None and asked.demand is not None:
+                balance.note(found.places, here.shape, s.balance)
+                demand = balance.onto(asked.demand)
+            found = here.correct(
+                found.places,
+                region,
+                frames,
+                passes=min(turn, wanted - done),
+                first=first + done,
+                exhaustive=level == 0 and self._pairs(region, asked) <= s.exhaustive,
+                reach=step.reach,
+                acceptance=s.acceptance,
+                coherence=s.coherence,
+                vote=min(step.vote, here.radius),
+                # Costs that change let nothing settle.
+                settled=s.settled if balance is None else 0.0,
+                # The noise of a level is its own.
+                seed=(self.seed + 0x9E3779B97F4A7C15 * (level + 1)) % (1 << 64),
+                held=asked.held,
+                demand=demand,
+                overwrite=True,
+                progress=_part(advance, done / wanted, turn / wanted),
+            )
+            made, done = done + found.passes, done + turn
+        return found._replace(passes=made)
+
+    def _pairs(self, region: Region, asked: Asked) -> int:
+        """Return how many pairs of windows of the coarsest level there are to compare."""
+        demand = asked.demand
+        drawn = 0 if demand is None else demand.order.size
+        return region.points * (drawn or int(np.prod(self.levels[0].shape)))
+
+
+def _part(advance: Callable[[float], object] | None, start: float, share: float) -> Callable[[float], object] | None:
+    """Return what a kernel may call that does a part of a level's passes."""
+    return None if advance is None else lambda done: advance(min(1.0, start + share * done))

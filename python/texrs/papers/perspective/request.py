@@ -1,0 +1,109 @@
+"""What a caller asks of `texrs.perspective`, checked before anything is done."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from texrs import scale_maps
+from texrs._arrays import as_float, as_seed, as_size, as_wrap
+from texrs._typing import Array, Floats, Interpolation
+from texrs.errors import InvalidInput
+from texrs.exemplar import Exemplar, as_exemplar
+from texrs.papers.perspective.sizes import Sizes
+from texrs.scale_maps._maps import as_map
+
+__all__ = ["Method", "Request"]
+
+Method: TypeAlias = Literal["paper"] | None
+
+LEAST = 16
+"""Least side of an exemplar."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Request:
+    """The arguments of a synthesis, checked.
+
+    Attributes
+    ----------
+    exemplar : Exemplar
+        What it grows from.
+    scale : (H, W) float32
+        How large its elements are.
+    target : (rows, columns) float32
+        How large those of the output are to be.
+    method : {None, "paper"}
+        Which algorithm.
+    strength : float
+        How much the scale counts.
+    sizes : {"auto", True, False} or sequence of float
+        The copies that may be copied from.
+    wrap : (bool, bool)
+        Axes along which the output is to repeat.
+    seed : int
+        Chooses the texture.
+    interpolation : {"nearest", "linear", "cubic"}
+        Between the exemplar's samples, in the last look-up.
+
+    """
+
+    exemplar: Exemplar
+    scale: Floats
+    target: Floats
+    method: Method
+    strength: float
+    sizes: Sizes
+    wrap: tuple[bool, ...]
+    seed: int
+    interpolation: Interpolation
+
+    @classmethod
+    def check(
+        cls,
+        exemplar: Array | Exemplar,
+        scale_map: Array,
+        size: int | Sequence[int],
+        *,
+        target: Array | None,
+        method: Method,
+        scale_weight: float,
+        augment_scales: Sizes,
+        wrap: bool | Sequence[bool],
+        seed: int,
+        interpolation: Interpolation,
+    ) -> Request:
+        """Return the request of a caller, or raise what is wrong with it."""
+        known = as_exemplar(exemplar, minimum=LEAST)
+        mine = as_map(scale_map, "scale_map", known.shape)
+        sides = as_size(size)
+        shape = (sides[0], sides[1])
+        wanted = scale_maps.resample(mine, shape) if target is None else as_map(target, "target", shape)
+        closed = as_wrap(wrap)
+        check_wrap(wanted, closed, target is None)
+        strength = as_float(scale_weight, "scale_weight", 0, 16)
+        if method not in (None, "paper"):
+            raise InvalidInput(f"method: None or 'paper' is allowed, got {method!r}")
+        if interpolation not in ("nearest", "linear", "cubic"):
+            raise InvalidInput(f"interpolation: allowed are nearest, linear and cubic; got {interpolation!r}")
+        return cls(known, mine, wanted, method, strength, augment_scales, closed, as_seed(seed), interpolation)
+
+
+def check_wrap(target: Floats, wrap: Sequence[bool], stretched: bool) -> None:
+    """Refuse a target whose ends do not meet where the output is to repeat."""
+    for axis, closed in enumerate(wrap):
+        if not closed:
+            continue
+        logs = np.log(target)
+        inner = float(np.abs(np.diff(logs, axis=axis)).max(initial=0.0))
+        across = float(np.abs(np.take(logs, 0, axis) - np.take(logs, -1, axis)).max())
+        if across > 2 * inner + 0.02:
+            name = ("rows", "columns")[axis]
+            way = "give a target that repeats" if stretched else "make it repeat"
+            raise InvalidInput(
+                f"wrap: the target's first and last {name} differ by a factor of {np.exp(across):.2f}, so the result "
+                f"cannot repeat along {name}; {way}, or leave wrap off along {name}"
+            )

@@ -1,0 +1,87 @@
+"""Which copies of an exemplar an atlas is made of, and what of a target they cannot give."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from texrs._arrays import as_float
+from texrs._typing import Floats
+from texrs.errors import InvalidInput
+from texrs.exemplar.atlas import LARGEST, SMALLEST, extend_sizes
+
+__all__ = ["Outside", "Sizes", "bring_within", "choose_sizes", "count_supply"]
+
+Sizes: TypeAlias = Literal["auto"] | bool | Sequence[float]
+
+FACTORS = (1.0, 0.8, 0.64, 1.25, 1.5625)
+"""Sizes of the copies in an atlas, the exemplar first."""
+PLENTY = 0.75
+"""Samples of about the wanted scale for each point of the output at which the exemplar alone will do."""
+ALIKE = 0.1
+"""Natural logarithm of a ratio of scales that are about the same."""
+
+
+def choose_sizes(scale: Floats, target: Floats, asked: Sizes) -> tuple[float, ...]:
+    """Return the sizes of the copies, the exemplar's own first."""
+    if isinstance(asked, bool | np.bool_):
+        if not asked:
+            return (1.0,)
+    elif not (isinstance(asked, str) and asked == "auto"):
+        return _check_sizes(asked)
+    elif count_supply(scale, target) >= PLENTY:
+        return (1.0,)
+    return extend_sizes(FACTORS, scale, (float(target.min()), float(target.max())))
+
+
+def _check_sizes(asked: object) -> tuple[float, ...]:
+    if isinstance(asked, Sequence) and not isinstance(asked, str) and 1 <= len(asked) <= 16:
+        sizes = [as_float(s, "augment_scales", SMALLEST, LARGEST) for s in asked]
+        # The exemplar itself is always there.
+        return (1.0, *dict.fromkeys(s for s in sizes if s != 1))
+    raise InvalidInput(f"augment_scales: needs 'auto', True, False or up to 16 sizes from 1/8 to 4, got {asked!r}")
+
+
+def count_supply(scale: Floats, target: Floats) -> float:
+    """Return how many samples of about the wanted scale the exemplar has for each point, where it has the fewest."""
+    mine, theirs = np.sort(np.log(scale), axis=None), np.log(target).ravel()
+    bins = np.arange(theirs.min(), theirs.max() + ALIKE, ALIKE)
+    asked = np.histogram(theirs, np.append(bins, bins[-1] + ALIKE))[0]
+    middle = bins + ALIKE / 2
+    there = np.searchsorted(mine, middle + ALIKE) - np.searchsorted(mine, middle - ALIKE)
+    counts = asked > theirs.size // 200
+    return float((there[counts] / asked[counts]).min(initial=np.inf))
+
+
+@dataclass(frozen=True, slots=True)
+class Outside:
+    """How much of a target was beyond the scales that there are: its share, and by what factor at most."""
+
+    share: float
+    factor: float
+
+    def sentence(self, sizes: Sequence[float]) -> str:
+        """Return what to tell the caller."""
+        way = "augment_scales='auto' would resize it" if len(sizes) == 1 else "nor have its resized copies"
+        return (
+            f"target: {self.share:.1%} of it asks for scales that the exemplar has not, by a factor of up to "
+            f"{self.factor:.2f}; they were brought to those that it has ({way})"
+        )
+
+
+def bring_within(scale: Floats, target: Floats, sizes: Sequence[float]) -> tuple[Floats, Outside]:
+    """Bring a target to the scales that the copies have, and say how much of it was beyond them."""
+    low, high = float(scale.min()) * min(sizes), float(scale.max()) * max(sizes)
+    slack = 1 + 1e-3
+    beyond = (target < low / slack) | (target > high * slack)
+    if beyond.all():
+        raise InvalidInput(
+            f"target: asks for scales from {target.min():.3g} to {target.max():.3g} where the exemplar, in all its sizes, "
+            f"has {low:.3g} to {high:.3g}; give a target within these, or larger or smaller augment_scales"
+        )
+    factor = max(low / float(target.min()), float(target.max()) / high, 1.0)
+    share = float(beyond.mean())
+    return np.clip(target, low, high), Outside(round(share, 6), round(factor if share else 1.0, 4))

@@ -1,0 +1,114 @@
+"""What a caller asks of `texrs.solid` and `texrs.synthesize`, checked before anything is done."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from texrs._arrays import as_seed, as_size, as_wrap
+from texrs._engine.pyramid import Region
+from texrs._typing import Array, Interpolation
+from texrs.errors import InvalidInput
+from texrs.exemplar import Exemplar, as_exemplar
+from texrs.exemplar.analysis import COARSEST
+from texrs.fields import Field
+from texrs.growth import Conditions, Constraints, Guide
+from texrs.papers.solid.limits import check_memory
+from texrs.papers.solid.settings import Quality, as_quality
+
+__all__ = ["Method", "Request", "as_field", "as_interpolation"]
+
+Method: TypeAlias = Literal["paper"] | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Request:
+    """The arguments of a synthesis, checked.
+
+    Attributes
+    ----------
+    exemplar : Exemplar
+        What it grows from.
+    region : Region
+        The output.
+    field : Field, optional
+        Over the output; none where it leaves everything in place.
+    seed : int
+        Chooses the texture.
+    quality : {"preserve", "fast", "optimise"}
+        How much work is done.
+    method : {None, "paper"}
+        Which algorithm.
+    conditions : Conditions
+        What is asked beside the texture.
+    interpolation : {"nearest", "linear", "cubic"}
+        Between the exemplar's samples, in the last look-up.
+
+    """
+
+    exemplar: Exemplar
+    region: Region
+    field: Field | None
+    seed: int
+    quality: Quality
+    method: Method
+    conditions: Conditions
+    interpolation: Interpolation
+
+    @classmethod
+    def check(
+        cls,
+        exemplar: Array | Exemplar,
+        size: int | Sequence[int],
+        *,
+        axes: int,
+        field: Field | None,
+        seed: int,
+        wrap: bool | Sequence[bool],
+        quality: Quality,
+        method: Method,
+        constraints: Constraints | None,
+        guide: Guide | None,
+        interpolation: Interpolation | None,
+        memory_limit: int | None,
+    ) -> Request:
+        """Return the request of a caller, or raise what is wrong with it."""
+        known = as_exemplar(exemplar, axes=axes, minimum=COARSEST)
+        region = Region.whole(as_size(size, axes=axes), as_wrap(wrap, axes=axes))
+        if method not in (None, "paper"):
+            raise InvalidInput(f"method: None or 'paper' is allowed, got {method!r}")
+        if method == "paper" and (constraints is not None or guide is not None):
+            what = "constraints" if constraints is not None else "guide"
+            raise InvalidInput(f"{what}: the paper's method knows none; leave out {what}, or method='paper'")
+        checked = as_quality(quality)
+        if checked == "optimise" and min(region.shape) < COARSEST:
+            checked = "preserve"  # What is so thin cannot be judged by a trial.
+        how = as_interpolation(interpolation, known, "nearest" if method == "paper" else "cubic")
+        turned = as_field(field, axes)
+        if turned is not None:
+            turned = turned.over(region.shape)
+        check_memory(known.pixels, region, turned, memory_limit)
+        conditions = Conditions.of(known.pixels, region.shape, constraints, guide)
+        return cls(known, region, turned, as_seed(seed), checked, method, conditions, how)
+
+
+def as_field(field: object, axes: int) -> Field | None:
+    """Check a field; the identity is none."""
+    if field is None:
+        return None
+    if not isinstance(field, Field):
+        raise InvalidInput(f"field: needs a field of texrs.fields, got {type(field).__name__}")
+    if field.axes != axes:
+        raise InvalidInput(f"field: needs {axes} axes, got one of {field.axes}")
+    still = field.constant is not None and np.array_equal(field.constant, np.eye(axes, dtype=np.float32))
+    return None if still else field
+
+
+def as_interpolation(value: Interpolation | None, exemplar: Exemplar, default: Interpolation) -> Interpolation:
+    """Check how the exemplar is looked up; labels are always at the nearest sample."""
+    if value not in (None, "nearest", "linear", "cubic"):
+        raise InvalidInput(f"interpolation: allowed are nearest, linear, cubic or None; got {value!r}")
+    return "nearest" if exemplar.labels else value or default
