@@ -7,8 +7,8 @@ from dataclasses import asdict
 import numpy as np
 
 import texrs
-from texrs import PlaneTexture, SolidTexture, fields, volume
-from texrs.exemplar import analysis
+from texrs import Constraints, Exemplar, Guide, PlaneTexture, SolidTexture, fields, volume
+from texrs.exemplar._exemplar import _FACTS
 from truth.exemplars import box, channels, classes, clear, colour, deep, floats
 from truth.table import Parts, case, parts_of
 
@@ -34,7 +34,7 @@ def synthesize_under_a_zigzag() -> Parts:
 def synthesize_under_an_array() -> Parts:
     turns = [[fields.slant(angle, axes=2).constant * size for angle, size in row] for row in FRAMES]
     field = fields.from_array(np.array(turns), extent=(96, 128))
-    result = texrs.synthesize(channels("dots", 80, 80), (96, 128), field=field, quality="fast", repeat=False)
+    result = texrs.synthesize(Exemplar(channels("dots", 80, 80), repeat=False), (96, 128), field=field, quality="fast")
     return parts_of(result, report=GROWN)
 
 
@@ -47,8 +47,11 @@ def synthesize_around_what_is_held() -> Parts:
     held = box((112, 112), (20, 60), (30, 90))
     coordinates = np.zeros((112, 112, 2), np.float32)
     coordinates[held] = np.argwhere(held) - np.array([10, -5])
-    trend = np.linspace(0, 1, 96)[:, np.newaxis], np.linspace(1, 0, 112)[:, np.newaxis]
-    result = texrs.synthesize(exemplar, 112, held=held, coordinates=coordinates, guide=trend, guide_weight=0.5)
+    trend = Guide(
+        exemplar=np.linspace(0, 1, 96)[:, np.newaxis], output=np.linspace(1, 0, 112)[:, np.newaxis], weight=0.5
+    )
+    constraints = Constraints(mask=held, coordinates=coordinates)
+    result = texrs.synthesize(exemplar, 112, constraints=constraints, guide=trend)
     return parts_of(result, report=GROWN)
 
 
@@ -94,7 +97,9 @@ def solid_by_optimising() -> Parts:
 def solid_of_labels() -> Parts:
     exemplar = classes("weave_solid", *CUBE, seed=3)
     field = fields.zigzag(period=20, angle=20)
-    return parts_of(texrs.solid(exemplar, (22, 26, 24), field=field, labels=True, seed=4), report=GROWN)
+    return parts_of(
+        texrs.solid(Exemplar(exemplar, axes=3, labels=True), (22, 26, 24), field=field, seed=4), report=GROWN
+    )
 
 
 @case
@@ -103,12 +108,14 @@ def solid_around_what_is_held() -> Parts:
     held = box((24, 24, 26), (6, 16), (8, 18), (4, 14))
     values = np.zeros((24, 24, 26, 3), np.uint8)
     values[held] = exemplar[box(CUBE, (9, 19), (9, 19), (9, 19))]
-    return parts_of(texrs.solid(exemplar, held.shape, held=held, values=values, seed=3), report=GROWN)
+    return parts_of(
+        texrs.solid(exemplar, held.shape, constraints=Constraints(mask=held, values=values), seed=3), report=GROWN
+    )
 
 
 @case
 def solid_along_a_trend() -> Parts:
-    trend = np.linspace(0, 1, 32)[:, np.newaxis, np.newaxis], np.linspace(1, 0, 24)
+    trend = Guide(exemplar=np.linspace(0, 1, 32)[:, np.newaxis, np.newaxis], output=np.linspace(1, 0, 24))
     exemplar = clear("wood_solid", *CUBE, seed=3)
     return parts_of(texrs.solid(exemplar, (28, 28, 24), quality="fast", guide=trend, seed=6), report=GROWN)
 
@@ -151,7 +158,7 @@ def windows_of_a_plane() -> Parts:
 
 @case
 def windows_of_a_solid() -> Parts:
-    texture = SolidTexture(deep("stripes", *CUBE, seed=2), seed=1, repeat=False)
+    texture = SolidTexture(Exemplar(deep("stripes", *CUBE, seed=2), axes=3, repeat=False), seed=1)
     parts = parts_of(texture.window((-4, 98, 2), (4, 8, 8)), report=("origin", "repeats"))
     return parts | {"slice": texture.slice((-2, 102, 6), normal=(1, 1, 0), size=4)}
 
@@ -175,16 +182,17 @@ def pictures_of_volumes() -> Parts:
 
 @case
 def analyses() -> Parts:
-    """Analyses are kept by content, but not these: they are made with each number of threads."""
+    """Analyses are kept by content: here they are dropped first, so that each number of threads makes them."""
     exemplars = {
         "colours": (colour("weave", 48, 64), 2),
         "channels": (channels("grit", 48, 48), 2),
         "labels": (classes("weave_solid", *CUBE, seed=4), 3),
         "volume": (deep("particles", *CUBE, seed=5), 3),
     }
+    _FACTS.clear()
     parts: dict[str, object] = {}
     for name, (exemplar, axes) in exemplars.items():
-        found = analysis.analyse(exemplar, axes=axes, cache=False)
+        found = Exemplar(exemplar, axes=axes).analyse()
         parts |= {f"{name} wrap": found.wrap}
         parts |= {f"{name} level {i}": level.arrays()["features"] for i, level in enumerate(found.levels)}
     return parts
