@@ -355,7 +355,7 @@ class _Inverse(Field):
 
 
 def check(field: Field, shape: Sequence[int], origin: Sequence[float] | None = None) -> None:
-    """Check a field over a box before any long work.
+    """Check a field over a box, before any long work.
 
     Parameters
     ----------

@@ -60,7 +60,7 @@ def __dir__() -> list[str]:
 
 
 def read(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
-    """Read an image.
+    """Return the image of a file.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def read(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
 
 
 def read_volume(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
-    """Read a volume.
+    """Return the volume of a file.
 
     Parameters
     ----------

@@ -44,7 +44,7 @@ def read_npz(path: Path, limit: int) -> Array:
 
 
 def read_arrays(path: PathLike, *, limit: int = MAX_PIXELS) -> dict[str, Array]:
-    """Read all arrays of an .npz file.
+    """Return all arrays of an .npz file.
 
     Parameters
     ----------

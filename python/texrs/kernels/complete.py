@@ -60,7 +60,7 @@ def complete(
     shown: int | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Completion:
-    """Fill the unknown pixels of a picture from the hole boundary inwards, patch by patch.
+    """Return a picture whose unknown pixels are filled from the hole boundary inwards, patch by patch.
 
     At each step: good matches of the known pixels in a window on the boundary [1]_, less those that would repeat or
     mirror what lies near; the three most promising are joined to the known pixels by a minimum cut [2]_, and the cheapest

@@ -26,7 +26,7 @@ def gather(
     interpolation: Interpolation = "linear",
     wrap: bool | Sequence[bool] = False,
 ) -> Array:
-    """Sample exemplars at coordinates.
+    """Return samples of exemplars at coordinates.
 
     A coordinate that falls on a sample gives that sample, bit for bit, whatever the interpolation. ``"cubic"``
     (Catmull-Rom [1]_) is clipped to the range of its taps, so it neither rings nor leaves the range of the data.

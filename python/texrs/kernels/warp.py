@@ -1,4 +1,4 @@
-"""Pictures warped by moved points: where each pixel of the output comes from."""
+"""Warps of pictures by points that move: where each pixel of the output comes from."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def mesh(
     size: int | Sequence[int] | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Warp:
-    """Move each pixel of a picture, and rasterise the dense mesh between them.
+    """Return where the pixels of an output come from, when each pixel of a picture moves: its dense mesh, rasterised.
 
     Two triangles a cell, barycentric. Where several lie over each other the one whose corners weigh most is seen; of
     equals one that is not turned over, then the first.
@@ -133,7 +133,7 @@ class Triangles:
 def from_points(
     source: ArrayLike, target: ArrayLike, shape: int | Sequence[int], *, size: int | Sequence[int] | None = None
 ) -> Triangles:
-    """Warp a picture by points that move.
+    """Return where the pixels of an output come from, when points of a picture move.
 
     The Delaunay triangles of the source points are drawn where their corners go.
 

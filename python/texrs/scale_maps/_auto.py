@@ -28,7 +28,7 @@ _FLAT = 1e-4
 
 
 def auto_mask(image: object, *, detail: float | None = None, trend: Trend = "plane", known: object = None) -> Bools:
-    """Find the features of a picture: what is lighter than its surroundings.
+    """Return a mask of the features of a picture: what is lighter than its surroundings.
 
     How far the surroundings reach, and what is too fine to be seen, must grow with the elements, or else the mask has
     features of one size everywhere. So a scale map is measured in the mask (`from_mask`), and the mask made anew by it,

@@ -11,7 +11,7 @@ __all__ = ["blur", "shrink"]
 
 
 def blur(values: Floats, sigma: float) -> Floats:
-    """Blur by a Gaussian, or by three boxes of its variance where that is cheaper."""
+    """Return values blurred by a Gaussian, or by three boxes of its variance where that is cheaper."""
     if sigma < 3:
         return np.asarray(ndimage.gaussian_filter(values, sigma, mode="nearest"))
     for width in _boxes(sigma):

@@ -22,7 +22,7 @@ _MOST = 10_000
 
 
 def edit(scale: object, steps: Sequence[Mapping[str, Any] | str] | str) -> Floats:
-    """Change a scale map by a list of steps.
+    """Return a scale map that is changed by a list of steps.
 
     Each step is a mapping with the name of the operation, ``"op"``, and what it needs; or the name alone. A region is
     ``[top, left, bottom, right]`` (a rectangle), ``[row, column, radius]`` (a disc) or a list of at least three points

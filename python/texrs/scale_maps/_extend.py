@@ -15,9 +15,9 @@ __all__ = ["extend"]
 
 
 def extend(scale: object, known: object, *, trend: Trend = "plane") -> Floats:
-    """Continue a scale map into holes, and beyond what is known of it.
+    """Return a scale map that is continued into holes, and beyond what is known of it.
 
-    The trend of the known part says how scales go on; by how much the map differs from it at the rim is spread over
+    The trend of the known part says how scales go on; by how much the map differs from it at the hole boundary is spread over
     the hole as a membrane would, so that nothing jumps where the known part begins.
 
     Parameters

@@ -43,7 +43,7 @@ def from_mask(
     foreshortened: bool = False,
     known: object = None,
 ) -> Floats:
-    """Measure the size of elements by how densely the features of a mask lie.
+    """Return the scale map of a mask: the size of elements, by how densely the features of the mask lie.
 
     Where elements are seen twice as large there are half as many outlines in a window (equation 1 of [1]_, which counts
     the pixels of the mask and has it the other way round). What is measured so is smoothed (equation 2), on logarithms.
@@ -198,8 +198,8 @@ def _middles(mask: Bools, known: Bools | None) -> NDArray[np.uint16]:
     """Put 2 at the middle of each feature; 1 if the border or a hole cuts it, for half of those have theirs beyond."""
     labels, number = ndimage.label(mask if known is None else mask & known, np.ones((3, 3)))
     cut = np.zeros(number + 1, np.bool_)
-    for rim in (labels[0], labels[-1], labels[:, 0], labels[:, -1]):
-        cut[rim] = True
+    for border in (labels[0], labels[-1], labels[:, 0], labels[:, -1]):
+        cut[border] = True
     if known is not None:
         cut[labels[ndimage.binary_dilation(~known, np.ones((3, 3)))]] = True
     flat = labels.ravel()

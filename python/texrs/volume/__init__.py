@@ -1,4 +1,4 @@
-"""Looking at volumes, and measuring whether a synthesised one is like its exemplar.
+"""Pictures of volumes, and statistics of how like its exemplar a synthesised one is.
 
 Pictures: `slices`, `oblique`, `cube`, `turntable`; `paint` gives labels colours, `surface` the triangles around one.
 

@@ -81,7 +81,7 @@ class Comparison:
 
     @property
     def text(self) -> str:
-        """The report as a table."""
+        """Return the report as a table."""
         rows = [("", "exemplar", "output", "output/exemplar")]
 
         def row(name: str, pair: tuple[float, float], form: str) -> None:
@@ -130,7 +130,7 @@ def compare(
     chosen: int | tuple[int, ...] | None = None,
     axes: int | None = None,
 ) -> Comparison:
-    """Compare a synthesised picture or volume with its exemplar.
+    """Return how a synthesised picture or volume compares with its exemplar.
 
     Parameters
     ----------
