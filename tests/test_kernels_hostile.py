@@ -7,7 +7,7 @@ import inspect
 import itertools
 import math
 import re
-import resource
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from decimal import Decimal
 from fractions import Fraction
@@ -42,6 +42,11 @@ MEMORY = 2 << 30
 
 @pytest.fixture(scope="module", autouse=True)
 def _limited_memory() -> Iterator[None]:
+    if sys.platform != "linux":
+        yield
+        return
+    import resource
+
     limits = resource.getrlimit(resource.RLIMIT_AS)
     with open("/proc/self/statm") as file:
         taken = int(file.read().split()[0]) * resource.getpagesize()

@@ -168,15 +168,6 @@ def check_finite(array: Array, name: str) -> None:
         )
 
 
-def as_kernel(array: Array) -> Array:
-    """Return the values in a dtype that the kernels take: bool as uint8, float16 as float32."""
-    if array.dtype == np.bool_:
-        return array.view(np.uint8)
-    if array.dtype == np.float16:
-        return array.astype(np.float32)
-    return array
-
-
 def to_unit(array: Array) -> Floats:
     """Bring an image to [0, 1] in float32, so that thresholds mean the same for every dtype.
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from texrs import _rust
-from texrs._arrays import as_array, as_choice, as_image, as_kernel, as_wrap
+from texrs._arrays import as_array, as_choice, as_image, as_wrap
 from texrs._typing import Array, Interpolation
 from texrs.errors import InvalidInput
 
@@ -86,7 +86,7 @@ def gather(
         if index.size and index.max() >= len(images):
             raise InvalidInput(f"which: allowed are 0 to {len(images) - 1}, got {index.min()} to {index.max()}")
     out = _rust.gather(
-        [as_kernel(e) for e in images],
+        [_as_kernel(e) for e in images],
         as_wrap(wrap, axes=axes),
         index.reshape(-1),
         points.reshape(-1, axes),
@@ -99,3 +99,10 @@ def gather(
         out = out.astype(dtype)
     had_channels = np.asarray(several[0]).ndim > axes
     return out.reshape((*shape, -1) if had_channels else shape)
+
+
+def _as_kernel(array: Array) -> Array:
+    """Return the values in a dtype that the kernel takes: bool as uint8, float16 as float32."""
+    if array.dtype == np.bool_:
+        return array.view(np.uint8)
+    return array.astype(np.float32) if array.dtype == np.float16 else array
