@@ -72,8 +72,8 @@ def spacing(points: Points, count: int = NEIGHBOURS) -> float:
 
 def _mark_inner(points: Points, far: Points) -> NDArray[np.bool_]:
     """Mark the points that are not the outermost, or all if there is no other: half of the neighbours of these are missing."""
-    rim = INSIDE * float(np.median(far[:, 0]))
-    found: NDArray[np.bool_] = ((points > points.min(axis=0) + rim) & (points < points.max(axis=0) - rim)).all(axis=1)
+    edge = INSIDE * float(np.median(far[:, 0]))
+    found: NDArray[np.bool_] = ((points > points.min(axis=0) + edge) & (points < points.max(axis=0) - edge)).all(axis=1)
     return found if found.any() else ~found
 
 

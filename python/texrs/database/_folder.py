@@ -67,12 +67,12 @@ class Folder:
         replace_other: bool = True,
     ) -> Elements:
         """Write an entry, its ``pixels`` into the file ``image`` where they are given, and what the manifest says of it."""
-        plain = {k: _plain(v) for k, v in options.items()}
+        plain = {k: _to_plain(v) for k, v in options.items()}
         # With all that the manifest needs, should that be lost.
         entry = replace(entry, report={**entry.report, "database": {"image": image, "options": plain}})
         file = f"{name}.npz"
         record = _record_of(name, file, entry)
-        with self._locked():
+        with self._lock_manifest():
             found = self._parse()
             found = self._scan() if found is None else found
             # Another process may have taken the name while this one analysed.
@@ -89,11 +89,11 @@ class Folder:
         """Read the manifest; remake it from the entries where it is damaged."""
         found = self._parse()
         if found is None:
-            with self._locked():
+            with self._lock_manifest():
                 found = self._parse()
                 if found is None:
                     found = self._scan()
-                    self.tell(f"{self.path / MANIFEST}: damaged; made anew from {len(found)} entries")
+                    self.warn(f"{self.path / MANIFEST}: damaged; made anew from {len(found)} entries")
                     self._write(found)
         return found
 
@@ -146,7 +146,7 @@ class Folder:
             temporary.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
 
     @contextmanager
-    def _locked(self) -> Iterator[None]:
+    def _lock_manifest(self) -> Iterator[None]:
         """Keep other processes, and threads, from changing the manifest."""
         try:
             self.path.mkdir(exist_ok=True)
@@ -155,7 +155,7 @@ class Folder:
             raise FileError(f"{self.path}: cannot be written to ({error.strerror})") from None
         try:
             end = time.monotonic() + PATIENCE
-            while not _lock(number):
+            while not _lock_file(number):
                 if time.monotonic() > end:
                     raise FileError(f"{self.path}: another process has kept it locked for {PATIENCE:g} s")
                 time.sleep(PAUSE)
@@ -163,7 +163,7 @@ class Folder:
         finally:
             os.close(number)
 
-    def tell(self, sentence: str) -> None:
+    def warn(self, sentence: str) -> None:
         """Say what had to be remade."""
         if self._say is not None:
             self._say(sentence)
@@ -177,7 +177,7 @@ def check_free(found: Mapping[str, Record], name: str, hash: str) -> None:
         raise InvalidInput(f"name: {name} is there already, of another image; replace=True replaces it")
 
 
-def _lock(number: int) -> bool:
+def _lock_file(number: int) -> bool:
     """Lock a file until it is closed, which the system does for a process that dies."""
     try:
         try:
@@ -217,24 +217,24 @@ def _read_record(name: str, item: Mapping[str, Any]) -> Record:
     )
 
 
-def _plain(value: Any) -> Any:
+def _to_plain(value: Any) -> Any:
     """Return an option as text, numbers, and lists and tables of them; a mask by its runs."""
     if isinstance(value, np.ndarray) and value.dtype.kind in "b" and value.ndim == 2:
         changes = np.flatnonzero(np.diff(value.ravel().astype(np.int8), prepend=0))
         return {"shape": list(value.shape), "changes": changes.tolist()}
     if isinstance(value, ElementSearch):
-        return {k: _plain(v) for k, v in asdict(value).items()}
+        return {k: _to_plain(v) for k, v in asdict(value).items()}
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, Sequence) and not isinstance(value, str | bytes):
-        return [_plain(v) for v in value]
+        return [_to_plain(v) for v in value]
     return value
 
 
 def restore_option(value: Any) -> Any:
-    """Return an option as it was before `_plain` wrote it."""
+    """Return an option as it was before `_to_plain` wrote it."""
     if isinstance(value, dict) and "shape" not in value:
         return ElementSearch(**value)
     if isinstance(value, dict):

@@ -150,7 +150,10 @@ class TextureDatabase:
         progress : callable, optional
             Called as ``progress(stage, share)``; raising stops the work.
         **options
-            As of `texrs.elements.analyse`.
+            What `texrs.elements.analyse` takes: ``box`` (row, column, height, width) around one element; ``mask`` (H, W) bool,
+            the foreground; ``background``, points or (H, W) bool between the elements; ``layout`` ("disjoint", "connected"
+            or "jointed"); ``points`` (n, 2), the elements; ``search``, an `ElementSearch`; ``method`` (None or "paper");
+            ``wrap``, whether the texture repeats; ``seed``. They are kept, and an entry is made anew with them.
 
         Returns
         -------
@@ -219,14 +222,34 @@ class TextureDatabase:
             return entry
         if entry is not None and digest(image) == digest(entry.image):
             return entry
-        self._folder.tell(f"{name}: made anew, for the entry {reason or 'is of another image'}")
+        self._folder.warn(f"{name}: made anew, for the entry {reason or 'is of another image'}")
         options = {k: restore_option(v) for k, v in record.options.items()}
         similar = bool(options.pop("similarity", False))
         entry = analyse(image, progress=progress, **options)
         return self._folder.keep(name, entry.with_similarity() if similar else entry, record.image, record.options)
 
     def splice(self, a: str, b: str, size: Sequence[int] | None = None, **options: Unpack[SpliceOptions]) -> Synthesis:
-        """Splice two textures: the elements of ``a`` in the arrangement of ``b``; see `texrs.splice`."""
+        """Return the elements of one texture in the arrangement of another.
+
+        Parameters
+        ----------
+        a, b : str
+            Names of the texture whose elements are shown, and of that whose layout they take.
+        size : (rows, columns), optional
+            Of the result, in pixels; that of ``a`` by default.
+        **options
+            What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``align``, ``snap_rows``, ``refine``.
+
+        Returns
+        -------
+        Synthesis
+
+        Raises
+        ------
+        InvalidInput
+            There is no such texture, or what `texrs.splice` refuses.
+
+        """
         return splice(self.analyse(a), self.analyse(b), size, **options)
 
     def matrix(
@@ -252,7 +275,7 @@ class TextureDatabase:
         progress : callable, optional
             Called as ``progress("matrix", share)``; raising stops the work.
         **options
-            As of `texrs.splice`.
+            What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``align``, ``snap_rows``, ``refine``.
 
         Returns
         -------

@@ -21,7 +21,7 @@ from texrs.io import atomic, read_arrays
 from texrs.samples import Sample
 
 FORMAT = 2
-"""Of the file, and of what the analysis gives: an entry of another one is made anew."""
+"""Of the file, and of what the analysis finds: an entry of another version is refused, and remade by a database."""
 MARK = "texrs_elements"
 
 

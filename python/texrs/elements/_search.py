@@ -99,21 +99,21 @@ def pad(array: NDArray[Any], margin: tuple[int, int], wrap: Wrap) -> NDArray[Any
 def appearance_vectors(colours: Floats, wrap: Wrap, patches: Sequence[Floats] = ()) -> tuple[Floats, list[Floats]]:
     """Return the appearance vectors of an image, (H, W, 8), and of patches whose margins are `RADIUS` wide.
 
-    All lie on one sheet, so that the same components describe them.
+    All lie in one atlas, so that the same components describe them.
     """
     image = pad(colours, (RADIUS, RADIUS), wrap)
     height, width = image.shape[:2]
-    sheet = image
+    atlas = image
     if patches:
         extra = sum(len(p) for p in patches), max(0, *(p.shape[1] - width for p in patches))
-        sheet = np.pad(image, ((0, extra[0]), (0, extra[1]), (0, 0)), mode="symmetric")
+        atlas = np.pad(image, ((0, extra[0]), (0, extra[1]), (0, 0)), mode="symmetric")
     tops, top = [], height
     for patch in patches:
-        sheet[top : top + len(patch), : patch.shape[1]] = patch
+        atlas[top : top + len(patch), : patch.shape[1]] = patch
         tops.append(top)
         top += len(patch)
-    features = Appearance(sheet, axes=2, radius=RADIUS).arrays()["features"]
-    described = features.reshape(*sheet.shape[:2], -1)[..., :CHANNELS].astype(np.float32)
+    features = Appearance(atlas, axes=2, radius=RADIUS).arrays()["features"]
+    described = features.reshape(*atlas.shape[:2], -1)[..., :CHANNELS].astype(np.float32)
 
     def inside(top: int, shape: tuple[int, ...]) -> Floats:
         return described[top + RADIUS : top + shape[0] - RADIUS, RADIUS : shape[1] - RADIUS]
@@ -181,7 +181,7 @@ def search_similar(
     cut : bool
         Whether candidates are cut by their scores, and such as overlap better ones dropped.
     features : (H, W, 8) float32, optional
-        What `appearance_vectors` makes of the image alone, for who looks for many boxes.
+        What `appearance_vectors` makes of the image alone, where many boxes are looked for.
     progress : callable, optional
         Called with the share that is done.
     """

@@ -30,7 +30,7 @@ TRUSTED = 0.7
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Separation:
-    """The elements of a texture, told from its ground.
+    """The elements of a texture, and what belongs to them.
 
     Attributes
     ----------
@@ -130,15 +130,15 @@ def reconcile(
     names = {int(pieces[tuple(np.clip(np.rint(p[:2]).astype(int), 0, np.array(mask.shape) - 1))]) for p in table}
     used = np.isin(pieces, sorted(names - {0}))
     # What the border cuts may be no element, but is no ground either.
-    rim = [np.take(pieces, side, axis) for axis in range(2) if not wrap[axis] for side in (0, -1)]
-    cut = np.unique(np.concatenate(rim)) if rim else np.zeros(0, np.intp)
+    ends = [np.take(pieces, side, axis) for axis in range(2) if not wrap[axis] for side in (0, -1)]
+    cut = np.unique(np.concatenate(ends)) if ends else np.zeros(0, np.intp)
     cut = cut[(cut > 0) & (area[cut] >= ADDED * usual) & (area[cut] <= SWOLLEN * usual)]
     left: Bools = mask & (used | np.isin(pieces, cut))
     return Separation(table[:, :2].copy(), table[:, 2].copy(), table[:, 3].astype(np.intp), left, "cut")
 
 
 def _is_strip(bounds: tuple[int, ...], area: float, box: tuple[int, ...]) -> bool:
-    """Return whether a component is much longer than an element and much thinner: a rim along the border, mostly."""
+    """Return whether a component is much longer than an element and much thinner: a strip along the border, mostly."""
     side = max(bounds[axis + 2] - bounds[axis] for axis in range(2))
     return side > LONG * max(box) and area / side < THIN * min(box)
 

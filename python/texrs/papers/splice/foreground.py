@@ -97,7 +97,7 @@ def _split(entry: Elements) -> Foreground:
 def _claim(
     component: Labels, count: int, points: Points, mask: Bools
 ) -> tuple[Points, NDArray[np.intp], Labels, dict[int, int]]:
-    """Give every large component an element.
+    """Make every large component that of an element.
 
     Returns
     -------

@@ -36,7 +36,7 @@ JITTER = 1.0
 """Samples of a level that places of what is not rigid are displaced by before they are corrected."""
 PASSES = 2
 WIDE = 1.0
-"""A hole wider than so many spacings is filled with patches; less is grown over from its rim."""
+"""A hole wider than so many spacings is filled with patches; less is grown over from its boundary."""
 K, APART = 3, 0.05
 """Size of a similarity set, and how far apart its samples are, as a share of the shorter side."""
 
@@ -71,7 +71,7 @@ class Draft:
 
 
 def fill(image: NDArray[np.generic], draft: Draft, scale: float, seed: int, progress: Progress | None) -> Draft:
-    """Fill the holes: wide ones with patches of the ground alone, the others with what goes on from their rim."""
+    """Fill the holes: wide ones with patches of the ground alone, the others with what goes on from their boundary."""
     from scipy.ndimage import distance_transform_edt
 
     holes = ~draft.known
