@@ -10,7 +10,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
 from texrs import scale_maps
@@ -86,9 +85,38 @@ def optimise(
     for name, shape in zip(("image", "exemplar"), shapes, strict=False):
         if min(shape) < LEAST:
             raise InvalidInput(f"{name}: method 'optimise' needs at least {LEAST} pixels a side, got {shape}")
-    count = min(count_levels(shape, SETTINGS.coarsest) for shape in shapes)
+    levels = min(count_levels(shape, SETTINGS.coarsest) for shape in shapes)
     # Windows may not leave a copy, but those of known pixels at the border do.
-    margin = RADIUS << (count - 1)
+    margin = RADIUS << (levels - 1)
+    atlas = _make_atlas(pictures, open_, scales, wide, levels, margin)
+    region = _look_around(wide, AROUND << (levels - 1), 1 << (levels - 1), wrap)
+    part = tuple(slice(o, o + n) for o, n in zip(region.origin, region.shape, strict=True))
+    # The picture is the first copy of the atlas.
+    shown = np.stack(np.mgrid[part], axis=-1).astype(np.int32) + np.array(atlas.copies[0].origin, np.int32) + margin
+    grown = grow_from_atlas(
+        atlas,
+        region,
+        None if scales is None else np.ascontiguousarray(scales[0][part]),
+        settings=SETTINGS,
+        held=Surroundings(~wide[part], shown),
+        seed=seed,
+        progress=progress,
+    )
+    which, at = (found.reshape(*region.shape, -1)[wide[part]] for found in atlas.locate(grown.places))
+    identity = SourceMap.identity(shapes[0])
+    coordinates, label, exemplar = identity.coordinates.copy(), identity.label.copy(), identity.exemplar.copy()
+    coordinates[part][wide[part]] = at - (margin if len(pictures) == 1 else (shapes[0][0] + 2 * margin, 0))
+    label[part][wide[part]] = which[:, 0] + 1
+    exemplar[part][wide[part]] = len(pictures) - 1
+    frames = [np.eye(2), *(np.diag([1 / f for f in c.factor]) for c in atlas.copies)]
+    frame = np.array(frames, np.float32) if len(atlas.copies) > 1 else None
+    return SourceMap(coordinates, exemplar, label, frame, shapes), [done.report() for done in grown.levels]
+
+
+def _make_atlas(
+    pictures: list[Array], open_: Bools, scales: list[Floats] | None, wide: Bools, levels: int, margin: int
+) -> Atlas:
+    """Return what is copied from: what is known of the picture, or the source, in the sizes that are of use."""
     ground, free, scale = _lay_out(pictures, open_, scales, margin)
     sizes: tuple[float, ...] = (1.0,)
     wanted: tuple[float, float] | None = None
@@ -96,7 +124,7 @@ def optimise(
         asked = scales[0][wide]
         wanted = (float(asked.min()), float(asked.max()))
         sizes = SIZES if len(pictures) == 1 else extend_sizes(SIZES, scales[1], wanted)
-    atlas = Atlas.of(guidance(ground), scale, sizes, levels=count, wanted=wanted, known=free)
+    atlas = Atlas.of(guidance(ground), scale, sizes, levels=levels, wanted=wanted, known=free)
     if not atlas.usable:
         why = (
             "hole: leaves no part of the image that is free"
@@ -104,35 +132,7 @@ def optimise(
             else "exemplar: has no part large enough"
         )
         raise InvalidInput(f"{why} to copy from; method='patch' may find one")
-    box = find_box(wide, AROUND << (count - 1), 1 << (count - 1), wrap)
-    part = (slice(box[0], box[1]), slice(box[2], box[3]))
-    size = (box[1] - box[0], box[3] - box[2])
-    closed = tuple(w and n == m for w, n, m in zip(wrap, size, wide.shape, strict=True))
-    row, column = np.mgrid[part]
-    given: NDArray[np.int32] = (
-        np.stack([row, column], axis=-1).astype(np.int32) + np.array(atlas.copies[0].origin, np.int32) + margin
-    )
-    grown = grow_from_atlas(
-        atlas,
-        Region(size, (box[0], box[2]), (closed[0], closed[1])),
-        None if scales is None else np.ascontiguousarray(scales[0][part]),
-        settings=SETTINGS,
-        held=Surroundings(~wide[part], given),
-        seed=seed,
-        progress=progress,
-    )
-    which, at = atlas.locate(grown.places)
-    here = wide[part]
-    which, at = which.reshape(size)[here], at.reshape(*size, 2)[here]
-    identity = SourceMap.identity(shapes[0])
-    coordinates, label, exemplar = identity.coordinates.copy(), identity.label.copy(), identity.exemplar.copy()
-    coordinates[part][here] = at - (margin if len(pictures) == 1 else (shapes[0][0] + 2 * margin, 0))
-    label[part][here] = which + 1
-    exemplar[part][here] = len(pictures) - 1
-    frames = [np.eye(2), *(np.diag([1 / f for f in c.factor]) for c in atlas.copies)]
-    frame = np.array(frames, np.float32) if len(atlas.copies) > 1 else None
-    levels = [done.report() for done in grown.levels]
-    return SourceMap(coordinates, exemplar, label, frame, shapes), levels
+    return atlas
 
 
 def _lay_out(
@@ -159,17 +159,20 @@ def _lay_out(
     return np.concatenate(parts), free, scale
 
 
-def find_box(open_: Bools, margin: int, step: int, wrap: tuple[bool, bool]) -> tuple[int, int, int, int]:
-    """Return the part of a picture that a filling looks at: rows from, to, columns from, to; all of an axis that wraps."""
-    found: list[int] = []
+def _look_around(open_: Bools, margin: int, step: int, wrap: tuple[bool, bool]) -> Region:
+    """Return the part of a picture that a filling looks at: all of an axis that wraps."""
+    origin, shape, whole = [], [], []
     for axis, closed in enumerate(wrap):
         n = open_.shape[axis]
         at = np.nonzero(open_.any(axis=1 - axis))[0]
         low, high = int(at[0]) - margin, int(at[-1]) + 1 + margin
         if closed or high - low >= n:
             low, high = 0, n
-        found += [max(0, low) // step * step, min(n, -(-high // step) * step)]
-    return found[0], found[1], found[2], found[3]
+        low, high = max(0, low) // step * step, min(n, -(-high // step) * step)
+        origin.append(low)
+        shape.append(high - low)
+        whole.append(closed and high - low == n)
+    return Region(tuple(shape), tuple(origin), tuple(whole))
 
 
 def _paint_over(image: Array, open_: Bools) -> Array:
