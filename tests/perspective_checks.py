@@ -67,7 +67,7 @@ def fidelity(image, target):
 
 
 def discs(image, target):
-    """Return rank correlation and slope of the logarithms of coloured discs' diameters and the wanted scales, and their solidity.
+    """Return rank correlation and slope of the logarithms of discs' diameters and the wanted scales, and their solidity.
 
     Solidity is the share of a disc's bounding ellipse that it fills.
     """

@@ -92,7 +92,7 @@ def optimise(
     region = _look_around(wide, AROUND << (levels - 1), 1 << (levels - 1), wrap)
     part = tuple(slice(o, o + n) for o, n in zip(region.origin, region.shape, strict=True))
     # The picture is the first copy of the atlas.
-    shown = np.stack(np.mgrid[part], axis=-1).astype(np.int32) + np.array(atlas.copies[0].origin, np.int32) + margin
+    shown = np.moveaxis(np.mgrid[part], 0, -1).astype(np.int32) + np.array(atlas.copies[0].origin, np.int32) + margin
     grown = grow_from_atlas(
         atlas,
         region,
