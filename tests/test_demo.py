@@ -7,14 +7,12 @@ from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from texrs import samples
 from texrs.cli import main
 from texrs.demo import Section, page
-from texrs.demo._samples import cube
-from texrs.demo._workshop import Designed, Workshop
+from texrs.demo._workshop import Texture, Workshop
 
 
 class Page(HTMLParser):
@@ -41,10 +39,8 @@ class Page(HTMLParser):
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the demo make small textures, and each volume and picture at the least size."""
-    designed: Callable[..., Designed] = Workshop.designed
-    monkeypatch.setattr(
-        Workshop, "designed", lambda self, name, *sizes, **o: designed(self, name, 64, 64, tiles=1, **o)
-    )
+    designed: Callable[..., Texture] = Workshop.design
+    monkeypatch.setattr(Workshop, "design", lambda self, name, *sizes, **o: designed(self, name, 64, 64, tiles=1, **o))
     monkeypatch.setattr("texrs.demo._pictures.SIDE", 64)
     monkeypatch.setattr("texrs.demo._samples.SIDE", 64)
     monkeypatch.setattr("texrs.demo._samples.EDGE", 32)
@@ -94,13 +90,3 @@ def test_a_section_joins_the_page() -> None:
     text = page([mine], progress=lambda stage, share: seen.append((stage, share)))
     assert '<section id="mine"><h2>A &amp; B</h2><p class="lead">1 &lt; 2</p><p>body</p></section>' in text
     assert seen == [("A & B", 0.0), ("A & B", 1.0)]
-
-
-def test_cube_shows_three_faces() -> None:
-    volume = np.zeros((8, 8, 8, 3), np.uint8)
-    volume[0, :, :, 0], volume[1:, -1, :, 1], volume[1:, :-1, -1, 2] = 200, 200, 200
-    picture = cube(volume, 64)
-    assert picture[8, 32].tolist() == [200, 0, 0, 255]
-    assert picture[40, 20, 3] == picture[40, 44, 3] == 255
-    assert picture[40, 20, 0] == picture[40, 44, 0] == 0
-    assert picture[0, 0].tolist() == [0, 0, 0, 0]

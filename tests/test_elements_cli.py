@@ -34,9 +34,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_analyse_writes_what_the_function_finds(here: Path, capsys: Capture) -> None:
-    assert (
-        main(["analyse", "in.png", "-o", "e.npz", "--mask", "mask.png", "--layout", "disjoint", "--stages", "st"]) == 0
-    )
+    assert main(["analyse", "in.png", "-o", "e.npz", "--mask", "mask.png", "--layout", "F=d", "--stages", "st"]) == 0
     found = elements.load("e.npz")
     wanted = elements.analyse(DOTS.image, mask=DOTS.mask, layout="disjoint")
     np.testing.assert_array_equal(found.points, wanted.points)
@@ -49,7 +47,7 @@ def test_places_may_follow_each_other(here: Path) -> None:
 
     box, ground = told(DOTS)
     places = [f"{r},{c}" for r, c in ground[:4]]
-    start = ["analyse", "in.png", "-q", "--box", ",".join(map(str, box)), "--layout", "disjoint"]
+    start = ["analyse", "in.png", "-q", "--box", ",".join(map(str, box)), "--layout", "F=d"]
     assert main([*start, "-o", "a.npz", "--background", *places]) == 0
     assert main([*start, "-o", "b.npz", *(x for p in places for x in ("--background", p))]) == 0
     assert main([*start, "-o", "c.npz", "--background", " ".join(places)]) == 0
@@ -58,18 +56,7 @@ def test_places_may_follow_each_other(here: Path) -> None:
 
 
 def test_given_points_and_an_automatic_start(here: Path, capsys: Capture) -> None:
-    command = [
-        "analyse",
-        "in.png",
-        "-o",
-        "e.npz",
-        "--points",
-        "points.csv",
-        "--mask",
-        "mask.png",
-        "--layout",
-        "disjoint",
-    ]
+    command = ["analyse", "in.png", "-o", "e.npz", "--points", "points.csv", "--mask", "mask.png", "--layout", "F=d"]
     assert main([*command, "--similarity"]) == 0
     found = elements.load("e.npz")
     assert len(found.points) >= len(DOTS.centres)
@@ -81,10 +68,8 @@ def test_given_points_and_an_automatic_start(here: Path, capsys: Capture) -> Non
 
 
 def test_database(here: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert (
-        main(["database", "db", "add", "in.png", "--mask", "mask.png", "--layout", "disjoint", "--name", "dots"]) == 0
-    )
-    assert main(["database", "db", "add", "sample:leaves_and_flowers", "-q", "--layout", "disjoint"]) == 0
+    assert main(["database", "db", "add", "in.png", "--mask", "mask.png", "--layout", "F=d", "--name", "dots"]) == 0
+    assert main(["database", "db", "add", "sample:leaves_and_flowers", "-q", "--layout", "F=d"]) == 0
     capsys.readouterr()
     assert main(["database", "db", "list"]) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -108,9 +93,9 @@ def test_database(here: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) 
         ("analyse in.png -o before.npz --background 10", "--background: needs ROW,COL"),
         ("analyse in.png -o before.npz --background 10,nan", "--background: needs ROW,COL"),
         ("analyse in.png -o before.npz --background 10,900", "--background: point 0, .* outside"),
-        ("analyse in.png -o before.npz --layout F=e", "--layout: allowed are disjoint"),
+        ("analyse in.png -o before.npz --layout F=e", "--layout: allowed are default, disjoint, connected and jointed"),
         (
-            "analyse in.png -o before.npz --layout connected --mask mask.png --box 48,48,20,20",
+            "analyse in.png -o before.npz --layout F=c --mask mask.png --box 48,48,20,20",
             "--layout: contradicts the mask",
         ),
         ("analyse in.png -o before.npz --points nan.csv", "--points: must be finite, but point 1"),

@@ -83,7 +83,9 @@ def test_a_map_made_before_is_edited_and_encoded(here: Path) -> None:
     ):
         assert main(["scale-map", "in.png", "-o", name, "--slant", "30", "-q", *options]) == 0
         assert np.abs(np.log(read(io.read(name)) / made)).max() < 0.02
-        assert main(["scale-map", "in.png", "-o", "two.npy", "--scale", name, "--edit", "edits.json", *options]) == 0
+        assert (
+            main(["scale-map", "in.png", "-o", "two.npy", "--scale-map", name, "--edit", "edits.json", *options]) == 0
+        )
         values = io.read("two.npy")
         edited = scale_maps.decode(values, "paper") if options else values
         assert np.abs(np.log(edited / scale_maps.edit(made, EDITS))).max() < 0.02
@@ -109,8 +111,8 @@ def test_stages_are_pictures_to_look_at(here: Path, capsys: Capture) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ("", "scale-map: needs one of --mask, --auto, --slant and --scale, got none of them"),
-        ("--auto --slant 3", "scale-map: needs one of --mask, --auto, --slant and --scale, got --auto and --slant"),
+        ("", "scale-map: needs one of --mask, --auto, --slant and --scale-map, got none of them"),
+        ("--auto --slant 3", "scale-map: needs one of --mask, --auto, --slant and --scale-map, got --auto and --slant"),
         ("--auto --tilt 3", "--tilt: needs --slant, got --auto"),
         ("--slant 3 --hole hole.png", "--hole: needs --mask or --auto, got --slant"),
         ("--slant 89", "--slant: needs a number from 0 to 85.0, got 89.0"),
@@ -128,8 +130,8 @@ def test_stages_are_pictures_to_look_at(here: Path, capsys: Capture) -> None:
         ("--slant 3 --mode user", "--mode: allowed are stretch and extend; got 'user'"),
         ("--slant 3 --encoding log", "--encoding: allowed are log2 and paper; got 'log'"),
         ("--slant 3 --size 0x5", "--size: each side must be at least 1"),
-        ("--scale in.png", "in.png: needs grey levels, got colours"),
-        ("--scale none.npy", "none.npy:"),
+        ("--scale-map in.png", "in.png: needs grey levels, got colours"),
+        ("--scale-map none.npy", "none.npy:"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_done_is_said_and_nothing_is_written(

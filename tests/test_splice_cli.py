@@ -15,7 +15,7 @@ from texrs.cli import main
 def test_splice(tmp_path: Path) -> None:
     out, source, stages = tmp_path / "out.png", tmp_path / "map.npz", tmp_path / "stages"
     line = ["splice", "sample:dots", "sample:pebbles", "-o", str(out), "--size", "96x112", "--seed", "2", "-q"]
-    assert main([*line, "--source", str(source), "--stages", str(stages)]) == 0
+    assert main([*line, "--map", str(source), "--stages", str(stages)]) == 0
     image = io.read(out)
     assert image.shape == (96, 112, 3)
     assert (texrs.SourceMap.load(source).render(texrs.samples.dots().image) == image).all()
@@ -35,7 +35,7 @@ def test_self_splice_and_its_replay(tmp_path: Path) -> None:
 
 def test_entries_are_taken(tmp_path: Path) -> None:
     entry, out = tmp_path / "dots.npz", tmp_path / "out.png"
-    box = ["--box", "60,62,25,25", "--layout", "disjoint"]
+    box = ["--box", "60,62,25,25", "--layout", "F=d"]
     assert main(["analyse", "sample:dots", "-o", str(entry), *box, "-q"]) == 0
     assert main(["splice", str(entry), "sample:pebbles", "-o", str(out), "--size", "64", "-q"]) == 0
     assert io.read(out).shape == (64, 64, 3)

@@ -11,7 +11,7 @@ from PIL import Image
 
 from texrs import fields, io, samples, volume
 from texrs.cli import main
-from texrs.cli._volumes import read_field
+from texrs.cli._kinds import read_field
 from texrs.errors import TexrsError
 
 VOLUME = samples.stripes((32, 36, 40)).image
@@ -74,7 +74,12 @@ def test_turntables_and_samples(here, capsys):
         ("v.npy -o out.png --oblique 1,2,900/0,0,1", "does not meet"),
         ("v.npy -o out.png --cube --at plane=3", "--at and --cube: one of them"),
         ("v.npy -o out.png --cube --size 9", "--size: needs an integer from 16"),
-        ("v.npy -o out.png --interpolation best", "--interpolation: allowed are linear"),
+        ("v.npy -o out.png --cube --interpolation best", "--interpolation: allowed are nearest"),
+        (
+            "v.npy -o out.png --interpolation cubic",
+            "--interpolation: needs --oblique or --cube or --turntable, got --at",
+        ),
+        ("v.npy -o out.png --cube --seconds 9", "--seconds: needs --turntable, got --cube"),
         ("v.npy -o out.png --turntable", "--turntable is written to .gif"),
         ("v.npy -o out.gif --cube", "a picture is not written to .gif"),
         ("v.npy -o out.jpg --cube", "out.jpg: .jpg cannot hold uint8 with 4 channels"),

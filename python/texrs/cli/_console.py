@@ -13,58 +13,22 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
-from typing import Annotated, Any, cast
+from typing import TYPE_CHECKING, cast
 
 import typer
-from typer.core import TyperCommand
 
-from texrs._typing import Progress
-from texrs.cli._files import check_apart
-from texrs.errors import InvalidInput, TexrsError
+from texrs.errors import TexrsError
 
-__all__ = [
-    "Command",
-    "Method",
-    "Out",
-    "Quiet",
-    "Source",
-    "Stages",
-    "Stopped",
-    "Threads",
-    "as_method",
-    "complain",
-    "note",
-    "run",
-    "say",
-    "watching",
-]
+if TYPE_CHECKING:
+    # Numpy would come with it.
+    from texrs._typing import Progress
 
-Out = Annotated[
-    str, typer.Option("--out", "-o", metavar="OUT", help="File to write; its name says the format.", show_default=False)
-]
-Stages = Annotated[
-    str | None,
-    typer.Option(metavar="DIR", help="Folder for pictures of the stages and report.json.", show_default=False),
-]
-Source = Annotated[
-    str | None,
-    typer.Option(
-        "--source", "--map", metavar="FILE.npz", help="File for the source map, for texrs apply.", show_default=False
-    ),
-]
-Method = Annotated[str, typer.Option(help="default, or paper: the published algorithm to the letter.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no progress.")]
-Threads = Annotated[
-    int | None,
-    typer.Option("--threads", metavar="N", help="Threads, 1 to 1024; same bytes with any.", show_default="all cores"),
-]
+__all__ = ["Stopped", "complain", "note", "run", "say", "watching"]
 
 DONE, INTERNAL, BAD_INPUT = 0, 1, 2
 """Exit codes; a command that a signal ends has 128 plus the signal's number, so 130 for Ctrl-C."""
 TRACEBACK = "TEXRS_TRACEBACK"
 """Environment variable that asks for the traceback of an internal error."""
-OUTPUTS = ("out", "source", "stages")
-"""Options that say what is written; a source map that is read is an argument."""
 PAUSE = 5.0
 """Least seconds between two lines of progress of one stage."""
 PIPE = int(getattr(signal, "SIGPIPE", 13))
@@ -76,34 +40,6 @@ GRACE = 1.0
 UsageFailure = cast(type[Exception], next(c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException"))
 
 
-class Command(TyperCommand):
-    """A command that never writes over what it reads.
-
-    Its outputs are ``--out``, ``--stages`` and ``--source``; whatever else names a file may be read.
-    """
-
-    def invoke(self, ctx: Any) -> Any:
-        """Do the command, if no output is an input."""
-        outputs = {p.name for p in self.params if p.name in OUTPUTS and p.param_type_name == "option"}
-        given = ctx.params.items()
-        inputs = [text for name, value in given if name not in outputs for text in _texts(value)]
-        check_apart(inputs, **{name: value for name, value in given if name in outputs})
-        return super().invoke(ctx)
-
-
-def _texts(value: object) -> list[str]:
-    """Return the texts among the values of a parameter."""
-    return [v for v in (value if isinstance(value, list | tuple) else [value]) if isinstance(v, str)]
-
-
-def as_method(text: str, *others: str) -> Any:
-    """Check a method: default, which is None, or one of the others, by default paper."""
-    allowed = ("default", *(others or ("paper",)))
-    if text not in allowed:
-        raise InvalidInput(f"--method: allowed are {', '.join(allowed[:-1])} and {allowed[-1]}; got {text!r}")
-    return None if text == "default" else text
-
-
 class Stopped(BaseException):
     """A signal ended the work. No KeyboardInterrupt, from which typer makes an exit of its own."""
 
@@ -113,7 +49,7 @@ class Stopped(BaseException):
 
 
 def run(work: Callable[[], object]) -> int:
-    """Do the work of a command and give its exit code; say on one line of stderr what went wrong."""
+    """Do the work of a command and return its exit code; say on one line of stderr what went wrong."""
     try:
         with stoppable(), unwarned():
             code = work()

@@ -2,36 +2,31 @@
 
 from __future__ import annotations
 
-import colorsys
 from typing import Any
 
-import numpy as np
-
-from texrs._engine.noise import uniform
 from texrs._typing import Array
-from texrs.demo._html import code, figure, grid, row, tiled
+from texrs.demo._html import code, figure, grid, pair, row
 from texrs.demo._workshop import Section, Workshop
-from texrs.papers.design import DeformationOptions
 from texrs.synthesis import preview
 
-__all__ = ["RESULTS", "SEEDS", "STAGES", "coloured"]
+__all__ = ["RESULTS", "SEEDS", "SHOWN", "STAGES"]
 
 SHOWN: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("pebbles", "Rounded stones on sand", {}),
     ("leaves_and_flowers", "Flowers on leaves", {}),
     ("beans", "Touching beans of one colour", {}),
-    ("bark", "Furrowed bark, upright: rotate=0", {"deformation": DeformationOptions(rotate=0)}),
+    ("bark", "Furrowed bark, upright: --rotate 0", {"rotate": 0.0}),
     (
         "bricks",
-        "A wall: no rotation, no scaling",
-        {"deformation": DeformationOptions(rotate=0, scale=(1, 1), translate=0.05)},
+        "A wall: --rotate 0 --scale 1 --translate 0.05",
+        {"rotate": 0.0, "scale": (1.0, 1.0), "translate": 0.05},
     ),
     ("gravel", "A grey photograph", {}),
 )
 
 CAPTIONS = {
     "segmentation": ("Elements", "each in a colour of its own"),
-    "deformed": ("Deformed", "moved by chaos, stitched by graph cuts"),
+    "deformed": ("Deformed", "moved as a logistic map says, stitched by graph cuts"),
     "holes": ("Holes", "what no element covers"),
     "completed": ("Completed", "holes filled by example"),
     "composite": ("Composite", "variants stitched on the torus"),
@@ -42,12 +37,12 @@ def _results(workshop: Workshop) -> str:
     rows = []
     for i, (name, caption, options) in enumerate(SHOWN):
         workshop.watch(i / len(SHOWN))
-        made = workshop.designed(name, **options)
+        made = workshop.design(name, **options)
         reuse = made.result.source.reuse()
         rows.append(
             row(
                 figure(made.sample.image, "Example", note=_size(made.sample.image)),
-                tiled(
+                pair(
                     made.result.image,
                     caption,
                     "The result, tiled 2 × 2",
@@ -60,7 +55,7 @@ def _results(workshop: Workshop) -> str:
 
 def _stages(workshop: Workshop) -> str:
     name, _, options = SHOWN[0]
-    made = workshop.designed(name, **options)
+    made = workshop.design(name, **options)
     pictures = [figure(made.sample.image, "Example", note=_size(made.sample.image))]
     for stage, image in made.result.stages.items():
         caption, note = CAPTIONS.get(stage, (stage.capitalize(), ""))
@@ -72,21 +67,11 @@ def _seeds(workshop: Workshop) -> str:
     pictures: list[str] = []
     for seed in range(1, 6):
         workshop.watch((seed - 1) / 5)
-        made = workshop.designed("dots", 160, 200, seed=seed)
+        made = workshop.design("dots", 160, 200, seed=seed)
         if not pictures:
             pictures.append(figure(made.sample.image, "Example", share=160 / 200))
         pictures.append(figure(made.result.image, f"Seed {seed}"))
     return code("texrs design example.png -o result.png --size 200 --seed 1") + grid(pictures)
-
-
-def coloured(labels: Array) -> Array:
-    """Return each label a colour of its own, the background none."""
-    count = int(labels.max()) + 1
-    hues = [uniform(1, i, 0) for i in range(count)]
-    palette = np.array([colorsys.hsv_to_rgb(h, 0.6, 1.0) for h in hues])
-    palette[0] = 0.35
-    colours: Array = np.rint(255 * palette[labels]).astype(np.uint8)
-    return colours
 
 
 def _size(image: Array) -> str:

@@ -12,7 +12,7 @@ from texrs._typing import Array
 from texrs._version import __version__
 from texrs.synthesis import preview
 
-__all__ = ["code", "document", "figure", "grid", "row", "section", "tiled", "uri"]
+__all__ = ["code", "document", "figure", "grid", "pair", "row", "section", "uri"]
 
 QUALITY = 90
 """Of the JPEG pictures."""
@@ -39,7 +39,7 @@ def figure(image: Array, caption: str, *, exact: bool = False, share: float = 1.
     return f"<figure>{picture}{_caption(caption, note)}</figure>"
 
 
-def tiled(image: Array, caption: str, tiles: str, *, note: str = "") -> str:
+def pair(image: Array, caption: str, tiles: str, *, note: str = "") -> str:
     """Show a picture, and beside it the same data tiled 2 x 2 as a background."""
     height, width = image.shape[:2]
     ratio = f"aspect-ratio:{width}/{height}"

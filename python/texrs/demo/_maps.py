@@ -6,11 +6,12 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 
 from texrs._typing import Array, Floats, Labels
-from texrs.demo._design import SHOWN, coloured
+from texrs.demo._design import SHOWN
 from texrs.demo._html import code, figure, grid
 from texrs.demo._workshop import Section, Workshop
+from texrs.volume import paint
 
-__all__ = ["MAPS", "height_of", "lit", "normals_of"]
+__all__ = ["MAPS", "derive_normals", "guess_height", "light_up"]
 
 RELIEF = 12.0
 """Height of the relief, in pixels."""
@@ -18,37 +19,37 @@ RELIEF = 12.0
 
 def _maps(workshop: Workshop) -> str:
     name, _, options = SHOWN[0]
-    made = workshop.designed(name, **options)
+    made = workshop.design(name, **options)
     picture, labels, source = made.sample.image, made.sample.labels, made.result.source
     assert labels is not None
-    height = height_of(labels, picture)
-    normals = normals_of(height)
+    height = guess_height(labels, picture)
+    normals = derive_normals(height)
     there = source.render(normals, kind="normal")
     examples = [
         figure(picture, "Colours", note="uint8"),
         figure(height, "Height", note="uint16"),
         figure(normals, "Normals", note="uint8, y up"),
-        figure(lit(normals), "Lit from the upper left"),
-        figure(coloured(labels), "Labels", note="int32", exact=True),
+        figure(light_up(normals), "Lit from the upper left"),
+        figure(paint(labels), "Labels", note="int32", exact=True),
     ]
     results = [
         figure(source.render(picture), "Colours"),
         figure(source.render(height), "Height"),
         figure(there, "Normals", note="turned with the stones"),
-        figure(lit(there), "Lit from the upper left"),
-        figure(coloured(source.render(labels, interpolation="nearest")), "Labels", note="nearest", exact=True),
+        figure(light_up(there), "Lit from the upper left"),
+        figure(paint(source.render(labels, interpolation="nearest")), "Labels", note="nearest", exact=True),
     ]
     return (
         code(
-            "texrs design example.png -o result.png --source source.npz\n"
-            "texrs apply source.npz height.tif -o result-height.tif\n"
-            "texrs apply source.npz normals.png -o result-normals.png --kind normal"
+            "texrs design example.png -o result.png --map map.npz\n"
+            "texrs apply map.npz height.tif -o result-height.tif\n"
+            "texrs apply map.npz normals.png -o result-normals.png --kind normal"
         )
         + f"<h3>The example</h3>{grid(examples, least=180)}<h3>The result</h3>{grid(results, least=180)}"
     )
 
 
-def height_of(labels: Labels, picture: Array) -> Array:
+def guess_height(labels: Labels, picture: Array) -> Array:
     """Guess a relief: domes over the elements, with the fine grain of the picture; uint16."""
     depth = np.zeros(labels.shape)
     for label in range(1, int(labels.max()) + 1):
@@ -63,7 +64,7 @@ def height_of(labels: Labels, picture: Array) -> Array:
     return relief
 
 
-def normals_of(height: Array) -> Array:
+def derive_normals(height: Array) -> Array:
     """Return the tangent-space normals of a relief: uint8, x to the right and y up."""
     down, right = np.gradient(RELIEF * height.astype(np.float64) / 65535)
     normals = np.stack([-right, down, np.ones_like(down)], axis=-1)
@@ -71,7 +72,7 @@ def normals_of(height: Array) -> Array:
     return np.rint(127.5 * (normals + 1)).astype(np.uint8)
 
 
-def lit(normals: Array) -> Floats:
+def light_up(normals: Array) -> Floats:
     """Light a relief from the upper left."""
     light = np.array([-1.0, 1.0, 1.2]) / np.linalg.norm([-1.0, 1.0, 1.2])
     shade = (normals / 127.5 - 1) @ light

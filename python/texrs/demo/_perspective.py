@@ -17,7 +17,7 @@ SIDE, SIZE = 192, 224
 """Pixels a side of the example, and of what is grown."""
 
 
-def _patterns(scale: Floats) -> dict[str, Floats]:
+def _draw_targets(scale: Floats) -> dict[str, Floats]:
     """Return targets that do not look like the example's map."""
     low, high = np.log(np.quantile(scale, [0.05, 0.95]))
     at = (np.arange(SIZE) + 0.5) / SIZE
@@ -33,7 +33,7 @@ def _patterns(scale: Floats) -> dict[str, Floats]:
 def _perspective(workshop: Workshop) -> str:
     floor = samples.tilted_discs((SIDE, SIDE))
     scale = np.asarray(floor.scale_map, np.float32)
-    patterns = _patterns(scale)
+    patterns = _draw_targets(scale)
     grown = [
         figure(floor.image, "Example", share=SIDE / SIZE),
         figure(scale_maps.picture(scale), "Its scale map", share=SIDE / SIZE),
@@ -50,13 +50,15 @@ def _perspective(workshop: Workshop) -> str:
     filled = complete(floor.image, hole, scale_map=scale, seed=3)
     mended = [
         figure(np.where(hole[..., np.newaxis], 128, floor.image).astype(np.uint8), "With a hole"),
-        figure(filled.image, "Filled", note="--scale"),
+        figure(filled.image, "Filled", note="--scale-map"),
     ]
     return (
         code("texrs scale-map floor.png -o scale.npy --slant 50 --tilt 90")
-        + code("texrs perspective floor.png --scale scale.npy --target pattern.npy -o result.png --size 224 --seed 3")
+        + code(
+            "texrs perspective floor.png --scale-map scale.npy --target pattern.npy -o result.png --size 224 --seed 3"
+        )
         + grid(grown, least=200)
-        + code("texrs complete floor.png hole.png -o filled.png --scale scale.npy")
+        + code("texrs complete floor.png hole.png -o filled.png --scale-map scale.npy")
         + grid(mended, least=200)
     )
 
@@ -64,7 +66,7 @@ def _perspective(workshop: Workshop) -> str:
 PERSPECTIVE = Section(
     "perspective",
     "Elements of the right size",
-    "A picture taken at an angle has elements of every size. A scale map says which; textures are grown, and holes filled, with "
-    "elements as large as it, or any other map, asks for.",
+    "A picture taken at an angle has elements of every size. A scale map says which; textures are grown, and holes filled, "
+    "with elements as large as it, or any other map, asks for.",
     _perspective,
 )

@@ -6,8 +6,8 @@ import numpy as np
 
 from texrs._typing import Bools
 from texrs.completion import complete
-from texrs.demo._html import code, figure, grid, row, tiled
-from texrs.demo._workshop import Section, Workshop, exemplar
+from texrs.demo._html import code, figure, grid, pair, row
+from texrs.demo._workshop import Section, Workshop, load_sample
 from texrs.tiling import tile
 
 __all__ = ["COMPLETE", "TILE"]
@@ -26,13 +26,13 @@ def _tile(workshop: Workshop) -> str:
     rows = []
     for i, (name, caption) in enumerate(TILED):
         workshop.watch(i / len(TILED))
-        picture = exemplar(name, SIDE).image
+        picture = load_sample(name, SIDE).image
         made = tile(picture)
         note = " and ".join(str(n) for n in made.report["overlap"])
         rows.append(
             row(
                 figure(picture, "A picture", note=" × ".join(map(str, picture.shape[:2]))),
-                tiled(made.image, caption, "The result, tiled 2 × 2", note=f"overlap chosen: {note} pixels"),
+                pair(made.image, caption, "The result, tiled 2 × 2", note=f"overlap chosen: {note} pixels"),
             )
         )
     return code("texrs tile photograph.jpg -o tile.png") + "".join(rows)
@@ -42,8 +42,8 @@ def _complete(workshop: Workshop) -> str:
     pictures = []
     for i, (name, caption) in enumerate(FILLED):
         workshop.watch(i / len(FILLED))
-        picture = exemplar(name, SIDE).image
-        made = complete(picture, scratched((SIDE, SIDE)))
+        picture = load_sample(name, SIDE).image
+        made = complete(picture, mark_scratches((SIDE, SIDE)))
         pictures += [
             figure(made.stages["known"], f"{caption}, with holes"),
             figure(made.image, "Filled", note=f"{made.report['patches']} patches"),
@@ -51,7 +51,7 @@ def _complete(workshop: Workshop) -> str:
     return code("texrs complete picture.png holes.png -o whole.png") + grid(pictures, least=300)
 
 
-def scratched(shape: tuple[int, int]) -> Bools:
+def mark_scratches(shape: tuple[int, int]) -> Bools:
     """Mark a spot and a scratch."""
     row_, column = (i / n for i, n in zip(np.indices(shape), shape, strict=True))
     spot = ((row_ - 0.42) / 0.17) ** 2 + ((column - 0.5) / 0.22) ** 2 < 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from texrs import fields, samples
 from texrs.demo._html import code, figure, grid
-from texrs.demo._workshop import Section, Workshop, exemplar
+from texrs.demo._workshop import Section, Workshop, load_sample
 from texrs.papers.solid import solid, synthesize
 from texrs.volume import cube
 
@@ -40,7 +40,7 @@ def _solid(workshop: Workshop) -> str:
         grown.append(figure(cube(made.image, CUBE), words.partition(":")[0], note=f"--field {words}"))
     for i, (name, words) in enumerate(PICTURES, start=len(VOLUMES)):
         workshop.watch(i / total)
-        picture = exemplar(name, SIDE).image
+        picture = load_sample(name, SIDE).image
         made = synthesize(picture, WIDTH, field=fields.parse(words, 2), seed=3, quality="fast")
         drawn += [figure(picture, "Example", share=SIDE / WIDTH), figure(made.image, name, note=f"--field {words}")]
     return (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from texrs.demo._html import code, figure, grid
-from texrs.demo._workshop import Section, Workshop, exemplar
+from texrs.demo._workshop import Section, Workshop, load_sample
 from texrs.elements import Elements
 from texrs.papers.splice import self_splice, splice
 
@@ -22,7 +22,7 @@ EDITS: tuple[tuple[str, dict[str, Any], str], ...] = (
 
 def _entry(name: str) -> Elements:
     """Return a sample with the elements that it is known to have."""
-    return Elements.of_sample(exemplar(name, SIDE))
+    return Elements.of_sample(load_sample(name, SIDE))
 
 
 def _splice(workshop: Workshop) -> str:

@@ -14,7 +14,7 @@ from texrs._typing import Array, Progress
 from texrs.papers.design import design
 from texrs.synthesis import Synthesis
 
-__all__ = ["Designed", "Section", "Workshop"]
+__all__ = ["Section", "Texture", "Workshop", "load_sample"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class Section:
 
 
 @dataclass(frozen=True)
-class Designed:
+class Texture:
     """An exemplar, a texture designed from it and the options that made it."""
 
     sample: samples.Sample
@@ -59,7 +59,7 @@ class Workshop:
 
     progress: Progress
     title: str = ""
-    made: dict[str, Designed] = field(default_factory=dict)
+    made: dict[str, Texture] = field(default_factory=dict)
 
     def begin(self, title: str) -> None:
         """Start a section."""
@@ -70,15 +70,15 @@ class Workshop:
         """Report the share of the section that is done."""
         self.progress(self.title, share)
 
-    def designed(self, name: str, side: int = 160, size: int = 320, **options: Any) -> Designed:
-        """Design a texture from a sample, or give the one that was made before."""
+    def design(self, name: str, side: int = 160, size: int = 320, **options: Any) -> Texture:
+        """Design a texture from a sample, or return the one that was made before."""
         key = repr((name, side, size, sorted(options.items())))
         if key not in self.made:
-            self.made[key] = Designed(exemplar(name, side), size, {"seed": 7, **options})
+            self.made[key] = Texture(load_sample(name, side), size, {"seed": 7, **options})
         return self.made[key]
 
 
-def exemplar(name: str, side: int) -> samples.Sample:
+def load_sample(name: str, side: int) -> samples.Sample:
     """Return a sample of a size; of a photograph, which has its own, the middle at half the scale."""
     if name in samples.names():
         return samples.load(name, size=(side, side))

@@ -1,0 +1,85 @@
+"""Commands that need no picture: ``texrs samples`` and ``texrs demo``."""
+
+from __future__ import annotations
+
+import os
+import re
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from texrs import io, samples
+from texrs._threads import threads
+from texrs.cli import _outputs
+from texrs.cli._console import note, say, watching
+from texrs.cli._kinds import parse_size
+from texrs.cli._outputs import Quiet, Threads, describe, named, to_write
+from texrs.errors import InvalidInput
+
+__all__ = ["COMMANDS"]
+
+
+def demo_command(
+    out: Annotated[str, to_write("out", "DIR", "Folder for index.html.")],
+    count: Threads = None,
+    quiet: Quiet = False,
+) -> None:
+    """Write a page that shows what texrs makes, on built-in examples."""
+    # Which needs all verbs.
+    from texrs.demo import page
+
+    start = time.monotonic()
+    _outputs.check_folder(out)
+    index = os.path.join(out, "index.html")
+    if Path(out).is_dir():
+        _outputs.check_output(index)
+    with named(count="--threads"), threads(count), watching(quiet=quiet) as progress:
+        text = page(progress=progress)
+    Path(out).mkdir(parents=True, exist_ok=True)
+    with _outputs.output(index) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    note(f"wrote {index}, in {time.monotonic() - start:.1f} s", quiet=quiet)
+
+
+def samples_command(
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="NAME", help="Which; all by default.", show_default=False)
+    ] = None,
+    out: Annotated[str | None, to_write("out", "DIR", "Folder to write them to, as .png and .tif.")] = None,
+    size: Annotated[
+        str | None,
+        typer.Option(metavar="SIZE", help="Of those that are generated: 256, 192x256, 64x64x64.", show_default=False),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Of those that are generated.", show_default=False)] = None,
+    quiet: Quiet = False,
+) -> None:
+    """List the built-in examples, or write them to a folder."""
+    known = (*samples.names(), *samples.photographs())
+    for name in names or ():
+        if name not in known:
+            raise InvalidInput(f"there is no sample {name!r}; allowed are {', '.join(known)}")
+    chosen = names or list(known)
+    if out is None:
+        for name in chosen:
+            say(name)
+        return
+    _outputs.check_folder(out)
+    made = {}
+    for name in chosen:
+        options: dict[str, Any] = {} if seed is None else {"seed": seed}
+        if size is not None:
+            # A size of three sides is that of a volume.
+            options["size"] = parse_size(size, axes=max(2, len(re.split("[x×]", size))))
+        made[name] = samples.load(name, **(options if name in samples.names() else {})).image
+    Path(out).mkdir(parents=True, exist_ok=True)
+    for name, image in made.items():
+        volume = image.ndim == 4
+        path = os.path.join(out, f"{name}.{'tif' if volume else 'png'}")
+        (io.write_volume if volume else io.write)(path, image)
+        note(f"wrote {path}: {describe(image, 3 if volume else 2)}", quiet=quiet)
+
+
+COMMANDS: dict[str, Callable[..., None]] = {"demo": demo_command, "samples": samples_command}

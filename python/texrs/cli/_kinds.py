@@ -1,0 +1,372 @@
+"""Kinds of values: how each is written on the command line, and read. All that the signatures of the functions do not say."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from texrs import io, samples
+from texrs._arrays import as_image, as_size
+from texrs._typing import Array, Floats
+from texrs.cli._outputs import SAMPLE, named
+from texrs.errors import FileError, InvalidInput
+
+__all__ = [
+    "ENTRY",
+    "HOLE",
+    "KINDS",
+    "MAP",
+    "MAP_OR_AUTO",
+    "NUMBERS",
+    "PICTURE",
+    "PICTURES",
+    "PLACE",
+    "UNKNOWN",
+    "VOLUME",
+    "About",
+    "Kind",
+    "parse_axes",
+    "parse_bytes",
+    "parse_numbers",
+    "parse_places",
+    "parse_size",
+    "read_field",
+    "read_mask",
+    "read_picture",
+    "read_scale_map",
+    "read_steps",
+    "read_volume",
+]
+
+PLACE = r"\s*-?[0-9]+(\.[0-9]*)?\s*,\s*-?[0-9]+(\.[0-9]*)?\s*"
+"""A row and a column, as text."""
+
+
+@dataclass(frozen=True, slots=True)
+class About:
+    """What the text of an option may be understood by."""
+
+    option: str = ""
+    """What errors call it."""
+    axes: int = 2
+    size: tuple[int, ...] = ()
+    """Of the result, once it is known."""
+    like: Array | None = None
+    """The exemplar, once it is read."""
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of value."""
+
+    metavar: str | tuple[str, str]
+    """The form of the text; of pictures and of volumes where they differ."""
+    read: Callable[[Any, About], Any]
+    """Make the value of the text, or of the list of texts."""
+    note: str | tuple[str, str] = ""
+    """What the form does not say."""
+    show: Callable[[Any], str] = str
+    """Make the text of a default."""
+    file: bool = False
+    """Whether the text names a file, which is read when it is known that the result can be written."""
+    words: tuple[str, ...] = ()
+    """Texts that name no file, and are given to the function as they are."""
+    many: bool = False
+    """Whether there may be any number of texts."""
+    plain: bool = False
+    """Whether it is written in this way even where typer could read the type."""
+
+    @staticmethod
+    def pick(text: str | tuple[str, str], axes: int) -> str:
+        """Return what is said of pictures, or of volumes."""
+        return text if isinstance(text, str) else text[axes - 2]
+
+
+# --- values that are written -----------------------------------------------------------------------------------------
+
+
+def parse_size(text: str, option: str = "--size", *, axes: int = 2) -> tuple[int, ...]:
+    """Return the sides: of ``512x384`` rows and columns, of ``512`` a square; with three axes planes come first."""
+    parts = re.split(r"[x×]", text.strip().lower())
+    if len(parts) not in (1, axes) or not all(re.fullmatch(r"\s*-?[0-9]{1,18}\s*", p) for p in parts):
+        wanted = ("ROWSxCOLS, as in 512x384", "PLANESxROWSxCOLS, as in 64x96x128")[axes - 2]
+        raise InvalidInput(f"{option}: needs {wanted}, or one number; got {text!r}")
+    sides = [int(p) for p in parts]
+    return as_size(sides if len(sides) > 1 else sides[0], option, axes=axes)
+
+
+def parse_axes(text: str, option: str = "--wrap", *, axes: int = 2) -> tuple[bool, ...]:
+    """Return whether each axis is among the letters: x for columns, y for rows, z for planes."""
+    known = "zyx"[-axes:]
+    letters = text.strip().lower()
+    if letters != "none" and (not letters or set(letters) - set(known) or len(set(letters)) < len(letters)):
+        wanted = "allowed are xy, x, y and none" if axes == 2 else "needs axes among x, y and z, each once, or none"
+        raise InvalidInput(f"{option}: {wanted}; got {text!r}")
+    return tuple(letters != "none" and letter in letters for letter in known)
+
+
+def show_axes(wrap: bool | Sequence[bool]) -> str:
+    """Return the letters of the axes."""
+    if isinstance(wrap, bool):
+        return "all" if wrap else "none"
+    return "".join(letter for letter, cyclic in zip("xyz", reversed(wrap), strict=False) if cyclic) or "none"
+
+
+def parse_numbers(
+    text: str, option: str, wanted: str, *, counts: Sequence[int] = (), between: str = ":"
+) -> list[float]:
+    """Return finite numbers with a sign between them."""
+    try:
+        numbers = [float(p) for p in text.split(between)]
+    except ValueError:
+        numbers = []
+    if not numbers or (counts and len(numbers) not in counts):
+        raise InvalidInput(f"{option}: needs {wanted}; got {text!r}")
+    return numbers
+
+
+def parse_range(text: str, about: About) -> tuple[float, float]:
+    """Return the least and the largest of ``0.8:1.2``; of ``1``, it for both."""
+    numbers = parse_numbers(text, about.option, "LEAST:LARGEST, as in 0.8:1.2", counts=(1, 2))
+    return numbers[0], numbers[-1]
+
+
+def parse_sizes(text: str, about: About) -> str | bool | list[float]:
+    """Return auto, or the answer of yes or no, or numbers."""
+    word = text.strip().lower()
+    if word in ("auto", "yes", "no"):
+        return "auto" if word == "auto" else word == "yes"
+    return parse_numbers(word, about.option, "auto, yes, no, or sizes as in 0.8:1.25")
+
+
+def parse_bytes(text: str, option: str = "--memory-limit") -> int:
+    """Return ``900M`` or ``16G`` as a number of bytes, in powers of 1024."""
+    found = re.fullmatch(r"([0-9]{1,18})([kmgt]?)(i?b)?", text.strip().lower())
+    if not found or int(found[1]) == 0:
+        raise InvalidInput(f"{option}: needs a number of bytes, as in 900M or 16G; got {text!r}")
+    return int(found[1]) << 10 * " kmgt".index(found[2] or " ")
+
+
+def parse_box(text: str, about: About) -> list[float]:
+    """Return the middle and the sides of a box."""
+    return _finite(text, 4, about.option, "ROW,COL,HEIGHT,WIDTH, as in 96,92,50,50")
+
+
+def parse_places(texts: Sequence[str], about: About) -> list[list[float]]:
+    """Return the points of one text or of several."""
+    parts = [p for text in texts for p in re.split(r"[\s;]+", text.strip()) if p]
+    return [_finite(p, 2, about.option, "ROW,COL, as in 125,60") for p in parts]
+
+
+def _finite(text: str, count: int, option: str, wanted: str) -> list[float]:
+    numbers = parse_numbers(text, option, wanted, counts=(count,), between=",")
+    if not all(math.isfinite(n) for n in numbers):
+        raise InvalidInput(f"{option}: needs {wanted}; got {text!r}")
+    return numbers
+
+
+def read_steps(text: str, about: About) -> Any:
+    """Return an edit: names with commas between them, JSON, or a file of JSON."""
+    where = about.option
+    if text.lower().endswith(".json"):
+        where = text
+        try:
+            text = Path(text).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise FileError(f"{where}: {error}") from None
+    elif not text.lstrip().startswith(("[", "{")):
+        return [word.strip() for word in text.split(",")]
+    try:
+        found = json.loads(text)
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise InvalidInput(f"{where}: is not JSON ({error})") from None
+    # A report holds its edit beside other things.
+    return found["edit"] if isinstance(found, dict) and "edit" in found else found
+
+
+# --- values that stand in files --------------------------------------------------------------------------------------
+
+
+def read_picture(text: str, *, finite: bool = True) -> Array:
+    """Read an image file, or make the built-in exemplar that ``sample:NAME`` names."""
+    image: Array = samples.load(text.removeprefix(SAMPLE)).image if text.startswith(SAMPLE) else io.read(text)
+    if finite:
+        as_image(image, text)
+    return image
+
+
+def read_volume(text: str) -> Array:
+    """Read a volume, or make the built-in one that ``sample:NAME`` names; all of it must be finite."""
+    if text.startswith(SAMPLE):
+        volume: Array = samples.load(text.removeprefix(SAMPLE)).image
+        if volume.ndim != 4:
+            known = ", ".join(n for n in samples.names() if n.endswith("solid") or n in ("particles", "stripes"))
+            raise InvalidInput(f"{text}: is a picture; volumes are {known}")
+    else:
+        volume = io.read_volume(text)
+    as_image(volume, text, axes=3)
+    return volume
+
+
+def read_array(path: str, axes: int) -> Array:
+    """Read a picture or a volume, which may hold anything."""
+    array: Array = io.read_volume(path) if axes == 3 else io.read(path)
+    return array
+
+
+def read_values(path: str, about: About) -> Array:
+    """Read values like those of the exemplar: of one channel a file may keep the axis or not."""
+    given = read_array(path, about.axes)
+    return given[..., np.newaxis] if about.like is not None and given.ndim < about.like.ndim else given
+
+
+def read_numbers(path: str, about: About) -> Array:
+    """Read a number for each point: of several channels the mean."""
+    given = read_array(path, about.axes)
+    return given if given.ndim == about.axes else np.asarray(given.mean(axis=-1))
+
+
+def read_mask(path: str, axes: int = 2) -> Array:
+    """Read a mask: any colour but black, or 0 in all channels, is marked, whatever an alpha channel of a picture says."""
+    mask = read_array(path, axes)
+    if mask.ndim == axes:
+        return mask
+    colours = mask[..., :-1] if axes == 2 and mask.shape[-1] in (2, 4) else mask
+    marked: Array = (colours != 0).any(axis=-1)
+    return marked
+
+
+def read_scale_map(path: str, encoding: str = "log2") -> Floats:
+    """Read a scale map: floats are scales, grey levels are decoded."""
+    from texrs import scale_maps
+
+    values = io.read(path)
+    if values.dtype.kind == "f":
+        return np.asarray(values if values.ndim == 2 else values[..., 0], np.float32)
+    levels: Any = encoding
+    with named(image=path):
+        return scale_maps.decode(values, levels)
+
+
+def read_field(text: str, size: tuple[int, ...]) -> Any:
+    """Return the field that words describe, or that of the frames in an .npz file, over an output of a size."""
+    from texrs import fields
+
+    if Path(text).suffix.lower() != ".npz":
+        with named(field="--field"):
+            return fields.parse(text, len(size), size)
+    arrays = list(io.read_arrays(text).values())
+    if len(arrays) != 1:
+        raise FileError(f"{text}: needs a single array of frames, has {len(arrays)}")
+    with named(frames=text):
+        field = fields.from_array(arrays[0], size if arrays[0].ndim == len(size) + 2 else None)
+    if field.axes != len(size):
+        raise InvalidInput(f"{text}: holds frames of {field.axes} axes, {len(size)} are needed")
+    return field
+
+
+def read_entry(text: str, about: About) -> Any:
+    """Read analysed elements, or a picture, which is analysed by whoever takes it."""
+    from texrs import elements
+
+    return elements.load(text) if text.lower().endswith(".npz") else read_picture(text)
+
+
+def read_points(path: str, about: About) -> list[list[float]]:
+    """Read a list of points, row,column a line; a first line of words and empty lines are passed over."""
+    try:
+        lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "is no text"
+        raise FileError(f"{path}: cannot be read ({reason})") from None
+    found: list[list[float]] = []
+    for number, line in enumerate(lines, start=1):
+        parts = [p.strip() for p in re.split(r"[,;\t]", line.strip())]
+        if parts == [""]:
+            continue
+        try:
+            values = [float(p) for p in parts]
+        except ValueError:
+            if number == 1:
+                continue
+            values = []
+        if len(values) != 2:
+            raise InvalidInput(f"{path}: line {number} needs row,column, got {line.strip()[:60]!r}")
+        found.append(values)
+    if not found:
+        raise InvalidInput(f"{path}: holds no points")
+    return found
+
+
+# --- the kinds -------------------------------------------------------------------------------------------------------
+
+PICTURE = Kind("FILE", lambda text, about: read_picture(text), "A file, or sample:NAME.", file=True)
+PICTURES = Kind(
+    "FILE",
+    lambda texts, about: [read_picture(text) for text in texts],
+    "Files, or sample:NAME.",
+    file=True,
+    many=True,
+)
+UNKNOWN = replace(PICTURE, read=lambda text, about: read_picture(text, finite=False))
+"""A picture in which some is not known, and may be anything."""
+VOLUME = replace(PICTURE, read=lambda text, about: read_volume(text))
+ENTRY = Kind("FILE", read_entry, "An image file, sample:NAME, or an entry that texrs analyse wrote (.npz).", file=True)
+MASK = Kind("FILE", lambda path, about: read_mask(path, about.axes), "What is not black is marked.", file=True)
+HOLE = replace(MASK, words=("alpha",))
+MAP = Kind("FILE", lambda path, about: read_scale_map(path), "A file that texrs scale-map wrote.", file=True)
+MAP_OR_AUTO = replace(MAP, metavar="FILE|auto", words=("auto",))
+NUMBERS = Kind("FILE", read_numbers, "Of several channels the mean counts.", file=True)
+AXES = Kind(
+    ("xy|x|y|none", "xyz|...|none"),
+    lambda text, about: parse_axes(text, about.option, axes=about.axes),
+    (
+        "x is from left to right, y from top to bottom.",
+        "x is from left to right, y from top to bottom, z from plane to plane.",
+    ),
+    show_axes,
+)
+SIZE = Kind(
+    ("ROWSxCOLS", "PLANESxROWSxCOLS"), lambda text, about: parse_size(text, about.option, axes=about.axes), show=str
+)
+SHARES = Kind("A:B:...", lambda text, about: parse_numbers(text, about.option, "numbers such as 2:1:1"))
+
+KINDS = {
+    "size": SIZE,
+    "overlap": SIZE,
+    "wrap": AXES,
+    "repeat": AXES,
+    "weights": SHARES,
+    "scales": replace(SHARES, show=lambda numbers: ":".join(f"{n:g}" for n in numbers)),
+    "scale": Kind("LEAST:LARGEST", parse_range, show=lambda numbers: ":".join(f"{n:g}" for n in numbers)),
+    "augment_scales": Kind("auto|yes|no|A:B:...", parse_sizes),
+    "memory_limit": Kind(
+        "BYTES", lambda text, about: parse_bytes(text, about.option), "As in 900M or 16G.", plain=True
+    ),
+    "field": Kind(
+        "WORDS|FILE.npz",
+        lambda text, about: read_field(text, about.size),
+        "As in circular:axis=z or zigzag:period=64,angle=30, or frames in a file.",
+        file=True,
+    ),
+    "scale_map": MAP,
+    "target": MAP,
+    "mask": MASK,
+    "within": MASK,
+    "labels": Kind("FILE", lambda path, about: io.read(path), file=True),
+    "values": Kind("FILE", read_values, file=True),
+    "coordinates": Kind("FILE", lambda path, about: np.asarray(read_array(path, about.axes)), file=True),
+    "background": Kind("ROW,COL", parse_places, "The option may be repeated.", many=True),
+    "box": Kind("ROW,COL,HEIGHT,WIDTH", parse_box),
+    "points": Kind("POINTS.csv", read_points, "A file of row,column a line.", file=True),
+    "edit": Kind("WORDS|JSON|FILE.json", read_steps, "Names, JSON, or a file of it: a report is done again."),
+    "steps": Kind("WORDS|JSON|FILE.json", read_steps, "Names, JSON, or a file of it: a report is done again."),
+}
+"""Of parameters whose type does not tell, by name: a name means the same everywhere."""

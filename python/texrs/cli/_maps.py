@@ -1,0 +1,125 @@
+"""Commands about source maps: ``texrs apply`` and ``texrs info``."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from texrs import io
+from texrs._arrays import as_float
+from texrs._threads import threads
+from texrs.blending import blend
+from texrs.cli import _outputs
+from texrs.cli._console import note, say
+from texrs.cli._options import Options, check_needed, taking
+from texrs.cli._outputs import Quiet, Threads, describe, named, to_write
+from texrs.errors import FileError, InvalidInput
+from texrs.source_map import SourceMap
+
+__all__ = ["COMMANDS"]
+
+RENDERED = Options(SourceMap.render, leave={"exemplars": "they are arguments, as many as wanted"})
+BLENDED = Options(
+    blend,
+    names={"screening": "blend"},
+    leave={
+        "source": "it is an argument",
+        "exemplars": "they are arguments, as many as wanted",
+        "known": "one an exemplar, and no map is of them",
+        "interpolation": "as of render",
+        "kind": "as of render",
+        "green": "as of render",
+    },
+    optional={"wrap": "xy", "screening": "0"},
+)
+
+
+@taking(RENDERED, BLENDED)
+def apply_command(
+    source: Annotated[
+        str, typer.Argument(metavar="MAP.npz", help="A source map that --map wrote.", show_default=False)
+    ],
+    maps: Annotated[
+        list[str],
+        typer.Argument(metavar="IMAGE", help="Images in register with the exemplar.", show_default=False),
+    ],
+    out: Annotated[str, to_write("out", text="Image file to write; a folder for several.")],
+    given: dict[str, Any],
+    count: Threads = None,
+    quiet: Quiet = False,
+) -> None:
+    """Make the heights, normals or labels of a result, through its source map."""
+    options = RENDERED.call(RENDERED.read(given))
+    weight, blended = given["screening"], BLENDED.read(given, which=lambda o: not o.file)
+    if not weight:
+        check_needed({**given, "screening": None}, {"--blend": BLENDED}, "")
+    as_float(weight or 0.0, "--blend", 0, 1e6)
+    places = SourceMap.load(source)
+    if weight and places.axes != 2:
+        raise InvalidInput("--blend: is for pictures; the source map is that of a volume")
+    groups = group(maps, len(places.shapes))
+    targets = name_targets(groups, out, [source, *maps])
+    read = io.read if places.axes == 2 else io.read_volume
+    write = io.write if places.axes == 2 else io.write_volume
+    blended |= {("wrap",): (True, True)} | blended | BLENDED.read(given, which=lambda o: o.file)
+    # All results or none take their names, at the end.
+    with ExitStack() as stack, threads(count):
+        for paths, target in zip(groups, targets, strict=True):
+            images = [read(path) for path in paths]
+            _outputs.check_output(target, images[0], places.shape)
+            temporary = stack.enter_context(_outputs.output(target))
+            with named(**BLENDED.called(given), exemplars=" and ".join(paths)):
+                if weight:
+                    image = blend(places, images, **BLENDED.call(blended), **options)
+                else:
+                    image = places.render(images, **options)
+            write(temporary, image)
+            note(f"{paths[0]} gives {target}: {describe(image, places.axes)}", quiet=quiet)
+
+
+def info_command(
+    file: Annotated[str, typer.Argument(metavar="FILE", help="An image or a source map.", show_default=False)],
+) -> None:
+    """Say what an image or a source map holds."""
+    try:
+        places = SourceMap.load(file)
+    except FileError:
+        image = io.read(file)
+        say(f"image: {describe(image, 2)}, {image.min()} to {image.max()}")
+        return
+    reuse = places.reuse()
+    shapes = " and ".join(" x ".join(map(str, shape)) for shape in places.shapes)
+    say(f"source map: {' x '.join(map(str, places.shape))}, made from {shapes}")
+    say(f"copied unchanged: {reuse.verbatim:.1%} of the pixels, in {reuse.regions} regions")
+    say(f"largest region: {reuse.largest:.1%} of the example")
+
+
+def group(maps: Sequence[str], count: int) -> list[list[str]]:
+    """Return as many maps together as there were exemplars."""
+    if len(maps) % count:
+        raise InvalidInput(
+            f"IMAGE: the source map was made from {count} exemplars, so it needs {count} each; got {len(maps)}"
+        )
+    return [list(maps[i : i + count]) for i in range(0, len(maps), count)]
+
+
+def name_targets(groups: Sequence[Sequence[str]], out: str, inputs: Sequence[str]) -> list[str]:
+    """Return the names of what is written: the file itself, or in a folder files of the names of the maps."""
+    if len(groups) == 1 and not Path(out).is_dir():
+        return [out]
+    if not Path(out).is_dir():
+        raise InvalidInput(f"--out: needs a folder that exists for {len(groups)} results, got {out!r}")
+    targets = [os.path.join(out, Path(paths[0]).name) for paths in groups]
+    for i, target in enumerate(targets):
+        _outputs.check_apart(inputs, {"out": target})
+        if target in targets[:i]:
+            raise InvalidInput(f"--out: two maps have the name {Path(target).name}; write them one by one")
+    return targets
+
+
+COMMANDS: dict[str, Callable[..., None]] = {"apply": apply_command, "info": info_command}

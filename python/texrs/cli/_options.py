@@ -1,0 +1,365 @@
+"""Options of a command, made from the signature and the docstring of the function that it stands for.
+
+What a parameter is called, what it is by default, which words it allows and what it means is written once: at the function. The
+command line adds how a text becomes a value, once for all parameters of a kind (`texrs.cli._kinds`).
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+import types
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, is_dataclass, replace
+from enum import Enum
+from typing import Annotated, Any, Literal, TypeAlias, Union, get_args, get_origin
+
+import typer
+
+from texrs.cli._kinds import KINDS, About, Kind
+from texrs.errors import InvalidInput
+
+__all__ = ["MISSING", "Option", "Options", "as_command", "check_needed", "describe", "one_of", "parameter", "taking"]
+
+MISSING = inspect.Parameter.empty
+LONGEST = 200
+"""Characters of a help text."""
+AMERICAN = {"color": "colour", "optimize": "optimise"}
+
+Path: TypeAlias = tuple[str, ...]
+"""A parameter, or a parameter that is a dataclass and a field of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """An option or an argument of a command."""
+
+    path: Path
+    """Whose value it is."""
+    flag: str
+    """What a user writes: ``--seed``; or the name of an argument, in capitals."""
+    type: Any
+    """What typer reads."""
+    kind: Kind | None
+    """How the value is made of that; None where it is the value."""
+    default: Any
+    """The function's, as it is written; `MISSING` where the command needs a value."""
+    required: bool
+    """Whether the function needs one."""
+    info: Any
+    """What typer is told."""
+
+    @property
+    def name(self) -> str:
+        """What the parameter of the command is called."""
+        return "_".join(self.path)
+
+    @property
+    def argument(self) -> bool:
+        """Whether its place says what it is."""
+        return not self.flag.startswith("--")
+
+    @property
+    def file(self) -> bool:
+        """Whether the value stands in a file."""
+        return self.kind is not None and self.kind.file
+
+    def called(self, text: object) -> str:
+        """Return what errors call it: the file that was given, or the option."""
+        if self.kind is None or not self.kind.file or text is None or text in self.kind.words:
+            return self.flag
+        return " ".join(text) if isinstance(text, list) else str(text)
+
+    def parameter(self) -> inspect.Parameter:
+        """Return the parameter that makes typer take this option."""
+        # For typer a value that may be left out is one that may be None.
+        annotation: Any = Annotated[self.type if self.default is MISSING else self.type | None, self.info]
+        return inspect.Parameter(self.name, inspect.Parameter.KEYWORD_ONLY, default=self.default, annotation=annotation)
+
+
+class Options:
+    """The options of a function on the command line.
+
+    Parameters
+    ----------
+    function : callable
+        With types, and a docstring in the way of numpydoc. Parameters that are dataclasses give an option for each field.
+    arguments : mapping
+        Parameters whose place says what they are, and their kinds.
+    kinds : mapping
+        Kinds of parameters that neither their type nor their name tells.
+    names : mapping
+        Other names of parameters; of one that is a dataclass, what comes before the names of its fields.
+    leave : mapping
+        Parameters that are no options, and why; fields are written ``parameter.field``.
+    makers : mapping
+        What makes the values of parameters that are no dataclasses of options of its own.
+    only : collection of str
+        Parameters that are; all by default.
+    optional : mapping
+        Parameters whose default is that of the command, and what is shown of it; if they are not given they are not read.
+    axes : {2, 3}
+        Of what the function makes.
+
+    """
+
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        *,
+        arguments: Mapping[str, Kind] | None = None,
+        kinds: Mapping[str, Kind] | None = None,
+        names: Mapping[str, str] | None = None,
+        leave: Mapping[str, str] | None = None,
+        makers: Mapping[str, Callable[..., Any]] | None = None,
+        only: Collection[str] = (),
+        optional: Mapping[str, str] | None = None,
+        axes: int = 2,
+    ) -> None:
+        self.function, self.axes = function, axes
+        self.leave = {"progress": "the command line shows it by itself", **(leave or {})}
+        self._arguments, self._names, self.optional = dict(arguments or {}), dict(names or {}), dict(optional or {})
+        self._kinds = self._arguments | dict(kinds or {})
+        self.groups: dict[str, Any] = dict(makers or {})
+        found = list(self._find(only))
+        flags = {path[-1]: self._flag(path) for path, _, _ in found}
+        self.all = tuple(self._option(*each, flags) for each in found)
+
+    def __iter__(self) -> Iterator[Option]:
+        return iter(self.all)
+
+    def called(self, given: Mapping[str, Any]) -> dict[str, str]:
+        """Return what errors call each parameter: the file that was given, or the option; of several, all files."""
+        called = {option.path[-1]: option.called(given[option.name]) for option in reversed(self.all)}
+        for name in self.groups:
+            there = [
+                o.called(given[o.name]) for o in self if o.path[0] == name and o.file and given[o.name] is not None
+            ]
+            called |= {name: " and ".join(there)} if there else {}
+        return called
+
+    def read(
+        self, given: Mapping[str, Any], about: About | None = None, *, which: Callable[[Option], bool] | None = None
+    ) -> dict[Path, Any]:
+        """Return the values of what was given; for what was not the function's own default stands."""
+        values = {}
+        for option in self:
+            text = given[option.name]
+            if (which and not which(option)) or text is None or text == [] or text == option.default:
+                continue
+            if option.kind is None or (isinstance(text, str) and text in option.kind.words):
+                values[option.path] = text
+            else:
+                known = about or About(axes=self.axes)
+                values[option.path] = option.kind.read(text, replace(known, option=option.flag))
+        return values
+
+    def call(self, values: Mapping[Path, Any]) -> dict[str, Any]:
+        """Return the arguments of the function: fields of a dataclass are brought together in one."""
+        made = {path[0]: value for path, value in values.items() if len(path) == 1}
+        for name, group in self.groups.items():
+            fields = {path[1]: value for path, value in values.items() if len(path) == 2 and path[0] == name}
+            for option in self:
+                if fields and option.path[0] == name and option.required and option.path not in values:
+                    given = next(o.flag for o in self if o.path == (name, next(iter(fields))))
+                    raise InvalidInput(f"{given}: needs {option.flag} too")
+            if fields:
+                # How many axes there are is the command's.
+                known = {"axes": self.axes} if "axes" in inspect.signature(group).parameters else {}
+                made[name] = group(**fields, **known)
+        return made
+
+    def _find(self, only: Collection[str]) -> Iterator[tuple[Path, inspect.Parameter, str]]:
+        """Return each parameter and field, and what its docstring says."""
+        texts = describe(self.function)
+        for name, each in inspect.signature(self.function, eval_str=True).parameters.items():
+            if each.kind is each.VAR_KEYWORD or name == "self" or name in self.leave or (only and name not in only):
+                continue
+            group: Any = next((t for t in _parts(each.annotation) if is_dataclass(t)), self.groups.get(name))
+            if group is None or name in self._kinds:
+                yield (name,), each, texts.get(name, "")
+                continue
+            self.groups[name] = group
+            inner = describe(group)
+            for part, one in inspect.signature(group, eval_str=True).parameters.items():
+                if f"{name}.{part}" not in self.leave and part != "axes":
+                    text = texts if f"{name}.{part}" in self._arguments else inner
+                    yield (name, part), one, text.get(name if text is texts else part, "")
+
+    def _flag(self, path: Path) -> str:
+        name = self._names.get(".".join(path))
+        if name is None:
+            before = self._names.get(path[0], "") if len(path) == 2 else ""
+            name = "-".join(part for part in (before, path[-1]) if part)
+        return name.upper() if ".".join(path) in self._arguments else "--" + name.replace("_", "-")
+
+    def _option(self, path: Path, parameter: inspect.Parameter, text: str, flags: Mapping[str, str]) -> Option:
+        default, flag, name = parameter.default, self._flag(path), path[-1]
+        required = default is MISSING
+        kind, type_ = self._kind(path, parameter)
+        if name in self.optional or (required and len(path) == 2 and flag.startswith("--")):
+            default = None
+        if kind is not None and default is not None and default is not MISSING:
+            default = kind.show(default)
+        elif kind is not None and "default" in kind.words:
+            default = "default"
+        shown = self.optional.get(name) or default not in (None, MISSING)
+        words = () if kind is None or kind.file else kind.pick(kind.metavar, self.axes).split("|")
+        texts = (
+            _shorten(text, flags, flag if type_ is bool else "", parameter.default, words),
+            kind.pick(kind.note, self.axes) if kind else "",
+        )
+        help_ = " ".join(t for t in texts if t)
+        if not flag.startswith("--"):
+            info: Any = typer.Argument(metavar=flag, help=help_, show_default=False)
+        else:
+            both = f"{flag}/--no-{flag.removeprefix('--')}" if type_ is bool else flag
+            metavar = kind.pick(kind.metavar, self.axes) if kind else None
+            info = typer.Option(both, metavar=metavar, help=help_, show_default=shown)
+        return Option(path, flag, type_, kind, default, required, info)
+
+    def _kind(self, path: Path, parameter: inspect.Parameter) -> tuple[Kind | None, Any]:
+        """Return the kind of a value and what typer reads: as this command says, as the type, or as the name."""
+        type_, named = _type_of(parameter.annotation, parameter.default), KINDS.get(path[-1])
+        kind = self._kinds.get(".".join(path)) or (type_ if isinstance(type_, Kind) else None)
+        if kind is None and named is not None and (named.plain or type_ is None):
+            kind = named
+        if kind is None and type_ is None:
+            raise TypeError(f"{self.function.__name__}: nothing says how {'.'.join(path)} is read")
+        return kind, type_ if kind is None else list[str] if kind.many else str
+
+
+def parameter(name: str, annotation: Any, default: Any = MISSING) -> inspect.Parameter:
+    """Return a parameter that only the command line has."""
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+
+
+def as_command(work: Callable[..., None], parameters: Iterable[inspect.Parameter]) -> Callable[..., None]:
+    """Return a function that typer sees with these parameters."""
+
+    def command(**given: Any) -> None:
+        work(**given)
+
+    several = list(parameters)
+    command.__signature__ = inspect.Signature(several)  # type: ignore[attr-defined]
+    command.__annotations__ = {p.name: p.annotation for p in several}
+    return command
+
+
+def taking(*several: Options) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Let a command take options of functions too, as ``given``, which `Options.read` reads.
+
+    They come where the command has ``given``, but for arguments, which are first.
+    """
+    options: dict[str, list[Option]] = {}
+    for option in (o for each in several for o in each):
+        options.setdefault(option.name, []).append(option)
+    made = []
+    for alike in options.values():
+        one, defaults = alike[0], list(dict.fromkeys(o.default for o in alike))
+        if len(defaults) > 1:
+            one.info.show_default = " or ".join(map(str, defaults))
+            one = replace(one, default=None)
+        made.append((one.argument, one.parameter()))
+
+    def wrap(work: Callable[..., None]) -> Callable[..., None]:
+        def command(**all_: Any) -> None:
+            given = {name: all_.pop(name) for name in options}
+            work(**all_, given=given)
+
+        own = list(inspect.signature(work, eval_str=True).parameters.values())
+        place = next(i for i, p in enumerate(own) if p.name == "given")
+        own[place : place + 1] = [p for argument, p in made if not argument]
+        return as_command(
+            command, [p for argument, p in made if argument] + [p.replace(kind=p.KEYWORD_ONLY) for p in own]
+        )
+
+    return wrap
+
+
+def check_needed(given: Mapping[str, Any], owners: Mapping[str, Iterable[Option]], used: str) -> None:
+    """Check that no option is given that belongs to something else than what is used."""
+    free = {option.name for option in owners.get(used, ())}
+    for option in (o for each in owners.values() for o in each if o.name not in free):
+        if given[option.name] not in (None, option.default):
+            wanted = " or ".join(flag for flag, each in owners.items() if option.name in {o.name for o in each})
+            raise InvalidInput(f"{option.flag}: needs {wanted}{f', got {used}' if used else ''}")
+
+
+# --- types -----------------------------------------------------------------------------------------------------------
+
+
+def _parts(annotation: Any) -> tuple[Any, ...]:
+    """Return the types of a union, or the one that there is."""
+    return get_args(annotation) if get_origin(annotation) in (Union, types.UnionType) else (annotation,)
+
+
+def _type_of(annotation: Any, default: Any) -> Any:
+    """Return the type that typer reads by itself, or the kind of values that are words; None for all others."""
+    parts = [part for part in _parts(annotation) if part is not types.NoneType]
+    if all(get_origin(part) is Literal for part in parts):
+        return one_of([word for part in parts for word in get_args(part)], optional=default is None)
+    members = next((part for part in parts if isinstance(part, type) and issubclass(part, Enum)), None)
+    if members is not None:
+        return one_of([str(member.value) for member in members], members, optional=default is None)
+    return parts[0] if len(parts) == 1 and parts[0] in (bool, int, float, str) else None
+
+
+def one_of(words: Sequence[str], make: Callable[[str], Any] | None = None, *, optional: bool = False) -> Kind:
+    """Return the kind of values that are one of some words; ``default`` may stand for None."""
+    allowed = ["default", *words] if optional else list(words)
+    chosen = make or {word: word for word in words}.__getitem__
+
+    def read(text: str, about: About) -> Any:
+        try:
+            return chosen(AMERICAN.get(text, text))
+        except (KeyError, ValueError):
+            wanted = f"{', '.join(allowed[:-1])} and {allowed[-1]}"
+            raise InvalidInput(f"{about.option}: allowed are {wanted}; got {text!r}") from None
+
+    def show(value: Any) -> str:
+        return str(getattr(value, "value", value))
+
+    return Kind("|".join(allowed), read, show=show, words=("default",) if optional else ())
+
+
+# --- docstrings ------------------------------------------------------------------------------------------------------
+
+
+def describe(function: Callable[..., Any]) -> dict[str, str]:
+    """Return what a docstring says of each parameter, or of each attribute of a class."""
+    found: dict[str, str] = {}
+    names: list[str] = []
+    section = ""
+    lines = (inspect.getdoc(function) or "").splitlines()
+    for line, after in zip(lines, [*lines[1:], ""], strict=True):
+        if after and not after.strip("-"):
+            section, names = line, []
+        elif section in ("Parameters", "Attributes") and line.strip("-"):
+            if line.startswith(" "):
+                found |= {name: f"{found[name]} {line.strip()}".strip() for name in names}
+            else:
+                names = [name.strip() for name in line.partition(" : ")[0].split(",")]
+                found |= dict.fromkeys(names, "")
+    return found
+
+
+def _shorten(text: str, flags: Mapping[str, str], flag: str, default: Any, words: Collection[str]) -> str:
+    """Return the first sentence of a description, or two, or one for each word, in the words of the command line."""
+    # References are for readers of the documentation.
+    text = re.sub(r"\s*\((?:see )?(?:`|section|Eq\.)[^)]*\)|\s*\[\d+\]_|[:;,] see `texrs[^`]*`", "", text)
+    # What None does is not what happens when the option is left out, unless it is the default, and cannot be asked for.
+    beside = ("See ", "`texrs.") if default is None else ("See ", "`texrs.", "None")
+    first, *further = re.split(r"(?<=[.])\s+(?=[A-Z\"`])", text)
+    if len(first) > LONGEST:
+        ends = [m.start() for m in re.finditer("[:;] ", first[:LONGEST]) if first[: m.start()].count("``") % 2 == 0]
+        first = f"{first[: ends[-1]]}." if ends else first
+    of_words = [s for s in further if re.match(r"\W*(\w*)", s)[1] in words]  # type: ignore[index]
+    second = next((s for s in further if not s.startswith(beside)), "")
+    short = [first, second] if second and len(first + second) < LONGEST else [first]
+    chosen = " ".join([first, *of_words] if of_words else short)
+    chosen = re.sub(r"``(\w+)``", lambda found: flags.get(found[1], found[1]), chosen)
+    if flag:
+        chosen = re.sub(r"\bFalse\b", f"--no-{flag[2:]}", re.sub(r"\bTrue\b", flag, chosen))
+    chosen = re.sub(r"(?<=[;:] )None\b", "the default", re.sub(r"(^|(?<=[.] ))None\b", "The default", chosen))
+    return re.sub(r"`|(?<!\w)\"(?=\w)|(?<=\w)\"(?!\w)", "", chosen)

@@ -1,0 +1,137 @@
+"""The command that shows volumes: ``texrs slice``."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from texrs import io
+from texrs._arrays import as_int
+from texrs._threads import threads
+from texrs._typing import Array
+from texrs.cli import _outputs
+from texrs.cli._console import note, watching
+from texrs.cli._kinds import About, Kind, parse_numbers, read_volume
+from texrs.cli._options import Options, check_needed, taking
+from texrs.cli._outputs import Quiet, Threads, describe, named, to_write
+from texrs.errors import InvalidInput
+from texrs.volume import cube, oblique, paint, slices, turntable
+
+__all__ = ["COMMAND"]
+
+_AXES = ("plane", "row", "column")
+
+
+def parse_at(text: str, about: About) -> tuple[int, int] | list[int]:
+    """Return of ``plane=30`` an axis and a place, of ``30,20,10`` a place on each."""
+    axis, equals, number = (p.strip() for p in text.partition("="))
+    try:
+        if equals and axis in _AXES:
+            return _AXES.index(axis), int(number)
+        if not equals and text.count(",") == 2:
+            return [int(p) for p in text.split(",")]
+    except ValueError:
+        pass
+    raise InvalidInput(
+        f"{about.option}: needs plane=, row= or column= and a number, or three such as 30,20,10; got {text!r}"
+    )
+
+
+def parse_oblique(text: str, about: About) -> tuple[list[float] | None, list[float]]:
+    """Return of ``30,20,10/1,1,0`` a point and a direction."""
+    point, slash, normal = text.partition("/")
+    wanted = "POINT/NORMAL such as 30,20,10/1,1,0, or /1,1,0"
+    if not slash:
+        raise InvalidInput(f"{about.option}: needs {wanted}; got {text!r}")
+    sides = [
+        parse_numbers(p, about.option, wanted, counts=(3,), between=",") if p.strip() else None for p in (point, normal)
+    ]
+    if sides[1] is None:
+        raise InvalidInput(f"{about.option}: needs {wanted}; got {text!r}")
+    return sides[0], sides[1]
+
+
+ACROSS = Options(
+    slices,
+    only=("at",),
+    kinds={
+        "at": Kind("AXIS=N|N,N,N", parse_at, "As in 30,20,10; or one slice: plane=30, row=-1 (the last), column=7.")
+    },
+)
+CUT = Options(
+    oblique,
+    only=("normal", "interpolation"),
+    names={"normal": "oblique"},
+    kinds={"normal": Kind("POINT/NORMAL", parse_oblique, "As in 30,20,10/1,1,0; /1,1,0 is through the middle.")},
+)
+BLOCK = Options(cube, only=("size", "azimuth", "elevation", "interpolation"))
+TURNED = Options(turntable, only=("size", "frames", "elevation", "seconds", "interpolation"))
+
+
+@taking(ACROSS, CUT, BLOCK, TURNED)
+def slice_command(
+    volume: Annotated[
+        str, typer.Argument(metavar="VOLUME", help="The volume: a file, or sample:NAME.", show_default=False)
+    ],
+    out: Annotated[str, to_write("out", text="Image file to write.")],
+    given: dict[str, Any],
+    as_cube: Annotated[bool, typer.Option("--cube", help="A block of the material, on a transparent ground.")] = False,
+    as_turntable: Annotated[bool, typer.Option("--turntable", help="The block turning, as an animated GIF.")] = False,
+    labels: Annotated[bool, typer.Option("--labels", help="The volume holds labels: each is given a colour.")] = False,
+    count: Threads = None,
+    quiet: Quiet = False,
+) -> None:
+    """Show a volume: slices along its axes, a cut in any direction, a cube or a turntable."""
+    start = time.monotonic()
+    asked = {"--at": given["at"], "--oblique": given["normal"], "--cube": as_cube, "--turntable": as_turntable}
+    chosen = [option for option, there in asked.items() if there]
+    if len(chosen) > 1:
+        raise InvalidInput(f"{' and '.join(chosen)}: one of them can be asked for")
+    owners = {"--at": ACROSS, "--oblique": CUT, "--cube": BLOCK, "--turntable": TURNED}
+    used = owners[(chosen or ["--at"])[0]]
+    options = used.call(used.read(given))
+    check_needed(given, owners, (chosen or ["--at"])[0])
+    moving = Path(out).suffix.lower() == ".gif"
+    if moving != as_turntable:
+        raise InvalidInput(f"--out: {'a picture is not' if moving else '--turntable is'} written to .gif, got {out!r}")
+    _outputs.check_output(out, np.zeros((1, 1, 4), np.uint8) if as_cube else None)
+    voxels = read_volume(volume)
+    if labels:
+        with named(labels=volume):
+            voxels = paint(voxels)
+        if used is not ACROSS:
+            options["interpolation"] = "nearest"
+    if not (as_cube or as_turntable):
+        _outputs.check_output(out, voxels[0])
+    with named(volume=volume, point="--oblique", normal="--oblique", count="--threads"), threads(count):
+        if as_turntable:
+            with watching(quiet=quiet) as progress:
+                turntable(voxels, out, **options, progress=progress)
+            note(f"wrote {out}: {given['frames']} pictures, in {time.monotonic() - start:.1f} s", quiet=quiet)
+            return
+        picture = draw(voxels, used, options)
+    with _outputs.output(out) as temporary:
+        io.write(temporary, picture)
+    note(f"wrote {out}: {describe(picture, 2)}, in {time.monotonic() - start:.1f} s", quiet=quiet)
+
+
+def draw(voxels: Array, used: Options, options: dict[str, Any]) -> Array:
+    """Return the picture that was asked for."""
+    if used is BLOCK:
+        return cube(voxels, **options)
+    if used is CUT:
+        point, normal = options.pop("normal")
+        return oblique(voxels, point, normal, **options)
+    place = options.get("at")
+    if isinstance(place, tuple):
+        axis, number = place
+        length = voxels.shape[axis]
+        return np.asarray(np.take(voxels, as_int(number, "at", -length, length - 1), axis=axis))
+    return slices(voxels, place)
+
+
+COMMAND = slice_command

@@ -1,0 +1,209 @@
+"""Commands that make one thing of another: each is a verb, the kinds of its inputs, and what its options cannot be made of."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from texrs import io
+from texrs._arrays import as_int
+from texrs._threads import threads
+from texrs._typing import Array
+from texrs.cli import _kinds, _outputs
+from texrs.cli._console import note, watching
+from texrs.cli._kinds import About
+from texrs.cli._options import Options, as_command, parameter
+from texrs.cli._outputs import Quiet, Threads, describe, named, to_write
+from texrs.synthesis import Synthesis
+
+__all__ = ["VERBS", "Verb"]
+
+VARIANTS = typer.Option(
+    help="Make so many, OUT-SEED each, and OUT as their contact sheet.", show_default="one, in OUT", metavar="N"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Verb:
+    """A function that makes a `Synthesis`, as a command."""
+
+    options: Options
+    times: int = 1
+    """How large the result is, of the sides of the first input, where no size is given."""
+    shape: str = ""
+    """The file whose shape the result has, where one is given and no size is."""
+    several: Callable[..., Iterable[Synthesis]] | None = None
+    """The function that makes ``count`` of them."""
+    says: Callable[[Synthesis], str] = lambda result: ""
+    """What else is to be said of the result."""
+
+    def command(self) -> Callable[..., None]:
+        """Return the function of the command."""
+        parameters = [o.parameter() for o in self.options if o.argument]
+        parameters.append(parameter("out", Annotated[str, to_write("out")]))
+        parameters += [o.parameter() for o in self.options if not o.argument]
+        if self.several is not None:
+            parameters.append(parameter("variants", Annotated[int | None, VARIANTS], None))
+        for name in ("map", "stages"):
+            parameters.append(parameter(name, Annotated[str | None, to_write(name)], None))
+        parameters += [parameter("count", Threads, None), parameter("quiet", Quiet, False)]
+        return as_command(self.run, parameters)
+
+    def run(self, *, count: int | None, quiet: bool, variants: int | None = None, **given: Any) -> None:
+        """Do the command: what can be checked is checked before any file is read, and before the work."""
+        start, options = time.monotonic(), self.options
+        paths: dict[str, str | None] = {name: given.pop(name) for name in _outputs.OUTPUTS}
+        out = paths["out"] or ""
+        values = options.read(given, which=lambda o: not o.file)
+        _outputs.check_outputs(paths)
+        places = [paths]
+        if variants is not None:
+            first, texts = given["seed"], [text for value in given.values() for text in _outputs.texts(value)]
+            places = [_outputs.variant_names(first + k, paths) for k in range(as_int(variants, "--variants", 1, 4096))]
+            for each in places:
+                _outputs.check_apart(texts, each)
+        values |= options.read(given, which=lambda o: o.file and (o.argument or o.name == self.shape))
+        example = self.example(values)
+        size = self.size(values, example)
+        _outputs.check_output(out, example, size)
+        about = About(axes=options.axes, size=size, like=example)
+        small, made = [], None
+        with (
+            named(**options.called(given), count="--threads"),
+            threads(count),
+            watching(quiet=quiet) as progress,
+            warnings.catch_warnings(record=True) as said,
+        ):
+            warnings.simplefilter("always")
+            values |= options.read(given, about, which=lambda o: o.file and o.path not in values)
+            call = options.call(values)
+            if any(o.name == "size" and o.required for o in options):
+                call["size"] = size
+            if variants is None or self.several is None:
+                made = options.function(**call, progress=progress)
+                _outputs.deliver(made, paths)
+            else:
+                for each, made in zip(places, self.several(count=variants, **call, progress=progress), strict=True):
+                    _outputs.deliver(made, each)
+                    small.append(_outputs.shrink(made.image))
+        for warning in said:
+            if issubclass(warning.category, UserWarning):
+                note(str(warning.message), quiet=quiet)
+        if small:
+            with _outputs.output(out) as temporary:
+                io.write(temporary, _outputs.contact_sheet(small))
+        assert made is not None
+        many = f"{len(small)} textures and their contact sheet, each " if small else ""
+        what = f"{many}{describe(np.asarray(made.image), options.axes)}{self.says(made)}"
+        note(f"wrote {out}: {what}, in {time.monotonic() - start:.1f} s", quiet=quiet)
+
+    def example(self, values: Mapping[tuple[str, ...], Any]) -> Array:
+        """Return the pixels of the first input."""
+        first = values[next(o.path for o in self.options if o.argument)]
+        first = first[0] if isinstance(first, list) else first
+        # Analysed elements hold theirs.
+        return np.asarray(getattr(first, "image", first))
+
+    def size(self, values: Mapping[tuple[str, ...], Any], example: Array) -> tuple[int, ...]:
+        """Return about how large the result will be."""
+        if ("size",) in values:
+            return tuple(values["size",])
+        if (self.shape,) in values:
+            return tuple(values[self.shape,].shape)
+        return tuple(self.times * n for n in example.shape[: self.options.axes])
+
+
+# --- the verbs, each imported when it is asked for --------------------------------------------------------------------
+
+TWICE = {"size": "twice the exemplar"}
+GROWN = {"constraints": "constraint", "guide": "guide", "exemplar.image": "exemplar"}
+
+
+def _design() -> Verb:
+    from texrs.papers.design import design as verb
+    from texrs.papers.design import design_variants
+
+    options = Options(verb, arguments={"exemplar": _kinds.PICTURES}, names={"elements": "element"})
+    return Verb(options, times=2, several=design_variants)
+
+
+def _splice() -> Verb:
+    from texrs.papers.splice import splice as verb
+
+    return Verb(Options(verb, arguments={"a": _kinds.ENTRY, "b": _kinds.ENTRY}), says=count_moved)
+
+
+def _self_splice() -> Verb:
+    from texrs.papers.splice import self_splice as verb
+
+    return Verb(Options(verb, arguments={"a": _kinds.ENTRY}), says=count_moved)
+
+
+def count_moved(result: Synthesis) -> str:
+    """Return how many elements moved."""
+    return f", {len(result.report['matches'])} elements moved"
+
+
+def _perspective() -> Verb:
+    from texrs.papers.perspective import perspective as verb
+
+    return Verb(Options(verb, arguments={"exemplar": _kinds.PICTURE}, optional=TWICE), times=2, shape="target")
+
+
+def _solid() -> Verb:
+    from texrs.papers.solid import solid as verb
+
+    return _grow(verb, _kinds.VOLUME, 3)
+
+
+def _synthesize() -> Verb:
+    from texrs.papers.solid import synthesize as verb
+
+    return _grow(verb, _kinds.PICTURE, 2)
+
+
+def _grow(verb: Callable[..., Synthesis], kind: _kinds.Kind, axes: int) -> Verb:
+    from texrs.exemplar import Exemplar
+
+    options = Options(
+        verb,
+        arguments={"exemplar.image": kind},
+        kinds={"guide.exemplar": _kinds.NUMBERS, "guide.output": _kinds.NUMBERS},
+        names=GROWN,
+        makers={"exemplar": Exemplar},
+        optional=TWICE,
+        axes=axes,
+    )
+    return Verb(options, times=2)
+
+
+def _tile() -> Verb:
+    from texrs.tiling import tile as verb
+
+    return Verb(Options(verb, arguments={"image": _kinds.PICTURE}))
+
+
+def _complete() -> Verb:
+    from texrs.completion import complete as verb
+
+    kinds = {"exemplar": _kinds.PICTURE, "scale_map": _kinds.MAP_OR_AUTO, "exemplar_scale_map": _kinds.MAP_OR_AUTO}
+    names = {"exemplar": "from", "exemplar_scale_map": "from-scale-map"}
+    return Verb(Options(verb, arguments={"image": _kinds.UNKNOWN, "hole": _kinds.HOLE}, kinds=kinds, names=names))
+
+
+VERBS = {
+    "complete": _complete,
+    "design": _design,
+    "perspective": _perspective,
+    "self-splice": _self_splice,
+    "solid": _solid,
+    "splice": _splice,
+    "synthesize": _synthesize,
+    "tile": _tile,
+}
