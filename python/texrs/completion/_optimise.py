@@ -91,8 +91,9 @@ def optimise(
     atlas = _make_atlas(pictures, open_, scales, wide, levels, margin)
     region = _look_around(wide, AROUND << (levels - 1), 1 << (levels - 1), wrap)
     part = tuple(slice(o, o + n) for o, n in zip(region.origin, region.shape, strict=True))
+    row, column = np.mgrid[part]
     # The picture is the first copy of the atlas.
-    shown = np.moveaxis(np.mgrid[part], 0, -1).astype(np.int32) + np.array(atlas.copies[0].origin, np.int32) + margin
+    shown = np.stack([row, column], axis=-1).astype(np.int32) + np.array(atlas.copies[0].origin, np.int32) + margin
     grown = grow_from_atlas(
         atlas,
         region,

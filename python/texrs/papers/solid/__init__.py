@@ -278,6 +278,7 @@ def grow_texture(asked: Request, progress: Progress | None) -> Synthesis:
         windows = analyse(asked, quality)
         start = choose_start(asked, quality)
         grown = windows.grow(asked.region, start=start, ask=asked.conditions.at, show=show, progress=progress)
+    last = {f"level {len(asked.exemplar.analyse().levels)}": show(grown.places, asked.region, 1)}
     source = SourceMap(
         as_coordinates(grown.places, asked.region),
         np.zeros(asked.region.shape, np.uint16),
@@ -286,7 +287,6 @@ def grow_texture(asked: Request, progress: Progress | None) -> Synthesis:
         (asked.exemplar.shape,),
     )
     composite = source.render(asked.exemplar.image, interpolation=asked.interpolation)
-    last = {f"level {len(asked.exemplar.analyse().levels)}": show(grown.places, asked.region, 1)}
     stages = {**grown.stages, **last, "composite": composite}
     return Synthesis(asked.conditions.show(composite), source, stages, describe(asked, quality, trial, grown))
 
