@@ -50,7 +50,7 @@ class Balance:
         demand : Demand
             The scales of samples, and of points one number each; its order holds what may be copied.
         """
-        weight = _weights(demand.exemplar[0::4][demand.order].astype(np.int64), demand.output.astype(np.int64))
+        weight = _weigh(demand.exemplar[0::4][demand.order].astype(np.int64), demand.output.astype(np.int64))
         shares = [np.bincount(tone[demand.order], weight, BINS) for tone in tones]
         return cls(tones, demand.order, np.stack(shares), np.zeros((len(tones), BINS)))
 
@@ -76,7 +76,7 @@ class Balance:
         return demand._replace(exemplar=values)
 
 
-def _weights(mine: NDArray[np.int64], asked: NDArray[np.int64]) -> Array:
+def _weigh(mine: NDArray[np.int64], asked: NDArray[np.int64]) -> Array:
     """Weigh samples of some scales, so that together they have those that are asked for."""
     low, high = int(asked.min()), int(asked.max())
     width = max(NARROWEST, -(-(high - low) // BANDS))

@@ -16,7 +16,7 @@ from texrs.errors import InvalidInput
 from texrs.growth.balance import Balance
 from texrs.kernels.gather import gather
 
-__all__ = ["NOTHING", "Asked", "Conditions", "Constraints", "Guide", "Pins", "Surroundings", "means"]
+__all__ = ["NOTHING", "Asked", "Conditions", "Constraints", "Guide", "Pins", "Surroundings", "average_points"]
 
 WEIGHT = 1500
 """Cost of another colour than the given one, in 1/256: a tenth of the range costs about as much as windows that have
@@ -205,7 +205,7 @@ class Surroundings:
 
     def at(self, region: Region, spacing: int) -> tuple[Bools, NDArray[np.int32]]:
         """Return which points of a level keep their places, and these."""
-        share = means(self.mask.astype(np.float32), region.shape, spacing)
+        share = average_points(self.mask.astype(np.float32), region.shape, spacing)
         starts = [np.minimum(np.arange(n) * spacing, m - 1) for n, m in zip(region.shape, self.mask.shape, strict=True)]
         first = self.places[np.ix_(*starts)].astype(np.float64)
         return (share >= 0.5).reshape(-1), np.asarray(np.rint(first.reshape(-1) * ONE / spacing), np.int32)
@@ -297,22 +297,22 @@ class Conditions:
         """Ask for the guide's map, or for the mean of the values that a point of the level stands for."""
         if self.maps is not None and self.weight:
             mine, theirs = self.maps
-            points = _pooled(np.ones((*theirs.shape[:-1], 1), np.float32), region, spacing)
-            wished = np.asarray(_pooled(theirs, region, spacing) / np.maximum(points, 1), np.float32)
+            points = _pool(np.ones((*theirs.shape[:-1], 1), np.float32), region, spacing)
+            wished = np.asarray(_pool(theirs, region, spacing) / np.maximum(points, 1), np.float32)
             everywhere = np.full(region.points, self.weight, np.uint16)
-            return Demand(_coded(_shrunk(mine, spacing)), _coded(wished), everywhere)
+            return Demand(_code(_shrink(mine, spacing)), _code(wished), everywhere)
         if self.mask is None or self.values is None or not self.mask.any():
             return None
-        wanted = _channels(self.values, self.image)
-        total = _pooled(wanted * self.mask[..., np.newaxis], region, spacing)
-        count = _pooled(self.mask[..., np.newaxis].astype(np.float32), region, spacing)
+        wanted = _as_channels(self.values, self.image)
+        total = _pool(wanted * self.mask[..., np.newaxis], region, spacing)
+        count = _pool(self.mask[..., np.newaxis].astype(np.float32), region, spacing)
         mean = np.asarray(total / np.maximum(count, 1), np.float32)
         weight = np.where(count[..., 0] > 0, WEIGHT, 0).astype(np.uint16)
-        small = _shrunk(_channels(self.image, self.image), spacing)
-        return Demand(_coded(small), _coded(mean), weight.reshape(-1))
+        small = _shrink(_as_channels(self.image, self.image), spacing)
+        return Demand(_code(small), _code(mean), weight.reshape(-1))
 
 
-def means(values: Array, shape: tuple[int, ...], spacing: int) -> Array:
+def average_points(values: Array, shape: tuple[int, ...], spacing: int) -> Array:
     """Return the mean of the points of the output that each point of a level stands for; the last stands for what is left."""
     total, count = values, np.ones((1, 1))
     for axis, n in enumerate(shape):
@@ -366,14 +366,14 @@ def _check_maps(guide: Guide, mine: tuple[int, ...], theirs: tuple[int, ...]) ->
 # --- from level to level ---------------------------------------------------------------------------------------------
 
 
-def _channels(values: Array, image: Array) -> Floats:
+def _as_channels(values: Array, image: Array) -> Floats:
     """Return up to four channels in units of the exemplar's range."""
     low = image.reshape(-1, image.shape[-1]).min(axis=0).astype(np.float64)
     span = float((image.reshape(-1, image.shape[-1]).max(axis=0) - low).max()) or 1.0
     return np.asarray((values[..., :4].astype(np.float64) - low[:4]) / span, np.float32)
 
 
-def _coded(values: Floats) -> NDArray[np.int16]:
+def _code(values: Floats) -> NDArray[np.int16]:
     """Return values in [0, 1] as four numbers of 12 bits each."""
     flat = values.reshape(-1, values.shape[-1])
     out = np.zeros((len(flat), 4), np.int16)
@@ -381,7 +381,7 @@ def _coded(values: Floats) -> NDArray[np.int16]:
     return out.reshape(-1)
 
 
-def _pooled(values: Floats, region: Region, spacing: int) -> Floats:
+def _pool(values: Floats, region: Region, spacing: int) -> Floats:
     """Sum values of the output over the points of a level."""
     for axis, n in enumerate(region.shape):
         starts = np.minimum(np.arange(n) * spacing, values.shape[axis] - 1)
@@ -389,7 +389,7 @@ def _pooled(values: Floats, region: Region, spacing: int) -> Floats:
     return values
 
 
-def _shrunk(exemplar: Floats, spacing: int) -> Floats:
+def _shrink(exemplar: Floats, spacing: int) -> Floats:
     """Return the mean of the samples that a sample of a level stands for; those that are left at the ends are left out."""
     axes = exemplar.ndim - 1
     trimmed = exemplar[tuple(slice(0, n // spacing * spacing) for n in exemplar.shape[:axes])]

@@ -12,7 +12,7 @@ from texrs._engine.pyramid import ONE, Region
 from texrs._typing import Floats, Progress
 from texrs.exemplar.atlas import Atlas, code_logs
 from texrs.growth.balance import Balance
-from texrs.growth.constraints import Asked, Held, means
+from texrs.growth.constraints import Asked, Held, average_points
 from texrs.growth.engine import Grown, Show
 from texrs.growth.settings import Settings
 from texrs.growth.windows import Windows
@@ -74,7 +74,7 @@ class Scales:
                 # The last point of a closed axis stands for what is left.
                 last = (first + thick) * spacing if first + thick < len(asked) else len(self.target)
                 logs = np.log(self.target[min(first * spacing, len(self.target) - 1) : last])
-                band[...] = code_logs(means(logs, band.shape, spacing))
+                band[...] = code_logs(average_points(logs, band.shape, spacing))
         return asked.reshape(-1)
 
 

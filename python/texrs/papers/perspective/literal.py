@@ -155,7 +155,7 @@ class Search:
 
         parts, bases, variance = [], [], 0.0
         for values, share in ((e, 0.95), (scale[..., np.newaxis], 0.99)):
-            windows = _windows(values, 1)
+            windows = _cut_windows(values, 1)
             mean = windows.mean(axis=0)
             spread, axes = np.linalg.eigh(np.cov((windows - mean).T))
             total = np.cumsum(spread[::-1])
@@ -170,22 +170,22 @@ class Search:
 
     def step(self, x: Doubles, scale: Doubles) -> tuple[Doubles, NDArray[np.intp], float]:
         """Search the nearest window for each of the output's, then average them: a round."""
-        seen = [_windows(v, SPACING) for v in (x, scale[..., np.newaxis])]
+        seen = [_cut_windows(v, SPACING) for v in (x, scale[..., np.newaxis])]
         query = np.concatenate([(w - m) @ b for w, (m, b) in zip(seen, self.bases, strict=True)], axis=1)
         distance, near = self.tree.query(query)
         square = np.maximum(distance**2, self.least)
         energy = float((square ** (R / 2)).mean())  # Eq. 5
         omega = square ** ((R - 2) / 2)  # Eq. 6
-        rows, columns = (_starts(n, SPACING) for n in x.shape[:2])
+        rows, columns = (_find_starts(n, SPACING) for n in x.shape[:2])
         top, left = (v.reshape(len(rows), len(columns)) for v in np.divmod(self.first[near], self.columns))
         omega = omega.reshape(len(rows), len(columns))
-        excess = _excess(x, self.e)
+        excess = _measure_excess(x, self.e)
         total, weight = np.zeros_like(x), np.zeros(x.shape[:2])
         best, at = np.full(x.shape[:2], -1.0), np.zeros((*x.shape[:2], 2), np.intp)
         for dy in range(SIDE):
             for dx in range(SIDE):
                 colour = self.e[top + dy, left + dx]
-                w = omega / (1 + _sum_of(excess, colour))  # Eq. 8
+                w = omega / (1 + _add_excess(excess, colour))  # Eq. 8
                 here = np.ix_(rows + dy, columns + dx)
                 total[here] += w[..., np.newaxis] * colour  # Eq. 7, minimised
                 weight[here] += w
@@ -195,31 +195,31 @@ class Search:
         return total / weight[..., np.newaxis], at, energy
 
 
-def _starts(n: int, spacing: int) -> NDArray[np.intp]:
+def _find_starts(n: int, spacing: int) -> NDArray[np.intp]:
     """Return where windows begin: every so many pixels, and at the end."""
     return np.unique(np.append(np.arange(0, n - SIDE + 1, spacing), n - SIDE))
 
 
-def _windows(values: Doubles, spacing: int) -> Doubles:
+def _cut_windows(values: Doubles, spacing: int) -> Doubles:
     every = np.lib.stride_tricks.sliding_window_view(values, (SIDE, SIDE), axis=(0, 1))
-    rows, columns = (_starts(n, spacing) for n in values.shape[:2])
+    rows, columns = (_find_starts(n, spacing) for n in values.shape[:2])
     chosen: Doubles = every[np.ix_(rows, columns)].reshape(len(rows) * len(columns), -1)
     return chosen
 
 
-def _bins(colour: Doubles) -> NDArray[np.intp]:
+def _find_bins(colour: Doubles) -> NDArray[np.intp]:
     return np.clip((colour * BINS).astype(np.intp), 0, BINS - 1)
 
 
-def _excess(x: Doubles, e: Doubles) -> Doubles:
+def _measure_excess(x: Doubles, e: Doubles) -> Doubles:
     """Return, for each channel and bin, how much more often the output shows it, in units of an even spread."""
     counts = [
-        [np.bincount(_bins(v[..., c]).ravel(), minlength=BINS) / v[..., c].size for c in range(e.shape[-1])]
+        [np.bincount(_find_bins(v[..., c]).ravel(), minlength=BINS) / v[..., c].size for c in range(e.shape[-1])]
         for v in (x, e)
     ]
     return np.maximum(0, np.array(counts[0]) - np.array(counts[1])) * BINS
 
 
-def _sum_of(excess: Doubles, colour: Doubles) -> Doubles:
-    bins = _bins(colour)
+def _add_excess(excess: Doubles, colour: Doubles) -> Doubles:
+    bins = _find_bins(colour)
     return np.asarray(sum(excess[c][bins[..., c]] for c in range(len(excess))))

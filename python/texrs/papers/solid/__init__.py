@@ -50,7 +50,7 @@ from texrs.exemplar.analysis import COARSEST
 from texrs.fields import Field
 from texrs.growth import Constraints, Grown, Guide, Start, Windows, from_patches
 from texrs.growth.engine import Places
-from texrs.papers.solid.gate import Trial, trial_region
+from texrs.papers.solid.gate import Trial, choose_trial_region
 from texrs.papers.solid.literal import grow_as_printed
 from texrs.papers.solid.request import Method, Request
 from texrs.papers.solid.settings import QUALITIES, Quality
@@ -311,7 +311,7 @@ def choose_start(asked: Request, quality: Quality) -> Start | None:
 
 def try_optimise(asked: Request, progress: Progress | None) -> Trial:
     """Grow the middle of the output by "optimise", and judge it."""
-    part = trial_region(asked.region, asked.exemplar.pixels)
+    part = choose_trial_region(asked.region, asked.exemplar.pixels)
     told = None if progress is None else lambda name, share: progress(f"trial: {name}", share)
     tried = analyse(asked, "optimise").grow(part, progress=told)
     return Trial.of(asked.exemplar.pixels, as_coordinates(tried.places, part), asked.field)

@@ -13,7 +13,7 @@ from texrs.fields import Field
 from texrs.kernels.gather import gather
 from texrs.source_map import SourceMap
 
-__all__ = ["Trial", "trial_region"]
+__all__ = ["Trial", "choose_trial_region"]
 
 SHARE = 0.15
 """How far the share of each class of colours may stray."""
@@ -72,7 +72,7 @@ class Trial:
         return cls([round(float(r), 4) for r in relative], round(fine[1] / max(fine[0], 1e-12), 4), round(used, 2))
 
 
-def trial_region(region: Region, image: Array) -> Region:
+def choose_trial_region(region: Region, image: Array) -> Region:
     """Return the middle of a region, no larger than the exemplar: what a trial is made on, under the field as it is there."""
     shape, origin = [], []
     for n, first, most in zip(region.shape, region.origin, image.shape, strict=False):

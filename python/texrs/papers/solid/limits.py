@@ -15,7 +15,7 @@ LIMIT = 8 << 30
 """Bytes that a synthesis may take unless another limit is given."""
 
 
-def bytes_needed(image: Array, region: Region, field: Field | None) -> int:
+def estimate_bytes(image: Array, region: Region, field: Field | None) -> int:
     """Return the bytes that a synthesis takes at most, about.
 
     A point of the output has its place four times over (12 bytes an axis triple), what its window shows, its value and
@@ -36,7 +36,7 @@ def check_memory(image: Array, region: Region, field: Field | None, limit: objec
         limit = LIMIT
     if isinstance(limit, bool) or not isinstance(limit, numbers.Integral) or int(limit) <= 0:
         raise InvalidInput(f"memory_limit: needs a positive number of bytes, got {limit!r}")
-    total = bytes_needed(image, region, field)
+    total = estimate_bytes(image, region, field)
     if total > int(limit):
         raise LimitExceeded(
             f"size: {region.shape} would take {total / 2**30:.1f} GiB, more than the limit of "

@@ -151,7 +151,7 @@ class _Texture:
     def _origin(self, origin: object) -> tuple[int, ...]:
         values = [origin] * self.axes if isinstance(origin, numbers.Integral) else origin
         if isinstance(values, Sequence | np.ndarray) and len(values) == self.axes:
-            ends = [_end(v) for v in values]
+            ends = [_as_end(v) for v in values]
             if None not in ends:
                 return tuple(int(v) for v in values)
         raise InvalidInput(f"origin: needs {self.axes} integers within {FAR}, got {origin!r}")
@@ -166,19 +166,19 @@ class _Texture:
             one = isinstance(part, numbers.Integral) and not isinstance(part, bool)
             if isinstance(part, slice):
                 if part.start is None or part.stop is None:
-                    raise InvalidInput(f"texture: has no end, so a range needs both: start:stop; got {_text(part)}")
+                    raise InvalidInput(f"texture: has no end, so a range needs both: start:stop; got {_spell(part)}")
                 if part.step is not None:
-                    raise InvalidInput(f"texture: ranges have no step; got {_text(part)}")
-                start, stop = _end(part.start), _end(part.stop)
+                    raise InvalidInput(f"texture: ranges have no step; got {_spell(part)}")
+                start, stop = _as_end(part.start), _as_end(part.stop)
             elif one:
-                start = _end(part)
+                start = _as_end(part)
                 stop = None if start is None else start + 1
             else:
                 raise InvalidInput(f"texture: takes integers and ranges, {_ORDER[self.axes]}; got {part!r}")
             if start is None or stop is None:
-                raise InvalidInput(f"texture: a range needs integers within {FAR}, got {_text(part)}")
+                raise InvalidInput(f"texture: a range needs integers within {FAR}, got {_spell(part)}")
             if stop <= start:
-                raise InvalidInput(f"texture: the range {_text(part)} is empty")
+                raise InvalidInput(f"texture: the range {_spell(part)} is empty")
             origin.append(start)
             shape.append(stop - start)
             single.append(one)
@@ -327,16 +327,16 @@ class SolidTexture(_Texture):
             The work was stopped.
 
         """
-        middle = _numbers(point, "point", (3,))
+        middle = _as_numbers(point, "point", (3,))
         if (normal is None) == (axes is None):
             raise InvalidInput("normal, axes: needs one of the two")
         if axes is None:
-            across = _numbers(normal, "normal", (3,))
+            across = _as_numbers(normal, "normal", (3,))
             if np.abs(across).max() < 1e-6:
                 raise InvalidInput(f"normal: needs a direction, got {normal!r}")
             steps = _across(across)
         else:
-            steps = _numbers(axes, "axes", (2, 3))
+            steps = _as_numbers(axes, "axes", (2, 3))
             if np.linalg.norm(np.cross(*steps)) < 1e-6:
                 raise InvalidInput("axes: needs two directions that are not parallel")
         sides = as_size(size)
@@ -391,7 +391,7 @@ class _Moved(Field):
         return f"{self.field.describe()}; seen from ({', '.join(map(str, self.by))})"
 
 
-def _numbers(value: object, name: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def _as_numbers(value: object, name: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
     try:
         given: Array = np.asarray(value)
     except (ValueError, TypeError):
@@ -401,14 +401,14 @@ def _numbers(value: object, name: str, shape: tuple[int, ...]) -> NDArray[np.flo
     return given.astype(np.float64)
 
 
-def _end(value: object) -> int | None:
+def _as_end(value: object) -> int | None:
     """Return an integer of the world; none where it is not one."""
     if isinstance(value, bool) or not isinstance(value, numbers.Integral) or not -FAR <= int(value) <= FAR:
         return None
     return int(value)
 
 
-def _text(part: object) -> str:
+def _spell(part: object) -> str:
     if not isinstance(part, slice):
         return repr(part)
     ends = ["" if x is None else str(x) for x in (part.start, part.stop)]

@@ -56,7 +56,7 @@ from texrs.papers.splice.edit import as_steps
 from texrs.papers.splice.entry import as_elements
 from texrs.papers.splice.literal import fill_literally, match_literally
 from texrs.papers.splice.matching import Match, match_edit, match_layouts
-from texrs.papers.splice.refine import fill, refined_places
+from texrs.papers.splice.refine import fill, refine_places
 from texrs.papers.splice.result import compose
 from texrs.synthesis import Synthesis
 
@@ -242,7 +242,7 @@ def _synthesize(
         filled = fill(a.image, draft, spacing(a.points), seed, watch)
     places = filled.places
     if refine and method != "preview":
-        places = refined_places(a.image, a.wrap, filled, seed, watch)
+        places = refine_places(a.image, a.wrap, filled, seed, watch)
     result = compose(a, b, match, warp, draft, filled, places, label, method=method, seed=seed)
     watch("done", 1.0)
     return result
