@@ -140,15 +140,15 @@ class Exemplar:
 
     # --- what is measured --------------------------------------------------------------------------------------------
 
-    @cached_property
+    @property
     def labels(self) -> bool:
         """Whether the values are classes without an order."""
-        return are_labels(self._pixels, self._labels)
+        return self.remember("labels", lambda: are_labels(self._pixels, self._labels))
 
-    @cached_property
+    @property
     def repeat(self) -> tuple[bool, ...]:
         """Axes along which the example repeats: as given, or measured at each level of its pyramid."""
-        return self._measure(count_levels(self.shape, COARSEST))
+        return self.remember("repeat", lambda: self._measure(count_levels(self.shape, COARSEST)))
 
     def analyse(self, radii: Sequence[int] = (2,), coarsest: int = COARSEST) -> Analysis:
         """Return the pyramid, with the appearance vector of each sample's window at each level.
