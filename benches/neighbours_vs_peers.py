@@ -17,8 +17,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from skimage import data
 
-from texrs import _threads as threads
-from texrs import samples
+from texrs import samples, threads
 from texrs._engine.appearance import Appearance
 from texrs._engine.coherence import similar
 

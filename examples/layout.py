@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from skimage.transform import resize
 
-import texrs
+from texrs.synthesis import preview
 
 FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 GAP = 8
@@ -13,7 +13,7 @@ GAP = 8
 
 def rgb(picture: np.ndarray, height: int | None = None) -> np.ndarray:
     """Return an 8-bit RGB version of a picture or a stage, on white where it is transparent, at a height or at its own."""
-    seen = texrs.synthesis.preview(np.asarray(picture))
+    seen = preview(np.asarray(picture))
     if seen.ndim == 2:
         seen = np.repeat(seen[..., np.newaxis], 3, axis=-1)
     elif seen.shape[-1] == 4:
