@@ -36,7 +36,7 @@ except ImportError:
 Filler = Callable[[np.ndarray, np.ndarray, np.ndarray, int], np.ndarray]
 MEANING = """
 scale: correlation of the logarithms of the local wavelength and of the true scale in the hole, as a share of the
-photograph's own (>= 0.95); seam: mean gradient across the rim over that inside the hole, as a share of the photograph's own
+photograph's own (>= 0.95); seam: mean gradient across its boundary over that inside it, as a share of the photograph's own
 (0.7 to 1.4); kept: whether all known pixels are as they were. Figures are means over the holes; **bold** fails.
 """
 OPTIONS: dict[str, dict[str, Any]] = {
@@ -90,7 +90,7 @@ def without(image: np.ndarray, hole: np.ndarray) -> np.ndarray:
 
 
 def agreement(image: np.ndarray, hole: np.ndarray, scale: np.ndarray) -> float:
-    """Return the correlation of sizes seen and true ones in a hole, away from its rim."""
+    """Return the correlation of sizes seen and true ones in a hole, away from its boundary."""
     at = np.argwhere(hole)
     (top, left), (bottom, right) = at.min(axis=0) + 6, at.max(axis=0) - 5
     inside = (slice(top, bottom), slice(left, right))
@@ -117,8 +117,8 @@ def main() -> None:
             continue
         holes = holes_of(image.shape[:2])
         own = [agreement(image, hole, scale) for hole in holes]
-        rim = [checks.seam(image, hole) for hole in holes]
-        print(f"| {name} | itself | ({np.mean(own):.2f}) | ({np.mean(rim):.2f}) | | |", flush=True)
+        edges = [checks.seam(image, hole) for hole in holes]
+        print(f"| {name} | itself | ({np.mean(own):.2f}) | ({np.mean(edges):.2f}) | | |", flush=True)
         row = [image, without(image, holes[1])]
         for filler, fill in fillers.items():
             start = time.perf_counter()
@@ -126,7 +126,7 @@ def main() -> None:
             spent = (time.perf_counter() - start) / len(holes)
             pairs = list(zip(made, holes, strict=True))
             likeness = np.mean([agreement(m, hole, scale) for m, hole in pairs]) / np.mean(own)
-            edge = np.mean([checks.seam(m, hole) for m, hole in pairs]) / np.mean(rim)
+            edge = np.mean([checks.seam(m, hole) for m, hole in pairs]) / np.mean(edges)
             same = all((m[~hole] == image[~hole]).all() for m, hole in pairs)
             print(
                 f"| {name} | {filler} | {shown(float(likeness), 0.95)} | {shown(float(edge), 0.7, 1.4)} | "

@@ -41,7 +41,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "plain": {"scale_weight": 0.0},
     "paper": {"method": "paper"},
 }
-"""Options of the verb, and settings of its supply."""
+"""Options of the verb, and settings of its atlas."""
 HEAD = ("rho", "slope", "wavelength", "error", "sharp", "colour", "rows", "seconds")
 BOUNDS = {"error": (0, 0.08), "sharp": (0.9, 1.1), "colour": (0, 0.012)}
 MEANING = """

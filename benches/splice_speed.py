@@ -141,8 +141,8 @@ def grown(what: str, side: int) -> None:
     elif what == "similarity":
         mine.similarity()
     else:
-        ground = np.argwhere(binary_erosion(~mine.mask, iterations=4))[:1]
-        analyse(mine.image, box=(*mine.points[middle], *mine.box), background=ground, layout="disjoint")
+        background = np.argwhere(binary_erosion(~mine.mask, iterations=4))[:1]
+        analyse(mine.image, box=(*mine.points[middle], *mine.box), background=background, layout="disjoint")
     after = resource.getrusage(resource.RUSAGE_SELF)
     busy = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     print(f"{what:12s} {side:5d}^2 {busy:8.2f} s of processors, {after.ru_maxrss / 1024:7.0f} MB at most", flush=True)

@@ -42,8 +42,8 @@ def read(path: Path, *, auto: bool) -> Elements:
     box = told["foreground_box"]
     x, y = box["center"]
     width, height = box["size"]
-    ground = np.array(told["background_scribble"])[:, ::-1]
-    return elements.analyse(image, box=(y, x, height, width), background=ground, layout=told["tag"])
+    background = np.array(told["background_scribble"])[:, ::-1]
+    return elements.analyse(image, box=(y, x, height, width), background=background, layout=told["tag"])
 
 
 def entries(folder: str | None, *, auto: bool) -> dict[str, Elements]:
