@@ -1,18 +1,20 @@
 # Each goal sets up all it needs in this folder: a virtual environment in .venv and a release build.
-# make demo | test | lint | bench | docs | format | clean
+# make demo | test | fuzz | lint | bench | docs | format | clean
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
+MINUTES ?= 10
 RUST := Cargo.toml $(shell find rust -name '*.rs')
 
-.PHONY: help demo test lint format bench docs clean requirements
+.PHONY: help demo test fuzz lint format bench docs clean requirements
 .DELETE_ON_ERROR:
 
 help:
 	@echo "make demo    pictures of every system at work on built-in examples: demo/index.html"
 	@echo "make test    all tests, Rust and Python"
+	@echo "make fuzz    property tests with new random cases, for about ten minutes (MINUTES=10)"
 	@echo "make lint    formatting, clippy, rustdoc, ruff, mypy, stubtest"
 	@echo "make format  rewrite the sources in the house's format"
 	@echo "make bench   criterion benches of the kernels"
@@ -42,6 +44,17 @@ demo: $(VENV)/.built
 test: $(VENV)/.built
 	cargo test --quiet
 	$(BIN)/python -m pytest -n $(JOBS) -q
+
+# Rounds with a seed each, until one fails or the time is up; with a SEED, the round of that seed.
+fuzz: $(VENV)/.built
+	@end=$$(($$(date +%s) + 60 * $(MINUTES))); \
+	while seed=$(or $(SEED),$$(od -An -N4 -tu4 /dev/urandom | tr -d ' ')); do \
+		echo "make fuzz SEED=$$seed"; \
+		PROPTEST_RNG_SEED=$$seed cargo test --quiet --lib && \
+		$(BIN)/python -m pytest tests -n $(JOBS) -q -m hypothesis --hypothesis-profile fuzz --hypothesis-seed $$seed || \
+			{ echo "make fuzz SEED=$$seed repeats this" >&2; exit 1; }; \
+		[ -z "$(SEED)" ] && [ $$(date +%s) -lt $$end ] || break; \
+	done
 
 lint: $(VENV)/.built
 	cargo fmt --check

@@ -87,5 +87,5 @@ class Annotated:
 
 def annotated(folder: Path) -> list[Annotated]:
     """Read all annotations of the textures with separate elements, nets and joints."""
-    rooms = ("b-disjoint", "c-connected", "d-background")
-    return [Annotated.of(path) for room in rooms for path in sorted((folder / room).glob("*.json"))]
+    folders = ("b-disjoint", "c-connected", "d-background")
+    return [Annotated.of(path) for name in folders for path in sorted((folder / name).glob("*.json"))]

@@ -135,7 +135,7 @@ def repetition(image, band=8, least=20):
 
 
 def seam(image, hole, width=2):
-    """Return the mean gradient across a hole's rim, as a share of that inside it."""
+    """Return the mean gradient across a hole's boundary, as a share of that inside it."""
     inside = ndimage.binary_erosion(hole, iterations=3 * width)
-    rim = ndimage.binary_dilation(hole, iterations=width) & ~ndimage.binary_erosion(hole, iterations=width)
-    return float(gradient(image)[rim].mean() / gradient(image)[inside].mean())
+    boundary = ndimage.binary_dilation(hole, iterations=width) & ~ndimage.binary_erosion(hole, iterations=width)
+    return float(gradient(image)[boundary].mean() / gradient(image)[inside].mean())

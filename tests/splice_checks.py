@@ -104,8 +104,7 @@ def copied(a: Elements, result: Synthesis) -> tuple[float, float]:
     share = float(np.mean([c.tobytes() in known for c in out[:: max(1, len(out) // 20000)]]))
     number = result.source.label.astype(int)
     rigid = np.argwhere(number > 0)
-    if not len(rigid):
-        return share, 1.0
+    assert len(rigid), "no pixel shows an element that was matched"
     goals = np.array([m["target"] for m in result.report["matches"]])
     starts = np.array([m["point"] for m in result.report["matches"]])
     which = number[tuple(rigid.T)] - 1
@@ -125,8 +124,7 @@ def coherence(a: Elements, result: Synthesis, seed: int = 0) -> tuple[float, flo
         free = uniform_filter(mask.astype(float), side, mode="constant", cval=1.0) < 0.5 / side**2
         view = np.lib.stride_tricks.sliding_window_view(picture, (side, side), axis=(0, 1))
         at = np.argwhere(free[side // 2 : -(side // 2), side // 2 : -(side // 2)])
-        if len(at) < 50:
-            return 0.0, 0.0  # There is no ground to speak of.
+        assert len(at) >= 50, "there is no ground to speak of"
         corners.append(at)
         patches.append(view[at[:, 0], at[:, 1]].reshape(len(at), -1))
     draw = np.random.default_rng(seed)

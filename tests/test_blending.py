@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import texrs
+from reference.look_up import view
 from texrs import samples
 from texrs.blending import _seams, _values, _visibility, blend, measure_visibility
 from texrs.blending._correction import divide_strips
@@ -53,7 +54,7 @@ def exemplar():
 def twin(source, image, wrap, screening):
     """The least squares problem written out: one row an edge, one row a pixel."""
     height, width = source.shape
-    values = source.render(image)
+    values = view(source, image)
     joined = [source.continues(a, wrap=wrap[a]) for a in range(2)]
     frames = source.frames()
     fixed = np.zeros(source.shape, bool)
@@ -121,7 +122,7 @@ def test_a_source_that_continues_stays_as_it_is(exemplar):
 
 
 def test_a_picture_of_shifted_brightness_becomes_one():
-    """Two exemplars that differ by a constant: unscreened, with free room to drift, the step is gone."""
+    """Two exemplars that differ by a constant: unscreened, and free to drift, the step is gone."""
     random = np.random.default_rng(4)
     dark = random.random((40, 40)).astype(np.float32)
     light = dark + np.float32(1)
@@ -131,7 +132,7 @@ def test_a_picture_of_shifted_brightness_becomes_one():
     healed = blend(source, [dark, light], wrap=(False, False), screening=0.01)
     step = (healed - dark)[10:30, 20] - (healed - dark)[10:30, 19]
     assert np.abs(step).max() < 0.15
-    # The rim keeps its values.
+    # The border keeps its values.
     rendered = source.render([dark, light])
     assert (healed[0] == rendered[0]).all()
     assert (healed[:, -1] == rendered[:, -1]).all()
@@ -166,7 +167,7 @@ def test_values_stay_in_the_range_of_each_channel(patchwork, exemplar):
 def test_transparency_is_not_corrected(patchwork, exemplar, channels):
     alpha = np.random.default_rng(5).integers(0, 256, (64, 64, 1)).astype(np.uint8)
     healed = blend(patchwork, np.concatenate([exemplar[..., : channels - 1], alpha], axis=-1), wrap=True)
-    np.testing.assert_array_equal(healed[..., -1:], patchwork.render(alpha))
+    np.testing.assert_array_equal(healed[..., -1:], view(patchwork, alpha))
     np.testing.assert_allclose(
         healed[..., :-1].astype(int), blend(patchwork, exemplar[..., : channels - 1], wrap=True), atol=1
     )
@@ -175,10 +176,10 @@ def test_transparency_is_not_corrected(patchwork, exemplar, channels):
 @pytest.mark.parametrize("dtype", [np.bool_, np.int8, np.int16, np.int32])
 def test_labels_are_not_corrected(patchwork, exemplar, dtype):
     labels = (exemplar[..., 0] // 64).astype(dtype)
-    np.testing.assert_array_equal(blend(patchwork, labels, wrap=True), patchwork.render(labels))
+    np.testing.assert_array_equal(blend(patchwork, labels, wrap=True), view(patchwork, labels))
     numbers = exemplar[..., 0].astype(np.uint16)
     nearest = blend(patchwork, numbers, wrap=True, interpolation="nearest")
-    np.testing.assert_array_equal(nearest, patchwork.render(numbers, interpolation="nearest"))
+    np.testing.assert_array_equal(nearest, view(patchwork, numbers, "nearest"))
 
 
 def test_normals_stay_unit_vectors(patchwork, exemplar):
@@ -219,7 +220,7 @@ def test_normals_of_a_turned_copy_meet_where_the_surface_does():
 def test_a_band_keeps_all_else(patchwork, exemplar):
     image = exemplar.astype(np.float32)
     healed = blend(patchwork, image, wrap=True, band=6)
-    changed = (healed != patchwork.render(image)).any(axis=-1)
+    changed = (healed != view(patchwork, image)).any(axis=-1)
     distance = np.full(patchwork.shape, 99)
     rows = np.minimum(np.arange(96) % 32, 31 - np.arange(96) % 32)
     columns = np.minimum(np.arange(128) % 32, 31 - np.arange(128) % 32)
@@ -427,7 +428,7 @@ def test_volumes_and_other_sizes_are_refused(patchwork):
 
 
 def test_the_public_name_is_the_function():
-    """The module of the same room must not hide it."""
+    """The module of the same name must not hide it."""
     assert texrs.blend is blend
     whole = SourceMap.identity((12, 16))
     apart = np.where(np.arange(16)[:, np.newaxis] < 8, whole.coordinates, whole.coordinates[:, ::-1])
@@ -436,7 +437,7 @@ def test_the_public_name_is_the_function():
     within, known = np.zeros((12, 16), bool), np.ones((12, 16), bool)
     within[:, 8:] = True
     known[:, 0] = False
-    plain, healed = source.render(image), texrs.blend(source, image, wrap=False, within=within, known=known)
+    plain, healed = view(source, image), texrs.blend(source, image, wrap=False, within=within, known=known)
     np.testing.assert_array_equal(healed[~within], plain[~within])
     assert (healed[within] != plain[within]).any()
     everywhere = texrs.blend(source, image, wrap=False, within=within)

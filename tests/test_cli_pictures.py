@@ -170,10 +170,10 @@ def test_bad_input_gets_one_line_and_leaves_what_was_there(here: Path, capsys: C
     assert main([*command.split(), "-o", "out.png" if "nan.npy hole" not in command else "out.tif"]) == 2
     out, err = capsys.readouterr()
     assert out == ""
-    told = [line for line in err.splitlines() if line not in ("texrs: complete", "texrs: join columns")]
-    assert len(told) == 1, err
-    assert told[0].startswith("texrs: ")
-    assert REFUSED[command] in told[0]
+    lines = [line for line in err.splitlines() if line not in ("texrs: complete", "texrs: join columns")]
+    assert len(lines) == 1, err
+    assert lines[0].startswith("texrs: ")
+    assert REFUSED[command] in lines[0]
     assert files(here) == before
 
 

@@ -8,7 +8,6 @@ import sys
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import imageio.v3 as iio
@@ -161,16 +160,16 @@ def add_one(folder: str, number: int, replace: bool) -> str:
 
 @pytest.mark.parametrize("replace", [False, True])
 def test_one_name_given_by_several_processes_at_once(tmp_path: Path, said: list[str], replace: bool) -> None:
-    context, count = get_context("spawn"), 6
+    context, count = get_context("spawn"), 3
     with ProcessPoolExecutor(count, context, meet, (context.Barrier(count),)) as pool:
-        told = list(pool.map(add_one, [str(tmp_path / "db")] * count, range(count), [replace] * count))
+        answers = list(pool.map(add_one, [str(tmp_path / "db")] * count, range(count), [replace] * count))
     textures = TextureDatabase(tmp_path / "db", say=said.append)
     if replace:
-        assert told == ["ok"] * count
+        assert answers == ["ok"] * count
     else:
-        assert told.count("ok") == 1
-        assert sum("name: one is there already, of another image" in t for t in told) == count - 1
-        winner = told.index("ok")
+        assert answers.count("ok") == 1
+        assert sum("name: one is there already, of another image" in answer for answer in answers) == count - 1
+        winner = answers.index("ok")
         assert (textures["one"].image == np.roll(DOTS.image, winner, axis=-1) // (winner + 1)).all()
     # The manifest, the entry and the pixels are of one picture.
     assert (np.load(tmp_path / "db" / "one.npy") == textures["one"].image).all()
@@ -187,25 +186,26 @@ def test_a_texture_that_is_refused_leaves_no_folder(tmp_path: Path) -> None:
 
 
 def test_splices_and_their_matrix(textures: TextureDatabase, monkeypatch: pytest.MonkeyPatch) -> None:
-    calls = []
-
-    def splice(a, b, size=None, **options):
-        calls.append((len(a.points), len(b.points), size, options))
-        if a is b and options.get("seed") == 1:
-            raise InvalidInput("a: is b")
-        return SimpleNamespace(image=a.image[: (size or (96, 96))[0]])
-
-    monkeypatch.setattr("texrs.database._textures.splice", splice)
     textures.add(DOTS.image[:, ::-1].copy(), "other", mask=DOTS.mask[:, ::-1], layout="disjoint")
-    assert textures.splice("dots", "other", (40, 40), seed=3).image.shape == (40, 96, 3)
-    assert calls[0][2:] == ((40, 40), {"seed": 3})
-    made = textures.matrix(cell=32)
+    mine, theirs = textures["dots"], textures["other"]
+    expected = texrs.splice(mine, theirs, (40, 48), seed=3).image
+    np.testing.assert_array_equal(textures.splice("dots", "other", (40, 48), seed=3).image, expected)
+    made = textures.matrix(cell=32, size=(40, 48), seed=3)
     assert made.rows == made.columns == ("dots", "other")
     assert len(made.results) == 4
+    np.testing.assert_array_equal(made.results["dots", "other"].image, expected)
     assert made.sheet.shape == (108, 108, 3)
-    failing = textures.matrix(["dots"], ["dots", "other"], cell=32, seed=1)
+
+    def refuse(a, b, size=None, **options):
+        if (a.points == b.points).all():
+            raise InvalidInput("a: is b")
+        return texrs.splice(a, b, size, **options)
+
+    monkeypatch.setattr("texrs.database._textures.splice", refuse)
+    failing = textures.matrix(["dots"], ["dots", "other"], cell=32, size=(40, 48), seed=1)
     assert failing.failed == {("dots", "dots"): "a: is b"}
     assert (failing.sheet[40:60, 40:60] == 128).all()
+    assert (failing.sheet[40:60, 76:96] != 128).any()
 
 
 @pytest.mark.parametrize(

@@ -57,6 +57,7 @@ def test_a_lambda_within_0_to_2_is_taken(growth_rate):
 def test_a_turned_element_takes_the_place_of_its_like():
     labels = bars(0, 40, 90)
     elements = measure_elements(labels)
+    assert len(elements) == 3
     heap = Heap.measure(elements, labels)
     for site, element in enumerate(elements):
         taken = heap.take_place(site, FREE, 0, 0)

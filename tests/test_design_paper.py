@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import texrs
+from reference.look_up import view
 from texrs import DeformationOptions, ElementOptions, samples
 from texrs._arrays import to_unit
 from texrs.errors import InvalidInput
@@ -175,9 +176,9 @@ def test_completion_takes_the_best_match_of_a_centred_window():
 # --- the result ------------------------------------------------------------------------------------------------------
 
 
-def test_the_source_map_renders_the_composite(pebbles, result):
+def test_the_composite_is_what_the_source_map_shows(pebbles, result):
     assert result.image.shape == (160, 192, 3)
-    np.testing.assert_array_equal(result.source.render(pebbles), result.stages["composite"])
+    np.testing.assert_array_equal(view(result.source, pebbles), result.stages["composite"])
 
 
 def test_unscreened_poisson_acts_and_keeps_the_border(result):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from types import SimpleNamespace
 
 import imageio.v3 as iio
 import numpy as np
@@ -43,9 +42,9 @@ def test_analyse_writes_what_the_function_finds(here: Path, capsys: Capture) -> 
 
 
 def test_places_may_follow_each_other(here: Path) -> None:
-    from test_elements import told
+    from test_elements import annotate
 
-    box, ground = told(DOTS)
+    box, ground = annotate(DOTS)
     places = [f"{r},{c}" for r, c in ground[:4]]
     start = ["analyse", "in.png", "-q", "--box", ",".join(map(str, box)), "--layout", "F=d"]
     assert main([*start, "-o", "a.npz", "--background", *places]) == 0
@@ -62,21 +61,18 @@ def test_given_points_and_an_automatic_start(here: Path, capsys: Capture) -> Non
     assert len(found.points) >= len(DOTS.centres)
     assert found.sets is not None
     assert main(["analyse", "in.png", "-o", "e.npz"]) == 0
-    told = capsys.readouterr().err
-    assert re.search(r"proposed box: \d+,\d+,\d+,\d+ \(\d+% sure\)", told)
-    assert "proposed layout" in told
+    err = capsys.readouterr().err
+    assert re.search(r"proposed box: \d+,\d+,\d+,\d+ \(\d+% sure\)", err)
+    assert "proposed layout" in err
 
 
-def test_database(here: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_database(here: Path, capsys: Capture) -> None:
     assert main(["database", "db", "add", "in.png", "--mask", "mask.png", "--layout", "F=d", "--name", "dots"]) == 0
     assert main(["database", "db", "add", "sample:leaves_and_flowers", "-q", "--layout", "F=d"]) == 0
     capsys.readouterr()
     assert main(["database", "db", "list"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split("\t")[:2] for line in lines] == [["dots", "disjoint"], ["leaves_and_flowers", "disjoint"]]
-    monkeypatch.setattr(
-        "texrs.database._textures.splice", lambda a, b, *size, **options: SimpleNamespace(image=a.image)
-    )
     assert main(["database", "db", "matrix", "-o", "sheet.png", "--cell", "32", "--size", "40x40"]) == 0
     assert iio.imread("sheet.png").shape == (108, 108, 3)
     (here / "db" / "dots.npz").write_bytes(b"x")

@@ -8,6 +8,7 @@ from hypothesis.extra import numpy as hnp
 from scipy.ndimage import map_coordinates
 
 import texrs
+from reference.look_up import look_up
 from texrs.errors import InvalidInput
 from texrs.kernels.gather import gather
 
@@ -59,6 +60,33 @@ def test_cubic_stays_in_the_range_of_the_data(image, points):
     out = gather(image, points, interpolation="cubic")
     assert out.min() >= image.min()
     assert out.max() <= image.max()
+
+
+@given(
+    dtype=st.sampled_from(DTYPES),
+    channels=st.sampled_from([(), (1,), (3,)]),
+    axes=st.sampled_from([2, 3]),
+    interpolation=st.sampled_from(["nearest", "linear", "cubic"]),
+    wrap=st.booleans(),
+    step=st.sampled_from([0.0, 0.5, 1 / 4096]),
+    seed=st.integers(0, 2**32),
+)
+def test_everything_is_that_of_the_slow_twin(dtype, channels, axes, interpolation, wrap, step, seed):
+    rng = np.random.default_rng(seed)
+    images = [(rng.random((*shape[:axes], *channels)) * 99).astype(dtype) for shape in ((5, 6, 4), (3, 7, 5))]
+    at = rng.uniform(-3, 9, (40, axes)).astype(np.float32)
+    # Also whole coordinates, halves, and those of fixed point, some of them along one axis alone.
+    rounded = rng.random((40, axes)) < 0.5
+    at[rounded] = np.rint(at / step)[rounded] * step if step else np.rint(at)[rounded]
+    which = rng.integers(0, 2, 40)
+    found = gather(images, at, which, interpolation=interpolation, wrap=wrap)
+    exact = look_up([i.astype(np.float64) for i in images], at, which, interpolation=interpolation, wrap=wrap)
+    assert found.dtype == dtype
+    if found.dtype.kind == "f":
+        np.testing.assert_allclose(found, exact.astype(dtype), rtol=4 * np.finfo(dtype).eps, atol=1e-12)
+    else:
+        # Where a sum ends in a half, its last bit says which integer is the nearest.
+        np.testing.assert_allclose(found.astype(np.float64), exact, rtol=0, atol=0.5 + 1e-9)
 
 
 def test_volumes_and_several_exemplars():

@@ -41,6 +41,7 @@ def test_resizing_is_that_of_the_twin(n, m):
 
 
 def test_copies_do_not_overlap_and_are_found_again(atlas):
+    assert len(atlas.copies) == 3
     taken = np.zeros(atlas.levels[-1].appearance.shape, int)
     for number, copy in enumerate(atlas.copies):
         (top, left), (rows, columns) = copy.origin, copy.shape
@@ -58,6 +59,7 @@ def test_what_is_barred_is_that_of_the_twin(floor):
     known = np.ones((96, 80), bool)
     known[30:41, 20:33] = False
     atlas = atlas_of(floor.image, known=known)
+    assert len(atlas.levels) > 1
     for number, level in enumerate(atlas.levels):
         spacing = 1 << (len(atlas.levels) - 1 - number)
         shape = level.appearance.shape
@@ -164,10 +166,10 @@ def test_balanced_colours_are_nearer_to_the_exemplars(floor):
 
 def test_any_start_and_any_corrector_can_be_handed_in():
     """A draft that a corrector leaves alone comes out as it went in, upsampled; each level is asked for what it is to hold."""
-    told = []
+    calls = []
 
     def leave(places, level, region, frames, asked, progress):
-        told.append((level, region.shape, asked.held is None))
+        calls.append((level, region.shape, asked.held is None))
         return Corrected(places, level, 0.25)
 
     def ask(level, region, spacing):
@@ -189,7 +191,7 @@ def test_any_start_and_any_corrector_can_be_handed_in():
     )
     copy[0, 0] = 0
     np.testing.assert_array_equal(made.places.reshape(14, 20, 2), copy * ONE)
-    assert told == [(1, (7, 10), True), (2, (14, 20), False)]
+    assert calls == [(1, (7, 10), True), (2, (14, 20), False)]
     assert list(made.stages) == ["level 2"]
     assert [done.report() for done in made.levels] == [
         {"shape": [7, 10], "passes": 1, "changed": 0.25},

@@ -23,7 +23,7 @@ def test_agrees_with_the_naive_twin(shape, radius, limit, iterations, wrap, seed
     options = {"max_iterations": iterations, "tolerance": 1.01, "wrap": wrap}
     result = mean_shift(image, radius, limit, **options)
     expected = reference.mean_shift(image, radius, limit, **options)
-    # A colour at the rim of a ball may fall on either side: rounding decides.
+    # A colour at the border of a ball may fall on either side: rounding decides.
     assert np.mean(np.abs(result - expected) < 1e-2) > 0.98
 
 
@@ -52,17 +52,6 @@ def test_moving_a_cyclic_image_moves_the_result():
     result = mean_shift(image, 4, 60, wrap=True)
     moved = mean_shift(np.roll(image, (7, 11), (0, 1)), 4, 60, wrap=True)
     assert np.mean(moved == np.roll(result, (7, 11), (0, 1))) > 0.999
-
-
-def test_close_to_opencv():
-    cv2 = pytest.importorskip("cv2")
-    from skimage import data
-
-    image = np.ascontiguousarray(data.coffee()[100:228, 200:328])
-    ours = mean_shift(image, 6, 14).astype(int)
-    difference = np.abs(ours - cv2.pyrMeanShiftFiltering(image, 6, 14, maxLevel=0)).max(-1)
-    assert np.median(difference) <= 1
-    assert np.mean(difference <= 2) > 0.8
 
 
 def test_progress_is_reported_and_can_stop():

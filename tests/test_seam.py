@@ -228,9 +228,9 @@ def test_a_shell_is_cut_in_three_dimensions():
     found = seam.cut(a, b, np.ones(shape, bool), **given)
     assert found.mask[given["core_b"]].all()
     assert not found.mask[~given["mask_b"]].any()
-    rim = given["mask_b"] & beside(~given["mask_b"], (False,) * 3)
+    border = given["mask_b"] & beside(~given["mask_b"], (False,) * 3)
     costs = edge_costs(a, b, given["mask_b"], (False,) * 3)
-    assert found.value == pytest.approx(least(costs, rim & ~given["core_b"], given["core_b"]), rel=1e-3)
+    assert found.value == pytest.approx(least(costs, border & ~given["core_b"], given["core_b"]), rel=1e-3)
 
 
 def test_old_seam_is_covered_where_that_is_cheaper():

@@ -54,10 +54,10 @@ def test_solid_writes_what_the_function_makes(here: Path, capsys: Capture) -> No
     np.testing.assert_array_equal(places.coordinates, expected.source.coordinates)
     assert json.loads(Path("stages/report.json").read_text()) == json.loads(json.dumps(expected.report))
     assert sorted(p.name for p in Path("stages").iterdir())[3] == "04-composite.png"
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert "blocks" in told.err
-    assert re.search(r"wrote out.tif: 20 x 24 x 18, 3 channels, uint8, in [0-9.]+ s\n$", told.err)
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert "blocks" in said.err
+    assert re.search(r"wrote out.tif: 20 x 24 x 18, 3 channels, uint8, in [0-9.]+ s\n$", said.err)
     assert not list(here.glob(".texrs*"))
     # Another map of the example goes the same way.
     io.write_volume("height.npy", VOLUME[..., 0].astype(np.float32))
@@ -169,10 +169,10 @@ WRONG = [
 def test_wrong_requests_get_a_line_and_change_nothing(here: Path, capsys: Capture, arguments: str, says: str) -> None:
     before = files(here)
     assert main([*arguments.split(), "--quiet"]) == 2
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert says in told.err
-    assert told.err.count("\n") == 1
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert says in said.err
+    assert said.err.count("\n") == 1
     assert files(here) == before
 
 

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
+from reference.solid import ONE, Twin, upsampled
 from texrs import fields
 from texrs._engine.appearance import Appearance
 from texrs._engine.pyramid import Region, to_fixed, upsample
 from texrs.errors import Cancelled, InvalidInput
-
-sys.path.insert(0, str(Path(__file__).parent / "reference"))
-from solid import ONE, Twin, upsampled
 
 
 def exemplar(axes, wrap=False, channels=2):

@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import texrs
+from reference.look_up import view
 from texrs import io
 from texrs.cli import main
 
@@ -18,7 +20,7 @@ def test_splice(tmp_path: Path) -> None:
     assert main([*line, "--map", str(source), "--stages", str(stages)]) == 0
     image = io.read(out)
     assert image.shape == (96, 112, 3)
-    assert (texrs.SourceMap.load(source).render(texrs.samples.dots().image) == image).all()
+    np.testing.assert_array_equal(view(texrs.SourceMap.load(source), texrs.samples.dots().image), image)
     assert json.loads((stages / "report.json").read_text())["seed"] == 2
     assert len(list(stages.glob("*.png"))) >= 7
 

@@ -51,10 +51,10 @@ def test_what_differs_is_named():
     stored = witness({"image": np.zeros(2), "report shares": (0.25, 0.75), "label": np.ones(2), "frame": None})
     found = witness({"image": np.ones(2), "report shares": [0.25, 0.5], "label": np.ones(2), "stage": None})
     assert differences(stored, stored) == []
-    told = differences(stored, found)
-    assert [sentence.split(":")[0] for sentence in told] == ["frame", "image", "report shares", "stage"]
-    assert "mean 0.000000, now" in told[1]
-    assert told[2].endswith("stored [0.25, 0.75], now [0.25, 0.5]")
+    sentences = differences(stored, found)
+    assert [sentence.split(":")[0] for sentence in sentences] == ["frame", "image", "report shares", "stage"]
+    assert "mean 0.000000, now" in sentences[1]
+    assert sentences[2].endswith("stored [0.25, 0.75], now [0.25, 0.5]")
     # Of what is long a digest is stored, which is of all of it; of arrays, whatever their mean is printed as.
     first, second = (witness({"log": [*range(100), last]}) for last in (1, 2))
     assert len(differences(first, second)) == 1

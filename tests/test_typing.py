@@ -44,15 +44,15 @@ def complaints(tmp_path_factory: pytest.TempPathFactory) -> dict[int, str]:
     file.write_text(HEAD + "\n".join(lines) + "\n", encoding="utf-8")
     root = Path(__file__).resolve().parents[1]
     command = [sys.executable, "-m", "mypy", "--strict", "--config-file", str(root / "pyproject.toml"), str(file)]
-    told = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False).stdout
+    output = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False).stdout
     found = {}
-    for line in told.splitlines():
+    for line in output.splitlines():
         name, _, rest = line.partition(":")
         if name.endswith(file.name):
             number, _, words = rest.partition(":")
             if words.lstrip().startswith("error"):
                 found[int(number)] = words.strip()
-    assert found, told
+    assert found, output
     return found
 
 

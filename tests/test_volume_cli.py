@@ -44,9 +44,9 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_slice_writes_what_the_functions_make(here, capsys, arguments, expected):
     assert main(["slice", "v.npy", "-o", "out.png", *arguments.split()]) == 0
     np.testing.assert_array_equal(iio.imread("out.png"), expected())
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert told.err.startswith("texrs: wrote out.png: ")
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.startswith("texrs: wrote out.png: ")
     assert sorted(p.name for p in here.iterdir()) == ["out.png", "v.npy"]
 
 
@@ -94,10 +94,10 @@ def test_turntables_and_samples(here, capsys):
 def test_wrong_requests_get_a_line_and_change_nothing(here, capsys, arguments, says):
     before = {p.name: p.read_bytes() for p in here.iterdir()}
     assert main(["slice", *arguments.split()]) == 2
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert says in told.err
-    assert told.err.count("\n") == 1
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert says in said.err
+    assert said.err.count("\n") == 1
     assert {p.name: p.read_bytes() for p in here.iterdir()} == before
 
 

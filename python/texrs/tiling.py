@@ -88,7 +88,8 @@ def tile(
     >>> result = texrs.tile(pebbles, overlap=(16, 20))
     >>> result.image.shape
     (80, 76, 3)
-    >>> bool((result.source.render(pebbles) == result.image).all())
+    >>> row, column = result.source.coordinates[30, 40].astype(int)
+    >>> bool((result.image[30, 40] == pebbles[row, column]).all())
     True
 
     """
