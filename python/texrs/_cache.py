@@ -10,8 +10,6 @@ from typing import Generic, TypeVar
 import cachetools
 import numpy as np
 
-__all__ = ["Cache", "content_hash"]
-
 K = TypeVar("K", bound=Hashable)
 V = TypeVar("V")
 

@@ -8,8 +8,6 @@ from contextlib import contextmanager
 from texrs import _rust
 from texrs._arrays import as_int
 
-__all__ = ["threads"]
-
 
 @contextmanager
 def threads(count: int | None = None) -> Iterator[None]:

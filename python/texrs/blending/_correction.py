@@ -14,8 +14,6 @@ from texrs.blending import _values
 from texrs.blending._seams import Seam, wrap_rows
 from texrs.kernels.poisson import Boundary, spread
 
-__all__ = ["Strip", "divide_strips", "solve_correction"]
-
 REACH = 9.0
 """Strips overlap by this over the root of the screening, in pixels: corrections fall to exp(-9) there."""
 

@@ -12,8 +12,6 @@ from texrs._typing import Array, Bools, Floats, Interpolation
 from texrs.blending._values import Samples
 from texrs.source_map import SourceMap
 
-__all__ = ["Look", "Seam", "list_seams", "take_rows", "wrap_rows"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:

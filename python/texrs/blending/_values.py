@@ -11,8 +11,6 @@ import numpy as np
 from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput
 
-__all__ = ["STRIP", "Samples", "divide_rows"]
-
 STRIP = 2**22
 """Pixels that are solved at once; up to four times as many where corrections reach far."""
 BAND = 64

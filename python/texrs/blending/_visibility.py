@@ -15,8 +15,6 @@ from texrs.blending._values import divide_rows
 from texrs.errors import InvalidInput
 from texrs.source_map import SourceMap
 
-__all__ = ["Visibility", "measure_visibility"]
-
 LOOK = 2**22
 """Pixels whose seams are measured, and four times as many as those of an exemplar that they are compared with."""
 

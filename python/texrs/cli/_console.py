@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     # Numpy would come with it.
     from texrs._typing import Progress
 
-__all__ = ["Stopped", "complain", "note", "run", "say", "watching"]
-
 DONE, INTERNAL, BAD_INPUT = 0, 1, 2
 """Exit codes; a command that a signal ends has 128 plus the signal's number, so 130 for Ctrl-C."""
 TRACEBACK = "TEXRS_TRACEBACK"

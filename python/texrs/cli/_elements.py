@@ -22,8 +22,6 @@ from texrs.database import TextureDatabase
 from texrs.elements import analyse, pictures
 from texrs.errors import FileError, InvalidInput
 
-__all__ = ["COMMANDS"]
-
 PICTURED = Options(analyse, arguments={"image": PICTURE}, names={"tag": "layout"})
 ANALYSED = Options(analyse, names={"tag": "layout"}, leave={"image": "there may be several"})
 KEPT = Options(TextureDatabase.add, only=("name", "similarity", "replace"))

@@ -19,8 +19,6 @@ from texrs.cli._kinds import parse_size
 from texrs.cli._outputs import Quiet, Threads, describe, named, to_write
 from texrs.errors import InvalidInput
 
-__all__ = ["COMMANDS"]
-
 
 def demo_command(
     out: Annotated[str, to_write("out", "DIR", "Folder for index.html.")],

@@ -18,33 +18,6 @@ from texrs._typing import Array, Floats
 from texrs.cli._outputs import SAMPLE, named
 from texrs.errors import FileError, InvalidInput
 
-__all__ = [
-    "ENTRY",
-    "HOLE",
-    "KINDS",
-    "MAP",
-    "MAP_OR_AUTO",
-    "NUMBERS",
-    "PICTURE",
-    "PICTURES",
-    "PLACE",
-    "UNKNOWN",
-    "VOLUME",
-    "About",
-    "Kind",
-    "parse_axes",
-    "parse_bytes",
-    "parse_numbers",
-    "parse_places",
-    "parse_size",
-    "read_field",
-    "read_mask",
-    "read_picture",
-    "read_scale_map",
-    "read_steps",
-    "read_volume",
-]
-
 PLACE = r"\s*-?[0-9]+(\.[0-9]*)?\s*,\s*-?[0-9]+(\.[0-9]*)?\s*"
 """A row and a column, as text."""
 

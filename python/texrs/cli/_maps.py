@@ -21,8 +21,6 @@ from texrs.cli._outputs import Quiet, Threads, describe, named, to_write
 from texrs.errors import FileError, InvalidInput
 from texrs.source_map import SourceMap
 
-__all__ = ["COMMANDS"]
-
 RENDERED = Options(SourceMap.render, leave={"exemplars": "they are arguments, as many as wanted"})
 BLENDED = Options(
     blend,

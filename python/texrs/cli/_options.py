@@ -19,8 +19,6 @@ import typer
 from texrs.cli._kinds import KINDS, About, Kind
 from texrs.errors import InvalidInput
 
-__all__ = ["MISSING", "Option", "Options", "as_command", "check_needed", "describe", "one_of", "parameter", "taking"]
-
 MISSING = inspect.Parameter.empty
 LONGEST = 200
 """Characters of a help text."""

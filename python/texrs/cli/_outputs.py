@@ -19,27 +19,6 @@ from texrs._typing import Array
 from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.synthesis import Synthesis
 
-__all__ = [
-    "OUTPUTS",
-    "SAMPLE",
-    "Command",
-    "Quiet",
-    "Threads",
-    "check_apart",
-    "check_folder",
-    "check_output",
-    "check_outputs",
-    "contact_sheet",
-    "deliver",
-    "describe",
-    "named",
-    "output",
-    "shrink",
-    "texts",
-    "to_write",
-    "variant_names",
-]
-
 SAMPLE = "sample:"
 """What the name of a built-in exemplar starts with."""
 LONGEST_PROBE = 2**17

@@ -22,8 +22,6 @@ from texrs.cli._outputs import Quiet, Threads, named, to_write
 from texrs.errors import InvalidInput
 from texrs.synthesis import preview
 
-__all__ = ["COMMAND"]
-
 FLOATS = (".npy", ".npz", ".tif", ".tiff", ".exr")
 """Formats that keep the scales themselves; pictures of 8 bits keep them encoded."""
 ANGLES = Options(scale_maps.from_angles, only=("slant", "tilt", "fov"), optional={"slant": "", "tilt": "90"})

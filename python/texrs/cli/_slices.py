@@ -21,8 +21,6 @@ from texrs.cli._outputs import Quiet, Threads, describe, named, to_write
 from texrs.errors import InvalidInput
 from texrs.volume import cube, oblique, paint, slices, turntable
 
-__all__ = ["COMMAND"]
-
 _AXES = ("plane", "row", "column")
 
 

@@ -22,8 +22,6 @@ from texrs.cli._options import Options, as_command, parameter
 from texrs.cli._outputs import Quiet, Threads, describe, named, to_write
 from texrs.synthesis import Synthesis
 
-__all__ = ["VERBS", "Verb"]
-
 VARIANTS = typer.Option(
     help="Make so many, OUT-SEED each, and OUT as their contact sheet.", show_default="one, in OUT", metavar="N"
 )

@@ -23,8 +23,6 @@ from texrs.growth import FROM_ATLAS, Surroundings, grow_from_atlas
 from texrs.scale_maps._maps import as_map
 from texrs.source_map import SourceMap
 
-__all__ = ["optimise", "recover_scale"]
-
 SETTINGS = replace(
     FROM_ATLAS,
     passes=(24, 12, 6),

@@ -20,8 +20,6 @@ from texrs._typing import Array
 from texrs.elements import FORMAT, Elements, ElementSearch, Layout, digest, load
 from texrs.errors import FileError, InvalidInput, TexrsError
 
-__all__ = ["NAME", "Folder", "Record", "check_free", "restore_option"]
-
 MANIFEST, LOCK = "manifest.json", ".lock"
 VERSION = 2
 """Of the manifest."""

@@ -20,8 +20,6 @@ from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.papers.splice import splice
 from texrs.synthesis import Synthesis
 
-__all__ = ["Matrix", "TextureDatabase"]
-
 GAP = 4
 """Pixels between the pictures of a sheet."""
 

@@ -9,8 +9,6 @@ from texrs.demo._html import code, figure, grid, pair, row
 from texrs.demo._workshop import Section, Workshop
 from texrs.synthesis import preview
 
-__all__ = ["RESULTS", "SEEDS", "SHOWN", "STAGES"]
-
 SHOWN: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("pebbles", "Rounded stones on sand", {}),
     ("leaves_and_flowers", "Flowers on leaves", {}),

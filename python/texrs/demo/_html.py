@@ -12,8 +12,6 @@ from texrs._typing import Array
 from texrs._version import __version__
 from texrs.synthesis import preview
 
-__all__ = ["code", "document", "figure", "grid", "pair", "row", "section", "uri"]
-
 QUALITY = 90
 """Of the JPEG pictures."""
 

@@ -11,8 +11,6 @@ from texrs.demo._html import code, figure, grid
 from texrs.demo._workshop import Section, Workshop
 from texrs.volume import paint
 
-__all__ = ["MAPS", "derive_normals", "guess_height", "light_up"]
-
 RELIEF = 12.0
 """Height of the relief, in pixels."""
 

@@ -11,8 +11,6 @@ from texrs.demo._html import code, figure, grid
 from texrs.demo._workshop import Section, Workshop
 from texrs.papers.perspective import perspective
 
-__all__ = ["PERSPECTIVE"]
-
 SIDE, SIZE = 192, 224
 """Pixels a side of the example, and of what is grown."""
 

@@ -10,8 +10,6 @@ from texrs.demo._html import code, figure, grid, pair, row
 from texrs.demo._workshop import Section, Workshop, load_sample
 from texrs.tiling import tile
 
-__all__ = ["COMPLETE", "TILE"]
-
 SIDE = 192
 """Side of the pictures."""
 TILED = (

@@ -7,8 +7,6 @@ from texrs.demo._html import code, figure, grid
 from texrs.demo._workshop import Section, Workshop, load_sample
 from texrs.volume import cube
 
-__all__ = ["SAMPLES"]
-
 SIDE, EDGE = 128, 64
 """Pixels a side of the pictures, and of the volumes."""
 PHOTOGRAPHS = ("brick", "grass", "gravel")

@@ -8,8 +8,6 @@ from texrs.demo._workshop import Section, Workshop, load_sample
 from texrs.papers.solid import solid, synthesize
 from texrs.volume import cube
 
-__all__ = ["SOLID"]
-
 EDGE, SIZE = 64, 80
 """Voxels a side of the examples, and of what is grown."""
 SIDE, WIDTH = 128, 256

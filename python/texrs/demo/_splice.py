@@ -9,8 +9,6 @@ from texrs.demo._workshop import Section, Workshop, load_sample
 from texrs.elements import Elements
 from texrs.papers.splice import self_splice, splice
 
-__all__ = ["SPLICE"]
-
 SIDE = 192
 SPLICES = (("dots", "net"), ("dots", "bricks"), ("pebbles", "dots"))
 EDITS: tuple[tuple[str, dict[str, Any], str], ...] = (

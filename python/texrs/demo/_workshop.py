@@ -14,8 +14,6 @@ from texrs._typing import Array, Progress
 from texrs.papers.design import design
 from texrs.synthesis import Synthesis
 
-__all__ = ["Section", "Texture", "Workshop", "load_sample"]
-
 
 @dataclass(frozen=True, slots=True)
 class Section:

@@ -23,8 +23,6 @@ from texrs.elements._separation import Separation, add_missing, reconcile
 from texrs.errors import InvalidInput
 from texrs.layouts import directions, spacing
 
-__all__ = ["analyse"]
-
 FEWEST = 3
 """Elements without which there is no layout."""
 SHORTEST = 16
@@ -45,7 +43,7 @@ def analyse(
     background: object = None,
     layout: Layout | LayoutName | None = None,
     points: object = None,
-    search: ElementSearch = ElementSearch(),  # noqa: B008
+    search: ElementSearch = ElementSearch(),
     method: Literal["paper"] | None = None,
     wrap: bool | Sequence[bool] = False,
     seed: int = 0,

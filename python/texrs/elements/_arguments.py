@@ -15,8 +15,6 @@ from texrs.elements._mask import disc, ellipse, nearest_odd, stamp
 from texrs.elements._separation import label_components
 from texrs.errors import InvalidInput
 
-__all__ = ["Box", "Given", "as_box", "check_consistency", "find_contradiction", "usual_box"]
-
 Points = NDArray[np.float64]
 Shape = tuple[int, int]
 Wrap = tuple[bool, bool]

@@ -10,8 +10,6 @@ from texrs.elements._mask import nearest_odd, to_lab
 from texrs.exemplar.regularity import find_lattice
 from texrs.exemplar.segmentation import ElementOptions, segment
 
-__all__ = ["propose_boxes", "resize_box"]
-
 SIGMAS = (2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)
 """Standard deviations under which blobs are looked for there, in pixels."""
 A_KIND, PIECES = 3, 6

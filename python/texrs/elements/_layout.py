@@ -7,8 +7,6 @@ from typing import Literal, TypeAlias
 
 from texrs.errors import InvalidInput
 
-__all__ = ["Layout", "LayoutName"]
-
 LayoutName: TypeAlias = Literal["disjoint", "connected", "jointed", "F=d", "F=c", "B=c"]
 """What a `Layout` can be made from: its values, and the paper's tags."""
 

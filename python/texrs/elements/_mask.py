@@ -15,8 +15,6 @@ from texrs.elements._mixture import Mixture
 from texrs.elements._options import Model
 from texrs.kernels.seam import binary_labels
 
-__all__ = ["cut_foreground", "disc", "ellipse", "nearest_odd", "stamp", "tidy_mask", "to_lab"]
-
 Wrap: TypeAlias = tuple[bool, bool]
 
 SMOOTH = 2.0

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from texrs._engine.noise import uniform
 
-__all__ = ["Mixture"]
-
 Doubles = NDArray[np.float64]
 
 COMPONENTS, ROUNDS = 5, 25

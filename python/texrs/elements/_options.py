@@ -11,8 +11,6 @@ import numpy as np
 from texrs._arrays import as_float, as_int, as_seed, as_wrap
 from texrs.errors import InvalidInput
 
-__all__ = ["Channel", "ElementSearch", "Model", "Settings"]
-
 Channel: TypeAlias = Literal["weighted", "min-entropy"]
 Model: TypeAlias = Literal["mixture", "nearest"]
 

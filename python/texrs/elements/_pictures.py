@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from texrs._arrays import as_image, guidance
 from texrs.elements._elements import Elements
 
-__all__ = ["pictures"]
-
 Picture = NDArray[np.uint8]
 
 CROSS, BOX, GROUND = (255, 40, 40), (0, 230, 255), np.array((30, 30, 190), np.float64)

@@ -25,8 +25,6 @@ from texrs.elements._separation import label_components
 from texrs.errors import InvalidInput
 from texrs.layouts import spacing
 
-__all__ = ["Start", "propose"]
-
 SMALL = 224
 """Longest side of the picture in which boxes are compared."""
 GROWN, STEPS = 3, 5

@@ -15,15 +15,6 @@ from texrs.elements._mask import nearest_odd
 from texrs.elements._options import ElementSearch
 from texrs.kernels.ncc import Correlation
 
-__all__ = [
-    "Detections",
-    "Template",
-    "appearance_vectors",
-    "otsu",
-    "search_similar",
-    "suppress_non_maxima",
-]
-
 Wrap: TypeAlias = tuple[bool, bool]
 
 CHANNELS = 8
@@ -161,7 +152,7 @@ def search_similar(
     box: tuple[int, int],
     *,
     wrap: Wrap = (False, False),
-    options: ElementSearch = ElementSearch(),  # noqa: B008
+    options: ElementSearch = ElementSearch(),
     cut: bool = True,
     features: Floats | None = None,
     progress: Callable[[float], object] | None = None,

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from texrs._typing import Bools, Floats, Labels
 from texrs.elements._mask import Wrap, ellipse, stamp
 
-__all__ = ["Separation", "add_missing", "label_components", "reconcile"]
-
 ADDED = 0.25
 """Least area of a component that is taken for an element that was not found, as a share of the usual one's."""
 SOLID, ROUND = 0.8, 0.9

@@ -27,8 +27,6 @@ from texrs.exemplar.regularity import measure_direction
 from texrs.exemplar.segmentation import ElementOptions, Segmentation, segment
 from texrs.exemplar.symmetry import Flip, find_mirrors
 
-__all__ = ["Exemplar", "as_exemplar"]
-
 T = TypeVar("T")
 
 FORMAT = 2

@@ -11,8 +11,6 @@ from texrs.errors import InvalidInput
 from texrs.fields import _shapes
 from texrs.fields._field import Field
 
-__all__ = ["names", "parse"]
-
 _KNOWN: dict[str, Callable[..., Field]] = {
     f.__name__: f
     for f in (

@@ -23,8 +23,6 @@ from texrs.errors import InvalidInput
 from texrs.fields._field import Field, as_place, as_points, refuse_flat
 from texrs.fields._matrices import Matrices, determinants, exponentials, multiply, rotations, transpose_each
 
-__all__ = ["from_array", "from_function", "interpolate"]
-
 MAX_FRAMES = 2**24
 """Of an array of frames: 256 voxels a side."""
 MAX_POINTS = 4096

@@ -14,8 +14,6 @@ from texrs.errors import InvalidInput
 from texrs.fields._field import FAR, Field, as_place, refuse_flat
 from texrs.fields._kinds import LETTERS, Constant, Ramp, Wound, Zigzag, turn
 
-__all__ = ["circular", "constant", "identity", "scale_ramp", "shear", "slant", "slant_3d", "spiral", "zigzag"]
-
 _WORDS = {"plane": "z", "row": "y", "column": "x"}
 
 

@@ -9,8 +9,6 @@ import numpy as np
 from texrs._typing import Bools, Floats
 from texrs.kernels.patch_search import Match, PatchIndex
 
-__all__ = ["Finder", "halve"]
-
 POOL = 48
 """Matches that are looked at for what they repeat."""
 

@@ -15,8 +15,6 @@ from texrs.quilting._finder import Finder
 from texrs.quilting._windows import Window
 from texrs.source_map import SourceMap, pixels_of
 
-__all__ = ["Picture", "Quilt", "find_calm_lines"]
-
 CANDIDATES = 3
 """Matches of the pool that are cut in."""
 REPETITION, GOOD, ON_LATTICE = 10.0, 0.1, 1.5

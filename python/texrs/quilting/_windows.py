@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 from texrs._engine.noise import uniform
 from texrs._typing import Bools
 
-__all__ = ["Span", "Window", "deal_exemplars", "divide_axis"]
-
 
 @dataclass(frozen=True, slots=True)
 class Span:

@@ -9,22 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "blur",
-    "clouds",
-    "decode",
-    "encode",
-    "fold",
-    "light",
-    "mix",
-    "palette",
-    "ramp",
-    "scatter",
-    "shades",
-    "softest",
-    "spread",
-]
-
 Floats = NDArray[np.floating[Any]]
 
 # The sun stands towards the upper left; the sky fills the shadows with a cooler light.

@@ -25,8 +25,6 @@ from texrs.samples._regular import lay_bricks
 from texrs.samples._sample import LayoutName, Sample, check_size, generator
 from texrs.samples._scene import Scene, relabel
 
-__all__ = ["tilted_bricks", "tilted_discs"]
-
 _PITCH, _RADIUS = 26.0, 10.5
 
 

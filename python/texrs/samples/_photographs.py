@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 from texrs.errors import InvalidInput
 from texrs.samples._sample import Sample
 
-__all__ = ["PHOTOGRAPHS", "photograph"]
-
 PHOTOGRAPHS = ("brick", "coffee", "coins", "grass", "gravel", "hubble_deep_field", "rocket")
 
 

@@ -11,8 +11,6 @@ from texrs.samples._noise import Floats, mix, palette, ramp, shades
 from texrs.samples._sample import Sample, check_size, generator
 from texrs.samples._scene import Scene
 
-__all__ = ["bricks", "lay_bricks", "net", "scales", "weave"]
-
 _COURSE, _BRICK, _JOINT = 34, 80, 5.0
 
 

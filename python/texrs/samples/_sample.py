@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from texrs.errors import InvalidInput
 
-__all__ = ["MIN_SIDE", "LayoutName", "Sample", "check_size", "generator"]
-
 LayoutName: TypeAlias = Literal["disjoint", "connected", "jointed"]
 """How elements hang together: apart on a ground, in one net, or parted by joints."""
 

@@ -12,8 +12,6 @@ from texrs.samples._noise import Floats, mix, palette, ramp, scatter, shades, so
 from texrs.samples._sample import Sample, check_size, generator
 from texrs.samples._scene import Scene, Window
 
-__all__ = ["beans", "dots", "leaves_and_flowers", "pebbles"]
-
 
 def pebbles(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
     """Return rounded stones of many colours, none of which touch, on dark sand.

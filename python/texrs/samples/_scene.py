@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 from texrs.samples._noise import Floats, blur, clouds, encode, fold, light
 from texrs.samples._sample import LayoutName, Sample
 
-__all__ = ["Scene", "Window"]
-
 _FINE = 2
 _Number = TypeVar("_Number", bound=np.generic)
 

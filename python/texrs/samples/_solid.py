@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from texrs.samples._noise import Floats, clouds, encode, mix, palette, ramp, shades
 from texrs.samples._sample import Sample, check_size, generator
 
-__all__ = ["particles", "stripes", "weave_solid", "wood_solid"]
-
 _CUBE = (64, 64, 64)
 _STRIPE = 9.0
 

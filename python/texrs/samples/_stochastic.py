@@ -11,8 +11,6 @@ from texrs.samples._noise import fold, mix, palette, ramp, shades, softest, spre
 from texrs.samples._sample import Sample, check_size, generator
 from texrs.samples._scene import Scene
 
-__all__ = ["bark", "grit"]
-
 
 def bark(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) -> Sample:
     """Return the bark of an old tree, its furrows along the rows' axis: a stochastic texture.

@@ -12,8 +12,6 @@ from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.scale_maps._maps import LEAST
 
-__all__ = ["STEEPEST", "from_angles", "slant_for_ratio"]
-
 STEEPEST = 85.0
 """Degrees of slant up to which a plane can be asked for."""
 

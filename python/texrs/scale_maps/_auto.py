@@ -12,8 +12,6 @@ from texrs.scale_maps._mask import SMALLEST, from_mask
 from texrs.scale_maps._trend import Trend, as_trend
 from texrs.scale_maps._windows import Lattice
 
-__all__ = ["auto_mask"]
-
 _AROUND = 1 / 12
 """Of the shorter side: how far around a pixel is compared with it."""
 _DETAIL = 1 / 400

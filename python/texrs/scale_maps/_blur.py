@@ -7,8 +7,6 @@ from scipy import ndimage
 
 from texrs._typing import Bools, Floats
 
-__all__ = ["blur", "shrink"]
-
 
 def blur(values: Floats, sigma: float) -> Floats:
     """Return values blurred by a Gaussian, or by three boxes of its variance where that is cheaper."""

@@ -14,8 +14,6 @@ from texrs.scale_maps._blur import blur
 from texrs.scale_maps._maps import as_map
 from texrs.scale_maps._regions import as_number, as_points, centre, stroke, weights
 
-__all__ = ["edit"]
-
 _LEAST, _LARGEST = 1 / 8, 8.0
 """No step brings a scale further than that."""
 _MOST = 10_000

@@ -11,8 +11,6 @@ from texrs.kernels import poisson
 from texrs.scale_maps._maps import LARGEST, LEAST, as_map
 from texrs.scale_maps._trend import Trend, as_trend, follow
 
-__all__ = ["extend"]
-
 
 def extend(scale: object, known: object, *, trend: Trend = "plane") -> Floats:
     """Return a scale map that is continued into holes, and beyond what is known of it.

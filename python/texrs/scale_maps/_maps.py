@@ -10,8 +10,6 @@ from texrs._arrays import as_image
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 
-__all__ = ["LARGEST", "LEAST", "as_map", "centre_logs"]
-
 LEAST, LARGEST = 1e-3, 1e3
 """Scales that a map may hold."""
 

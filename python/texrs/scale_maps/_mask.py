@@ -16,8 +16,6 @@ from texrs.scale_maps._maps import centre_logs
 from texrs.scale_maps._trend import Trend, as_trend, follow, gradient
 from texrs.scale_maps._windows import Lattice, smooth
 
-__all__ = ["SMALLEST", "Measure", "from_mask"]
-
 Measure: TypeAlias = Literal["boundary", "skeleton", "count", "area"]
 """What of a mask is counted."""
 

@@ -13,8 +13,6 @@ from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.scale_maps._maps import as_map
 
-__all__ = ["Encoding", "decode", "encode", "picture"]
-
 Encoding: TypeAlias = Literal["log2", "paper"]
 
 _ENCODINGS = ("log2", "paper")

@@ -11,8 +11,6 @@ from scipy import ndimage
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 
-__all__ = ["MAX_POINTS", "as_number", "as_points", "centre", "stroke", "weights"]
-
 MAX_POINTS = 1024
 _FARTHEST = 1e6
 _SOFT = 0.25

@@ -14,8 +14,6 @@ from texrs.scale_maps._angles import from_angles
 from texrs.scale_maps._extend import extend
 from texrs.scale_maps._maps import as_map
 
-__all__ = ["resample"]
-
 
 def resample(
     scale: object,

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from texrs._arrays import as_choice
 from texrs._typing import Bools, Floats
 
-__all__ = ["TRENDS", "Trend", "as_trend", "follow", "gradient"]
-
 Trend: TypeAlias = Literal["none", "plane", "linear", "quadratic"]
 """What a map is brought to: itself; a flat surface in perspective, whose S is linear in the picture; or a linear or a
 quadratic function for log S."""

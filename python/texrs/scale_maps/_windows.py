@@ -15,8 +15,6 @@ from scipy import ndimage
 
 from texrs._typing import Array, Bools, Floats
 
-__all__ = ["Lattice", "smooth"]
-
 _ACROSS = 9
 """Cells across a window; odd, so that one is in the middle."""
 _LEAST_AREA = 1 / 6

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Pixels", "bands", "number_pairs"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pixels:

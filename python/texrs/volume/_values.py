@@ -11,8 +11,6 @@ from texrs._arrays import as_array, as_image, check_finite, guidance
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 
-__all__ = ["as_direction", "as_region", "as_values", "axes_of", "colours_of", "drop_first", "drop_last"]
-
 
 def drop_last(array: Array, axis: int, step: int) -> Array:
     """Return all but the last lines along an axis."""
