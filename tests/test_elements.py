@@ -267,7 +267,7 @@ HALF[:, :40] = True
         ({"search": {"threshold": 3}}, "threshold: needs a number from -1 to 1"),
         ({"search": {"channel": "third"}}, "channel: allowed are"),
         ({"search": {"model": "forest"}}, "model: allowed are"),
-        ({"method": "letter"}, "method: None or 'paper' is allowed"),
+        ({"method": "letter"}, "method: allowed are None and 'paper'"),
     ],
 )
 def test_bad_input_gets_a_sentence(change: dict, message: str) -> None:

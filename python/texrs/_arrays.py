@@ -135,6 +135,14 @@ def _fits(sides: tuple[int, ...], shape: Sequence[int | str]) -> bool:
     )
 
 
+def try_array(value: object, dtype: DTypeLike | None = None) -> Array:
+    """Return an array of a value; one of no entries, of objects by default, where it is none."""
+    try:
+        return np.asarray(value, dtype)
+    except (ValueError, TypeError):
+        return np.empty(0, np.object_ if dtype is None else dtype)
+
+
 def _as_ndarray(value: object, name: str) -> Array:
     try:
         return np.asarray(value)
@@ -198,6 +206,16 @@ def guidance(pixels: Array) -> Floats:
     return np.ascontiguousarray(unit[..., :3])
 
 
+def as_rgb(unit: Floats) -> Floats:
+    """Return three channels: the first three, or the first one three times."""
+    return unit[..., :3] if unit.shape[-1] >= 3 else np.repeat(unit[..., :1], 3, axis=-1)
+
+
+def as_list(value: object) -> list[Any]:
+    """Return several things as a list, and a single one as a list of it."""
+    return list(value) if isinstance(value, list | tuple) else [value]
+
+
 def as_size(
     value: object, name: str = "size", *, axes: int = 2, minimum: int = 1, limit: int = MAX_PIXELS
 ) -> tuple[int, ...]:
@@ -221,9 +239,7 @@ def as_size(
     result = tuple(int(s) for s in sides)
     if min(result) < minimum:
         raise InvalidInput(f"{name}: each side must be at least {minimum}, got {result}")
-    pixels = 1
-    for side in result:
-        pixels *= side
+    pixels = math.prod(result)
     if pixels > limit:
         raise LimitExceeded(f"{name}: {result} has {pixels} pixels, more than the limit of {limit}")
     return result
@@ -288,6 +304,13 @@ def as_choice(value: object, name: str, allowed: Sequence[str]) -> str:
     if not isinstance(value, str) or value not in allowed:
         raise InvalidInput(f"{name}: allowed are {', '.join(allowed[:-1])} and {allowed[-1]}; got {value!r}")
     return value
+
+
+def as_method(value: object, *allowed: str | None) -> None:
+    """Check the name of an algorithm; None is the usual one."""
+    if value not in allowed:
+        names = [repr(name) for name in allowed]
+        raise InvalidInput(f"method: allowed are {', '.join(names[:-1])} and {names[-1]}, got {value!r}")
 
 
 def as_progress(value: object, name: str = "progress") -> Callable[..., object] | None:

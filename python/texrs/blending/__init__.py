@@ -16,7 +16,7 @@ from typing import Literal
 
 import numpy as np
 
-from texrs._arrays import as_float, as_image, as_int, as_mask, as_wrap
+from texrs._arrays import as_float, as_image, as_int, as_list, as_mask, as_wrap
 from texrs._typing import Array, Floats, Interpolation, Progress
 from texrs.blending._correction import divide_strips, solve_correction
 from texrs.blending._seams import Look, Seam, take_rows
@@ -129,7 +129,7 @@ def blend(
     width = None if band is None else as_int(band, "band", 1, 2**31)
     inside = None if within is None else as_mask(within, "within", source.shape)
     result = source.render(exemplars, interpolation=interpolation, kind=kind, green=green)
-    several = list(exemplars) if isinstance(exemplars, list | tuple) else [exemplars]
+    several = as_list(exemplars)
     shown = None if known is None else as_known(known, source.shapes)
     samples = Samples.scale([as_image(e) for e in several], kind)
     if samples is None or interpolation == "nearest":
@@ -161,7 +161,7 @@ def _scale_progress(progress: Progress, number: int, steps: int) -> Callable[[fl
 
 def as_known(value: object, shapes: Sequence[tuple[int, ...]]) -> list[Floats]:
     """Check masks of the exemplars; 1 is what they have."""
-    several = list(value) if isinstance(value, list | tuple) else [value]
+    several = as_list(value)
     if len(several) != len(shapes):
         raise InvalidInput(f"known: needs a mask for each of {len(shapes)} exemplars, got {len(several)}")
     return [as_mask(k, "known", shape).astype(np.float32) for k, shape in zip(several, shapes, strict=True)]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_image, as_wrap
+from texrs._arrays import as_image, as_list, as_wrap
 from texrs._typing import Array
 from texrs.blending._seams import list_seams, take_rows, wrap_rows
 from texrs.blending._values import divide_rows
@@ -76,7 +76,7 @@ def measure_visibility(
 
     """
     cyclic = as_wrap(wrap)
-    several = [as_image(e, "exemplars") for e in (exemplars if isinstance(exemplars, list | tuple) else [exemplars])]
+    several = [as_image(e, "exemplars") for e in as_list(exemplars)]
     pixels = as_image(image)
     if pixels.shape[:2] != source.shape:
         raise InvalidInput(f"image: needs the size of the source map, {source.shape}, got {pixels.shape[:2]}")

@@ -15,6 +15,7 @@ import typer
 from typer.core import TyperCommand
 
 from texrs import io
+from texrs._arrays import as_list
 from texrs._typing import Array
 from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.synthesis import Synthesis
@@ -59,7 +60,7 @@ class Command(TyperCommand):
 
 def texts(value: object) -> list[str]:
     """Return the texts among the values of a parameter."""
-    return [v for v in (value if isinstance(value, list | tuple) else [value]) if isinstance(v, str)]
+    return [v for v in as_list(value) if isinstance(v, str)]
 
 
 # --- checks ----------------------------------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float, as_image, as_int, as_mask, as_seed, as_wrap, guidance
+from texrs._arrays import as_bool, as_float, as_image, as_int, as_mask, as_method, as_seed, as_wrap, guidance
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.blending import blend as correct_colours
 from texrs.completion._optimise import optimise, recover_scale
@@ -127,13 +127,10 @@ def complete(
     True
 
     """
-    if method not in ("patch", "optimise"):
-        raise InvalidInput(f"method: allowed are 'patch' and 'optimise', got {method!r}")
+    as_method(method, "patch", "optimise")
     if exemplar_scale_map is not None and (exemplar is None or scale_map is None):
         raise InvalidInput("exemplar_scale_map: needs an exemplar, and a scale_map whose units it shares")
-    mirror = scale_map is None if mirror is None else mirror
-    if not isinstance(mirror, bool | np.bool_):
-        raise InvalidInput(f"mirror: needs True or False, got {mirror!r}")
+    mirror = scale_map is None if mirror is None else as_bool(mirror, "mirror")
     screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
     picture = image.image if isinstance(image, Exemplar) else image
     asked = mark_transparent(picture) if isinstance(hole, str) and hole == "alpha" else hole
@@ -158,7 +155,7 @@ def complete(
         count = int(places.label.max())
     elif open_.any():
         places, side, count = fill_with_patches(
-            pictures, open_, scales, chosen, ~wide, mirror=bool(mirror), wrap=cyclic, seed=seed, watch=watch
+            pictures, open_, scales, chosen, ~wide, mirror=mirror, wrap=cyclic, seed=seed, watch=watch
         )
     new = find_places(places.label)
     # What is kept maps to itself; of patches every coordinate is whole.
@@ -190,7 +187,7 @@ def complete(
         "replaced_outside": int(np.count_nonzero(~open_[new])),
         "patch": side,
         "patches": count,
-        "mirror": bool(mirror),
+        "mirror": mirror,
         "blend": screening,
         "wrap": list(cyclic),
     }

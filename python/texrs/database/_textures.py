@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs import io
-from texrs._arrays import as_image, as_int, guidance
+from texrs._arrays import as_image, as_int, as_rgb, guidance
 from texrs._typing import Array, Path, Progress
 from texrs.database._folder import NAME, Folder, Record, check_free, restore_option
 from texrs.elements import FORMAT, Elements, ElementSearch, Layout, LayoutName, analyse, digest, load
@@ -332,8 +332,7 @@ def thumbnail(image: Array, side: int) -> NDArray[np.uint8]:
     """Return a small picture of an image, for people."""
     from skimage.transform import resize
 
-    guide = guidance(as_image(image))
-    guide = guide if guide.shape[-1] == 3 else np.repeat(guide[..., :1], 3, axis=-1)
+    guide = as_rgb(guidance(as_image(image)))
     share = side / max(guide.shape[:2])
     size = [max(1, round(n * share)) for n in guide.shape[:2]]
     small = resize(guide, size, anti_aliasing=share < 1)

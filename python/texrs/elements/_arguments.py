@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_mask
+from texrs._arrays import as_mask, try_array
 from texrs._typing import Bools
 from texrs.elements._layout import Layout
 from texrs.elements._mask import disc, ellipse, nearest_odd, stamp
@@ -95,10 +95,7 @@ class Given:
 def as_box(value: object, shape: Shape, name: str = "box") -> Box:
     """Check a box: (row, column, height, width), centre and size, inside the image."""
     wanted = f"{name}: needs (row, column, height, width), the centre and the size of a box in pixels"
-    try:
-        numbers = np.asarray(value, np.float64)
-    except (TypeError, ValueError):
-        raise InvalidInput(f"{wanted}, got {value!r}") from None
+    numbers = try_array(value, np.float64)
     if numbers.shape != (4,) or not np.isfinite(numbers).all():
         raise InvalidInput(f"{wanted}, got {value!r}")
     if min(numbers[2:]) < LEAST:

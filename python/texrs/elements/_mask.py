@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import as_rgb
 from texrs._engine.noise import uniform
 from texrs._typing import Bools, Floats
 from texrs.elements._layout import Layout
@@ -39,8 +40,7 @@ def to_lab(guide: Floats) -> Floats:
     """Return Lab / 100, so that a just visible difference is about 0.02."""
     from skimage.color import rgb2lab
 
-    rgb = guide if guide.shape[-1] == 3 else np.repeat(guide[..., :1], 3, axis=-1)
-    return np.asarray(rgb2lab(rgb) / 100, np.float32)
+    return np.asarray(rgb2lab(as_rgb(guide)) / 100, np.float32)
 
 
 def ellipse(box: tuple[int, int], share: float = 1.0) -> Bools:

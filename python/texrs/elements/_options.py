@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from texrs._arrays import as_float, as_int, as_seed, as_wrap
+from texrs._arrays import as_choice, as_float, as_int, as_method, as_seed, as_wrap
 from texrs.errors import InvalidInput
 
 Channel: TypeAlias = Literal["weighted", "min-entropy"]
@@ -65,10 +65,10 @@ class ElementSearch:
         object.__setattr__(self, "scales", sizes)
         if self.threshold is not None:
             object.__setattr__(self, "threshold", as_float(self.threshold, "threshold", -1, 1))
-        if self.channel not in (None, "weighted", "min-entropy"):
-            raise InvalidInput(f"channel: allowed are weighted and min-entropy; got {self.channel!r}")
-        if self.model not in (None, "mixture", "nearest"):
-            raise InvalidInput(f"model: allowed are mixture and nearest; got {self.model!r}")
+        if self.channel is not None:
+            as_choice(self.channel, "channel", ("weighted", "min-entropy"))
+        if self.model is not None:
+            as_choice(self.model, "model", ("mixture", "nearest"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +85,7 @@ class Settings:
     @classmethod
     def of(cls, search: object, method: object, wrap: object, seed: object) -> Settings:
         """Check the options, and choose what the method leaves open."""
-        if method not in (None, "paper"):
-            raise InvalidInput(f"method: None or 'paper' is allowed, got {method!r}")
+        as_method(method, None, "paper")
         if not isinstance(search, ElementSearch):
             raise InvalidInput(f"search: needs a texrs.elements.ElementSearch, got {type(search).__name__}")
         literal = method == "paper"

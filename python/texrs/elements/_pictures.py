@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_image, guidance
+from texrs._arrays import as_image, as_rgb, guidance
 from texrs.elements._elements import Elements
 
 Picture = NDArray[np.uint8]
@@ -32,9 +32,7 @@ def pictures(entry: Elements) -> dict[str, Picture]:
     ['mask', 'points']
 
     """
-    guide = guidance(as_image(entry.image))
-    guide = guide if guide.shape[-1] == 3 else np.repeat(guide[..., :1], 3, axis=-1)
-    plain = np.rint(np.clip(guide, 0, 1) * 255)
+    plain = np.rint(np.clip(as_rgb(guidance(as_image(entry.image))), 0, 1) * 255)
     dimmed = np.where(entry.mask[..., np.newaxis], plain, (1 - DIM) * plain + DIM * GROUND)
     drawn = plain.astype(np.uint8)
     arm = max(2, min(entry.box) // 10)

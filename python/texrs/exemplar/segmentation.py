@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_image, as_int, to_unit
+from texrs._arrays import as_choice, as_image, as_int, as_list, as_rgb, to_unit
 from texrs._cache import content_hash
 from texrs._engine.noise import uniform
 from texrs._typing import Array, Floats, Labels, Progress
@@ -71,9 +71,8 @@ class ElementOptions:
     def __post_init__(self) -> None:
         if self.layers is not None:
             as_int(self.layers, "layers", 1, 16)
-        if self.kind not in ("auto", "components", "grid", "none"):
-            raise InvalidInput(f"kind: allowed are auto, components, grid and none; got {self.kind!r}")
-        for marks in self.labels if isinstance(self.labels, list | tuple) else [self.labels]:
+        as_choice(self.kind, "kind", ("auto", "components", "grid", "none"))
+        for marks in as_list(self.labels):
             found = np.asarray(0 if marks is None else marks)
             if found.dtype.kind not in "biu":
                 raise InvalidInput(f"labels: needs integers, got {found.dtype} {found.shape}")
@@ -182,7 +181,7 @@ def segment(
     height, width = pixels.shape[:2]
     if options.labels is not None:
         return number_marks(options.labels, (height, width))
-    rgb = take_colours(to_unit(pixels))
+    rgb = np.ascontiguousarray(as_rgb(to_unit(pixels)))
     watch = Steps(progress)
     regions = Regions.of(rgb, watch)
     if options.kind == "none":
@@ -221,12 +220,6 @@ def number_marks(labels: Marks | Sequence[Marks], shape: tuple[int, int]) -> Seg
     values, dense = np.unique(marks, return_inverse=True)
     elements = dense.reshape(shape).astype(np.int32) + np.int32(values[0] != 0)
     return Segmentation((elements > 0).astype(np.int32), elements, "labels", "")
-
-
-def take_colours(unit: Floats) -> Floats:
-    """Return three colour channels in [0, 1]: those there are, or the first of them three times."""
-    chosen = unit[..., :3] if unit.shape[-1] >= 3 else np.repeat(unit[..., :1], 3, axis=-1)
-    return np.ascontiguousarray(chosen)
 
 
 def draw_cells(height: int, width: int) -> Labels:

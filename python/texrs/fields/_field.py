@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_float, as_size
-from texrs._typing import Array, Floats
+from texrs._arrays import as_float, as_size, try_array
+from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.fields._matrices import Matrices, find_flat, inverses, transpose_each
 
@@ -297,10 +297,7 @@ def refuse_flat(frames: Matrices, places: NDArray[np.float64], name: str = "fiel
 
 def as_points(points: ArrayLike, axes: int, name: str = "points") -> NDArray[np.float64]:
     """Check points of shape (..., A): finite numbers."""
-    try:
-        given: Array = np.asarray(points)
-    except (ValueError, TypeError):
-        given = np.empty(0, np.object_)
+    given = try_array(points)
     if given.dtype.kind not in "buif" or given.ndim == 0 or given.shape[-1] != axes:
         raise InvalidInput(
             f"{name}: needs numbers of shape (..., {axes}), ({', '.join(_NAMES[axes - 2])}) each; "

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_size
+from texrs._arrays import as_size, try_array
 from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput
 from texrs.fields._field import Field, as_place, as_points, refuse_flat
@@ -337,10 +337,7 @@ def _to_matrices(frames: Array) -> Matrices:
 
 
 def _numbers(value: ArrayLike, name: str) -> Array:
-    try:
-        given: Array = np.asarray(value)
-    except (ValueError, TypeError):
-        given = np.empty(0, np.object_)
+    given = try_array(value)
     if given.dtype.kind not in "buif":
         raise InvalidInput(f"{name}: needs an array of real numbers, got {given.dtype}")
     return given

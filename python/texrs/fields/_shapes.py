@@ -8,8 +8,7 @@ from math import isfinite
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_float
-from texrs._typing import Array
+from texrs._arrays import as_float, try_array
 from texrs.errors import InvalidInput
 from texrs.fields._field import FAR, Field, as_place, refuse_flat
 from texrs.fields._kinds import LETTERS, Constant, Ramp, Wound, Zigzag, turn
@@ -406,10 +405,7 @@ def _pair(value: object, axes: int, name: str) -> tuple[int, int]:
 
 
 def _matrix(value: ArrayLike) -> NDArray[np.float64]:
-    try:
-        given: Array = np.asarray(value)
-    except (ValueError, TypeError):
-        given = np.empty(0, np.object_)
+    given = try_array(value)
     if given.dtype.kind not in "buif" or given.shape not in ((2, 2), (3, 3)):
         raise InvalidInput(f"matrix: needs numbers of shape (2, 2) or (3, 3), got {given.dtype} of {given.shape}")
     matrix = np.ascontiguousarray(given, np.float64)

@@ -8,6 +8,7 @@ import shutil
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from math import prod
 from pathlib import Path
 
 import numpy as np
@@ -82,9 +83,7 @@ def load(path: Path, limit: int) -> bytes:
 
 def check_size(path: Path, sides: tuple[int, ...], channels: int, itemsize: int, limit: int) -> int:
     """Compare what a header announces with the limit and return the number of pixels."""
-    pixels = 1
-    for side in sides:
-        pixels *= side
+    pixels = prod(sides)
     named = " x ".join(map(str, sides))
     if pixels <= 0 or channels <= 0:
         raise FileError(f"{path}: holds no pixels ({named}, {channels} channels)")

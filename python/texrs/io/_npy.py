@@ -6,6 +6,7 @@ import ast
 import re
 import zipfile
 from collections.abc import Iterable
+from math import prod
 from pathlib import Path
 from typing import BinaryIO, cast
 
@@ -115,9 +116,7 @@ def write_npz(path: Path, array: Array) -> None:
 def _array(path: Path, file: BinaryIO, length: int, limit: int) -> Array:
     """Read what lies in a stream of ``length`` bytes."""
     shape, fortran, dtype, start = _header(path, file)
-    count = 1
-    for side in shape:
-        count *= side
+    count = prod(shape)
     if count == 0:
         raise FileError(f"{path}: holds an empty array of shape {shape}")
     # Which axis is the channels is not known here, so only bytes can be compared.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from texrs import _rust
-from texrs._arrays import as_array, as_choice, as_image, as_wrap
+from texrs._arrays import as_array, as_choice, as_image, as_list, as_wrap
 from texrs._typing import Array, Interpolation
 from texrs.errors import InvalidInput
 
@@ -71,7 +71,7 @@ def gather(
     axes = points.shape[-1] if points.ndim else 0
     if axes not in (2, 3):
         raise InvalidInput(f"coordinates: needs shape (..., 2) or (..., 3), got {points.shape}")
-    several = exemplars if isinstance(exemplars, list | tuple) else [exemplars]
+    several = as_list(exemplars)
     if not several:
         raise InvalidInput("exemplars: at least one is needed, got none")
     images = [as_image(e, "exemplars", axes=axes) for e in several]

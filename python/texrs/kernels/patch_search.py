@@ -10,7 +10,18 @@ from typing import Any
 import numpy as np
 
 from texrs import _rust
-from texrs._arrays import as_array, as_float, as_image, as_int, as_items, as_mask, as_size, check_finite
+from texrs._arrays import (
+    as_array,
+    as_float,
+    as_image,
+    as_int,
+    as_items,
+    as_list,
+    as_mask,
+    as_size,
+    as_tuple,
+    check_finite,
+)
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 
@@ -103,7 +114,7 @@ class PatchIndex:
         max_patch: int | tuple[int, int] | None = None,
     ) -> None:
         single = not isinstance(images, list | tuple)
-        given = list(images) if isinstance(images, list | tuple) else [images]
+        given = as_list(images)
         masks = _masks(allowed, len(given), single)
         if not given:
             raise InvalidInput("images: needs at least one image, got none")
@@ -236,7 +247,7 @@ class PatchIndex:
             # The type first: it costs a tenth of the full check, and there may be many.
             tuple(
                 n if type(n) is int and 0 <= n <= high else as_int(n, "candidates", 0, high)
-                for n, high in zip(_triple(place), most, strict=True)
+                for n, high in zip(as_tuple(place, "candidates", 3, "(exemplar, row, column) each"), most, strict=True)
             )
             for place in as_items(candidates, "candidates")
         ]
@@ -303,15 +314,6 @@ def _floats(value: object, name: str) -> Floats:
     floats = as_array(as_image(value, name), name, np.float32)
     check_finite(floats, name)
     return floats
-
-
-def _triple(place: Any) -> Sequence[int]:
-    try:
-        if len(place) == 3:
-            return tuple(place)
-    except (TypeError, OverflowError):
-        pass
-    raise InvalidInput(f"candidates: needs (exemplar, row, column) each, got {place!r}")
 
 
 def _pick(count: object, separation: object, ratio: object) -> tuple[int, int, float]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from texrs._arrays import try_array
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 
@@ -26,10 +27,7 @@ def as_number(value: object, name: str, low: float, high: float) -> float:
 
 def as_points(value: object, name: str, least: int = 1) -> NDArray[np.float64]:
     """Check a list of (row, column)."""
-    try:
-        points = np.asarray(value, np.float64)
-    except (TypeError, ValueError):
-        points = np.empty(0)
+    points = try_array(value, np.float64)
     if points.ndim != 2 or points.shape[1] != 2 or not least <= len(points) <= MAX_POINTS:
         raise InvalidInput(f"{name} needs {least} to {MAX_POINTS} points [row, column], got {_shorten(value)}")
     if not (np.abs(points) <= _FARTHEST).all():

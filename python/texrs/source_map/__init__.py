@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_image
+from texrs._arrays import as_image, as_list
 from texrs._typing import Array, Bools, Frames, Interpolation, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.kernels.gather import gather
@@ -223,7 +223,7 @@ class SourceMap:
         True
 
         """
-        several: list[Array] = list(exemplars) if isinstance(exemplars, list | tuple) else [exemplars]  # type: ignore[list-item]
+        several = as_list(exemplars)
         if len(several) != len(self.shapes):
             raise InvalidInput(f"exemplars: the map was made from {len(self.shapes)}, got {len(several)}")
         images = [as_image(e, "exemplars", axes=self.axes) for e in several]

@@ -7,7 +7,7 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_array, as_image, check_finite, guidance
+from texrs._arrays import as_array, as_image, check_finite, guidance, try_array
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 
@@ -57,10 +57,7 @@ def as_region(mask: ArrayLike) -> Bools:
 
 def as_direction(value: object, name: str) -> NDArray[np.float64]:
     """Return three numbers, for planes, rows and columns; a normal has a length."""
-    try:
-        out = np.asarray(value, np.float64)
-    except (TypeError, ValueError):
-        out = np.empty(0)
+    out = try_array(value, np.float64)
     if out.shape != (3,) or not np.isfinite(out).all() or (name == "normal" and not np.abs(out).max() > 1e-12):
         raise InvalidInput(f"{name}: needs three numbers (plane, row, column), got {str(value)[:60]}")
     return out

@@ -5,12 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float, as_int, as_seed, as_size, as_wrap, check_memory, to_unit
+from texrs._arrays import (
+    as_float,
+    as_int,
+    as_list,
+    as_method,
+    as_seed,
+    as_size,
+    as_wrap,
+    check_memory,
+    to_unit,
+    try_array,
+)
 from texrs._typing import Array, Progress
 from texrs.errors import InvalidInput
 from texrs.exemplar import ElementOptions, Exemplar, as_exemplar
@@ -79,8 +90,7 @@ def check_arguments(
     progress: Progress | None,
 ) -> Arguments:
     """Check the arguments of `texrs.design_variants`."""
-    several: list[Any] = list(exemplar) if isinstance(exemplar, list | tuple) else [exemplar]
-    exemplars = [as_exemplar(e, minimum=MINIMUM_SIDE) for e in several]
+    exemplars = [as_exemplar(e, minimum=MINIMUM_SIDE) for e in as_list(exemplar)]
     for name, value, kind in (("elements", elements, ElementOptions), ("deformation", deformation, DeformationOptions)):
         if not isinstance(value, kind):
             raise InvalidInput(f"{name}: needs {kind.__name__}(...), got {value!r}")
@@ -88,8 +98,7 @@ def check_arguments(
     rows, columns = as_size(size if size is not None else [2 * n for n in exemplars[0].shape], minimum=MINIMUM_SIDE)
     first, cyclic = as_seed(seed), as_wrap(wrap)
     shares = as_shares(weights, len(exemplars), (rows, columns))
-    if method not in (None, "paper"):
-        raise InvalidInput(f"method: None or 'paper' is allowed, got {method!r}")
+    as_method(method, None, "paper")
     arguments = Arguments(
         exemplars,
         scale_together(exemplars),
@@ -143,10 +152,7 @@ def as_shares(weights: object, count: int, size: tuple[int, ...]) -> NDArray[np.
     """Check the shares of the exemplars: (count,) for the whole, or (rows, columns, count) over the texture."""
     if weights is None:
         return np.full(count, 1 / count)
-    try:
-        array = np.asarray(weights, np.float64)
-    except (TypeError, ValueError):
-        raise InvalidInput(f"weights: needs numbers, got {weights!r}") from None
+    array = try_array(weights, np.float64)
     if array.shape == size and np.asarray(weights).dtype.kind in "iu":
         if array.min() < 0 or array.max() >= count:
             raise InvalidInput(

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from texrs._arrays import as_float, as_int
+from texrs._arrays import as_bool, as_float, as_int
 from texrs.errors import InvalidInput
 from texrs.papers.design.logistic_map import iterate
 
@@ -64,14 +62,12 @@ class DeformationOptions:
         low, high = (as_float(s, "scale", 0.5, 2) for s in self.scale)
         if low > high:
             raise InvalidInput(f"scale: the least comes first, got {self.scale!r}")
-        if not isinstance(self.mirror, bool | np.bool_):
-            raise InvalidInput(f"mirror: needs True or False, got {self.mirror!r}")
         values: dict[str, object] = {
             "operations": as_int(self.operations, "operations", 0, 8),
             "translate": as_float(self.translate, "translate", 0, 0.5),
             "rotate": None if self.rotate is None else as_float(self.rotate, "rotate", 0, 180),
             "scale": (low, high),
-            "mirror": bool(self.mirror),
+            "mirror": as_bool(self.mirror, "mirror"),
             "growth_rate": as_float(self.growth_rate, "growth_rate", 0, 2),
         }
         if self.start is not None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from texrs._arrays import as_rgb
 from texrs._typing import Array
 from texrs.papers.design.arguments import Arguments
 from texrs.papers.design.plan import Plan
@@ -28,8 +29,7 @@ TINT = 0.55
 
 def draw_elements(plan: Plan) -> Array:
     """Return the exemplar with its elements in a colour each, between white lines."""
-    guide, elements = plan.guide, plan.parts.elements
-    seen = guide if guide.shape[-1] == 3 else np.repeat(guide[..., :1], 3, axis=-1)
+    seen, elements = as_rgb(plan.guide), plan.parts.elements
     tinted = (1 - TINT) * seen + TINT / 255 * paint(elements)
     picture = np.where(elements[..., np.newaxis] > 0, tinted, seen)
     picture[1:][elements[1:] != elements[:-1]] = 1

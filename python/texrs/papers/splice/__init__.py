@@ -44,10 +44,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal, TypeAlias
 
-from texrs._arrays import as_seed, as_size
+from texrs._arrays import as_method, as_seed, as_size
 from texrs._typing import Array, Progress
 from texrs.elements import Elements
-from texrs.errors import InvalidInput
 from texrs.layouts import spacing
 from texrs.papers.splice.adjustment import adjust_targets, crop_extension, straighten_rows
 from texrs.papers.splice.backward_warp import warp_backwards
@@ -129,7 +128,7 @@ def splice(
     ((128, 128, 3), True)
 
     """
-    _check_method(method, None, "paper", "preview")
+    as_method(method, None, "paper", "preview")
     watch = progress or (lambda stage, share: None)
     mine, theirs = as_elements(a, "a", watch), as_elements(b, "b", watch)
     rows, columns = as_size(size if size is not None else mine.mask.shape, minimum=16)
@@ -202,7 +201,7 @@ def self_splice(
     [{'op': 'randomise', 'seed': 5}]
 
     """
-    _check_method(method, None, "preview")
+    as_method(method, None, "preview")
     watch = progress or (lambda stage, share: None)
     mine, number = as_elements(a, "a", watch), as_seed(seed)
     steps = as_steps(edit, number)
@@ -212,12 +211,6 @@ def self_splice(
         mine, None, match, size, number, method=method, refine=bool(refine), watch=watch, listed=listed
     )
     return replace(result, report={**result.report, "edit": steps})
-
-
-def _check_method(method: object, *allowed: str | None) -> None:
-    if method not in allowed:
-        names = [repr(name) for name in allowed]
-        raise InvalidInput(f"method: allowed are {', '.join(names[:-1])} and {names[-1]}, got {method!r}")
 
 
 def _synthesize(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float, as_int, as_seed
+from texrs._arrays import as_float, as_int, as_seed, try_array
 from texrs.errors import InvalidInput
 from texrs.layouts import match_points, nearest_distances, spacing
 
@@ -112,10 +112,7 @@ def apply_steps(points: Points, originals: int, steps: Sequence[Step], nameable:
 
 def _read_pair(step: Step, name: str, default: object = None) -> NDArray[np.float64]:
     value = step.get(name, default)
-    try:
-        array = np.array(value, np.float64)
-    except (TypeError, ValueError):
-        array = np.zeros(0)
+    array = try_array(value, np.float64)
     if array.shape not in ((), (2,)) or not np.isfinite(array).all():
         raise InvalidInput(f"edit: {step['op']} needs {name} as a number or [rows, columns], got {value!r}")
     return np.array(np.broadcast_to(array, 2), np.float64)
@@ -237,10 +234,7 @@ def _remove_element(step: Step, at: Points, originals: int, kept: NDArray[np.boo
 
 def _take_points(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) -> Points:
     """Take a list of points: by index where there are as many as elements, else each the element that costs least."""
-    try:
-        listed = np.array(step.get("points"), np.float64)
-    except (TypeError, ValueError):
-        listed = np.zeros(0)
+    listed = try_array(step.get("points"), np.float64)
     if listed.ndim != 2 or listed.shape[1] != 2 or not np.isfinite(listed).all():
         raise InvalidInput("edit: points needs a list of finite [row, column]")
     if len(np.unique(listed, axis=0)) < len(listed):

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_image, to_unit
+from texrs._arrays import as_image, as_rgb, to_unit
 from texrs._typing import Array, Bools
 from texrs.elements import Elements
 from texrs.papers.splice.matching import Match
@@ -70,9 +70,7 @@ class Stages(Mapping[str, Array]):
 
 def picture(image: Array) -> Picture:
     """Return 8-bit RGB of anything."""
-    unit = to_unit(as_image(image))
-    colours = unit[..., :3] if unit.shape[-1] >= 3 else np.repeat(unit[..., :1], 3, axis=-1)
-    return np.rint(colours * 255).astype(np.uint8)
+    return np.rint(as_rgb(to_unit(as_image(image))) * 255).astype(np.uint8)
 
 
 def mark_points(image: Picture, points: Points, colour: tuple[int, int, int]) -> Picture:
