@@ -79,7 +79,7 @@ def tile(
     References
     ----------
     .. [1] J. Shen, X. Jin, X. Mao, J. Feng, "Completion-based texture design using deformation", The Visual Computer
-       22, 2006, section 3.5. :doi:`10.1007/s00371-006-0040-9`
+       22, 2006, section 3.5. :doi:`10.1007/s00371-006-0079-2`
 
     Examples
     --------

@@ -104,7 +104,7 @@ def blend(
     References
     ----------
     .. [1] J. Shen, X. Jin, X. Mao, J. Feng, "Completion-based texture design using deformation", The Visual Computer
-       22, 2006, section 3.6. :doi:`10.1007/s00371-006-0040-9`
+       22, 2006, section 3.6. :doi:`10.1007/s00371-006-0079-2`
 
     Examples
     --------

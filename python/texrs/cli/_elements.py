@@ -22,8 +22,8 @@ from texrs.database import TextureDatabase
 from texrs.elements import analyse, pictures
 from texrs.errors import FileError, InvalidInput
 
-PICTURED = Options(analyse, arguments={"image": PICTURE}, names={"tag": "layout"})
-ANALYSED = Options(analyse, names={"tag": "layout"}, leave={"image": "there may be several"})
+PICTURED = Options(analyse, arguments={"image": PICTURE})
+ANALYSED = Options(analyse, leave={"image": "there may be several"})
 KEPT = Options(TextureDatabase.add, only=("name", "similarity", "replace"))
 SIMILAR = Options(TextureDatabase.add, only=("similarity",))
 MATRIX = Options(TextureDatabase.matrix, only=("size", "cell"))

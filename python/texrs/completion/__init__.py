@@ -111,7 +111,7 @@ def complete(
     References
     ----------
     .. [1] J. Shen, X. Jin, X. Mao, J. Feng, "Completion-based texture design using deformation", The Visual Computer
-       22, 2006, section 3.4. :doi:`10.1007/s00371-006-0040-9`
+       22, 2006, section 3.4. :doi:`10.1007/s00371-006-0079-2`
     .. [2] W. Dong, N. Zhou, J.-C. Paul, "Perspective-aware texture analysis and synthesis", The Visual Computer 24,
        2008. :doi:`10.1007/s00371-008-0232-1`
 

@@ -94,7 +94,7 @@ def analyse(
     References
     ----------
     .. [1] Y. Liu, J. Wang, S. Xue, X. Tong, S. B. Kang and B. Guo, "Texture splicing", Computer Graphics Forum 28(7),
-       2009. :doi:`10.1111/j.1467-8659.2009.01569.x`
+       2009.
 
     Examples
     --------

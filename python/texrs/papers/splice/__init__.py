@@ -114,7 +114,7 @@ def splice(
 
     References
     ----------
-    .. [1] Y. Liu et al., "Texture splicing", Computer Graphics Forum 28(7), 2009. :doi:`10.1111/j.1467-8659.2009.01569.x`
+    .. [1] Y. Liu et al., "Texture splicing", Computer Graphics Forum 28(7), 2009.
 
     Examples
     --------
