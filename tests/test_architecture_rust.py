@@ -23,8 +23,9 @@ WITHIN = {
 """What modules use of their own layer. The foundation and the bindings are of one piece."""
 HOMES = {
     "rayon": ("foundation/par",),
-    "rustfft": ("kernels/ncc", "kernels/patch_search", "kernels/poisson"),
-    "realfft": ("kernels/ncc", "kernels/patch_search"),
+    "rustfft": ("foundation/fft",),
+    "realfft": ("foundation/fft",),
+    "pulp": ("foundation/wide",),
     "faer": ("kernels/sparse",),
     "spade": ("kernels/warp",),
     "image": ("kernels/image_io",),

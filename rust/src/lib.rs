@@ -7,10 +7,13 @@
 //! |---|---|
 //! | [`error`] | the one error type |
 //! | [`grid`] | shape, strides, wrap or clamp per axis; two and three dimensions from one source |
+//! | `memory` | allocations that may fail |
 //! | [`par`] | the process-local thread pool, fixed chunks, progress and cancellation |
 //! | [`hash`] | counter-based noise: randomness belongs to the position, never to a stream |
 //! | [`fixed`] | coordinates and frames in fixed point |
+//! | `fft` | Fourier transforms of lines and of images |
 //! | [`pca`] | principal components |
+//! | `wide` | wide registers, chosen at run time |
 //!
 //! | kernels | |
 //! |---|---|

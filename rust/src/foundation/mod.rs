@@ -1,8 +1,11 @@
 //! What every kernel stands on: knows nothing of textures.
 
 pub mod error;
+pub(crate) mod fft;
 pub mod fixed;
 pub mod grid;
 pub mod hash;
+pub(crate) mod memory;
 pub mod par;
 pub mod pca;
+pub(crate) mod wide;

@@ -10,12 +10,7 @@
 //! variance correlates with nothing, instead of dividing by zero; everything is f64 and the answer is rounded to 20
 //! bits, so that what a threshold decides hangs on no transform's last bits.
 
-use std::sync::Arc;
-
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
-use rustfft::num_complex::Complex;
-use rustfft::{Fft, FftPlanner};
-
+use crate::foundation::fft::{Complex, Images, Scratch};
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
@@ -27,7 +22,7 @@ const STEPS: f64 = (1 << 20) as f64;
 /// The channels of an image, made ready to be compared with many templates.
 pub struct Correlation {
     shape: [usize; 2],
-    plan: Plan,
+    plan: Images<f64>,
     channels: Vec<Channel>,
 }
 
@@ -50,7 +45,8 @@ impl Correlation {
             });
         }
         finite(image, "image")?;
-        let plan = Plan::new(shape);
+        // Windows that lie inside the image meet nothing of what comes round, so its own size is enough.
+        let plan = Images::new([quick(shape[0]), quick(shape[1].max(2))]);
         let channels = par::map(image.len() / points, |c| {
             let values = &image[c * points..][..points];
             let mean = mean(values);
@@ -59,7 +55,7 @@ impl Correlation {
             let centre = if same { f64::from(values[0]) } else { mean };
             let centred: Vec<f64> = values.iter().map(|&x| f64::from(x) - centre).collect();
             Channel {
-                spectrum: plan.forward(&centred, shape),
+                spectrum: spectrum(&plan, &centred, shape[1], &mut Scratch::default()),
                 sums: running(&centred, shape),
                 variance: centred.iter().map(|x| x * x).sum::<f64>() / points as f64,
             }
@@ -120,12 +116,15 @@ impl Correlation {
         if energy <= flat * points {
             return vec![0.0; valid[0] * valid[1]];
         }
-        let mut spectrum = self.plan.forward(template, shape);
-        for (t, s) in spectrum.iter_mut().zip(&channel.spectrum) {
+        let mut scratch = Scratch::default();
+        let mut product = spectrum(&self.plan, template, shape[1], &mut scratch);
+        for (t, s) in product.iter_mut().zip(&channel.spectrum) {
             *t = t.conj() * s;
         }
+        let [height, columns] = self.plan.size();
+        let scale = 1.0 / (height * columns) as f64;
         let mut map = Vec::with_capacity(valid[0] * valid[1]);
-        self.plan.inverse(&mut spectrum, valid[0], |row, line| {
+        let take = |row: usize, line: &[f64]| {
             let [above, below] = [row, row + shape[0]].map(|r| &channel.sums[r * width..][..width]);
             for (column, &numerator) in line[..valid[1]].iter().enumerate() {
                 let end = column + shape[1];
@@ -133,13 +132,15 @@ impl Correlation {
                     .map(|k| below[end][k] - below[column][k] - above[end][k] + above[column][k]);
                 let variance = squares - sum * sum / points;
                 let found = if variance > flat * points {
-                    (numerator / (variance * energy).sqrt()).clamp(-1.0, 1.0)
+                    (numerator * scale / (variance * energy).sqrt()).clamp(-1.0, 1.0)
                 } else {
                     0.0
                 };
                 map.push(((found * STEPS).round() / STEPS) as f32);
             }
-        });
+        };
+        self.plan
+            .inverse(&mut product, valid[0], take, &mut scratch);
         map
     }
 }
@@ -173,78 +174,17 @@ fn running(values: &[f64], shape: [usize; 2]) -> Vec<[f64; 2]> {
     sums
 }
 
-/// Transforms of one size. Spectra are stored transposed, frequency of the columns first, so that both passes run over
-/// contiguous memory.
-struct Plan {
-    size: [usize; 2],
-    rows_forward: Arc<dyn RealToComplex<f64>>,
-    rows_inverse: Arc<dyn ComplexToReal<f64>>,
-    columns_forward: Arc<dyn Fft<f64>>,
-    columns_inverse: Arc<dyn Fft<f64>>,
-}
-
-impl Plan {
-    /// Windows that lie inside the image meet nothing of what comes round, so its own size is enough.
-    fn new(shape: [usize; 2]) -> Self {
-        let size = [quick(shape[0]), quick(shape[1].max(2))];
-        let (mut real, mut complex) = (RealFftPlanner::new(), FftPlanner::new());
-        Self {
-            size,
-            rows_forward: real.plan_fft_forward(size[1]),
-            rows_inverse: real.plan_fft_inverse(size[1]),
-            columns_forward: complex.plan_fft_forward(size[0]),
-            columns_inverse: complex.plan_fft_inverse(size[0]),
-        }
-    }
-
-    fn forward(&self, values: &[f64], shape: [usize; 2]) -> Vec<Complex<f64>> {
-        let [height, width] = self.size;
-        let half = width / 2 + 1;
-        let mut spectrum = vec![Complex::default(); half * height];
-        let (mut line, mut out) = (vec![0.0; width], self.rows_forward.make_output_vec());
-        let mut scratch = self.rows_forward.make_scratch_vec();
-        for (row, values) in values.chunks_exact(shape[1]).enumerate() {
-            line[..shape[1]].copy_from_slice(values);
-            line[shape[1]..].fill(0.0);
-            // Cannot fail: the lengths are those of the plan.
-            let _ = self
-                .rows_forward
-                .process_with_scratch(&mut line, &mut out, &mut scratch);
-            for (frequency, &x) in out.iter().enumerate() {
-                spectrum[frequency * height + row] = x;
-            }
-        }
-        self.columns_forward.process(&mut spectrum);
-        spectrum
-    }
-
-    /// Gives the first `rows` lines of the inverse to `take`.
-    fn inverse(
-        &self,
-        spectrum: &mut [Complex<f64>],
-        rows: usize,
-        mut take: impl FnMut(usize, &[f64]),
-    ) {
-        let [height, width] = self.size;
-        self.columns_inverse.process(spectrum);
-        let (mut line, mut given) = (vec![0.0; width], self.rows_inverse.make_input_vec());
-        let mut scratch = self.rows_inverse.make_scratch_vec();
-        let scale = 1.0 / (height * width) as f64;
-        let last = given.len() - 1;
-        for row in 0..rows {
-            for (frequency, x) in given.iter_mut().enumerate() {
-                *x = spectrum[frequency * height + row];
-            }
-            // Of a real line these are real; rounding left a trace that the transform would refuse.
-            given[0].im = 0.0;
-            given[last].im = 0.0;
-            let _ = self
-                .rows_inverse
-                .process_with_scratch(&mut given, &mut line, &mut scratch);
-            line.iter_mut().for_each(|x| *x *= scale);
-            take(row, &line);
-        }
-    }
+fn spectrum(
+    plan: &Images<f64>,
+    values: &[f64],
+    width: usize,
+    scratch: &mut Scratch<f64>,
+) -> Vec<Complex<f64>> {
+    let mut spectrum = Vec::new();
+    let row =
+        |r: usize, out: &mut [f64]| out[..width].copy_from_slice(&values[r * width..][..width]);
+    plan.forward(values.len() / width, row, &mut spectrum, scratch);
+    spectrum
 }
 
 /// The next even length of factors 2, 3 and 5.

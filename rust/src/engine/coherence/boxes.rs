@@ -120,65 +120,69 @@ fn found(limit: i32, apart: impl Fn(usize, usize) -> i32) -> Found {
 
 /// The same in the registers that nearly every x86-64 has.
 #[cfg(target_arch = "x86_64")]
-#[allow(unsafe_code)] // loads from arrays
-pub(super) mod avx2 {
-    use std::arch::x86_64::{
-        __m256i, _mm256_add_epi32, _mm256_castsi256_ps, _mm256_cmpgt_epi32, _mm256_loadu_si256,
-        _mm256_madd_epi16, _mm256_max_epi16, _mm256_movemask_ps, _mm256_set1_epi32,
-        _mm256_setzero_si256, _mm256_storeu_si256, _mm256_sub_epi16,
-    };
+pub(super) mod v3 {
+    use std::arch::x86_64::__m256i;
 
     use super::{Block, Boxes, Found, PAIRS, Query, WIDTH};
+    use crate::foundation::wide::{V3, cast};
 
-    #[inline]
-    #[target_feature(enable = "avx2")]
-    pub(in super::super) fn distances(block: &Block, query: &Query, limit: i32) -> Found {
-        let mut sums = _mm256_setzero_si256();
-        for k in 0..PAIRS {
-            let apart = _mm256_sub_epi16(load(&block[k]), same(query[k]));
-            sums = _mm256_add_epi32(sums, _mm256_madd_epi16(apart, apart));
-        }
-        found(sums, limit)
+    // Wide by themselves, for not all of a search is inlined into the function that is.
+    #[inline(always)]
+    pub(in super::super) fn distances(simd: V3, block: &Block, query: &Query, limit: i32) -> Found {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let mut sums = simd.avx._mm256_setzero_si256();
+                for k in 0..PAIRS {
+                    let apart = simd
+                        .avx2
+                        ._mm256_sub_epi16(cast(block[k]), same(simd, query[k]));
+                    sums = add(simd, sums, apart);
+                }
+                found(simd, sums, limit)
+            },
+        )
     }
 
-    #[inline]
-    #[target_feature(enable = "avx2")]
-    pub(in super::super) fn bounds(boxes: &Boxes, query: &Query, limit: i32) -> Found {
-        let zero = _mm256_setzero_si256();
-        let mut sums = zero;
-        for k in 0..PAIRS {
-            let x = same(query[k]);
-            let below = _mm256_sub_epi16(load(&boxes.low[k]), x);
-            let above = _mm256_sub_epi16(x, load(&boxes.high[k]));
-            let apart = _mm256_max_epi16(_mm256_max_epi16(below, above), zero);
-            sums = _mm256_add_epi32(sums, _mm256_madd_epi16(apart, apart));
-        }
-        let (near, found) = found(sums, limit);
-        (near & boxes.there, found)
+    #[inline(always)]
+    pub(in super::super) fn bounds(simd: V3, boxes: &Boxes, query: &Query, limit: i32) -> Found {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let zero = simd.avx._mm256_setzero_si256();
+                let mut sums = zero;
+                for k in 0..PAIRS {
+                    let x = same(simd, query[k]);
+                    let below = simd.avx2._mm256_sub_epi16(cast(boxes.low[k]), x);
+                    let above = simd.avx2._mm256_sub_epi16(x, cast(boxes.high[k]));
+                    let outside = simd.avx2._mm256_max_epi16(below, above);
+                    sums = add(simd, sums, simd.avx2._mm256_max_epi16(outside, zero));
+                }
+                let (near, found) = found(simd, sums, limit);
+                (near & boxes.there, found)
+            },
+        )
     }
 
-    #[inline]
-    #[target_feature(enable = "avx2")]
-    fn load(numbers: &[i16; 2 * WIDTH]) -> __m256i {
-        // SAFETY: sixteen numbers of 16 bits.
-        unsafe { _mm256_loadu_si256(numbers.as_ptr().cast()) }
+    /// Adds the squares, pair by pair.
+    #[inline(always)]
+    fn add(simd: V3, sums: __m256i, apart: __m256i) -> __m256i {
+        let squares = simd.avx2._mm256_madd_epi16(apart, apart);
+        simd.avx2._mm256_add_epi32(sums, squares)
     }
 
     /// One pair for all vectors.
-    #[inline]
-    #[target_feature(enable = "avx2")]
-    fn same([first, second]: [i16; 2]) -> __m256i {
-        _mm256_set1_epi32(i32::from(second) << 16 | i32::from(first as u16))
+    #[inline(always)]
+    fn same(simd: V3, [first, second]: [i16; 2]) -> __m256i {
+        simd.avx
+            ._mm256_set1_epi32(i32::from(second) << 16 | i32::from(first as u16))
     }
 
-    #[inline]
-    #[target_feature(enable = "avx2")]
-    fn found(sums: __m256i, limit: i32) -> Found {
-        let mut found = [0; WIDTH];
-        // SAFETY: eight numbers of 32 bits.
-        unsafe { _mm256_storeu_si256(found.as_mut_ptr().cast(), sums) };
-        let far = _mm256_cmpgt_epi32(sums, _mm256_set1_epi32(limit));
-        let far = _mm256_movemask_ps(_mm256_castsi256_ps(far));
-        (!far as u32 & 255, found)
+    #[inline(always)]
+    fn found(simd: V3, sums: __m256i, limit: i32) -> Found {
+        let limits = simd.avx._mm256_set1_epi32(limit);
+        let far = simd.avx2._mm256_cmpgt_epi32(sums, limits);
+        let far = simd.avx._mm256_movemask_ps(cast(far));
+        (!far as u32 & 255, cast::<_, [i32; WIDTH]>(sums))
     }
 }

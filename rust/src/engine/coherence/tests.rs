@@ -82,12 +82,11 @@ fn sets_are_those_of_the_definition() {
 
 #[test]
 #[cfg(target_arch = "x86_64")]
-#[allow(unsafe_code)] // behind the question whether the CPU has the feature
 fn wide_registers_give_the_same_numbers() {
-    use super::boxes::{self, Boxes, avx2, block, pairs};
-    if !is_x86_feature_detected!("avx2") {
+    use super::boxes::{self, Boxes, block, pairs, v3};
+    let Some(simd) = crate::foundation::wide::V3::try_new() else {
         return;
-    }
+    };
     let noise = Noise::new(9);
     let vector = |i: usize| -> [i16; FEW] {
         std::array::from_fn(|k| (noise.uniform([i as u32, k as u32, 0, 0]) * 8190.0) as i16 - 4095)
@@ -101,11 +100,9 @@ fn wide_registers_give_the_same_numbers() {
             (boxes::extent(ends.into_iter()), lane as u32)
         }));
         let plain = boxes::distances(&vectors, &query, limit);
-        // SAFETY: asked for above.
-        assert_eq!(plain, unsafe { avx2::distances(&vectors, &query, limit) });
+        assert_eq!(plain, v3::distances(simd, &vectors, &query, limit));
         let plain = boxes::bounds(&boxes, &query, limit);
-        // SAFETY: asked for above.
-        assert_eq!(plain, unsafe { avx2::bounds(&boxes, &query, limit) });
+        assert_eq!(plain, v3::bounds(simd, &boxes, &query, limit));
     }
 }
 

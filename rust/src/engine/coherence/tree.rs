@@ -3,6 +3,8 @@
 use super::boxes::{Boxes, WIDTH, extent, pairs};
 use super::{FEW, apart, boxes};
 use crate::foundation::par;
+#[cfg(target_arch = "x86_64")]
+use crate::foundation::wide::V3;
 
 /// Vectors of a leaf: as many blocks as a node has children.
 const LEAF: usize = WIDTH * WIDTH;
@@ -79,36 +81,31 @@ impl<const D: usize, const N: usize> Tree<D, N> {
     }
 
     /// The nearest to a vector of the leaf `own`, of those that are `allowed`; (i32::MAX, u32::MAX) if there is none.
-    #[allow(unsafe_code)] // measured: twice as fast as with the baseline instructions
     pub(super) fn nearest(
         &self,
         vector: &[i16; N],
         own: usize,
         allowed: impl Fn([i32; D]) -> bool,
     ) -> Nearest {
+        // Measured: twice as fast as with the baseline instructions.
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: the CPU has the feature that the function is compiled for.
-            return unsafe { self.nearest_avx2(vector, own, &allowed) };
+        if let Some(simd) = V3::try_new() {
+            return simd.vectorize(
+                #[inline(always)]
+                || {
+                    self.search(
+                        vector,
+                        own,
+                        &allowed,
+                        #[inline(always)]
+                        |block, query, limit| boxes::v3::distances(simd, block, query, limit),
+                        #[inline(always)]
+                        |boxes, query, limit| boxes::v3::bounds(simd, boxes, query, limit),
+                    )
+                },
+            );
         }
         self.search(vector, own, &allowed, boxes::distances, boxes::bounds)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn nearest_avx2(
-        &self,
-        vector: &[i16; N],
-        own: usize,
-        allowed: &impl Fn([i32; D]) -> bool,
-    ) -> Nearest {
-        self.search(
-            vector,
-            own,
-            allowed,
-            |block, query, limit| boxes::avx2::distances(block, query, limit),
-            |boxes, query, limit| boxes::avx2::bounds(boxes, query, limit),
-        )
     }
 
     /// From the root down, the nearest box first; what its own leaf holds is near already.

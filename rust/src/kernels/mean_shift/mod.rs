@@ -11,8 +11,10 @@ mod window;
 
 use crate::foundation::grid::Grid;
 use crate::foundation::par::{self, Monitor};
+#[cfg(target_arch = "x86_64")]
+use crate::foundation::wide::V3;
 use crate::{Error, Result};
-use window::{Planes, Window};
+use window::{Planes, Sums, window, window_any};
 
 /// The largest radius: windows of four million samples.
 pub const MAX_RADIUS: usize = 1024;
@@ -88,12 +90,13 @@ pub fn filter(
 }
 
 /// One step; whether the pixel has arrived.
+#[inline(always)]
 fn step(
     planes: &Planes,
     options: &Options,
     state: &mut State<'_>,
     before: &mut [f32],
-    window: Window,
+    window: &impl Fn(&Planes, [usize; 2], &mut [f32], f32) -> Sums,
 ) -> bool {
     before.copy_from_slice(state.colour);
     let limit = options.range * options.range;
@@ -121,8 +124,56 @@ fn step(
     stayed && distance <= options.tolerance * options.tolerance
 }
 
+/// The pixels of a row, by the fastest way to sum a window on this CPU.
 fn filter_row(planes: &Planes, options: &Options, channels: usize, row: usize, out: &mut [f32]) {
-    let window = window::choose(channels);
+    #[cfg(target_arch = "x86_64")]
+    if let Some(simd) = V3::try_new() {
+        macro_rules! wide {
+            ($c:literal) => {
+                return simd.vectorize(
+                    #[inline(always)]
+                    || {
+                        climb(
+                            planes,
+                            options,
+                            $c,
+                            row,
+                            out,
+                            #[inline(always)]
+                            |planes, at, colour, limit| {
+                                window::v3::window::<$c>(simd, planes, at, colour, limit)
+                            },
+                        )
+                    },
+                )
+            };
+        }
+        match channels {
+            1 => wide!(1),
+            3 => wide!(3),
+            4 => wide!(4),
+            _ => {}
+        }
+    }
+    match channels {
+        1 => climb(planes, options, 1, row, out, window::<1>),
+        3 => climb(planes, options, 3, row, out, window::<3>),
+        4 => climb(planes, options, 4, row, out, window::<4>),
+        _ => climb(planes, options, channels, row, out, window_any),
+    }
+}
+
+/// Moves the pixels of a row to their modes. A window is summed around a place; the colour that goes in comes out as the
+/// sum of the colours within the limit.
+#[inline(always)]
+fn climb(
+    planes: &Planes,
+    options: &Options,
+    channels: usize,
+    row: usize,
+    out: &mut [f32],
+    window: impl Fn(&Planes, [usize; 2], &mut [f32], f32) -> Sums,
+) {
     let mut before = vec![0.0; channels];
     for (x, colour) in out.chunks_exact_mut(channels).enumerate() {
         let mut state = State {
@@ -130,7 +181,7 @@ fn filter_row(planes: &Planes, options: &Options, channels: usize, row: usize, o
             colour,
         };
         for _ in 0..options.max_iterations {
-            if step(planes, options, &mut state, &mut before, window) {
+            if step(planes, options, &mut state, &mut before, &window) {
                 break;
             }
         }

@@ -1,6 +1,11 @@
 //! A query made ready, and the exact score of one position.
 
+#[cfg(target_arch = "x86_64")]
+use std::arch::x86_64::{__m128, __m256d};
+
 use super::Query;
+#[cfg(target_arch = "x86_64")]
+use crate::foundation::wide::{V3, cast};
 use crate::{Error, Result};
 
 /// Sums of a score. Fixed, so that every CPU adds in the same order.
@@ -184,7 +189,8 @@ impl Prepared {
     }
 
     /// The cost of a position; infinite where it is more than `bound`, as soon as that is seen.
-    #[allow(unsafe_code)] // measured: twice as fast as with the baseline instructions
+    ///
+    /// Lanes, their order and the absence of fused operations are part of the result.
     pub(super) fn cost_within(
         &self,
         data: &[f32],
@@ -193,26 +199,19 @@ impl Prepared {
         bound: f64,
     ) -> f64 {
         #[cfg(target_arch = "x86_64")]
-        {
-            if is_x86_feature_detected!("avx2") {
-                // SAFETY: the CPU has the feature that the function is compiled for.
-                return unsafe { self.cost_avx2(data, shape, at, bound) };
-            }
+        if let Some(simd) = V3::try_new() {
+            return self.cost_by(data, shape, at, bound, |lanes, patch, weight, samples| {
+                simd.vectorize(
+                    #[inline(always)]
+                    || add_v3(simd, lanes, patch, weight, samples),
+                );
+            });
         }
-        self.cost_any(data, shape, at, bound, add)
+        self.cost_by(data, shape, at, bound, add)
     }
 
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn cost_avx2(&self, data: &[f32], shape: [usize; 2], at: [usize; 2], bound: f64) -> f64 {
-        self.cost_any(data, shape, at, bound, |lanes, p, w, s| {
-            add_avx2(lanes, p, w, s);
-        })
-    }
-
-    /// Lanes, their order and the absence of fused operations are part of the result.
     #[inline(always)]
-    fn cost_any(
+    fn cost_by(
         &self,
         data: &[f32],
         shape: [usize; 2],
@@ -262,12 +261,29 @@ fn add(lanes: &mut [f64; LANES], patch: &[f32], weight: &[f32], samples: &[f32])
     }
 }
 
-/// Not inlined: among the branches around it the lanes would become registers of half the width.
+/// [`add`] in wide registers, the same operations in the same order. Measured: twice as fast as what the compiler makes of
+/// it.
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-#[inline(never)]
-fn add_avx2(lanes: &mut [f64; LANES], patch: &[f32], weight: &[f32], samples: &[f32]) {
-    add(lanes, patch, weight, samples);
+#[inline(always)]
+fn add_v3(simd: V3, lanes: &mut [f64; LANES], patch: &[f32], weight: &[f32], samples: &[f32]) {
+    let V3 { avx, .. } = simd;
+    let (p, p_rest) = patch.as_chunks::<LANES>();
+    let (w, w_rest) = weight.as_chunks::<LANES>();
+    let (s, s_rest) = samples.as_chunks::<LANES>();
+    let mut sums: [__m256d; 2] = cast(*lanes);
+    for ((&p, &w), &s) in p.iter().zip(w).zip(s) {
+        let [p, w, s] = [p, w, s].map(|eight| {
+            let halves: [__m128; 2] = cast(eight);
+            halves.map(|half| avx._mm256_cvtps_pd(half))
+        });
+        for h in 0..2 {
+            let d = avx._mm256_sub_pd(p[h], s[h]);
+            let square = avx._mm256_mul_pd(w[h], avx._mm256_mul_pd(d, d));
+            sums[h] = avx._mm256_add_pd(sums[h], square);
+        }
+    }
+    *lanes = cast(sums);
+    add(lanes, p_rest, w_rest, s_rest);
 }
 
 /// The sum of the lanes, in a fixed order.

@@ -11,13 +11,12 @@
 mod multigrid;
 mod sweep;
 mod transform;
-mod wide;
 
 use crate::foundation::par::{self, Monitor};
+use crate::foundation::wide::wide;
 use crate::{Error, Result};
 use sweep::PANEL;
 use transform::Transform;
-use wide::wide;
 
 /// What happens at both ends of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -73,11 +72,14 @@ pub fn solve(problem: &Problem<'_>, monitor: &Monitor) -> Result<Vec<f32>> {
     let width = columns * channels;
     let mut out = vec![0.0; problem.image.len()];
     par::chunks_mut(&mut out, ROWS * width, |chunk, out| {
-        wide(|| {
-            for (r, out) in out.chunks_exact_mut(width).enumerate() {
-                residual(problem, chunk * ROWS + r, out);
-            }
-        });
+        wide(
+            #[inline(always)]
+            || {
+                for (r, out) in out.chunks_exact_mut(width).enumerate() {
+                    residual(problem, chunk * ROWS + r, out);
+                }
+            },
+        );
     });
     spread(&problem.domain, &mut out, monitor)?;
     par::chunks_mut(&mut out, ROWS * width, |chunk, out| {
@@ -293,7 +295,10 @@ fn rectangle(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) {
             eigenvalue.map_or(1.0, |e| e + domain.screening)
         });
         let mut scratch = sweep::Scratch::default();
-        wide(|| sweep::solve(domain.edges[0], &shifts, rows, panel, &mut scratch));
+        wide(
+            #[inline(always)]
+            || sweep::solve(domain.edges[0], &shifts, rows, panel, &mut scratch),
+        );
         let _ = monitor.advance(present as u64);
     });
 

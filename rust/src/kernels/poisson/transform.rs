@@ -5,19 +5,15 @@
 //! transform in one and two dimensions*, IEEE ASSP 1980).
 
 use std::f64::consts::PI;
-use std::sync::Arc;
-
-use rustfft::num_complex::Complex;
-use rustfft::{Fft, FftPlanner};
 
 use super::Edge;
+use crate::foundation::fft::{Complex, Lines};
 
 /// The transform of an axis of `len` unknowns.
 pub(super) struct Transform {
     edge: Edge,
     len: usize,
-    forward: Arc<dyn Fft<f32>>,
-    inverse: Arc<dyn Fft<f32>>,
+    lines: Lines<f32>,
     /// Sines of the folding, or half-sample rotations.
     twiddles: Vec<Complex<f32>>,
     /// Eigenvalue of each coefficient.
@@ -35,7 +31,6 @@ impl Transform {
     pub(super) fn new(edge: Edge, len: usize) -> Self {
         // Sines of n unknowns live on n + 1 steps.
         let size = if edge == Edge::Fixed { len + 1 } else { len };
-        let mut planner = FftPlanner::new();
         let n = size as f64;
         let twiddles = match edge {
             Edge::Fixed => (0..size)
@@ -62,8 +57,7 @@ impl Transform {
         Self {
             edge,
             len,
-            forward: planner.plan_fft_forward(size),
-            inverse: planner.plan_fft_inverse(size),
+            lines: Lines::new(size),
             twiddles,
             eigenvalues,
         }
@@ -72,14 +66,13 @@ impl Transform {
     /// Coefficients of two rows, in place.
     pub(super) fn forward(&self, a: &mut [f32], b: &mut [f32], scratch: &mut Scratch) {
         let Scratch { line, work } = scratch;
-        work.resize(self.forward.get_inplace_scratch_len(), Complex::default());
         match self.edge {
             Edge::Fixed => self.sines(a, b, 1.0, line, work),
             Edge::Free => self.cosines(a, b, line, work),
             Edge::Wrap => {
                 line.clear();
                 line.extend(a.iter().zip(b.iter()).map(|(&a, &b)| Complex::new(a, b)));
-                self.forward.process_with_scratch(line, work);
+                self.lines.forward(line, work);
                 let n = self.len;
                 (a[0], b[0]) = (line[0].re, line[0].im);
                 for k in 1..n.div_ceil(2) {
@@ -97,12 +90,6 @@ impl Transform {
     /// Rows of two sets of coefficients, in place.
     pub(super) fn inverse(&self, a: &mut [f32], b: &mut [f32], scratch: &mut Scratch) {
         let Scratch { line, work } = scratch;
-        work.resize(
-            self.forward
-                .get_inplace_scratch_len()
-                .max(self.inverse.get_inplace_scratch_len()),
-            Complex::default(),
-        );
         let n = self.len;
         match self.edge {
             // The sine transform is its own inverse but for a factor.
@@ -118,7 +105,7 @@ impl Transform {
                 line.extend(
                     turned.map(|(((a, a2), (b, b2)), t)| Complex::new(a + b2, b - a2) * *t * norm),
                 );
-                self.inverse.process_with_scratch(line, work);
+                self.lines.inverse(line, work);
                 for j in 0..n.div_ceil(2) {
                     (a[2 * j], b[2 * j]) = (line[j].re, line[j].im);
                 }
@@ -141,7 +128,7 @@ impl Transform {
                 if n.is_multiple_of(2) {
                     line[n / 2] = Complex::new(a[n - 1], b[n - 1]) * norm;
                 }
-                self.inverse.process_with_scratch(line, work);
+                self.lines.inverse(line, work);
                 for ((a, b), z) in a.iter_mut().zip(b.iter_mut()).zip(line.iter()) {
                     (*a, *b) = (z.re, z.im);
                 }
@@ -155,7 +142,7 @@ impl Transform {
         b: &mut [f32],
         factor: f32,
         line: &mut Vec<Complex<f32>>,
-        work: &mut [Complex<f32>],
+        work: &mut Vec<Complex<f32>>,
     ) {
         line.clear();
         line.push(Complex::default());
@@ -168,7 +155,7 @@ impl Transform {
                 s.re * (b1 + b2) + 0.5 * (b1 - b2),
             )
         }));
-        self.forward.process_with_scratch(line, work);
+        self.lines.forward(line, work);
         // Odd coefficients are a running sum, kept in f64 so that it does not drift.
         let (mut sum_a, mut sum_b) = (0.5 * f64::from(line[0].re), 0.5 * f64::from(line[0].im));
         (a[0], b[0]) = (factor * sum_a as f32, factor * sum_b as f32);
@@ -190,7 +177,7 @@ impl Transform {
         a: &mut [f32],
         b: &mut [f32],
         line: &mut Vec<Complex<f32>>,
-        work: &mut [Complex<f32>],
+        work: &mut Vec<Complex<f32>>,
     ) {
         let n = self.len;
         line.clear();
@@ -200,7 +187,7 @@ impl Transform {
                 .rev()
                 .map(|j| Complex::new(a[2 * j + 1], b[2 * j + 1])),
         );
-        self.forward.process_with_scratch(line, work);
+        self.lines.forward(line, work);
         (a[0], b[0]) = (line[0].re, line[0].im);
         let mirrored = line[1..].iter().zip(line[1..].iter().rev());
         let slots = a[1..].iter_mut().zip(&mut b[1..]);

@@ -2,6 +2,7 @@
 //! on threads; rows of cells that do not reach the band are passed over by their bounds.
 
 use super::{Point, Warped};
+use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
@@ -201,8 +202,13 @@ pub(super) fn bands(
     draw: impl Fn(&mut Band<'_>) + Sync + Send,
 ) -> Result<(Vec<[f32; 2]>, Vec<u32>)> {
     let [rows, columns] = shape;
-    let mut places = vec![[f32::NAN; 2]; rows * columns];
-    let mut triangle = vec![0; rows * columns];
+    if shape.iter().any(|n| !(1..=i32::MAX as usize).contains(n)) {
+        let message = format!("sides from 1 to 2^31 - 1 are allowed, got {shape:?}");
+        return Err(Error::value("shape", message));
+    }
+    let pixels = memory::product("shape", &shape)?;
+    let mut places = memory::filled("the output", [f32::NAN; 2], pixels)?;
+    let mut triangle = memory::filled("the output", 0u32, pixels)?;
     monitor.expect(rows.div_ceil(BAND) as u64);
     let mut pairs: Vec<_> = places
         .chunks_mut(BAND * columns)

@@ -2,7 +2,7 @@
 
 use super::CHUNK;
 use crate::foundation::par;
-use crate::kernels::poisson::wide::wide_fn;
+use crate::foundation::wide::wide_fn;
 
 /// What lies beyond one side of a grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -7,9 +7,9 @@
 
 mod level;
 
-use super::wide::wide_fn;
 use super::{Domain, Edge};
 use crate::foundation::par::{self, Monitor};
+use crate::foundation::wide::wide_fn;
 use crate::{Error, Result};
 use level::{Level, Side, Vectors};
 

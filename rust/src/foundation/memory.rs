@@ -1,0 +1,48 @@
+//! Memory that grows with what a caller asks for: where there is too little of it, that is an error, not the end of the
+//! process.
+
+use crate::{Error, Result};
+
+/// `len` copies of `value`, for what is named `what`.
+pub(crate) fn filled<T: Clone>(what: &str, value: T, len: usize) -> Result<Vec<T>> {
+    check::<T>(what, len)?;
+    // Asked for anew: memory that the system hands out as zeros is not written twice.
+    Ok(vec![value; len])
+}
+
+/// An error where there is no room for `len` values.
+pub(crate) fn check<T>(what: &str, len: usize) -> Result<()> {
+    Vec::<T>::new()
+        .try_reserve_exact(len)
+        .map_err(|_| Error::Limit {
+            what: what.into(),
+            needed: format!("{} bytes", len as u128 * size_of::<T>() as u128),
+            limit: "memory that there is".into(),
+        })
+}
+
+/// The product of sizes, an error where it is more than can be counted.
+pub(crate) fn product(what: &'static str, sizes: &[usize]) -> Result<usize> {
+    let all = sizes
+        .iter()
+        .try_fold(1usize, |n, &size| n.checked_mul(size));
+    all.ok_or_else(|| Error::value(what, format!("{sizes:?} is more than can be counted")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_does_not_fit_is_an_error() {
+        assert_eq!(filled("numbers", 7u8, 3).unwrap(), [7; 3]);
+        for len in [usize::MAX, usize::MAX / 8, 1 << 60] {
+            assert!(matches!(
+                filled("numbers", 0u64, len),
+                Err(Error::Limit { .. })
+            ));
+        }
+        assert_eq!(product("sides", &[3, 0, 5]).unwrap(), 0);
+        assert!(product("sides", &[1 << 40, 1 << 40]).is_err());
+    }
+}
