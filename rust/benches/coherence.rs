@@ -20,10 +20,7 @@ fn sides<const D: usize>(c: &mut Criterion, side: usize) {
         })
         .collect();
     let appearance = Appearance::new(&colours, grid, 1, 2).unwrap();
-    let region = Region {
-        grid,
-        origin: [0; D],
-    };
+    let region = Region::new(grid, [0; D]).unwrap();
     let sets = similar(&appearance, 3, 7, FEW, &Monitor::default()).unwrap();
     let mut start: Vec<Place<D>> = vec![[side as i32 / 2 * ONE; D]; grid.len()];
     jitter(

@@ -3,7 +3,7 @@ use numpy::{
 };
 use pyo3::prelude::*;
 
-use super::run;
+use super::{grouped, run};
 use crate::engine::appearance::{CHANNELS, KEEP, Parts};
 use crate::engine::guide::Guide;
 use crate::engine::{appearance, blocks, optimize, pyramid};
@@ -61,24 +61,18 @@ fn fixed<T: Copy, const D: usize>(argument: &'static str, values: &[T]) -> Resul
 }
 
 pub(super) fn region<const D: usize>((shape, origin, wrap): &Where) -> Result<Region<D>> {
-    Ok(Region {
-        grid: Grid::new(fixed("shape", shape)?, fixed("wrap", wrap)?)?,
-        origin: fixed("origin", origin)?,
-    })
+    let grid = Grid::new(fixed("shape", shape)?, fixed("wrap", wrap)?)?;
+    Region::new(grid, fixed("origin", origin)?)
 }
 
 /// One frame, or one a point.
-pub(super) fn frames<const D: usize>(values: &[i16], points: usize) -> Result<Frames<'_, D>> {
-    let frames: &[Frame<D>] = values.as_chunks().0.as_chunks().0;
-    match frames {
-        [one] => Ok(Frames::Constant(*one)),
-        all if all.len() == points => Ok(Frames::Dense(all)),
-        _ => Err(Error::Shape {
-            argument: "frames",
-            expected: vec![points, D, D],
-            got: vec![values.len()],
-        }),
-    }
+pub(super) fn frames<const D: usize>(values: &[i16]) -> Result<Frames<'_, D>> {
+    let rows: &[[i16; D]] = grouped("frames", values)?;
+    let frames: &[Frame<D>] = grouped("frames", rows)?;
+    Ok(match frames {
+        [one] => Frames::Constant(*one),
+        all => Frames::Dense(all),
+    })
 }
 
 /// Values of the exemplar's samples and of the output's points, weights, and samples by value.
@@ -99,7 +93,7 @@ fn slices<'a>(guide: &'a Option<GuideIn<'_>>) -> PyResult<GuideSlices<'a>> {
 
 fn guide<'a>(arrays: GuideSlices<'a>, samples: usize, points: usize) -> Result<Option<Guide<'a>>> {
     arrays
-        .map(|(a, b, c, d)| Guide::new(a.as_chunks().0, b, c, samples, points)?.ordered(d))
+        .map(|(a, b, c, d)| Guide::new(grouped("guide", a)?, b, c, samples, points)?.ordered(d))
         .transpose()
 }
 
@@ -193,8 +187,8 @@ impl Appearance {
                     grid: Grid::new(fixed("shape", &shape)?, fixed("wrap", &wrap)?)?,
                     radius,
                     channels,
-                    colours: colours.as_slice()?.as_chunks::<CHANNELS>().0.to_vec(),
-                    features: features.as_slice()?.as_chunks::<KEEP>().0.to_vec(),
+                    colours: grouped::<_, CHANNELS>("colours", colours.as_slice()?)?.to_vec(),
+                    features: grouped::<_, KEEP>("features", features.as_slice()?)?.to_vec(),
                     basis: basis.as_slice()?.to_vec(),
                     bias: fixed("bias", bias.as_slice()?)?,
                     gain,
@@ -244,11 +238,11 @@ impl Appearance {
         let places = run(py, progress, |monitor| {
             either!(&self.0, a, {
                 let region = region::<D>(&place)?;
-                let frames = self::frames(values, region.grid.len())?;
+                let frames = self::frames(values)?;
                 let guide = self::guide(guide, a.grid().len(), region.grid.len())?;
                 let held = blocks::Held {
                     points: held,
-                    places: given.as_chunks().0,
+                    places: grouped("given", given)?,
                 };
                 blocks::blocks(a, &region, frames, guide.as_ref(), held, &options, monitor)
                     .map(Vec::into_flattened)
@@ -294,8 +288,9 @@ impl Appearance {
         run(py, progress, |monitor| {
             either!(&self.0, a, {
                 let region = region::<D>(&place)?;
-                let frames = self::frames(values, region.grid.len())?;
+                let frames = self::frames(values)?;
                 let guide = self::guide(guide, a.grid().len(), region.grid.len())?;
+                grouped::<_, D>("places", places)?;
                 optimize::correct(
                     a,
                     &region,
@@ -327,8 +322,8 @@ pub(super) fn upsample<'py>(
         values: &[i16],
     ) -> Result<Vec<i32>> {
         let (from, to) = (region::<D>(from)?, region::<D>(to)?);
-        let frames = self::frames(values, to.grid.len())?;
-        pyramid::upsample(parents.as_chunks().0, &from, &to, frames).map(Vec::into_flattened)
+        let frames = self::frames(values)?;
+        pyramid::upsample(grouped("parents", parents)?, &from, &to, frames).map(Vec::into_flattened)
     }
     let (parents, values) = (parents.as_slice()?, frames.as_slice()?);
     let places = run(py, None, |_| match to.0.len() {

@@ -2,7 +2,7 @@ use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray3};
 use pyo3::prelude::*;
 
 use super::appearance::{Analysis, Appearance, PlacesOut, Where, either, frames, region};
-use super::run;
+use super::{grouped, run};
 use crate::Result;
 use crate::engine::coherence::{self, Kinds, Options, Similarity};
 use crate::foundation::fixed::Place;
@@ -62,8 +62,8 @@ pub(super) fn cohere<'py>(
     let places = run(py, progress, |monitor| {
         either!(&appearance.0, a, {
             let region = region::<D>(&place)?;
-            let frames = self::frames(values, region.grid.len())?;
-            let mut places: Vec<Place<D>> = places.as_chunks().0.to_vec();
+            let frames = self::frames(values)?;
+            let mut places: Vec<Place<D>> = grouped("places", places)?.to_vec();
             coherence::correct(
                 a,
                 &similarity,
@@ -100,7 +100,7 @@ pub(super) fn jitter<'py>(
         seed: u64,
         level: u32,
     ) -> Result<Vec<i32>> {
-        let mut places: Vec<Place<D>> = places.as_chunks().0.to_vec();
+        let mut places: Vec<Place<D>> = grouped("places", places)?.to_vec();
         coherence::jitter(&mut places, &region::<D>(place)?, held, reach, seed, level)?;
         Ok(places.into_flattened())
     }

@@ -5,8 +5,9 @@ use numpy::{
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
-use super::run;
+use super::{grouped, run};
 use crate::foundation::grid::Grid;
+use crate::foundation::memory;
 use crate::kernels::gather::{Element, Exemplar, Interpolation};
 use crate::{Error, Result};
 
@@ -77,16 +78,9 @@ fn axes<'py, T: Element + numpy::Element, const D: usize>(
         .and_then(|a| a.shape().last().copied())
         .unwrap_or(0);
     let (which, flat) = (which.as_slice()?, coordinates.as_slice()?);
-    let (points, rest) = flat.as_chunks::<D>();
-    if !rest.is_empty() {
-        return Err(Error::Shape {
-            argument: "coordinates",
-            expected: vec![points.len(), D],
-            got: vec![flat.len()],
-        }
-        .into());
-    }
-    let mut out = vec![T::default(); points.len() * channels];
+    let points = grouped::<_, D>("coordinates", flat)?;
+    let samples = memory::product("coordinates", &[points.len(), channels])?;
+    let mut out = memory::filled("the output", T::default(), samples)?;
     run(py, None, |monitor| {
         crate::kernels::gather::gather(&exemplars, which, points, interpolation, &mut out, monitor)
     })?;

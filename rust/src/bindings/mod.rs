@@ -73,6 +73,18 @@ fn run<R: Send>(
     })
 }
 
+/// Values in groups of `N`, an error where some are left.
+fn grouped<'a, T, const N: usize>(argument: &'static str, values: &'a [T]) -> Result<&'a [[T; N]]> {
+    match values.as_chunks() {
+        (groups, []) => Ok(groups),
+        (groups, _) => Err(Error::Shape {
+            argument,
+            expected: vec![groups.len(), N],
+            got: vec![values.len()],
+        }),
+    }
+}
+
 /// Sets the number of threads that kernels called from this thread use (0: RAYON_NUM_THREADS, or all cores) and
 /// returns the former one.
 #[pyfunction]

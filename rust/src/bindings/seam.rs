@@ -1,7 +1,7 @@
 use numpy::{PyArray1, PyReadonlyArray3, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use super::run;
+use super::{grouped, run};
 use crate::foundation::grid::Grid;
 use crate::foundation::par;
 use crate::kernels::seam::cost::Cost;
@@ -195,7 +195,7 @@ fn axes<'py, const D: usize>(
     let shape = unary.shape();
     let energy = labels::Energy {
         grid: grid::<D>(&shape[..shape.len().saturating_sub(1)], wrap)?,
-        unary: unary.as_slice()?.as_chunks().0,
+        unary: grouped("unary", unary.as_slice()?)?,
         forward: slices(forward)?,
         backward: slices(backward)?,
     };

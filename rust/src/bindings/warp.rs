@@ -1,7 +1,7 @@
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use super::run;
+use super::{grouped, run};
 use crate::kernels::warp::{self, Mesh, Warped};
 
 /// Places (pixels, 2), triangle of each pixel, and how many were drawn, turned over, and heavy and turned over.
@@ -32,7 +32,7 @@ pub(super) fn warp_mesh<'py>(
 ) -> PyResult<WarpedOut<'py>> {
     let mesh = Mesh {
         shape: source,
-        target: target.as_slice()?.as_chunks().0,
+        target: grouped("target", target.as_slice()?)?,
         weight: weight.as_slice()?,
     };
     let warped = run(py, progress, |monitor| warp::mesh(&mesh, shape, monitor))?;
@@ -48,8 +48,8 @@ pub(super) fn warp_points<'py>(
     shape: [usize; 2],
 ) -> PyResult<(WarpedOut<'py>, Bound<'py, PyArray2<u32>>)> {
     let (from, to) = (
-        source.as_slice()?.as_chunks().0,
-        target.as_slice()?.as_chunks().0,
+        grouped("source", source.as_slice()?)?,
+        grouped("target", target.as_slice()?)?,
     );
     let (warped, corners) = run(py, None, |monitor| {
         warp::scattered(from, to, shape, monitor)

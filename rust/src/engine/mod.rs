@@ -6,3 +6,6 @@ pub mod coherence;
 pub mod guide;
 pub mod optimize;
 pub mod pyramid;
+
+#[cfg(test)]
+mod hostile_tests;

@@ -2,7 +2,7 @@
 
 use crate::foundation::fixed::{Frames, ONE, Place, add, apply};
 use crate::foundation::grid::Region;
-use crate::foundation::par;
+use crate::foundation::{memory, par};
 use crate::{Error, Result};
 
 /// Points a task takes at a time.
@@ -40,7 +40,8 @@ pub fn upsample<const D: usize>(
             got: vec![parents.len()],
         });
     }
-    let mut places = vec![[0; D]; to.grid.len()];
+    frames.check(to.grid.len())?;
+    let mut places = memory::filled("the places of a region", [0; D], to.grid.len())?;
     par::chunks_mut(&mut places, CHUNK, |chunk, places| {
         for (i, place) in places.iter_mut().enumerate() {
             let p = chunk * CHUNK + i;
@@ -54,7 +55,8 @@ pub fn upsample<const D: usize>(
                 // Twice the step from the middle of the first two children.
                 twice[axis] = 2 * (world[axis] - 2 * (at + from.origin[axis])) - 1;
             }
-            let middle = parents[from.grid.index(parent)].map(|x| 2 * x + ONE / 2);
+            let middle =
+                parents[from.grid.index(parent)].map(|x| x.wrapping_mul(2).wrapping_add(ONE / 2));
             let moved = apply(&frames.at(p), twice).map(|x| x >> 1);
             *place = add(middle, moved);
         }
@@ -69,10 +71,7 @@ mod tests {
     use crate::foundation::grid::Grid;
 
     fn region(shape: [usize; 2], wrap: bool, origin: [i32; 2]) -> Region<2> {
-        Region {
-            grid: Grid::new(shape, [wrap; 2]).unwrap(),
-            origin,
-        }
+        Region::new(Grid::new(shape, [wrap; 2]).unwrap(), origin).unwrap()
     }
 
     #[test]

@@ -1,7 +1,10 @@
 //! Coordinates and frames in fixed point.
 //!
 //! A synthesis moves coordinates by frames many thousand times, and its choices hang on where they round to. In fixed
-//! point every step is exact, so the result is the same on any machine and in any order of work.
+//! point every step is exact, so the result is the same on any machine and in any order of work. What leaves 32 bits comes
+//! round: it is far outside of any exemplar either way, and brought inside like all that is.
+
+use crate::{Error, Result};
 
 /// Binary digits after the point.
 pub const BITS: u32 = 12;
@@ -28,16 +31,16 @@ pub const fn identity<const D: usize>() -> Frame<D> {
 /// The sample nearest to a place; half-way goes to the higher one.
 #[inline(always)]
 pub fn nearest<const D: usize>(place: Place<D>) -> [i32; D] {
-    place.map(|x| (x + ONE / 2) >> BITS)
+    place.map(|x| x.wrapping_add(ONE / 2) >> BITS)
 }
 
 /// The displacement J step of a step in whole samples of the output.
 #[inline(always)]
 pub fn apply<const D: usize>(frame: &Frame<D>, step: [i32; D]) -> Place<D> {
-    let mut moved = [0; D];
+    let mut moved = [0i32; D];
     for i in 0..D {
         for j in 0..D {
-            moved[i] += i32::from(frame[i][j]) * step[j];
+            moved[i] = moved[i].wrapping_add(i32::from(frame[i][j]).wrapping_mul(step[j]));
         }
     }
     moved
@@ -48,7 +51,7 @@ pub fn apply<const D: usize>(frame: &Frame<D>, step: [i32; D]) -> Place<D> {
 pub fn add<const D: usize>(a: Place<D>, b: Place<D>) -> Place<D> {
     let mut sum = a;
     for i in 0..D {
-        sum[i] += b[i];
+        sum[i] = sum[i].wrapping_add(b[i]);
     }
     sum
 }
@@ -58,7 +61,7 @@ pub fn add<const D: usize>(a: Place<D>, b: Place<D>) -> Place<D> {
 pub fn sub<const D: usize>(a: Place<D>, b: Place<D>) -> Place<D> {
     let mut difference = a;
     for i in 0..D {
-        difference[i] -= b[i];
+        difference[i] = difference[i].wrapping_sub(b[i]);
     }
     difference
 }
@@ -79,6 +82,18 @@ impl<const D: usize> Frames<'_, D> {
         match self {
             Self::Constant(frame) => *frame,
             Self::Dense(frames) => frames[index],
+        }
+    }
+
+    /// An error unless there is one for all, or one for each of `points`.
+    pub fn check(&self, points: usize) -> Result<()> {
+        match self {
+            Self::Dense(frames) if frames.len() != points => Err(Error::Shape {
+                argument: "frames",
+                expected: vec![points, D, D],
+                got: vec![frames.len(), D, D],
+            }),
+            _ => Ok(()),
         }
     }
 

@@ -113,6 +113,7 @@ impl<const D: usize> Grid<D> {
 /// A part of an endless lattice: its points, and where its first one lies in the world. What is hashed is the place in
 /// the world, so every part that holds a point gives it the same noise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Region<const D: usize> {
     /// Its points; cyclic axes are those along which the output repeats.
     pub grid: Grid<D>,
@@ -121,6 +122,33 @@ pub struct Region<const D: usize> {
 }
 
 impl<const D: usize> Region<D> {
+    /// World coordinates of its points are less than this from zero, so that steps between any two fit into 32 bits.
+    pub const FAR: i32 = 1 << 30;
+
+    /// A region; refuses more than 2^32 - 1 points, which are numbered by 32 bits, and points beyond [`Self::FAR`].
+    pub fn new(grid: Grid<D>, origin: [i32; D]) -> Result<Self> {
+        if grid.len() > u32::MAX as usize {
+            return Err(Error::Limit {
+                what: format!("a region of {:?}", grid.shape()),
+                needed: format!("{} points", grid.len()),
+                limit: format!("{} points", u32::MAX),
+            });
+        }
+        for (&first, n) in origin.iter().zip(grid.shape()) {
+            let last = i64::from(first) + n as i64 - 1;
+            if i64::from(first) <= -i64::from(Self::FAR) || last >= i64::from(Self::FAR) {
+                return Err(Error::value(
+                    "origin",
+                    format!(
+                        "{origin:?} with {:?} points reaches beyond 2^30 from zero",
+                        grid.shape()
+                    ),
+                ));
+            }
+        }
+        Ok(Self { grid, origin })
+    }
+
     /// World coordinates of a point.
     #[inline(always)]
     pub fn world(&self, point: [usize; D]) -> [i32; D] {
@@ -160,6 +188,20 @@ mod tests {
     fn refuses_empty_and_uncountable_shapes() {
         assert!(Grid::new([3, 0], [false; 2]).is_err());
         assert!(Grid::new([usize::MAX, 2], [false; 2]).is_err());
+    }
+
+    #[test]
+    fn regions_stay_within_32_bits() {
+        let region = |shape, origin| Region::new(Grid::new(shape, [false; 2]).unwrap(), origin);
+        let far = Region::<2>::FAR;
+        assert!(region([1, 1], [1 - far, far - 1]).is_ok());
+        assert!(region([10, 10], [0, far - 10]).is_ok());
+        assert!(region([10, 10], [0, far - 9]).is_err());
+        assert!(region([10, 10], [-far, 0]).is_err());
+        assert!(region([10, 10], [i32::MIN, i32::MAX]).is_err());
+        assert!(region([1 << 31, 1], [-far + 1, 0]).is_err());
+        let many = region([1 << 20, 1 << 20], [0; 2]);
+        assert!(matches!(many, Err(Error::Limit { .. })));
     }
 
     #[test]

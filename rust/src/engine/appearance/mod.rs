@@ -53,6 +53,8 @@ const LONGEST: usize = 2048;
 const LANES: usize = 16;
 /// Places that differ by less are of one piece of the exemplar: rounding moves them by half a sample.
 const SAME: i32 = ONE * 3 / 4;
+/// Samples along an axis, at most: places have 12 of 32 bits after the point, and room is left for steps.
+const SIDE: usize = 1 << 18;
 /// Points a task takes at a time.
 const CHUNK: usize = 1024;
 
@@ -75,7 +77,9 @@ impl<const D: usize> Appearance<D> {
     /// Analyses `colours`: points of `grid` by `channels`. A cyclic axis of the grid is one along which the exemplar
     /// repeats.
     pub fn new(colours: &[f32], grid: Grid<D>, channels: usize, radius: usize) -> Result<Self> {
-        if !(1..=CHANNELS).contains(&channels) || colours.len() != grid.len() * channels {
+        if !(1..=CHANNELS).contains(&channels)
+            || grid.len().checked_mul(channels) != Some(colours.len())
+        {
             let mut expected = grid.shape().to_vec();
             expected.push(channels.clamp(1, CHANNELS));
             return Err(Error::Shape {
@@ -87,10 +91,7 @@ impl<const D: usize> Appearance<D> {
         if let Some(bad) = colours.iter().find(|x| !x.is_finite()) {
             return Err(Error::value("colours", format!("{bad} is not finite")));
         }
-        let least = 2 * radius + 2;
-        let numbers = (2 * radius + 1)
-            .saturating_pow(D as u32)
-            .saturating_mul(channels);
+        let numbers = numbers::<D>(radius, channels);
         if radius == 0 || numbers > LONGEST {
             return Err(Error::value(
                 "radius",
@@ -99,15 +100,7 @@ impl<const D: usize> Appearance<D> {
                 ),
             ));
         }
-        if grid.shape().iter().any(|&n| n < least) {
-            return Err(Error::value(
-                "exemplar",
-                format!(
-                    "{:?} is too small for windows of radius {radius}: sides of at least {least} are needed",
-                    grid.shape()
-                ),
-            ));
-        }
+        check_sides(&grid, radius)?;
         let colours = quantise(colours, channels);
         let mut this = Self {
             grid,
@@ -241,7 +234,7 @@ impl<const D: usize> Appearance<D> {
     #[inline(always)]
     pub fn same(&self, a: Place<D>, b: Place<D>) -> bool {
         (0..D).all(|axis| {
-            let d = (a[axis] - b[axis]).abs();
+            let d = a[axis].wrapping_sub(b[axis]).wrapping_abs();
             d <= SAME
                 || self.grid.wrap()[axis] && {
                     let n = self.grid.shape()[axis] as i32 * ONE;
@@ -443,6 +436,35 @@ impl<const D: usize> Centres<D> {
         }
         sample
     }
+}
+
+/// Numbers of a window.
+fn numbers<const D: usize>(radius: usize, channels: usize) -> usize {
+    let side = radius.saturating_mul(2).saturating_add(1);
+    side.saturating_pow(D as u32).saturating_mul(channels)
+}
+
+/// Refuses exemplars in which windows of `radius` do not fit, and those that 32 bits cannot address with their rim.
+fn check_sides<const D: usize>(grid: &Grid<D>, radius: usize) -> Result<()> {
+    let (shape, least) = (grid.shape(), 2 * radius + 2);
+    if shape.iter().any(|&n| n < least) {
+        return Err(Error::value(
+            "exemplar",
+            format!(
+                "{shape:?} is too small for windows of radius {radius}: sides of at least {least} are needed"
+            ),
+        ));
+    }
+    let wide = shape.map(|n| n.saturating_add(least));
+    let points = wide.iter().fold(1usize, |n, &side| n.saturating_mul(side));
+    if shape.iter().any(|&n| n > SIDE) || points > i32::MAX as usize {
+        return Err(Error::Limit {
+            what: format!("an exemplar of {shape:?}"),
+            needed: format!("{points} samples with its rim"),
+            limit: format!("{} samples, {SIDE} along an axis", i32::MAX),
+        });
+    }
+    Ok(())
 }
 
 /// The offsets of a window, in row-major order.

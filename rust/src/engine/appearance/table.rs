@@ -1,6 +1,9 @@
 //! An analysis taken apart into plain arrays, to be kept, and put together again.
 
-use super::{Appearance, Apron, CHANNELS, Colour, Feature, KEEP, LANES, Line, Projection, window};
+use super::{
+    Appearance, Apron, CHANNELS, Colour, Feature, KEEP, LANES, Line, Projection, check_sides,
+    numbers, window,
+};
 use crate::foundation::grid::Grid;
 use crate::{Error, Result};
 
@@ -48,7 +51,8 @@ impl<const D: usize> Appearance<D> {
         let points = parts.grid.len();
         let known = (1..=8).contains(&parts.radius) && (1..=CHANNELS).contains(&parts.channels);
         let length = if known {
-            (2 * parts.radius + 1).pow(D as u32) * parts.channels
+            check_sides(&parts.grid, parts.radius)?;
+            numbers::<D>(parts.radius, parts.channels)
         } else {
             0
         };
@@ -59,12 +63,11 @@ impl<const D: usize> Appearance<D> {
             .all(|row| row.iter().map(|&x| i64::from(x).abs()).sum::<i64>() * 2048 <= 1 << 31);
         let within = |x: &i16| (-2047..=2047).contains(x);
         if !known
-            || parts.grid.shape().iter().any(|&n| n < 2 * parts.radius + 2)
             || parts.colours.len() != points
             || parts.features.len() != points
             || parts.basis.len() != padded * KEEP
             || !sums_fit
-            || parts.bias.iter().any(|b| b.abs() > 1 << 31)
+            || parts.bias.iter().any(|b| b.unsigned_abs() > 1 << 31)
             || !(0..=1 << 32).contains(&parts.gain)
             || parts.spacing < 0
             || !parts.colours.iter().flatten().all(within)

@@ -1,10 +1,11 @@
 //! A region divided into cells with borders that are nowhere straight.
 
 use super::{CHUNK, Options};
+use crate::Result;
 use crate::foundation::fixed::{Frame, Frames, sub};
 use crate::foundation::grid::{Grid, Region};
 use crate::foundation::hash::Noise;
-use crate::foundation::par;
+use crate::foundation::{memory, par};
 
 /// How far a centre strays from the middle of its cell, as a share of the cell.
 const STRAY: f64 = 0.4;
@@ -31,7 +32,7 @@ pub(super) struct Cell<const D: usize> {
 }
 
 impl<const D: usize> Cells<D> {
-    pub(super) fn new(region: &Region<D>, options: &Options) -> Self {
+    pub(super) fn new(region: &Region<D>, options: &Options) -> Result<Self> {
         let (shape, wrap) = (region.grid.shape(), region.grid.wrap());
         let side = options.cell as i32;
         let mut first = [0; D];
@@ -49,7 +50,8 @@ impl<const D: usize> Cells<D> {
                 counts[axis] = (last - first[axis] + 1) as usize;
             }
         }
-        let grid = Grid::new(counts, wrap).expect("a region has points, so it has cells");
+        let grid = Grid::new(counts, wrap)?;
+        memory::check::<[i32; D]>("the cells of a region", grid.len())?;
         let noise = Noise::new(options.seed).part(2);
         let centres = (0..grid.len())
             .map(|c| {
@@ -63,13 +65,13 @@ impl<const D: usize> Cells<D> {
                 })
             })
             .collect();
-        Self {
+        Ok(Self {
             region: *region,
             grid,
             first,
             sides,
             centres,
-        }
+        })
     }
 
     /// Whether anything inside the margin hangs on what a cell chooses in a round.
@@ -108,9 +110,9 @@ impl<const D: usize> Cells<D> {
     }
 
     /// The cell that each point belongs to: that of the nearest centre, along the axis on which it is farthest.
-    pub(super) fn owners(&self) -> Vec<u32> {
+    pub(super) fn owners(&self) -> Result<Vec<u32>> {
         let grid = &self.region.grid;
-        let mut owners = vec![0u32; grid.len()];
+        let mut owners = memory::filled("the points of cells", 0u32, grid.len())?;
         par::chunks_mut(&mut owners, CHUNK, |chunk, owners| {
             // Points one after the other mostly fall into one cell.
             let (mut seen, mut around) = (None, Vec::new());
@@ -131,7 +133,7 @@ impl<const D: usize> Cells<D> {
                 *owner = nearest.map_or(0, |(_, c)| c as u32);
             }
         });
-        owners
+        Ok(owners)
     }
 
     /// The cell at a position of the lattice of cells, and those beside it.
@@ -158,8 +160,9 @@ impl<const D: usize> Cells<D> {
     }
 
     /// Points and shells of all cells.
-    pub(super) fn list(&self, owners: &[u32], frames: Frames<'_, D>) -> Vec<Cell<D>> {
+    pub(super) fn list(&self, owners: &[u32], frames: Frames<'_, D>) -> Result<Vec<Cell<D>>> {
         let grid = &self.region.grid;
+        memory::check::<Cell<D>>("the cells of a region", self.grid.len())?;
         let mut list: Vec<Cell<D>> = (0..self.grid.len())
             .map(|c| {
                 let cell = self.grid.point(c);
@@ -215,7 +218,7 @@ impl<const D: usize> Cells<D> {
                 list[other as usize].shell.push((at as u32, step));
             }
         }
-        list
+        Ok(list)
     }
 
     /// The cells within two steps of a cell.

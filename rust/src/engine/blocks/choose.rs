@@ -160,13 +160,13 @@ impl<'a, const D: usize> Chooser<'a, D> {
         held: Held<'_, D>,
     ) -> Asked<'g, D> {
         let mut points = Vec::new();
-        let mut middle = (i32::MAX, 0);
+        let mut middle = (i64::MAX, 0);
         if let Some(guide) = guide {
             let asks = |&&p: &&u32| guide.asks(p as usize) && !held.holds(p as usize);
             for &p in self.cell.points.iter().filter(asks) {
                 let world = cells.region.world(cells.region.grid.point(p as usize));
                 let step = cells.step_from_centre(self.index, world);
-                middle = middle.min((step.iter().map(|x| x * x).sum(), p as usize));
+                middle = middle.min((step.iter().map(|&x| i64::from(x).pow(2)).sum(), p as usize));
                 points.push((p as usize, step));
             }
         }
@@ -218,14 +218,14 @@ impl<'a, const D: usize> Chooser<'a, D> {
     /// How much of the piece is shown near by already.
     #[inline(always)]
     fn repeated(&self, origin: Place<D>, near: &[Place<D>], cell: usize) -> f64 {
-        let reach = (cell as i32 * ONE / 2).max(ONE);
+        let reach = (cell as u32 * ONE as u32 / 2).max(ONE as u32);
         let shared = |other: &Place<D>| {
             let far = sub(*other, origin)
                 .iter()
-                .map(|d| d.abs())
+                .map(|d| d.unsigned_abs())
                 .max()
                 .unwrap_or(0);
-            f64::from((reach - far).max(0)) / f64::from(reach)
+            f64::from(reach.saturating_sub(far)) / f64::from(reach)
         };
         near.iter().map(shared).sum()
     }

@@ -16,6 +16,7 @@ use crate::engine::guide::Guide;
 use crate::foundation::fixed::{Frames, Place, add, apply};
 use crate::foundation::grid::Region;
 use crate::foundation::hash::Noise;
+use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
@@ -24,6 +25,10 @@ use choose::Chooser;
 
 /// Points that a thread takes at once.
 const CHUNK: usize = 4096;
+
+/// Points of a cell along an axis, rounds, and candidates of a round, at most: places of cells fit into 32 bits, and draws
+/// are told apart by 16.
+const MOST: usize = 1 << 16;
 
 /// What [`blocks`] is asked for.
 #[derive(Debug, Clone, Copy)]
@@ -79,12 +84,23 @@ pub fn blocks<const D: usize>(
     options: &Options,
     monitor: &Monitor,
 ) -> Result<Vec<Place<D>>> {
-    if options.cell < 2 || options.candidates == 0 || options.rounds == 0 {
+    let counts = [options.candidates, options.rounds];
+    if !(2..=MOST).contains(&options.cell) || counts.iter().any(|n| !(1..MOST).contains(n)) {
         return Err(Error::value(
             "cell",
-            format!("needs at least 2 points a cell, 1 candidate and 1 round, got {options:?}"),
+            format!(
+                "needs at least 2 points a cell, 1 candidate and 1 round, and at most {MOST}, got {options:?}"
+            ),
         ));
     }
+    let costs = [options.contrast, options.continuation, options.repetition];
+    if !costs.iter().all(|x| x.is_finite()) || options.margin > u32::MAX as usize {
+        return Err(Error::value(
+            "options",
+            format!("finite costs and a margin within the region are allowed, got {options:?}"),
+        ));
+    }
+    frames.check(region.grid.len())?;
     for n in [held.points.len(), held.places.len()] {
         if n != held.points.len() || !(n == 0 || n == region.grid.len()) {
             return Err(Error::Shape {
@@ -94,10 +110,11 @@ pub fn blocks<const D: usize>(
             });
         }
     }
-    let cells = Cells::new(region, options);
+    let mut places = memory::filled("the places of a region", [0; D], region.grid.len())?;
+    let cells = Cells::new(region, options)?;
     let noise = Noise::new(options.seed).part(1);
-    let owners = cells.owners();
-    let list = cells.list(&owners, frames);
+    let owners = cells.owners()?;
+    let list = cells.list(&owners, frames)?;
     let mut origins: Vec<Place<D>> = par::map(list.len(), |c| {
         Chooser::new(appearance, &cells, &list, c).place(&noise, 0, 0)
     });
@@ -105,7 +122,6 @@ pub fn blocks<const D: usize>(
         distance(appearance.feature(at), &[0; KEEP])
     });
     monitor.expect((options.rounds * list.len()) as u64);
-    let mut places = vec![[0; D]; region.grid.len()];
     for round in 0..=options.rounds {
         if round > 0 {
             let even = round % 2 == 0;

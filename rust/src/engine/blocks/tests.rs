@@ -34,10 +34,7 @@ fn run(
     side: usize,
     options: &Options,
 ) -> Vec<Place<2>> {
-    let region = Region {
-        grid: Grid::new([side; 2], [false; 2]).unwrap(),
-        origin,
-    };
+    let region = Region::new(Grid::new([side; 2], [false; 2]).unwrap(), origin).unwrap();
     let frames = Frames::Constant(identity());
     blocks(
         exemplar,
@@ -108,10 +105,7 @@ fn a_guide_is_followed() {
         .collect();
     let weight = vec![256; 1600];
     let guide = Guide::new(&rows, wanted.as_flattened(), &weight, 1024, 1600).unwrap();
-    let region = Region {
-        grid: Grid::new([40; 2], [false; 2]).unwrap(),
-        origin: [0; 2],
-    };
+    let region = Region::new(Grid::new([40; 2], [false; 2]).unwrap(), [0; 2]).unwrap();
     let frames = Frames::Constant(identity());
     let places = blocks(
         &exemplar,
@@ -162,10 +156,7 @@ fn what_is_drawn_near_the_guide_is_found_with_few_candidates() {
     // One weight, and the first values alone.
     let (wanted, weight) = (vec![900; 1600], [256]);
     let order: Vec<u32> = (0..1024).collect();
-    let region = Region {
-        grid: Grid::new([40; 2], [false; 2]).unwrap(),
-        origin: [0; 2],
-    };
+    let region = Region::new(Grid::new([40; 2], [false; 2]).unwrap(), [0; 2]).unwrap();
     let options = Options {
         candidates: 4,
         ..OPTIONS
@@ -192,10 +183,7 @@ fn what_is_drawn_near_the_guide_is_found_with_few_candidates() {
 #[test]
 fn what_is_held_stays_and_is_gone_on_from() {
     let exemplar = exemplar(false);
-    let region = Region {
-        grid: Grid::new([24; 2], [false; 2]).unwrap(),
-        origin: [0; 2],
-    };
+    let region = Region::new(Grid::new([24; 2], [false; 2]).unwrap(), [0; 2]).unwrap();
     // All but a square in the middle shows the exemplar as it is.
     let given: Vec<Place<2>> = (0..576)
         .map(|i| [(i / 24 + 4) * ONE, (i % 24 + 4) * ONE])

@@ -57,6 +57,10 @@ pub fn jitter<const D: usize>(
             got: vec![places.len()],
         });
     }
+    if reach > i32::MAX as u32 {
+        let message = format!("up to {} is allowed, got {reach}", i32::MAX);
+        return Err(crate::Error::value("reach", message));
+    }
     let noise = Noise::new(seed).part(4);
     par::chunks_mut(places, CHUNK, |chunk, places| {
         for (i, place) in places.iter_mut().enumerate() {

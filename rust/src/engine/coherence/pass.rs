@@ -14,6 +14,9 @@ const SHARE: usize = 256;
 /// Sums that a cost is added up in, each of pairs of numbers.
 const LANES: usize = 4;
 
+/// Passes, at most: turns are counted by 32 bits.
+const MOST: usize = 1 << 24;
+
 /// What [`correct`] is asked for.
 #[derive(Debug, Clone, Copy)]
 pub struct Options {
@@ -58,11 +61,10 @@ pub fn correct<const D: usize>(
 ) -> Result<()> {
     let points = region.grid.len();
     let samples = appearance.grid().len();
-    if points > u32::MAX as usize {
-        return Err(Error::value(
-            "region",
-            format!("{points} points are too many"),
-        ));
+    frames.check(points)?;
+    if !(1..=LARGEST).contains(&similarity.k) {
+        let message = format!("needs sets of 1 to {LARGEST}, got {}", similarity.k);
+        return Err(Error::value("similarity", message));
     }
     for (argument, length, wanted) in [
         ("places", places.len(), points),
@@ -94,12 +96,12 @@ pub fn correct<const D: usize>(
             appearance.inside(sample).is_some()
         })
         .collect();
-    let sets = similarity.sets.chunks_exact(similarity.k.max(1));
+    let sets = similarity.sets.chunks_exact(similarity.k);
     let sound = sets.enumerate().all(|(i, set)| {
         let allowed = |&s: &u32| s as usize == i || inside.get(s as usize).is_some_and(|&b| b);
         set.iter().all(allowed)
     });
-    if !(1..=LARGEST).contains(&similarity.k) || !sound {
+    if !sound {
         return Err(Error::value(
             "similarity",
             format!(
@@ -112,6 +114,10 @@ pub fn correct<const D: usize>(
             *place = appearance.bring_inside(*place);
         }
     });
+    if options.passes > MOST {
+        let message = format!("up to {MOST} are allowed, got {}", options.passes);
+        return Err(Error::value("passes", message));
+    }
     match options.numbers {
         FEW => Level::<D, FEW>::new(appearance, similarity, region, frames, held, kinds, options)
             .run(places, monitor),
@@ -184,8 +190,9 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
         let classes = self.classes();
         // The turn, counted from 1, in which each point last changed.
         let mut changed = vec![0u32; places.len()];
-        monitor.expect((self.options.passes << D) as u64);
-        for turn in 0..self.options.passes << D {
+        let turns = self.options.passes << D;
+        monitor.expect(turns as u64);
+        for turn in 0..turns {
             let class = &classes[turn % (1 << D)];
             let now = turn as u32 + 1;
             let before = now.saturating_sub(1 << D);

@@ -26,7 +26,7 @@ pub fn similar<const D: usize>(
     numbers: usize,
     monitor: &Monitor,
 ) -> Result<Similarity> {
-    if !(1..=LARGEST).contains(&k) || n.is_multiple_of(2) {
+    if !(1..=LARGEST).contains(&k) || n.is_multiple_of(2) || n > i32::MAX as usize {
         return Err(Error::value(
             "k",
             format!("1 to {LARGEST} samples an odd n apart are allowed, got k = {k} and n = {n}"),

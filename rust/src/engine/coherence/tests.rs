@@ -16,10 +16,7 @@ fn exemplar<const D: usize>(side: usize, wrap: bool) -> Appearance<D> {
 }
 
 fn region<const D: usize>(side: usize, wrap: bool) -> Region<D> {
-    Region {
-        grid: Grid::new([side; D], [wrap; D]).unwrap(),
-        origin: [-3; D],
-    }
+    Region::new(Grid::new([side; D], [wrap; D]).unwrap(), [-3; D]).unwrap()
 }
 
 const OPTIONS: Options = Options {

@@ -141,7 +141,7 @@ impl<const D: usize> Level<'_, D> {
                 let radius = (appearance.grid().shape()[axis] >> draw) as u64;
                 let span = 2 * radius + 1;
                 let shift = ((u64::from(words[axis]) * span) >> 32) as i32 - radius as i32;
-                best[axis] + shift * ONE
+                best[axis].wrapping_add(shift * ONE)
             })
         });
         let costs = drawn.map(|place| match appearance.inside(nearest(place)) {

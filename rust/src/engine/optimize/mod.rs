@@ -24,10 +24,11 @@ use crate::engine::appearance::{Appearance, UNIT};
 use crate::engine::guide::Guide;
 use crate::foundation::fixed::{Frames, Place, add, apply};
 use crate::foundation::grid::Region;
-
-use self::recent::Recent;
+use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
+
+use self::recent::Recent;
 
 /// Points that a task takes at a time.
 const CHUNK: usize = 2048;
@@ -35,6 +36,8 @@ const CHUNK: usize = 2048;
 const FINEST: i32 = UNIT / 256;
 /// How far a change makes points look again.
 const NEAR: usize = 1;
+/// What the hysteresis and the unity may be, at most.
+const DEAREST: f64 = 1e6;
 /// Points between two looks at whether to stop, at least.
 const SLAB: usize = 1 << 18;
 
@@ -104,6 +107,16 @@ pub fn correct<const D: usize>(
             ),
         ));
     }
+    let costs = [options.hysteresis, options.unity];
+    if !costs.iter().all(|x| (0.0..=DEAREST).contains(x)) || options.settled.is_nan() {
+        return Err(Error::value(
+            "options",
+            format!("hysteresis and unity from 0 to {DEAREST:e} are allowed, got {options:?}"),
+        ));
+    }
+    frames.check(points)?;
+    let room = if options.vote > 0 { 2 * points } else { points };
+    memory::check::<Place<D>>("the matches of a region", room)?;
     par::chunks_mut(places, CHUNK, |_, places| {
         for place in places {
             *place = appearance.bring_inside(*place);
@@ -119,14 +132,14 @@ pub fn correct<const D: usize>(
         around: around(),
         recent: Recent::new(points, NEAR),
     };
-    monitor.expect((options.passes * points.div_ceil(level.slab())) as u64);
+    monitor.expect(options.passes.saturating_mul(points.div_ceil(level.slab())) as u64);
     let mut matches = places.to_vec();
     let mut elected = vec![[0; D]; if options.vote > 0 { points } else { 0 }];
     // What is before a pass and what is after it take turns.
     let (mut before, mut matches, mut elected) = (places, &mut matches[..], &mut elected[..]);
     let (mut moved, mut done) = ([0, 0], 0);
     while done < options.passes {
-        let number = options.first + done as u32;
+        let number = options.first.wrapping_add(done as u32);
         level.matches(before, matches, number, monitor)?;
         let newest = if options.vote > 0 {
             level.vote(before, matches, elected, number);

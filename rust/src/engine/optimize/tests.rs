@@ -38,10 +38,7 @@ fn start<const D: usize>(region: &Region<D>, side: usize) -> Vec<Place<D>> {
 }
 
 fn region<const D: usize>(side: usize, wrap: bool, origin: i32) -> Region<D> {
-    Region {
-        grid: Grid::new([side; D], [wrap; D]).unwrap(),
-        origin: [origin; D],
-    }
+    Region::new(Grid::new([side; D], [wrap; D]).unwrap(), [origin; D]).unwrap()
 }
 
 fn mean_cost<const D: usize>(
