@@ -301,10 +301,10 @@ def test_names_are_the_generators_and_no_photograph_shares_one() -> None:
     assert all(callable(getattr(samples, name)) for name in samples.names())
 
 
-@pytest.mark.parametrize("size", [(31, 64), (64,), (64, 64, 64), (64.0, 64), (True, 64), 64, "64"])
+@pytest.mark.parametrize("size", [(31, 64), (64,), (64, 64, 64), (64.0, 64), (True, 64), 31, "64"])
 @pytest.mark.parametrize("name", ["pebbles", "tilted_discs"])
 def test_bad_sizes_are_refused(name: str, size: object) -> None:
-    with pytest.raises(ValueError, match="size must be"):
+    with pytest.raises(ValueError, match="size: "):
         samples.load(name, size=size)
 
 
@@ -315,9 +315,9 @@ def test_bad_names_seeds_and_solids_are_refused() -> None:
         samples.photograph("pebbles")
     with pytest.raises(ValueError, match="takes no options"):
         samples.load("coins", seed=1)
-    with pytest.raises(ValueError, match="seed must be an int"):
+    with pytest.raises(ValueError, match="seed: needs an integer"):
         samples.dots((64, 64), seed=-1)
-    with pytest.raises(ValueError, match="size must be 3 ints"):
+    with pytest.raises(ValueError, match=r"size: needs \(planes, rows, columns\)"):
         samples.stripes((64, 64))
     with pytest.raises(ValueError, match="at least 32"):
         samples.wood_solid((64, 64, 8))

@@ -20,9 +20,10 @@ from math import cos, pi, radians, sin, sqrt, tan
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import as_size
 from texrs.samples._noise import Floats, mix, palette, ramp
 from texrs.samples._regular import lay_bricks
-from texrs.samples._sample import LayoutName, Sample, check_size, generator
+from texrs.samples._sample import MIN_SIDE, LayoutName, Sample, generator
 from texrs.samples._scene import Scene, relabel
 
 _PITCH, _RADIUS = 26.0, 10.5
@@ -60,7 +61,7 @@ def tilted_discs(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
     ((96, 96, 2, 2), True)
     """
     rng = generator("tilted_discs", seed)
-    plane = _Plane.seen(check_size(size, 2), tilt=50.0, towards=pi)
+    plane = _Plane.seen(as_size(size, minimum=MIN_SIDE), tilt=50.0, towards=pi)
     rise = _PITCH * sqrt(3) / 2
     rows = 2 * int(np.ceil(plane.extent[0] / (2 * rise)))
     cols = int(np.ceil(plane.extent[1] / _PITCH))
@@ -101,7 +102,7 @@ def tilted_bricks(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
     True
     """
     rng = generator("tilted_bricks", seed)
-    plane = _Plane.seen(check_size(size, 2), tilt=45.0, towards=radians(-112.0), zoom=1.25)
+    plane = _Plane.seen(as_size(size, minimum=MIN_SIDE), tilt=45.0, towards=radians(-112.0), zoom=1.25)
     courses = 2 * int(np.ceil(plane.extent[0] / 68))
     across = int(np.ceil(plane.extent[1] / 80))
     scene = Scene((courses * 34, across * 80), rng)

@@ -7,8 +7,9 @@ from math import pi
 
 import numpy as np
 
+from texrs._arrays import as_size
 from texrs.samples._noise import Floats, mix, palette, ramp, shades
-from texrs.samples._sample import Sample, check_size, generator
+from texrs.samples._sample import MIN_SIDE, Sample, generator
 from texrs.samples._scene import Scene
 
 _COURSE, _BRICK, _JOINT = 34, 80, 5.0
@@ -48,7 +49,7 @@ def bricks(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fals
     ('jointed', (256, 256, 3))
     """
     rng = generator("bricks", seed)
-    rows, cols = check_size(size, 2)
+    rows, cols = as_size(size, minimum=MIN_SIDE)
     if wrap:
         scene = Scene((rows, cols), rng)
         courses = 2 * max(round(rows / (2 * _COURSE)), 1)
@@ -144,7 +145,7 @@ def scales(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fals
     True
     """
     rng = generator("scales", seed)
-    scene = Scene.around(check_size(size, 2), rng, wrap=wrap, margin=40)
+    scene = Scene.around(as_size(size, minimum=MIN_SIDE), rng, wrap=wrap, margin=40)
     rows_of = 2 * max(round(scene.period[0] / 32), 1)
     across = max(round(scene.period[1] / 32), 1)
     tall, wide = scene.period[0] / rows_of, scene.period[1] / across
@@ -211,7 +212,7 @@ def net(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) 
     True
     """
     rng = generator("net", seed)
-    scene = Scene.around(check_size(size, 2), rng, wrap=wrap, margin=48)
+    scene = Scene.around(as_size(size, minimum=MIN_SIDE), rng, wrap=wrap, margin=48)
     rows_of = 2 * max(round(scene.period[0] / 40), 1)
     across = max(round(scene.period[1] / 40), 1)
     tall, wide = scene.period[0] / rows_of, scene.period[1] / across
@@ -282,7 +283,7 @@ def weave(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False
     (16, 2)
     """
     rng = generator("weave", seed)
-    scene = Scene.around(check_size(size, 2), rng, wrap=wrap, margin=32)
+    scene = Scene.around(as_size(size, minimum=MIN_SIDE), rng, wrap=wrap, margin=32)
     counts = [2 * max(round(n / 32), 1) for n in scene.period]
     pitch = [n / c for n, c in zip(scene.period, counts, strict=True)]
     scene.anchors = [((i + 0.5) * pitch[0], (j + 0.5) * pitch[1]) for i in range(counts[0]) for j in range(counts[1])]
@@ -337,28 +338,20 @@ def _strand(scene: Scene, knot: Floats, span: Floats, tone: Floats, fray: Floats
 
 
 def _label_cells(scene: Scene, cells: Sequence[tuple[float, float]]) -> None:
-    """Return the holes in the net (label -1) the numbers of the cells' middles in them."""
+    """Label each hole in the net (label -1) with the number of the cell whose middle lies in it."""
     from scipy import ndimage
 
     parts = np.zeros(scene.shape, np.int32)
     count = int(ndimage.label(scene.label == 0, output=parts))
     # Join the parts that meet across the border of the torus.
-    parent = list(range(count + 1))
+    into = np.arange(count + 1)
     for a, b in ((parts[0], parts[-1]), (parts[:, 0], parts[:, -1])):
         for i, j in zip(a.tolist(), b.tolist(), strict=True):
             if i and j:
-                roots = sorted((_root(parent, i), _root(parent, j)))
-                parent[roots[1]] = roots[0]
-    whole = np.array([_root(parent, i) for i in range(count + 1)])[parts]
+                into[into == into[j]] = into[i]
+    whole = into[parts]
     number = np.zeros(count + 1, np.int32)
     for cell in cells:
         row, col = (round(2 * c) % n for c, n in zip(cell, scene.shape, strict=True))
         number[whole[row, col]] = scene.add(cell)
     scene.label = number[whole]
-
-
-def _root(parent: Sequence[int], i: int) -> int:
-    """Return the first part of those joined with `i`."""
-    while parent[i] != i:
-        i = parent[i]
-    return i

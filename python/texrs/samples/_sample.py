@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from numbers import Integral
 from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs.errors import InvalidInput
+from texrs._arrays import as_seed
 
 LayoutName: TypeAlias = Literal["disjoint", "connected", "jointed"]
 """How elements hang together: apart on a ground, in one net, or parted by joints."""
@@ -70,21 +68,6 @@ class Sample:
         return f"Sample({self.name!r}, {shape}, known: {', '.join(known) or 'nothing'})"
 
 
-def check_size(size: object, axes: Literal[2, 3]) -> tuple[int, ...]:
-    """Return `size` as a tuple of `axes` ints of at least `MIN_SIDE`, or raise ValueError."""
-    words = "(rows, cols)" if axes == 2 else "(planes, rows, cols)"
-    given = tuple(size) if isinstance(size, Sequence | np.ndarray) else None
-    integers = given is not None and all(isinstance(n, Integral) and not isinstance(n, bool) for n in given)
-    if given is None or not integers or len(given) != axes:
-        raise InvalidInput(f"size must be {axes} ints {words}, got {size!r}")
-    if min(given) < MIN_SIDE:
-        raise InvalidInput(f"size must be at least {MIN_SIDE} along every axis {words}, got {size!r}")
-    return tuple(int(n) for n in given)
-
-
 def generator(name: str, seed: object) -> np.random.Generator:
     """Return the generator of sample `name`: a seed gives unrelated numbers to each sample."""
-    if isinstance(seed, bool) or not isinstance(seed, Integral) or seed < 0:
-        raise InvalidInput(f"seed must be an int of at least 0, got {seed!r}")
-    words = [int(seed), *name.encode()]
-    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(words)))
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence([as_seed(seed), *name.encode()])))

@@ -8,8 +8,9 @@ from math import cos, pi, sin
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import as_size
 from texrs.samples._noise import Floats, mix, palette, ramp, scatter, shades, softest, spread
-from texrs.samples._sample import Sample, check_size, generator
+from texrs.samples._sample import MIN_SIDE, Sample, generator
 from texrs.samples._scene import Scene, Window
 
 
@@ -46,7 +47,7 @@ def pebbles(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fal
     ((64, 96, 3), True)
     """
     rng = generator("pebbles", seed)
-    scene = Scene.around(check_size(size, 2), rng, wrap=wrap, margin=36)
+    scene = Scene.around(as_size(size, minimum=MIN_SIDE), rng, wrap=wrap, margin=36)
     _sand(scene)
     points = spread(scene.period, rng, 26.0, 5)
     weight = rng.uniform(-70, 70, len(points))
@@ -124,7 +125,7 @@ def dots(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
     'disjoint'
     """
     rng = generator("dots", seed)
-    scene = Scene.around(check_size(size, 2), rng, wrap=wrap, margin=24)
+    scene = Scene.around(as_size(size, minimum=MIN_SIDE), rng, wrap=wrap, margin=24)
     fibre = scene.noise(12, 1, stretch=(1, 5)) + scene.noise(12, 1, stretch=(5, 1))
     scene.height += np.float32(0.07) * fibre + np.float32(0.05) * scene.noise(4, 1, gain=0.9)
     scene.albedo[:] = (
@@ -190,7 +191,7 @@ def leaves_and_flowers(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap:
     True
     """
     rng = generator("leaves_and_flowers", seed)
-    scene = Scene.around(check_size(size, 2), rng, wrap=wrap, margin=36)
+    scene = Scene.around(as_size(size, minimum=MIN_SIDE), rng, wrap=wrap, margin=36)
     scene.albedo[:] = palette("1d2415")[0]
     mottle, crinkle = scene.noise(12, 2, gain=0.5), scene.noise(12, 4)
     greens = palette(
@@ -242,7 +243,7 @@ def beans(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False
     2
     """
     rng = generator("beans", seed)
-    scene = Scene.around(check_size(size, 2), rng, wrap=wrap, margin=30)
+    scene = Scene.around(as_size(size, minimum=MIN_SIDE), rng, wrap=wrap, margin=30)
     scene.albedo[:] = palette("2a1c15")[0]
     scene.height += np.float32(0.3) * scene.noise(6) - 6
     skin, tone = scene.noise(20, 2, gain=0.6), palette("7a2f25")[0]

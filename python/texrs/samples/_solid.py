@@ -8,8 +8,9 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import as_size
 from texrs.samples._noise import Floats, clouds, encode, mix, palette, ramp, shades
-from texrs.samples._sample import Sample, check_size, generator
+from texrs.samples._sample import MIN_SIDE, Sample, generator
 
 _CUBE = (64, 64, 64)
 _STRIPE = 9.0
@@ -46,7 +47,7 @@ def stripes(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     (32, 32, 40, 3, 3)
     """
     rng = generator("stripes", seed)
-    shape = check_size(size, 3)
+    shape = as_size(size, axes=3, minimum=MIN_SIDE)
     p = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), -1).astype(np.float32)
     source, frames = p.copy(), np.zeros((*shape, 3, 3), np.float32)
     frames[:] = np.eye(3)
@@ -99,7 +100,7 @@ def particles(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     (3, 'disjoint')
     """
     rng = generator("particles", seed)
-    shape = check_size(size, 3)
+    shape = as_size(size, axes=3, minimum=MIN_SIDE)
     box = np.array(shape, np.float64)
     grain, cloud = clouds(shape, rng, coarse=4, gain=1.0), clouds(shape, rng, coarse=24, gain=0.6)
     albedo = palette("8c8a85")[0] * (1 + np.float32(0.13) * grain + np.float32(0.10) * cloud)[..., None]
@@ -158,7 +159,7 @@ def weave_solid(size: Sequence[int] = _CUBE, *, seed: int = 0, wrap: bool = Fals
     (32, 32, 32, 3)
     """
     rng = generator("weave_solid", seed)
-    shape = check_size(size, 3)
+    shape = as_size(size, axes=3, minimum=MIN_SIDE)
     period = shape if wrap else tuple(32 * -(-n // 32) for n in shape)
     counts = [2 * max(round(n / 32), 1) for n in period]
     z, y, x = (
@@ -221,7 +222,7 @@ def wood_solid(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     dtype('bool')
     """
     rng = generator("wood_solid", seed)
-    shape = check_size(size, 3)
+    shape = as_size(size, axes=3, minimum=MIN_SIDE)
     z, y, x = (a.astype(np.float32) for a in np.ogrid[tuple(slice(0, n) for n in shape)])
     wander = clouds(shape, rng, coarse=60, fine=10, stretch=(1, 3, 1))
     lean = rng.uniform(-0.06, 0.06, 2).astype(np.float32)

@@ -7,8 +7,9 @@ from math import cos, pi, sin
 
 import numpy as np
 
+from texrs._arrays import as_size
 from texrs.samples._noise import fold, mix, palette, ramp, shades, softest, spread
-from texrs.samples._sample import Sample, check_size, generator
+from texrs.samples._sample import MIN_SIDE, Sample, generator
 from texrs.samples._scene import Scene
 
 
@@ -43,17 +44,11 @@ def bark(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
     from scipy.spatial import cKDTree
 
     rng = generator("bark", seed)
-    scene = Scene.around(check_size(size, 2), rng, wrap=wrap, margin=24)
+    scene = Scene.around(as_size(size, minimum=MIN_SIDE), rng, wrap=wrap, margin=24)
     long = 2.9
     points = spread((scene.period[0], scene.period[1] * 3), rng, 42.0, 2) / np.array([1.0, 3.0])
     wander = [8.0 * scene.noise(70, 14, stretch=(1.6, 1)), 3.4 * scene.noise(60, 4, stretch=(2, 1))]
-    where = np.stack(
-        [
-            (scene.y + wander[0]) / long,
-            scene.x + wander[1],
-        ],
-        -1,
-    )
+    where = np.stack([(scene.y + wander[0]) / long, scene.x + wander[1]], -1)
     box = np.array([scene.period[0] / long, scene.period[1]])
     tree = cKDTree(fold(points / np.array([long, 1.0]), box), boxsize=box)
     found = tree.query(fold(where.astype(np.float64), box), k=2)
@@ -103,7 +98,7 @@ def grit(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
     True
     """
     rng = generator("grit", seed)
-    scene = Scene.around(check_size(size, 2), rng, wrap=wrap, margin=16)
+    scene = Scene.around(as_size(size, minimum=MIN_SIDE), rng, wrap=wrap, margin=16)
     scene.albedo[:] = palette("3a342d")[0]
     speckle, rough = scene.noise(3, gain=0.9), scene.noise(6, 1, gain=0.7)
     tones = palette("8d857a", "6f6a64", "a79a88", "5b5650", "94816a", "b8afa2", "7d7166")
