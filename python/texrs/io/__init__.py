@@ -40,6 +40,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from itertools import chain
 from math import prod
+from pathlib import Path
 
 import numpy as np
 
@@ -103,13 +104,7 @@ def read(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
         planes, orientation = _tiff.read_tiff(name, limit)
         return _tiff.image_of(name, planes, orientation)
     if kind in ("npy", "npz"):
-        array = _npy.read_npy(name, limit) if kind == "npy" else _npy.read_npz(name, limit)
-        if array.ndim not in (2, 3):
-            hint = "; texrs.io.read_volume reads volumes" if array.ndim == 4 else ""
-            raise FileError(f"{name}: holds an array of shape {array.shape}; an image is (H, W) or (H, W, C){hint}")
-        channels = array.shape[2] if array.ndim == 3 else 1
-        _files.check_size(name, array.shape[:2], channels, array.itemsize, limit)
-        return array
+        return _read_numpy(name, kind, limit, 2)
     if kind in VOLUMES:
         raise FileError(f"{name}: is a {kind} file, which holds a volume; texrs.io.read_volume reads it")
     file = _files.load(name, limit)
@@ -170,12 +165,7 @@ def read_volume(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
         raise FileError(
             f"{name}: is a {kind} file, which holds one image; volumes are read from TIFF, .npy, .npz, NRRD and NIfTI"
         )
-    array = _npy.read_npy(name, limit) if kind == "npy" else _npy.read_npz(name, limit)
-    if array.ndim not in (3, 4):
-        raise FileError(f"{name}: holds an array of shape {array.shape}, a volume is (D, H, W) or (D, H, W, C)")
-    channels = array.shape[3] if array.ndim == 4 else 1
-    _files.check_size(name, array.shape[:3], channels, array.itemsize, limit)
-    return array
+    return _read_numpy(name, kind, limit, 3)
 
 
 def write(path: PathLike, array: Array, *, overwrite: bool = True) -> None:
@@ -343,6 +333,17 @@ def write_surface(path: PathLike, vertices: Array, faces: Array, *, overwrite: b
         raise InvalidInput(f"faces: name corners from 0 to {len(corners) - 1}")
     with atomic(target, overwrite=overwrite) as temporary, _files.translate_errors(target, "writing"):
         _volumes.write_stl(temporary, corners.astype(np.float32), triangles.astype(np.int64))
+
+
+def _read_numpy(name: Path, kind: str, limit: int, axes: int) -> Array:
+    array = _npy.read_npy(name, limit) if kind == "npy" else _npy.read_npz(name, limit)
+    if array.ndim not in (axes, axes + 1):
+        what = ("an image is (H, W) or (H, W, C)", "a volume is (D, H, W) or (D, H, W, C)")[axes - 2]
+        hint = "; texrs.io.read_volume reads volumes" if axes == 2 and array.ndim == 4 else ""
+        raise FileError(f"{name}: holds an array of shape {array.shape}; {what}{hint}")
+    channels = array.shape[axes] if array.ndim > axes else 1
+    _files.check_size(name, array.shape[:axes], channels, array.itemsize, limit)
+    return array
 
 
 def _write(path: PathLike, value: Array, axes: int, overwrite: bool, spacing: Sequence[float] | None) -> None:

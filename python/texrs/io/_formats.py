@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from texrs._arrays import as_float
+from texrs._arrays import as_float, as_tuple
 from texrs._typing import Array
 from texrs.errors import FileError, InvalidInput
 from texrs.io import _files, _npy, _volumes
@@ -94,18 +94,12 @@ def kind_of(path: Path) -> str:
     )
 
 
-def _common_first() -> list[str]:
-    return sorted(FORMATS, key=lambda suffix: (not FORMATS[suffix].images, suffix))
-
-
 def spacing_of(spacing: Sequence[float] | None, suffix: str) -> tuple[float, ...]:
     if spacing is None:
         return UNIT
     if FORMATS[suffix].images:
         raise InvalidInput(f"spacing: {suffix} cannot keep it; .nrrd, .nii, .nii.gz and .vti can")
-    steps = tuple(spacing) if isinstance(spacing, Sequence | np.ndarray) else ()
-    if len(steps) != 3:
-        raise InvalidInput(f"spacing: needs three numbers, of planes, rows and columns; got {spacing!r}")
+    steps = as_tuple(spacing, "spacing", 3, "three numbers, of planes, rows and columns")
     return tuple(as_float(s, "spacing", 1e-12, 1e12) for s in steps)
 
 
@@ -124,7 +118,8 @@ def check(value: object, suffix: str, axes: int) -> Array:
     form, volume = FORMATS[suffix], axes == 3
     channels = array.shape[axes] if array.ndim > axes else 1
     if not form.holds(array.dtype, channels, volume):
-        able = [s for s in _common_first() if FORMATS[s].holds(array.dtype, channels, volume)]
+        common = sorted(FORMATS, key=lambda suffix: (not FORMATS[suffix].images, suffix))
+        able = [s for s in common if FORMATS[s].holds(array.dtype, channels, volume)]
         what = f"{'volumes of ' * volume}{array.dtype} with {channels} channel{'s'[: channels != 1]}"
         can = f"{', '.join(able)} can" if able else f"no format can, of more than {_MOST_CHANNELS}"
         raise InvalidInput(f"array: {suffix} cannot hold {what}; {can}")

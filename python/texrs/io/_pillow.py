@@ -9,7 +9,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -26,20 +25,15 @@ QUALITY = 95
 
 def read_jpeg(path: Path, file: bytes, limit: int) -> Array:
     """Decode a JPEG file and turn it upright."""
-    header = _jpeg(path, file)
-    if header.channels not in (1, 3):
-        raise FileError(
-            f"{path}: is a JPEG with {header.channels} channels (CMYK); grey and RGB are read, convert it first"
-        )
-    return turn_upright(
-        _decode(path, header.stripped, ".jpg", header.sides, header.channels, limit),
-        header.orientation,
-    )
+    sides, channels, orientation, stripped = _strip_jpeg(path, file)
+    if channels not in (1, 3):
+        raise FileError(f"{path}: is a JPEG with {channels} channels (CMYK); grey and RGB are read, convert it first")
+    return turn_upright(_decode(path, stripped, ".jpg", sides, channels, limit), orientation)
 
 
 def read_gif(path: Path, file: bytes, limit: int) -> Array:
     """Decode the first frame of a GIF file to RGB, or RGBA where a pixel is transparent."""
-    array = _decode(path, file, ".gif", _gif(path, file), 4, limit, mode="RGBA")
+    array = _decode(path, file, ".gif", _read_gif_size(path, file), 4, limit, mode="RGBA")
     return array if (array[..., 3] != 255).any() else np.ascontiguousarray(array[..., :3])
 
 
@@ -101,54 +95,40 @@ def _silence(path: Path, pixels: int) -> Iterator[None]:
         yield
 
 
-@dataclass(slots=True)
-class _Jpeg:
-    sides: tuple[int, int] = (0, 0)
-    channels: int = 0
-    orientation: int = 1
-    parts: list[bytes] = field(default_factory=list)
+def _strip_jpeg(path: Path, file: bytes) -> tuple[tuple[int, int], int, int, bytes]:
+    """Return sides, channels, orientation, and the file without what does not say how its pixels are coded.
 
-    @property
-    def stripped(self) -> bytes:
-        return b"".join(self.parts)
-
-
-def _jpeg(path: Path, file: bytes) -> _Jpeg:
-    """Walk the segments before the first scan (ITU-T T.81, annex B)."""
-    header = _Jpeg(parts=[file[:2]])
-    at = 2
+    Only the segments before the first scan are walked through (ITU-T T.81, annex B).
+    """
+    sides, channels, orientation = (0, 0), 0, 1
+    parts, at = [file[:2]], 2
     while at + 4 <= len(file) and file[at] == 0xFF:
         marker = file[at + 1]
         if marker == 0xFF:  # Fill byte.
             at += 1
             continue
         if marker == 0xDA:  # Start of scan: the rest is pixels.
-            if header.channels == 0:
+            if channels == 0:
                 break
-            header.parts.append(file[at:])
-            return header
+            return sides, channels, orientation, b"".join([*parts, file[at:]])
         length = int.from_bytes(file[at + 2 : at + 4], "big")
         segment = file[at : at + 2 + length]
         if length < 2 or len(segment) < 2 + length:
             break
         if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):  # Start of frame.
-            if header.channels or len(segment) < 10:
+            if channels or len(segment) < 10:
                 break
-            header.sides = (
-                int.from_bytes(segment[5:7], "big"),
-                int.from_bytes(segment[7:9], "big"),
-            )
-            header.channels = segment[9]
+            sides, channels = (int.from_bytes(segment[5:7], "big"), int.from_bytes(segment[7:9], "big")), segment[9]
         if marker == 0xE1 and segment[4:10] == b"Exif\0\0":
-            header.orientation = _rust.exif_orientation(segment[10:])
+            orientation = _rust.exif_orientation(segment[10:])
         # Of the application's segments, only JFIF and Adobe say how pixels are coded.
         if marker == 0xEE or not (0xE1 <= marker <= 0xEF or marker == 0xFE):
-            header.parts.append(segment)
+            parts.append(segment)
         at += 2 + length
     raise FileError(f"{path}: is cut off or corrupt; its JPEG header does not reach the pixels")
 
 
-def _gif(path: Path, file: bytes) -> tuple[int, int]:
+def _read_gif_size(path: Path, file: bytes) -> tuple[int, int]:
     """Return the sides of the screen, or of the first frame where that reaches beyond it."""
     cut = FileError(f"{path}: is cut off or corrupt; its GIF header does not reach the pixels")
     if len(file) < 13:

@@ -33,11 +33,7 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
 
     length = size_of(path)
     # OME files can name other files to read; this one is all that was asked for.
-    with (
-        translate_errors(path, "decoding"),
-        _mute(),
-        tifffile.TiffFile(path, is_ome=False) as tif,
-    ):
+    with translate_errors(path, "decoding"), _mute(), tifffile.TiffFile(path, is_ome=False) as tif:
         if not tif.series or not tif.pages:
             raise FileError(f"{path}: holds no image")
         series, first = tif.series[0], tif.pages.first
@@ -61,8 +57,9 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
         array = series.asarray(maxworkers=1)
         if array.shape != series.shape:
             raise FileError(f"{path}: is cut off or corrupt; not all of its pixels are there")
-        array = _arrange(array, series.axes, sides, channels)
-        return _colours(path, array, first), orientation
+        order = [a for a in series.axes if a not in "YXSC"] + [a for a in "YXCS" if a in series.axes]
+        array = array.transpose([series.axes.index(a) for a in order]).reshape(*sides, channels)
+        return _colours(path, np.ascontiguousarray(array), first), orientation
 
 
 def image_of(path: Path, planes: Array, orientation: int) -> Array:
@@ -84,10 +81,7 @@ def write_tiff(path: Path, planes: Iterable[Array], channels: int, size: int) ->
     import tifffile
 
     extra = {2: ["unassalpha"], 4: ["unassalpha"]}.get(channels, ["unspecified"] * (channels - 1))
-    options: dict[str, Any] = {
-        "photometric": "rgb" if channels in (3, 4) else "minisblack",
-        "metadata": None,
-    }
+    options: dict[str, Any] = {"photometric": "rgb" if channels in (3, 4) else "minisblack", "metadata": None}
     if channels not in (1, 3):
         options["extrasamples"] = extra
     if channels > 1:
@@ -106,12 +100,6 @@ def _sides(path: Path, axes: str, shape: tuple[int, ...]) -> tuple[tuple[int, in
     channels = size.get("S", 1) * size.get("C", 1)
     planes = prod(n for axis, n in size.items() if axis not in "YXSC")
     return (planes, size["Y"], size["X"]), channels
-
-
-def _arrange(array: Array, axes: str, sides: tuple[int, int, int], channels: int) -> Array:
-    order = [a for a in axes if a not in "YXSC"] + [a for a in "YXCS" if a in axes]
-    array = array.transpose([axes.index(a) for a in order])
-    return np.ascontiguousarray(array.reshape(*sides, channels))
 
 
 def _check_tags(path: Path, tif: Any, page: Any) -> None:
