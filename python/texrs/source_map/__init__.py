@@ -17,7 +17,7 @@ from texrs._arrays import as_image, as_list
 from texrs._typing import Array, Bools, Frames, Interpolation, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.kernels.gather import gather
-from texrs.source_map._pixels import Pixels, bands, number_pairs
+from texrs.source_map._pixels import Pixels, bands, label_pieces, number_pairs
 
 __all__ = ["Reuse", "SourceMap"]
 
@@ -433,22 +433,11 @@ class SourceMap:
         Reuse(verbatim=1.0, largest=1.0, regions=1)
 
         """
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
-
-        count = self.label.size
-        index = np.arange(count).reshape(self.shape)
-        starts, ends = [], []
-        for axis in range(self.axes):
-            joined = self.continues(axis)
-            starts.append(index[joined])
-            ends.append(np.roll(index, -1, axis)[joined])
-        start, end = np.concatenate(starts), np.concatenate(ends)
-        graph = coo_array((np.ones(len(start), np.uint8), (start, end)), shape=(count, count))
-        regions, region = connected_components(graph, directed=False)
+        joined = [np.delete(self.continues(axis), -1, axis) for axis in range(self.axes)]
+        regions, region = label_pieces(joined, self.shape)
         largest = int(np.bincount(region).max())
         whole = (self.coordinates == np.rint(self.coordinates)).all(axis=-1)
-        return Reuse(float(whole.mean()), largest / max(int(np.prod(s)) for s in self.shapes), int(regions))
+        return Reuse(float(whole.mean()), largest / max(int(np.prod(s)) for s in self.shapes), regions)
 
     def save(self, path: Path) -> None:
         """Write the map to an ``.npz`` file, whole or not at all.

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from texrs._typing import Bools
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,6 +69,36 @@ def bands(shape: tuple[int, ...]) -> Iterator[slice]:
     step = max(1, BAND // max(1, math.prod(shape[1:])))
     for start in range(0, shape[0], step):
         yield slice(start, start + step)
+
+
+def label_pieces(joined: Sequence[Bools], shape: tuple[int, ...]) -> tuple[int, NDArray[np.int32]]:
+    """Return how many pieces a picture falls into, and the piece of each pixel.
+
+    Parameters
+    ----------
+    joined : sequence of bool array
+        For each axis, whether a pixel and the next one are of one piece: one shorter than the picture along that axis.
+    shape : tuple of int
+        Sides of the picture.
+
+    Returns
+    -------
+    int
+        Number of pieces.
+    int32 array, (pixels,)
+        The piece of each pixel.
+
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    count = math.prod(shape)
+    index = np.arange(count, dtype=np.int32 if count < 2**31 else np.int64).reshape(shape)
+    start = np.concatenate([np.delete(index, -1, axis)[there] for axis, there in enumerate(joined)])
+    end = np.concatenate([np.delete(index, 0, axis)[there] for axis, there in enumerate(joined)])
+    graph = coo_array((np.ones(len(start), np.uint8), (start, end)), shape=(count, count))
+    pieces, piece = connected_components(graph, directed=False)
+    return int(pieces), piece
 
 
 def number_pairs(

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from texrs._arrays import as_array, as_image, check_finite, guidance, try_array
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
+from texrs.fields import Field
 
 
 def drop_last(array: Array, axis: int, step: int) -> Array:
@@ -20,6 +21,23 @@ def drop_last(array: Array, axis: int, step: int) -> Array:
 def drop_first(array: Array, axis: int, step: int) -> Array:
     """Return all but the first lines along an axis."""
     return array[(slice(None),) * axis + (slice(step, None),)]
+
+
+def correlate(values: Array, reach: int, product: np.ufunc) -> NDArray[np.float64]:
+    """Return the mean product of values and those some steps further along each axis, (A, reach + 1); NaN beyond the ends."""
+    out = np.full((values.ndim, reach + 1), np.nan)
+    for axis in range(values.ndim):
+        for step in range(min(reach + 1, values.shape[axis])):
+            both = product(drop_last(values, axis, step), drop_first(values, axis, step))
+            out[axis, step] = both.mean(dtype=np.float64)
+    return out
+
+
+def check_field(field: object, axes: int) -> None:
+    """Check that a field, if there is one, has so many axes."""
+    if field is not None and (not isinstance(field, Field) or field.axes != axes):
+        got = field if isinstance(field, Field) else type(field).__name__
+        raise InvalidInput(f"field: needs a field of {axes} axes, got {got}")
 
 
 def axes_of(image: Array) -> int:

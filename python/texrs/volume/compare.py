@@ -13,7 +13,7 @@ from texrs.errors import InvalidInput
 from texrs.fields import Field
 from texrs.source_map import SourceMap
 from texrs.volume import statistics, structure
-from texrs.volume._values import axes_of
+from texrs.volume._values import axes_of, check_field
 from texrs.volume.reuse import CellReuse, cell_reuse
 
 __all__ = ["Comparison", "compare"]
@@ -197,8 +197,7 @@ def compare(
     window = min(64, *first.shape[:count], *second.shape[:count])
     orientation, turned = None, None
     if field is not None:
-        if not isinstance(field, Field) or field.axes != count:
-            raise InvalidInput(f"field: needs a field of {count} axes, got {type(field).__name__}")
+        check_field(field, count)
         field = field.over(second.shape[:count])
         normal = structure.texture_normal(grey[0])
         errors = (

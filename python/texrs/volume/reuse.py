@@ -12,6 +12,8 @@ from texrs._typing import Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.fields import Field
 from texrs.source_map import SourceMap
+from texrs.source_map._pixels import label_pieces
+from texrs.volume._values import check_field
 
 __all__ = ["CellReuse", "cell_reuse", "coherence"]
 
@@ -115,26 +117,14 @@ def cell_reuse(source: SourceMap, field: Field | None = None, *, cell: int = 8) 
     CellReuse(coherent=1.0, largest=1.0, most_used=1.0, unused=0.0)
 
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     field = _check(source, field)
     side = as_int(cell, "cell", 1, 2**20)
-    count = source.label.size
-    index = np.arange(count, dtype=np.int32 if count < 2**31 else np.int64).reshape(source.shape)
-    starts, ends, pairs = [], [], 0
-    for axis in range(source.axes):
-        joined = coherence(source, axis, field)
-        pairs += joined.size
-        starts.append(np.delete(index, -1, axis)[joined])
-        ends.append(np.delete(index, 0, axis)[joined])
-    start, end = np.concatenate(starts), np.concatenate(ends)
-    graph = coo_array((np.ones(len(start), np.uint8), (start, end)), shape=(count, count))
-    _, patch = connected_components(graph, directed=False)
+    joined = [coherence(source, axis, field) for axis in range(source.axes)]
+    patch = label_pieces(joined, source.shape)[1]
     use = np.concatenate([_cell_use(source, number, side) for number in range(len(source.shapes))])
     return CellReuse(
-        len(start) / max(pairs, 1),
-        float(np.bincount(patch).max()) / count,
+        sum(map(np.count_nonzero, joined)) / max(sum(j.size for j in joined), 1),
+        float(np.bincount(patch).max()) / source.label.size,
         float(use.max() / max(float(use.mean()), 1e-30)),
         float((use == 0).mean()),
     )
@@ -174,8 +164,6 @@ def _check(source: SourceMap, field: Field | None) -> Field | None:
     """Return the field that J is taken from: the one that is given, or the map's own, where that is a field."""
     if not isinstance(source, SourceMap):
         raise InvalidInput(f"source: needs a source map, got {type(source).__name__}")
-    if field is not None and (not isinstance(field, Field) or field.axes != source.axes):
-        got = field if isinstance(field, Field) else type(field).__name__
-        raise InvalidInput(f"field: needs a field of {source.axes} axes, got {got}")
+    check_field(field, source.axes)
     frame: Any = source.frame
     return frame if field is None and isinstance(frame, Field) else field

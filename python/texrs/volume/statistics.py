@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from texrs._arrays import as_int
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
-from texrs.volume._values import as_region, colours_of, drop_first, drop_last
+from texrs.volume._values import as_region, colours_of, correlate, drop_first, drop_last
 
 __all__ = ["Classes", "Particles", "classes", "lightness", "lineal_path", "particles", "two_point"]
 
@@ -245,12 +245,7 @@ def two_point(mask: ArrayLike, reach: int = 16) -> NDArray[np.float64]:
     array([0.5 , 0.26, 0.  , 0.24, 0.5 ])
 
     """
-    phase, far = as_region(mask), as_int(reach, "reach", 1, 2**20)
-    out = np.full((phase.ndim, far + 1), np.nan)
-    for axis in range(phase.ndim):
-        for step in range(min(far + 1, phase.shape[axis])):
-            out[axis, step] = (drop_last(phase, axis, step) & drop_first(phase, axis, step)).mean()
-    return out
+    return correlate(as_region(mask), as_int(reach, "reach", 1, 2**20), np.logical_and)
 
 
 def lineal_path(mask: ArrayLike, reach: int = 16) -> NDArray[np.float64]:

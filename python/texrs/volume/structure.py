@@ -15,7 +15,7 @@ from texrs._arrays import as_float, as_int, as_wrap
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.fields import Field
-from texrs.volume._values import as_values, drop_first, drop_last
+from texrs.volume._values import as_values, check_field, correlate, drop_first, drop_last
 
 __all__ = [
     "autocorrelation",
@@ -63,11 +63,7 @@ def autocorrelation(values: ArrayLike, reach: int = 12) -> NDArray[np.float64]:
     v, far = as_values(values), as_int(reach, "reach", 1, 2**20)
     v = v - v.mean(dtype=np.float64)
     variance = max(float((v * v).mean(dtype=np.float64)), 1e-30)
-    out = np.full((v.ndim, far + 1), np.nan)
-    for axis in range(v.ndim):
-        for step in range(min(far + 1, v.shape[axis])):
-            out[axis, step] = (drop_last(v, axis, step) * drop_first(v, axis, step)).mean(dtype=np.float64) / variance
-    return out
+    return correlate(v, far, np.multiply) / variance
 
 
 def frequency(values: ArrayLike, *, window: int | None = None, whole: bool = False) -> float:
@@ -317,10 +313,7 @@ def orientation_errors(
     each = as_int(step, "step", 1, 2**20)
     if min(v.shape) <= 2 * edge:
         raise InvalidInput(f"margin: {edge} on both sides leaves nothing of {v.shape}")
-    if field is not None and (not isinstance(field, Field) or field.axes != v.ndim):
-        raise InvalidInput(
-            f"field: needs a field of {v.ndim} axes, got {field if isinstance(field, Field) else type(field).__name__}"
-        )
+    check_field(field, v.ndim)
     n = texture_normal(v) if normal is None else np.asarray(normal, np.float64)
     if n.shape != (v.ndim,) or not 1e-12 < float(np.abs(n).max()) < 1e12:
         raise InvalidInput(f"normal: needs {v.ndim} numbers, not all zero, got shape {n.shape}")
