@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from texrs._arrays import as_float, as_size, try_array
+from texrs._cache import content_hash
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.fields._matrices import Matrices, find_flat, inverses, transpose_each
@@ -88,13 +88,7 @@ class Field(ABC):
     def key(self) -> bytes | None:
         """A digest of all that the field depends on, for caches; None of a field that calls a function."""
         content = self._content()
-        if content is None:
-            return None
-        digest = hashlib.blake2b(digest_size=16, person=b"texrs.fields")
-        for part in (type(self).__name__, self.axes, *content):
-            data = np.ascontiguousarray(part).tobytes() if isinstance(part, np.ndarray) else repr(part).encode()
-            digest.update(len(data).to_bytes(8, "little") + data)
-        return digest.digest()
+        return None if content is None else content_hash(type(self).__name__, self.axes, *content)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Field):
@@ -307,6 +301,13 @@ def as_points(points: ArrayLike, axes: int, name: str = "points") -> NDArray[np.
     if not np.isfinite(at).all():
         raise InvalidInput(f"{name}: {int((~np.isfinite(at)).sum())} of {at.size} values are NaN or infinite")
     return at
+
+
+def check_axes(axes: object) -> int:
+    """Check a number of axes, 2 or 3."""
+    if axes not in (2, 3) or isinstance(axes, bool):
+        raise InvalidInput(f"axes: needs 2 or 3, got {axes!r}")
+    return int(axes)
 
 
 def as_place(place: ArrayLike | None, axes: int, name: str) -> NDArray[np.float64]:

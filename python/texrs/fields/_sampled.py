@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from texrs._arrays import as_size, try_array
 from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput
-from texrs.fields._field import Field, as_place, as_points, refuse_flat
+from texrs.fields._field import Field, as_place, as_points, check_axes, refuse_flat
 from texrs.fields._matrices import Matrices, determinants, exponentials, multiply, rotations, transpose_each
 
 MAX_FRAMES = 2**24
@@ -175,9 +175,7 @@ def from_function(function: Callable[[NDArray[np.float64]], ArrayLike], axes: in
     """
     if not callable(function):
         raise InvalidInput(f"function: needs a function of points, got {type(function).__name__}")
-    if axes not in (2, 3) or isinstance(axes, bool):
-        raise InvalidInput(f"axes: needs 2 or 3, got {axes!r}")
-    return _Function(axes, function)
+    return _Function(check_axes(axes), function)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

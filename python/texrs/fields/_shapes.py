@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from texrs._arrays import as_float, try_array
 from texrs.errors import InvalidInput
-from texrs.fields._field import FAR, Field, as_place, refuse_flat
+from texrs.fields._field import FAR, Field, as_place, check_axes, refuse_flat
 from texrs.fields._kinds import LETTERS, Constant, Ramp, Wound, Zigzag, turn
 
 _WORDS = {"plane": "z", "row": "y", "column": "x"}
@@ -42,7 +42,7 @@ def identity(axes: int = 3) -> Field:
            [0., 1.]], dtype=float32)
 
     """
-    return Constant(_axes(axes), np.eye(axes), "identity")
+    return Constant(check_axes(axes), np.eye(axes), "identity")
 
 
 def constant(matrix: ArrayLike) -> Field:
@@ -107,7 +107,7 @@ def slant(angle: float = 30, plane: str = "xy", *, axes: int = 3) -> Field:
 
     """
     degrees = _angle(angle)
-    first, second = _pair(plane, _axes(axes), "plane")
+    first, second = _pair(plane, check_axes(axes), "plane")
     return Constant(axes, turn(degrees, first, second, axes), f"slant of {degrees:g} degrees in the plane {plane}")
 
 
@@ -174,7 +174,7 @@ def shear(amount: float = 0.5, plane: str = "xy", *, axes: int = 3) -> Field:
            [0.5, 1. ]], dtype=float32)
 
     """
-    first, second = _pair(plane, _axes(axes), "plane")
+    first, second = _pair(plane, check_axes(axes), "plane")
     matrix = np.eye(axes)
     matrix[first, second] = as_float(amount, "amount", -9, 9)
     return Constant(axes, matrix, f"shear of {float(amount):g} in the plane {plane}")
@@ -307,7 +307,7 @@ def zigzag(
     array([ 0.5,  0.5, -0.5, -0.5,  0.5], dtype=float32)
 
     """
-    first, second = _pair(plane, _axes(axes), "plane")
+    first, second = _pair(plane, check_axes(axes), "plane")
     across = first if axis is None else _index(axis, axes, "axis")
     return Zigzag(axes, as_float(period, "period", 2, FAR), _angle(angle), across, first, second)
 
@@ -351,13 +351,13 @@ def scale_ramp(
 
     """
     ends = tuple(as_float(v, name, 0.125, 8) for v, name in ((start, "start"), (stop, "stop")))
-    along = _index(axis, _axes(axes), "axis")
+    along = _index(axis, check_axes(axes), "axis")
     reach = None if length is None else as_float(length, "length", 1, FAR)
     return Ramp(axes, ends[0], ends[1], along, reach)
 
 
 def _wind(axis: str, radial: str | None, centre: Sequence[float] | None, axes: int, angle: float) -> Field:
-    _axes(axes)
+    check_axes(axes)
     letter = _letter(axis, "zyx", "axis")
     if axes == 2 and letter != "z":
         raise InvalidInput(f"axis: a picture is wound round 'z' alone, got {axis!r}")
@@ -372,12 +372,6 @@ def _wind(axis: str, radial: str | None, centre: Sequence[float] | None, axes: i
     return Wound(
         axes, None if about is None else tuple(about.tolist()), letters.index(out), letters.index(along), angle
     )
-
-
-def _axes(axes: object) -> int:
-    if axes not in (2, 3) or isinstance(axes, bool):
-        raise InvalidInput(f"axes: needs 2 or 3, got {axes!r}")
-    return int(axes)
 
 
 def _angle(value: float, name: str = "angle") -> float:
