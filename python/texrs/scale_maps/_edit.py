@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -84,7 +85,7 @@ def edit(scale: object, steps: Sequence[Mapping[str, Any] | str] | str) -> Float
     logs = before
     for number, (operation, options) in enumerate(_read_all(steps), start=1):
         try:
-            changed = _OPERATIONS[operation].change(logs, **options)
+            changed = _OPERATIONS[operation](logs, **options)
         except InvalidInput as error:
             raise InvalidInput(f"steps: step {number}, {operation}: {error}") from None
         # What was beyond the limits already may stay there.
@@ -113,14 +114,14 @@ def _read(one: object, number: int) -> tuple[str, dict[str, Any]]:
     operation = options.pop("op", None)
     if not isinstance(operation, str) or operation not in _OPERATIONS:
         raise InvalidInput(f"steps: step {number} needs an 'op' among {', '.join(_OPERATIONS)}; got {one!r}")
-    needed, allowed = _OPERATIONS[operation].needed, _OPERATIONS[operation].allowed
+    _, *parameters = inspect.signature(_OPERATIONS[operation]).parameters.values()
+    allowed = [p.name for p in parameters]
     for key in options:
-        if key not in (*needed, *allowed):
-            words = ", ".join((*needed, *allowed))
-            raise InvalidInput(f"steps: step {number}, {operation}, knows no {key}; allowed are {words}")
-    for key in needed:
-        if key not in options:
-            raise InvalidInput(f"steps: step {number}, {operation}, needs {key}")
+        if key not in allowed:
+            raise InvalidInput(f"steps: step {number}, {operation}, knows no {key}; allowed are {', '.join(allowed)}")
+    for parameter in parameters:
+        if parameter.default is parameter.empty and parameter.name not in options:
+            raise InvalidInput(f"steps: step {number}, {operation}, needs {parameter.name}")
     return operation, options
 
 
@@ -201,23 +202,14 @@ def _mean(logs: Floats, inside: Floats) -> float:
     return float(np.sum(logs * inside, dtype=np.float64)) / total if total > 0 else 0.0
 
 
-class _Operation(NamedTuple):
-    """A change of log S, the options it needs and those it may have."""
-
-    change: Callable[..., Floats]
-    needed: tuple[str, ...]
-    allowed: tuple[str, ...]
-
-
-_SOFT = ("region", "feather")
-_OPERATIONS = {
-    "magnify": _Operation(_magnify, (), ("factor", *_SOFT)),
-    "minify": _Operation(_minify, (), ("factor", *_SOFT)),
-    "set": _Operation(_set, ("value",), _SOFT),
-    "vary": _Operation(_vary, ("gain",), _SOFT),
-    "ramp": _Operation(_ramp, ("start", "end", "values"), _SOFT),
-    "duplicate": _Operation(_duplicate, ("region", "to"), ("mode", "feather")),
-    "brush": _Operation(_brush, ("points", "radius", "factor"), ()),
-    "smooth": _Operation(_smooth, ("sigma",), _SOFT),
+_OPERATIONS: dict[str, Callable[..., Floats]] = {
+    "magnify": _magnify,
+    "minify": _minify,
+    "set": _set,
+    "vary": _vary,
+    "ramp": _ramp,
+    "duplicate": _duplicate,
+    "brush": _brush,
+    "smooth": _smooth,
 }
-"""By the names that edits give them."""
+"""Changes of log S by the names that edits give them; their parameters are what a step takes."""
