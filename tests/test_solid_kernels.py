@@ -149,7 +149,7 @@ def test_wrong_arrays_get_a_sentence():
     appearance, region = exemplar(2), region_of(2)
     frames, good = to_fixed(None, region), scattered(exemplar(2), region_of(2))
     for call, says in (
-        (lambda: appearance.correct(good[:-1], region, frames), "places: needs int32, 2 for each of 143 points"),
+        (lambda: appearance.correct(good[:-1], region, frames), "places: needs int32 of 286 numbers"),
         (lambda: appearance.correct(good, region, frames[:, :1]), "frames"),
         (lambda: appearance.correct(good, region, np.repeat(frames, 3, axis=0)), "frames"),
         (lambda: appearance.correct(good, region, frames, held=np.zeros(3, bool)), "places"),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from texrs import _rust
 from texrs._arrays import as_float, as_image, as_int, as_seed, as_wrap
-from texrs._engine.pyramid import Region
+from texrs._engine.pyramid import Region, flatten
 from texrs._typing import Array
 from texrs.errors import InvalidInput
 
@@ -240,7 +240,7 @@ class Appearance:
             The work was stopped.
 
         """
-        self._check(region)
+        self.check(region)
         return self._inner.blocks(
             region.place,
             frames,
@@ -252,7 +252,7 @@ class Appearance:
             as_float(repetition, "repetition", 0, 4),
             as_seed(seed),
             as_int(margin, "margin", 0, 1 << 20),
-            np.zeros(0, np.bool_) if held is None else np.ascontiguousarray(held.reshape(-1)),
+            flatten(held),
             np.zeros(0, np.int32) if given is None else given,
             demand,
             progress,
@@ -324,19 +324,15 @@ class Appearance:
             The work was stopped.
 
         """
-        self._check(region)
-        if places.dtype != np.int32 or places.shape != (region.points * len(region.shape),):
-            raise InvalidInput(
-                f"places: needs int32, {len(region.shape)} for each of {region.points} points, "
-                f"got {places.dtype} {places.shape}"
-            )
+        self.check(region)
+        region.check_places(places)
         if not overwrite:
             places = places.copy()
         passes, changed = self._inner.correct(
             places,
             region.place,
             frames,
-            np.zeros(0, np.bool_) if held is None else np.ascontiguousarray(held.reshape(-1)),
+            flatten(held),
             as_int(passes, "passes", 0, 1000),
             as_int(first, "first", 0, 1 << 20),
             exhaustive,
@@ -351,6 +347,7 @@ class Appearance:
         )
         return Corrected(places, passes, changed)
 
-    def _check(self, region: Region) -> None:
+    def check(self, region: Region) -> None:
+        """Check that a region has as many axes as the exemplar."""
         if len(region.shape) != len(self.shape):
             raise InvalidInput(f"region: the exemplar has {len(self.shape)} axes, got {region.shape}")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from texrs import _rust
 from texrs._arrays import as_float, as_int, as_seed
 from texrs._engine.appearance import Appearance
-from texrs._engine.pyramid import ONE, Region
+from texrs._engine.pyramid import ONE, Region, flatten
 from texrs.errors import InvalidInput
 
 __all__ = ["Similarity", "correct", "jitter", "similar"]
@@ -168,9 +168,8 @@ def correct(
     True
 
     """
-    _check(places, region)
-    if len(region.shape) != len(appearance.shape):
-        raise InvalidInput(f"region: the exemplar has {len(appearance.shape)} axes, got {region.shape}")
+    region.check_places(places)
+    appearance.check(region)
     return _rust.cohere(
         appearance._inner,
         np.ascontiguousarray(similarity.sets, np.uint32).reshape(-1),
@@ -178,7 +177,7 @@ def correct(
         places,
         region.place,
         frames,
-        _flat(held),
+        flatten(held),
         _kinds(kinds),
         as_int(passes, "passes", 0, 1000),
         _numbers(similarity.numbers),
@@ -229,10 +228,10 @@ def jitter(
     True
 
     """
-    _check(places, region)
+    region.check_places(places)
     most = round(as_float(reach, "reach", 0, 65536) * ONE)
     return _rust.jitter(
-        places, region.place, _flat(held), most, as_seed(seed), as_int(level, "level", 0, (1 << 32) - 1)
+        places, region.place, flatten(held), most, as_seed(seed), as_int(level, "level", 0, (1 << 32) - 1)
     )
 
 
@@ -242,10 +241,6 @@ def _numbers(numbers: int) -> int:
     return int(numbers)
 
 
-def _flat(held: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
-    return np.zeros(0, np.bool_) if held is None else np.ascontiguousarray(held.reshape(-1))
-
-
 def _kinds(
     kinds: tuple[NDArray[np.uint8], NDArray[np.uint8]] | None,
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
@@ -253,9 +248,3 @@ def _kinds(
         return np.zeros(0, np.uint8), np.zeros(0, np.uint8)
     samples, points = (np.ascontiguousarray(k, np.uint8).reshape(-1) for k in kinds)
     return samples, points
-
-
-def _check(places: NDArray[np.int32], region: Region) -> None:
-    wanted = region.points * len(region.shape)
-    if places.dtype != np.int32 or places.shape != (wanted,):
-        raise InvalidInput(f"places: needs int32 of {wanted} numbers, got {places.dtype} {places.shape}")

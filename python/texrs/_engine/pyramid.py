@@ -13,7 +13,7 @@ from texrs._arrays import as_image, as_size, as_wrap
 from texrs._typing import Array, Floats, Frames
 from texrs.errors import InvalidInput
 
-__all__ = ["ONE", "Region", "halve", "to_fixed", "upsample"]
+__all__ = ["ONE", "Region", "flatten", "halve", "to_fixed", "upsample"]
 
 ONE = 4096
 """Places are kept in fixed point: this is one sample. Every step is then exact, on any machine and in any order."""
@@ -85,6 +85,17 @@ class Region:
         if any(s < 0 or s + n > m for s, n, m in zip(starts, self.shape, outer.shape, strict=True)):
             raise InvalidInput(f"region: {self} does not lie inside {outer}")
         return tuple(slice(s, s + n) for s, n in zip(starts, self.shape, strict=True))
+
+    def check_places(self, places: NDArray[np.int32]) -> None:
+        """Check that there is a place for each point."""
+        count = self.points * len(self.shape)
+        if places.dtype != np.int32 or places.shape != (count,):
+            raise InvalidInput(f"places: needs int32 of {count} numbers, got {places.dtype} {places.shape}")
+
+
+def flatten(mask: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
+    """Return a mask of points as the compiled code takes it: in one row, and empty where it is none."""
+    return np.zeros(0, np.bool_) if mask is None else np.ascontiguousarray(mask.reshape(-1))
 
 
 def to_fixed(field: Frames | None, region: Region, step: int = 1) -> NDArray[np.int16]:
@@ -221,7 +232,6 @@ def upsample(
             [11, 15]]], dtype=int32)
 
     """
-    axes = len(as_size(region.shape, "region", axes=len(region.shape)))
-    if places.dtype != np.int32 or places.shape != (parents.points * axes,):
-        raise InvalidInput(f"places: needs int32 of {parents.points * axes} numbers, got {places.dtype} {places.shape}")
+    as_size(region.shape, "region", axes=len(region.shape))
+    parents.check_places(places)
     return _rust.upsample(places, parents.place, region.place, frames)
