@@ -38,41 +38,40 @@ class Draft:
     """What was done to each element."""
 
 
-@dataclass(slots=True, eq=False)
-class Canvas:
-    """A picture in the making: colours, where they come from, and what is covered (the mask of Eq. 4)."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Canvas(Draft):
+    """A draft in the making, and where elements lie on it."""
 
-    colours: Floats
-    coordinates: Floats
-    label: NDArray[np.uint32]
-    covered: Bools
     hard: Bools
     """Hard constraints: what is for certain of the elements that are placed."""
     occupied: Labels
     """Elements that others keep out of."""
-    frames: list[NDArray[np.float64]]
-    """The Jacobian of each label."""
 
     @classmethod
-    def start_on_background(cls, picture: Floats, labels: Labels, still: frozenset[int], free: bool) -> Canvas:
+    def start(cls, picture: Floats, mirror: Flip, covered: Bools, hard: Bools, occupied: Labels) -> Canvas:
+        """Start from what is covered of a picture, which is one of the mirror images of the exemplar."""
+        own, log = SourceMap.identity(covered.shape), [{"element": 0, "mirror": list(mirror)}]
+        return cls(picture.copy(), own.coordinates, own.label, covered, [np.eye(2)], mirror, log, hard, occupied)
+
+    @classmethod
+    def start_on_background(
+        cls, picture: Floats, mirror: Flip, labels: Labels, still: frozenset[int], free: bool
+    ) -> Canvas:
         """Start from the background: everything but the elements that move and the pixel around them."""
         from scipy.ndimage import binary_dilation, binary_erosion
 
         rest = np.isin(labels, sorted(still))
-        start = SourceMap.identity(labels.shape)
         covered: Bools = ~binary_dilation((labels > 0) & ~rest, np.ones((3, 3), bool)) | rest
         hard: Bools = binary_erosion(rest, np.ones((3, 3), bool), iterations=int(INNER), border_value=1)
         # Where elements lie apart, an element keeps out of places that others may still leave: then it can always stay.
         occupied = labels.copy() if free else np.where(hard, labels, 0)
-        return cls(picture.copy(), start.coordinates, start.label, covered, hard, occupied, [np.eye(2)])
+        return cls.start(picture, mirror, covered, hard, occupied)
 
     @classmethod
-    def start_on_picture(cls, picture: Floats) -> Canvas:
+    def start_on_picture(cls, picture: Floats, mirror: Flip) -> Canvas:
         """Start from the whole picture, which any element may cover."""
-        start = SourceMap.identity(picture.shape[:2])
         everywhere = np.ones(picture.shape[:2], bool)
-        nothing = np.zeros(picture.shape[:2], np.int32)
-        return cls(picture.copy(), start.coordinates, start.label, everywhere, ~everywhere, nothing, [np.eye(2)])
+        return cls.start(picture, mirror, everywhere, ~everywhere, np.zeros(picture.shape[:2], np.int32))
 
     def suits(self, picture: Floats, placement: Placement) -> bool:
         """Return whether the context band of an element is much like what it comes to lie on."""
@@ -115,7 +114,3 @@ class Canvas:
         self.occupied[self.occupied == element] = 0
         self.occupied[window][(placement.distance > 0) & placement.inside] = element
         self.frames.append(placement.frame)
-
-    def finish(self, mirror: Flip, log: list[dict[str, Any]]) -> Draft:
-        """Return the draft of a tile."""
-        return Draft(self.colours, self.coordinates, self.label, self.covered, self.frames, mirror, log)

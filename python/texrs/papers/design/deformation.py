@@ -76,11 +76,10 @@ def deform_elements(plan: Plan, seed: int, tile: int) -> Draft:
     heap = Heap.measure(elements, labels) if arrangement == "heap" else None
     # Where all is full, an element has its place, which another one may take: nothing is left open.
     canvas = (
-        Canvas.start_on_picture(picture)
+        Canvas.start_on_picture(picture, mirror)
         if full
-        else Canvas.start_on_background(picture, labels, resting, arrangement == "apart")
+        else Canvas.start_on_background(picture, mirror, labels, resting, arrangement == "apart")
     )
-    log: list[dict[str, Any]] = [{"element": 0, "mirror": list(mirror)}]
     for site, element in enumerate(elements):
         moved: tuple[Element, list[Operation], Placement] | None = None
         if element.label in resting:
@@ -93,15 +92,15 @@ def deform_elements(plan: Plan, seed: int, tile: int) -> Draft:
             moved = None if fitted is None else (element, *fitted)
         if moved is None:
             stays = full or element.label in resting
-            log.append({"element": element.label, "operations": [] if stays else None})
+            canvas.log.append({"element": element.label, "operations": [] if stays else None})
             continue
         mover, operations, placement = moved
-        log.append(describe(mover, operations, full=full))
+        canvas.log.append(describe(mover, operations, full=full))
         if operations or not full:
             canvas.stitch(picture, labels, placement, mover.label)
         if heap is not None:
             canvas.open_remains(labels, element, len(canvas.frames) - 1)
-    return canvas.finish(mirror, log)
+    return canvas
 
 
 def describe(element: Element, operations: Sequence[Operation], *, full: bool) -> dict[str, Any]:
