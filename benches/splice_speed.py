@@ -28,8 +28,9 @@ from texrs import samples
 from texrs.elements import Elements, analyse
 from texrs.kernels.sparse import Cholesky
 from texrs.kernels.warp import mesh
-from texrs.papers.splice import adjustment, extension, factors, foreground, matching
+from texrs.papers.splice import factors
 from texrs.papers.splice.energy import energy_matrix
+from texrs.papers.splice.entry import CACHES
 
 try:
     import cvxopt
@@ -60,13 +61,8 @@ def best(
 
 def forget() -> None:
     factors._FACTORS.clear()
-    foreground._FOREGROUNDS.clear()
-    extension._EXTENSIONS.clear()
-    extension._LAYOUTS.clear()
-    extension._COUNTS.clear()
-    matching._DIRECTIONS.clear()
-    matching._LAYOUTS.clear()
-    adjustment._REACHES.clear()
+    for cache in CACHES:
+        cache.clear()
 
 
 def splices(sides: list[int]) -> None:

@@ -320,9 +320,9 @@ def test_regular_layouts() -> None:
     [
         ({"points": np.zeros((0, 2))}, "three or more"),
         ({"points": np.array([[5.0, 5], [9, 9]])}, "2 elements are too few"),
-        ({"points": np.array([[5.0, 5], [5, 5], [9, 9], [7, 20]])}, "same place"),
-        ({"points": np.array([[5.0, 5], [np.nan, 5], [9, 9]])}, "NaN"),
-        ({"points": np.array([[5.0, 5], [500, 5], [9, 9]])}, "must lie in the picture"),
+        ({"points": np.array([[5.0, 5], [5, 5], [9, 9], [7, 20]])}, "is there twice"),
+        ({"points": np.array([[5.0, 5], [np.nan, 5], [9, 9]])}, "must be finite"),
+        ({"points": np.array([[5.0, 5], [500, 5], [9, 9]])}, "lies outside of the image"),
         ({"mask": np.zeros((5, 5), bool)}, "mask: needs bool of shape"),
         ({"mask": np.ones(SIZE, bool)}, "all foreground"),
         ({"mask": np.zeros(SIZE, bool)}, "no foreground"),

@@ -12,7 +12,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._cache import Cache
 from texrs.elements import Elements, Layout
 from texrs.layouts import spacing
 from texrs.papers.splice.entry import remember
@@ -56,7 +55,7 @@ def separate_targets(a: Elements, match: Match, *, rounds: int = 12, room: float
     """
     from scipy.spatial import cKDTree
 
-    reach = remember(_REACHES, a, None, lambda: _measure_reach(a))
+    reach = _measure_reach(a)
     mine = reach[match.extension.element[match.assigned]]
     at = match.targets.copy()
     far = 2 * float(mine.max()) + room
@@ -79,6 +78,7 @@ def separate_targets(a: Elements, match: Match, *, rounds: int = 12, room: float
     return replace(match, targets=at)
 
 
+@remember(16)
 def _measure_reach(a: Elements, count: int = 32) -> Points:
     """Return how far each element reaches from its centre in so many directions, (n, count)."""
     parts = split_foreground(a)
@@ -146,6 +146,3 @@ def crop_extension(a: Elements, match: Match, size: tuple[int, int]) -> Match:
     }
     origin = (extension.origin[0] + first[0], extension.origin[1] + first[1])
     return replace(match, extension=replace(extension, origin=origin, **fields))
-
-
-_REACHES: Cache[bytes, Points] = Cache(16)

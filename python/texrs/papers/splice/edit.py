@@ -18,17 +18,6 @@ __all__ = ["EditedLayout", "Step", "apply_steps", "as_steps"]
 Points = NDArray[np.float64]
 Step = Mapping[str, Any]
 
-STEPS = {
-    "scale": {"factor"},
-    "shift": {"by"},
-    "rows": {"by"},
-    "randomise": {"amount", "least", "seed"},
-    "regularise": {"amount"},
-    "move": {"element", "by", "to"},
-    "remove": {"element"},
-    "points": {"points"},
-}
-"""What steps there are, and what each may say."""
 DRAWS = 24
 """Places that an element may try when it is moved at random."""
 
@@ -63,11 +52,11 @@ def as_steps(edit: object, seed: int) -> list[dict[str, Any]]:
         given = {"op": step} if isinstance(step, str) else step
         if not isinstance(given, Mapping) or given.get("op") not in STEPS:
             raise InvalidInput(f"edit: step {number} needs an 'op' among {', '.join(STEPS)}; got {step!r}")
-        unknown = set(given) - {"op"} - STEPS[given["op"]]
+        allowed = STEPS[given["op"]][1]
+        unknown = sorted(map(str, set(given) - {"op", *allowed}))
         if unknown:
             raise InvalidInput(
-                f"edit: step {number}, {given['op']}, knows no {', '.join(sorted(map(str, unknown)))}; "
-                f"allowed are {', '.join(sorted(STEPS[given['op']]))}"
+                f"edit: step {number}, {given['op']}, knows no {', '.join(unknown)}; allowed are {', '.join(allowed)}"
             )
         plain = dict(given)
         if plain["op"] == "randomise":
@@ -92,19 +81,9 @@ def apply_steps(points: Points, originals: int, steps: Sequence[Step], nameable:
 
     """
     at, kept = points.copy(), np.ones(len(points), bool)
-    acts: dict[str, Callable[[Step, Points, int, NDArray[np.bool_]], Points]] = {
-        "scale": _scale_layout,
-        "shift": _shift_layout,
-        "rows": _shift_rows,
-        "randomise": _randomise,
-        "regularise": _regularise,
-        "move": _move_element,
-        "remove": _remove_element,
-        "points": _take_points,
-    }
     for step in steps:
         by_name = step["op"] in ("move", "remove", "points")
-        at = acts[step["op"]](step, at, nameable if by_name and nameable is not None else originals, kept)
+        at = STEPS[step["op"]][0](step, at, nameable if by_name and nameable is not None else originals, kept)
     if not np.isfinite(at).all() or np.abs(at).max() > 1e6:
         raise InvalidInput("edit: moves elements further than 10^6 pixels")
     return EditedLayout(at, kept, all(step["op"] in ("move", "points") for step in steps))
@@ -247,3 +226,16 @@ def _take_points(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]
     kept[of] = True
     out[of] = listed
     return out
+
+
+STEPS: dict[str, tuple[Callable[[Step, Points, int, NDArray[np.bool_]], Points], tuple[str, ...]]] = {
+    "scale": (_scale_layout, ("factor",)),
+    "shift": (_shift_layout, ("by",)),
+    "rows": (_shift_rows, ("by",)),
+    "randomise": (_randomise, ("amount", "least", "seed")),
+    "regularise": (_regularise, ("amount",)),
+    "move": (_move_element, ("by", "element", "to")),
+    "remove": (_remove_element, ("element",)),
+    "points": (_take_points, ("points",)),
+}
+"""What steps there are: what each does to a layout, and what it may say."""

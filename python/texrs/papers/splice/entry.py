@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TypeVar
+from functools import wraps
+from typing import Any, Concatenate, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -12,14 +13,19 @@ from texrs._arrays import as_image, as_wrap
 from texrs._cache import Cache, content_hash
 from texrs._typing import Progress
 from texrs.elements import Elements, analyse
+from texrs.elements._arguments import as_points
 from texrs.errors import InvalidInput
 
 __all__ = ["as_elements", "remember"]
 
+P = ParamSpec("P")
 T = TypeVar("T")
+Making: TypeAlias = Callable[Concatenate[Elements, P], T]
 
 FEWEST = 3
 SHORTEST = 16
+CACHES: list[Cache[bytes, Any]] = []
+"""All that is remembered of entries."""
 
 
 def as_elements(value: object, name: str, progress: Progress) -> Elements:
@@ -46,28 +52,29 @@ def check_entry(entry: Elements, name: str) -> Elements:
         raise InvalidInput(
             f"{name}.mask: is {'all' if mask.any() else 'no'} foreground; splicing needs elements and a ground between them"
         )
-    points = np.asarray(entry.points)
-    if points.ndim != 2 or points.shape[1] != 2 or points.dtype.kind not in "fiu":
-        raise InvalidInput(f"{name}.points: needs shape (n, 2), one (row, column) an element, got {points.shape}")
-    if not np.isfinite(points).all():
-        raise InvalidInput(f"{name}.points: must be finite, got NaN or infinity")
+    points = as_points(entry.points, (shape[0], shape[1]), f"{name}.points")
     if len(points) < FEWEST:
         raise InvalidInput(
             f"{name}.points: {len(points)} elements are too few for a layout, three or more are needed; "
             "give a larger picture, another box, or the points"
         )
-    inside = ((points >= -0.5) & (points <= np.array(shape) - 0.5)).all(axis=1)
-    if not inside.all():
-        raise InvalidInput(f"{name}.points: all must lie in the picture of {shape}, got {points[~inside][0].tolist()}")
-    if len(np.unique(points, axis=0)) < len(points):
-        raise InvalidInput(f"{name}.points: two elements lie at the same place")
-    if float(np.ptp(points, axis=0).max()) == 0:
-        raise InvalidInput(f"{name}.points: needs elements at different places")
     as_wrap(entry.wrap, f"{name}.wrap")
-    return replace(entry, points=np.asarray(points, np.float64))
+    return replace(entry, points=points)
 
 
-def remember(cache: Cache[bytes, T], entry: Elements, rest: object, make: Callable[[], T]) -> T:
-    """Return what was made of an entry's mask, points, layout and wrap, and of the rest, made now unless it is kept."""
-    key = content_hash(np.packbits(entry.mask), entry.points, entry.mask.shape, entry.layout, entry.wrap, rest)
-    return cache.get_or_make(key, make)
+def remember(count: int) -> Callable[[Making[P, T]], Making[P, T]]:
+    """Let a function keep what it last made of the mask, points, layout and wrap of so many entries, and of the rest."""
+
+    def decorate(make: Making[P, T]) -> Making[P, T]:
+        cache: Cache[bytes, T] = Cache(count)
+        CACHES.append(cache)
+
+        @wraps(make)
+        def recall(entry: Elements, /, *rest: P.args, **options: P.kwargs) -> T:
+            content = (np.packbits(entry.mask), entry.points, entry.mask.shape, entry.layout, entry.wrap)
+            key = content_hash(*content, rest, sorted(options.items()))
+            return cache.get_or_make(key, lambda: make(entry, *rest, **options))
+
+        return recall
+
+    return decorate

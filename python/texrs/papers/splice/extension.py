@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import check_memory
-from texrs._cache import Cache
 from texrs._typing import Bools, Labels
 from texrs.elements import Elements, Layout
 from texrs.errors import InvalidInput
@@ -76,6 +75,7 @@ class Extension:
     originals: int = 0
 
 
+@remember(4)
 def extend(
     entry: Elements, size: tuple[int, int], margin: int, *, whole: bool = True, exact: bool = False
 ) -> Extension:
@@ -84,49 +84,6 @@ def extend(
     With ``whole=False`` every element of the picture itself is kept, also those that the border cuts; with ``exact`` every
     pixel is.
     """
-    rest = (size, margin, whole, exact)
-    return remember(_EXTENSIONS, entry, rest, lambda: _extend(entry, size, margin, whole=whole, exact=exact))
-
-
-def count_elements(entry: Elements, size: tuple[int, int], margin: int) -> int:
-    """Count the elements that `extend` finds, without what it makes of them."""
-    return remember(_COUNTS, entry, (size, margin), lambda: _count(entry, size, margin))
-
-
-def _count(entry: Elements, size: tuple[int, int], margin: int) -> int:
-    layout, low, high = _bounds(entry, size, margin, exact=False)
-    places, of, flips = layout.within(low.astype(np.float64), (high - 1).astype(np.float64))
-    if entry.layout != Layout.DISJOINT:
-        return len(of)
-    check_memory(int(np.prod(high - low)) * EACH)
-    instance = np.zeros(high - low, np.int32)
-    return len(_place_elements(entry, instance, (places - low, of, flips), None)[0])
-
-
-def _bounds(
-    entry: Elements, size: tuple[int, int], margin: int, *, exact: bool
-) -> tuple[PointLayout, NDArray[np.intp], NDArray[np.intp]]:
-    """Return the layout of a texture as its pixels go on, and the first pixel and the one after the last, in its own."""
-    shape = np.array(entry.mask.shape)
-    offset = (np.array(size) - shape) // 2  # Of the picture in the output.
-    disjoint = entry.layout == Layout.DISJOINT
-    if disjoint or exact:
-        # The elements that the border cuts are left out, or wanted: no pixel is in the way.
-        points = split_foreground(entry).points if disjoint else entry.points
-        ends = [(-0.5, n - 0.5) if w else (0.0, n - 1.0) for n, w in zip(shape, entry.wrap, strict=True)]
-        folds = [Fold(*e, w) for e, w in zip(ends, entry.wrap, strict=True)]
-        layout = PointLayout(points, (folds[0], folds[1]), 0.0)
-    else:
-        layout = remember(
-            _LAYOUTS,
-            entry,
-            None,
-            lambda: PointLayout.of(entry.points, entry.mask.shape, entry.wrap, beyond=False),
-        )
-    return layout, np.minimum(-margin - offset, 0), np.maximum(np.array(size) + margin - offset, shape)
-
-
-def _extend(entry: Elements, size: tuple[int, int], margin: int, *, whole: bool, exact: bool) -> Extension:
     layout, low, high = _bounds(entry, size, margin, exact=exact)
     shape = np.array(entry.mask.shape)
     offset = (np.array(size) - shape) // 2
@@ -151,6 +108,42 @@ def _extend(entry: Elements, size: tuple[int, int], margin: int, *, whole: bool,
     origin = (int(first[0]), int(first[1]))
     points, rest = places + first, np.zeros((0, 2))
     return Extension(origin, pixel, mask, points, of, none, none > 0, mirrored, none, rest, originals)
+
+
+@remember(256)
+def count_elements(entry: Elements, size: tuple[int, int], margin: int) -> int:
+    """Count the elements that `extend` finds, without what it makes of them."""
+    layout, low, high = _bounds(entry, size, margin, exact=False)
+    places, of, flips = layout.within(low.astype(np.float64), (high - 1).astype(np.float64))
+    if entry.layout != Layout.DISJOINT:
+        return len(of)
+    check_memory(int(np.prod(high - low)) * EACH)
+    instance = np.zeros(high - low, np.int32)
+    return len(_place_elements(entry, instance, (places - low, of, flips), None)[0])
+
+
+@remember(64)
+def lay_out(entry: Elements, *, beyond: bool) -> PointLayout:
+    """Return how the layout of a texture goes on; ``beyond`` lets it be reflected outside of the picture."""
+    return PointLayout.of(entry.points, entry.mask.shape, entry.wrap, beyond=beyond)
+
+
+def _bounds(
+    entry: Elements, size: tuple[int, int], margin: int, *, exact: bool
+) -> tuple[PointLayout, NDArray[np.intp], NDArray[np.intp]]:
+    """Return the layout of a texture as its pixels go on, and the first pixel and the one after the last, in its own."""
+    shape = np.array(entry.mask.shape)
+    offset = (np.array(size) - shape) // 2  # Of the picture in the output.
+    disjoint = entry.layout == Layout.DISJOINT
+    if disjoint or exact:
+        # The elements that the border cuts are left out, or wanted: no pixel is in the way.
+        points = split_foreground(entry).points if disjoint else entry.points
+        ends = [(-0.5, n - 0.5) if w else (0.0, n - 1.0) for n, w in zip(shape, entry.wrap, strict=True)]
+        folds = [Fold(*e, w) for e, w in zip(ends, entry.wrap, strict=True)]
+        layout = PointLayout(points, (folds[0], folds[1]), 0.0)
+    else:
+        layout = lay_out(entry, beyond=False)
+    return layout, np.minimum(-margin - offset, 0), np.maximum(np.array(size) + margin - offset, shape)
 
 
 def _stamp(
@@ -270,8 +263,3 @@ def _shapes(
 def _round_half_up(place: Points) -> NDArray[np.intp]:
     """Return the nearest pixel; half-way the higher one, so that whole steps stay whole."""
     return np.asarray(np.floor(place + 0.5), np.intp)
-
-
-_COUNTS: Cache[bytes, int] = Cache(256)
-_LAYOUTS: Cache[bytes, PointLayout] = Cache(64)
-_EXTENSIONS: Cache[bytes, Extension] = Cache(4)

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._cache import Cache
 from texrs._typing import Bools, Labels
 from texrs.elements import Elements
 from texrs.papers.splice.entry import remember
@@ -57,12 +56,9 @@ class Foreground:
         return whole
 
 
+@remember(16)
 def split_foreground(entry: Elements) -> Foreground:
-    """Tell the elements of a disjoint foreground apart: by component, and within one by the nearest element."""
-    return remember(_FOREGROUNDS, entry, None, lambda: _split(entry))
-
-
-def _split(entry: Elements) -> Foreground:
+    """Split a disjoint foreground into its elements: by component, and within one by the nearest element."""
     from scipy.ndimage import distance_transform_edt, label
     from skimage.segmentation import expand_labels, watershed
 
@@ -161,6 +157,3 @@ def _open_gaps(region: Labels) -> Labels:
         a, b = (np.moveaxis(x, axis, 0) for x in (region, gap))
         b[:-1] |= (a[:-1] != a[1:]) & (a[:-1] > 0) & (a[1:] > 0)
     return np.where(gap, 0, region)
-
-
-_FOREGROUNDS: Cache[bytes, Foreground] = Cache(16)

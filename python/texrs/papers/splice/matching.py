@@ -9,19 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._cache import Cache
 from texrs.elements import Elements, Layout
 from texrs.errors import InvalidInput
 from texrs.layouts import PointLayout, directions, match_points, nearest_distances, spacing
 from texrs.papers.splice.edit import Step, apply_steps
 from texrs.papers.splice.entry import remember
-from texrs.papers.splice.extension import Extension, count_elements, extend
+from texrs.papers.splice.extension import Extension, count_elements, extend, lay_out
 from texrs.papers.splice.foreground import split_foreground
 
 __all__ = ["Match", "element_points", "find_turns", "match_edit", "match_layouts"]
@@ -102,7 +100,7 @@ def element_points(entry: Elements) -> Points:
 def match_layouts(a: Elements, b: Elements, size: tuple[int, int], *, align: bool) -> Match:
     """Match the elements of A with B's layout."""
     unit = spacing(a.points)
-    layout = remember(_LAYOUTS, b, None, lambda: PointLayout.of(b.points, b.mask.shape, b.wrap, beyond=True))
+    layout = lay_out(b, beyond=True)
     scale, gain, disjoint = unit / layout.scale, 1.0, a.layout == Layout.DISJOINT
     if disjoint:
         gain = _room_gain(a, scale * nearest_distances(layout.points, 1)[:, 0])
@@ -137,10 +135,16 @@ def match_layouts(a: Elements, b: Elements, size: tuple[int, int], *, align: boo
 
 def find_turns(a: Elements, b: Elements) -> list[float]:
     """Return the turns, in degrees, that bring a direction in which B's points line up to one of A's; none is the first."""
-    mine, theirs = (t.directions or remember(_DIRECTIONS, t, None, partial(directions, t.points)) for t in (a, b))
+    mine, theirs = (t.directions or find_directions(t) for t in (a, b))
     # Lines have no sense of direction: angles are those within a quarter turn.
     turns = {round((p - q + 90) % 180 - 90, 6) for p in mine[:3] for q in theirs[:3]}
     return [0.0, *sorted(turns - {0.0}, key=lambda t: (abs(t), t))]
+
+
+@remember(64)
+def find_directions(entry: Elements) -> tuple[float, ...]:
+    """Return the directions in which the points of a texture line up."""
+    return directions(entry.points)
 
 
 def _room_gain(a: Elements, distances: Points) -> float:
@@ -225,7 +229,3 @@ def match_edit(a: Elements, steps: Sequence[Step]) -> tuple[Match, bool]:
     moved = edited.points[assigned]
     cost = float(((moved - extension.points[assigned]) ** 2).sum(axis=1).mean())
     return Match(moved, extension, assigned, 1.0, 0.0, 1.0, cost), edited.listed
-
-
-_DIRECTIONS: Cache[bytes, tuple[float, ...]] = Cache(64)
-_LAYOUTS: Cache[bytes, PointLayout] = Cache(64)
