@@ -46,7 +46,7 @@ import numpy as np
 from texrs._engine.pyramid import ONE, Region
 from texrs._typing import Array, Interpolation, Progress
 from texrs.exemplar import Exemplar
-from texrs.exemplar.analysis import COARSEST
+from texrs.exemplar.analysis import COARSEST, count_levels
 from texrs.fields import Field
 from texrs.growth import Constraints, Grown, Guide, Start, Windows, from_patches
 from texrs.growth.engine import Places
@@ -278,7 +278,7 @@ def grow_texture(asked: Request, progress: Progress | None) -> Synthesis:
         windows = analyse(asked, quality)
         start = choose_start(asked, quality)
         grown = windows.grow(asked.region, start=start, ask=asked.conditions.at, show=show, progress=progress)
-    last = {f"level {len(asked.exemplar.analyse().levels)}": show(grown.places, asked.region, 1)}
+    last = {f"level {count_levels(asked.exemplar.shape, COARSEST)}": show(grown.places, asked.region, 1)}
     source = SourceMap(
         as_coordinates(grown.places, asked.region),
         np.zeros(asked.region.shape, np.uint16),
