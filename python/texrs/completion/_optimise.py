@@ -115,7 +115,7 @@ def optimise(
 def _make_atlas(
     pictures: list[Array], open_: Bools, scales: list[Floats] | None, wide: Bools, levels: int, margin: int
 ) -> Atlas:
-    """Return what is copied from: what is known of the picture, or the source, in the sizes that are of use."""
+    """Return what is copied from: what is known of the picture, or the exemplar, in the sizes that are of use."""
     ground, free, scale = _lay_out(pictures, open_, scales, margin)
     sizes: tuple[float, ...] = (1.0,)
     wanted: tuple[float, float] | None = None
@@ -137,24 +137,24 @@ def _make_atlas(
 def _lay_out(
     pictures: list[Array], open_: Bools, scales: list[Floats] | None, margin: int
 ) -> tuple[Array, Bools, Floats | None]:
-    """Return the picture, with a source below it, what of them may be copied, and their scales.
+    """Return the picture, with an exemplar below it, what of them may be copied, and their scales.
 
-    Beside a source the picture is there for what is around the hole to look like, and nothing is copied from it.
+    Beside an exemplar the picture is there for what is around the hole to look like, and nothing is copied from it.
     """
     wide = ((margin, margin), (margin, margin))
     image = np.pad(_paint_over(as_image(pictures[0]), open_), (*wide, (0, 0)), mode="symmetric")
     if len(pictures) == 1:
         scale = None if scales is None else np.pad(scales[0], wide, mode="edge")
         return image, np.pad(~open_, wide), scale
-    source = as_image(pictures[1])
-    columns = max(image.shape[1], source.shape[1])
-    parts = [np.pad(p, ((0, 0), (0, columns - p.shape[1]), (0, 0)), mode="symmetric") for p in (image, source)]
-    free = np.zeros((len(image) + len(source), columns), bool)
-    free[len(image) :, : source.shape[1]] = True
+    exemplar = as_image(pictures[1])
+    columns = max(image.shape[1], exemplar.shape[1])
+    parts = [np.pad(p, ((0, 0), (0, columns - p.shape[1]), (0, 0)), mode="symmetric") for p in (image, exemplar)]
+    free = np.zeros((len(image) + len(exemplar), columns), bool)
+    free[len(image) :, : exemplar.shape[1]] = True
     if scales is None:
         return np.concatenate(parts), free, None
     scale = np.full(free.shape, NOWHERE, np.float32)
-    scale[len(image) :, : source.shape[1]] = scales[1]
+    scale[len(image) :, : exemplar.shape[1]] = scales[1]
     return np.concatenate(parts), free, scale
 
 

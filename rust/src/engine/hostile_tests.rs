@@ -231,9 +231,9 @@ proptest! {
         wrap: bool,
         plain: bool,
     ) {
-        let [hysteresis, unity, settled] = costs;
+        let [acceptance, coherence, settled] = costs;
         let options = optimize::Options {
-            passes, first, exhaustive, reach, hysteresis, unity, vote, settled, seed,
+            passes, first, exhaustive, reach, acceptance, coherence, vote, settled, seed,
         };
         let _ = corrected::<2>(&place, &options, wrap, plain);
         let _ = corrected::<3>(&place, &options, wrap, plain);

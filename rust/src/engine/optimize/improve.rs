@@ -18,7 +18,7 @@ struct Search {
     /// What a drawn match must be better by.
     limit: i64,
     /// What each neighbour costs whose piece of the exemplar is another.
-    unity: i64,
+    coherence: i64,
 }
 
 impl<const D: usize> Level<'_, D> {
@@ -35,8 +35,8 @@ impl<const D: usize> Level<'_, D> {
         let search = Search {
             noise: Noise::new(self.options.seed).part(3),
             number,
-            limit: (self.options.hysteresis * spacing) as i64,
-            unity: (self.options.unity * spacing) as i64,
+            limit: (self.options.acceptance * spacing) as i64,
+            coherence: (self.options.coherence * spacing) as i64,
         };
         let mut seen = Seen::default();
         let slab = self.slab();
@@ -107,13 +107,13 @@ impl<const D: usize> Level<'_, D> {
             }
         }
         let apart = |place: Place<D>| -> i64 {
-            if search.unity == 0 {
+            if search.coherence == 0 {
                 return 0;
             }
             let others = proposals[..beside]
                 .iter()
                 .filter(|&&(other, _)| !appearance.same(other, place));
-            others.count() as i64 * search.unity
+            others.count() as i64 * search.coherence
         };
         least += apart(best);
         for &(place, there) in &proposals[..count] {

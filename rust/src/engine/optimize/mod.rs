@@ -9,7 +9,7 @@
 //!    around the best;
 //! 3. votes: takes one of the coordinates that the windows around it propose.
 //!
-//! Departures: a drawn match must be better by some of the exemplar's own spacing (hysteresis), so that what is good
+//! Departures: a drawn match must be better by some of the exemplar's own spacing (the acceptance threshold), so that what is good
 //! enough stays and sparse features are not washed out. Points whose neighbours all go on with the same piece of the
 //! exemplar are left: only where pieces meet is there anything to correct. So are those around which nothing changed since
 //! they were corrected last. Coordinates are displaced by the frame's
@@ -36,7 +36,7 @@ const CHUNK: usize = 2048;
 const FINEST: i32 = UNIT / 256;
 /// How far a change makes points look again.
 const NEAR: usize = 1;
-/// What the hysteresis and the unity may be, at most.
+/// What the acceptance and the coherence may be, at most.
 const DEAREST: f64 = 1e6;
 /// Points between two looks at whether to stop, at least.
 const SLAB: usize = 1 << 18;
@@ -53,9 +53,9 @@ pub struct Options {
     /// How far the neighbours are whose matches are tried, 1 or 2.
     pub reach: i32,
     /// How much better a drawn match must be, in units of the exemplar's spacing.
-    pub hysteresis: f64,
+    pub acceptance: f64,
     /// What each neighbour costs whose piece of the exemplar is another, in units of the exemplar's spacing.
-    pub unity: f64,
+    pub coherence: f64,
     /// Radius of the vote; 0: each point takes the match of its own window.
     pub vote: usize,
     /// Stop when two passes change less than this share of the points; 0: never, for results that must not hang on
@@ -107,11 +107,11 @@ pub fn correct<const D: usize>(
             ),
         ));
     }
-    let costs = [options.hysteresis, options.unity];
+    let costs = [options.acceptance, options.coherence];
     if !costs.iter().all(|x| (0.0..=DEAREST).contains(x)) || options.settled.is_nan() {
         return Err(Error::value(
             "options",
-            format!("hysteresis and unity from 0 to {DEAREST:e} are allowed, got {options:?}"),
+            format!("acceptance and coherence from 0 to {DEAREST:e} are allowed, got {options:?}"),
         ));
     }
     frames.check(points)?;

@@ -20,8 +20,8 @@ const OPTIONS: Options = Options {
     first: 0,
     exhaustive: false,
     reach: 2,
-    hysteresis: 2.0,
-    unity: 0.2,
+    acceptance: 2.0,
+    coherence: 0.2,
     vote: 1,
     settled: 0.0,
     seed: 1,
@@ -106,7 +106,7 @@ fn correction_lowers_the_cost_in_both_dimensions() {
         let frames = Frames::Constant(identity());
         let options = Options {
             passes: 12,
-            hysteresis: 0.5,
+            acceptance: 0.5,
             ..OPTIONS
         };
         correct(
