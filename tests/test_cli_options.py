@@ -16,12 +16,12 @@ import texrs
 from texrs.cli import COMMANDS, _elements, _maps, app
 from texrs.cli._kinds import About
 from texrs.cli._options import MISSING, Option, Options, describe
-from texrs.cli._verbs import VERBS
+from texrs.cli._verbs import NAMES, make_verb
 from texrs.errors import InvalidInput
 
 GROUP: Any = typer.main.get_command(app)
-VERBS_MADE = {name: make() for name, make in VERBS.items()}
-STANDING = {name: (verb.options,) for name, verb in VERBS_MADE.items()} | {
+VERBS = {name: make_verb(name) for name in NAMES}
+STANDING = {name: (verb.options,) for name, verb in VERBS.items()} | {
     "analyse": (_elements.PICTURED,),
     "apply": (_maps.RENDERED, _maps.BLENDED),
 }

@@ -9,15 +9,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
 from texrs import io
 from texrs._threads import threads
 from texrs.cli import _outputs
 from texrs.cli._console import complain, note, say, watching
 from texrs.cli._kinds import PICTURE, PLACE, read_picture
 from texrs.cli._options import Options, taking
-from texrs.cli._outputs import SAMPLE, Quiet, Threads, named, to_write
+from texrs.cli._outputs import SAMPLE, Quiet, Threads, make_argument, named, to_write
 from texrs.database import TextureDatabase
 from texrs.elements import analyse, pictures
 from texrs.errors import FileError, InvalidInput
@@ -33,10 +31,7 @@ MATRIX = Options(TextureDatabase.matrix, only=("size", "cell"))
 def analyse_command(
     out: Annotated[str, to_write("out", "ENTRY.npz", "Entry to write.")],
     given: dict[str, Any],
-    more: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="ROW,COL", help="More places of --background.", show_default=False),
-    ] = None,
+    more: Annotated[list[str] | None, make_argument("ROW,COL", "More places of --background.")] = None,
     stages: Annotated[str | None, to_write("stages", text="Folder for pictures of the points and the mask.")] = None,
     count: Threads = None,
     quiet: Quiet = False,
@@ -66,22 +61,10 @@ def analyse_command(
 
 @taking(ANALYSED, KEPT, MATRIX)
 def database_command(
-    folder: Annotated[
-        str, typer.Argument(metavar="DIR", help="Folder of the database; made if it is not there.", show_default=False)
-    ],
-    action: Annotated[
-        str,
-        typer.Argument(
-            metavar="add|list|matrix",
-            help="Add images, list what is there, or splice all with all.",
-            show_default=False,
-        ),
-    ],
+    folder: Annotated[str, make_argument("DIR", "Folder of the database; made if it is not there.")],
+    action: Annotated[str, make_argument("add|list|matrix", "Add images, list what is there, or splice all with all.")],
     given: dict[str, Any],
-    items: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="IMAGE|NAME", help="Images to add; names for matrix.", show_default=False),
-    ] = None,
+    items: Annotated[list[str] | None, make_argument("IMAGE|NAME", "Images to add; names for matrix.")] = None,
     out: Annotated[str | None, to_write("out", text="Image file for matrix.")] = None,
     count: Threads = None,
     quiet: Quiet = False,
@@ -143,7 +126,7 @@ def explain(entry: Any, *, quiet: bool) -> None:
     """Say what was proposed, how sure that is, and what is doubtful."""
     sure = entry.report.get("confidence", {})
     for name in entry.report["proposed"]:
-        value = {"box": ",".join(map(str, entry.report["box"])), "tag": entry.layout}.get(name, "as drawn")
+        value = {"box": ",".join(map(str, entry.report["box"])), "layout": entry.layout}.get(name, "as drawn")
         note(f"proposed {name}: {value} ({sure.get(name, 0):.0%} sure)", quiet=quiet)
     for doubt in entry.report["doubts"]:
         note(f"doubtful: {doubt}", quiet=quiet)

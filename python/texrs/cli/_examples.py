@@ -9,14 +9,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
 from texrs import io, samples
 from texrs._threads import threads
 from texrs.cli import _outputs
 from texrs.cli._console import note, say, watching
 from texrs.cli._kinds import parse_size
-from texrs.cli._outputs import Quiet, Threads, describe, named, to_write
+from texrs.cli._outputs import Quiet, Threads, describe, make_argument, make_option, named, to_write
 from texrs.errors import InvalidInput
 
 
@@ -43,15 +41,10 @@ def demo_command(
 
 
 def samples_command(
-    names: Annotated[
-        list[str] | None, typer.Argument(metavar="NAME", help="Which; all by default.", show_default=False)
-    ] = None,
+    names: Annotated[list[str] | None, make_argument("NAME", "Which; all by default.")] = None,
     out: Annotated[str | None, to_write("out", "DIR", "Folder to write them to, as .png and .tif.")] = None,
-    size: Annotated[
-        str | None,
-        typer.Option(metavar="SIZE", help="Of those that are generated: 256, 192x256, 64x64x64.", show_default=False),
-    ] = None,
-    seed: Annotated[int | None, typer.Option(help="Of those that are generated.", show_default=False)] = None,
+    size: Annotated[str | None, make_option("SIZE", "Of those that are generated: 256, 192x256, 64x64x64.")] = None,
+    seed: Annotated[int | None, make_option(None, "Of those that are generated.")] = None,
     quiet: Quiet = False,
 ) -> None:
     """List the built-in examples, or write them to a folder."""

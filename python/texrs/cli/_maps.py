@@ -8,8 +8,6 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
 from texrs import io
 from texrs._arrays import as_float
 from texrs._threads import threads
@@ -17,7 +15,7 @@ from texrs.blending import blend
 from texrs.cli import _outputs
 from texrs.cli._console import note, say
 from texrs.cli._options import Options, check_needed, taking
-from texrs.cli._outputs import Quiet, Threads, describe, named, to_write
+from texrs.cli._outputs import Quiet, Threads, describe, make_argument, named, to_write
 from texrs.errors import FileError, InvalidInput
 from texrs.source_map import SourceMap
 
@@ -39,13 +37,8 @@ BLENDED = Options(
 
 @taking(RENDERED, BLENDED)
 def apply_command(
-    source: Annotated[
-        str, typer.Argument(metavar="MAP.npz", help="A source map that --map wrote.", show_default=False)
-    ],
-    maps: Annotated[
-        list[str],
-        typer.Argument(metavar="IMAGE", help="Images in register with the exemplar.", show_default=False),
-    ],
+    source: Annotated[str, make_argument("MAP.npz", "A source map that --map wrote.")],
+    maps: Annotated[list[str], make_argument("IMAGE", "Images in register with the exemplar.")],
     out: Annotated[str, to_write("out", text="Image file to write; a folder for several.")],
     given: dict[str, Any],
     count: Threads = None,
@@ -81,7 +74,7 @@ def apply_command(
 
 
 def info_command(
-    file: Annotated[str, typer.Argument(metavar="FILE", help="An image or a source map.", show_default=False)],
+    file: Annotated[str, make_argument("FILE", "An image or a source map.")],
 ) -> None:
     """Say what an image or a source map holds."""
     try:

@@ -40,6 +40,16 @@ Threads = Annotated[
 ]
 
 
+def make_argument(metavar: str, text: str) -> Any:
+    """Return what tells typer of an argument."""
+    return typer.Argument(metavar=metavar, help=text, show_default=False)
+
+
+def make_option(metavar: str | None, text: str) -> Any:
+    """Return what tells typer of an option that may be left out."""
+    return typer.Option(metavar=metavar, help=text, show_default=False)
+
+
 def to_write(name: str, metavar: str | None = None, text: str | None = None) -> Any:
     """Return the option for one of the outputs, which a command may describe in its own way."""
     flags, usual, purpose = OUTPUTS[name]
@@ -197,11 +207,8 @@ def variant_names(seed: int, paths: Mapping[str, str | None]) -> dict[str, str |
     for option, path in paths.items():
         if path is not None and not Path(path).name:
             raise InvalidInput(f"--{option}: needs a name that the seed of a variant can follow, got {path!r}")
-    return {option: None if p is None else _beside(Path(p), seed) for option, p in paths.items()}
-
-
-def _beside(path: Path, seed: int) -> str:
-    return str(path.with_name(f"{path.stem}-{seed}{path.suffix}"))
+    places = {option: None if path is None else Path(path) for option, path in paths.items()}
+    return {o: None if p is None else str(p.with_name(f"{p.stem}-{seed}{p.suffix}")) for o, p in places.items()}
 
 
 def contact_sheet(images: Sequence[Array]) -> Array:

@@ -18,7 +18,7 @@ from texrs.cli import _outputs
 from texrs.cli._console import note
 from texrs.cli._kinds import read_mask, read_picture, read_scale_map
 from texrs.cli._options import Options, check_needed, one_of, taking
-from texrs.cli._outputs import Quiet, Threads, named, to_write
+from texrs.cli._outputs import Quiet, Threads, make_argument, make_option, named, to_write
 from texrs.errors import InvalidInput
 from texrs.synthesis import preview
 
@@ -39,28 +39,18 @@ ENCODED = Options(scale_maps.encode, only=("encoding",), optional={"encoding": "
 
 @taking(ANGLES, MASKS, FOUND, EDITED, RESIZED, ENCODED)
 def scale_map_command(
-    image: Annotated[
-        str, typer.Argument(metavar="IMAGE", help="The texture: an image file, or sample:NAME.", show_default=False)
-    ],
+    image: Annotated[str, make_argument("IMAGE", "The texture: an image file, or sample:NAME.")],
     out: Annotated[str, to_write("out")],
     given: dict[str, Any],
-    mask: Annotated[
-        str | None,
-        typer.Option(metavar="FILE", help="Measure in a mask of the elements: what is not black.", show_default=False),
-    ] = None,
+    mask: Annotated[str | None, make_option("FILE", "Measure in a mask of the elements: what is not black.")] = None,
     auto: Annotated[bool, typer.Option("--auto", help="Measure in a mask that is found in the image.")] = False,
     scale_map: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FILE", help="A map made before, to edit or to bring to another size.", show_default=False
-        ),
+        str | None, make_option("FILE", "A map made before, to edit or to bring to another size.")
     ] = None,
     hole: Annotated[
         str | None,
-        typer.Option(
-            metavar="FILE",
-            help="With --mask or --auto: what is not black is no texture, and the map is continued into it.",
-            show_default=False,
+        make_option(
+            "FILE", "With --mask or --auto: what is not black is no texture, and the map is continued into it."
         ),
     ] = None,
     stages: Annotated[str | None, to_write("stages")] = None,

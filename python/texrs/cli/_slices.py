@@ -17,7 +17,7 @@ from texrs.cli import _outputs
 from texrs.cli._console import note, watching
 from texrs.cli._kinds import About, Kind, parse_numbers, read_volume
 from texrs.cli._options import Options, check_needed, taking
-from texrs.cli._outputs import Quiet, Threads, describe, named, to_write
+from texrs.cli._outputs import Quiet, Threads, describe, make_argument, named, to_write
 from texrs.errors import InvalidInput
 from texrs.volume import cube, oblique, paint, slices, turntable
 
@@ -72,9 +72,7 @@ TURNED = Options(turntable, only=("size", "frames", "elevation", "seconds", "int
 
 @taking(ACROSS, CUT, BLOCK, TURNED)
 def slice_command(
-    volume: Annotated[
-        str, typer.Argument(metavar="VOLUME", help="The volume: a file, or sample:NAME.", show_default=False)
-    ],
+    volume: Annotated[str, make_argument("VOLUME", "The volume: a file, or sample:NAME.")],
     out: Annotated[str, to_write("out", text="Image file to write.")],
     given: dict[str, Any],
     as_cube: Annotated[bool, typer.Option("--cube", help="A block of the material, on a transparent ground.")] = False,

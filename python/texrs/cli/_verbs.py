@@ -15,9 +15,9 @@ from texrs import io
 from texrs._arrays import as_int
 from texrs._threads import threads
 from texrs._typing import Array
-from texrs.cli import _kinds, _outputs
+from texrs.cli import _outputs
 from texrs.cli._console import note, watching
-from texrs.cli._kinds import About
+from texrs.cli._kinds import ENTRY, HOLE, MAP_OR_AUTO, NUMBERS, PICTURE, PICTURES, UNKNOWN, VOLUME, About, Kind
 from texrs.cli._options import Options, as_command, parameter
 from texrs.cli._outputs import Quiet, Threads, describe, named, to_write
 from texrs.synthesis import Synthesis
@@ -117,30 +117,52 @@ class Verb:
         return tuple(self.times * n for n in example.shape[: self.options.axes])
 
 
-# --- the verbs, each imported when it is asked for --------------------------------------------------------------------
+# --- the verbs -------------------------------------------------------------------------------------------------------
 
+NAMES = ("complete", "design", "perspective", "self-splice", "solid", "splice", "synthesize", "tile")
 TWICE = {"size": "twice the exemplar"}
 GROWN = {"constraints": "constraint", "guide": "guide", "exemplar.image": "exemplar"}
 
 
-def _design() -> Verb:
-    from texrs.papers.design import design as verb
-    from texrs.papers.design import design_variants
+def make_verb(name: str) -> Verb:
+    """Return the verb of a name; its function is imported now."""
+    match name:
+        case "complete":
+            from texrs.completion import complete
 
-    options = Options(verb, arguments={"exemplar": _kinds.PICTURES}, names={"elements": "element"})
-    return Verb(options, times=2, several=design_variants)
+            kinds = {"exemplar": PICTURE, "scale_map": MAP_OR_AUTO, "exemplar_scale_map": MAP_OR_AUTO}
+            names = {"exemplar": "from", "exemplar_scale_map": "from-scale-map"}
+            return Verb(Options(complete, arguments={"image": UNKNOWN, "hole": HOLE}, kinds=kinds, names=names))
+        case "design":
+            from texrs.papers.design import design, design_variants
 
+            options = Options(design, arguments={"exemplar": PICTURES}, names={"elements": "element"})
+            return Verb(options, times=2, several=design_variants)
+        case "perspective":
+            from texrs.papers.perspective import perspective
 
-def _splice() -> Verb:
-    from texrs.papers.splice import splice as verb
+            options = Options(perspective, arguments={"exemplar": PICTURE}, optional=TWICE)
+            return Verb(options, times=2, shape="target")
+        case "solid":
+            from texrs.papers.solid import solid
 
-    return Verb(Options(verb, arguments={"a": _kinds.ENTRY, "b": _kinds.ENTRY}), says=count_moved)
+            return _grow(solid, VOLUME, 3)
+        case "synthesize":
+            from texrs.papers.solid import synthesize
 
+            return _grow(synthesize, PICTURE, 2)
+        case "splice":
+            from texrs.papers.splice import splice
 
-def _self_splice() -> Verb:
-    from texrs.papers.splice import self_splice as verb
+            return Verb(Options(splice, arguments={"a": ENTRY, "b": ENTRY}), says=count_moved)
+        case "self-splice":
+            from texrs.papers.splice import self_splice
 
-    return Verb(Options(verb, arguments={"a": _kinds.ENTRY}), says=count_moved)
+            return Verb(Options(self_splice, arguments={"a": ENTRY}), says=count_moved)
+        case _:
+            from texrs.tiling import tile
+
+            return Verb(Options(tile, arguments={"image": PICTURE}))
 
 
 def count_moved(result: Synthesis) -> str:
@@ -148,60 +170,16 @@ def count_moved(result: Synthesis) -> str:
     return f", {len(result.report['matches'])} elements moved"
 
 
-def _perspective() -> Verb:
-    from texrs.papers.perspective import perspective as verb
-
-    return Verb(Options(verb, arguments={"exemplar": _kinds.PICTURE}, optional=TWICE), times=2, shape="target")
-
-
-def _solid() -> Verb:
-    from texrs.papers.solid import solid as verb
-
-    return _grow(verb, _kinds.VOLUME, 3)
-
-
-def _synthesize() -> Verb:
-    from texrs.papers.solid import synthesize as verb
-
-    return _grow(verb, _kinds.PICTURE, 2)
-
-
-def _grow(verb: Callable[..., Synthesis], kind: _kinds.Kind, axes: int) -> Verb:
+def _grow(verb: Callable[..., Synthesis], kind: Kind, axes: int) -> Verb:
     from texrs.exemplar import Exemplar
 
     options = Options(
         verb,
         arguments={"exemplar.image": kind},
-        kinds={"guide.exemplar": _kinds.NUMBERS, "guide.output": _kinds.NUMBERS},
+        kinds={"guide.exemplar": NUMBERS, "guide.output": NUMBERS},
         names=GROWN,
         makers={"exemplar": Exemplar},
         optional=TWICE,
         axes=axes,
     )
     return Verb(options, times=2)
-
-
-def _tile() -> Verb:
-    from texrs.tiling import tile as verb
-
-    return Verb(Options(verb, arguments={"image": _kinds.PICTURE}))
-
-
-def _complete() -> Verb:
-    from texrs.completion import complete as verb
-
-    kinds = {"exemplar": _kinds.PICTURE, "scale_map": _kinds.MAP_OR_AUTO, "exemplar_scale_map": _kinds.MAP_OR_AUTO}
-    names = {"exemplar": "from", "exemplar_scale_map": "from-scale-map"}
-    return Verb(Options(verb, arguments={"image": _kinds.UNKNOWN, "hole": _kinds.HOLE}, kinds=kinds, names=names))
-
-
-VERBS = {
-    "complete": _complete,
-    "design": _design,
-    "perspective": _perspective,
-    "self-splice": _self_splice,
-    "solid": _solid,
-    "splice": _splice,
-    "synthesize": _synthesize,
-    "tile": _tile,
-}
