@@ -20,8 +20,8 @@ from texrs.blending import blend as correct_colours
 from texrs.completion._optimise import optimise, recover_scale
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
-from texrs.exemplar.patches import index_patches, mark_corners
-from texrs.exemplar.symmetry import ALL, NONE, Flip, flip_coordinates, flip_frame
+from texrs.exemplar.patches import index_patches, mark_corners, place_patches, usual_side
+from texrs.exemplar.symmetry import ALL, NONE
 from texrs.kernels.complete import complete as fill
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
@@ -286,8 +286,13 @@ def fill_with_patches(
         shown=0 if itself else None,
         progress=lambda share: watch("complete", share),
     )
-    places = paste(map_untouched(shapes), filled.label, filled.source, filled.coordinates, mirrors)
-    return places, side, len(filled.source)
+    new, coordinates, jacobians = place_patches(filled, mirrors, (shapes[-1][0], shapes[-1][1]))
+    places = map_untouched(shapes)
+    places.coordinates[new] = coordinates
+    places.exemplar[new] = len(shapes) - 1
+    frames = np.stack([np.eye(2, dtype=np.float32), *jacobians])
+    label = (filled.label + 1).astype(np.uint32)
+    return SourceMap(places.coordinates, places.exemplar, label, frames, shapes), side, len(filled.source)
 
 
 def guide_together(pictures: Sequence[Array]) -> list[Floats]:
@@ -312,8 +317,7 @@ def choose_side(free: Bools, chosen: int | None, largest: int) -> int:
             hint = f"at most {fits} has one" if fits else "nor has any other; give an exemplar"
             raise InvalidInput(f"patch: {chosen} has no place in the image that is free of holes; {hint}")
         return chosen
-    usual = min(largest, max(12, min(32, min(free.shape) // 6)))
-    for side in range(usual, LEAST - 1, -1):
+    for side in range(min(largest, usual_side(min(free.shape))), LEAST - 1, -1):
         if np.count_nonzero(mark_corners(free, side)) >= PLACES:
             return side
     if not mark_corners(free, LEAST).any():
@@ -336,24 +340,3 @@ def widen(mask: Bools, width: int, wrap: Sequence[bool]) -> Bools:
 def find_places(marked: Array) -> tuple[NDArray[np.intp], ...]:
     """Return the places of what is not zero, as `np.nonzero`, which looks at each axis apart, in a tenth of its time."""
     return np.unravel_index(np.flatnonzero(marked), marked.shape)
-
-
-def paste(
-    kept: SourceMap,
-    label: NDArray[np.int32],
-    origin: NDArray[np.int64],
-    coordinates: Floats,
-    mirrors: Sequence[Flip],
-) -> SourceMap:
-    """Return the map of a picture in which patches are pasted: those of the last exemplar, each in one of its mirrors."""
-    new = find_places(label >= 0)
-    places, exemplar = kept.coordinates.copy(), kept.exemplar.copy()
-    which, found = origin[label[new]], coordinates[new]
-    rows, columns = kept.shapes[-1]
-    for number, mirror in enumerate(mirrors):
-        here = which == number
-        found[here] = flip_coordinates(found[here], mirror, (rows, columns))
-    places[new] = found
-    exemplar[new] = len(kept.shapes) - 1
-    frames = np.stack([np.eye(2, dtype=np.float32), *(flip_frame(mirrors[o]) for o in origin)])
-    return SourceMap(places, exemplar, (label + 1).astype(np.uint32), frames, kept.shapes)

@@ -19,7 +19,7 @@ from texrs.elements._layout import Layout, LayoutName
 from texrs.elements._options import ElementSearch, Settings
 from texrs.elements._proposal import Start, propose
 from texrs.elements._search import Detections, search_similar
-from texrs.elements._separation import Separation, add_missing, reconcile
+from texrs.elements._separation import Separation, add_missing, nearest_pixels, reconcile
 from texrs.errors import InvalidInput
 from texrs.layouts import directions, spacing
 
@@ -179,9 +179,8 @@ def _separate(guide: Floats, given: Given, start: Start, found: Detections, how:
         agreed = reconcile(mask, found.points, found.scores, found.similarity, own, how.wrap, certain=certain)
         # What a user lists stays as it is; the mask alone follows.
         return replace(plain, mask=agreed.mask, made_by=agreed.made_by) if listed else agreed
-    at = np.clip(np.rint(found.points).astype(np.intp), 0, np.array(mask.shape) - 1)
     jointed = start.layout == Layout.JOINTED
-    if not listed and (jointed or mask[tuple(at.T)].mean() < 0.5):
+    if not listed and (jointed or mask[nearest_pixels(found.points, mask.shape)].mean() < 0.5):
         return add_missing(plain, found.similarity, how.wrap, joints=jointed)
     return plain
 

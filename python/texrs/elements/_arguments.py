@@ -12,7 +12,7 @@ from texrs._arrays import as_mask, try_array
 from texrs._typing import Bools
 from texrs.elements._layout import Layout
 from texrs.elements._mask import disc, ellipse, nearest_odd, stamp
-from texrs.elements._separation import label_components
+from texrs.elements._separation import label_components, rank_pieces
 from texrs.errors import InvalidInput
 
 Points = NDArray[np.float64]
@@ -163,18 +163,10 @@ def as_background(value: object, shape: Shape) -> Bools | None:
 
 def usual_box(mask: Bools, layout: Layout | None, wrap: Wrap) -> Box:
     """Return the box of the most usual piece of a mask that no border cuts."""
-    from skimage.measure import regionprops
-
-    regions = [
-        r
-        for r in regionprops(label_components(mask, wrap)[0])
-        if min(r.bbox[:2]) > 0 and r.bbox[2] < mask.shape[0] and r.bbox[3] < mask.shape[1] and r.area >= LEAST**2
-    ]
+    regions = rank_pieces(label_components(mask, wrap)[0], LEAST**2)
     if not regions or layout == Layout.CONNECTED:
         raise InvalidInput("box: is needed with this mask, no piece of which lies wholly inside the image")
-    usual = float(np.median([r.area for r in regions]))
-    best = min(regions, key=lambda r: (abs(np.log(r.area / usual)), r.label))
-    top, left, bottom, right = best.bbox
+    top, left, bottom, right = regions[0].bbox
     shape = (mask.shape[0], mask.shape[1])
     return as_box(((top + bottom - 1) / 2, (left + right - 1) / 2, bottom - top, right - left), shape)
 

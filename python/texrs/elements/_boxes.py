@@ -7,6 +7,7 @@ import numpy as np
 from texrs._typing import Floats
 from texrs.elements._arguments import LEAST, Box
 from texrs.elements._mask import nearest_odd, to_lab
+from texrs.elements._separation import rank_pieces
 from texrs.exemplar.regularity import find_lattice
 from texrs.exemplar.segmentation import ElementOptions, segment
 
@@ -62,17 +63,9 @@ def _find_blobs(small: Floats) -> list[tuple[float, float, float, float]]:
 
 def _find_pieces(small: Floats) -> list[tuple[float, float, float, float]]:
     """Take pieces of a segmentation by colour, of the usual size."""
-    from skimage.measure import regionprops
-
-    elements = segment(small, ElementOptions(kind="components")).elements
-    rows, columns = elements.shape
-    inner = [
-        r for r in regionprops(elements) if r.bbox[0] > 0 and r.bbox[1] > 0 and r.bbox[2] < rows and r.bbox[3] < columns
-    ]
+    inner = rank_pieces(segment(small, ElementOptions(kind="components")).elements)
     if len(inner) < 3:
         return []
-    usual = float(np.median([r.area for r in inner]))
-    inner.sort(key=lambda r: (abs(float(np.log(r.area / usual))), r.label))
     sides = [np.median([r.bbox[a + 2] - r.bbox[a] for r in inner[: max(3, len(inner) // 2)]]) for a in range(2)]
     found = []
     for r in inner[:PIECES]:

@@ -21,7 +21,7 @@ from texrs.elements._boxes import propose_boxes, resize_box
 from texrs.elements._layout import Layout
 from texrs.elements._mask import disc, nearest_odd, to_lab
 from texrs.elements._search import Detections, appearance_vectors, search_similar
-from texrs.elements._separation import label_components
+from texrs.elements._separation import label_components, nearest_pixels
 from texrs.errors import InvalidInput
 from texrs.layouts import spacing
 
@@ -326,13 +326,13 @@ def _compare_things(colours: Floats, away: Floats, points: NDArray[np.float64]) 
     light = colours[..., 0]
     edges = gaussian_gradient_magnitude(light, 1.0)
     smooth = np.stack([gaussian_filter(colours[..., c], 2.0) for c in range(3)], axis=-1)
-    at = np.clip(np.rint(points).astype(np.intp), 0, np.array(light.shape) - 1)
+    at = nearest_pixels(points, light.shape)
 
     def unlike(some: Floats) -> float:
         return float(np.median(np.sqrt(((some - np.median(some, axis=0)) ** 2).sum(axis=-1))))
 
     busy = (float(np.median(edges[inner])) + LEAST_EDGE) / (float(np.median(edges[outer])) + LEAST_EDGE)
-    varied = (unlike(smooth[tuple(at.T)]) + LEAST_EDGE) / (unlike(smooth[outer]) + LEAST_EDGE)
+    varied = (unlike(smooth[at]) + LEAST_EDGE) / (unlike(smooth[outer]) + LEAST_EDGE)
     return busy * varied, abs(float(np.median(light[inner])) - float(np.median(light[outer])))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,6 +69,23 @@ def label_components(mask: Bools, wrap: Wrap) -> tuple[Labels, int]:
     return dense[pieces].astype(np.int32), len(names) - 1
 
 
+def rank_pieces(labels: Labels, least: float = 0) -> list[Any]:
+    """Return the pieces of labels that no border cuts, of so many pixels at least: those of the most usual area first."""
+    from skimage.measure import regionprops
+
+    rows, columns = labels.shape
+    whole = [r for r in regionprops(labels) if min(r.bbox[:2]) > 0 and r.bbox[2] < rows and r.bbox[3] < columns]
+    large = [r for r in whole if r.area >= least]
+    usual = float(np.median([r.area for r in large])) if large else 0.0
+    return sorted(large, key=lambda r: (abs(float(np.log(r.area / usual))), r.label))
+
+
+def nearest_pixels(points: NDArray[np.float64], shape: tuple[int, ...]) -> tuple[NDArray[np.intp], ...]:
+    """Return the rows and columns of the pixels that points lie on, or nearest to."""
+    rows, columns = np.clip(np.rint(points).astype(np.intp), 0, np.array(shape) - 1).T
+    return rows, columns
+
+
 def reconcile(
     mask: Bools,
     points: NDArray[np.float64],
@@ -85,8 +103,7 @@ def reconcile(
     from skimage.measure import regionprops
 
     pieces, count = label_components(mask, wrap)
-    at = np.clip(np.rint(points).astype(np.intp), 0, np.array(mask.shape) - 1)
-    owner = pieces[tuple(at.T)]
+    owner = pieces[nearest_pixels(points, mask.shape)]
     regions = {r.label: r for r in regionprops(pieces)}
     area, solid = np.zeros(count + 1), np.zeros(count + 1)
     for number, region in regions.items():
@@ -121,12 +138,11 @@ def reconcile(
             place = centre if good[number] or whole else points[best]
             kept.append((*place, scores[best], best))
         elif good[number] or certain:
-            place = np.clip(np.rint(centre).astype(np.intp), 0, np.array(mask.shape) - 1)
-            kept.append((*centre, float(similarity[tuple(place)]), -1))
+            kept.append((*centre, float(similarity[nearest_pixels(centre, mask.shape)]), -1))
     kept.sort(key=lambda p: (-p[2], p[0], p[1]))
     table = np.array(kept, np.float64).reshape(-1, 4)
-    names = {int(pieces[tuple(np.clip(np.rint(p[:2]).astype(int), 0, np.array(mask.shape) - 1))]) for p in table}
-    used = np.isin(pieces, sorted(names - {0}))
+    names = np.unique(pieces[nearest_pixels(table[:, :2], mask.shape)])
+    used = np.isin(pieces, names[names > 0])
     # What the border cuts may be no element, but is no ground either.
     ends = [np.take(pieces, side, axis) for axis in range(2) if not wrap[axis] for side in (0, -1)]
     cut = np.unique(np.concatenate(ends)) if ends else np.zeros(0, np.intp)
@@ -151,8 +167,7 @@ def add_missing(found: Separation, similarity: Floats, wrap: Wrap, *, joints: bo
 
     size, least = found.mask.shape, JOINED if joints else MESHED
     pieces, count = label_components(found.mask if joints else ~found.mask, wrap)
-    at = np.clip(np.rint(found.points).astype(np.intp), 0, np.array(size) - 1)
-    inside = np.bincount(pieces[tuple(at.T)], minlength=count + 1)
+    inside = np.bincount(pieces[nearest_pixels(found.points, size)], minlength=count + 1)
     inside[0] = 0
     areas = np.bincount(pieces.ravel(), minlength=count + 1)
     if not (inside == 1).any():
@@ -167,8 +182,7 @@ def add_missing(found: Separation, similarity: Floats, wrap: Wrap, *, joints: bo
         if inside[region.label] or cut or not fits or region.solidity < SOLID:
             continue
         centre = _centre(region.coords, size, wrap)
-        place = np.clip(np.rint(centre).astype(np.intp), 0, np.array(size) - 1)
-        new.append((*centre, float(similarity[tuple(place)]), -1.0))
+        new.append((*centre, float(similarity[nearest_pixels(centre, size)]), -1.0))
     if not new:
         return found
     table = np.concatenate([np.column_stack([found.points, found.scores, found.detection]), np.array(new)])
@@ -178,8 +192,7 @@ def add_missing(found: Separation, similarity: Floats, wrap: Wrap, *, joints: bo
 
 
 def _drop_fragments(found: Separation, pieces: Labels, areas: NDArray[np.intp], usual: float) -> Separation:
-    at = np.clip(np.rint(found.points).astype(np.intp), 0, np.array(pieces.shape) - 1)
-    owner = pieces[tuple(at.T)]
+    owner = pieces[nearest_pixels(found.points, pieces.shape)]
     bits = (owner > 0) & (areas[owner] < ADDED * usual)
     if not bits.any() or bits.mean() > 1 - TRUSTED:
         return found

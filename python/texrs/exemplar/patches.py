@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from texrs._typing import Bools, Floats
-from texrs.exemplar.symmetry import Flip, flip
+from texrs.exemplar.symmetry import Flip, flip, flip_coordinates, flip_frame
+from texrs.kernels.complete import Completion
 from texrs.kernels.patch_search import PatchIndex
 
-__all__ = ["index_patches", "mark_corners"]
+__all__ = ["index_patches", "mark_corners", "place_patches", "usual_side"]
 
 
 def index_patches(guide: Floats, side: int, mirrors: Sequence[Flip], free: Bools | None = None) -> PatchIndex:
@@ -31,6 +33,44 @@ def index_patches(guide: Floats, side: int, mirrors: Sequence[Flip], free: Bools
     pictures = [flip(guide, mirror) for mirror in mirrors]
     allowed = None if free is None else [mark_corners(flip(free, mirror), side) for mirror in mirrors]
     return PatchIndex(pictures, allowed=allowed, max_patch=side)
+
+
+def place_patches(
+    found: Completion, mirrors: Sequence[Flip], shape: tuple[int, int]
+) -> tuple[tuple[NDArray[np.intp], ...], Floats, list[Floats]]:
+    """Return what patches fill, and where that comes from in an exemplar of which some lie in mirror images.
+
+    Parameters
+    ----------
+    found : Completion
+        Made with an index of the mirror images.
+    mirrors : sequence of (bool, bool)
+        The mirror images, as in the index.
+    shape : (int, int)
+        Sides of the exemplar.
+
+    Returns
+    -------
+    tuple of intp array
+        Rows and columns of the pixels that are new.
+    (n, 2) float32 array
+        Where each of them comes from, (row, column) in the exemplar.
+    list of (2, 2) float32 array
+        The Jacobian of each patch.
+
+    """
+    # In a tenth of the time of `np.nonzero`, which looks at each axis apart.
+    new = np.unravel_index(np.flatnonzero(found.label >= 0), found.label.shape)
+    origin, places = found.source[found.label[new]], found.coordinates[new]
+    for number, mirror in enumerate(mirrors):
+        here = origin == number
+        places[here] = flip_coordinates(places[here], mirror, shape)
+    return new, places, [flip_frame(mirrors[number]) for number in found.source]
+
+
+def usual_side(shorter: int) -> int:
+    """Return the usual side of a patch, by the shorter side of an exemplar: about the size of an element."""
+    return min(shorter, max(12, min(32, shorter // 6)))
 
 
 def mark_corners(free: Bools, side: int) -> Bools:

@@ -54,11 +54,9 @@ def find_lattice(guide: Floats) -> Lattice | None:
     """Find the lattice that an image repeats on, by the correlation of its lightness, or of its edges, with itself."""
     from scipy.ndimage import gaussian_filter
 
-    height, width = guide.shape[:2]
-    if min(height, width) < 4 * SHORTEST:
+    if min(guide.shape[:2]) < 4 * SHORTEST:
         return None
-    top, left = max(0, height - WINDOW) // 2, max(0, width - WINDOW) // 2
-    light = guide[top : top + WINDOW, left : left + WINDOW].mean(axis=-1, dtype=np.float32)
+    light = crop_light(guide)
     if light.std() < 1e-4:
         return None
     rows, columns = np.gradient(gaussian_filter(light, 1.0))
@@ -67,6 +65,13 @@ def find_lattice(guide: Floats) -> Lattice | None:
     believed = [each for each in found if each is not None and each.correlation >= REGULAR]
     # Edges are told apart less well than colours: two of them may be half a period apart.
     return believed[0] if believed else None
+
+
+def crop_light(guide: Floats) -> Floats:
+    """Return the lightness of the middle of an image."""
+    top, left = (max(0, n - WINDOW) // 2 for n in guide.shape[:2])
+    light: Floats = guide[top : top + WINDOW, left : left + WINDOW].mean(axis=-1, dtype=np.float32)
+    return light
 
 
 def _correlate(picture: Floats) -> Floats:
@@ -177,9 +182,7 @@ def measure_polarity(guide: Floats) -> tuple[float, float, float]:
     """
     from scipy.ndimage import gaussian_filter
 
-    height, width = guide.shape[:2]
-    top, left = max(0, height - WINDOW) // 2, max(0, width - WINDOW) // 2
-    light = guide[top : top + WINDOW, left : left + WINDOW].mean(axis=-1, dtype=np.float32)
+    light = crop_light(guide)
     along = [0.0, 0.0, 0.0]
     if min(light.shape) < BLOCKS * SHORTEST:
         return along[0], along[1], along[2]

@@ -9,7 +9,7 @@ import numpy as np
 
 from texrs._typing import Floats
 from texrs.exemplar import Exemplar
-from texrs.exemplar.patches import index_patches, mark_corners
+from texrs.exemplar.patches import index_patches, mark_corners, usual_side
 from texrs.exemplar.segmentation import Segmentation
 from texrs.exemplar.symmetry import NONE, Flip
 from texrs.kernels.patch_search import PatchIndex
@@ -62,7 +62,7 @@ def make_plan(
     """
     if literal:
         parts, options = replace(parts, kind="none", lattice=None), replace(options, mirror=False)
-    guide, extent = exemplar.guidance, side or choose_side(min(exemplar.shape))
+    guide, extent = exemplar.guidance, side or usual_side(min(exemplar.shape))
     mirrors = exemplar.mirrors if options.mirror else (NONE,)
     moves = settle_moves(exemplar, parts, options, mirrors)
     return Plan(guide, parts, choose_patches(guide, parts, mirrors, extent), mirrors, moves, extent, literal)
@@ -83,11 +83,6 @@ def settle_moves(
     if options.rotate is None:
         options = replace(options, rotate=ROTATE if exemplar.directedness < DIRECTED else 0.0)
     return Moves(options, (), axes)
-
-
-def choose_side(shorter: int) -> int:
-    """Return the default side of a completion patch, by the shorter side of an exemplar: about the size of an element."""
-    return min(shorter, max(12, min(32, shorter // 6)))
 
 
 def choose_patches(guide: Floats, parts: Segmentation, mirrors: Sequence[Flip], side: int) -> PatchIndex:

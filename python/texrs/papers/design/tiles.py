@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Array, Floats
+from texrs.exemplar.patches import place_patches
 from texrs.exemplar.symmetry import flip_coordinates, flip_frame
 from texrs.kernels.complete import complete
 from texrs.kernels.gather import gather
@@ -73,12 +74,9 @@ def fill_holes(draft: Draft, plan: Plan, shapes: tuple[tuple[int, ...], ...], wh
             paper=plan.literal,
             shown=plan.mirrors.index(draft.mirror),
         )
-        pasted = filled.label >= 0
-        origin = np.where(pasted, filled.source[filled.label], -1)
-        for k, mirror in enumerate(plan.mirrors):
-            coordinates[origin == k] = flip_coordinates(filled.coordinates[origin == k], mirror, shape)
-        label = np.where(pasted, len(frames) + filled.label, label).astype(np.uint32)
-        frames += [flip_frame(plan.mirrors[k]) for k in filled.source]
+        new, coordinates[new], jacobians = place_patches(filled, plan.mirrors, shape)
+        label = np.where(filled.label >= 0, len(frames) + filled.label, label).astype(np.uint32)
+        frames += jacobians
     source = SourceMap(coordinates, np.full(shape, which, np.uint16), label, np.array(frames, np.float32), shapes)
     colours = gather(plan.guide, coordinates, interpolation="cubic")
     deformed = np.where(holes[..., np.newaxis], np.float32(0), draft.colours)
