@@ -127,17 +127,8 @@ class Folder:
         table = {
             "version": VERSION,
             "textures": {
-                name: {
-                    "file": r.file,
-                    "image": r.image,
-                    "hash": r.hash,
-                    "version": r.version,
-                    "layout": r.layout,
-                    "box": list(r.box),
-                    "elements": r.elements,
-                    "options": dict(r.options),
-                }
-                for name, r in sorted(found.items())
+                name: {key: value for key, value in asdict(record).items() if key != "name"}
+                for name, record in sorted(found.items())
             },
         }
         with io.atomic(self.path / MANIFEST) as temporary:

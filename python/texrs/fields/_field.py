@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from math import prod
 from typing import Any
@@ -58,9 +58,10 @@ class Field(ABC):
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
         """Return the frames (A, A, N) of (N, A) points, unchecked."""
 
-    @abstractmethod
     def _content(self) -> tuple[Any, ...] | None:
         """Return what the field is made of, for its key; None if that cannot be known."""
+        parts: Any = self
+        return tuple(getattr(self, part.name) for part in fields(parts) if part.compare)
 
     @abstractmethod
     def describe(self) -> str:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import cos, log, radians, sin
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,7 @@ LETTERS = "yx", "zyx"
 class Constant(Field):
     axes: int
     matrix: NDArray[np.float64]
-    text: str
+    text: str = field(compare=False)
 
     @property
     def constant(self) -> NDArray[np.float32]:
@@ -29,9 +28,6 @@ class Constant(Field):
 
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
         return repeat(self.matrix, len(points))
-
-    def _content(self) -> tuple[Any, ...]:
-        return (self.matrix,)
 
     def describe(self) -> str:
         return self.text
@@ -65,9 +61,6 @@ class Wound(Field):
             return frames
         return multiply(frames, repeat(turn(self.angle, r, t, self.axes), len(points)))
 
-    def _content(self) -> tuple[Any, ...]:
-        return (self.centre, self.radial, self.tangential, self.angle)
-
     def over(self, shape: Sequence[int]) -> Field:
         super().over(shape)
         return self if self.centre is not None else replace(self, centre=tuple((n - 1) / 2 for n in shape))
@@ -95,9 +88,6 @@ class Zigzag(Field):
         both = np.stack([turn(a, self.first, self.second, self.axes) for a in (self.angle, -self.angle)], axis=-1)
         return np.asarray(both[:, :, odd.astype(np.intp)])
 
-    def _content(self) -> tuple[Any, ...]:
-        return (self.period, self.angle, self.across, self.first, self.second)
-
     def describe(self) -> str:
         letters = LETTERS[self.axes - 2]
         plane = letters[self.first] + letters[self.second]
@@ -119,9 +109,6 @@ class Ramp(Field):
         way = np.clip(points[:, self.along] / (128.0 if self.length is None else self.length), 0, 1)
         size = np.exp(np.ascontiguousarray(log(self.start) + way * log(self.stop / self.start)))
         return repeat(np.eye(self.axes), len(points)) * size
-
-    def _content(self) -> tuple[Any, ...]:
-        return (self.start, self.stop, self.along, self.length)
 
     def over(self, shape: Sequence[int]) -> Field:
         super().over(shape)

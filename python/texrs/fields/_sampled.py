@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import prod
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -209,9 +208,6 @@ class _Grid(Field):
                 stretch += weight * self.stretches[..., index]
         return _join(turn, stretch, points)
 
-    def _content(self) -> tuple[Any, ...]:
-        return (self.sides, self.first, self.step, self.turns, self.stretches)
-
     def describe(self) -> str:
         return f"array of {' x '.join(map(str, self.sides))} frames, {' x '.join(f'{d:g}' for d in self.step)} apart"
 
@@ -250,9 +246,6 @@ class _Scattered(Field):
             away = points[:, a] - place[a]
             total = total + away * away
         return total
-
-    def _content(self) -> tuple[Any, ...]:
-        return (self.places, self.turns, self.stretches)
 
     def describe(self) -> str:
         return f"interpolated between {len(self.places)} frames"

@@ -85,7 +85,7 @@ def quilt(
             which = mine[int(uniform(seed, 0, 0, 0, 3) * len(mine))]
             free = [n - m + 1 for n, m in zip(pictures[which].colours.shape, shape, strict=False)]
             row, column = (int(uniform(seed, 1 + axis, 0, 0, 3) * n) for axis, n in enumerate(free))
-            canvas.lay_first(window, Match(0.0, which, row, column))
+            canvas.lay(window, Match(0.0, which, row, column))
         else:
             canvas.paste(window, finders[wanted[number]])
     progress(1.0)

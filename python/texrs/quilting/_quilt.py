@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,10 +86,6 @@ class Quilt:
         lines = corner[:, np.newaxis] + np.multiply.outer(width, rows)
         return np.asarray(lines[..., np.newaxis] + columns, np.uint32)
 
-    def lay_first(self, window: Window, match: Match) -> None:
-        """Lay the first patch."""
-        self._lay(window, match, np.ones(window.shape, bool))
-
     def paste(self, window: Window, finder: Finder) -> None:
         """Cut the most promising matches into what is there, and keep the one that shows and repeats the least."""
         old, known = self.place[window.index(self.size)], window.mark_known()
@@ -109,9 +106,10 @@ class Quilt:
         seams = self.cut(window, colours, self.all_penalties.take(old), exact)
         usual = float(np.median([value for value, _ in seams])) or 1.0
         chosen = min(range(len(best)), key=lambda i: seams[i][0] / usual + charges[best[i]])
-        self._lay(window, exact[chosen], seams[chosen][1])
+        self.lay(window, exact[chosen], seams[chosen][1])
 
-    def _lay(self, window: Window, match: Match, mask: Bools) -> None:
+    def lay(self, window: Window, match: Match, mask: Bools | Literal[True] = True) -> None:
+        """Lay a patch, or what of it a mask marks."""
         at, [places] = window.index(self.size), self.list_places([match], window)
         self.place[at] = np.where(mask, places, self.place[at])
         self.label[at] = np.where(mask, np.uint32(self.pastes), self.label[at])
