@@ -81,7 +81,7 @@ def test_what_it_does_not_do():
     given = texrs.Constraints(mask=np.ones((32, 32), bool), values=weave[:32, :32])
     with pytest.raises(InvalidInput, match="constraints: the paper's method knows none"):
         texrs.synthesize(weave, 32, method="paper", constraints=given)
-    with pytest.raises(InvalidInput, match="method: None or 'paper'"):
+    with pytest.raises(InvalidInput, match="method: allowed are None and 'paper'"):
         texrs.synthesize(weave, 32, method="su")
     with pytest.raises(ValueError, match="stop"):
         texrs.synthesize(weave, 32, method="paper", progress=stop)

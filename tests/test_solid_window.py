@@ -175,7 +175,7 @@ def test_bad_indices(index: tuple[object, ...], says: str) -> None:
 
 def test_bad_options() -> None:
     for options, says in (
-        ({"field": fields.circular(axes=2)}, "field: needs 3 axes"),
+        ({"field": fields.circular(axes=2)}, "field: needs a field of 3 axes"),
         ({"cache_bytes": -1}, "cache_bytes"),
         ({"interpolation": "best"}, "interpolation"),
         ({"seed": -1}, "seed"),

@@ -252,4 +252,4 @@ def swap_halves(shape: tuple[int, ...], axis: int, split: int, mask: Bools) -> S
     lines[side - split - overlap : side - split] = np.moveaxis(mask, axis, 0)
     coordinates = SourceMap.identity(size).coordinates
     coordinates[..., axis] += np.where(late, np.float32(split + overlap - side), np.float32(split))
-    return SourceMap(coordinates, np.zeros(size, np.uint16), late.astype(np.uint32), None, (shape[:2],))
+    return SourceMap.from_coordinates(coordinates, shape[:2], label=late.astype(np.uint32))

@@ -190,7 +190,7 @@ class Atlas:
         which, at = self.locate(places)
         inverse = np.array([np.diag([1 / f for f in c.factor]) for c in self.copies], np.float32)
         frame = inverse if len(self.copies) > 1 else None
-        return SourceMap(at.reshape(*shape, 2), np.zeros(shape, np.uint16), which.reshape(shape), frame, (self.shape,))
+        return SourceMap.from_coordinates(at.reshape(*shape, 2), self.shape, label=which.reshape(shape), frame=frame)
 
 
 def extend_sizes(sizes: Sequence[float], scale: Floats, wanted: tuple[float, float]) -> tuple[float, ...]:

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_float, as_mask
+from texrs._arrays import as_float, as_mask, try_array
 from texrs._engine.appearance import Demand
 from texrs._engine.pyramid import ONE, Region
 from texrs._typing import Array, Bools, Floats
@@ -114,10 +114,7 @@ class Guide:
         """Check what can be checked without a size."""
         as_float(self.weight, "weight", 0, 100)
         for name, given in (("exemplar", self.exemplar), ("output", self.output)):
-            try:
-                values = np.asarray(given)
-            except (ValueError, TypeError):
-                values = np.asarray(None)
+            values = try_array(given)
             if values.dtype.kind not in "biuf" or not np.isfinite(values).all():
                 raise InvalidInput(
                     f"guide: the map of the {name} needs finite numbers, got {values.dtype} {values.shape}"
@@ -297,15 +294,15 @@ class Conditions:
         """Ask for the guide's map, or for the mean of the values that a point of the level stands for."""
         if self.maps is not None and self.weight:
             mine, theirs = self.maps
-            points = _pool(np.ones((*theirs.shape[:-1], 1), np.float32), region, spacing)
-            wished = np.asarray(_pool(theirs, region, spacing) / np.maximum(points, 1), np.float32)
+            points = _pool(np.ones((*theirs.shape[:-1], 1), np.float32), region.shape, spacing)
+            wished = np.asarray(_pool(theirs, region.shape, spacing) / np.maximum(points, 1), np.float32)
             everywhere = np.full(region.points, self.weight, np.uint16)
             return Demand(_code(_shrink(mine, spacing)), _code(wished), everywhere)
         if self.mask is None or self.values is None or not self.mask.any():
             return None
         wanted = _as_channels(self.values, self.image)
-        total = _pool(wanted * self.mask[..., np.newaxis], region, spacing)
-        count = _pool(self.mask[..., np.newaxis].astype(np.float32), region, spacing)
+        total = _pool(wanted * self.mask[..., np.newaxis], region.shape, spacing)
+        count = _pool(self.mask[..., np.newaxis].astype(np.float32), region.shape, spacing)
         mean = np.asarray(total / np.maximum(count, 1), np.float32)
         weight = np.where(count[..., 0] > 0, WEIGHT, 0).astype(np.uint16)
         small = _shrink(_as_channels(self.image, self.image), spacing)
@@ -314,13 +311,8 @@ class Conditions:
 
 def average_points(values: Array, shape: tuple[int, ...], spacing: int) -> Array:
     """Return the mean of the points of the output that each point of a level stands for; the last stands for what is left."""
-    total, count = values, np.ones((1, 1))
-    for axis, n in enumerate(shape):
-        starts = np.minimum(np.arange(n) * spacing, values.shape[axis] - 1)
-        total = np.add.reduceat(total, starts, axis=axis)
-        size = np.diff([*starts, values.shape[axis]])
-        count = count * np.expand_dims(size, 1 - axis)
-    return np.asarray(total / np.maximum(count, 1))
+    sizes = [np.diff([*_find_starts(n, m, spacing), m]) for n, m in zip(shape, values.shape, strict=True)]
+    return np.asarray(_pool(values, shape, spacing) / np.maximum(np.multiply.outer(*sizes), 1))
 
 
 # --- checks ----------------------------------------------------------------------------------------------------------
@@ -381,11 +373,15 @@ def _code(values: Floats) -> NDArray[np.int16]:
     return out.reshape(-1)
 
 
-def _pool(values: Floats, region: Region, spacing: int) -> Floats:
+def _find_starts(count: int, length: int, spacing: int) -> NDArray[np.intp]:
+    """Return where the points of a level begin along an axis of the output."""
+    return np.minimum(np.arange(count) * spacing, length - 1)
+
+
+def _pool(values: Floats, shape: tuple[int, ...], spacing: int) -> Floats:
     """Sum values of the output over the points of a level."""
-    for axis, n in enumerate(region.shape):
-        starts = np.minimum(np.arange(n) * spacing, values.shape[axis] - 1)
-        values = np.add.reduceat(values, starts, axis=axis)
+    for axis, n in enumerate(shape):
+        values = np.add.reduceat(values, _find_starts(n, values.shape[axis], spacing), axis=axis)
     return values
 
 

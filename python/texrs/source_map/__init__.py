@@ -133,7 +133,53 @@ class SourceMap:
 
         """
         grid = np.stack(np.meshgrid(*(np.arange(n, dtype=np.float32) for n in shape), indexing="ij"), axis=-1)
-        return cls(grid, np.zeros(shape, np.uint16), np.zeros(shape, np.uint32), None, (tuple(shape),))
+        return cls.from_coordinates(grid, tuple(shape))
+
+    @classmethod
+    def from_coordinates(
+        cls,
+        coordinates: NDArray[np.float32],
+        shape: tuple[int, ...],
+        *,
+        label: NDArray[np.uint32] | None = None,
+        frame: NDArray[np.float32] | Frames | None = None,
+    ) -> SourceMap:
+        """Return the map of a picture (or a volume) that was made from one exemplar.
+
+        Parameters
+        ----------
+        coordinates : (rows, columns, 2) or (planes, rows, columns, 3) float32 array
+            Where each pixel comes from, in pixels of the exemplar.
+        shape : tuple of int
+            Sides of the exemplar, without channels.
+        label : uint32 array, optional
+            The patch of each pixel; one patch by default.
+        frame : float32 array or field, optional
+            As the attribute; nothing is turned by default.
+
+        Returns
+        -------
+        SourceMap
+            Which looks into that exemplar alone.
+
+        Raises
+        ------
+        InvalidInput
+            Parts that do not agree.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from texrs import SourceMap
+        >>> mirrored = SourceMap.identity((2, 3)).coordinates[:, ::-1]
+        >>> SourceMap.from_coordinates(mirrored, (2, 3)).render(np.arange(6).reshape(2, 3).astype(np.uint8))
+        array([[2, 1, 0],
+               [5, 4, 3]], dtype=uint8)
+
+        """
+        sides = coordinates.shape[:-1]
+        patches = np.zeros(sides, np.uint32) if label is None else label
+        return cls(coordinates, np.zeros(sides, np.uint16), patches, frame, (shape,))
 
     @property
     def shape(self) -> tuple[int, ...]:

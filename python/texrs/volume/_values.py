@@ -33,11 +33,12 @@ def correlate(values: Array, reach: int, product: np.ufunc) -> NDArray[np.float6
     return out
 
 
-def check_field(field: object, axes: int) -> None:
-    """Check that a field, if there is one, has so many axes."""
+def check_field(field: object, axes: int) -> Field | None:
+    """Check that a field, if there is one, has so many axes, and return it."""
     if field is not None and (not isinstance(field, Field) or field.axes != axes):
         got = field if isinstance(field, Field) else type(field).__name__
         raise InvalidInput(f"field: needs a field of {axes} axes, got {got}")
+    return field
 
 
 def axes_of(image: Array) -> int:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_float, as_image, as_int, as_size, guidance
+from texrs._arrays import as_float, as_image, as_int, as_size, guidance, try_array
 from texrs._typing import Array, Floats, Interpolation, Path, Progress
 from texrs.errors import FileError, InvalidInput, LimitExceeded
 from texrs.io import atomic
@@ -130,11 +130,7 @@ def oblique(
     v = as_image(volume, "volume", axes=3)
     shape = np.array(v.shape[:3])
     middle = (shape - 1) / 2 if point is None else as_direction(point, "point")
-    if (normal is None) == (axes is None):
-        raise InvalidInput("normal, axes: needs one of the two")
-    steps = _across(as_direction(normal, "normal")) if axes is None else np.asarray(axes, np.float64)
-    if steps.shape != (2, 3) or not np.isfinite(steps).all() or np.linalg.norm(np.cross(*steps)) < 1e-6:
-        raise InvalidInput("axes: needs two directions of three numbers that are not parallel")
+    steps = as_steps(normal, axes)
     if size is None:
         low, high = _clip_ray(steps, middle, shape)
         start, sides = np.ceil(low), tuple((np.floor(high) - np.ceil(low) + 1).astype(int).tolist())
@@ -349,9 +345,18 @@ def _view(azimuth: float, elevation: float) -> NDArray[np.float64]:
     )
 
 
-def _across(normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return unit steps of rows and columns on a plane: as those of a slice where it is one."""
-    n = normal / np.linalg.norm(normal)
+def as_steps(normal: object, axes: object) -> NDArray[np.float64]:
+    """Return the steps of rows and columns on a plane, (2, 3): those given, or unit steps across a normal."""
+    if (normal is None) == (axes is None):
+        raise InvalidInput("normal, axes: needs one of the two")
+    if axes is not None:
+        steps = try_array(axes, np.float64)
+        if steps.shape != (2, 3) or not np.isfinite(steps).all() or np.linalg.norm(np.cross(*steps)) < 1e-6:
+            raise InvalidInput("axes: needs two directions of three numbers that are not parallel")
+        return steps
+    # Of a normal along an axis they are those of a slice.
+    across = as_direction(normal, "normal")
+    n = across / np.linalg.norm(across)
     along = np.eye(3)[2 if abs(n[2]) < 0.9 else 1]
     columns = along - n * (n @ along)
     columns /= np.linalg.norm(columns)

@@ -26,7 +26,7 @@ from texrs.papers.perspective.request import Request
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
-__all__ = ["Averaged", "average", "average_windows"]
+__all__ = ["average", "average_windows"]
 
 SIDE, SPACING = 8, 2
 ROUNDS = (20, 10, 6)
@@ -39,15 +39,6 @@ NEAREST = 1e-3
 Doubles = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Averaged:
-    """The averages in the exemplar's dtype, its sample of the heaviest window at each pixel, and the energy of each round."""
-
-    image: Array
-    coordinates: Floats
-    energies: list[list[float]]
-
-
 def average_windows(asked: Request, progress: Progress | None) -> Synthesis:
     """Do what the paper prints; the composite shows what the averages were made of."""
     image, target = asked.exemplar.pixels, asked.target
@@ -57,19 +48,18 @@ def average_windows(asked: Request, progress: Progress | None) -> Synthesis:
         raise InvalidInput(f"exemplar: the paper's method takes up to 4 channels, got {image.shape[-1]}")
     if min(*image.shape[:2], *target.shape) < 2 * SIDE:
         raise InvalidInput(f"size: the paper's method needs at least {2 * SIDE} pixels a side, got {target.shape}")
-    made = average(image, asked.scale, target, weight=asked.strength, seed=asked.seed, progress=progress)
-    shape = (target.shape[0], target.shape[1])
-    source = SourceMap(
-        made.coordinates, np.zeros(shape, np.uint16), np.zeros(shape, np.uint32), None, (image.shape[:2],)
+    made, coordinates, energies = average(
+        image, asked.scale, target, weight=asked.strength, seed=asked.seed, progress=progress
     )
+    source = SourceMap.from_coordinates(coordinates, image.shape[:2])
     composite = source.render(asked.exemplar.image, interpolation="nearest")
-    report = {"method": "paper", "seed": asked.seed, "scale_weight": asked.strength, "energies": made.energies}
-    return Synthesis(made.image.reshape(composite.shape), source, {"target": target, "composite": composite}, report)
+    report = {"method": "paper", "seed": asked.seed, "scale_weight": asked.strength, "energies": energies}
+    return Synthesis(made.reshape(composite.shape), source, {"target": target, "composite": composite}, report)
 
 
 def average(
     image: Array, scale: Floats, target: Floats, *, weight: float, seed: int, progress: Progress | None
-) -> Averaged:
+) -> tuple[Array, Floats, list[list[float]]]:
     """Minimise Eq. 5 from coarse to fine."""
     exemplars, scales, targets = [to_unit(image)], [scale], [target]
     while len(exemplars) < len(ROUNDS) and min(*exemplars[-1].shape[:2], *targets[-1].shape) >= 4 * SIDE:
@@ -95,7 +85,7 @@ def average(
         energies.append(found)
     assert x is not None
     assert at is not None
-    return Averaged(bring_back(x, image), np.asarray(at, np.float32), energies)
+    return bring_back(x, image), np.asarray(at, np.float32), energies
 
 
 def bring_back(x: Doubles, like: Array) -> Array:

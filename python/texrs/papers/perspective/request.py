@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from texrs import scale_maps
-from texrs._arrays import as_float, as_seed, as_size, as_wrap
+from texrs._arrays import as_choice, as_float, as_method, as_seed, as_size, as_wrap
 from texrs._typing import Array, Floats, Interpolation
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
@@ -85,10 +85,8 @@ class Request:
         closed = as_wrap(wrap)
         check_wrap(wanted, closed, target is None)
         strength = as_float(scale_weight, "scale_weight", 0, 16)
-        if method not in (None, "paper"):
-            raise InvalidInput(f"method: None or 'paper' is allowed, got {method!r}")
-        if interpolation not in ("nearest", "linear", "cubic"):
-            raise InvalidInput(f"interpolation: allowed are nearest, linear and cubic; got {interpolation!r}")
+        as_method(method, None, "paper")
+        as_choice(interpolation, "interpolation", ("nearest", "linear", "cubic"))
         return cls(known, mine, wanted, method, strength, augment_scales, closed, as_seed(seed), interpolation)
 
 

@@ -279,13 +279,8 @@ def grow_texture(asked: Request, progress: Progress | None) -> Synthesis:
         start = choose_start(asked, quality)
         grown = windows.grow(asked.region, start=start, ask=asked.conditions.at, show=show, progress=progress)
     last = {f"level {count_levels(asked.exemplar.shape, COARSEST)}": show(grown.places, asked.region, 1)}
-    source = SourceMap(
-        as_coordinates(grown.places, asked.region),
-        np.zeros(asked.region.shape, np.uint16),
-        np.zeros(asked.region.shape, np.uint32),
-        asked.field,
-        (asked.exemplar.shape,),
-    )
+    coordinates = as_coordinates(grown.places, asked.region)
+    source = SourceMap.from_coordinates(coordinates, asked.exemplar.shape, frame=asked.field)
     composite = source.render(asked.exemplar.image, interpolation=asked.interpolation)
     stages = {**grown.stages, **last, "composite": composite}
     return Synthesis(asked.conditions.show(composite), source, stages, describe(asked, quality, trial, grown))

@@ -61,14 +61,7 @@ class Trial:
             volume.frequency(volume.lightness(seen, axes=axes), window=window, whole=field is not None and axes == 3)
             for seen in (image, shown)
         ]
-        source = SourceMap(
-            coordinates,
-            np.zeros(coordinates.shape[:-1], np.uint16),
-            np.zeros(coordinates.shape[:-1], np.uint32),
-            None,
-            (image.shape[:axes],),
-        )
-        used = volume.cell_reuse(source).most_used
+        used = volume.cell_reuse(SourceMap.from_coordinates(coordinates, image.shape[:axes])).most_used
         return cls([round(float(r), 4) for r in relative], round(fine[1] / max(fine[0], 1e-12), 4), round(used, 2))
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import numbers
-
+from texrs._arrays import as_int
 from texrs._engine.pyramid import Region
 from texrs._typing import Array
-from texrs.errors import InvalidInput, LimitExceeded
+from texrs.errors import LimitExceeded
 from texrs.fields import Field
 
 __all__ = ["check_memory"]
@@ -32,13 +31,10 @@ def estimate_bytes(image: Array, region: Region, field: Field | None) -> int:
 
 def check_memory(image: Array, region: Region, field: Field | None, limit: object) -> None:
     """Refuse what would take more memory than allowed, before anything is allocated."""
-    if limit is None:
-        limit = LIMIT
-    if isinstance(limit, bool) or not isinstance(limit, numbers.Integral) or int(limit) <= 0:
-        raise InvalidInput(f"memory_limit: needs a positive number of bytes, got {limit!r}")
+    most = LIMIT if limit is None else as_int(limit, "memory_limit", 1, 1 << 62)
     total = estimate_bytes(image, region, field)
-    if total > int(limit):
+    if total > most:
         raise LimitExceeded(
             f"size: {region.shape} would take {total / 2**30:.1f} GiB, more than the limit of "
-            f"{int(limit) / 2**30:.1f} GiB (memory_limit); an unbounded texture gives it in parts"
+            f"{most / 2**30:.1f} GiB (memory_limit); an unbounded texture gives it in parts"
         )

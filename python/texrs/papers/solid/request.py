@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from texrs._arrays import as_seed, as_size, as_wrap
+from texrs._arrays import as_choice, as_method, as_seed, as_size, as_wrap
 from texrs._engine.pyramid import Region
 from texrs._typing import Array, Interpolation
 from texrs.errors import InvalidInput
@@ -18,6 +18,7 @@ from texrs.fields import Field
 from texrs.growth import Conditions, Constraints, Guide
 from texrs.papers.solid.limits import check_memory
 from texrs.papers.solid.settings import Quality, as_quality
+from texrs.volume._values import check_field
 
 __all__ = ["Method", "Request", "as_field", "as_interpolation"]
 
@@ -78,8 +79,7 @@ class Request:
         """Return the request of a caller, or raise what is wrong with it."""
         known = as_exemplar(exemplar, axes=axes, minimum=COARSEST)
         region = Region.whole(as_size(size, axes=axes), as_wrap(wrap, axes=axes))
-        if method not in (None, "paper"):
-            raise InvalidInput(f"method: None or 'paper' is allowed, got {method!r}")
+        as_method(method, None, "paper")
         if method == "paper" and (constraints is not None or guide is not None):
             what = "constraints" if constraints is not None else "guide"
             raise InvalidInput(f"{what}: the paper's method knows none; leave out {what}, or method='paper'")
@@ -97,18 +97,15 @@ class Request:
 
 def as_field(field: object, axes: int) -> Field | None:
     """Check a field; the identity is none."""
-    if field is None:
-        return None
-    if not isinstance(field, Field):
-        raise InvalidInput(f"field: needs a field of texrs.fields, got {type(field).__name__}")
-    if field.axes != axes:
-        raise InvalidInput(f"field: needs {axes} axes, got one of {field.axes}")
-    still = field.constant is not None and np.array_equal(field.constant, np.eye(axes, dtype=np.float32))
-    return None if still else field
+    known = check_field(field, axes)
+    still = known is None or (
+        known.constant is not None and np.array_equal(known.constant, np.eye(axes, dtype=np.float32))
+    )
+    return None if still else known
 
 
 def as_interpolation(value: Interpolation | None, exemplar: Exemplar, default: Interpolation) -> Interpolation:
     """Check how the exemplar is looked up; labels are always at the nearest sample."""
-    if value not in (None, "nearest", "linear", "cubic"):
-        raise InvalidInput(f"interpolation: allowed are nearest, linear, cubic or None; got {value!r}")
+    if value is not None:
+        as_choice(value, "interpolation", ("nearest", "linear", "cubic"))
     return "nearest" if exemplar.labels else value or default

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, cast
 
-from texrs.errors import InvalidInput
+from texrs._arrays import as_choice
 from texrs.growth import EVERY, Settings
 
 __all__ = ["ON_DEMAND", "PRESERVE", "QUALITIES", "Quality", "as_quality"]
@@ -39,7 +39,4 @@ QUALITIES: dict[Quality, Settings] = {"preserve": PRESERVE, "fast": FAST, "optim
 
 def as_quality(quality: object) -> Quality:
     """Check the name of a quality."""
-    for name in QUALITIES:
-        if isinstance(quality, str) and quality == name:
-            return name
-    raise InvalidInput(f"quality: allowed are {', '.join(QUALITIES)}; got {quality!r}")
+    return cast(Quality, as_choice(quality, "quality", tuple(QUALITIES)))

@@ -26,7 +26,8 @@ from texrs.papers.solid.settings import ON_DEMAND
 from texrs.papers.solid.world import World
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
-from texrs.volume.pictures import _across
+from texrs.volume._values import as_direction
+from texrs.volume.pictures import as_steps
 
 __all__ = ["PlaneTexture", "SolidTexture"]
 
@@ -130,13 +131,8 @@ class _Texture:
         field = self._field
         if field is not None and field.constant is None and any(start):
             field = _Moved(field, start)
-        source = SourceMap(
-            (places / np.float32(ONE)).astype(np.float32, copy=False),
-            np.zeros(region.shape, np.uint16),
-            np.zeros(region.shape, np.uint32),
-            field,
-            (self._exemplar.shape,),
-        )
+        coordinates = (places / np.float32(ONE)).astype(np.float32, copy=False)
+        source = SourceMap.from_coordinates(coordinates, self._exemplar.shape, frame=field)
         image = self._show(places)
         report = {
             "quality": "on demand",
@@ -327,18 +323,7 @@ class SolidTexture(_Texture):
             The work was stopped.
 
         """
-        middle = _as_numbers(point, "point", (3,))
-        if (normal is None) == (axes is None):
-            raise InvalidInput("normal, axes: needs one of the two")
-        if axes is None:
-            across = _as_numbers(normal, "normal", (3,))
-            if np.abs(across).max() < 1e-6:
-                raise InvalidInput(f"normal: needs a direction, got {normal!r}")
-            steps = _across(across)
-        else:
-            steps = _as_numbers(axes, "axes", (2, 3))
-            if np.linalg.norm(np.cross(*steps)) < 1e-6:
-                raise InvalidInput("axes: needs two directions that are not parallel")
+        middle, steps = as_direction(point, "point"), as_steps(normal, axes)
         sides = as_size(size)
         reach = np.abs(middle) + np.abs(steps).T @ np.array(sides)
         if reach.max() >= FAR:
@@ -389,16 +374,6 @@ class _Moved(Field):
 
     def describe(self) -> str:
         return f"{self.field.describe()}; seen from ({', '.join(map(str, self.by))})"
-
-
-def _as_numbers(value: object, name: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    try:
-        given: Array = np.asarray(value)
-    except (ValueError, TypeError):
-        given = np.empty(0, np.object_)
-    if given.dtype.kind not in "buif" or given.shape != shape or not np.isfinite(given).all():
-        raise InvalidInput(f"{name}: needs finite numbers of shape {shape}, got {value!r}")
-    return given.astype(np.float64)
 
 
 def _as_end(value: object) -> int | None:

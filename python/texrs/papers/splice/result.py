@@ -38,7 +38,7 @@ def compose(
     shape = (a.mask.shape[0], a.mask.shape[1])
     size = label.shape
     frames = _frames(filled.mirrored)
-    source = SourceMap(places.astype(np.float32), np.zeros(size, np.uint16), label, frames, (shape,))
+    source = SourceMap.from_coordinates(places.astype(np.float32), shape, label=label, frame=frames)
     image = source.render(a.image, interpolation="nearest")
     step = STEP if a.layout == Layout.DISJOINT else coarseness(match.extension.mask.shape)
     report: dict[str, Any] = {
