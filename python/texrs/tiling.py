@@ -182,12 +182,7 @@ class Joint:
 
 
 def join(
-    guide: Floats,
-    axis: int,
-    overlaps: range,
-    *,
-    closed: bool,
-    progress: Callable[[float], object] = lambda share: None,
+    guide: Floats, axis: int, overlaps: range, *, closed: bool, progress: Callable[[float], object] = lambda share: None
 ) -> Joint:
     """Make one axis cyclic with the smallest overlap whose cut is about as cheap as the cheapest.
 

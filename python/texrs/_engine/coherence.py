@@ -241,9 +241,7 @@ def _numbers(numbers: int) -> int:
     return int(numbers)
 
 
-def _kinds(
-    kinds: tuple[NDArray[np.uint8], NDArray[np.uint8]] | None,
-) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+def _kinds(kinds: tuple[NDArray[np.uint8], NDArray[np.uint8]] | None) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     if kinds is None:
         return np.zeros(0, np.uint8), np.zeros(0, np.uint8)
     samples, points = (np.ascontiguousarray(k, np.uint8).reshape(-1) for k in kinds)

@@ -19,9 +19,7 @@ from texrs.errors import InvalidInput
 
 
 def demo_command(
-    out: Annotated[str, to_write("out", "DIR", "Folder for index.html.")],
-    count: Threads = None,
-    quiet: Quiet = False,
+    out: Annotated[str, to_write("out", "DIR", "Folder for index.html.")], count: Threads = None, quiet: Quiet = False
 ) -> None:
     """Write a page that shows what texrs makes, on built-in examples."""
     # Which needs all verbs.

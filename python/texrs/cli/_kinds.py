@@ -282,11 +282,7 @@ def read_points(path: str, about: About) -> list[list[float]]:
 
 PICTURE = Kind("FILE", lambda text, about: read_picture(text), "A file, or sample:NAME.", file=True)
 PICTURES = Kind(
-    "FILE",
-    lambda texts, about: [read_picture(text) for text in texts],
-    "Files, or sample:NAME.",
-    file=True,
-    many=True,
+    "FILE", lambda texts, about: [read_picture(text) for text in texts], "Files, or sample:NAME.", file=True, many=True
 )
 UNKNOWN = replace(PICTURE, read=lambda text, about: read_picture(text, finite=False))
 """A picture in which some is not known, and may be anything."""

@@ -73,9 +73,7 @@ def apply_command(
             note(f"{paths[0]} gives {target}: {describe(image, places.axes)}", quiet=quiet)
 
 
-def info_command(
-    file: Annotated[str, make_argument("FILE", "An image or a source map.")],
-) -> None:
+def info_command(file: Annotated[str, make_argument("FILE", "An image or a source map.")]) -> None:
     """Say what an image or a source map holds."""
     try:
         places = SourceMap.load(file)

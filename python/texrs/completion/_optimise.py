@@ -24,13 +24,7 @@ from texrs.scale_maps._maps import as_map
 from texrs.source_map import SourceMap
 
 SETTINGS = replace(
-    FROM_ATLAS,
-    passes=(24, 12, 6),
-    acceptance=1.0,
-    coherence=0.3,
-    continuation=0.0,
-    repetition=0.1,
-    exhaustive=1 << 24,
+    FROM_ATLAS, passes=(24, 12, 6), acceptance=1.0, coherence=0.3, continuation=0.0, repetition=0.1, exhaustive=1 << 24
 )
 """What goes on across a hole counts more than that nothing rare is lost, and a copy of what is beside it is no fault."""
 LEAST = 16

@@ -5,15 +5,7 @@ from texrs.exemplar.analysis import Analysis
 from texrs.exemplar.regularity import Lattice
 from texrs.exemplar.segmentation import ElementOptions, Segmentation, segment
 
-__all__ = [
-    "Analysis",
-    "ElementOptions",
-    "Exemplar",
-    "Lattice",
-    "Segmentation",
-    "as_exemplar",
-    "segment",
-]
+__all__ = ["Analysis", "ElementOptions", "Exemplar", "Lattice", "Segmentation", "as_exemplar", "segment"]
 
 
 def __dir__() -> list[str]:

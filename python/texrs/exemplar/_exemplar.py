@@ -74,12 +74,7 @@ class Exemplar:
     """
 
     def __init__(
-        self,
-        image: Array,
-        *,
-        axes: int = 2,
-        labels: bool | None = None,
-        repeat: bool | Sequence[bool] | None = None,
+        self, image: Array, *, axes: int = 2, labels: bool | None = None, repeat: bool | Sequence[bool] | None = None
     ) -> None:
         self._axes = as_int(axes, "axes", 2, 3)
         checked = as_image(image, "image", axes=self._axes)

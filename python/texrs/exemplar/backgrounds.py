@@ -109,12 +109,7 @@ def choose_background(layers: Labels, features: Features, watch: Callable[[], ob
 
 
 def add_layers(
-    regions: Regions,
-    features: Features,
-    layers: Labels,
-    elements: Labels,
-    fault: str,
-    watch: Callable[[], object],
+    regions: Regions, features: Features, layers: Labels, elements: Labels, fault: str, watch: Callable[[], object]
 ) -> tuple[Labels, Labels, str]:
     """Add layers as long as they find clearly more elements of the same size, which lie apart.
 

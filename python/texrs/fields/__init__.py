@@ -28,17 +28,7 @@ long work.
 from texrs.fields._field import LEAST_DETERMINANT, WORST_CONDITION, Field, check
 from texrs.fields._parse import names, parse
 from texrs.fields._sampled import from_array, from_function, interpolate
-from texrs.fields._shapes import (
-    circular,
-    constant,
-    identity,
-    scale_ramp,
-    shear,
-    slant,
-    slant_3d,
-    spiral,
-    zigzag,
-)
+from texrs.fields._shapes import circular, constant, identity, scale_ramp, shear, slant, slant_3d, spiral, zigzag
 
 __all__ = [
     "LEAST_DETERMINANT",

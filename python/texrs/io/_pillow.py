@@ -58,13 +58,7 @@ def encode(array: Array, suffix: str) -> bytes:
 
 
 def _decode(
-    path: Path,
-    file: bytes,
-    suffix: str,
-    sides: tuple[int, ...],
-    channels: int,
-    limit: int,
-    mode: str | None = None,
+    path: Path, file: bytes, suffix: str, sides: tuple[int, ...], channels: int, limit: int, mode: str | None = None
 ) -> Array:
     pixels = check_size(path, sides, channels, 1, limit)
     import imageio.v3 as iio

@@ -107,11 +107,7 @@ class PatchIndex:
     """
 
     def __init__(
-        self,
-        images: object,
-        *,
-        allowed: object = None,
-        max_patch: int | tuple[int, int] | None = None,
+        self, images: object, *, allowed: object = None, max_patch: int | tuple[int, int] | None = None
     ) -> None:
         single = not isinstance(images, list | tuple)
         given = as_list(images)
@@ -143,13 +139,7 @@ class PatchIndex:
         return rows, columns
 
     def best(
-        self,
-        patch: object,
-        weight: object = None,
-        *,
-        count: int = 1,
-        separation: int = 4,
-        ratio: float = math.inf,
+        self, patch: object, weight: object = None, *, count: int = 1, separation: int = 4, ratio: float = math.inf
     ) -> list[Match]:
         """Return the best positions of a patch.
 

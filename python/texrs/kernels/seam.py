@@ -11,18 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from texrs import _rust
-from texrs._arrays import (
-    as_array,
-    as_bool,
-    as_choice,
-    as_float,
-    as_image,
-    as_int,
-    as_items,
-    as_tuple,
-    as_wrap,
-    to_unit,
-)
+from texrs._arrays import as_array, as_bool, as_choice, as_float, as_image, as_int, as_items, as_tuple, as_wrap, to_unit
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 

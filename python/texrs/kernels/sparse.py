@@ -153,8 +153,4 @@ def _entries(matrix: Any, name: str = "matrix") -> tuple[NDArray[np.uint32], NDA
     lower.sum_duplicates()
     if max(lower.nnz, lower.shape[0]) >= 1 << 31:
         raise InvalidInput(f"{name}: up to 2^31 rows and entries are allowed, got {lower.shape[0]} and {lower.nnz}")
-    return (
-        lower.indptr.astype(np.uint32),
-        lower.indices.astype(np.uint32),
-        as_array(lower.data, name, np.float64),
-    )
+    return (lower.indptr.astype(np.uint32), lower.indices.astype(np.uint32), as_array(lower.data, name, np.float64))

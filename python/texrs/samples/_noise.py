@@ -223,11 +223,7 @@ def light(
         away = 0.75 * k
         shift = np.rint(-to_sun * away / pitch).astype(int)
         rise = np.roll(height, (int(shift[0]), int(shift[1])), (0, 1)) - height
-        np.maximum(
-            blocked,
-            (rise - np.float32(away * tan(up))) / np.float32(0.6 + 0.12 * away),
-            out=blocked,
-        )
+        np.maximum(blocked, (rise - np.float32(away * tan(up))) / np.float32(0.6 + 0.12 * away), out=blocked)
     sun = blur(1 - ramp(blocked, 0.0, 1.0), 0.5 / pitch) * lambert
 
     sky = np.ones_like(height)

@@ -59,10 +59,7 @@ def bricks(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fals
         across = cols // _BRICK + 3
         # The first whole course starts 9 pixels below the border, the first joints at 28 and 68.
         scene = Scene(
-            (rows, cols),
-            rng,
-            period=(courses * _COURSE, across * _BRICK),
-            origin=(2 * _COURSE - 9, 2 * _BRICK - 28),
+            (rows, cols), rng, period=(courses * _COURSE, across * _BRICK), origin=(2 * _COURSE - 9, 2 * _BRICK - 28)
         )
     lay_bricks(scene, courses, across)
     return scene.finish("bricks", layout="jointed", reach=8.0, exposure=0.9)

@@ -65,10 +65,7 @@ def pebbles(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fal
         away -= np.array(scene.period) / 2
         near = np.argsort((away**2).sum(1))[1:13]
         edge = _cell(
-            window.y + bend[0][rows, cols],
-            window.x + bend[1][rows, cols],
-            away[near],
-            weight[i] - weight[near],
+            window.y + bend[0][rows, cols], window.x + bend[1][rows, cols], away[near], weight[i] - weight[near]
         )
         inner = edge - np.float32(1.5)
         core = max(float(inner.max()), 2.0)

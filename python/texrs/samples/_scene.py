@@ -82,21 +82,10 @@ class Scene:
         return (np.arange(self.shape[1], dtype=np.float32) / _FINE)[None, :]
 
     def noise(
-        self,
-        coarse: float,
-        fine: float = 1.0,
-        gain: float = 0.5,
-        stretch: tuple[float, float] | None = None,
+        self, coarse: float, fine: float = 1.0, gain: float = 0.5, stretch: tuple[float, float] | None = None
     ) -> Floats:
         """Return `clouds` over the torus, with wavelengths in pixels."""
-        return clouds(
-            self.shape,
-            self.rng,
-            coarse=coarse * _FINE,
-            fine=fine * _FINE,
-            gain=gain,
-            stretch=stretch,
-        )
+        return clouds(self.shape, self.rng, coarse=coarse * _FINE, fine=fine * _FINE, gain=gain, stretch=stretch)
 
     def window(self, centre: tuple[float, float], reach: float, wide: float = 0.0) -> Window:
         """Return the rectangle within `reach` rows and as many (or `wide`) columns of `centre`."""

@@ -249,10 +249,7 @@ def wood_solid(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
 
 
 def _ellipsoid(
-    centre: NDArray[np.float64],
-    shape: tuple[int, ...],
-    half_axes: NDArray[np.float64],
-    rng: np.random.Generator,
+    centre: NDArray[np.float64], shape: tuple[int, ...], half_axes: NDArray[np.float64], rng: np.random.Generator
 ) -> tuple[Floats, tuple[NDArray[np.intp], ...]]:
     """Return the radius (1 at the surface) in a window of the torus around a turned ellipsoid."""
     turn, _ = np.linalg.qr(rng.standard_normal((3, 3)))

@@ -265,12 +265,7 @@ def texture_normal(values: ArrayLike) -> NDArray[np.float64]:
 
 
 def orientation_errors(
-    values: ArrayLike,
-    field: Field | None = None,
-    normal: ArrayLike | None = None,
-    *,
-    margin: int = 6,
-    step: int = 1,
+    values: ArrayLike, field: Field | None = None, normal: ArrayLike | None = None, *, margin: int = 6, step: int = 1
 ) -> Floats:
     """Return the angle between the layers of a texture and where a field turns those of its exemplar.
 

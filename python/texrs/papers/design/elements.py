@@ -61,10 +61,7 @@ def measure_elements(labels: Labels) -> list[Element]:
         rows, columns = box
         near = extended[rows.start : rows.stop + 2 * pad, columns.start : columns.stop + 2 * pad] == label
         distance = distance_transform_edt(near) - distance_transform_edt(~near)
-        touches = (
-            rows.start == 0 or rows.stop == height,
-            columns.start == 0 or columns.stop == width,
-        )
+        touches = (rows.start == 0 or rows.stop == height, columns.start == 0 or columns.stop == width)
         mine = np.argwhere(labels[box] == label)
         spread, turned = np.linalg.eigh(np.cov(mine.T, bias=True) + np.eye(2) / 12)
         angle = math.degrees(math.atan2(turned[1, 1], turned[0, 1]))

@@ -117,14 +117,7 @@ class Correction:
             level, k=K, n=N, numbers=NUMBERS, progress=stage(progress, f"similarity sets, {of}")
         )
         found = correct(
-            levels[level],
-            sets,
-            places,
-            region,
-            frames,
-            passes=PASSES,
-            compensated=False,
-            progress=stage(progress, of),
+            levels[level], sets, places, region, frames, passes=PASSES, compensated=False, progress=stage(progress, of)
         )
         return Corrected(found, PASSES, 0.0)
 

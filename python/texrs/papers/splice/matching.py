@@ -159,12 +159,7 @@ def _room_gain(a: Elements, distances: Points) -> float:
 
 
 def _place_targets(
-    layout: PointLayout,
-    scale: float,
-    angle: float,
-    size: tuple[int, int],
-    beyond: float,
-    offset: Points | float = 0.0,
+    layout: PointLayout, scale: float, angle: float, size: tuple[int, int], beyond: float, offset: Points | float = 0.0
 ) -> Points:
     """Scale and turn a layout about its centroid into the middle of an output, or beside it, and cover that and a margin."""
     turn = math.radians(angle)

@@ -26,14 +26,7 @@ class Stages(Mapping[str, Array]):
     """Pictures by name, in the order of the stages; each is drawn when first asked for."""
 
     def __init__(
-        self,
-        a: Elements,
-        b: Elements | None,
-        match: Match,
-        target: Points,
-        draft: Draft,
-        filled: Draft,
-        image: Array,
+        self, a: Elements, b: Elements | None, match: Match, target: Points, draft: Draft, filled: Draft, image: Array
     ) -> None:
         extension = match.extension
         origin = np.array(extension.origin)

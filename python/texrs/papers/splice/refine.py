@@ -133,11 +133,7 @@ def _fill_with_patches(
 
 
 def refine_places(
-    image: NDArray[np.generic],
-    wrap: tuple[bool, bool],
-    draft: Draft,
-    seed: int,
-    progress: Progress | None,
+    image: NDArray[np.generic], wrap: tuple[bool, bool], draft: Draft, seed: int, progress: Progress | None
 ) -> Places:
     """Return corrected places of what may change: at half the resolution first, then at the full one.
 
