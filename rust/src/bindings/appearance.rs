@@ -240,7 +240,7 @@ impl Appearance {
                 let region = region::<D>(&place)?;
                 let frames = self::frames(values)?;
                 let guide = self::guide(guide, a.grid().len(), region.grid.len())?;
-                let held = blocks::Held {
+                let held = blocks::Constraints {
                     points: held,
                     places: grouped("given", given)?,
                 };
@@ -251,7 +251,7 @@ impl Appearance {
         Ok(PyArray1::from_vec(py, places))
     }
 
-    /// Corrects places, and gives the number of passes and the share of points that the last two changed.
+    /// Corrects places, and returns the number of passes and the share of points that the last two changed.
     #[allow(clippy::too_many_arguments)] // the options of the kernel
     fn correct<'py>(
         &self,

@@ -1,4 +1,5 @@
-//! What an output is asked to show at its points, beside looking like the exemplar: given values, a trend, a scale.
+//! Soft constraints: what an output is asked to show at its points, beside looking like the exemplar (values, a trend, a
+//! scale).
 
 use crate::engine::appearance::{CHANNELS, Colour};
 use crate::{Error, Result};

@@ -2,10 +2,11 @@
 
 use proptest::prelude::*;
 
-use super::appearance::{Appearance, Parts};
-use super::blocks::{self, Held};
-use super::coherence::{self, Kinds, Similarity};
-use super::{optimize, pyramid};
+use crate::engine::appearance::{Appearance, Parts};
+use crate::engine::blocks::{self, Constraints};
+use crate::engine::coherence::{self, Kinds, Similarity};
+use crate::engine::optimize;
+use crate::engine::pyramid;
 use crate::foundation::fixed::{Frames, Place, identity};
 use crate::foundation::grid::{Grid, Region};
 use crate::foundation::hash::Noise;
@@ -120,7 +121,7 @@ fn start<const D: usize>(
         &region,
         frames,
         None,
-        Held::NONE,
+        Constraints::NONE,
         options,
         &Monitor::default(),
     )?;

@@ -29,13 +29,13 @@ impl<T: FftNum + Default> Lines<T> {
 
     /// Transforms one or several lines; `work` is memory to be kept for the next call.
     pub(crate) fn forward(&self, lines: &mut [Complex<T>], work: &mut Vec<Complex<T>>) {
-        let work = room(work, self.forward.get_inplace_scratch_len());
+        let work = grow(work, self.forward.get_inplace_scratch_len());
         self.forward.process_with_scratch(lines, work);
     }
 
     /// Transforms one or several lines back.
     pub(crate) fn inverse(&self, lines: &mut [Complex<T>], work: &mut Vec<Complex<T>>) {
-        let work = room(work, self.inverse.get_inplace_scratch_len());
+        let work = grow(work, self.inverse.get_inplace_scratch_len());
         self.inverse.process_with_scratch(lines, work);
     }
 }
@@ -88,9 +88,9 @@ impl<T: FftNum + Default> Images<T> {
         scratch: &mut Scratch<T>,
     ) {
         let [height, width] = self.size;
-        let real = room(&mut scratch.real, width);
-        let out = room(&mut scratch.rows, width / 2 + 1);
-        let work = room(&mut scratch.work, self.rows_forward.get_scratch_len());
+        let real = grow(&mut scratch.real, width);
+        let out = grow(&mut scratch.rows, width / 2 + 1);
+        let work = grow(&mut scratch.work, self.rows_forward.get_scratch_len());
         spectrum.clear();
         spectrum.resize(self.len(), Complex::default());
         for r in 0..rows.min(height) {
@@ -116,9 +116,9 @@ impl<T: FftNum + Default> Images<T> {
         let [height, width] = self.size;
         let half = width / 2 + 1;
         self.columns.inverse(spectrum, &mut scratch.work);
-        let real = room(&mut scratch.real, width);
-        let lines = room(&mut scratch.rows, half * GROUP);
-        let work = room(&mut scratch.work, self.rows_inverse.get_scratch_len());
+        let real = grow(&mut scratch.real, width);
+        let lines = grow(&mut scratch.rows, half * GROUP);
+        let work = grow(&mut scratch.work, self.rows_inverse.get_scratch_len());
         for first in (0..rows).step_by(GROUP) {
             let group = GROUP.min(rows - first);
             for k in 0..half {
@@ -139,7 +139,7 @@ impl<T: FftNum + Default> Images<T> {
 }
 
 /// The first `len` numbers of a buffer that is made longer where it must be.
-fn room<T: Clone + Default>(buffer: &mut Vec<T>, len: usize) -> &mut [T] {
+fn grow<T: Clone + Default>(buffer: &mut Vec<T>, len: usize) -> &mut [T] {
     if buffer.len() < len {
         buffer.resize(len, T::default());
     }

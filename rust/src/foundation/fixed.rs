@@ -103,7 +103,7 @@ impl<const D: usize> Frames<'_, D> {
     }
 }
 
-/// F = J^-1 in fixed point, as far as 32 bits hold it; a singular frame gives the identity.
+/// F = J^-1 in fixed point, as far as 32 bits hold it; the identity for a singular frame.
 pub fn inverse<const D: usize>(frame: &Frame<D>) -> [[i32; D]; D] {
     // Gauss-Jordan elimination with pivots: at most three rows.
     let mut a = frame.map(|row| row.map(f64::from));

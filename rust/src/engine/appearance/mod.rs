@@ -53,7 +53,7 @@ const LONGEST: usize = 2048;
 const LANES: usize = 16;
 /// Places that differ by less are of one piece of the exemplar: rounding moves them by half a sample.
 const SAME: i32 = ONE * 3 / 4;
-/// Samples along an axis, at most: places have 12 of 32 bits after the point, and room is left for steps.
+/// Samples along an axis, at most: places have 12 of 32 bits after the point, and steps must fit too.
 const SIDE: usize = 1 << 18;
 /// Points a task takes at a time.
 const CHUNK: usize = 1024;
@@ -262,7 +262,7 @@ impl<const D: usize> Appearance<D> {
         &self.features[at].0
     }
 
-    /// Room for the numbers of one window.
+    /// Memory for the numbers of one window.
     pub fn scratch(&self) -> Vec<i16> {
         // A colour is written whole, so the last one reaches beyond the numbers that count.
         vec![0; (self.offsets.len() * self.channels).next_multiple_of(LANES) + CHANNELS]

@@ -1,7 +1,7 @@
 //! The piece of the exemplar for one cell: the one that fits what lies around it.
 
 use super::cells::{Cell, Cells};
-use super::{Held, Options};
+use super::{Constraints, Options};
 use crate::engine::appearance::{Appearance, UNIT, distance};
 use crate::engine::guide::Guide;
 use crate::foundation::fixed::{ONE, Place, add, apply, nearest, sub};
@@ -157,12 +157,12 @@ impl<'a, const D: usize> Chooser<'a, D> {
         &self,
         cells: &Cells<D>,
         guide: Option<&'g Guide<'g>>,
-        held: Held<'_, D>,
+        constraints: Constraints<'_, D>,
     ) -> Asked<'g, D> {
         let mut points = Vec::new();
         let mut middle = (i64::MAX, 0);
         if let Some(guide) = guide {
-            let asks = |&&p: &&u32| guide.asks(p as usize) && !held.holds(p as usize);
+            let asks = |&&p: &&u32| guide.asks(p as usize) && !constraints.hold(p as usize);
             for &p in self.cell.points.iter().filter(asks) {
                 let world = cells.region.world(cells.region.grid.point(p as usize));
                 let step = cells.step_from_centre(self.index, world);

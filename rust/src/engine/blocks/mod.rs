@@ -1,4 +1,4 @@
-//! A coherent start: the output divided into cells, each filled by one piece of the exemplar.
+//! Patch-based initialisation: the output divided into cells, each filled by one piece of the exemplar.
 //!
 //! The lattice is divided into cells of about `cell` points a side, with centres shifted by noise and each point given
 //! to the nearest centre, so that no seam is straight. A cell's piece is chosen to fit its neighbours: cells of even
@@ -52,35 +52,35 @@ pub struct Options {
     pub margin: usize,
 }
 
-/// Points that keep their places: none, or one flag and one place a point.
+/// Hard constraints, points that keep their places: none, or one flag and one place a point.
 #[derive(Debug, Clone, Copy)]
-pub struct Held<'a, const D: usize> {
+pub struct Constraints<'a, const D: usize> {
     /// Which.
     pub points: &'a [bool],
     /// Where they look; those of other points do not count.
     pub places: &'a [Place<D>],
 }
 
-impl<const D: usize> Held<'_, D> {
-    /// Nothing is held.
+impl<const D: usize> Constraints<'_, D> {
+    /// No constraints.
     pub const NONE: Self = Self {
         points: &[],
         places: &[],
     };
 
     #[inline(always)]
-    fn holds(&self, point: usize) -> bool {
+    fn hold(&self, point: usize) -> bool {
         self.points.get(point).is_some_and(|&h| h)
     }
 }
 
-/// Gives every point of `region` a place in the exemplar.
+/// Returns a place in the exemplar for every point of `region`.
 pub fn blocks<const D: usize>(
     appearance: &Appearance<D>,
     region: &Region<D>,
     frames: Frames<'_, D>,
     guide: Option<&Guide<'_>>,
-    held: Held<'_, D>,
+    constraints: Constraints<'_, D>,
     options: &Options,
     monitor: &Monitor,
 ) -> Result<Vec<Place<D>>> {
@@ -101,8 +101,8 @@ pub fn blocks<const D: usize>(
         ));
     }
     frames.check(region.grid.len())?;
-    for n in [held.points.len(), held.places.len()] {
-        if n != held.points.len() || !(n == 0 || n == region.grid.len()) {
+    for n in [constraints.points.len(), constraints.places.len()] {
+        if n != constraints.points.len() || !(n == 0 || n == region.grid.len()) {
             return Err(Error::Shape {
                 argument: "held",
                 expected: region.grid.shape().to_vec(),
@@ -126,14 +126,14 @@ pub fn blocks<const D: usize>(
         if round > 0 {
             let even = round % 2 == 0;
             origins = par::map(list.len(), |c| {
-                let idle =
-                    list[c].even != even || list[c].points.iter().all(|&p| held.holds(p as usize));
+                let idle = list[c].even != even
+                    || list[c].points.iter().all(|&p| constraints.hold(p as usize));
                 if idle || !cells.counts(c, options, round) || monitor.advance(1).is_err() {
                     return origins[c];
                 }
                 let chooser = Chooser::new(appearance, &cells, &list, c);
                 let around = chooser.around(&places, &contrasts);
-                let asked = chooser.asked(&cells, guide, held);
+                let asked = chooser.asked(&cells, guide, constraints);
                 let near: Vec<_> = cells.near(c).map(|n| origins[n]).collect();
                 let round = round as u32;
                 chooser.choose(&around, origins[c], &near, &asked, &noise, round, options)
@@ -144,8 +144,8 @@ pub fn blocks<const D: usize>(
         par::chunks_mut(&mut places, CHUNK, |chunk, places| {
             for (i, place) in places.iter_mut().enumerate() {
                 let p = chunk * CHUNK + i;
-                *place = appearance.bring_inside(if held.holds(p) {
-                    held.places[p]
+                *place = appearance.bring_inside(if constraints.hold(p) {
+                    constraints.places[p]
                 } else {
                     let c = owners[p] as usize;
                     let step = cells.step_from_centre(c, region.world(region.grid.point(p)));

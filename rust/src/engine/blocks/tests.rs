@@ -41,7 +41,7 @@ fn run(
         &region,
         frames,
         None,
-        Held::NONE,
+        Constraints::NONE,
         options,
         &Monitor::default(),
     )
@@ -112,7 +112,7 @@ fn a_guide_is_followed() {
         &region,
         frames,
         Some(&guide),
-        Held::NONE,
+        Constraints::NONE,
         &OPTIONS,
         &Monitor::default(),
     )
@@ -170,7 +170,7 @@ fn what_is_drawn_near_the_guide_is_found_with_few_candidates() {
             &region,
             frames,
             Some(&guide),
-            Held::NONE,
+            Constraints::NONE,
             &options,
             &Monitor::default(),
         )
@@ -201,7 +201,7 @@ fn what_is_held_stays_and_is_gone_on_from() {
         &region,
         Frames::Constant(identity()),
         None,
-        Held {
+        Constraints {
             points: &held,
             places: &given,
         },

@@ -9,7 +9,7 @@
 //!    around the best;
 //! 3. votes: takes one of the coordinates that the windows around it propose.
 //!
-//! Departures: a drawn match must be better by some of the exemplar's own spacing (the acceptance threshold), so that what is good
+//! Departures: a drawn match must be better by some of the exemplar's own spacing (an acceptance threshold), so that what is good
 //! enough stays and sparse features are not washed out. Points whose neighbours all go on with the same piece of the
 //! exemplar are left: only where pieces meet is there anything to correct. So are those around which nothing changed since
 //! they were corrected last. Coordinates are displaced by the frame's
@@ -52,9 +52,9 @@ pub struct Options {
     pub exhaustive: bool,
     /// How far the neighbours are whose matches are tried, 1 or 2.
     pub reach: i32,
-    /// How much better a drawn match must be, in units of the exemplar's spacing.
+    /// Acceptance threshold: how much better a drawn match must be, in units of the exemplar's spacing.
     pub acceptance: f64,
-    /// What each neighbour costs whose piece of the exemplar is another, in units of the exemplar's spacing.
+    /// Coherence penalty: what each neighbour costs whose piece of the exemplar is another, in units of the exemplar's spacing.
     pub coherence: f64,
     /// Radius of the vote; 0: each point takes the match of its own window.
     pub vote: usize,
@@ -79,7 +79,7 @@ struct Level<'a, const D: usize> {
 }
 
 /// Corrects `places`, one a point of `region`, and returns the number of passes and the share of the points that the
-/// last two changed. Points that are `held` keep their places.
+/// last two changed. Points that are `held` are hard constraints: they keep their places.
 #[allow(clippy::too_many_arguments)] // the exemplar, the region, and what is known of it
 pub fn correct<const D: usize>(
     appearance: &Appearance<D>,
@@ -115,8 +115,8 @@ pub fn correct<const D: usize>(
         ));
     }
     frames.check(points)?;
-    let room = if options.vote > 0 { 2 * points } else { points };
-    memory::check::<Place<D>>("the matches of a region", room)?;
+    let copies = if options.vote > 0 { 2 * points } else { points };
+    memory::check::<Place<D>>("the matches of a region", copies)?;
     par::chunks_mut(places, CHUNK, |_, places| {
         for place in places {
             *place = appearance.bring_inside(*place);
@@ -201,22 +201,22 @@ impl<const D: usize> Level<'_, D> {
         })
     }
 
-    /// Runs `each`, which has a room to work in, on the points that a pass corrects; the others keep their places.
+    /// Runs `each`, with scratch memory of its own, on the points that a pass corrects; the others keep their places.
     fn pass<S>(
         &self,
         places: &[Place<D>],
         range: std::ops::Range<usize>,
         to: &mut [Place<D>],
         number: u32,
-        room: impl Fn() -> S + Sync,
+        scratch: impl Fn() -> S + Sync,
         each: impl Fn(&mut S, usize) -> Place<D> + Sync,
     ) {
         par::chunks_mut(&mut to[range.clone()], CHUNK, |chunk, to| {
             let first = range.start + chunk * CHUNK;
-            let mut room = room();
+            let mut scratch = scratch();
             for (p, place) in (first..).zip(to) {
                 *place = if self.corrects(places, p, number) {
-                    self.appearance.bring_inside(each(&mut room, p))
+                    self.appearance.bring_inside(each(&mut scratch, p))
                 } else {
                     places[p]
                 };

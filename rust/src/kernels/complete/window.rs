@@ -97,7 +97,7 @@ impl Window {
         })
     }
 
-    /// Gives all known pixels the same weight.
+    /// Sets all known pixels to the same weight.
     pub(super) fn level(&mut self) {
         for (weight, &known) in self.weight.iter_mut().zip(&self.known) {
             *weight = f32::from(u8::from(known));

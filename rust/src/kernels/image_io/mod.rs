@@ -112,32 +112,32 @@ pub struct Decoded {
 pub fn decode(name: &str, file: &[u8], limit: u64) -> Result<Decoded> {
     let format = Format::of_content(file)
         .ok_or_else(|| fail(name, "not a PNG, WebP, TIFF, HDR or EXR file"))?;
-    let room = Room { name, limit };
+    let budget = Budget { name, limit };
     caught(name, || match format {
         Format::Png => {
-            room.png(file)?;
-            let limits = room.png_limits(file);
+            budget.png(file)?;
+            let limits = budget.png_limits(file);
             let decoder = png::PngDecoder::with_limits(Cursor::new(file), limits);
             let orientation = png_exif(file).map_or(1, exif_orientation);
             Ok(Decoded {
                 orientation,
-                ..room.read(decoder)?
+                ..budget.read(decoder)?
             })
         }
         Format::WebP => {
             whole_chunks(name, file)?;
-            room.read(webp::WebPDecoder::new(Cursor::new(file)))
+            budget.read(webp::WebPDecoder::new(Cursor::new(file)))
         }
-        Format::Tiff => room.read(tiff::TiffDecoder::new(Cursor::new(file))),
+        Format::Tiff => budget.read(tiff::TiffDecoder::new(Cursor::new(file))),
         Format::Hdr => {
             // The lenient reader takes the signature for a comment, and so knows #?RGBE as well as #?RADIANCE.
             let decoder = hdr::HdrDecoder::new_nonstrict(Cursor::new(file));
             if let Ok(decoder) = &decoder {
                 rgbe(name, &decoder.metadata())?;
             }
-            room.read(decoder)
+            budget.read(decoder)
         }
-        Format::Exr => openexr::decode(&room, file),
+        Format::Exr => openexr::decode(&budget, file),
     })
 }
 
@@ -236,12 +236,12 @@ fn color(format: Format, sample: Sample, channels: usize) -> Option<ExtendedColo
 }
 
 /// The limit in force for one file.
-struct Room<'a> {
+struct Budget<'a> {
     name: &'a str,
     limit: u64,
 }
 
-impl Room<'_> {
+impl Budget<'_> {
     /// Refuses an image that is empty, or larger than the limit in pixels or bytes.
     fn check(&self, rows: u64, cols: u64, bytes_per_pixel: u64) -> Result<()> {
         if rows == 0 || cols == 0 {
@@ -270,7 +270,7 @@ impl Room<'_> {
         Ok(())
     }
 
-    /// An empty vector with room for `bytes`. Decoders reserve memory of their own in a way that ends the process when
+    /// An empty vector with memory for `bytes`. Decoders reserve memory of their own in a way that ends the process when
     /// there is none, so what they will need is asked for here first, and let go of.
     fn memory(&self, bytes: u64) -> Result<Vec<u8>> {
         let short = || Error::Limit {
@@ -284,7 +284,7 @@ impl Room<'_> {
         Ok(buffer)
     }
 
-    /// Zeros for an image that has passed [`Room::check`].
+    /// Zeros for an image that has passed [`Budget::check`].
     fn zeros(&self, bytes: u64) -> Result<Vec<u8>> {
         let mut buffer = self.memory(bytes)?;
         buffer.resize(bytes as usize, 0);
@@ -302,7 +302,7 @@ impl Room<'_> {
         }
     }
 
-    /// Room for a few rows and for what is not pixels: an embedded profile must not unfold to gigabytes.
+    /// Memory for a few rows and for what is not pixels: an embedded profile must not unfold to gigabytes.
     fn png_limits(&self, file: &[u8]) -> image::Limits {
         let width = file
             .get(16..20)

@@ -9,16 +9,16 @@ use exr::prelude::{
     ReadLayers, Vec2, WritableImage, f16, read,
 };
 
-use super::{Decoded, Room, Sample, fail};
+use super::{Budget, Decoded, Sample, fail};
 use crate::Result;
 
 /// The names that the channels of an image bear, in its order.
 const NAMES: [&[&str]; 4] = [&["Y"], &["Y", "A"], &["R", "G", "B"], &["R", "G", "B", "A"]];
 
-pub(super) fn decode(room: &Room<'_>, file: &[u8]) -> Result<Decoded> {
+pub(super) fn decode(budget: &Budget<'_>, file: &[u8]) -> Result<Decoded> {
     let wrong = |error: exr::error::Error| {
         fail(
-            room.name,
+            budget.name,
             format!("cannot be decoded: {error}").replace('\n', " "),
         )
     };
@@ -32,10 +32,10 @@ pub(super) fn decode(room: &Room<'_>, file: &[u8]) -> Result<Decoded> {
             .map(|c| c.sample_type.bytes_per_sample())
             .sum::<usize>();
         // A file may hold channels beside those of the image; all of them are decoded.
-        room.check(rows as u64, cols as u64, bytes as u64)?;
-        drop(room.memory(rows as u64 * cols as u64 * bytes as u64)?);
+        budget.check(rows as u64, cols as u64, bytes as u64)?;
+        drop(budget.memory(rows as u64 * cols as u64 * bytes as u64)?);
         let Vec2(cols, rows) = header.shared_attributes.display_window.size;
-        room.check(rows as u64, cols as u64, 1)?;
+        budget.check(rows as u64, cols as u64, 1)?;
     }
     let image = read()
         .no_deep_data()
@@ -47,7 +47,7 @@ pub(super) fn decode(room: &Room<'_>, file: &[u8]) -> Result<Decoded> {
         .from_chunks(reader)
         .map_err(wrong)?;
     let (window, layer) = (image.attributes.display_window, image.layer_data);
-    let channels = pick(room.name, &layer.channel_data.list)?;
+    let channels = pick(budget.name, &layer.channel_data.list)?;
     let sample = if channels
         .iter()
         .all(|c| matches!(c.sample_data, FlatSamples::F16(_)))
@@ -60,7 +60,7 @@ pub(super) fn decode(room: &Room<'_>, file: &[u8]) -> Result<Decoded> {
     let shape = [window.size.height(), window.size.width(), channels.len()];
     let offset = layer.attributes.layer_position - window.position;
     let stride = channels.len() * sample.size();
-    let mut bytes = room.zeros((shape[0] * shape[1]) as u64 * stride as u64)?;
+    let mut bytes = budget.zeros((shape[0] * shape[1]) as u64 * stride as u64)?;
     for (k, channel) in channels.iter().enumerate() {
         for row in 0..layer.size.height() {
             let Some(y) = inside(row, offset.y(), shape[0]) else {
@@ -85,7 +85,10 @@ pub(super) fn decode(room: &Room<'_>, file: &[u8]) -> Result<Decoded> {
                         bytes[to..to + 4].copy_from_slice(&data[from].to_ne_bytes());
                     }
                     (FlatSamples::U32(_), _) => {
-                        return Err(fail(room.name, "channels of 32-bit integers are not read"));
+                        return Err(fail(
+                            budget.name,
+                            "channels of 32-bit integers are not read",
+                        ));
                     }
                 }
             }

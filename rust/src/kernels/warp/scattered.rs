@@ -22,7 +22,7 @@ impl HasPosition for Vertex {
     }
 }
 
-/// Warps by `source` points that go to `target`, into an output of `shape`; gives the corners of the triangles too.
+/// Warps by `source` points that go to `target`, into an output of `shape`; returns the corners of the triangles too.
 pub fn scattered(
     source: &[Point],
     target: &[Point],

@@ -15,7 +15,7 @@ pub(super) enum Side {
     Wrap,
 }
 
-/// One resolution. Arrays have a margin of one on each side, and room for an even number of rows and columns.
+/// One resolution. Arrays have a margin of one on each side, and memory for an even number of rows and columns.
 ///
 /// The operator is `diagonal * x` less the four neighbours: what is not free holds 0, so that links need no weights.
 pub(super) struct Level {

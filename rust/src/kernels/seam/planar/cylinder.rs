@@ -123,7 +123,7 @@ impl Dual {
         Ok(())
     }
 
-    /// Gives the faces of P their top copies. The cut goes on beyond both ends of P, in eighths of a turn clockwise from
+    /// Adds the top copies of the faces of P. The cut goes on beyond both ends of P, in eighths of a turn clockwise from
     /// east: from the first face back to the one border, from the last face on to the other.
     pub(super) fn cut_open(&mut self, back: usize, on: usize) {
         let path = std::mem::take(&mut self.path);
@@ -174,7 +174,7 @@ impl Dual {
         a.max(b) >= between.left && a.min(b) < between.right
     }
 
-    /// Gives the pixels right of a seam its name, between the seams that it was searched between.
+    /// Labels the pixels right of a seam with its name, between the seams that it was searched between.
     fn split(&mut self, crossings: &[u32], name: u32, between: Between) {
         let far = sides(crossings, self.rows, self.width);
         for (cell, far) in self.cell.iter_mut().zip(far) {

@@ -48,7 +48,7 @@ impl Dual {
         }
     }
 
-    /// Gives each face inside of a seam its potential, as its distance; says whether all fit.
+    /// Sets the distance of each face inside of a seam to its potential; returns whether all fit.
     fn potentials(&mut self, cycle: &Cycle, monitor: &Monitor) -> Result<bool> {
         let (top, value) = (self.faces.len() - self.path.len(), cycle.value);
         // Ways that wind about P lead below what they start from, by less than twice the value.
