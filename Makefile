@@ -43,7 +43,7 @@ demo: $(VENV)/.built
 
 test: $(VENV)/.built
 	cargo test --quiet
-	$(BIN)/python -m pytest -n $(JOBS) -q
+	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal -q
 
 # Rounds with a seed each, until one fails or the time is up; with a SEED, the round of that seed.
 fuzz: $(VENV)/.built
@@ -51,7 +51,7 @@ fuzz: $(VENV)/.built
 	while seed=$(or $(SEED),$$(od -An -N4 -tu4 /dev/urandom | tr -d ' ')); do \
 		echo "make fuzz SEED=$$seed"; \
 		PROPTEST_RNG_SEED=$$seed cargo test --quiet --lib && \
-		$(BIN)/python -m pytest tests -n $(JOBS) -q -m hypothesis --hypothesis-profile fuzz --hypothesis-seed $$seed || \
+		$(BIN)/python -m pytest tests -n $(JOBS) --dist worksteal -q -m hypothesis --hypothesis-profile fuzz --hypothesis-seed $$seed || \
 			{ echo "make fuzz SEED=$$seed repeats this" >&2; exit 1; }; \
 		[ -z "$(SEED)" ] && [ $$(date +%s) -lt $$end ] || break; \
 	done

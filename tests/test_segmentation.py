@@ -1,5 +1,6 @@
 """Which elements are found: against truth, against nonsense, and on lattices."""
 
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -19,6 +20,11 @@ def unit(image):
     return np.asarray(image, np.float32) / 255
 
 
+@cache
+def drawn(name):
+    return samples.load(name, size=(256, 256))
+
+
 def matched(found, truth, share=0.7):
     """Count the true elements that an element covers alone: intersection over union of at least ``share``."""
     pairs = np.zeros((found.max() + 1, truth.max() + 1))
@@ -34,7 +40,7 @@ def matched(found, truth, share=0.7):
     ("name", "share"), [("dots", 0.6), ("pebbles", 0.65), ("leaves_and_flowers", 0.4), ("beans", 0.3)]
 )
 def test_elements_are_the_elements_that_were_drawn(name, share):
-    sample = getattr(samples, name)((256, 256))
+    sample = drawn(name)
     found = segment(sample.image)
     assert (found.kind, found.reason) == ("components", "")
     assert matched(found.elements, sample.labels) >= share * sample.labels.max()
@@ -198,15 +204,15 @@ def is_in(vector, found):
 
 @pytest.mark.parametrize("name", ["weave", "net", "bricks", "scales"])
 def test_regular_things_lie_on_a_lattice(name):
-    found = segment(getattr(samples, name)((256, 256)).image)
+    found = segment(drawn(name).image)
     assert found.lattice is not None
     assert "lattice" in found.reason
-    assert measure_direction(unit(samples.bricks((256, 256)).image)) > 0.3
+    assert measure_direction(unit(drawn("bricks").image)) > 0.3
 
 
 @pytest.mark.parametrize("name", ["dots", "pebbles", "beans", "grit", "leaves_and_flowers", "bark"])
 def test_scattered_things_do_not(name):
-    assert find_lattice(unit(getattr(samples, name)((256, 256)).image)) is None
+    assert find_lattice(unit(drawn(name).image)) is None
 
 
 def test_the_periods_of_a_tiling_are_found():
@@ -234,7 +240,7 @@ def test_direction_sees_one_direction_and_two_at_right_angles():
 
 @pytest.mark.parametrize(("name", "axes"), [("beans", (0, 1)), ("grit", (0, 1)), ("scales", (0, 1)), ("bark", (1,))])
 def test_what_is_lit_from_one_side_differs_from_its_mirror_image(name, axes):
-    picture = unit(getattr(samples, name)((256, 256)).image)
+    picture = unit(drawn(name).image)
     found = measure_polarity(picture)
     assert all(found[axis] > 10 for axis in axes)
     # Lit from the other side it differs as much.

@@ -21,7 +21,7 @@ FIELDS = {
     "zigzag": fields.zigzag(period=64, angle=30, plane="xz"),
     "circular": fields.circular(axis="x", radial="z"),
 }
-SIDE = {"stripes": 72, "particles": 64, "weave_solid": 64}
+SIDE = {"stripes": 60, "particles": 60, "weave_solid": 60}
 
 
 @cache
@@ -35,7 +35,7 @@ def made(name, kind, seed=0):
 
 
 # Rare things are few in a small volume, and so are layers: what is held to a limit is the mean of several.
-SEEDS = dict.fromkeys(("s2", "s3", "s3b"), (0, 1, 2))
+SEEDS = dict.fromkeys(("s2", "s3", "s3b"), (0, 1))
 
 
 def measure(check, name, kind):
@@ -84,7 +84,7 @@ def test_s2_a_frame_of_two_makes_features_twice_as_large():
 
 def test_s6_borders_of_blocks_do_not_gather_on_planes():
     wood = exemplar("wood_solid").image
-    found = checks.s6(wood, texrs.solid(wood, 96, seed=2).image)
+    found = checks.s6(wood, texrs.solid(wood, 80, seed=2).image)
     assert found.passed, found.figures
 
 

@@ -21,7 +21,7 @@ def exemplar(axes, wrap=False, channels=2):
 
 
 def region_of(axes, wrap=False, origin=-3):
-    shape = (13, 11) if axes == 2 else (5, 7, 6)
+    shape = (13, 11) if axes == 2 else (3, 5, 4)
     return Region(shape, (origin,) * axes, (wrap,) * axes)
 
 

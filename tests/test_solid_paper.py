@@ -15,7 +15,7 @@ from texrs.errors import InvalidInput
 from texrs.papers.solid import literal as _solid_literal
 from texrs.papers.solid.literal import bring_inside
 
-SIZE = 64
+SIZE = 48
 
 
 def grow(exemplar, field=None, method="paper", size=SIZE, **options):

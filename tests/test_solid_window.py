@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
@@ -35,15 +36,13 @@ def box(axes: int, start: int, stop: int) -> tuple[slice, ...]:
     return (slice(start, stop),) * axes
 
 
-@pytest.mark.parametrize(
-    ("axes", "field"), [(2, "none"), (2, "circular"), (2, "zigzag"), (2, "ramp"), (3, "circular"), (3, "zigzag")]
-)
+@pytest.mark.parametrize(("axes", "field"), [(2, "none"), (2, "circular"), (2, "zigzag"), (2, "ramp"), (3, "circular")])
 def test_a_window_is_the_same_wherever_it_is_seen_from(axes: int, field: str) -> None:
-    side = 24 if axes == 2 else 16
+    side = 24 if axes == 2 else 12
     wanted = texture(axes, field)[box(axes, 0, side)]
     other = texture(axes, field)
-    larger = other[box(axes, -9, side + 5)]
-    assert np.array_equal(larger[box(axes, 9, 9 + side)], wanted)
+    larger = other[box(axes, -5, side + 3)]
+    assert np.array_equal(larger[box(axes, 5, 5 + side)], wanted)
     assert np.array_equal(other[box(axes, 0, side)], wanted)  # out of what is kept
     with texrs.threads(7):
         forgetful = texture(axes, field, cache_bytes=0)
@@ -51,17 +50,17 @@ def test_a_window_is_the_same_wherever_it_is_seen_from(axes: int, field: str) ->
         assert forgetful.cached == 0
     chunks = texture(axes, field, cache_bytes=1_000_000)
     with texrs.threads(1):
-        for start in (8, 0, 4):
+        for start in (8, 0):
             part = (slice(start, start + 4), *box(axes - 1, 0, side))
             assert np.array_equal(chunks[part], wanted[start : start + 4])
 
 
 def test_the_same_without_a_field() -> None:
-    wanted = texture()[box(3, 0, 24)]
+    wanted = texture()[box(3, 0, 16)]
     other = texture(cache_bytes=400_000)
     with texrs.threads(2):
-        assert np.array_equal(other[13:24, 5:40, -3:24][:, :19, 3:], wanted[13:24, 5:24, 0:24])
-        assert np.array_equal(other[box(3, 0, 24)], wanted)
+        assert np.array_equal(other[9:16, 5:24, -3:16][:, :11, 3:], wanted[9:16, 5:16, 0:16])
+        assert np.array_equal(other[box(3, 0, 16)], wanted)
 
 
 @pytest.mark.parametrize("field", ["none", "circular"])
@@ -85,64 +84,65 @@ def test_a_stage_sees_as_far_as_it_says(stage: int, field: str, monkeypatch: pyt
     assert not np.array_equal(found[0], found[2])
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=25)
 @given(
-    st.tuples(*[st.integers(-12, 8)] * 3),
-    st.tuples(*[st.integers(1, 8)] * 3),
-    st.sampled_from(["none", "circular"]),
-    st.sampled_from([0, 1 << 20, 1 << 24]),
+    st.tuples(*[st.integers(-90, 60)] * 2),
+    st.tuples(*[st.integers(1, 60)] * 2),
+    st.sampled_from(list(FIELDS)),
+    st.sampled_from([0, 1 << 14, 1 << 24]),
 )
-def test_random_windows(origin: tuple[int, ...], size: tuple[int, ...], field: str, cache: int) -> None:
-    whole = _whole(field)
-    found = texture(3, field, cache_bytes=cache).window(origin, size)
-    inside = tuple(slice(o + 12, o + 12 + n) for o, n in zip(origin, size, strict=True))
-    assert np.array_equal(found.image, whole[inside])
+def test_random_windows(origin: tuple[int, ...], size: tuple[int, ...], field: str, kept: int) -> None:
+    found = texture(2, field, cache_bytes=kept).window(origin, size)
+    inside = tuple(slice(o + 90, o + 90 + n) for o, n in zip(origin, size, strict=True))
+    assert np.array_equal(found.image, whole_plane(field)[inside])
+    assert np.array_equal(view(found.source, PLANE), found.image)
+
+
+@cache
+def whole_plane(field: str) -> Array:
+    return texture(2, field)[box(2, -90, 120)]
+
+
+def test_a_volume_is_what_its_map_shows() -> None:
+    found = texture(3, "circular").window((3, -20, 9), (5, 9, 7))
+    assert found.image.shape == (5, 9, 7, 3)
     assert np.array_equal(view(found.source, SOLID), found.image)
 
 
-_KNOWN: dict[str, Array] = {}
-
-
-def _whole(field: str) -> Array:
-    if field not in _KNOWN:
-        _KNOWN[field] = texture(3, field)[box(3, -12, 16)]
-    return _KNOWN[field]
-
-
-@pytest.mark.parametrize("axes", [2, 3])
-def test_far_from_the_origin_and_across_it(axes: int) -> None:
-    for start in (-(10**9), 10**9 - 20):
-        a = texture(axes)[box(axes, start, start + 20)]
-        b = texture(axes)[box(axes, start + 5, start + 15)]
-        assert np.array_equal(a[box(axes, 5, 15)], b)
+@pytest.mark.parametrize(("axes", "start"), [(2, -(10**9)), (2, 10**9 - 20), (3, -(10**9))])
+def test_far_from_the_origin_and_across_it(axes: int, start: int) -> None:
+    a = texture(axes)[box(axes, start, start + 20)]
+    b = texture(axes)[box(axes, start + 5, start + 15)]
+    assert np.array_equal(a[box(axes, 5, 15)], b)
 
 
 def test_another_seed_is_another_texture() -> None:
-    a, b = (texture(seed=seed).window(0, 32).source.coordinates for seed in (1, 2))
+    a, b = (texture(2, seed=seed).window(0, 96).source.coordinates for seed in (1, 2))
     assert (a != b).any(axis=-1).mean() > 0.9
 
 
 def test_what_is_kept_is_bounded_and_forgotten() -> None:
-    small = texture(cache_bytes=200_000)
-    for start in range(0, 36, 12):
-        small[0:12, 0:12, start : start + 12]
-        assert 0 < small.cached <= 200_000
+    small = texture(2, cache_bytes=100_000)
+    for start in range(0, 400, 100):
+        small[0:100, start : start + 100]
+        assert 0 < small.cached <= 100_000
     small.clear()
     assert small.cached == 0
 
 
 def test_many_threads_share_a_texture() -> None:
-    shared, found = texture(), {}
+    shared, found = texture(2, "zigzag"), {}
 
     def work(start: int) -> None:
-        found[start] = shared[0:12, 0:12, start : start + 12]
+        found[start] = shared[0:80, start : start + 80]
 
-    workers = [threading.Thread(target=work, args=(12 * i,)) for i in range(4)]
+    workers = [threading.Thread(target=work, args=(80 * i,)) for i in range(4)]
     for worker in workers:
         worker.start()
     for worker in workers:
         worker.join()
-    assert np.array_equal(np.concatenate([found[12 * i] for i in range(4)], axis=2), texture()[0:12, 0:12, 0:48])
+    parts = [found[80 * i] for i in range(4)]
+    assert np.array_equal(np.concatenate(parts, axis=1), texture(2, "zigzag")[0:80, 0:320])
 
 
 def test_a_single_index_selects_a_plane() -> None:
@@ -196,23 +196,22 @@ def test_bad_options() -> None:
 
 
 def test_straight_slices_are_planes_of_the_texture() -> None:
-    for field in ("none", "circular"):
-        t = texture(3, field)
-        cut = t.slice((7, 2, 3), axes=[(0, 1, 0), (0, 0, 1)], size=(21, 31))
-        assert np.array_equal(cut, t[7, -8:13, -12:19])
-        again = texture(3, field, cache_bytes=0).slice((7, 2, 3), normal=(1, 0, 0), size=(21, 31))
-        assert np.array_equal(cut, again)
+    t = texture(3, "circular")
+    cut = t.slice((7, 2, 3), axes=[(0, 1, 0), (0, 0, 1)], size=(21, 31))
+    assert np.array_equal(cut, t[7, -8:13, -12:19])
+    again = texture(3, "circular", cache_bytes=0).slice((7, 2, 3), normal=(1, 0, 0), size=(21, 31))
+    assert np.array_equal(cut, again)
 
 
 def test_oblique_slices_carry_places_on() -> None:
     """No colour is mixed, and a part of a slice is the same."""
     t = texrs.SolidTexture(SOLID, seed=2, interpolation="nearest")
-    cut = t.slice((0.3, 0.1, 9.7), normal=(1, 2, 3), size=(140, 20))
-    assert cut.shape == (140, 20, 3)
+    cut = t.slice((0.3, 0.1, 9.7), normal=(1, 2, 3), size=(60, 20))
+    assert cut.shape == (60, 20, 3)
     known = {tuple(c) for c in SOLID.reshape(-1, 3).tolist()}
     assert {tuple(c) for c in cut.reshape(-1, 3).tolist()} <= known
     middle = texrs.SolidTexture(SOLID, seed=2, interpolation="nearest").slice((0.3, 0.1, 9.7), (1, 2, 3), size=(30, 20))
-    assert np.array_equal(cut[55:85], middle)
+    assert np.array_equal(cut[15:45], middle)
     for bad in ({"normal": (0, 0, 0)}, {"axes": [(1, 0, 0), (2, 0, 0)]}, {}, {"normal": (1, 0)}):
         with pytest.raises(InvalidInput):
             t.slice((0, 0, 0), size=8, **bad)  # type: ignore[arg-type]
@@ -237,9 +236,10 @@ def test_the_source_map_knows_the_field_where_the_window_lies() -> None:
 
 def test_classes_stay_classes_and_progress_can_stop() -> None:
     labels = (SOLID[..., 0] > 100).astype(np.uint8) + (SOLID[..., 0] > 180)
-    for exemplar in (labels, texrs.Exemplar(labels * 7.0, axes=3, labels=True)):
-        t = texrs.SolidTexture(exemplar)
-        assert set(np.unique(t[0:16, 0:16, 0:16])) <= set(np.unique(t.exemplar.image))
+    t = texrs.SolidTexture(labels)
+    assert set(np.unique(t[0:16, 0:16, 0:16])) <= set(np.unique(labels))
+    flat = texrs.PlaneTexture(texrs.Exemplar(labels[5] * 7.0, labels=True))
+    assert set(np.unique(flat[0:64, 0:64])) <= {0, 7, 14}
 
     def stop(stage: str, share: float) -> None:
         raise KeyboardInterrupt

@@ -245,9 +245,9 @@ def test_any_dtype_and_channels() -> None:
 
 
 def test_pictures_are_analysed() -> None:
-    mine = ENTRIES["dots"]
-    assert texrs.splice(mine.image, ENTRIES["pebbles"], 64).image.shape == (64, 64, 3)
-    assert texrs.splice(mine.image[..., 1], ENTRIES["pebbles"], 64).image.shape == (64, 64)
+    image = samples.load("dots", size=(96, 96)).image
+    assert texrs.splice(image, ENTRIES["pebbles"], 64).image.shape == (64, 64, 3)
+    assert texrs.splice(image[..., 1], ENTRIES["pebbles"], 64).image.shape == (64, 64)
     with pytest.raises(InvalidInput, match="^a: "):
         texrs.splice(np.zeros((40, 40)), ENTRIES["pebbles"])
 

@@ -14,9 +14,17 @@ from texrs import io
 from texrs.cli import main
 
 
+@pytest.fixture(autouse=True)
+def pictures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Work in a folder that holds two small pictures."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("dots", "pebbles"):
+        io.write(f"{name}.png", texrs.samples.load(name, size=(96, 96)).image)
+
+
 def test_splice(tmp_path: Path) -> None:
     out, source, stages = tmp_path / "out.png", tmp_path / "map.npz", tmp_path / "stages"
-    line = ["splice", "sample:dots", "sample:pebbles", "-o", str(out), "--size", "96x112", "--seed", "2", "-q"]
+    line = ["splice", "sample:dots", "pebbles.png", "-o", str(out), "--size", "96x112", "--seed", "2", "-q"]
     assert main([*line, "--map", str(source), "--stages", str(stages)]) == 0
     image = io.read(out)
     assert image.shape == (96, 112, 3)
@@ -27,7 +35,7 @@ def test_splice(tmp_path: Path) -> None:
 
 def test_self_splice_and_its_replay(tmp_path: Path) -> None:
     first, again, stages = tmp_path / "a.png", tmp_path / "b.png", tmp_path / "stages"
-    line = ["self-splice", "sample:dots", "-q", "--seed", "3"]
+    line = ["self-splice", "dots.png", "-q", "--seed", "3"]
     assert main([*line, "-o", str(first), "--edit", "randomise", "--stages", str(stages)]) == 0
     assert main([*line, "-o", str(again), "--edit", str(stages / "report.json")]) == 0
     assert first.read_bytes() == again.read_bytes()
@@ -38,8 +46,8 @@ def test_self_splice_and_its_replay(tmp_path: Path) -> None:
 def test_entries_are_taken(tmp_path: Path) -> None:
     entry, out = tmp_path / "dots.npz", tmp_path / "out.png"
     box = ["--box", "60,62,25,25", "--layout", "F=d"]
-    assert main(["analyse", "sample:dots", "-o", str(entry), *box, "-q"]) == 0
-    assert main(["splice", str(entry), "sample:pebbles", "-o", str(out), "--size", "64", "-q"]) == 0
+    assert main(["analyse", "dots.png", "-o", str(entry), *box, "-q"]) == 0
+    assert main(["splice", str(entry), "pebbles.png", "-o", str(out), "--size", "64", "-q"]) == 0
     assert io.read(out).shape == (64, 64, 3)
     assert main(["splice", str(tmp_path / "none.npz"), str(entry), "-o", str(out), "-q"]) == 2
 
@@ -47,12 +55,12 @@ def test_entries_are_taken(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        (["splice", "sample:dots", "nothing.png"], "nothing.png"),
-        (["splice", "sample:dots", "sample:net", "--method", "fast"], "--method"),
-        (["splice", "sample:dots", "sample:net", "--size", "4"], "--size"),
-        (["self-splice", "sample:dots", "--edit", "melt"], "--edit"),
-        (["self-splice", "sample:dots", "--edit", "[3"], "not JSON"),
-        (["self-splice", "sample:dots", "--edit", "gone.json"], "gone.json"),
+        (["splice", "dots.png", "nothing.png"], "nothing.png"),
+        (["splice", "dots.png", "pebbles.png", "--method", "fast"], "--method"),
+        (["splice", "dots.png", "pebbles.png", "--size", "4"], "--size"),
+        (["self-splice", "dots.png", "--edit", "melt"], "--edit"),
+        (["self-splice", "dots.png", "--edit", "[3"], "not JSON"),
+        (["self-splice", "dots.png", "--edit", "gone.json"], "gone.json"),
     ],
 )
 def test_bad_use(line: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
