@@ -12,7 +12,6 @@ mod ncc;
 mod patch_search;
 mod poisson;
 mod seam;
-
 mod sparse;
 mod warp;
 

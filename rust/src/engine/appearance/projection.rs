@@ -2,7 +2,7 @@
 
 use super::{FLAT, Feature, KEEP, LANES, SCALE, TOP};
 use crate::foundation::pca::Principal;
-use crate::foundation::wide::wide;
+use crate::foundation::wide::wide_fn;
 
 /// From the colours of a window to its appearance vector.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,26 +80,25 @@ impl Projection {
         }
     }
 
-    /// Whole numbers, so the order in which a compiler adds them does not matter.
+    /// The appearance vector of a window, filled up to whole registers.
     #[inline]
     pub(super) fn apply(&self, window: &[i16]) -> Feature {
-        // Measured: twice as fast as with the baseline instructions.
-        wide(
-            #[inline(always)]
-            || self.multiply(window),
-        )
+        multiply(self, window)
     }
+}
 
-    #[inline(always)]
-    fn multiply(&self, window: &[i16]) -> Feature {
+wide_fn! {
+    /// Whole numbers, so the order in which a compiler adds them does not matter. Measured: twice as fast as with the
+    /// baseline instructions.
+    fn multiply(projection: &Projection, window: &[i16]) -> Feature {
         let mut feature = [0; KEEP];
-        for (k, row) in self.basis.chunks_exact(self.padded).enumerate() {
+        for (k, row) in projection.basis.chunks_exact(projection.padded).enumerate() {
             let mut sum = 0i32;
             for (&w, &x) in row.iter().zip(window) {
                 sum += i32::from(w) * i32::from(x);
             }
             // Comes round only for parts that no analysis has.
-            let product = (i64::from(sum) - self.bias[k]).wrapping_mul(self.gain);
+            let product = (i64::from(sum) - projection.bias[k]).wrapping_mul(projection.gain);
             let scaled = product.wrapping_add(1 << 31) >> 32;
             feature[k] = scaled.clamp(-2047, 2047) as i16;
         }

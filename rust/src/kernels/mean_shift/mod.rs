@@ -12,7 +12,7 @@ mod window;
 use crate::foundation::grid::Grid;
 use crate::foundation::par::{self, Monitor};
 #[cfg(target_arch = "x86_64")]
-use crate::foundation::wide::V3;
+use crate::foundation::wide::{V3, wide_fn};
 use crate::{Error, Result};
 use window::{Planes, Sums, window, window_any};
 
@@ -128,30 +128,10 @@ fn step(
 fn filter_row(planes: &Planes, options: &Options, channels: usize, row: usize, out: &mut [f32]) {
     #[cfg(target_arch = "x86_64")]
     if let Some(simd) = V3::try_new() {
-        macro_rules! wide {
-            ($c:literal) => {
-                return simd.vectorize(
-                    #[inline(always)]
-                    || {
-                        climb(
-                            planes,
-                            options,
-                            $c,
-                            row,
-                            out,
-                            #[inline(always)]
-                            |planes, at, colour, limit| {
-                                window::v3::window::<$c>(simd, planes, at, colour, limit)
-                            },
-                        )
-                    },
-                )
-            };
-        }
         match channels {
-            1 => wide!(1),
-            3 => wide!(3),
-            4 => wide!(4),
+            1 => return climb_wide::<1>(simd, planes, options, row, out),
+            3 => return climb_wide::<3>(simd, planes, options, row, out),
+            4 => return climb_wide::<4>(simd, planes, options, row, out),
             _ => {}
         }
     }
@@ -160,6 +140,16 @@ fn filter_row(planes: &Planes, options: &Options, channels: usize, row: usize, o
         3 => climb(planes, options, 3, row, out, window::<3>),
         4 => climb(planes, options, 4, row, out, window::<4>),
         _ => climb(planes, options, channels, row, out, window_any),
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+wide_fn! {
+    /// [`climb`] with windows that are summed in wide registers.
+    fn climb_wide<const C: usize>(simd: V3, planes: &Planes, options: &Options, row: usize, out: &mut [f32]) {
+        climb(planes, options, C, row, out, #[inline(always)] |planes, at, colour, limit| {
+            window::v3::window::<C>(simd, planes, at, colour, limit)
+        });
     }
 }
 

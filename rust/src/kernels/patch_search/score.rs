@@ -271,15 +271,15 @@ fn add_v3(simd: V3, lanes: &mut [f64; LANES], patch: &[f32], weight: &[f32], sam
     let (w, w_rest) = weight.as_chunks::<LANES>();
     let (s, s_rest) = samples.as_chunks::<LANES>();
     let mut sums: [__m256d; 2] = cast(*lanes);
-    for ((&p, &w), &s) in p.iter().zip(w).zip(s) {
-        let [p, w, s] = [p, w, s].map(|eight| {
-            let halves: [__m128; 2] = cast(eight);
-            halves.map(|half| avx._mm256_cvtps_pd(half))
-        });
+    // No closures: one that is not inlined would make calls of single instructions.
+    for ((p, w), s) in p.iter().zip(w).zip(s) {
+        let p: [__m128; 2] = cast(*p);
+        let w: [__m128; 2] = cast(*w);
+        let s: [__m128; 2] = cast(*s);
         for h in 0..2 {
-            let d = avx._mm256_sub_pd(p[h], s[h]);
-            let square = avx._mm256_mul_pd(w[h], avx._mm256_mul_pd(d, d));
-            sums[h] = avx._mm256_add_pd(sums[h], square);
+            let d = avx._mm256_sub_pd(avx._mm256_cvtps_pd(p[h]), avx._mm256_cvtps_pd(s[h]));
+            let weighted = avx._mm256_mul_pd(avx._mm256_cvtps_pd(w[h]), avx._mm256_mul_pd(d, d));
+            sums[h] = avx._mm256_add_pd(sums[h], weighted);
         }
     }
     *lanes = cast(sums);
