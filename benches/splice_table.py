@@ -63,7 +63,7 @@ def verdict(a: Elements, b: Elements, result: texrs.Synthesis) -> dict[str, floa
     found = {
         "colours": checks.copied(a, result)[0],
         "holes": result.report["holes"],
-        "ground": checks.coherence(a, result)[0],
+        "ground": (checks.coherence(a, result) or (np.nan,))[0],
     }
     if a.layout == Layout.DISJOINT:
         windows = checks.windows(a, result)

@@ -73,8 +73,10 @@ def test_all_colours_are_the_texture_s(a: str, b: str, spliced: Any) -> None:
 
 @pytest.mark.parametrize(("a", "b"), PAIRS)
 def test_the_ground_is_like_the_texture_s(a: str, b: str, spliced: Any) -> None:
-    ratio, distance = checks.coherence(ENTRIES[a], spliced(a, b))
-    assert ratio <= 1.3 or distance <= 0.08, "S8"
+    found = checks.coherence(ENTRIES[a], spliced(a, b))
+    # Pebbles as dense as dots, which are bigger, leave no ground; everywhere else there is some.
+    assert found is not None or (a, b) == ("pebbles", "dots")
+    assert found is None or found[0] <= 1.3 or found[1] <= 0.08, "S8"
 
 
 @pytest.mark.parametrize(("a", "b"), PAIRS)

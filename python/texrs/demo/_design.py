@@ -7,17 +7,18 @@ from typing import Any
 from texrs._typing import Array
 from texrs.demo._html import code, figure, grid, pair, row
 from texrs.demo._workshop import Section, Workshop
+from texrs.papers.design import DeformationOptions
 from texrs.synthesis import preview
 
 SHOWN: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("pebbles", "Rounded stones on sand", {}),
     ("leaves_and_flowers", "Flowers on leaves", {}),
     ("beans", "Touching beans of one colour", {}),
-    ("bark", "Furrowed bark, upright: --rotate 0", {"rotate": 0.0}),
+    ("bark", "Furrowed bark, upright: --rotate 0", {"deformation": DeformationOptions(rotate=0)}),
     (
         "bricks",
         "A wall: --rotate 0 --scale 1 --translate 0.05",
-        {"rotate": 0.0, "scale": (1.0, 1.0), "translate": 0.05},
+        {"deformation": DeformationOptions(rotate=0, scale=(1, 1), translate=0.05)},
     ),
     ("gravel", "A grey photograph", {}),
 )
