@@ -1,4 +1,4 @@
-"""DESIGN to the letter (``method="paper"``): the printed constants, and what the departures of the default are for."""
+"""DESIGN as printed (``method="paper"``): the printed constants, and what the departures of the default are for."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""SOLID to the letter (``method="paper"``), and what the departures of the default are for."""
+"""SOLID as printed (``method="paper"``), and what the departures of the default are for."""
 
 from functools import partial
 

@@ -171,7 +171,7 @@ class Joint:
     """Overlaps that were cut."""
 
     def describe(self) -> dict[str, object]:
-        """Say what was done."""
+        """Return what was done."""
         return {
             "split": self.split,
             "overlap": self.overlap,

@@ -94,7 +94,7 @@ def say(line: str) -> None:
 
 
 def note(line: str, *, quiet: bool) -> None:
-    """Tell what was done, unless nobody wants to know."""
+    """Print what was done, unless nobody wants to know."""
     if not quiet:
         complain(line)
 
@@ -196,7 +196,7 @@ def _stopped(number: int) -> int:
 
 
 def _usage(failure: Exception) -> str:
-    """Say what was wrong with the arguments, and where the right ones are listed."""
+    """Return what was wrong with the arguments, and where the right ones are listed."""
     message = failure.format_message() if hasattr(failure, "format_message") else str(failure)
     context = getattr(failure, "ctx", None)
     command = context.command_path if context is not None else "texrs"

@@ -123,7 +123,7 @@ def add(folder: str, items: Sequence[str], given: dict[str, Any], count: int | N
 
 
 def explain(entry: Any, *, quiet: bool) -> None:
-    """Say what was proposed, how sure that is, and what is doubtful."""
+    """Print what was proposed, how sure that is, and what is doubtful."""
     sure = entry.report.get("confidence", {})
     for name in entry.report["proposed"]:
         value = {"box": ",".join(map(str, entry.report["box"])), "layout": entry.layout}.get(name, "as drawn")

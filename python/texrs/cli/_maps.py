@@ -74,7 +74,7 @@ def apply_command(
 
 
 def info_command(file: Annotated[str, make_argument("FILE", "An image or a source map.")]) -> None:
-    """Say what an image or a source map holds."""
+    """Print what an image or a source map holds."""
     try:
         places = SourceMap.load(file)
     except FileError:

@@ -230,7 +230,7 @@ def shrink(image: Array, side: int = 256) -> Array:
 
 
 def describe(image: Array, axes: int) -> str:
-    """Say the size, the channels and the dtype of an image."""
+    """Return the size, the channels and the dtype of an image."""
     channels = image.shape[axes] if image.ndim > axes else 1
     sides = " x ".join(map(str, image.shape[:axes]))
     return f"{sides}, {channels} channel{'s'[: channels != 1]}, {image.dtype}"

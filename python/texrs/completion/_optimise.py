@@ -71,7 +71,7 @@ def optimise(
 ) -> tuple[SourceMap, list[dict[str, object]]]:
     """Return the source map of a picture whose holes are filled, from itself or from a second one, and what each level did.
 
-    ``wide`` is what may be replaced: the holes and a rim around them.
+    ``wide`` is what may be replaced: the holes and a boundary around them.
     """
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
     for name, shape in zip(("image", "exemplar"), shapes, strict=False):
@@ -169,7 +169,7 @@ def _look_around(open_: Bools, margin: int, step: int, wrap: tuple[bool, bool]) 
 
 
 def _paint_over(image: Array, open_: Bools) -> Array:
-    """Paint over holes with the nearest known colours, which is what windows at their rim see."""
+    """Paint over holes with the nearest known colours, which is what windows at their boundary see."""
     nearest: Any = ndimage.distance_transform_edt(open_, return_distances=False, return_indices=True)
     painted: Array = image[tuple(nearest)]
     return painted

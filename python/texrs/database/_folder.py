@@ -153,7 +153,7 @@ class Folder:
             os.close(number)
 
     def warn(self, sentence: str) -> None:
-        """Say what had to be remade."""
+        """Report what had to be remade."""
         if self._say is not None:
             self._say(sentence)
         else:

@@ -167,7 +167,7 @@ def _detect(guide: Floats, given: Given, start: Start, how: Settings, progress: 
 
 
 def _separate(guide: Floats, given: Given, start: Start, found: Detections, how: Settings) -> Separation:
-    """Tell the elements from the ground, and make detections and mask agree as far as the layout says how."""
+    """Separate the elements from the ground, and make detections and mask agree as far as the layout says how."""
     mask = given.whole if given.whole is not None else _cut(guide, given, start, found, how)
     plain = Separation(found.points, found.scores, np.arange(len(found.points)), mask, "cut")
     if how.literal or not len(found.points):

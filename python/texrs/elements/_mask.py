@@ -179,7 +179,7 @@ def _nearest_costs(colours: NDArray[np.float64], samples: NDArray[np.float64]) -
 
 
 def _smoothness_costs(colours: Floats, wrap: Wrap, model: Model) -> Sequence[Any]:
-    """Equation 3, for pairs along each axis; its sigma is that of the picture, or 1 to the letter."""
+    """Equation 3, for pairs along each axis; its sigma is that of the picture, or 1 as printed."""
     squares = [((colours - np.roll(colours, -1, axis)) ** 2).sum(axis=-1) for axis in range(2)]
     inner = [s if wrap[axis] else np.delete(s, -1, axis) for axis, s in enumerate(squares)]
     mean = float(np.concatenate([s.ravel() for s in inner]).mean(dtype=np.float64))

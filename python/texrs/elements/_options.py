@@ -78,7 +78,7 @@ class Settings:
     search: ElementSearch
     model: Model
     literal: bool
-    """Whether the published algorithm is wanted to the letter."""
+    """Whether the published algorithm is wanted as printed."""
     wrap: tuple[bool, bool]
     seed: int
 

@@ -234,7 +234,7 @@ def search_similar(
 
 
 def choose_channel(maps: Floats) -> int:
-    """Return the channel whose map has the least entropy (section 3.2, to the letter)."""
+    """Return the channel whose map has the least entropy (section 3.2, as printed)."""
     entropies = []
     for c in range(maps.shape[-1]):
         share = np.histogram(maps[..., c], BINS, (-1, 1))[0] / maps[..., c].size

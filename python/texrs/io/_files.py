@@ -48,7 +48,7 @@ def translate_errors(path: Path, what: str) -> Iterator[None]:
 
 
 def reason(error: BaseException) -> str:
-    """Say what an error says, on one line."""
+    """Return what an error says, on one line."""
     if isinstance(error, OSError) and error.strerror:
         return error.strerror.lower()
     text = " ".join(str(error).split())

@@ -59,7 +59,7 @@ class Arguments:
     """Of the patches that fill holes."""
     screening: float
     literal: bool
-    """Whether the paper is followed to the letter."""
+    """Whether the paper is followed as printed."""
     watch: Progress
 
     @property

@@ -38,7 +38,7 @@ class Plan:
     side: int
     """Of a patch that fills holes, in pixels."""
     literal: bool
-    """Whether the paper is followed to the letter."""
+    """Whether the paper is followed as printed."""
 
 
 def make_plan(
@@ -57,7 +57,7 @@ def make_plan(
     side : int, optional
         Of a patch, in pixels; by default about the size of an element.
     literal : bool
-        Whether the paper is followed to the letter.
+        Whether the paper is followed as printed.
 
     """
     if literal:

@@ -19,7 +19,7 @@ Departures, with their reasons:
   asked.
 - What is optimised are coordinates, so that the last word is a copy, not a weighted mean: nothing blurs.
 - A point changes for a drawn match only if that gains more than twice the exemplar's own spacing, and the start is balanced
-  for contrast. Both keep what is rare.
+  for contrast. Both preserve low-frequency features.
 - The histograms of Eq. 8 are those of the exemplar's samples weighted to the target's scales, and what is in excess of them
   becomes dearer from pass to pass, not for one alone (`texrs.growth.balance`): colours differ by scale, and drift
   without it.
@@ -56,7 +56,7 @@ __all__ = ["perspective"]
 
 SETTINGS = replace(FROM_ATLAS, weights=(4.0, 1.5, 0.5), balance=0.05)
 """Where elements of all sizes lie side by side, the wanted one must be chosen at the coarsest level: later ones hardly move.
-Costs of colours that grow faster wash away what is rare: drops on paint."""
+Costs of colours that grow faster wash away low-frequency features: drops on paint."""
 
 
 def perspective(

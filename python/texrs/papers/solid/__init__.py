@@ -21,7 +21,7 @@ Departures, with their reasons:
   otherwise repeated corrections wash rare things out.
 - A pass corrects every other point, as on a chess board, and only where pieces of the exemplar meet. When all points
   change at once, neighbours on either side of a seam swap and nothing is gained; votes, which mended that, cost a third
-  of what is rare.
+  of the low-frequency features.
 - Windows are compensated for where the lattice makes them look (o - J step), which the paper leaves out: without it
   turned textures come out at the wrong scale.
 - A row vector in Eq. 1 and a column vector in Eq. 3 turn in opposite ways; here J is the inverse of the frame in both.
@@ -91,7 +91,7 @@ def solid(
     wrap : bool or (bool, bool, bool)
         Axes along which the result is to repeat: planes, rows, columns.
     quality : {"preserve", "fast", "optimise"}
-        How much work is done. "preserve" keeps what is rare. "fast" does a third of the work. "optimise" straightens
+        How much work is done. "preserve" keeps low-frequency features. "fast" does a third of the work. "optimise" straightens
         lattices and walls; it is checked on a trial, and "preserve" is done instead, and reported, where it would
         lose anything.
     method : {None, "paper"}
@@ -194,7 +194,7 @@ def synthesize(
     wrap : bool or (bool, bool)
         Axes along which the result is to repeat: rows, columns.
     quality : {"preserve", "fast", "optimise"}
-        How much work is done. "preserve" keeps what is rare. "fast" does a third of the work. "optimise" straightens
+        How much work is done. "preserve" keeps low-frequency features. "fast" does a third of the work. "optimise" straightens
         lattices and walls; it is checked on a trial, and "preserve" is done instead, and reported, where it would
         lose anything.
     method : {None, "paper"}

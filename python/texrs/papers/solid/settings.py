@@ -13,7 +13,7 @@ __all__ = ["ON_DEMAND", "PRESERVE", "QUALITIES", "Quality", "as_quality"]
 Quality: TypeAlias = Literal["preserve", "fast", "optimise"]
 
 PRESERVE = Settings()
-"""Keeps what is rare, and copies where a copy is good enough."""
+"""Preserves low-frequency features, and copies where a copy is good enough."""
 
 FAST = replace(PRESERVE, passes=(4, 2, 2), reaches=(2, 2, 1), rounds=4, candidates=256, settled=0.0)
 """Fixed counts: what a point becomes hangs on what is near it alone."""
