@@ -123,7 +123,7 @@ def cell_reuse(source: SourceMap, field: Field | None = None, *, cell: int = 8) 
     patch = label_pieces(joined, source.shape)[1]
     use = np.concatenate([_cell_use(source, number, side) for number in range(len(source.shapes))])
     return CellReuse(
-        sum(map(np.count_nonzero, joined)) / max(sum(j.size for j in joined), 1),
+        float(sum(map(np.count_nonzero, joined)) / max(sum(j.size for j in joined), 1)),
         float(np.bincount(patch).max()) / source.label.size,
         float(use.max() / max(float(use.mean()), 1e-30)),
         float((use == 0).mean()),
