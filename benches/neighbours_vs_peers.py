@@ -19,7 +19,7 @@ from skimage import data
 
 from texrs import samples, threads
 from texrs._engine.appearance import Appearance
-from texrs._engine.coherence import similar
+from texrs._engine.coherence import find_similar
 
 try:
     import faiss
@@ -46,7 +46,7 @@ def case(name: str, image: np.ndarray, rounds: int) -> None:
 
     def ours() -> np.ndarray:
         with threads(2):
-            return similar(appearance, k=2, n=1).sets
+            return find_similar(appearance, k=2, n=1).sets
 
     def tree() -> np.ndarray:
         return cKDTree(doubles).query(doubles, k=2, workers=2)[0][:, 1]

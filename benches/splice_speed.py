@@ -29,7 +29,7 @@ from texrs.elements import Elements, analyse
 from texrs.kernels.sparse import Cholesky
 from texrs.kernels.warp import mesh
 from texrs.papers.splice import factors
-from texrs.papers.splice.energy import energy_matrix
+from texrs.papers.splice.energy import make_energy_matrix
 from texrs.papers.splice.entry import CACHES
 
 try:
@@ -89,7 +89,7 @@ def solvers(sides: list[int]) -> None:
         assert sample.mask is not None
         assert sample.centres is not None
         at = np.rint(sample.centres).astype(np.intp)
-        matrix = energy_matrix(sample.mask, at[:, 0] * side + at[:, 1], 1, upright=False)
+        matrix = make_energy_matrix(sample.mask, at[:, 0] * side + at[:, 1], 1, upright=False)
         right = np.random.default_rng(0).standard_normal((side * side, 2))
         options = {"SymmetricMode": True}
         tasks: dict[str, Callable[[], object]] = {

@@ -7,7 +7,7 @@ import texrs
 from reference import coherence as twin
 from texrs import fields, samples
 from texrs._engine.appearance import Appearance
-from texrs._engine.coherence import correct, jitter, similar
+from texrs._engine.coherence import correct, find_similar, jitter
 from texrs._engine.pyramid import ONE, Region, to_fixed
 from texrs._threads import threads
 from texrs.errors import InvalidInput
@@ -28,7 +28,7 @@ def start(appearance, region, seed=1):
 @pytest.mark.parametrize(("axes", "n"), [(2, 7), (3, 5)])
 def test_similarity_sets(axes, n, wrap, numbers):
     appearance = exemplar(axes, wrap)
-    found = similar(appearance, k=3, n=n, numbers=numbers).sets
+    found = find_similar(appearance, k=3, n=n, numbers=numbers).sets
     np.testing.assert_array_equal(found, twin.similar(appearance, 3, n, numbers))
 
 
@@ -55,7 +55,7 @@ def test_jitter_leaves_what_is_held():
 @pytest.mark.parametrize(("axes", "shape"), [(2, (11, 14)), (3, (5, 4, 3))])
 def test_correction(axes, shape, wrap, compensated):
     appearance = exemplar(axes, wrap)
-    found = similar(appearance, k=3, n=5)
+    found = find_similar(appearance, k=3, n=5)
     region = Region(shape, (-3,) * axes, (wrap,) * axes)
     for field in (None, fields.circular(axes=axes, **({} if axes == 2 else {"axis": "z"})).over(shape)):
         frames = to_fixed(field, region)
@@ -70,7 +70,7 @@ def test_correction(axes, shape, wrap, compensated):
 def test_threads_and_held_points():
     appearance = exemplar(2)
     region = Region.whole((70, 90))
-    places, found, frames = start(appearance, region), similar(appearance), to_fixed(None, region)
+    places, found, frames = start(appearance, region), find_similar(appearance), to_fixed(None, region)
     results = []
     for count in (1, 2, 7):
         with threads(count):
@@ -84,7 +84,7 @@ def test_threads_and_held_points():
 
 def test_flat_exemplars_take_no_time():
     flat = Appearance(np.zeros((40, 40, 40), np.float32), axes=3)
-    assert similar(flat).sets[40 * 40 * 20 + 40 * 20 + 20].tolist() == [32820, 3282, 3286]
+    assert find_similar(flat).sets[40 * 40 * 20 + 40 * 20 + 20].tolist() == [32820, 3282, 3286]
 
 
 @pytest.mark.parametrize(
@@ -100,21 +100,21 @@ def test_flat_exemplars_take_no_time():
 )
 def test_what_leaves_no_candidates(options, words):
     with pytest.raises(InvalidInput, match=words):
-        similar(exemplar(2), **options)
+        find_similar(exemplar(2), **options)
 
 
 def test_arrays_that_do_not_belong_together():
     appearance, region = exemplar(2), Region.whole((9, 9))
     frames, places = to_fixed(None, region), np.zeros(162, np.int32)
-    other = similar(exemplar(2, True))
+    other = find_similar(exemplar(2, True))
     with pytest.raises(InvalidInput, match="similarity"):
         correct(appearance, other, places, region, frames)
     with pytest.raises(InvalidInput, match="places"):
-        correct(appearance, similar(appearance), places[:-1], region, frames)
+        correct(appearance, find_similar(appearance), places[:-1], region, frames)
     with pytest.raises(InvalidInput, match="region"):
-        correct(appearance, similar(appearance), np.zeros(24, np.int32), Region.whole((2, 2, 2)), frames)
+        correct(appearance, find_similar(appearance), np.zeros(24, np.int32), Region.whole((2, 2, 2)), frames)
     with pytest.raises(InvalidInput, match="held"):
-        correct(appearance, similar(appearance), places, region, frames, held=np.zeros(80, bool))
+        correct(appearance, find_similar(appearance), places, region, frames, held=np.zeros(80, bool))
     with pytest.raises(InvalidInput, match="reach"):
         jitter(places, region, -1)
 

@@ -12,7 +12,7 @@ from element_checks import passes, score
 from texrs import elements, samples
 from texrs.elements import Elements, ElementSearch, Layout, analyse
 from texrs.elements._mixture import Mixture
-from texrs.elements._search import otsu
+from texrs.elements._search import threshold_otsu
 from texrs.elements._separation import reconcile
 from texrs.errors import FileError, InvalidInput
 from texrs.layouts import directions
@@ -208,7 +208,7 @@ def test_same_bytes_for_any_number_of_threads() -> None:
 
 
 def test_otsu_parts_two_heaps() -> None:
-    assert 0.3 < otsu(np.array([0.1, 0.2, 0.25, 0.7, 0.8, 0.9, 0.95])) < 0.65
+    assert 0.3 < threshold_otsu(np.array([0.1, 0.2, 0.25, 0.7, 0.8, 0.9, 0.95])) < 0.65
 
 
 def test_a_mixture_knows_its_colours() -> None:

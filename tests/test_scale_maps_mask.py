@@ -12,7 +12,7 @@ import scale_checks as checks
 from texrs import samples, scale_maps
 from texrs._threads import threads
 from texrs.errors import InvalidInput
-from texrs.scale_maps._mask import _middles, _outlines
+from texrs.scale_maps._mask import _count_outlines, _mark_middles
 from texrs.scale_maps._windows import Lattice
 
 SIDE = 256
@@ -158,27 +158,27 @@ def test_windows_count_what_a_slow_twin_counts(mask: np.ndarray, window: int, ra
 def test_outlines_are_counted_once_and_for_both_sides() -> None:
     mask = np.zeros((12, 12), bool)
     mask[3:7, 2:10] = True
-    assert _outlines(mask, None).sum() == 2 * (4 + 8)
-    assert (_outlines(mask, None) == _outlines(~mask, None)).all()
+    assert _count_outlines(mask, None).sum() == 2 * (4 + 8)
+    assert (_count_outlines(mask, None) == _count_outlines(~mask, None)).all()
     known = np.ones_like(mask)
     known[:, 9:] = False
     # The right side, and what of the two long ones is not known.
-    assert _outlines(mask, known).sum() == 4 + 2 * 7
+    assert _count_outlines(mask, known).sum() == 4 + 2 * 7
 
 
 def test_features_are_counted_at_their_middles_and_cut_ones_by_half() -> None:
     mask = np.zeros((40, 40), bool)
     mask[10:13, 20:25] = mask[30, 5] = True
     mask[0:5, 30:33] = True
-    count = _middles(mask, None)
+    count = _mark_middles(mask, None)
     assert {tuple(at): int(count[tuple(at)]) for at in np.argwhere(count)} == {(11, 22): 2, (30, 5): 2, (2, 31): 1}
     known = np.ones_like(mask)
     known[10:13, 25:] = False
-    assert _middles(mask, known)[11, 22] == 1
+    assert _mark_middles(mask, known)[11, 22] == 1
     # A ring and what is in its middle are two.
     rows, columns = np.indices((41, 41)) - 20
     ring = (np.hypot(rows, columns) > 8) & (np.hypot(rows, columns) < 11) | (np.hypot(rows, columns) < 3)
-    assert _middles(ring, None)[20, 20] == 4
+    assert _mark_middles(ring, None)[20, 20] == 4
 
 
 def test_borders_see_one_side_alone_and_are_corrected() -> None:

@@ -49,9 +49,9 @@ def test_large_walls_are_solved_for_at_fewer_pixels(upright: bool, monkeypatch: 
     shift = np.random.default_rng(1).uniform(-3, 3, pins.shape)
     full = energy.minimise_energy(~wall.mask, pins, shift, upright=upright)
     monkeypatch.setattr(energy, "MOST", 192 * 192 // 2)
-    assert energy.coarseness((192, 192)) == 2
-    assert energy.coarseness((192, 191)) == 2
-    assert energy.coarseness((96, 96)) == 1
+    assert energy.choose_coarseness((192, 192)) == 2
+    assert energy.choose_coarseness((192, 191)) == 2
+    assert energy.choose_coarseness((96, 96)) == 1
     half = energy.minimise_energy(~wall.mask, pins, shift, upright=upright)
     assert half.shape == full.shape
     assert np.abs(half - full).mean() < 0.5

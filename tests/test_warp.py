@@ -117,14 +117,14 @@ def test_bad_warps() -> None:
 def test_factors_agree_with_scipy() -> None:
     from scipy.sparse.linalg import spsolve
 
-    from texrs.papers.splice.energy import energy_matrix
+    from texrs.papers.splice.energy import make_energy_matrix
 
     random = np.random.default_rng(0)
     rigid = random.random((24, 30)) < 0.4
     pins = random.choice(rigid.size, 12, replace=False)
     for axis in (0, 1):
         for upright in (False, True):
-            matrix = energy_matrix(rigid, pins, axis, upright=upright)
+            matrix = make_energy_matrix(rigid, pins, axis, upright=upright)
             assert abs(matrix - matrix.T).max() < 1e-9
             right = np.zeros((rigid.size, 2))
             right[pins] = random.uniform(-1e4, 1e4, (12, 2)) * 5
@@ -145,7 +145,7 @@ def test_several_factors_are_each_what_one_is() -> None:
 
 def test_energy_is_that_of_the_paper() -> None:
     """Eq. 5, Table 1 and Figure 5 pixel by pixel, for the displacement along columns."""
-    from texrs.papers.splice.energy import neighbour_weights
+    from texrs.papers.splice.energy import weigh_neighbours
 
     rigid = np.random.default_rng(3).random((7, 8)) < 0.5
     coupling, small = 0.25, 0.1
@@ -155,7 +155,7 @@ def test_energy_is_that_of_the_paper() -> None:
         return bool(rigid[y, x]) if inside else True
 
     for axis in (0, 1):
-        found = neighbour_weights(rigid, axis, coupling, small)
+        found = weigh_neighbours(rigid, axis, coupling, small)
         for y in range(7):
             for x in range(8):
                 for k, (dy, dx) in enumerate(((-1, 0), (1, 0), (0, -1), (0, 1))):

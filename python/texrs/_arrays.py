@@ -72,7 +72,7 @@ def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int 
         )
     if array.size == 0 or min(array.shape[:axes]) < minimum:
         raise InvalidInput(f"{name}: each side must be at least {max(minimum, 1)}, got shape {array.shape[:axes]}")
-    array = _contiguous(array, name, array.dtype.newbyteorder("="))
+    array = _make_contiguous(array, name, array.dtype.newbyteorder("="))
     check_finite(array, name)
     return array
 
@@ -119,17 +119,17 @@ def as_array(value: object, name: str, dtype: DTypeLike, shape: Sequence[int | s
     if array.dtype.kind not in ("buif" if wanted.kind == "f" else "bui"):
         allowed = "real numbers" if wanted.kind == "f" else "bool or integers"
         raise InvalidInput(f"{name}: needs {allowed}, got dtype {array.dtype}")
-    if shape is not None and not _fits(array.shape, shape):
+    if shape is not None and not _has_shape(array.shape, shape):
         sides = ", ".join(map(str, shape)) + "," * (len(shape) == 1)
         raise InvalidInput(f"{name}: needs shape ({sides}), got {array.shape}")
     if wanted.kind in "ui" and array.size and not np.can_cast(array.dtype, wanted):
         info, low, high = np.iinfo(wanted), int(array.min()), int(array.max())
         if low < info.min or high > info.max:
             raise InvalidInput(f"{name}: allowed are {info.min} to {info.max}, got {low} to {high}")
-    return _contiguous(array, name, wanted)
+    return _make_contiguous(array, name, wanted)
 
 
-def _fits(sides: tuple[int, ...], shape: Sequence[int | str]) -> bool:
+def _has_shape(sides: tuple[int, ...], shape: Sequence[int | str]) -> bool:
     return len(sides) == len(shape) and all(
         side > 0 if isinstance(wanted, str) else side == wanted for side, wanted in zip(sides, shape, strict=True)
     )
@@ -152,7 +152,7 @@ def _as_ndarray(value: object, name: str) -> Array:
         raise LimitExceeded(f"{name}: needs more memory than there is") from None
 
 
-def _contiguous(array: Array, name: str, dtype: np.dtype[Any]) -> Array:
+def _make_contiguous(array: Array, name: str, dtype: np.dtype[Any]) -> Array:
     """Return the values in a dtype, in order and aligned; a view of less memory than it has values may be of any size."""
     if array.dtype != dtype or not (array.flags.c_contiguous and array.flags.aligned):
         check_memory(array.size * dtype.itemsize, name)

@@ -208,7 +208,7 @@ def find_fold(points: Points, axis: int, ends: tuple[float, float], *, wrap: boo
         if not beyond:
             # The last pixel itself is a line too: reflected there, no pixel is lost.
             steps = np.append(steps[steps <= end], end)
-        costs = [_misfit(points, axis, sign, float(at), scale, inner) for at in steps]
+        costs = [_measure_misfit(points, axis, sign, float(at), scale, inner) for at in steps]
         lines.append(sign * float(steps[int(np.argmin(costs))]))
     low, high = lines
     if high - low < 0.5 * scale:
@@ -218,7 +218,7 @@ def find_fold(points: Points, axis: int, ends: tuple[float, float], *, wrap: boo
     return Fold(low, high, False)
 
 
-def _misfit(points: Points, axis: int, sign: int, line: float, scale: float, inner: Points) -> float:
+def _measure_misfit(points: Points, axis: int, sign: int, line: float, scale: float, inner: Points) -> float:
     """Return how far the neighbours of points near a line differ from those of points inside."""
     x = sign * points[:, axis]
     kept = points[x <= line + 0.25 * scale]

@@ -78,7 +78,7 @@ class Synthesis:
         paths = []
         for i, (name, stage) in enumerate(self.stages.items(), start=1):
             paths.append(directory / f"{i:02d}-{re.sub('[^a-z0-9]+', '-', name.lower())}.png")
-            write(paths[-1], preview(self._flat(stage)))
+            write(paths[-1], preview(self._flatten(stage)))
         paths.append(directory / "report.json")
         with atomic(paths[-1]) as temporary:
             FilePath(temporary).write_text(json.dumps(self.report, indent=2) + "\n", encoding="utf-8")
@@ -88,9 +88,9 @@ class Synthesis:
         """Show the image, or slices of a volume, in a notebook."""
         from texrs.io._image_io import encode
 
-        return encode("image", preview(self._flat(self.image)), "png")
+        return encode("image", preview(self._flatten(self.image)), "png")
 
-    def _flat(self, stage: Array) -> Array:
+    def _flatten(self, stage: Array) -> Array:
         """Return slices of what is as large as a volume; anything else is a picture already."""
         if self.source.axes == 2 or stage.shape[:3] != self.source.shape:
             return stage

@@ -285,7 +285,7 @@ class Appearance:
         places : (points * A) int32
             In units of 1/4096 of a sample.
         region, frames
-            As of `blocks`.
+            As for `blocks`.
         passes : int
             At most so many, up to 1000; each corrects every other point, as on a chess board.
         first : int
@@ -310,7 +310,7 @@ class Appearance:
         overwrite : bool
             Write the result over ``places``, which saves 4 bytes for each of their numbers.
         demand, progress
-            As of `blocks`.
+            As for `blocks`.
 
         Returns
         -------

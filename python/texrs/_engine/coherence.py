@@ -14,7 +14,7 @@ from texrs._engine.appearance import Appearance
 from texrs._engine.pyramid import ONE, Region, flatten
 from texrs.errors import InvalidInput
 
-__all__ = ["Similarity", "correct", "jitter", "similar"]
+__all__ = ["Similarity", "correct", "find_similar", "jitter"]
 
 Report = Callable[[float], object]
 
@@ -46,7 +46,7 @@ class Similarity:
         return self.sets.nbytes
 
 
-def similar(
+def find_similar(
     appearance: Appearance, *, k: int = 3, n: int = 7, numbers: int = 8, progress: Report | None = None
 ) -> Similarity:
     """Find the samples of an exemplar that look most like each one, far from it and from each other.
@@ -87,14 +87,14 @@ def similar(
     --------
     >>> import numpy as np
     >>> exemplar = Appearance(np.tile(np.arange(8.0), (32, 4)), axes=2)
-    >>> similar(exemplar, k=2).sets[32 * 16 + 16].tolist()  # row 2, column 8: the first that looks the same
+    >>> find_similar(exemplar, k=2).sets[32 * 16 + 16].tolist()  # row 2, column 8: the first that looks the same
     [528, 72]
 
     """
     if as_int(n, "n", 1, 1 << 20) % 2 == 0:
         raise InvalidInput(f"n: needs an odd number, the side of a box around a sample, got {n}")
     count = as_int(k, "k", 1, 16)
-    sets = _rust.similar(appearance._inner, count, n, _numbers(numbers), progress)
+    sets = _rust.similar(appearance._inner, count, n, _check_numbers(numbers), progress)
     return Similarity(sets.reshape(-1, count), numbers)
 
 
@@ -164,7 +164,7 @@ def correct(
     >>> exemplar = Appearance(np.random.default_rng(0).random((32, 32)), axes=2)
     >>> region = Region.whole((20, 20))
     >>> copy = (np.indices((20, 20)).transpose(1, 2, 0) + 5).astype(np.int32).reshape(-1) * ONE
-    >>> bool((correct(exemplar, similar(exemplar), copy, region, to_fixed(None, region)) == copy).all())
+    >>> bool((correct(exemplar, find_similar(exemplar), copy, region, to_fixed(None, region)) == copy).all())
     True
 
     """
@@ -178,9 +178,9 @@ def correct(
         region.place,
         frames,
         flatten(held),
-        _kinds(kinds),
+        _flatten_kinds(kinds),
         as_int(passes, "passes", 0, 1000),
-        _numbers(similarity.numbers),
+        _check_numbers(similarity.numbers),
         compensated,
         progress,
     )
@@ -235,13 +235,15 @@ def jitter(
     )
 
 
-def _numbers(numbers: int) -> int:
+def _check_numbers(numbers: int) -> int:
     if numbers not in (8, 24):
         raise InvalidInput(f"numbers: 8 or 24 are allowed, got {numbers!r}")
     return int(numbers)
 
 
-def _kinds(kinds: tuple[NDArray[np.uint8], NDArray[np.uint8]] | None) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+def _flatten_kinds(
+    kinds: tuple[NDArray[np.uint8], NDArray[np.uint8]] | None,
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     if kinds is None:
         return np.zeros(0, np.uint8), np.zeros(0, np.uint8)
     samples, points = (np.ascontiguousarray(k, np.uint8).reshape(-1) for k in kinds)

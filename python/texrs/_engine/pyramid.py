@@ -128,10 +128,10 @@ def to_fixed(field: Frames | None, region: Region, step: int = 1) -> NDArray[np.
     """
     axes = len(region.shape)
     if field is None:
-        return _fixed(np.eye(axes)[np.newaxis])
+        return _round_frames(np.eye(axes)[np.newaxis])
     constant = getattr(field, "constant", None)
     if constant is not None:
-        return _fixed(np.linalg.inv(np.asarray(constant, np.float64))[np.newaxis])
+        return _round_frames(np.linalg.inv(np.asarray(constant, np.float64))[np.newaxis])
     out = np.empty((region.points, axes, axes), np.int16)
     plane = region.points // region.shape[0]
     thick = max(1, _SLAB // plane)
@@ -139,11 +139,11 @@ def to_fixed(field: Frames | None, region: Region, step: int = 1) -> NDArray[np.
         slab = (min(thick, region.shape[0] - first), *region.shape[1:])
         origin = (region.origin[0] + first, *region.origin[1:])
         frames = field.lattice(slab, origin=origin, step=step).reshape(-1, axes, axes)
-        out[first * plane : first * plane + len(frames)] = _fixed(frames)
+        out[first * plane : first * plane + len(frames)] = _round_frames(frames)
     return out
 
 
-def _fixed(frames: Array) -> NDArray[np.int16]:
+def _round_frames(frames: Array) -> NDArray[np.int16]:
     largest = float(np.abs(frames).max())
     if largest >= 7.99:
         raise InvalidInput(f"field: features may shrink to an eighth of their size, got 1/{largest:.3g}")

@@ -65,7 +65,7 @@ def load(name: str) -> Callable[..., None]:
             return _examples.COMMANDS[name]
     from texrs.cli import _verbs
 
-    return _verbs.make_verb(name).command()
+    return _verbs.make_verb(name).make_command()
 
 
 class Group(TyperGroup):

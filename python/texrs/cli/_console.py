@@ -49,20 +49,20 @@ class Stopped(BaseException):
 def run(work: Callable[[], object]) -> int:
     """Do the work of a command and return its exit code; say on one line of stderr what went wrong."""
     try:
-        with stoppable(), unwarned():
+        with raise_on_signals(), silence_warnings():
             code = work()
             if sys.stdout is not None:
                 sys.stdout.flush()
     except Stopped as stopped:
-        return _stopped(stopped.number)
+        return _end_stopped(stopped.number)
     except BrokenPipeError:
-        return _stopped(PIPE)
+        return _end_stopped(PIPE)
     except (KeyboardInterrupt, typer.Abort):
-        return _stopped(signal.SIGINT)
+        return _end_stopped(signal.SIGINT)
     except SystemExit as leaving:
         code = leaving.code
     except UsageFailure as failure:
-        complain(_usage(failure))
+        complain(_describe_usage(failure))
         code = BAD_INPUT
     except TexrsError as error:
         complain(str(error))
@@ -108,7 +108,7 @@ def complain(message: str) -> None:
 
 
 @contextmanager
-def stoppable() -> Iterator[None]:
+def raise_on_signals() -> Iterator[None]:
     """Let Ctrl-C and requests to end raise `Stopped`, so that all that is half-written is removed."""
     last = -math.inf
 
@@ -135,7 +135,7 @@ def stoppable() -> Iterator[None]:
 
 
 @contextmanager
-def unwarned() -> Iterator[None]:
+def silence_warnings() -> Iterator[None]:
     """Keep warnings, which speak to programmers, off the terminal unless Python was asked for them."""
     with warnings.catch_warnings():
         if not sys.warnoptions:
@@ -144,19 +144,19 @@ def unwarned() -> Iterator[None]:
 
 
 @contextmanager
-def watching(*, quiet: bool) -> Iterator[Progress]:
+def show_progress(*, quiet: bool) -> Iterator[Progress]:
     """Return a callback that shows progress on stderr: a bar on a terminal, lines elsewhere."""
     if quiet or sys.stderr is None:
         yield lambda stage, share: None
     elif sys.stderr.isatty() and os.environ.get("TERM") != "dumb":
-        with _bar() as progress:
+        with _show_bar() as progress:
             yield progress
     else:
-        yield _lines()
+        yield _show_lines()
 
 
 @contextmanager
-def _bar() -> Iterator[Progress]:
+def _show_bar() -> Iterator[Progress]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -171,7 +171,7 @@ def _bar() -> Iterator[Progress]:
         yield lambda stage, share: bar.update(task, description=stage, completed=share)
 
 
-def _lines() -> Progress:
+def _show_lines() -> Progress:
     last, since = "", 0.0
 
     def show(stage: str, share: float) -> None:
@@ -184,7 +184,7 @@ def _lines() -> Progress:
     return show
 
 
-def _stopped(number: int) -> int:
+def _end_stopped(number: int) -> int:
     """Return the exit code of a command that a signal ended; a broken pipe is no news to anybody."""
     if number == PIPE:
         # What is still buffered has nowhere to go, and Python would complain of that at its end.
@@ -195,7 +195,7 @@ def _stopped(number: int) -> int:
     return 128 + number
 
 
-def _usage(failure: Exception) -> str:
+def _describe_usage(failure: Exception) -> str:
     """Return what was wrong with the arguments, and where the right ones are listed."""
     message = failure.format_message() if hasattr(failure, "format_message") else str(failure)
     context = getattr(failure, "ctx", None)

@@ -12,10 +12,10 @@ from typing import Annotated, Any
 from texrs import io
 from texrs._threads import threads
 from texrs.cli import _outputs
-from texrs.cli._console import complain, note, say, watching
+from texrs.cli._console import complain, note, say, show_progress
 from texrs.cli._kinds import PICTURE, PLACE, read_picture
-from texrs.cli._options import Options, taking
-from texrs.cli._outputs import SAMPLE, Quiet, Threads, make_argument, named, to_write
+from texrs.cli._options import Options, take_options
+from texrs.cli._outputs import SAMPLE, Quiet, Threads, make_argument, name_arguments, to_write
 from texrs.database import TextureDatabase
 from texrs.elements import analyse, pictures
 from texrs.errors import FileError, InvalidInput
@@ -27,7 +27,7 @@ SIMILAR = Options(TextureDatabase.add, only=("similarity",))
 MATRIX = Options(TextureDatabase.matrix, only=("size", "cell"))
 
 
-@taking(PICTURED, SIMILAR)
+@take_options(PICTURED, SIMILAR)
 def analyse_command(
     out: Annotated[str, to_write("out", "ENTRY.npz", "Entry to write.")],
     given: dict[str, Any],
@@ -46,7 +46,7 @@ def analyse_command(
         _outputs.check_folder(stages)
     options |= PICTURED.read(given, which=lambda o: o.file)
     names = {o.path[-1]: o.flag for o in PICTURED} | {"image": given["image"], "count": "--threads"}
-    with named(**names), threads(count), watching(quiet=quiet) as progress:
+    with name_arguments(**names), threads(count), show_progress(quiet=quiet) as progress:
         entry = analyse(**PICTURED.call(options), progress=progress)
         if given["similarity"]:
             entry = entry.with_similarity()
@@ -59,7 +59,7 @@ def analyse_command(
     note(f"wrote {out}: {len(entry.points)} elements, {entry.layout}, in {time.monotonic() - start:.1f} s", quiet=quiet)
 
 
-@taking(ANALYSED, KEPT, MATRIX)
+@take_options(ANALYSED, KEPT, MATRIX)
 def database_command(
     folder: Annotated[str, make_argument("DIR", "Folder of the database; made if it is not there.")],
     action: Annotated[str, make_argument("add|list|matrix", "Add images, list what is there, or splice all with all.")],
@@ -89,11 +89,11 @@ def database_command(
     _outputs.check_apart(kept, {"out": out})
     _outputs.check_output(out)
     options = MATRIX.call(MATRIX.read(given))
-    with named(count="--threads"), threads(count), watching(quiet=quiet) as progress:
+    with name_arguments(count="--threads"), threads(count), show_progress(quiet=quiet) as progress:
         made = textures.matrix(items or None, items or None, **options, progress=progress, seed=given["seed"])
     for (a, b), reason in made.failed.items():
         complain(f"{a} on {b}: {reason}")
-    with _outputs.output(out) as temporary:
+    with _outputs.write_output(out) as temporary:
         io.write(temporary, made.sheet)
     note(f"wrote {out}: {len(made.results)} splices", quiet=quiet)
 
@@ -116,7 +116,7 @@ def add(folder: str, items: Sequence[str], given: dict[str, Any], count: int | N
     for image in images:
         sample = image.startswith(SAMPLE)
         name = given["name"] or (image.removeprefix(SAMPLE) if sample else None)
-        with named(image=image, count="--threads"), threads(count), watching(quiet=quiet) as progress:
+        with name_arguments(image=image, count="--threads"), threads(count), show_progress(quiet=quiet) as progress:
             entry = textures.add(read_picture(image) if sample else image, name, **options, progress=progress)
         explain(entry, quiet=quiet)
         note(f"added {image}: {len(entry.points)} elements, {entry.layout}", quiet=quiet)

@@ -12,9 +12,9 @@ from typing import Annotated, Any
 from texrs import io, samples
 from texrs._threads import threads
 from texrs.cli import _outputs
-from texrs.cli._console import note, say, watching
+from texrs.cli._console import note, say, show_progress
 from texrs.cli._kinds import parse_size
-from texrs.cli._outputs import Quiet, Threads, describe, make_argument, make_option, named, to_write
+from texrs.cli._outputs import Quiet, Threads, describe, make_argument, make_option, name_arguments, to_write
 from texrs.errors import InvalidInput
 
 
@@ -30,10 +30,10 @@ def demo_command(
     index = os.path.join(out, "index.html")
     if Path(out).is_dir():
         _outputs.check_output(index)
-    with named(count="--threads"), threads(count), watching(quiet=quiet) as progress:
+    with name_arguments(count="--threads"), threads(count), show_progress(quiet=quiet) as progress:
         text = page(progress=progress)
     Path(out).mkdir(parents=True, exist_ok=True)
-    with _outputs.output(index) as temporary:
+    with _outputs.write_output(index) as temporary:
         temporary.write_text(text, encoding="utf-8")
     note(f"wrote {index}, in {time.monotonic() - start:.1f} s", quiet=quiet)
 

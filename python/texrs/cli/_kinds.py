@@ -15,7 +15,7 @@ import numpy as np
 from texrs import io, samples
 from texrs._arrays import as_image, as_size
 from texrs._typing import Array, Floats
-from texrs.cli._outputs import SAMPLE, named
+from texrs.cli._outputs import SAMPLE, name_arguments
 from texrs.errors import FileError, InvalidInput
 
 PLACE = r"\s*-?[0-9]+(\.[0-9]*)?\s*,\s*-?[0-9]+(\.[0-9]*)?\s*"
@@ -129,16 +129,16 @@ def parse_bytes(text: str, option: str = "--memory-limit") -> int:
 
 def parse_box(text: str, about: About) -> list[float]:
     """Return the middle and the sides of a box."""
-    return _finite(text, 4, about.option, "ROW,COL,HEIGHT,WIDTH, as in 96,92,50,50")
+    return _parse_finite(text, 4, about.option, "ROW,COL,HEIGHT,WIDTH, as in 96,92,50,50")
 
 
 def parse_places(texts: Sequence[str], about: About) -> list[list[float]]:
     """Return the points of one text or of several."""
     parts = [p for text in texts for p in re.split(r"[\s;]+", text.strip()) if p]
-    return [_finite(p, 2, about.option, "ROW,COL, as in 125,60") for p in parts]
+    return [_parse_finite(p, 2, about.option, "ROW,COL, as in 125,60") for p in parts]
 
 
-def _finite(text: str, count: int, option: str, wanted: str) -> list[float]:
+def _parse_finite(text: str, count: int, option: str, wanted: str) -> list[float]:
     numbers = parse_numbers(text, option, wanted, counts=(count,), between=",")
     if not all(math.isfinite(n) for n in numbers):
         raise InvalidInput(f"{option}: needs {wanted}; got {text!r}")
@@ -224,7 +224,7 @@ def read_scale_map(path: str, encoding: str = "log2") -> Floats:
     if values.dtype.kind == "f":
         return np.asarray(values if values.ndim == 2 else values[..., 0], np.float32)
     levels: Any = encoding
-    with named(image=path):
+    with name_arguments(image=path):
         return scale_maps.decode(values, levels)
 
 
@@ -233,12 +233,12 @@ def read_field(text: str, size: tuple[int, ...]) -> Any:
     from texrs import fields
 
     if Path(text).suffix.lower() != ".npz":
-        with named(field="--field"):
+        with name_arguments(field="--field"):
             return fields.parse(text, len(size), size)
     arrays = list(io.read_arrays(text).values())
     if len(arrays) != 1:
         raise FileError(f"{text}: needs a single array of frames, has {len(arrays)}")
-    with named(frames=text):
+    with name_arguments(frames=text):
         field = fields.from_array(arrays[0], size if arrays[0].ndim == len(size) + 2 else None)
     if field.axes != len(size):
         raise InvalidInput(f"{text}: holds frames of {field.axes} axes, {len(size)} are needed")

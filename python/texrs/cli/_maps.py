@@ -14,8 +14,8 @@ from texrs._threads import threads
 from texrs.blending import blend
 from texrs.cli import _outputs
 from texrs.cli._console import note, say
-from texrs.cli._options import Options, check_needed, taking
-from texrs.cli._outputs import Quiet, Threads, describe, make_argument, named, to_write
+from texrs.cli._options import Options, check_needed, take_options
+from texrs.cli._outputs import Quiet, Threads, describe, make_argument, name_arguments, to_write
 from texrs.errors import FileError, InvalidInput
 from texrs.source_map import SourceMap
 
@@ -35,7 +35,7 @@ BLENDED = Options(
 )
 
 
-@taking(RENDERED, BLENDED)
+@take_options(RENDERED, BLENDED)
 def apply_command(
     source: Annotated[str, make_argument("MAP.npz", "A source map that --map wrote.")],
     maps: Annotated[list[str], make_argument("IMAGE", "Images in register with the exemplar.")],
@@ -63,8 +63,8 @@ def apply_command(
         for paths, target in zip(groups, targets, strict=True):
             images = [read(path) for path in paths]
             _outputs.check_output(target, images[0], places.shape)
-            temporary = stack.enter_context(_outputs.output(target))
-            with named(**BLENDED.called(given), exemplars=" and ".join(paths)):
+            temporary = stack.enter_context(_outputs.write_output(target))
+            with name_arguments(**BLENDED.name_values(given), exemplars=" and ".join(paths)):
                 if weight:
                     image = blend(places, images, **BLENDED.call(blended), **options)
                 else:

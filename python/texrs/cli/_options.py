@@ -45,7 +45,7 @@ class Option:
     required: bool
     """Whether the function needs one."""
     info: Any
-    """What typer is told."""
+    """What typer gets."""
 
     @property
     def name(self) -> str:
@@ -62,13 +62,13 @@ class Option:
         """Whether the value stands in a file."""
         return self.kind is not None and self.kind.file
 
-    def called(self, text: object) -> str:
+    def name_value(self, text: object) -> str:
         """Return what errors call it: the file that was given, or the option."""
         if self.kind is None or not self.kind.file or text is None or text in self.kind.words:
             return self.flag
         return " ".join(text) if isinstance(text, list) else str(text)
 
-    def parameter(self) -> inspect.Parameter:
+    def make_parameter(self) -> inspect.Parameter:
         """Return the parameter that makes typer take this option."""
         # For typer a value that may be left out is one that may be None.
         annotation: Any = Annotated[self.type if self.default is MISSING else self.type | None, self.info]
@@ -120,18 +120,18 @@ class Options:
         self._kinds = self._arguments | dict(kinds or {})
         self.groups: dict[str, Any] = dict(makers or {})
         found = list(self._find(only))
-        flags = {path[-1]: self._flag(path) for path, _, _ in found}
-        self.all = tuple(self._option(*each, flags) for each in found)
+        flags = {path[-1]: self._make_flag(path) for path, _, _ in found}
+        self.all = tuple(self._make_option(*each, flags) for each in found)
 
     def __iter__(self) -> Iterator[Option]:
         return iter(self.all)
 
-    def called(self, given: Mapping[str, Any]) -> dict[str, str]:
+    def name_values(self, given: Mapping[str, Any]) -> dict[str, str]:
         """Return what errors call each parameter: the file that was given, or the option; of several, all files."""
-        called = {option.path[-1]: option.called(given[option.name]) for option in reversed(self.all)}
+        called = {option.path[-1]: option.name_value(given[option.name]) for option in reversed(self.all)}
         for name in self.groups:
             there = [
-                o.called(given[o.name]) for o in self if o.path[0] == name and o.file and given[o.name] is not None
+                o.name_value(given[o.name]) for o in self if o.path[0] == name and o.file and given[o.name] is not None
             ]
             called |= {name: " and ".join(there)} if there else {}
         return called
@@ -173,7 +173,7 @@ class Options:
         for name, each in inspect.signature(self.function, eval_str=True).parameters.items():
             if each.kind is each.VAR_KEYWORD or name == "self" or name in self.leave or (only and name not in only):
                 continue
-            group: Any = next((t for t in _parts(each.annotation) if is_dataclass(t)), self.groups.get(name))
+            group: Any = next((t for t in _split_union(each.annotation) if is_dataclass(t)), self.groups.get(name))
             if group is None or name in self._kinds:
                 yield (name,), each, texts.get(name, "")
                 continue
@@ -184,17 +184,17 @@ class Options:
                     text = texts if f"{name}.{part}" in self._arguments else inner
                     yield (name, part), one, text.get(name if text is texts else part, "")
 
-    def _flag(self, path: Path) -> str:
+    def _make_flag(self, path: Path) -> str:
         name = self._names.get(".".join(path))
         if name is None:
             before = self._names.get(path[0], "") if len(path) == 2 else ""
             name = "-".join(part for part in (before, path[-1]) if part)
         return name.upper() if ".".join(path) in self._arguments else "--" + name.replace("_", "-")
 
-    def _option(self, path: Path, parameter: inspect.Parameter, text: str, flags: Mapping[str, str]) -> Option:
-        default, flag, name = parameter.default, self._flag(path), path[-1]
+    def _make_option(self, path: Path, parameter: inspect.Parameter, text: str, flags: Mapping[str, str]) -> Option:
+        default, flag, name = parameter.default, self._make_flag(path), path[-1]
         required = default is MISSING
-        kind, type_ = self._kind(path, parameter)
+        kind, type_ = self._find_kind(path, parameter)
         if name in self.optional or (required and len(path) == 2 and flag.startswith("--")):
             default = None
         if kind is not None and default is not None and default is not MISSING:
@@ -216,9 +216,9 @@ class Options:
             info = typer.Option(both, metavar=metavar, help=help_, show_default=shown)
         return Option(path, flag, type_, kind, default, required, info)
 
-    def _kind(self, path: Path, parameter: inspect.Parameter) -> tuple[Kind | None, Any]:
+    def _find_kind(self, path: Path, parameter: inspect.Parameter) -> tuple[Kind | None, Any]:
         """Return the kind of a value and what typer reads: as this command says, as the type, or as the name."""
-        type_, named = _type_of(parameter.annotation, parameter.default), KINDS.get(path[-1])
+        type_, named = _find_type(parameter.annotation, parameter.default), KINDS.get(path[-1])
         kind = self._kinds.get(".".join(path)) or (type_ if isinstance(type_, Kind) else None)
         if kind is None and named is not None and (named.plain or type_ is None):
             kind = named
@@ -227,7 +227,7 @@ class Options:
         return kind, type_ if kind is None else list[str] if kind.many else str
 
 
-def parameter(name: str, annotation: Any, default: Any = MISSING) -> inspect.Parameter:
+def make_parameter(name: str, annotation: Any, default: Any = MISSING) -> inspect.Parameter:
     """Return a parameter that only the command line has."""
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
@@ -244,7 +244,7 @@ def as_command(work: Callable[..., None], parameters: Iterable[inspect.Parameter
     return command
 
 
-def taking(*several: Options) -> Callable[[Callable[..., None]], Callable[..., None]]:
+def take_options(*several: Options) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Let a command take options of functions too, as ``given``, which `Options.read` reads.
 
     They come where the command has ``given``, but for arguments, which are first.
@@ -258,7 +258,7 @@ def taking(*several: Options) -> Callable[[Callable[..., None]], Callable[..., N
         if len(defaults) > 1:
             one.info.show_default = " or ".join(map(str, defaults))
             one = replace(one, default=None)
-        made.append((one.argument, one.parameter()))
+        made.append((one.argument, one.make_parameter()))
 
     def wrap(work: Callable[..., None]) -> Callable[..., None]:
         def command(**all_: Any) -> None:
@@ -287,23 +287,23 @@ def check_needed(given: Mapping[str, Any], owners: Mapping[str, Iterable[Option]
 # --- types -----------------------------------------------------------------------------------------------------------
 
 
-def _parts(annotation: Any) -> tuple[Any, ...]:
+def _split_union(annotation: Any) -> tuple[Any, ...]:
     """Return the types of a union, or the one that there is."""
     return get_args(annotation) if get_origin(annotation) in (Union, types.UnionType) else (annotation,)
 
 
-def _type_of(annotation: Any, default: Any) -> Any:
+def _find_type(annotation: Any, default: Any) -> Any:
     """Return the type that typer reads by itself, or the kind of values that are words; None for all others."""
-    parts = [part for part in _parts(annotation) if part is not types.NoneType]
+    parts = [part for part in _split_union(annotation) if part is not types.NoneType]
     if all(get_origin(part) is Literal for part in parts):
-        return one_of([word for part in parts for word in get_args(part)], optional=default is None)
+        return make_choice([word for part in parts for word in get_args(part)], optional=default is None)
     members = next((part for part in parts if isinstance(part, type) and issubclass(part, Enum)), None)
     if members is not None:
-        return one_of([str(member.value) for member in members], members, optional=default is None)
+        return make_choice([str(member.value) for member in members], members, optional=default is None)
     return parts[0] if len(parts) == 1 and parts[0] in (bool, int, float, str) else None
 
 
-def one_of(words: Sequence[str], make: Callable[[str], Any] | None = None, *, optional: bool = False) -> Kind:
+def make_choice(words: Sequence[str], make: Callable[[str], Any] | None = None, *, optional: bool = False) -> Kind:
     """Return the kind of values that are one of some words; ``default`` may stand for None."""
     allowed = ["default", *words] if optional else list(words)
     chosen = make or {word: word for word in words}.__getitem__

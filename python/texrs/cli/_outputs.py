@@ -63,12 +63,12 @@ class Command(TyperCommand):
         """Do the command, if no output is an input."""
         outputs = {p.name for p in self.params if p.name in OUTPUTS and p.param_type_name == "option"}
         given = ctx.params.items()
-        inputs = [text for name, value in given if name not in outputs for text in texts(value)]
+        inputs = [text for name, value in given if name not in outputs for text in find_texts(value)]
         check_apart(inputs, {name: value for name, value in given if name in outputs})
         return super().invoke(ctx)
 
 
-def texts(value: object) -> list[str]:
+def find_texts(value: object) -> list[str]:
     """Return the texts among the values of a parameter."""
     return [v for v in as_list(value) if isinstance(v, str)]
 
@@ -112,7 +112,7 @@ def check_folder(path: str) -> None:
 
 def check_apart(inputs: Iterable[str], outputs: Mapping[str, str | None]) -> None:
     """Check that no output is an input, under whatever name, nor what the pictures of the stages would replace."""
-    found = [(name, status) for name in inputs if (status := _status(name)) is not None]
+    found = [(name, status) for name in inputs if (status := _read_status(name)) is not None]
     for option, path in outputs.items():
         if path is None:
             continue
@@ -121,14 +121,14 @@ def check_apart(inputs: Iterable[str], outputs: Mapping[str, str | None]) -> Non
             there = sorted(os.listdir(path)) if os.path.isdir(path) else []
             files = [os.path.join(path, name) for name in there if STAGE.fullmatch(name)]
         for file in files:
-            old = _status(file)
+            old = _read_status(file)
             for name, status in found:
                 if old is not None and os.path.samestat(old, status):
                     known = "" if name == file else f" as {name}"
                     raise InvalidInput(f"--{option}: {file} is read{known}, and would be lost; write to another file")
 
 
-def _status(path: str) -> os.stat_result | None:
+def _read_status(path: str) -> os.stat_result | None:
     """Return the status of the regular file that a path leads to, if there is one."""
     with suppress(OSError, ValueError):
         status = os.stat(path)
@@ -146,7 +146,7 @@ def check_output(path: str, like: Array | None = None, size: tuple[int, ...] = (
 
     Without ``like``, only whether a file can be.
     """
-    with suppress(_Enough), output(path) as temporary:
+    with suppress(_Enough), write_output(path) as temporary:
         if like is None:
             temporary.touch()
         else:
@@ -164,7 +164,7 @@ def check_output(path: str, like: Array | None = None, size: tuple[int, ...] = (
 
 
 @contextmanager
-def output(path: str) -> Iterator[Path]:
+def write_output(path: str) -> Iterator[Path]:
     """Return a temporary name that takes the place of ``path`` at the end; errors speak of ``path``."""
     with io.atomic(path) as temporary:
         try:
@@ -177,7 +177,7 @@ def output(path: str) -> Iterator[Path]:
 
 
 @contextmanager
-def named(**names: str) -> Iterator[None]:
+def name_arguments(**names: str) -> Iterator[None]:
     """Name the file or the option where an error names the argument of a function.
 
     Arguments that are not given have the option of their own name.
@@ -194,7 +194,7 @@ def named(**names: str) -> Iterator[None]:
 def deliver(result: Synthesis, paths: Mapping[str, str | None]) -> None:
     """Write a result and what was asked for beside it."""
     # The result takes its name last, when all else is written.
-    with output(paths["out"] or "") as temporary:
+    with write_output(paths["out"] or "") as temporary:
         (io.write if result.source.axes == 2 else io.write_volume)(temporary, result.image)
         if (source := paths.get("map")) is not None:
             result.source.save(source)
@@ -202,7 +202,7 @@ def deliver(result: Synthesis, paths: Mapping[str, str | None]) -> None:
             result.save_stages(stages)
 
 
-def variant_names(seed: int, paths: Mapping[str, str | None]) -> dict[str, str | None]:
+def name_variants(seed: int, paths: Mapping[str, str | None]) -> dict[str, str | None]:
     """Return the names of what is written of one of several results: each ends in its seed."""
     for option, path in paths.items():
         if path is not None and not Path(path).name:
@@ -211,7 +211,7 @@ def variant_names(seed: int, paths: Mapping[str, str | None]) -> dict[str, str |
     return {o: None if p is None else str(p.with_name(f"{p.stem}-{seed}{p.suffix}")) for o, p in places.items()}
 
 
-def contact_sheet(images: Sequence[Array]) -> Array:
+def make_contact_sheet(images: Sequence[Array]) -> Array:
     """Set images of one size into a grid, in their dtype."""
     columns = int(np.ceil(np.sqrt(len(images))))
     height, width = images[0].shape[:2]

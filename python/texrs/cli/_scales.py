@@ -17,8 +17,8 @@ from texrs._typing import Array
 from texrs.cli import _outputs
 from texrs.cli._console import note
 from texrs.cli._kinds import read_mask, read_picture, read_scale_map
-from texrs.cli._options import Options, check_needed, one_of, taking
-from texrs.cli._outputs import Quiet, Threads, make_argument, make_option, named, to_write
+from texrs.cli._options import Options, check_needed, make_choice, take_options
+from texrs.cli._outputs import Quiet, Threads, make_argument, make_option, name_arguments, to_write
 from texrs.errors import InvalidInput
 from texrs.synthesis import preview
 
@@ -31,13 +31,13 @@ EDITED = Options(scale_maps.edit, only=("steps",), names={"steps": "edit"}, opti
 RESIZED = Options(
     scale_maps.resample,
     only=("size", "mode"),
-    kinds={"mode": one_of(["stretch", "extend"])},
+    kinds={"mode": make_choice(["stretch", "extend"])},
     optional={"size": "that of the image"},
 )
 ENCODED = Options(scale_maps.encode, only=("encoding",), optional={"encoding": "log2 for formats without floats"})
 
 
-@taking(ANGLES, MASKS, FOUND, EDITED, RESIZED, ENCODED)
+@take_options(ANGLES, MASKS, FOUND, EDITED, RESIZED, ENCODED)
 def scale_map_command(
     image: Annotated[str, make_argument("IMAGE", "The texture: an image file, or sample:NAME.")],
     out: Annotated[str, to_write("out")],
@@ -81,18 +81,18 @@ def scale_map_command(
     _outputs.check_output(out, np.ones(1, np.uint8 if levels else np.float32)[0], sides)
     shown: dict[str, Array] = {}
     names = {"image": image, "mask": mask or image, "known": str(hole), "steps": "--edit", "count": "--threads"}
-    with named(**names), threads(count):
+    with name_arguments(**names), threads(count):
         if scale_map is not None:
             made = read_scale_map(scale_map, encoding or "log2")
         elif given["slant"] is not None:
             angles = {"tilt": 90.0} | ANGLES.call(ANGLES.read(given))
             made = scale_maps.from_angles(pixels.shape[:2], **angles)
         else:
-            known = None if hole is None else same_size(read_mask(hole), pixels, "--hole") == 0
+            known = None if hole is None else check_same_size(read_mask(hole), pixels, "--hole") == 0
             if mask is None:
                 drawn = scale_maps.auto_mask(pixels, known=known, **FOUND.call(FOUND.read(given)))
             else:
-                drawn = same_size(read_mask(mask), pixels, "--mask")
+                drawn = check_same_size(read_mask(mask), pixels, "--mask")
             made = scale_maps.from_mask(drawn, known=known, **MASKS.call(MASKS.read(given)))
             shown["mask"] = drawn != 0
         shown["scale"] = scale_maps.picture(made)
@@ -103,7 +103,7 @@ def scale_map_command(
             made = scale_maps.resample(made, **RESIZED.call(RESIZED.read(given)))
             shown["resampled"] = scale_maps.picture(made)
     least, largest = float(made.min()), float(made.max())
-    with _outputs.output(out) as temporary:
+    with _outputs.write_output(out) as temporary:
         io.write(temporary, made if levels is None else scale_maps.encode(made, levels))
         if stages is not None:
             said = {name: value for name, value in given.items() if value is not None and name not in ("steps", "size")}
@@ -115,7 +115,7 @@ def scale_map_command(
     note(f"wrote {out}: {extent}, scales {least:.3g} to {largest:.3g}, in {seconds:.1f} s", quiet=quiet)
 
 
-def same_size(mask: Array, pixels: Array, option: str) -> Array:
+def check_same_size(mask: Array, pixels: Array, option: str) -> Array:
     """Return the mask, if it is as large as the picture."""
     if mask.shape[:2] != pixels.shape[:2]:
         sizes = (" x ".join(map(str, a.shape[:2])) for a in (pixels, mask))

@@ -14,10 +14,10 @@ from texrs._arrays import as_int
 from texrs._threads import threads
 from texrs._typing import Array
 from texrs.cli import _outputs
-from texrs.cli._console import note, watching
+from texrs.cli._console import note, show_progress
 from texrs.cli._kinds import About, Kind, parse_numbers, read_volume
-from texrs.cli._options import Options, check_needed, taking
-from texrs.cli._outputs import Quiet, Threads, describe, make_argument, named, to_write
+from texrs.cli._options import Options, check_needed, take_options
+from texrs.cli._outputs import Quiet, Threads, describe, make_argument, name_arguments, to_write
 from texrs.errors import InvalidInput
 from texrs.volume import cube, oblique, paint, slices, turntable
 
@@ -70,7 +70,7 @@ BLOCK = Options(cube, only=("size", "azimuth", "elevation", "interpolation"))
 TURNED = Options(turntable, only=("size", "frames", "elevation", "seconds", "interpolation"))
 
 
-@taking(ACROSS, CUT, BLOCK, TURNED)
+@take_options(ACROSS, CUT, BLOCK, TURNED)
 def slice_command(
     volume: Annotated[str, make_argument("VOLUME", "The volume: a file, or sample:NAME.")],
     out: Annotated[str, to_write("out", text="Image file to write.")],
@@ -97,20 +97,20 @@ def slice_command(
     _outputs.check_output(out, np.zeros((1, 1, 4), np.uint8) if as_cube else None)
     voxels = read_volume(volume)
     if labels:
-        with named(labels=volume):
+        with name_arguments(labels=volume):
             voxels = paint(voxels)
         if used is not ACROSS:
             options["interpolation"] = "nearest"
     if not (as_cube or as_turntable):
         _outputs.check_output(out, voxels[0])
-    with named(volume=volume, point="--oblique", normal="--oblique", count="--threads"), threads(count):
+    with name_arguments(volume=volume, point="--oblique", normal="--oblique", count="--threads"), threads(count):
         if as_turntable:
-            with watching(quiet=quiet) as progress:
+            with show_progress(quiet=quiet) as progress:
                 turntable(voxels, out, **options, progress=progress)
             note(f"wrote {out}: {given['frames']} pictures, in {time.monotonic() - start:.1f} s", quiet=quiet)
             return
         picture = draw(voxels, used, options)
-    with _outputs.output(out) as temporary:
+    with _outputs.write_output(out) as temporary:
         io.write(temporary, picture)
     note(f"wrote {out}: {describe(picture, 2)}, in {time.monotonic() - start:.1f} s", quiet=quiet)
 

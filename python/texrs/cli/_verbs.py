@@ -16,10 +16,10 @@ from texrs._arrays import as_int
 from texrs._threads import threads
 from texrs._typing import Array
 from texrs.cli import _outputs
-from texrs.cli._console import note, watching
+from texrs.cli._console import note, show_progress
 from texrs.cli._kinds import ENTRY, HOLE, MAP_OR_AUTO, NUMBERS, PICTURE, PICTURES, UNKNOWN, VOLUME, About, Kind
-from texrs.cli._options import Options, as_command, parameter
-from texrs.cli._outputs import Quiet, Threads, describe, named, to_write
+from texrs.cli._options import Options, as_command, make_parameter
+from texrs.cli._outputs import Quiet, Threads, describe, name_arguments, to_write
 from texrs.synthesis import Synthesis
 
 VARIANTS = typer.Option(
@@ -41,16 +41,16 @@ class Verb:
     says: Callable[[Synthesis], str] = lambda result: ""
     """What else is to be said of the result."""
 
-    def command(self) -> Callable[..., None]:
+    def make_command(self) -> Callable[..., None]:
         """Return the function of the command."""
-        parameters = [o.parameter() for o in self.options if o.argument]
-        parameters.append(parameter("out", Annotated[str, to_write("out")]))
-        parameters += [o.parameter() for o in self.options if not o.argument]
+        parameters = [o.make_parameter() for o in self.options if o.argument]
+        parameters.append(make_parameter("out", Annotated[str, to_write("out")]))
+        parameters += [o.make_parameter() for o in self.options if not o.argument]
         if self.several is not None:
-            parameters.append(parameter("variants", Annotated[int | None, VARIANTS], None))
+            parameters.append(make_parameter("variants", Annotated[int | None, VARIANTS], None))
         for name in ("map", "stages"):
-            parameters.append(parameter(name, Annotated[str | None, to_write(name)], None))
-        parameters += [parameter("count", Threads, None), parameter("quiet", Quiet, False)]
+            parameters.append(make_parameter(name, Annotated[str | None, to_write(name)], None))
+        parameters += [make_parameter("count", Threads, None), make_parameter("quiet", Quiet, False)]
         return as_command(self.run, parameters)
 
     def run(self, *, count: int | None, quiet: bool, variants: int | None = None, **given: Any) -> None:
@@ -62,20 +62,20 @@ class Verb:
         _outputs.check_outputs(paths)
         places = [paths]
         if variants is not None:
-            first, texts = given["seed"], [text for value in given.values() for text in _outputs.texts(value)]
-            places = [_outputs.variant_names(first + k, paths) for k in range(as_int(variants, "--variants", 1, 4096))]
+            first, texts = given["seed"], [text for value in given.values() for text in _outputs.find_texts(value)]
+            places = [_outputs.name_variants(first + k, paths) for k in range(as_int(variants, "--variants", 1, 4096))]
             for each in places:
                 _outputs.check_apart(texts, each)
         values |= options.read(given, which=lambda o: o.file and (o.argument or o.name == self.shape))
-        example = self.example(values)
-        size = self.size(values, example)
+        example = self.find_example(values)
+        size = self.find_size(values, example)
         _outputs.check_output(out, example, size)
         about = About(axes=options.axes, size=size, like=example)
         small, made = [], None
         with (
-            named(**options.called(given), count="--threads"),
+            name_arguments(**options.name_values(given), count="--threads"),
             threads(count),
-            watching(quiet=quiet) as progress,
+            show_progress(quiet=quiet) as progress,
             warnings.catch_warnings(record=True) as said,
         ):
             warnings.simplefilter("always")
@@ -94,21 +94,21 @@ class Verb:
             if issubclass(warning.category, UserWarning):
                 note(str(warning.message), quiet=quiet)
         if small:
-            with _outputs.output(out) as temporary:
-                io.write(temporary, _outputs.contact_sheet(small))
+            with _outputs.write_output(out) as temporary:
+                io.write(temporary, _outputs.make_contact_sheet(small))
         assert made is not None
         many = f"{len(small)} textures and their contact sheet, each " if small else ""
         what = f"{many}{describe(np.asarray(made.image), options.axes)}{self.says(made)}"
         note(f"wrote {out}: {what}, in {time.monotonic() - start:.1f} s", quiet=quiet)
 
-    def example(self, values: Mapping[tuple[str, ...], Any]) -> Array:
+    def find_example(self, values: Mapping[tuple[str, ...], Any]) -> Array:
         """Return the pixels of the first input."""
         first = values[next(o.path for o in self.options if o.argument)]
         first = first[0] if isinstance(first, list) else first
         # Analysed elements hold theirs.
         return np.asarray(getattr(first, "image", first))
 
-    def size(self, values: Mapping[tuple[str, ...], Any], example: Array) -> tuple[int, ...]:
+    def find_size(self, values: Mapping[tuple[str, ...], Any], example: Array) -> tuple[int, ...]:
         """Return about how large the result will be."""
         if ("size",) in values:
             return tuple(values["size",])

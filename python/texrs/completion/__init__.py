@@ -20,7 +20,7 @@ from texrs.blending import blend as correct_colours
 from texrs.completion._optimise import optimise, recover_scale
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
-from texrs.exemplar.patches import index_patches, mark_corners, place_patches, usual_side
+from texrs.exemplar.patches import choose_usual_side, index_patches, mark_corners, place_patches
 from texrs.exemplar.symmetry import ALL, NONE
 from texrs.kernels.complete import complete as fill
 from texrs.source_map import SourceMap
@@ -317,7 +317,7 @@ def choose_side(free: Bools, chosen: int | None, largest: int) -> int:
             hint = f"at most {fits} has one" if fits else "nor has any other; give an exemplar"
             raise InvalidInput(f"patch: {chosen} has no place in the image that is free of holes; {hint}")
         return chosen
-    for side in range(min(largest, usual_side(min(free.shape))), LEAST - 1, -1):
+    for side in range(min(largest, choose_usual_side(min(free.shape))), LEAST - 1, -1):
         if np.count_nonzero(mark_corners(free, side)) >= PLACES:
             return side
     if not mark_corners(free, LEAST).any():

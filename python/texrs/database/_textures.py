@@ -203,7 +203,7 @@ class TextureDatabase:
             The entry cannot be made anew either, because its image is gone.
 
         """
-        record = self._record(name)
+        record = self._find_record(name)
         entry: Elements | None = None
         reason = ""
         if record.version != FORMAT:
@@ -213,7 +213,7 @@ class TextureDatabase:
                 entry = load(self.path / record.file)
             except TexrsError as error:
                 reason = str(error).removeprefix(f"{self.path / record.file}: ")
-        image = self._image(record)
+        image = self._read_image(record)
         if image is None:
             if entry is None:
                 raise FileError(f"{self.path / record.file}: {reason}, and its image {record.image} is gone")
@@ -300,7 +300,7 @@ class TextureDatabase:
         sheet = np.full(((len(down) + 1) * step, (len(across) + 1) * step, 3), 255, np.uint8)
 
         def put(row: int, column: int, image: Array | None) -> None:
-            small = np.full((side, side, 3), 128, np.uint8) if image is None else thumbnail(image, side)
+            small = np.full((side, side, 3), 128, np.uint8) if image is None else make_thumbnail(image, side)
             top, left = row * step, column * step
             sheet[top : top + small.shape[0], left : left + small.shape[1]] = small
 
@@ -314,21 +314,21 @@ class TextureDatabase:
 
     # --- the folder ----------------------------------------------------------------------------------------------
 
-    def _record(self, name: str) -> Record:
+    def _find_record(self, name: str) -> Record:
         found = self._folder.read()
         if name not in found:
             there = ", ".join(sorted(found)[:8]) or "none"
             raise InvalidInput(f"name: there is no texture {name!r} in {self.path}; there are {there}")
         return found[name]
 
-    def _image(self, record: Record) -> Array | None:
+    def _read_image(self, record: Record) -> Array | None:
         try:
             return as_image(io.read(self.path / record.image))
         except TexrsError:
             return None
 
 
-def thumbnail(image: Array, side: int) -> NDArray[np.uint8]:
+def make_thumbnail(image: Array, side: int) -> NDArray[np.uint8]:
     """Return a small picture of an image, for people."""
     from skimage.transform import resize
 

@@ -40,12 +40,12 @@ def _results(workshop: Workshop) -> str:
         reuse = made.result.source.reuse()
         rows.append(
             row(
-                figure(made.sample.image, "Example", note=_size(made.sample.image)),
+                figure(made.sample.image, "Example", note=_format_size(made.sample.image)),
                 pair(
                     made.result.image,
                     caption,
                     "The result, tiled 2 × 2",
-                    note=f"{_size(made.result.image)}; largest piece copied: {reuse.largest:.0%} of the example",
+                    note=f"{_format_size(made.result.image)}; largest piece copied: {reuse.largest:.0%} of the example",
                 ),
             )
         )
@@ -55,7 +55,7 @@ def _results(workshop: Workshop) -> str:
 def _stages(workshop: Workshop) -> str:
     name, _, options = SHOWN[0]
     made = workshop.design(name, **options)
-    pictures = [figure(made.sample.image, "Example", note=_size(made.sample.image))]
+    pictures = [figure(made.sample.image, "Example", note=_format_size(made.sample.image))]
     for stage, image in made.result.stages.items():
         caption, note = CAPTIONS.get(stage, (stage.capitalize(), ""))
         pictures.append(figure(preview(image), caption, note=note, exact=image.ndim == 2))
@@ -73,7 +73,7 @@ def _seeds(workshop: Workshop) -> str:
     return code("texrs design example.png -o result.png --size 200 --seed 1") + grid(pictures)
 
 
-def _size(image: Array) -> str:
+def _format_size(image: Array) -> str:
     return f"{image.shape[0]} × {image.shape[1]}"
 
 

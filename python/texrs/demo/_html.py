@@ -16,7 +16,7 @@ QUALITY = 90
 """Of the JPEG pictures."""
 
 
-def uri(image: Array, *, exact: bool = False) -> str:
+def encode_uri(image: Array, *, exact: bool = False) -> str:
     """Put a picture into a data URI: PNG where it must be exact or has an alpha channel, else JPEG."""
     seen = preview(image)
     if seen.ndim == 3 and seen.shape[2] == 1:
@@ -33,7 +33,7 @@ def figure(image: Array, caption: str, *, exact: bool = False, share: float = 1.
     height, width = image.shape[:2]
     style = f' style="width:{share:.0%}"' if share != 1 else ""
     size = f'width="{width}" height="{height}"{style}'
-    picture = f'<img src="{uri(image, exact=exact)}" alt="{escape(caption)}" {size}>'
+    picture = f'<img src="{encode_uri(image, exact=exact)}" alt="{escape(caption)}" {size}>'
     return f"<figure>{picture}{_caption(caption, note)}</figure>"
 
 
@@ -43,7 +43,7 @@ def pair(image: Array, caption: str, tiles: str, *, note: str = "") -> str:
     ratio = f"aspect-ratio:{width}/{height}"
     picture = '<div class="ground{}" role="img" aria-label="{}" style="{}"></div>'
     return (
-        f'<div class="pair" style="--picture:url({uri(image)})">'
+        f'<div class="pair" style="--picture:url({encode_uri(image)})">'
         f"<figure>{picture.format('', escape(caption), ratio)}{_caption(caption, note)}</figure>"
         f"<figure>{picture.format(' four', escape(tiles), ratio)}{_caption(tiles)}</figure></div>"
     )

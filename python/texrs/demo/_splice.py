@@ -18,7 +18,7 @@ EDITS: tuple[tuple[str, dict[str, Any], str], ...] = (
 )
 
 
-def _entry(name: str) -> Elements:
+def _load_entry(name: str) -> Elements:
     """Return a sample with the elements that it is known to have."""
     return Elements.of_sample(load_sample(name, SIDE))
 
@@ -28,12 +28,12 @@ def _splice(workshop: Workshop) -> str:
     spliced, edited = [], []
     for i, (a, b) in enumerate(SPLICES):
         workshop.watch(i / total)
-        elements, layout = _entry(a), _entry(b)
+        elements, layout = _load_entry(a), _load_entry(b)
         made = splice(elements, layout, seed=1)
         spliced += [figure(elements.image, a), figure(layout.image, b), figure(made.image, f"{a} laid out as {b}")]
     for i, (a, edit, note) in enumerate(EDITS, start=len(SPLICES)):
         workshop.watch(i / total)
-        elements = _entry(a)
+        elements = _load_entry(a)
         made = self_splice(elements, edit, seed=1)
         edited += [figure(elements.image, a), figure(made.image, str(edit["op"]), note=note)]
     return (

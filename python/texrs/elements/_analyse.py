@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from texrs._arrays import as_image, check_memory, guidance
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.elements import _mask
-from texrs.elements._arguments import Given, check_consistency, find_contradiction, usual_box
+from texrs.elements._arguments import Arguments, check_consistency, choose_usual_box, find_contradiction
 from texrs.elements._elements import Elements
 from texrs.elements._layout import Layout, LayoutName
 from texrs.elements._options import ElementSearch, Settings
 from texrs.elements._proposal import Start, propose
 from texrs.elements._search import Detections, search_similar
-from texrs.elements._separation import Separation, add_missing, nearest_pixels, reconcile
+from texrs.elements._separation import Separation, add_missing, find_nearest_pixels, reconcile
 from texrs.errors import InvalidInput
 from texrs.layouts import directions, spacing
 
@@ -109,9 +109,9 @@ def analyse(
     size = (pixels.shape[0], pixels.shape[1])
     check_memory(BYTES * size[0] * size[1], "image")
     how = Settings.of(search, method, wrap, seed)
-    given = Given.of(size, how.wrap, box=box, layout=layout, background=background, mask=mask, points=points)
+    given = Arguments.of(size, how.wrap, box=box, layout=layout, background=background, mask=mask, points=points)
     watch = progress or (lambda stage, share: None)
-    guide = _three_channels(guidance(pixels))
+    guide = _repeat_channel(guidance(pixels))
 
     # 1. The element, the background and the layout: as said, or proposed.
     start = propose(guide, given, how.wrap, partial(watch, "propose"))
@@ -128,17 +128,17 @@ def analyse(
             f"image: {len(parted.points)} elements were found, at least {FEWEST} are needed; try another box, more "
             f"rotations or scales, a lower threshold (it was {found.threshold:.2f}), or give the points"
         )
-    entry = _reanalyse(pixels, given, start, parted, how) or _entry(pixels, given, start, found, parted, how)
+    entry = _reanalyse(pixels, given, start, parted, how) or _make_entry(pixels, given, start, found, parted, how)
     watch("separate", 1.0)
     return entry
 
 
-def _three_channels(guide: Floats) -> Floats:
+def _repeat_channel(guide: Floats) -> Floats:
     """Return colours of two channels with the first one twice: what is compared has one or three."""
     return np.concatenate([guide, guide[..., :1]], axis=-1) if guide.shape[-1] == 2 else guide
 
 
-def _check(given: Given, start: Start, how: Settings) -> None:
+def _check(given: Arguments, start: Start, how: Settings) -> None:
     """Check that what is said of a texture, and what was proposed for the rest, does not contradict itself."""
     check_consistency(given.mask, start.background, start.box, start.layout)
     trouble = "" if given.whole is None else find_contradiction(given.whole, start.layout, how.wrap)
@@ -146,7 +146,7 @@ def _check(given: Given, start: Start, how: Settings) -> None:
         raise InvalidInput(f"layout: contradicts the mask: {trouble}")
 
 
-def _detect(guide: Floats, given: Given, start: Start, how: Settings, progress: Any) -> Detections:
+def _detect(guide: Floats, given: Arguments, start: Start, how: Settings, progress: Any) -> Detections:
     """Find the places that look like the element, or take the points that are listed, all equally like it."""
     if given.points is not None:
         size = guide.shape[:2]
@@ -166,7 +166,7 @@ def _detect(guide: Floats, given: Given, start: Start, how: Settings, progress: 
     )
 
 
-def _separate(guide: Floats, given: Given, start: Start, found: Detections, how: Settings) -> Separation:
+def _separate(guide: Floats, given: Arguments, start: Start, found: Detections, how: Settings) -> Separation:
     """Separate the elements from the ground, and make detections and mask agree as far as the layout says how."""
     mask = given.whole if given.whole is not None else _cut(guide, given, start, found, how)
     plain = Separation(found.points, found.scores, np.arange(len(found.points)), mask, "cut")
@@ -180,12 +180,12 @@ def _separate(guide: Floats, given: Given, start: Start, found: Detections, how:
         # What a user lists stays as it is; the mask alone follows.
         return replace(plain, mask=agreed.mask, made_by=agreed.made_by) if listed else agreed
     jointed = start.layout == Layout.JOINTED
-    if not listed and (jointed or mask[nearest_pixels(found.points, mask.shape)].mean() < 0.5):
+    if not listed and (jointed or mask[find_nearest_pixels(found.points, mask.shape)].mean() < 0.5):
         return add_missing(plain, found.similarity, how.wrap, joints=jointed)
     return plain
 
 
-def _cut(guide: Floats, given: Given, start: Start, found: Detections, how: Settings) -> Bools:
+def _cut(guide: Floats, given: Arguments, start: Start, found: Detections, how: Settings) -> Bools:
     """Cut the foreground out by its colours (section 3.3)."""
     mask = _mask.cut_foreground(
         _mask.to_lab(guide),
@@ -204,7 +204,7 @@ def _cut(guide: Floats, given: Given, start: Start, found: Detections, how: Sett
     return _mask.tidy_mask(mask, area, net=start.layout != Layout.DISJOINT)
 
 
-def _reanalyse(pixels: Array, given: Given, start: Start, parted: Separation, how: Settings) -> Elements | None:
+def _reanalyse(pixels: Array, given: Arguments, start: Start, parted: Separation, how: Settings) -> Elements | None:
     """Analyse again from the box of a usual piece of the mask: what was proposed may lie beside the middle of an element.
 
     Return None where the box was said, or where that finds far fewer elements.
@@ -213,7 +213,7 @@ def _reanalyse(pixels: Array, given: Given, start: Start, parted: Separation, ho
     if "box" not in start.proposed or not disjoint or how.literal or given.points is not None:
         return None
     try:
-        middle = usual_box(parted.mask, Layout.DISJOINT, how.wrap)
+        middle = choose_usual_box(parted.mask, Layout.DISJOINT, how.wrap)
         again = analyse(
             pixels,
             box=(*middle.centre, *middle.size),
@@ -230,11 +230,13 @@ def _reanalyse(pixels: Array, given: Given, start: Start, parted: Separation, ho
     return replace(again, report={**again.report, "proposed": start.proposed, "confidence": start.confidence})
 
 
-def _entry(pixels: Array, given: Given, start: Start, found: Detections, parted: Separation, how: Settings) -> Elements:
+def _make_entry(
+    pixels: Array, given: Arguments, start: Start, found: Detections, parted: Separation, how: Settings
+) -> Elements:
     """Return the entry of a texture, with a report of what was found and decided."""
     report: dict[str, Any] = {
         "proposed": start.proposed,
-        "doubts": _doubts(given, start, parted, how),
+        "doubts": _list_doubts(given, start, parted, how),
         "confidence": start.confidence,
         "box": [*start.box.centre, *start.box.size],
         "background": [] if start.background is None else _sample_places(start.background),
@@ -263,7 +265,7 @@ def _entry(pixels: Array, given: Given, start: Start, found: Detections, parted:
     )
 
 
-def _doubts(given: Given, start: Start, parted: Separation, how: Settings) -> list[str]:
+def _list_doubts(given: Arguments, start: Start, parted: Separation, how: Settings) -> list[str]:
     """Return what speaks against the result, in words."""
     share = parted.mask.mean()
     found = [] if given.whole is not None else [find_contradiction(parted.mask, start.layout, how.wrap)]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_mask, try_array
 from texrs._typing import Bools
 from texrs.elements._layout import Layout
-from texrs.elements._mask import disc, ellipse, nearest_odd, stamp
+from texrs.elements._mask import disc, ellipse, round_to_odd, stamp
 from texrs.elements._separation import label_components, rank_pieces
 from texrs.errors import InvalidInput
 
@@ -36,7 +36,7 @@ class Box:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Given:
+class Arguments:
     """What is said of a texture, checked; None where nothing is.
 
     Attributes
@@ -77,7 +77,7 @@ class Given:
         background: object,
         mask: object,
         points: object,
-    ) -> Given:
+    ) -> Arguments:
         """Check the arguments of an image of that size."""
         place = None if box is None else as_box(box, size)
         ground = as_background(background, size)
@@ -88,7 +88,7 @@ class Given:
             return cls(place, kind, ground, None, None, None, listed)
         if not marked.any() or marked.all():
             raise InvalidInput(f"mask: is {'all' if marked.any() else 'no'} foreground")
-        place = usual_box(marked, kind, wrap) if place is None else place
+        place = choose_usual_box(marked, kind, wrap) if place is None else place
         return cls(place, kind, ground, marked, *split_mask(marked, place, wrap), listed)
 
 
@@ -109,7 +109,7 @@ def as_box(value: object, shape: Shape, name: str = "box") -> Box:
                 f"which has {side}; (row, column) is the centre"
             )
     row, column = (int(np.clip(np.floor(numbers[a] + 0.5), 0, shape[a] - 1)) for a in range(2))
-    height, width = (min(nearest_odd(numbers[a + 2]), nearest_odd(shape[a] - 1)) for a in range(2))
+    height, width = (min(round_to_odd(numbers[a + 2]), round_to_odd(shape[a] - 1)) for a in range(2))
     return Box((row, column), (height, width))
 
 
@@ -161,7 +161,7 @@ def as_background(value: object, shape: Shape) -> Bools | None:
     return marked
 
 
-def usual_box(mask: Bools, layout: Layout | None, wrap: Wrap) -> Box:
+def choose_usual_box(mask: Bools, layout: Layout | None, wrap: Wrap) -> Box:
     """Return the box of the most usual piece of a mask that no border cuts."""
     regions = rank_pieces(label_components(mask, wrap)[0], LEAST**2)
     if not regions or layout == Layout.CONNECTED:

@@ -6,7 +6,7 @@ import numpy as np
 
 from texrs._typing import Floats
 from texrs.elements._arguments import LEAST, Box
-from texrs.elements._mask import nearest_odd, to_lab
+from texrs.elements._mask import round_to_odd, to_lab
 from texrs.elements._separation import rank_pieces
 from texrs.exemplar.regularity import find_lattice
 from texrs.exemplar.segmentation import ElementOptions, segment
@@ -30,7 +30,7 @@ def propose_boxes(small: Floats) -> list[Box]:
         if min(height, width) < LEAST + 2 or height > LARGEST * size[0] or width > LARGEST * size[1]:
             continue
         centre = (int(np.floor(row + 0.5)), int(np.floor(column + 0.5)))
-        sides = (nearest_odd(height), nearest_odd(width))
+        sides = (round_to_odd(height), round_to_odd(width))
         if all(sides[a] // 2 <= centre[a] < size[a] - sides[a] // 2 for a in range(2)):
             kept[(*centre, *sides)] = Box(centre, sides)
     return list(kept.values())
@@ -87,7 +87,7 @@ def _find_periods(small: Floats) -> list[tuple[float, float, float, float]]:
     found = []
     for share in (1.0, 0.5):
         height, width = (max(5.0, share * s) for s in sides)
-        even = uniform_filter(edges, (nearest_odd(height * 0.7), nearest_odd(width * 0.7)))
+        even = uniform_filter(edges, (round_to_odd(height * 0.7), round_to_odd(width * 0.7)))
         rows, columns = (int(s / 2) + 1 for s in (height, width))
         inner = even[rows:-rows, columns:-columns]
         if not inner.size:
@@ -102,7 +102,7 @@ def resize_box(box: Box, size: tuple[int, ...]) -> list[Box]:
     """List the boxes with one side a third longer or shorter, or both, that fit."""
     found = []
     for tall, wide in ((1.35, 1), (1, 1.35), (0.74, 1), (1, 0.74), (1.35, 1.35), (0.74, 0.74)):
-        sides = (nearest_odd(box.size[0] * tall + 0.5), nearest_odd(box.size[1] * wide + 0.5))
+        sides = (round_to_odd(box.size[0] * tall + 0.5), round_to_odd(box.size[1] * wide + 0.5))
         fits = all(sides[a] // 2 <= box.centre[a] < size[a] - sides[a] // 2 for a in range(2))
         if fits and min(sides) >= LEAST + 2 and all(sides[a] <= LARGEST * size[a] for a in range(2)):
             found.append(Box(box.centre, sides))

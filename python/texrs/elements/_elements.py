@@ -144,16 +144,16 @@ class Elements:
         parts: dict[str, Any] = {
             MARK: np.array(FORMAT),
             "image": self.image,
-            "hash": _text(digest(self.image)),
+            "hash": _encode_text(digest(self.image)),
             "points": self.points,
             "mask": self.mask,
             "box": np.array(self.box, np.int64),
-            "layout": _text(self.layout),
+            "layout": _encode_text(self.layout),
             "scores": self.scores,
             # An array of no length cannot be told from a damaged one.
             "directions": np.array([np.nan, *self.directions]),
             "wrap": np.array(self.wrap, bool),
-            "report": _text(json.dumps(self.report, allow_nan=False)),
+            "report": _encode_text(json.dumps(self.report, allow_nan=False)),
         }
         for name in ("angles", "scales"):
             if getattr(self, name) is not None:
@@ -193,9 +193,9 @@ def load(path: Path) -> Elements:
         )
     try:
         image = as_image(parts["image"])
-        if _words(parts["hash"]) != digest(image):
+        if _decode_text(parts["hash"]) != digest(image):
             raise InvalidInput("its image is not the one that was analysed")
-        layout, report = Layout(_words(parts["layout"])), json.loads(_words(parts["report"]))
+        layout, report = Layout(_decode_text(parts["layout"])), json.loads(_decode_text(parts["report"]))
         if not isinstance(report, dict):
             raise InvalidInput("report")
         count, size = len(parts["points"]), image.shape[:2]
@@ -230,11 +230,11 @@ def load(path: Path) -> Elements:
         raise FileError(f"{path}: is damaged ({' '.join(str(error).split())})") from None
 
 
-def _text(words: str) -> Array:
+def _encode_text(words: str) -> Array:
     return np.frombuffer(words.encode(), np.uint8)
 
 
-def _words(array: Array) -> str:
+def _decode_text(array: Array) -> str:
     if array.dtype != np.uint8:
         raise InvalidInput("text")
     return array.tobytes().decode()

@@ -114,7 +114,7 @@ def cut_foreground(
     def cost(mine: Sequence[NDArray[np.float64]], number: int) -> NDArray[np.float64]:
         samples = np.concatenate([_subsample(m, SAMPLES // len(mine), seed + number) for m in mine if len(m)])
         if model == "nearest":
-            return _nearest_costs(flat, samples)
+            return _measure_nearest_costs(flat, samples)
         return -Mixture.fit(samples, seed=seed + number).log(flat)
 
     half = WHOLE * np.array(box)
@@ -137,7 +137,7 @@ def cut_foreground(
         unlike = unlikeness[fore.ravel()]
         fore.ravel()[np.flatnonzero(fore.ravel())[unlike < np.quantile(unlike, 1 - ALIKE)]] = False
     elif layout == Layout.DISJOINT and model == "mixture":
-        back = ~mark(centres, np.ones((nearest_odd(box[0] * FAR), nearest_odd(box[1] * FAR)), bool))
+        back = ~mark(centres, np.ones((round_to_odd(box[0] * FAR), round_to_odd(box[1] * FAR)), bool))
     costs = [cost([known, flat[(back & ~background).ravel()]], 0), cost([flat[fore.ravel()]], 1)]
     difference = np.clip(costs[1] - costs[0], -NATS, NATS).reshape(size)
     if model == "mixture" and (layout != Layout.CONNECTED or mesh):
@@ -145,7 +145,7 @@ def cut_foreground(
     unary = np.stack([np.maximum(-difference, 0), np.maximum(difference, 0)], axis=-1).astype(np.float32)
     unary[certain, 0] = np.inf
     unary[background, 1] = np.inf
-    return binary_labels(unary, _smoothness_costs(colours, wrap, model), wrap=wrap).mask
+    return binary_labels(unary, _measure_smoothness_costs(colours, wrap, model), wrap=wrap).mask
 
 
 def flatten_shading(colours: Floats, reach: float, wrap: Wrap) -> Floats:
@@ -157,7 +157,7 @@ def flatten_shading(colours: Floats, reach: float, wrap: Wrap) -> Floats:
     return np.asarray(colours - slow + slow.mean(axis=(0, 1)), np.float32)
 
 
-def nearest_odd(length: float) -> int:
+def round_to_odd(length: float) -> int:
     """Return the odd number nearest to a length, at least 3."""
     return max(3, 2 * int(np.floor(length / 2)) + 1)
 
@@ -170,7 +170,7 @@ def _subsample(samples: NDArray[np.float64], most: int, seed: int) -> NDArray[np
     return samples[np.minimum(at.astype(np.intp), len(samples) - 1)]
 
 
-def _nearest_costs(colours: NDArray[np.float64], samples: NDArray[np.float64]) -> NDArray[np.float64]:
+def _measure_nearest_costs(colours: NDArray[np.float64], samples: NDArray[np.float64]) -> NDArray[np.float64]:
     """Equation 2, its sign made right: the squared distance to the nearest sample, of colours from 0 to 255."""
     from scipy.spatial import cKDTree
 
@@ -178,7 +178,7 @@ def _nearest_costs(colours: NDArray[np.float64], samples: NDArray[np.float64]) -
     return found
 
 
-def _smoothness_costs(colours: Floats, wrap: Wrap, model: Model) -> Sequence[Any]:
+def _measure_smoothness_costs(colours: Floats, wrap: Wrap, model: Model) -> Sequence[Any]:
     """Equation 3, for pairs along each axis; its sigma is that of the picture, or 1 as printed."""
     squares = [((colours - np.roll(colours, -1, axis)) ** 2).sum(axis=-1) for axis in range(2)]
     inner = [s if wrap[axis] else np.delete(s, -1, axis) for axis, s in enumerate(squares)]

@@ -44,16 +44,16 @@ class Mixture:
         share = (apart == apart.min(axis=1, keepdims=True)).astype(np.float64)
         share /= share.sum(axis=1, keepdims=True)
         floor = max(FLOOR * float(samples.var(axis=0).mean()), LEAST)
-        model = cls._of(samples, share, floor)
+        model = cls._estimate(samples, share, floor)
         for _ in range(ROUNDS):
-            logs = model._logs(samples)
+            logs = model._measure_logs(samples)
             share = np.exp(logs - logs.max(axis=1, keepdims=True))
             share /= share.sum(axis=1, keepdims=True)
-            model = cls._of(samples, share, floor)
+            model = cls._estimate(samples, share, floor)
         return model
 
     @classmethod
-    def _of(cls, samples: Doubles, share: Doubles, floor: float) -> Mixture:
+    def _estimate(cls, samples: Doubles, share: Doubles, floor: float) -> Mixture:
         # No product of matrices here: a library may add in another order with another number of threads.
         mass = share.sum(axis=0) + 1e-12
         means = np.einsum("nk,nd->kd", share, samples) / mass[:, np.newaxis]
@@ -62,7 +62,7 @@ class Mixture:
         spread += floor * np.eye(samples.shape[1])
         return cls(mass / mass.sum(), means, np.linalg.inv(np.linalg.cholesky(spread)))
 
-    def _logs(self, samples: Doubles) -> Doubles:
+    def _measure_logs(self, samples: Doubles) -> Doubles:
         found = np.empty((len(samples), len(self.weights)))
         dimensions = samples.shape[1]
         for k, (weight, mean, whiten) in enumerate(zip(self.weights, self.means, self.whiten, strict=True)):
@@ -79,7 +79,7 @@ class Mixture:
 
     def log(self, samples: Doubles) -> Doubles:
         """Return the logarithm of the density at samples (n, d)."""
-        logs = self._logs(samples)
+        logs = self._measure_logs(samples)
         top = logs.max(axis=1)
         density: Doubles = top + np.log(np.exp(logs - top[:, np.newaxis]).sum(axis=1))
         return density

@@ -38,20 +38,20 @@ def pictures(entry: Elements) -> dict[str, Picture]:
     arm = max(2, min(entry.box) // 10)
     for row, column in np.floor(entry.points + 0.5).astype(int).tolist():
         for step in range(-arm, arm + 1):
-            _dot(drawn, row + step, column + step, CROSS)
-            _dot(drawn, row + step, column - step, CROSS)
+            _draw_dot(drawn, row + step, column + step, CROSS)
+            _draw_dot(drawn, row + step, column - step, CROSS)
     chosen = entry.report.get("box")
     if chosen:
         row, column, height, width = (int(n) for n in chosen)
         for r in (row - height // 2, row + height // 2):
             for c in range(column - width // 2, column + width // 2 + 1):
-                _dot(drawn, r, c, BOX)
+                _draw_dot(drawn, r, c, BOX)
         for c in (column - width // 2, column + width // 2):
             for r in range(row - height // 2, row + height // 2 + 1):
-                _dot(drawn, r, c, BOX)
+                _draw_dot(drawn, r, c, BOX)
     return {"points": drawn, "mask": dimmed.astype(np.uint8)}
 
 
-def _dot(picture: Picture, row: int, column: int, colour: tuple[int, int, int]) -> None:
+def _draw_dot(picture: Picture, row: int, column: int, colour: tuple[int, int, int]) -> None:
     if 0 <= row < picture.shape[0] and 0 <= column < picture.shape[1]:
         picture[row, column] = colour

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Bools, Floats
-from texrs.elements._arguments import LEAST, Box, Given, as_box
+from texrs.elements._arguments import LEAST, Arguments, Box, as_box
 from texrs.elements._boxes import propose_boxes, resize_box
 from texrs.elements._layout import Layout
-from texrs.elements._mask import disc, nearest_odd, to_lab
-from texrs.elements._search import Detections, appearance_vectors, search_similar
-from texrs.elements._separation import label_components, nearest_pixels
+from texrs.elements._mask import disc, round_to_odd, to_lab
+from texrs.elements._search import Detections, describe_appearance, search_similar
+from texrs.elements._separation import find_nearest_pixels, label_components
 from texrs.errors import InvalidInput
 from texrs.layouts import spacing
 
@@ -75,7 +75,7 @@ class Start:
     confidence: dict[str, float]
 
 
-def propose(guide: Floats, given: Given, wrap: tuple[bool, bool], progress: Callable[[float], object]) -> Start:
+def propose(guide: Floats, given: Arguments, wrap: tuple[bool, bool], progress: Callable[[float], object]) -> Start:
     """Propose what is not given."""
     size = (guide.shape[0], guide.shape[1])
     box, layout, background, points = given.box, given.layout, given.background, given.points
@@ -86,13 +86,13 @@ def propose(guide: Floats, given: Given, wrap: tuple[bool, bool], progress: Call
     sure: dict[str, float] = {}
     if box is None:
         if points is not None and len(points) > 2:
-            box, sure["box"] = _box_inside(points, size), 0.5
+            box, sure["box"] = _place_box(points, size), 0.5
         else:
             box, sure["box"] = _choose_box(guide, wrap, progress)
     if points is None:
         points = search_similar(guide, box.centre, box.size, wrap=wrap).points
     progress(0.9)
-    away = _element_distance(size, points, box.size, wrap)
+    away = _measure_distance(size, points, box.size, wrap)
     if layout is None:
         layout, sure["layout"] = _choose_layout(guide, away, points, given.whole)
     if blind and "layout" in sure and layout == Layout.CONNECTED:
@@ -119,7 +119,7 @@ def _choose_box(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[floa
     boxes = propose_boxes(small)
     if not boxes:
         raise InvalidInput("box: none could be proposed for this image; give one, or the points")
-    light, features = to_lab(small)[..., 0], appearance_vectors(small, wrap)[0]
+    light, features = to_lab(small)[..., 0], describe_appearance(small, wrap)[0]
     best: tuple[float, Box] | None = None
     tried: list[tuple[float, Box, Detections]] = []
 
@@ -151,7 +151,7 @@ def _choose_box(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[floa
             value, box = top
         progress(0.5 + 0.3 * (number + 1) / GROWN)
     assert best is not None
-    sure = _confidence(light, best[1], next(f for _, b, f in tried if b == best[1]))
+    sure = _measure_confidence(light, best[1], next(f for _, b, f in tried if b == best[1]))
     row, column = (float(c * step + (step - 1) / 2) for c in best[1].centre)
     height, width = (float(s * step) for s in best[1].size)
     whole = (guide.shape[0], guide.shape[1])
@@ -182,25 +182,27 @@ def _score(light: Floats, found: Detections, box: Box) -> float:
     alike = float(inner.mean())
     cover = min(1.0, len(found.scores) * box.size[0] * box.size[1] / float(light.size))
     clear = float(inner.mean() - np.median(found.similarity))
-    window = _mean_window(light, found, box, WIDE)
+    window = _average_window(light, found, box, WIDE)
     if window is None:
         return 0.0
     # What is alike by chance is so less often the more there is of it (Fisher's z grows with the root of the area).
     large = float(np.sqrt(box.size[0] * box.size[1] / light.size))
-    return large * alike * float(np.sqrt(cover)) * max(0.0, clear) * _closure(window, np.zeros(2), box.size) ** 2
+    return (
+        large * alike * float(np.sqrt(cover)) * max(0.0, clear) * _measure_closure(window, np.zeros(2), box.size) ** 2
+    )
 
 
-def _confidence(light: Floats, box: Box, found: Detections) -> float:
+def _measure_confidence(light: Floats, box: Box, found: Detections) -> float:
     """Return how sure a box is: how alike its copies are, and how much it holds one thing."""
-    window = _mean_window(light, found, box, WIDE)
+    window = _average_window(light, found, box, WIDE)
     if window is None or len(found.scores) < 4:
         return 0.1
-    return float(np.clip(found.scores[1:].mean() * _closure(window, np.zeros(2), box.size) * 1.5, 0.05, 0.95))
+    return float(np.clip(found.scores[1:].mean() * _measure_closure(window, np.zeros(2), box.size) * 1.5, 0.05, 0.95))
 
 
-def _mean_window(light: Floats, found: Detections, box: Box, wide: float) -> Floats | None:
+def _average_window(light: Floats, found: Detections, box: Box, wide: float) -> Floats | None:
     """Average what lies around the places that were found, where it is inside the picture."""
-    half = [nearest_odd(wide * s) // 2 for s in box.size]
+    half = [round_to_odd(wide * s) // 2 for s in box.size]
     sides = light.shape
     whole = [p for p in found.pixels.tolist() if all(half[a] <= p[a] < sides[a] - half[a] for a in range(2))]
     if not whole:
@@ -209,7 +211,7 @@ def _mean_window(light: Floats, found: Detections, box: Box, wide: float) -> Flo
     return np.asarray(np.mean(cuts, axis=0, dtype=np.float64), np.float32)
 
 
-def _closure(window: Floats, centre: NDArray[np.float64], size: tuple[int, int]) -> float:
+def _measure_closure(window: Floats, centre: NDArray[np.float64], size: tuple[int, int]) -> float:
     """Return how much of what changes in a window does so outwards from a centre, 0 to 1: the outline of one thing does."""
     rows, columns = np.gradient(window)
     middle = (np.array(window.shape) - 1) / 2 + centre
@@ -228,7 +230,7 @@ def _closure(window: Floats, centre: NDArray[np.float64], size: tuple[int, int])
 
 def _recentre(light: Floats, found: Detections, box: Box) -> Box | None:
     """Move a box, within half of it, to where what it has in common with its copies is one thing in its middle."""
-    window = _mean_window(light, found, box, 2.2)
+    window = _average_window(light, found, box, 2.2)
     if window is None:
         return None
     best, move = 0.0, np.zeros(2)
@@ -239,7 +241,7 @@ def _recentre(light: Floats, found: Detections, box: Box) -> Box | None:
             low = [max(0, a - h) for a, h in zip(at, half, strict=True)]
             part = window[low[0] : at[0] + half[0] + 1, low[1] : at[1] + half[1] + 1]
             offset = np.array([a - lo - (n - 1) / 2 for a, lo, n in zip(at, low, part.shape, strict=True)])
-            value = _closure(part, offset, box.size)
+            value = _measure_closure(part, offset, box.size)
             if value > best + 1e-6:
                 best, move = value, np.array([row, column])
     half_box = np.array(box.size) // 2
@@ -250,7 +252,7 @@ def _recentre(light: Floats, found: Detections, box: Box) -> Box | None:
     return None
 
 
-def _box_inside(points: NDArray[np.float64], size: tuple[int, int]) -> Box:
+def _place_box(points: NDArray[np.float64], size: tuple[int, int]) -> Box:
     """Return a box of three quarters of the spacing around the point that lies farthest inside."""
     side = max(float(LEAST), 0.75 * spacing(points))
     side = min(side, min(size) - 1.0)
@@ -262,7 +264,7 @@ def _box_inside(points: NDArray[np.float64], size: tuple[int, int]) -> Box:
 # --- background and layout ----------------------------------------------------------------------------------------------
 
 
-def _element_distance(
+def _measure_distance(
     size: tuple[int, int], points: NDArray[np.float64], box: tuple[int, int], wrap: tuple[bool, bool]
 ) -> Floats:
     """Return the distance of each pixel to the nearest element, in halves of its box."""
@@ -297,17 +299,17 @@ def _choose_layout(
     if len(points) < 3:
         return Layout.DISJOINT, 0.1
     thing, contrast = _compare_things(to_lab(guide), away, points)
-    sure = _odds(thing / THING)
+    sure = _measure_odds(thing / THING)
     if thing >= THING:
         return Layout.DISJOINT, sure
     near = cKDTree(points).query(points, k=2)[0][:, 1]
     spread = float(near.std() / max(float(near.mean()), 1e-9))
     # A net stands out from what is seen through it, and joints less; the less if all between them is of one size.
     net = contrast / (NET if spread < EVEN else NET / 2)
-    return (Layout.CONNECTED if net >= 1 else Layout.JOINTED), sure * _odds(net)
+    return (Layout.CONNECTED if net >= 1 else Layout.JOINTED), sure * _measure_odds(net)
 
 
-def _odds(ratio: float) -> float:
+def _measure_odds(ratio: float) -> float:
     """Return how sure a choice is that falls where a measure is 1: a coin's toss there, and surer on either side."""
     return float(1 / (1 + min(ratio, 1 / max(ratio, 1e-9)) ** 1.5))
 
@@ -326,7 +328,7 @@ def _compare_things(colours: Floats, away: Floats, points: NDArray[np.float64]) 
     light = colours[..., 0]
     edges = gaussian_gradient_magnitude(light, 1.0)
     smooth = np.stack([gaussian_filter(colours[..., c], 2.0) for c in range(3)], axis=-1)
-    at = nearest_pixels(points, light.shape)
+    at = find_nearest_pixels(points, light.shape)
 
     def unlike(some: Floats) -> float:
         return float(np.median(np.sqrt(((some - np.median(some, axis=0)) ** 2).sum(axis=-1))))
@@ -341,7 +343,7 @@ def _choose_background(guide: Floats, away: Floats, box: Box) -> tuple[Bools, fl
     from scipy.ndimage import gaussian_filter, maximum_filter
 
     colours = to_lab(guide)
-    reach = nearest_odd(min(box.size) / 2)
+    reach = round_to_odd(min(box.size) / 2)
     top = maximum_filter(away, reach) == away
     places = np.argwhere(top)
     order = np.lexsort((places[:, 1], places[:, 0], -away[tuple(places.T)]))

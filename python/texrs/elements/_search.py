@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from texrs._engine.appearance import Appearance
 from texrs._typing import Floats
-from texrs.elements._mask import nearest_odd
+from texrs.elements._mask import round_to_odd
 from texrs.elements._options import ElementSearch
 from texrs.kernels.ncc import Correlation
 
@@ -87,7 +87,7 @@ def pad(array: NDArray[Any], margin: tuple[int, int], wrap: Wrap) -> NDArray[Any
     return array
 
 
-def appearance_vectors(colours: Floats, wrap: Wrap, patches: Sequence[Floats] = ()) -> tuple[Floats, list[Floats]]:
+def describe_appearance(colours: Floats, wrap: Wrap, patches: Sequence[Floats] = ()) -> tuple[Floats, list[Floats]]:
     """Return the appearance vectors of an image, (H, W, 8), and of patches whose margins are `RADIUS` wide.
 
     All lie in one atlas, so that the same components describe them.
@@ -120,9 +120,11 @@ def make_bank(box: tuple[int, int], rotations: int, scales: Sequence[float]) -> 
             angle = 360.0 * turn / rotations
             share = float(np.cos(np.deg2rad(angle)) ** 2)
             sides = (box[0] * share + box[1] * (1 - share), box[1] * share + box[0] * (1 - share))
-            inner = (nearest_odd(sides[0] * scale), nearest_odd(sides[1] * scale))
+            inner = (round_to_odd(sides[0] * scale), round_to_odd(sides[1] * scale))
             found.append(
-                Template((nearest_odd(inner[0] * CONTEXT), nearest_odd(inner[1] * CONTEXT)), inner, angle, float(scale))
+                Template(
+                    (round_to_odd(inner[0] * CONTEXT), round_to_odd(inner[1] * CONTEXT)), inner, angle, float(scale)
+                )
             )
     return found
 
@@ -180,7 +182,7 @@ def search_similar(
     turned = [t for t in templates if t.angle or t.scale != 1.0]
     patches: list[Floats] = []
     if features is None or turned:
-        features, patches = appearance_vectors(
+        features, patches = describe_appearance(
             colours, wrap, [extract_template(colours, centre, t, wrap) for t in turned]
         )
     margin = tuple(max(t.box[axis] for t in templates) // 2 for axis in range(2))
@@ -223,7 +225,7 @@ def search_similar(
     if options.threshold is not None:
         least = options.threshold
     elif cut and len(scores) and scores[1:].max(initial=-1) - scores[-1] > RANGE:
-        least = otsu(scores[1:])
+        least = threshold_otsu(scores[1:])
     if cut:
         # The cut needs to see what lies between elements; afterwards nothing is one that overlaps a better one.
         apart = suppress_non_maxima(best, [t.inner for t in templates], which, wrap, share=APART)
@@ -272,7 +274,7 @@ def suppress_non_maxima(
     return np.array(taken, np.intp).reshape(-1, 2)
 
 
-def otsu(values: NDArray[np.float64]) -> float:
+def threshold_otsu(values: NDArray[np.float64]) -> float:
     """Return the value that parts two classes of numbers with the largest variance between them."""
     ordered = np.sort(values)
     count = np.arange(1, len(ordered))

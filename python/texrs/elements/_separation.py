@@ -80,7 +80,7 @@ def rank_pieces(labels: Labels, least: float = 0) -> list[Any]:
     return sorted(large, key=lambda r: (abs(float(np.log(r.area / usual))), r.label))
 
 
-def nearest_pixels(points: NDArray[np.float64], shape: tuple[int, ...]) -> tuple[NDArray[np.intp], ...]:
+def find_nearest_pixels(points: NDArray[np.float64], shape: tuple[int, ...]) -> tuple[NDArray[np.intp], ...]:
     """Return the rows and columns of the pixels that points lie on, or nearest to."""
     rows, columns = np.clip(np.rint(points).astype(np.intp), 0, np.array(shape) - 1).T
     return rows, columns
@@ -103,7 +103,7 @@ def reconcile(
     from skimage.measure import regionprops
 
     pieces, count = label_components(mask, wrap)
-    owner = pieces[nearest_pixels(points, mask.shape)]
+    owner = pieces[find_nearest_pixels(points, mask.shape)]
     regions = {r.label: r for r in regionprops(pieces)}
     area, solid = np.zeros(count + 1), np.zeros(count + 1)
     for number, region in regions.items():
@@ -138,10 +138,10 @@ def reconcile(
             place = centre if good[number] or whole else points[best]
             kept.append((*place, scores[best], best))
         elif good[number] or certain:
-            kept.append((*centre, float(similarity[nearest_pixels(centre, mask.shape)]), -1))
+            kept.append((*centre, float(similarity[find_nearest_pixels(centre, mask.shape)]), -1))
     kept.sort(key=lambda p: (-p[2], p[0], p[1]))
     table = np.array(kept, np.float64).reshape(-1, 4)
-    names = np.unique(pieces[nearest_pixels(table[:, :2], mask.shape)])
+    names = np.unique(pieces[find_nearest_pixels(table[:, :2], mask.shape)])
     used = np.isin(pieces, names[names > 0])
     # What the border cuts may be no element, but is no ground either.
     ends = [np.take(pieces, side, axis) for axis in range(2) if not wrap[axis] for side in (0, -1)]
@@ -167,7 +167,7 @@ def add_missing(found: Separation, similarity: Floats, wrap: Wrap, *, joints: bo
 
     size, least = found.mask.shape, JOINED if joints else MESHED
     pieces, count = label_components(found.mask if joints else ~found.mask, wrap)
-    inside = np.bincount(pieces[nearest_pixels(found.points, size)], minlength=count + 1)
+    inside = np.bincount(pieces[find_nearest_pixels(found.points, size)], minlength=count + 1)
     inside[0] = 0
     areas = np.bincount(pieces.ravel(), minlength=count + 1)
     if not (inside == 1).any():
@@ -182,7 +182,7 @@ def add_missing(found: Separation, similarity: Floats, wrap: Wrap, *, joints: bo
         if inside[region.label] or cut or not fits or region.solidity < SOLID:
             continue
         centre = _centre(region.coords, size, wrap)
-        new.append((*centre, float(similarity[nearest_pixels(centre, size)]), -1.0))
+        new.append((*centre, float(similarity[find_nearest_pixels(centre, size)]), -1.0))
     if not new:
         return found
     table = np.concatenate([np.column_stack([found.points, found.scores, found.detection]), np.array(new)])
@@ -192,7 +192,7 @@ def add_missing(found: Separation, similarity: Floats, wrap: Wrap, *, joints: bo
 
 
 def _drop_fragments(found: Separation, pieces: Labels, areas: NDArray[np.intp], usual: float) -> Separation:
-    owner = pieces[nearest_pixels(found.points, pieces.shape)]
+    owner = pieces[find_nearest_pixels(found.points, pieces.shape)]
     bits = (owner > 0) & (areas[owner] < ADDED * usual)
     if not bits.any() or bits.mean() > 1 - TRUSTED:
         return found

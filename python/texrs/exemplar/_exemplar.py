@@ -11,7 +11,7 @@ import numpy as np
 
 from texrs._arrays import as_image, as_int, as_wrap, guidance, to_unit
 from texrs._cache import Cache, content_hash
-from texrs._engine.coherence import Similarity, similar
+from texrs._engine.coherence import Similarity, find_similar
 from texrs._typing import Array, Floats, Path, Progress
 from texrs.errors import FileError, InvalidInput
 from texrs.exemplar.analysis import (
@@ -227,7 +227,7 @@ class Exemplar:
         number = as_int(level, "level", -len(levels), len(levels) - 1) % len(levels)
         return self.remember(
             ("similarity", coarsest, number, k, n, numbers),
-            lambda: similar(levels[number], k=k, n=n, numbers=numbers, progress=progress),
+            lambda: find_similar(levels[number], k=k, n=n, numbers=numbers, progress=progress),
         )
 
     @property
@@ -383,8 +383,8 @@ def _check_sides(shape: tuple[int, ...], name: str, minimum: int) -> None:
         raise InvalidInput(f"{name}: each side must be at least {minimum}, got shape {shape}")
 
 
-def _size(fact: object) -> int:
+def _measure_size(fact: object) -> int:
     return min(int(getattr(fact, "nbytes", _SMALL)), CACHED)
 
 
-_FACTS: Cache[tuple[str, Hashable], Any] = Cache(CACHED, _size)
+_FACTS: Cache[tuple[str, Hashable], Any] = Cache(CACHED, _measure_size)

@@ -96,7 +96,7 @@ def split_touching(mask: Bools, crease: Floats) -> Labels:
     tops = local_maxima(reconstruction(height - np.float32(np.log(NECK)), height)) & mask
     seeds, count = ndimage.label(tops, SQUARE)
     parts = watershed(-distance, seeds, mask=mask).astype(np.int32)
-    peak = np.maximum(_greatest(distance, parts, count), 1e-6)
+    peak = np.maximum(_measure_maxima(distance, parts, count), 1e-6)
     inside = distance / peak[parts]
     markers = np.where(inside > MARKER, parts, 0)
     relief = crease / np.float32(typical)
@@ -107,7 +107,7 @@ def split_touching(mask: Bools, crease: Floats) -> Labels:
     return _join_parts(parts, relief)
 
 
-def _greatest(values: Floats, labels: Labels, count: int) -> Floats:
+def _measure_maxima(values: Floats, labels: Labels, count: int) -> Floats:
     """Return the greatest value of each label; as `scipy.ndimage.maximum`, in an eighth of its time."""
     result = np.zeros(count + 1, values.dtype)
     np.maximum.at(result, labels.ravel(), values.ravel())
@@ -143,13 +143,13 @@ def _join_parts(parts: Labels, relief: Floats) -> Labels:
     perimeter = np.bincount(np.concatenate([flat[side] for side in _list_borders(parts)]), minlength=len(shapes.area))
     into = np.arange(len(shapes.area), dtype=np.int32)
 
-    def parting(one: Any, other: Any, mean: Any, share: Any) -> Any:
+    def weigh(one: Any, other: Any, mean: Any, share: Any) -> Any:
         apart, together = shapes.compare_solidity(one, other)
         return mean + CONVEXITY * (apart - together) - share
 
     one, other = (keys >> 32).astype(np.intp), (keys & 0xFFFFFFFF).astype(np.intp)
     least = np.minimum(perimeter[one], perimeter[other])
-    first = parting(one, other, sums / lengths, lengths / least).tolist()
+    first = weigh(one, other, sums / lengths, lengths / least).tolist()
     scores = dict(zip(zip(one.tolist(), other.tolist(), strict=True), first, strict=True))
     # Entries of pairs that were weighed anew, or are no more, stay behind and are passed over.
     queue = [(score, pair) for pair, score in scores.items()]
@@ -173,7 +173,7 @@ def _join_parts(parts: Labels, relief: Floats) -> Labels:
         if near:
             totals, borderings = np.array([borders[p][r] for r in near]).T
             least = np.minimum(perimeter[p], perimeter[near])
-            again = parting(p, np.array(near), totals / borderings, borderings / least).tolist()
+            again = weigh(p, np.array(near), totals / borderings, borderings / least).tolist()
             for r, value in zip(near, again, strict=True):
                 scores[min(p, r), max(p, r)] = value
                 heappush(queue, (value, (min(p, r), max(p, r))))

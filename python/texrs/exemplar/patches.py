@@ -12,7 +12,7 @@ from texrs.exemplar.symmetry import Flip, flip, flip_coordinates, flip_frame
 from texrs.kernels.complete import Completion
 from texrs.kernels.patch_search import PatchIndex
 
-__all__ = ["index_patches", "mark_corners", "place_patches", "usual_side"]
+__all__ = ["choose_usual_side", "index_patches", "mark_corners", "place_patches"]
 
 
 def index_patches(guide: Floats, side: int, mirrors: Sequence[Flip], free: Bools | None = None) -> PatchIndex:
@@ -68,7 +68,7 @@ def place_patches(
     return new, places, [flip_frame(mirrors[number]) for number in found.source]
 
 
-def usual_side(shorter: int) -> int:
+def choose_usual_side(shorter: int) -> int:
     """Return the usual side of a patch, by the shorter side of an exemplar: about the size of an element."""
     return min(shorter, max(12, min(32, shorter // 6)))
 

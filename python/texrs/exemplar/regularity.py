@@ -112,7 +112,7 @@ def _fit_lattice(correlation: Floats) -> Lattice | None:
             if cell < 0.3 * np.hypot(*a) * np.hypot(*b) or cell < SHORTEST**2:
                 continue
             mean = _average(tolerant, a, b, reach)
-            if mean > 0 and all(_dips(correlation, v, reach) for v in (a, b)):
+            if mean > 0 and all(_has_dip(correlation, v, reach) for v in (a, b)):
                 found[(int(a[0]), int(a[1])), (int(b[0]), int(b[1]))] = (mean, cell)
     if not found:
         return None
@@ -143,7 +143,7 @@ def _average(correlation: Floats, a: NDArray[np.intp], b: NDArray[np.intp], reac
     return float(correlation[tuple(places.T)].mean()) if len(places) >= 4 else 0.0
 
 
-def _dips(correlation: Floats, vector: NDArray[np.intp], reach: NDArray[np.intp]) -> bool:
+def _has_dip(correlation: Floats, vector: NDArray[np.intp], reach: NDArray[np.intp]) -> bool:
     """Whether the correlation falls on the way to a vector, and rises again."""
     if (np.abs(vector) > reach).any():
         return False

@@ -50,16 +50,16 @@ class Shapes:
 
     def measure_solidity(self) -> NDArray[np.float64]:
         """Return the share of its hull that each fills; 0 for those of no pixel."""
-        return np.where(self.area > 0, self.area / np.maximum(_hull_area(self.reach), 1.0), 0.0)
+        return np.where(self.area > 0, self.area / np.maximum(_measure_hulls(self.reach), 1.0), 0.0)
 
     def compare_solidity(self, one: Any, other: Any) -> tuple[Any, Any]:
         """Return the share of two hulls that is filled, and that of the hull of both."""
         area = self.area[one] + self.area[other]
-        apart = _hull_area(self.reach[one]) + _hull_area(self.reach[other])
-        return area / apart, area / _hull_area(np.maximum(self.reach[one], self.reach[other]))
+        apart = _measure_hulls(self.reach[one]) + _measure_hulls(self.reach[other])
+        return area / apart, area / _measure_hulls(np.maximum(self.reach[one], self.reach[other]))
 
 
-def _hull_area(reach: NDArray[np.float64]) -> Any:
+def _measure_hulls(reach: NDArray[np.float64]) -> Any:
     """Return the area of the polygon that reaches so far in each direction."""
     finite = np.where(np.isfinite(reach), reach, 0.0)
     # By index: `np.roll` takes longer than all the rest, and this is called for each pair that is weighed.

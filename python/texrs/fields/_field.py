@@ -149,7 +149,7 @@ class Field(ABC):
         Raises
         ------
         InvalidInput
-            As of `frames`.
+            As for `frames`.
 
         Examples
         --------
@@ -185,7 +185,7 @@ class Field(ABC):
         Raises
         ------
         InvalidInput
-            As of `frames`, or the shape is not one.
+            As for `frames`, or the shape is not one.
         LimitExceeded
             More samples than 4 GiB hold.
 

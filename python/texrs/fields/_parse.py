@@ -44,7 +44,7 @@ def names() -> dict[str, str]:
     """
     out = {}
     for name, make in _KNOWN.items():
-        options = [f"{k}={'' if v is None else v}" for k, v in _parameters(make).items()]
+        options = [f"{k}={'' if v is None else v}" for k, v in _list_parameters(make).items()]
         out[name] = name + ":" * bool(options) + ",".join(options)
     return out
 
@@ -90,7 +90,7 @@ def parse(text: str, axes: int = 3, size: Sequence[int] | None = None) -> Field:
         hint = f"; did you mean {near[0]}? Known are" if near else "; known are"
         raise InvalidInput(f"field: there is no {name!r}{hint} {', '.join(_KNOWN)}")
     make, options = _KNOWN[name], {}
-    allowed = _parameters(make)
+    allowed = _list_parameters(make)
     for part in rest.split(",") if rest.strip() else []:
         key, equals, value = (p.strip() for p in part.partition("="))
         if key not in allowed or not equals or not value:
@@ -98,7 +98,7 @@ def parse(text: str, axes: int = 3, size: Sequence[int] | None = None) -> Field:
             raise InvalidInput(f"field: {name} takes {takes}; got {part.strip()!r}")
         if key in options:
             raise InvalidInput(f"field: {key} is given twice in {text.strip()!r}")
-        options[key] = _value(key, value)
+        options[key] = _parse_value(key, value)
     if "axes" in inspect.signature(make).parameters:
         options["axes"] = axes
     elif axes != 3:
@@ -110,11 +110,11 @@ def parse(text: str, axes: int = 3, size: Sequence[int] | None = None) -> Field:
     return field if size is None else field.over(size)
 
 
-def _parameters(make: Callable[..., Field]) -> dict[str, object]:
+def _list_parameters(make: Callable[..., Field]) -> dict[str, object]:
     return {k: p.default for k, p in inspect.signature(make).parameters.items() if k != "axes"}
 
 
-def _value(key: str, text: str) -> object:
+def _parse_value(key: str, text: str) -> object:
     if key in _WORDS:
         return text
     try:

@@ -73,7 +73,7 @@ def from_array(
            [0., 1.]], dtype=float32)
 
     """
-    given = _numbers(frames, "frames")
+    given = _as_numbers(frames, "frames")
     axes = given.shape[-1] if given.ndim else 0
     if axes not in (2, 3) or given.shape[-2:] != (axes, axes) or given.ndim != axes + 2 or given.size == 0:
         raise InvalidInput(f"frames: needs shape (R, C, 2, 2) or (P, R, C, 3, 3), got {given.shape}")
@@ -125,7 +125,7 @@ def interpolate(points: ArrayLike, frames: ArrayLike) -> Field:
     array([0.   , 0.707, 1.   ], dtype=float32)
 
     """
-    given = _numbers(frames, "frames")
+    given = _as_numbers(frames, "frames")
     axes = given.shape[-1] if given.ndim == 3 else 0
     if axes not in (2, 3) or given.shape[1] != axes or not 0 < len(given) <= MAX_POINTS:
         raise InvalidInput(f"frames: needs shape (N, 2, 2) or (N, 3, 3), N up to {MAX_POINTS}; got {given.shape}")
@@ -222,13 +222,13 @@ class _Scattered(Field):
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
         nearest = np.full(len(points), np.inf)
         for place in self.places:
-            nearest = np.minimum(nearest, self._square_distances(points, place))
+            nearest = np.minimum(nearest, self._measure_squares(points, place))
         turn = np.zeros((self.axes, self.axes, len(points)))
         stretch = None if self.stretches is None else np.zeros((*self.stretches.shape[:-1], len(points)))
         total = np.zeros(len(points))
         for i, place in enumerate(self.places):
             # Relative to the nearest, so that no weight overflows on a point or vanishes far away.
-            distance = self._square_distances(points, place)
+            distance = self._measure_squares(points, place)
             ratio = np.where(distance > 0, nearest / np.where(distance > 0, distance, 1), 1)
             weight = ratio * ratio
             total += weight
@@ -240,7 +240,7 @@ class _Scattered(Field):
             stretch /= total
         return _join(turn, stretch, points)
 
-    def _square_distances(self, points: NDArray[np.float64], place: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _measure_squares(self, points: NDArray[np.float64], place: NDArray[np.float64]) -> NDArray[np.float64]:
         total = np.zeros(len(points))
         for a in range(self.axes):
             away = points[:, a] - place[a]
@@ -327,7 +327,7 @@ def _to_matrices(frames: Array) -> Matrices:
     return np.array(frames.reshape(-1, axes, axes).transpose(1, 2, 0), np.float64, order="C")
 
 
-def _numbers(value: ArrayLike, name: str) -> Array:
+def _as_numbers(value: ArrayLike, name: str) -> Array:
     given = try_array(value)
     if given.dtype.kind not in "buif":
         raise InvalidInput(f"{name}: needs an array of real numbers, got {given.dtype}")

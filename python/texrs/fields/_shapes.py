@@ -70,7 +70,7 @@ def constant(matrix: ArrayLike) -> Field:
     'constant [[0, 1], [1, 0]]'
 
     """
-    m = _matrix(matrix)
+    m = _as_matrix(matrix)
     rows = ", ".join(f"[{', '.join(f'{v:g}' for v in row)}]" for row in m.tolist())
     return Constant(len(m), m, f"constant [{rows}]")
 
@@ -106,8 +106,8 @@ def slant(angle: float = 30, plane: str = "xy", *, axes: int = 3) -> Field:
            [-1.,  0.]], dtype=float32)
 
     """
-    degrees = _angle(angle)
-    first, second = _pair(plane, check_axes(axes), "plane")
+    degrees = _as_angle(angle)
+    first, second = _as_plane(plane, check_axes(axes), "plane")
     return Constant(axes, turn(degrees, first, second, axes), f"slant of {degrees:g} degrees in the plane {plane}")
 
 
@@ -138,7 +138,7 @@ def slant_3d(angle: float = 30, angle2: float = 30) -> Field:
     'slant of 30 degrees in the plane xy, then of 20 degrees in the plane yz'
 
     """
-    first, second = _angle(angle), _angle(angle2, "angle2")
+    first, second = _as_angle(angle), _as_angle(angle2, "angle2")
     matrix = turn(second, 1, 0, 3) @ turn(first, 2, 1, 3)
     text = f"slant of {first:g} degrees in the plane xy, then of {second:g} degrees in the plane yz"
     return Constant(3, matrix, text)
@@ -174,7 +174,7 @@ def shear(amount: float = 0.5, plane: str = "xy", *, axes: int = 3) -> Field:
            [0.5, 1. ]], dtype=float32)
 
     """
-    first, second = _pair(plane, check_axes(axes), "plane")
+    first, second = _as_plane(plane, check_axes(axes), "plane")
     matrix = np.eye(axes)
     matrix[first, second] = as_float(amount, "amount", -9, 9)
     return Constant(axes, matrix, f"shear of {float(amount):g} in the plane {plane}")
@@ -265,7 +265,7 @@ def spiral(
     'spiral of 15 degrees, x outwards, about (31.5, 31.5)'
 
     """
-    return _wind(axis, radial, centre, axes, _angle(angle))
+    return _wind(axis, radial, centre, axes, _as_angle(angle))
 
 
 def zigzag(
@@ -307,9 +307,9 @@ def zigzag(
     array([ 0.5,  0.5, -0.5, -0.5,  0.5], dtype=float32)
 
     """
-    first, second = _pair(plane, check_axes(axes), "plane")
-    across = first if axis is None else _index(axis, axes, "axis")
-    return Zigzag(axes, as_float(period, "period", 2, FAR), _angle(angle), across, first, second)
+    first, second = _as_plane(plane, check_axes(axes), "plane")
+    across = first if axis is None else _as_index(axis, axes, "axis")
+    return Zigzag(axes, as_float(period, "period", 2, FAR), _as_angle(angle), across, first, second)
 
 
 def scale_ramp(
@@ -351,19 +351,19 @@ def scale_ramp(
 
     """
     ends = tuple(as_float(v, name, 0.125, 8) for v, name in ((start, "start"), (stop, "stop")))
-    along = _index(axis, check_axes(axes), "axis")
+    along = _as_index(axis, check_axes(axes), "axis")
     reach = None if length is None else as_float(length, "length", 1, FAR)
     return Ramp(axes, ends[0], ends[1], along, reach)
 
 
 def _wind(axis: str, radial: str | None, centre: Sequence[float] | None, axes: int, angle: float) -> Field:
     check_axes(axes)
-    letter = _letter(axis, "zyx", "axis")
+    letter = _as_letter(axis, "zyx", "axis")
     if axes == 2 and letter != "z":
         raise InvalidInput(f"axis: a picture is wound round 'z' alone, got {axis!r}")
     following = "xyz"["xyz".index(letter) - 2]
     others = sorted(set("xyz") - {letter})
-    out = following if radial is None else _letter(radial, "zyx", "radial")
+    out = following if radial is None else _as_letter(radial, "zyx", "radial")
     if out not in others:
         raise InvalidInput(f"radial: round {letter} it is {' or '.join(others)}, got {radial!r}")
     along = (set(others) - {out}).pop()
@@ -374,23 +374,23 @@ def _wind(axis: str, radial: str | None, centre: Sequence[float] | None, axes: i
     )
 
 
-def _angle(value: float, name: str = "angle") -> float:
+def _as_angle(value: float, name: str = "angle") -> float:
     return as_float(value, name, -360, 360)
 
 
-def _letter(value: object, letters: str, name: str) -> str:
+def _as_letter(value: object, letters: str, name: str) -> str:
     letter = _WORDS.get(value, value) if isinstance(value, str) else value
     if not isinstance(letter, str) or len(letter) != 1 or letter not in letters:
         raise InvalidInput(f"{name}: allowed are {', '.join(sorted(letters))}; got {value!r}")
     return letter
 
 
-def _index(value: object, axes: int, name: str) -> int:
+def _as_index(value: object, axes: int, name: str) -> int:
     letters = LETTERS[axes - 2]
-    return letters.index(_letter(value, letters, name))
+    return letters.index(_as_letter(value, letters, name))
 
 
-def _pair(value: object, axes: int, name: str) -> tuple[int, int]:
+def _as_plane(value: object, axes: int, name: str) -> tuple[int, int]:
     letters = LETTERS[axes - 2]
     if not isinstance(value, str) or len(value) != 2 or not set(value) <= set(letters) or value[0] == value[1]:
         allowed = ", ".join(a + b for a in sorted(letters) for b in sorted(letters) if a != b)
@@ -398,7 +398,7 @@ def _pair(value: object, axes: int, name: str) -> tuple[int, int]:
     return letters.index(value[0]), letters.index(value[1])
 
 
-def _matrix(value: ArrayLike) -> NDArray[np.float64]:
+def _as_matrix(value: ArrayLike) -> NDArray[np.float64]:
     given = try_array(value)
     if given.dtype.kind not in "buif" or given.shape not in ((2, 2), (3, 3)):
         raise InvalidInput(f"matrix: needs numbers of shape (2, 2) or (3, 3), got {given.dtype} of {given.shape}")

@@ -137,7 +137,7 @@ class Asked:
     given : (points * A) int32, optional
         The places of these, in units of 1/4096 of a sample; none where they have them already.
     surrounds : bool
-        Whether the start is told of held points, and grows from them.
+        Whether the start receives the held points, and grows from them.
     balance : Balance, optional
         What keeps the colours of the output in balance.
 
@@ -288,9 +288,9 @@ class Conditions:
     def at(self, level: int, region: Region, spacing: int) -> Asked:
         """Return what is asked of a level."""
         held, given = (None, None) if self.pins is None else self.pins.at(region, spacing)
-        return Asked(self._demand(region, spacing), held, given)
+        return Asked(self._make_demand(region, spacing), held, given)
 
-    def _demand(self, region: Region, spacing: int) -> Demand | None:
+    def _make_demand(self, region: Region, spacing: int) -> Demand | None:
         """Ask for the guide's map, or for the mean of the values that a point of the level stands for."""
         if self.maps is not None and self.weight:
             mine, theirs = self.maps

@@ -59,12 +59,12 @@ class Scales:
         here = self.atlas.levels[level]
         share = self.settings.at(level, len(self.atlas.levels)).weight * self.strength
         weight = np.array([min(round(WEIGHT * share), 65535)], np.uint16)
-        demand = Demand(here.values, self._wanted(region, spacing), weight, here.order)
+        demand = Demand(here.values, self._ask_scales(region, spacing), weight, here.order)
         held, given = (None, None) if self.held is None else self.held.at(region, spacing)
         balance = None if here.tones is None or not weight[0] else Balance.of(here.tones, demand)
         return Asked(demand, held, given, True, balance)
 
-    def _wanted(self, region: Region, spacing: int) -> NDArray[np.int16]:
+    def _ask_scales(self, region: Region, spacing: int) -> NDArray[np.int16]:
         """Return the mean logarithm of the target at each point, (points)."""
         asked = np.zeros(region.shape, np.int16)
         if self.target is not None:

@@ -125,7 +125,7 @@ class Windows:
                 frames,
                 passes=min(turn, wanted - done),
                 first=first + done,
-                exhaustive=level == 0 and self._pairs(region, asked) <= s.exhaustive,
+                exhaustive=level == 0 and self._count_pairs(region, asked) <= s.exhaustive,
                 reach=step.reach,
                 acceptance=s.acceptance,
                 coherence=s.coherence,
@@ -137,18 +137,20 @@ class Windows:
                 held=asked.held,
                 demand=demand,
                 overwrite=True,
-                progress=_part(advance, done / wanted, turn / wanted),
+                progress=_scale_progress(advance, done / wanted, turn / wanted),
             )
             made, done = done + found.passes, done + turn
         return found._replace(passes=made)
 
-    def _pairs(self, region: Region, asked: Asked) -> int:
+    def _count_pairs(self, region: Region, asked: Asked) -> int:
         """Return how many pairs of windows of the coarsest level there are to compare."""
         demand = asked.demand
         drawn = 0 if demand is None else demand.order.size
         return region.points * (drawn or int(np.prod(self.levels[0].shape)))
 
 
-def _part(advance: Callable[[float], object] | None, start: float, share: float) -> Callable[[float], object] | None:
+def _scale_progress(
+    advance: Callable[[float], object] | None, start: float, share: float
+) -> Callable[[float], object] | None:
     """Return what a kernel may call that does a part of a level's passes."""
     return None if advance is None else lambda done: advance(min(1.0, start + share * done))

@@ -50,7 +50,7 @@ from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput
 from texrs.io import _files, _image_io, _npy, _pillow, _slabs, _tiff, _volumes
 from texrs.io._files import atomic
-from texrs.io._formats import FORMATS, VOLUMES, check, kind_of, spacing_of
+from texrs.io._formats import FORMATS, VOLUMES, as_spacing, check, detect_kind
 from texrs.io._npy import read_arrays
 
 __all__ = ["atomic", "read", "read_arrays", "read_volume", "write", "write_slabs", "write_surface", "write_volume"]
@@ -99,10 +99,10 @@ def read(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
 
     """
     name, limit = _files.as_path(path), as_int(limit, "limit", 1, 2**40)
-    kind = kind_of(name)
+    kind = detect_kind(name)
     if kind == "tiff":
         planes, orientation = _tiff.read_tiff(name, limit)
-        return _tiff.image_of(name, planes, orientation)
+        return _tiff.take_image(name, planes, orientation)
     if kind in ("npy", "npz"):
         return _read_numpy(name, kind, limit, 2)
     if kind in VOLUMES:
@@ -153,10 +153,10 @@ def read_volume(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
 
     """
     name, limit = _files.as_path(path), as_int(limit, "limit", 1, 2**40)
-    kind = kind_of(name)
+    kind = detect_kind(name)
     if kind == "tiff":
         planes, orientation = _tiff.read_tiff(name, limit)
-        return _tiff.volume_of(name, planes, orientation)
+        return _tiff.take_volume(name, planes, orientation)
     if kind == "nrrd":
         return _volumes.read_nrrd(name, limit)
     if kind in ("nii", "nii.gz"):
@@ -285,7 +285,7 @@ def write_slabs(path: PathLike, slabs: Iterable[Array], shape: Sequence[int], *,
             _npy.write_parts(temporary, whole, sides, first.dtype)
         else:
             channels, size = prod(sides[3:]), prod(sides) * first.itemsize
-            _tiff.write_tiff(temporary, _slabs.planes(whole), channels, size)
+            _tiff.write_tiff(temporary, _slabs.split_planes(whole), channels, size)
 
 
 def write_surface(path: PathLike, vertices: Array, faces: Array, *, overwrite: bool = True) -> None:
@@ -351,7 +351,7 @@ def _write(path: PathLike, value: Array, axes: int, overwrite: bool, spacing: Se
     suffix = ".nii.gz" if target.name.lower().endswith(".nii.gz") else target.suffix.lower()
     if suffix not in FORMATS:
         raise FileError(f"{target}: the suffix {suffix!r} is not one that is written: {', '.join(FORMATS)}")
-    array, steps = check(value, suffix, axes), spacing_of(spacing, suffix)
+    array, steps = check(value, suffix, axes), as_spacing(spacing, suffix)
     with atomic(target, overwrite=overwrite) as temporary, _files.translate_errors(target, "writing"):
         if suffix == ".npy":
             _npy.write_npy(temporary, array)

@@ -40,14 +40,14 @@ def translate_errors(path: Path, what: str) -> Iterator[None]:
     except MemoryError:
         raise LimitExceeded(f"{path}: {what} needs more memory than there is") from None
     except OSError as error:
-        raise FileError(f"{path}: {what} failed ({reason(error)})") from error
+        raise FileError(f"{path}: {what} failed ({describe_error(error)})") from error
     except Exception as error:
         raise FileError(
-            f"{path}: {what} failed; the file is corrupt, or of a kind that is not read ({reason(error)})"
+            f"{path}: {what} failed; the file is corrupt, or of a kind that is not read ({describe_error(error)})"
         ) from error
 
 
-def reason(error: BaseException) -> str:
+def describe_error(error: BaseException) -> str:
     """Return what an error says, on one line."""
     if isinstance(error, OSError) and error.strerror:
         return error.strerror.lower()
@@ -55,14 +55,14 @@ def reason(error: BaseException) -> str:
     return text[:200] or type(error).__name__
 
 
-def size_of(path: Path) -> int:
+def check_file(path: Path) -> int:
     """Check that a regular, non-empty file lies there and return its length."""
     try:
         status = path.stat()
     except FileNotFoundError:
         raise FileError(f"{path}: there is no such file") from None
     except OSError as error:
-        raise FileError(f"{path}: cannot be opened ({reason(error)})") from None
+        raise FileError(f"{path}: cannot be opened ({describe_error(error)})") from None
     if stat.S_ISDIR(status.st_mode):
         raise FileError(f"{path}: is a folder, a file is needed")
     if not stat.S_ISREG(status.st_mode):
@@ -74,7 +74,7 @@ def size_of(path: Path) -> int:
 
 def load(path: Path, limit: int) -> bytes:
     """Read a whole file that may not be larger than the pixels it may hold."""
-    length = size_of(path)
+    length = check_file(path)
     if length > BYTES_PER_PIXEL * limit + 2**26:
         raise LimitExceeded(f"{path}: has {length} bytes, too many for an image of {limit} pixels")
     with translate_errors(path, "reading"):
@@ -160,7 +160,7 @@ def atomic(path: PathLike, *, overwrite: bool = True) -> Iterator[Path]:
     except OSError as error:
         if isinstance(error, FileError):
             raise
-        raise FileError(f"{target}: cannot be written ({reason(error)})") from None
+        raise FileError(f"{target}: cannot be written ({describe_error(error)})") from None
     # A fixed, short stem: the target's own name may already be as long as names can be.
     temporary = final.with_name(f".texrs-{secrets.token_hex(8)}{final.suffix}")
     try:
@@ -173,7 +173,7 @@ def atomic(path: PathLike, *, overwrite: bool = True) -> Iterator[Path]:
     except OSError as error:
         if isinstance(error, TexrsError):
             raise
-        raise FileError(f"{target}: cannot be written ({reason(error)})") from error
+        raise FileError(f"{target}: cannot be written ({describe_error(error)})") from error
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)

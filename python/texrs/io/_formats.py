@@ -79,9 +79,9 @@ FORMATS = {
 }
 
 
-def kind_of(path: Path) -> str:
+def detect_kind(path: Path) -> str:
     """Return which format a file has, by its content."""
-    _files.size_of(path)
+    _files.check_file(path)
     with _files.translate_errors(path, "reading"), path.open("rb") as file:
         start = file.read(16)
     for magic, kind in MAGIC:
@@ -94,7 +94,7 @@ def kind_of(path: Path) -> str:
     )
 
 
-def spacing_of(spacing: Sequence[float] | None, suffix: str) -> tuple[float, ...]:
+def as_spacing(spacing: Sequence[float] | None, suffix: str) -> tuple[float, ...]:
     if spacing is None:
         return UNIT
     if FORMATS[suffix].images:
@@ -108,7 +108,7 @@ def check(value: object, suffix: str, axes: int) -> Array:
     try:
         array = np.asarray(value)
     except (ValueError, TypeError) as error:
-        raise InvalidInput(f"array: not an array of numbers ({_files.reason(error)})") from None
+        raise InvalidInput(f"array: not an array of numbers ({_files.describe_error(error)})") from None
     if array.dtype.kind not in "buif" or array.dtype.itemsize > 8:
         raise InvalidInput(f"array: needs bool, integers or floats, got dtype {array.dtype}")
     if array.ndim not in (axes, axes + 1) or array.size == 0:

@@ -16,7 +16,7 @@ def decode(path: Path, file: bytes, limit: int) -> tuple[Array, int]:
     Palettes are applied and samples of less than 8 bit spread to 8. The limit, in pixels and in a sixteenth of the bytes,
     is compared with the header before anything is decoded.
     """
-    samples, dtype, shape, orientation = _rust.decode_image(_printable(path), file, limit)
+    samples, dtype, shape, orientation = _rust.decode_image(_make_printable(path), file, limit)
     pixels: Array = samples.view(dtype).reshape(shape)
     return pixels[..., 0] if shape[2] == 1 else pixels, orientation
 
@@ -25,9 +25,11 @@ def encode(path: str | Path, image: Array, format: str) -> bytes:
     """Return the file of an image, (H, W) or (H, W, C): png, webp, hdr or exr."""
     rows, columns, channels = (*image.shape, 1)[:3]
     samples = np.ascontiguousarray(image).reshape(-1).view(np.uint8)
-    return _rust.encode_image(_printable(path), format, image.dtype.name, (rows, columns, channels), samples).tobytes()
+    return _rust.encode_image(
+        _make_printable(path), format, image.dtype.name, (rows, columns, channels), samples
+    ).tobytes()
 
 
-def _printable(path: str | Path) -> str:
+def _make_printable(path: str | Path) -> str:
     """Return a path as text; names of files may hold bytes that are none."""
     return str(path).encode("utf-8", "backslashreplace").decode()

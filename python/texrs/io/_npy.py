@@ -16,7 +16,7 @@ from texrs._arrays import MAX_PIXELS
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, LimitExceeded
-from texrs.io._files import BYTES_PER_PIXEL, as_path, reason, size_of, translate_errors
+from texrs.io._files import BYTES_PER_PIXEL, as_path, check_file, describe_error, translate_errors
 
 MAGIC = b"\x93NUMPY"
 
@@ -27,9 +27,9 @@ _KEY = "image"
 
 def read_npy(path: Path, limit: int) -> Array:
     """Read an .npy file."""
-    length = size_of(path)
+    length = check_file(path)
     with translate_errors(path, "reading the array"), path.open("rb") as file:
-        return _array(path, file, length, limit)
+        return _read_array(path, file, length, limit)
 
 
 def read_npz(path: Path, limit: int) -> Array:
@@ -41,7 +41,7 @@ def read_npz(path: Path, limit: int) -> Array:
             keys = ", ".join(m.filename.removesuffix(".npy") for m in members[:8])
             raise FileError(f"{path}: needs a single array, or one with the key {_KEY!r}; has {keys or 'no arrays'}")
         with archive.open(chosen[0]) as file:
-            return _array(path, cast(BinaryIO, file), chosen[0].file_size, limit)
+            return _read_array(path, cast(BinaryIO, file), chosen[0].file_size, limit)
 
 
 def read_arrays(path: PathLike, *, limit: int = MAX_PIXELS) -> dict[str, Array]:
@@ -79,7 +79,7 @@ def read_arrays(path: PathLike, *, limit: int = MAX_PIXELS) -> dict[str, Array]:
 
     """
     place = as_path(path)
-    length = size_of(place)
+    length = check_file(place)
     with translate_errors(place, "reading the archive"), place.open("rb") as file:
         if file.read(4) != b"PK\x03\x04":
             raise FileError(f"{place}: is not an .npz file of {length} bytes")
@@ -87,7 +87,7 @@ def read_arrays(path: PathLike, *, limit: int = MAX_PIXELS) -> dict[str, Array]:
             arrays = {}
             for member in archive.infolist():
                 with archive.open(member) as stream:
-                    array = _array(place, cast(BinaryIO, stream), member.file_size, limit)
+                    array = _read_array(place, cast(BinaryIO, stream), member.file_size, limit)
                     arrays[member.filename.removesuffix(".npy")] = array
             return arrays
 
@@ -113,9 +113,9 @@ def write_npz(path: Path, array: Array) -> None:
         np.savez_compressed(file, allow_pickle=False, **{_KEY: array})
 
 
-def _array(path: Path, file: BinaryIO, length: int, limit: int) -> Array:
+def _read_array(path: Path, file: BinaryIO, length: int, limit: int) -> Array:
     """Read what lies in a stream of ``length`` bytes."""
-    shape, fortran, dtype, start = _header(path, file)
+    shape, fortran, dtype, start = _read_header(path, file)
     count = prod(shape)
     if count == 0:
         raise FileError(f"{path}: holds an empty array of shape {shape}")
@@ -139,7 +139,7 @@ def _array(path: Path, file: BinaryIO, length: int, limit: int) -> Array:
     return np.ascontiguousarray(array, dtype=dtype.newbyteorder("="))
 
 
-def _header(path: Path, file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[np.generic], int]:
+def _read_header(path: Path, file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[np.generic], int]:
     """Return shape, whether columns come first, dtype and where the data starts."""
     start = file.read(8)
     if len(start) < 8 or not start.startswith(MAGIC) or start[6] not in (1, 2, 3):
@@ -154,7 +154,7 @@ def _header(path: Path, file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype
         fields = ast.literal_eval(text.decode("latin-1").strip())
         kind, fortran, shape = fields["descr"], fields["fortran_order"], fields["shape"]
     except (ValueError, SyntaxError, TypeError, KeyError, RecursionError, MemoryError) as error:
-        raise FileError(f"{path}: its NumPy header cannot be read ({reason(error)})") from None
+        raise FileError(f"{path}: its NumPy header cannot be read ({describe_error(error)})") from None
     if isinstance(kind, str) and kind.lstrip("<>=|").startswith("O"):
         raise FileError(f"{path}: holds Python objects; reading them could run code, so only numbers are read")
     if not isinstance(kind, str) or not _NUMBERS.fullmatch(kind):

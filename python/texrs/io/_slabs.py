@@ -37,7 +37,7 @@ def check(slabs: Iterable[Array], shape: tuple[int, ...]) -> Iterator[Array]:
         raise InvalidInput(f"slabs: end after {done} of {shape[0]} planes")
 
 
-def planes(slabs: Iterable[Array]) -> Iterator[Array]:
+def split_planes(slabs: Iterable[Array]) -> Iterator[Array]:
     """Return the planes of slabs, with channels; bool as 0 and 255."""
     for slab in slabs:
         part = slab.astype(np.uint8) * np.uint8(255) if slab.dtype == np.bool_ else slab

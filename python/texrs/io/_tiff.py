@@ -15,7 +15,7 @@ import numpy as np
 from texrs._typing import Array
 from texrs.errors import FileError
 from texrs.io import _image_io
-from texrs.io._files import check_size, load, size_of, translate_errors, turn_upright
+from texrs.io._files import check_file, check_size, load, translate_errors, turn_upright
 
 _LZW, _JPEG = 5, 7
 _ORIENTATION = 274
@@ -31,7 +31,7 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
     """
     import tifffile
 
-    length = size_of(path)
+    length = check_file(path)
     # OME files can name other files to read; this one is all that was asked for.
     with translate_errors(path, "decoding"), _mute(), tifffile.TiffFile(path, is_ome=False) as tif:
         if not tif.series or not tif.pages:
@@ -41,7 +41,7 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
         dtype = series.dtype
         if dtype is None or dtype.kind not in "buif" or dtype.itemsize > 8:
             raise FileError(f"{path}: holds samples of {dtype}; integers and floats are read")
-        sides, channels = _sides(path, series.axes, series.shape)
+        sides, channels = _read_sides(path, series.axes, series.shape)
         palette = first.photometric == _PALETTE
         check_size(path, sides, channels * (3 if palette else 1), dtype.itemsize, limit)
         _check_segments(path, series, length)
@@ -59,17 +59,17 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
             raise FileError(f"{path}: is cut off or corrupt; not all of its pixels are there")
         order = [a for a in series.axes if a not in "YXSC"] + [a for a in "YXCS" if a in series.axes]
         array = array.transpose([series.axes.index(a) for a in order]).reshape(*sides, channels)
-        return _colours(path, np.ascontiguousarray(array), first), orientation
+        return _apply_colours(path, np.ascontiguousarray(array), first), orientation
 
 
-def image_of(path: Path, planes: Array, orientation: int) -> Array:
+def take_image(path: Path, planes: Array, orientation: int) -> Array:
     """Return the only plane of a file."""
     if planes.shape[0] != 1:
         raise FileError(f"{path}: holds {planes.shape[0]} planes; texrs.io.read_volume reads them as a volume")
     return turn_upright(planes[0, ..., 0] if planes.shape[3] == 1 else planes[0], orientation)
 
 
-def volume_of(path: Path, planes: Array, orientation: int) -> Array:
+def take_volume(path: Path, planes: Array, orientation: int) -> Array:
     """Return all planes of a file."""
     if orientation != 1:
         planes = np.stack([turn_upright(plane, orientation) for plane in planes])
@@ -92,7 +92,7 @@ def write_tiff(path: Path, planes: Iterable[Array], channels: int, size: int) ->
             tif.write(plane if channels > 1 else plane[..., 0], **options)
 
 
-def _sides(path: Path, axes: str, shape: tuple[int, ...]) -> tuple[tuple[int, int, int], int]:
+def _read_sides(path: Path, axes: str, shape: tuple[int, ...]) -> tuple[tuple[int, int, int], int]:
     """Return (planes, rows, columns) and channels: S and C are channels, T, Z and others planes."""
     size = dict(zip(axes, shape, strict=True))
     if "Y" not in size or "X" not in size or len(size) != len(axes):
@@ -130,7 +130,7 @@ def _check_segments(path: Path, series: Any, length: int) -> None:
                 raise cut
 
 
-def _colours(path: Path, array: Array, page: Any) -> Array:
+def _apply_colours(path: Path, array: Array, page: Any) -> Array:
     """Apply what the file says about its samples: palettes, white as zero, single bits."""
     photometric = page.photometric
     if photometric == _PALETTE and page.colormap is not None and array.dtype.kind == "u":

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from texrs._typing import Array
 from texrs.errors import FileError
-from texrs.io._files import check_size, size_of, translate_errors
+from texrs.io._files import check_file, check_size, translate_errors
 
 NRRD_MAGIC = b"NRRD000"
 GZIP_MAGIC = b"\x1f\x8b"
@@ -60,8 +60,8 @@ _STL_TITLE = b"texrs".ljust(80)
 
 def read_nrrd(path: Path, limit: int) -> Array:
     """Read an NRRD volume whose samples lie in the file itself, raw or compressed by gzip."""
-    nrrd: Any = _library("nrrd", "pynrrd", path)
-    length = size_of(path)
+    nrrd: Any = _import_library("nrrd", "pynrrd", path)
+    length = check_file(path)
     with translate_errors(path, "reading"), path.open("rb") as file:
         # The library reads lines of any length: give it no more than a header may have.
         start = file.read(_LONGEST_HEADER)
@@ -86,13 +86,13 @@ def read_nrrd(path: Path, limit: int) -> Array:
             dtype = dtype.newbyteorder(">")
         sizes = [int(n) for n in np.atleast_1d(header["sizes"])]
         kinds = [str(kind).lower() for kind in header.get("kinds", [])]
-        channel = _nrrd_channel(path, sizes, kinds)
+        channel = _find_channel(path, sizes, kinds)
         _check_sides(path, sizes)
         sides = tuple(n for a, n in enumerate(sizes) if a != channel)[::-1]
         channels = 1 if channel is None else sizes[channel]
         check_size(path, sides, channels, dtype.itemsize, limit)
         file.seek(end)
-        flat = _samples(path, file, length - end, prod(sizes), dtype, compressed=_NRRD_ENCODINGS[encoding])
+        flat = _read_samples(path, file, length - end, prod(sizes), dtype, compressed=_NRRD_ENCODINGS[encoding])
     volume = flat.reshape(sizes[::-1])
     if channel is not None:
         volume = np.moveaxis(volume, len(sizes) - 1 - channel, -1)
@@ -101,7 +101,7 @@ def read_nrrd(path: Path, limit: int) -> Array:
 
 def write_nrrd(path: Path, volume: Array, spacing: Sequence[float]) -> None:
     """Write an NRRD volume, raw."""
-    nrrd: Any = _library("nrrd", "pynrrd", path)
+    nrrd: Any = _import_library("nrrd", "pynrrd", path)
     axes = [repr(float(s)) for s in reversed(spacing)]
     header: dict[str, Any] = {"encoding": "raw", "endian": "little"}
     if volume.ndim == 4:
@@ -115,7 +115,7 @@ def write_nrrd(path: Path, volume: Array, spacing: Sequence[float]) -> None:
         nrrd.write(file, little, header, index_order="C", compression_level=1)
 
 
-def _nrrd_channel(path: Path, sizes: list[int], kinds: list[str]) -> int | None:
+def _find_channel(path: Path, sizes: list[int], kinds: list[str]) -> int | None:
     """Return which axis is the channels; without kinds the fastest of four."""
     if len(sizes) == 3:
         return None
@@ -134,8 +134,8 @@ def _nrrd_channel(path: Path, sizes: list[int], kinds: list[str]) -> int | None:
 
 def read_nifti(path: Path, limit: int, *, compressed: bool) -> Array:
     """Read a NIfTI volume in one file, of version 1 or 2."""
-    nibabel: Any = _library("nibabel", "nibabel", path)
-    length = size_of(path)
+    nibabel: Any = _import_library("nibabel", "nibabel", path)
+    length = check_file(path)
     with translate_errors(path, "reading"), path.open("rb") as raw:
         file: BinaryIO = gzip.GzipFile(fileobj=raw) if compressed else raw  # type: ignore[assignment]
         start = file.read(540)
@@ -170,7 +170,7 @@ def read_nifti(path: Path, limit: int, *, compressed: bool) -> Array:
         check_size(path, tuple(sizes[2::-1]), max(channels, colours), dtype.itemsize // (colours or 1), limit)
         file.seek(int(offset))
         whole = prod(sizes)
-        flat = _samples(path, file, None if compressed else length - int(offset), whole, dtype, compressed=False)
+        flat = _read_samples(path, file, None if compressed else length - int(offset), whole, dtype, compressed=False)
         slope, intercept = header.get_slope_inter() if not colours else (None, None)
     if colours:
         volume = flat.view(np.uint8).reshape(*sizes[2::-1], colours)
@@ -185,7 +185,7 @@ def read_nifti(path: Path, limit: int, *, compressed: bool) -> Array:
 
 def write_nifti(path: Path, volume: Array, spacing: Sequence[float], *, compressed: bool) -> None:
     """Write a NIfTI volume of version 1: bytes of three or four channels as colours, others as vectors."""
-    nibabel: Any = _library("nibabel", "nibabel", path)
+    nibabel: Any = _import_library("nibabel", "nibabel", path)
     channels = volume.shape[3] if volume.ndim == 4 else 1
     vector = False
     if volume.ndim == 3:
@@ -248,7 +248,7 @@ def write_stl(path: Path, vertices: NDArray[np.float32], faces: NDArray[np.int64
 # --- shared ----------------------------------------------------------------------------------------------------------
 
 
-def _samples(
+def _read_samples(
     path: Path, file: BinaryIO, left: int | None, count: int, dtype: np.dtype[Any], *, compressed: bool
 ) -> Array:
     """Read so many samples, and no byte more than they need, in native byte order."""
@@ -288,7 +288,7 @@ def _tidy(volume: Array) -> Array:
     return np.array(volume, volume.dtype.newbyteorder("="), order="C")
 
 
-def _library(name: str, package: str, path: Path) -> Any:
+def _import_library(name: str, package: str, path: Path) -> Any:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

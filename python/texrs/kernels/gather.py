@@ -86,7 +86,7 @@ def gather(
         if index.size and index.max() >= len(images):
             raise InvalidInput(f"which: allowed are 0 to {len(images) - 1}, got {index.min()} to {index.max()}")
     out = _rust.gather(
-        [_as_kernel(e) for e in images],
+        [_to_kernel(e) for e in images],
         as_wrap(wrap, axes=axes),
         index.reshape(-1),
         points.reshape(-1, axes),
@@ -101,7 +101,7 @@ def gather(
     return out.reshape((*shape, -1) if had_channels else shape)
 
 
-def _as_kernel(array: Array) -> Array:
+def _to_kernel(array: Array) -> Array:
     """Return the values in a dtype that the kernel takes: bool as uint8, float16 as float32."""
     if array.dtype == np.bool_:
         return array.view(np.uint8)

@@ -48,7 +48,7 @@ class Correlation:
     """
 
     def __init__(self, image: object) -> None:
-        planes = _planes(image, "image")
+        planes = _as_planes(image, "image")
         #: Rows, columns and channels of the image.
         self.shape: tuple[int, int, int] = (planes.shape[1], planes.shape[2], planes.shape[0])
         self._inner = _rust.Correlation(planes)
@@ -84,14 +84,14 @@ class Correlation:
                [ 0.  , -0.58,  1.  ]], dtype=float32)
 
         """
-        planes = _planes(template, "template")
+        planes = _as_planes(template, "template")
         if planes.shape[0] != self.shape[2]:
             raise InvalidInput(f"template: needs {self.shape[2]} channels as the image, got {planes.shape[0]}")
         found: Floats = np.moveaxis(self._inner.maps(planes), 0, -1)
         return found
 
 
-def _planes(value: object, name: str) -> Floats:
+def _as_planes(value: object, name: str) -> Floats:
     image = as_image(value, name)
     with np.errstate(over="ignore"):
         return np.ascontiguousarray(np.moveaxis(image, -1, 0), np.float32)

@@ -111,11 +111,11 @@ class PatchIndex:
     ) -> None:
         single = not isinstance(images, list | tuple)
         given = as_list(images)
-        masks = _masks(allowed, len(given), single)
+        masks = _as_masks(allowed, len(given), single)
         if not given:
             raise InvalidInput("images: needs at least one image, got none")
         name = "images" if single else "images[{}]"
-        arrays = [_floats(v, name.format(i)) for i, v in enumerate(given)]
+        arrays = [_as_floats(v, name.format(i)) for i, v in enumerate(given)]
         channels = [a.shape[2] for a in arrays]
         if len(set(channels)) > 1:
             raise InvalidInput(f"images: must agree in channels, got {channels}")
@@ -180,8 +180,8 @@ class PatchIndex:
         [(1, 1), (1, 3)]
 
         """
-        samples, weights = self._query(patch, weight)
-        count, separation, ratio = _pick(count, separation, ratio)
+        samples, weights = self._as_query(patch, weight)
+        count, separation, ratio = _as_choice(count, separation, ratio)
         return [Match(*m) for m in self._index.best(samples, weights, count, separation, ratio)]
 
     def best_among(
@@ -231,7 +231,7 @@ class PatchIndex:
         [Match(cost=100.0, exemplar=0, row=2, column=1)]
 
         """
-        samples, weights = self._query(patch, weight)
+        samples, weights = self._as_query(patch, weight)
         most = (len(self.shapes) - 1, _MOST, _MOST)
         positions: Any = [
             # The type first: it costs a tenth of the full check, and there may be many.
@@ -241,7 +241,7 @@ class PatchIndex:
             )
             for place in as_items(candidates, "candidates")
         ]
-        count, separation, ratio = _pick(count, separation, ratio)
+        count, separation, ratio = _as_choice(count, separation, ratio)
         found = self._index.best_among(samples, weights, positions, count, separation, ratio)
         return [Match(*m) for m in found]
 
@@ -276,11 +276,11 @@ class PatchIndex:
                [3., 0.]], dtype=float32)
 
         """
-        samples, weights = self._query(patch, weight)
+        samples, weights = self._as_query(patch, weight)
         which = as_int(exemplar, "exemplar", 0, len(self.shapes) - 1)
         return self._index.cost_map(samples, weights, which)[0]
 
-    def _query(self, patch: object, weight: object) -> tuple[Floats, Floats]:
+    def _as_query(self, patch: object, weight: object) -> tuple[Floats, Floats]:
         samples = as_array(patch, "patch", np.float32)
         if samples.ndim == 2:
             samples = samples[..., np.newaxis]
@@ -290,7 +290,7 @@ class PatchIndex:
         return samples, weights
 
 
-def _masks(allowed: object, images: int, single: bool) -> list[object]:
+def _as_masks(allowed: object, images: int, single: bool) -> list[object]:
     if allowed is None:
         return [None] * images
     if single:
@@ -300,13 +300,13 @@ def _masks(allowed: object, images: int, single: bool) -> list[object]:
     return list(allowed)
 
 
-def _floats(value: object, name: str) -> Floats:
+def _as_floats(value: object, name: str) -> Floats:
     floats = as_array(as_image(value, name), name, np.float32)
     check_finite(floats, name)
     return floats
 
 
-def _pick(count: object, separation: object, ratio: object) -> tuple[int, int, float]:
+def _as_choice(count: object, separation: object, ratio: object) -> tuple[int, int, float]:
     return (
         as_int(count, "count", 1, _MOST),
         as_int(separation, "separation", 0, _MOST),

@@ -95,18 +95,18 @@ def solve(
     True
 
     """
-    values = _floats(as_image(image), "image")
-    rows = _gradient(gradient_rows, "gradient_rows", values)
-    columns = _gradient(gradient_columns, "gradient_columns", values)
+    values = _as_floats(as_image(image), "image")
+    rows = _as_gradient(gradient_rows, "gradient_rows", values)
+    columns = _as_gradient(gradient_columns, "gradient_columns", values)
     solved = _rust.poisson(
         values,
         (rows, columns),
-        _weight(screening),
-        _boundary(boundary),
+        _as_weight(screening),
+        _as_boundary(boundary),
         None if mask is None else as_mask(mask, "mask", values.shape[:2]),
         as_progress(progress),
     )
-    return _finite(solved).reshape(np.asarray(image).shape)
+    return _check_finite(solved).reshape(np.asarray(image).shape)
 
 
 def spread(
@@ -157,8 +157,8 @@ def spread(
         raise InvalidInput("flow: needs a float32 array, contiguous, writeable and in native byte order")
     _rust.poisson_spread(
         flow,
-        _weight(screening),
-        _boundary(boundary),
+        _as_weight(screening),
+        _as_boundary(boundary),
         None if mask is None else as_mask(mask, "mask", flow.shape[:2]),
         as_progress(progress),
     )
@@ -223,8 +223,8 @@ def blend(
     shape = np.asarray(target).shape
     if np.asarray(source).shape != shape:
         raise InvalidInput(f"source: needs the target's shape {shape}, got {np.asarray(source).shape}")
-    inside, weight = as_mask(mask, "mask", onto.shape[:2]), _weight(screening)
-    values, other = (_numbers(a, n) for a, n in ((onto, "target"), (taken, "source")))
+    inside, weight = as_mask(mask, "mask", onto.shape[:2]), _as_weight(screening)
+    values, other = (_as_numbers(a, n) for a, n in ((onto, "target"), (taken, "source")))
     # With v = source + c no difference is wanted of c, but where the target shows through.
     if inside.all() and weight == 0:
         # Nothing is left of the target but its mean.
@@ -236,17 +236,17 @@ def blend(
     rows, columns = ("periodic" if w else "free" for w in as_wrap(wrap))
     solved = _rust.poisson(correction, gradients, weight, (rows, columns), inside, None)
     result = onto.copy()
-    for band in _bands(len(onto)):
+    for band in _divide_rows(len(onto)):
         part = solved[band]
         part += other[band]
-        _write_into(result[band], _finite(part), inside[band])
+        _write_into(result[band], _check_finite(part), inside[band])
     return result.reshape(shape)
 
 
 def _subtract_outside(values: Array, other: Array, inside: Bools) -> Floats:
     """Return the differences of two images outside a mask, and 0 under it."""
     result = np.empty(values.shape, np.float32)
-    for band in _bands(len(values)):
+    for band in _divide_rows(len(values)):
         part = result[band]
         with np.errstate(over="ignore", invalid="ignore"):
             np.subtract(values[band], other[band], out=part, dtype=np.float32)
@@ -276,41 +276,41 @@ def _write_into(onto: Array, solved: Floats, inside: Bools) -> None:
         onto[inside] = solved[inside]
 
 
-def _bands(rows: int) -> Iterator[slice]:
+def _divide_rows(rows: int) -> Iterator[slice]:
     """Divide rows so that what is made of them stays in the cache."""
     return (slice(first, first + 32) for first in range(0, rows, 32))
 
 
-def _numbers(array: Array, name: str) -> Array:
+def _as_numbers(array: Array, name: str) -> Array:
     """Return values that float32 holds; others than float64 as they are."""
-    return _floats(array, name) if array.dtype == np.float64 else array
+    return _as_floats(array, name) if array.dtype == np.float64 else array
 
 
-def _gradient(value: object, name: str, image: Floats) -> Floats:
+def _as_gradient(value: object, name: str, image: Floats) -> Floats:
     gradient = as_image(value, name)
     if gradient.shape != image.shape:
         raise InvalidInput(f"{name}: needs the image's shape {image.shape}, got {gradient.shape}")
-    return _floats(gradient, name)
+    return _as_floats(gradient, name)
 
 
-def _floats(array: Array, name: str) -> Floats:
+def _as_floats(array: Array, name: str) -> Floats:
     floats = as_array(array, name, np.float32)
     if array.dtype == np.float64:
         check_finite(floats, name)
     return floats
 
 
-def _weight(screening: object) -> float:
+def _as_weight(screening: object) -> float:
     return as_float(screening, "screening", 0, float(np.finfo(np.float32).max))
 
 
-def _finite(solved: Floats) -> Floats:
+def _check_finite(solved: Floats) -> Floats:
     if not np.isfinite(solved).all():
         raise InvalidInput("image: values or differences too large to be squared in float32")
     return solved
 
 
-def _boundary(boundary: object) -> tuple[str, str]:
+def _as_boundary(boundary: object) -> tuple[str, str]:
     both = (boundary, boundary) if isinstance(boundary, str) else boundary
     if (
         not isinstance(both, Sequence)

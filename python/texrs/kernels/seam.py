@@ -178,7 +178,7 @@ def cut(
     axes = covered.ndim
     if axes not in (2, 3):
         raise InvalidInput(f"mask_a: needs shape (rows, columns) or (planes, rows, columns), got {axes} axes")
-    first, second = _pair(a, b, axes)
+    first, second = _as_pair(a, b, axes)
     shape = first.shape[:-1]
     mask, value, edges = _rust.seam_cut(
         first,
@@ -187,9 +187,9 @@ def cut(
         as_array(mask_b, "mask_b", np.bool_, shape),
         None if core_a is None else as_array(core_a, "core_a", np.bool_, shape),
         None if core_b is None else as_array(core_b, "core_b", np.bool_, shape),
-        None if penalty is None else _floats(penalty, "penalty", shape),
-        None if old is None else _old(old, shape),
-        _cost(cost),
+        None if penalty is None else _as_floats(penalty, "penalty", shape),
+        None if old is None else _as_seams(old, shape),
+        _as_cost(cost),
         as_wrap(wrap, axes=axes),
     )
     return Cut(mask.reshape(shape), value, edges)
@@ -252,11 +252,13 @@ def cut_strip(
            [0, 1, 1, 1]])
 
     """
-    first, second = _pair(a, b, 2)
+    first, second = _as_pair(a, b, 2)
     shape = first.shape[:-1]
-    dear = None if penalty is None else _floats(penalty, "penalty", shape)
+    dear = None if penalty is None else _as_floats(penalty, "penalty", shape)
     crossed = as_int(axis, "axis", 0, 1)
-    [(mask, value, edges)] = _rust.seam_strips([(first, second, crossed, dear)], as_bool(cyclic, "cyclic"), _cost(cost))
+    [(mask, value, edges)] = _rust.seam_strips(
+        [(first, second, crossed, dear)], as_bool(cyclic, "cyclic"), _as_cost(cost)
+    )
     return Cut(mask.reshape(shape), value, edges)
 
 
@@ -318,9 +320,9 @@ def cut_strips(strips: Sequence[Strip], *, cyclic: bool = False, cost: Cost = "g
             raise InvalidInput(f"strips: needs a Strip each, got {type(strip).__name__}")
         first = as_array(strip.a, "strips: a", np.float32, ("rows", "columns", "channels"))
         second = as_array(strip.b, "strips: b", np.float32, first.shape)
-        dear = None if strip.penalty is None else _floats(strip.penalty, "strips: penalty", first.shape[:2])
+        dear = None if strip.penalty is None else _as_floats(strip.penalty, "strips: penalty", first.shape[:2])
         given.append((first, second, as_int(strip.axis, "strips: axis", 0, 1), dear))
-    found = _rust.seam_strips(given, as_bool(cyclic, "cyclic"), _cost(cost))
+    found = _rust.seam_strips(given, as_bool(cyclic, "cyclic"), _as_cost(cost))
     return [
         Cut(mask.reshape(one[0].shape[:2]), value, edges)
         for one, (mask, value, edges) in zip(given, found, strict=True)
@@ -390,12 +392,12 @@ def binary_labels(
     both = [entry if isinstance(entry, tuple) else (entry, entry) for entry in entries]
     if any(len(entry) != 2 for entry in both):
         raise InvalidInput("pairwise: a tuple needs two entries, False before True and True before False")
-    forward, backward = ([_floats(entry[i], "pairwise", shape) for entry in both] for i in (0, 1))
+    forward, backward = ([_as_floats(entry[i], "pairwise", shape) for entry in both] for i in (0, 1))
     mask, energy = _rust.seam_labels(costs, forward, backward, as_wrap(wrap, axes=axes))
     return Labels(mask.reshape(shape), energy)
 
 
-def _pair(a: object, b: object, axes: int) -> tuple[Floats, Floats]:
+def _as_pair(a: object, b: object, axes: int) -> tuple[Floats, Floats]:
     """Return two images of one shape, brought to [0, 1] together."""
     first, second = as_image(a, "a", axes=axes), as_image(b, "b", axes=axes)
     if first.shape != second.shape:
@@ -403,18 +405,18 @@ def _pair(a: object, b: object, axes: int) -> tuple[Floats, Floats]:
     if first.dtype.kind == second.dtype.kind == "f" and not (_is_unit(first) and _is_unit(second)):
         both = to_unit(np.stack([first, second]))
         return both[0], both[1]
-    return np.ascontiguousarray(_unit(first)), np.ascontiguousarray(_unit(second))
+    return np.ascontiguousarray(_bring_to_unit(first)), np.ascontiguousarray(_bring_to_unit(second))
 
 
 def _is_unit(image: Array) -> bool:
     return bool(image.min() >= 0 and image.max() <= 1)
 
 
-def _unit(image: Array) -> Floats:
+def _bring_to_unit(image: Array) -> Floats:
     return image if image.dtype == np.float32 else to_unit(image)
 
 
-def _floats(value: object, name: str, shape: tuple[int, ...]) -> Floats:
+def _as_floats(value: object, name: str, shape: tuple[int, ...]) -> Floats:
     """Return an array of floats; one number stands for all of them."""
     if isinstance(value, Real):
         most = float(np.finfo(np.float32).max)
@@ -422,15 +424,15 @@ def _floats(value: object, name: str, shape: tuple[int, ...]) -> Floats:
     return as_array(value, name, np.float32, shape)
 
 
-def _old(old: object, shape: tuple[int, ...]) -> list[list[Floats]]:
+def _as_seams(old: object, shape: tuple[int, ...]) -> list[list[Floats]]:
     if not isinstance(old, OldSeams):
         raise InvalidInput(f"old: needs OldSeams, got {type(old).__name__}")
     fields = []
     for name in ("old.kept", "old.ab", "old.ba"):
         arrays = as_tuple(getattr(old, name[4:]), name, len(shape), f"{len(shape)} arrays, one an axis")
-        fields.append([_floats(array, name, shape) for array in arrays])
+        fields.append([_as_floats(array, name, shape) for array in arrays])
     return fields
 
 
-def _cost(cost: object) -> str:
+def _as_cost(cost: object) -> str:
     return as_choice(cost, "cost", ("gradient", "paper"))

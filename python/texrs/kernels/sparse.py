@@ -56,7 +56,7 @@ class Cholesky:
     """
 
     def __init__(self, matrix: Any, *, limit: int = LIMIT) -> None:
-        self._inner = _rust.Cholesky(*_entries(matrix), as_int(limit, "limit", 1, 1 << 62))
+        self._inner = _rust.Cholesky(*_list_entries(matrix), as_int(limit, "limit", 1, 1 << 62))
 
     @classmethod
     def several(cls, matrices: Sequence[Any], *, limit: int = LIMIT) -> list[Cholesky]:
@@ -88,7 +88,7 @@ class Cholesky:
         [3, 5]
 
         """
-        entries = [_entries(matrix, "matrices") for matrix in as_items(matrices, "matrices")]
+        entries = [_list_entries(matrix, "matrices") for matrix in as_items(matrices, "matrices")]
         factors = []
         for inner in _rust.Cholesky.several(entries, as_int(limit, "limit", 1, 1 << 62)):
             factor = cls.__new__(cls)
@@ -138,7 +138,9 @@ class Cholesky:
         return np.ascontiguousarray(found.reshape(array.shape[::-1]).T)
 
 
-def _entries(matrix: Any, name: str = "matrix") -> tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float64]]:
+def _list_entries(
+    matrix: Any, name: str = "matrix"
+) -> tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float64]]:
     """Return the lower triangle, column by column."""
     from scipy.sparse import csc_array, issparse, tril
 

@@ -14,7 +14,7 @@ from texrs.kernels.patch_search import Match
 from texrs.kernels.seam import Strip, cut_strips
 from texrs.quilting._finder import Finder
 from texrs.quilting._windows import Window
-from texrs.source_map import SourceMap, pixels_of
+from texrs.source_map import SourceMap, chain_pixels
 
 CANDIDATES = 3
 """Matches of the pool that are cut in."""
@@ -64,7 +64,7 @@ class Quilt:
         self.place = np.zeros(size, np.uint32)
         self.label = np.zeros(size, np.uint32)
         self.pastes = 0
-        self.pixels = pixels_of([p.source for p in pictures])
+        self.pixels = chain_pixels([p.source for p in pictures])
         self.all_colours = np.concatenate([p.colours.reshape(-1, channels) for p in pictures])
         self.all_penalties = np.concatenate([p.penalty.ravel() for p in pictures])
         self.all_hands = np.concatenate([np.linalg.det(p.source.frames()).ravel() > 0 for p in pictures])

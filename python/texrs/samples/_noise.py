@@ -95,7 +95,7 @@ def encode(linear: Floats) -> Floats:
     return np.where(x <= 0.0031308, x * 12.92, 1.055 * x ** np.float32(1 / 2.4) - 0.055).astype(np.float32)
 
 
-def softest(values: Sequence[Floats], hardness: float) -> Floats:
+def soft_minimum(values: Sequence[Floats], hardness: float) -> Floats:
     """Return the smooth minimum of some fields; never above the true one."""
     total = sum(np.exp(np.float32(-hardness) * v) for v in values)
     return np.asarray(-np.log(total) / np.float32(hardness), np.float32)

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_size
 from texrs.samples._noise import Floats, mix, palette, ramp
 from texrs.samples._regular import lay_bricks
-from texrs.samples._sample import MIN_SIDE, LayoutName, Sample, generator
+from texrs.samples._sample import MIN_SIDE, LayoutName, Sample, make_generator
 from texrs.samples._scene import Scene, relabel
 
 _PITCH, _RADIUS = 26.0, 10.5
@@ -60,8 +60,8 @@ def tilted_discs(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
     >>> sample.frames.shape, bool(sample.scale_map.max() > 3 * sample.scale_map.min())
     ((96, 96, 2, 2), True)
     """
-    rng = generator("tilted_discs", seed)
-    plane = _Plane.seen(as_size(size, minimum=MIN_SIDE), tilt=50.0, towards=pi)
+    rng = make_generator("tilted_discs", seed)
+    plane = _Plane.tilt(as_size(size, minimum=MIN_SIDE), tilt=50.0, towards=pi)
     rise = _PITCH * sqrt(3) / 2
     rows = 2 * int(np.ceil(plane.extent[0] / (2 * rise)))
     cols = int(np.ceil(plane.extent[1] / _PITCH))
@@ -101,8 +101,8 @@ def tilted_bricks(size: Sequence[int] = (256, 256), *, seed: int = 0) -> Sample:
     >>> abs(float(np.log(sample.scale_map).mean())) < 1e-3
     True
     """
-    rng = generator("tilted_bricks", seed)
-    plane = _Plane.seen(as_size(size, minimum=MIN_SIDE), tilt=45.0, towards=radians(-112.0), zoom=1.25)
+    rng = make_generator("tilted_bricks", seed)
+    plane = _Plane.tilt(as_size(size, minimum=MIN_SIDE), tilt=45.0, towards=radians(-112.0), zoom=1.25)
     courses = 2 * int(np.ceil(plane.extent[0] / 68))
     across = int(np.ceil(plane.extent[1] / 80))
     scene = Scene((courses * 34, across * 80), rng)
@@ -138,7 +138,7 @@ class _Plane:
     extent: NDArray[np.float64]
 
     @classmethod
-    def seen(cls, size: tuple[int, ...], *, tilt: float, towards: float, zoom: float = 1.0) -> _Plane:
+    def tilt(cls, size: tuple[int, ...], *, tilt: float, towards: float, zoom: float = 1.0) -> _Plane:
         """Return the plane whose depth grows `towards` an angle from +row to +col, by `tilt`."""
         along = np.array([cos(towards), sin(towards)])
         lean = radians(tilt)

@@ -9,7 +9,7 @@ import numpy as np
 
 from texrs._arrays import as_size
 from texrs.samples._noise import Floats, mix, palette, ramp, shades
-from texrs.samples._sample import MIN_SIDE, Sample, generator
+from texrs.samples._sample import MIN_SIDE, Sample, make_generator
 from texrs.samples._scene import Scene
 
 _COURSE, _BRICK, _JOINT = 34, 80, 5.0
@@ -48,7 +48,7 @@ def bricks(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fals
     >>> wall.layout, wall.image.shape
     ('jointed', (256, 256, 3))
     """
-    rng = generator("bricks", seed)
+    rng = make_generator("bricks", seed)
     rows, cols = as_size(size, minimum=MIN_SIDE)
     if wrap:
         scene = Scene((rows, cols), rng)
@@ -141,7 +141,7 @@ def scales(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fals
     >>> bool(samples.scales((64, 64)).mask.all())
     True
     """
-    rng = generator("scales", seed)
+    rng = make_generator("scales", seed)
     scene = Scene.around(as_size(size, minimum=MIN_SIDE), rng, wrap=wrap, margin=40)
     rows_of = 2 * max(round(scene.period[0] / 32), 1)
     across = max(round(scene.period[1] / 32), 1)
@@ -208,7 +208,7 @@ def net(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) 
     >>> bool((sample.mask == (sample.labels == 0)).all())
     True
     """
-    rng = generator("net", seed)
+    rng = make_generator("net", seed)
     scene = Scene.around(as_size(size, minimum=MIN_SIDE), rng, wrap=wrap, margin=48)
     rows_of = 2 * max(round(scene.period[0] / 40), 1)
     across = max(round(scene.period[1] / 40), 1)
@@ -234,7 +234,7 @@ def net(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) 
                 regular = np.array([tall, (side - 0.5) * wide])
                 turn = np.array(scene.period)
                 span = (other - knot - regular + turn / 2) % turn - turn / 2 + regular
-                _strand(scene, knot, span, rope * rng.uniform(0.85, 1.12), fray, wear)
+                _lay_strand(scene, knot, span, rope * rng.uniform(0.85, 1.12), fray, wear)
             window = scene.window((knot[0], knot[1]), 7)
             rows, cols = window.where
             rho = np.hypot(window.y / 5.2, window.x / 4.4) + np.float32(0.05) * fray[rows, cols]
@@ -279,7 +279,7 @@ def weave(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False
     >>> samples.weave((64, 64), wrap=True).centres.shape
     (16, 2)
     """
-    rng = generator("weave", seed)
+    rng = make_generator("weave", seed)
     scene = Scene.around(as_size(size, minimum=MIN_SIDE), rng, wrap=wrap, margin=32)
     counts = [2 * max(round(n / 32), 1) for n in scene.period]
     pitch = [n / c for n, c in zip(scene.period, counts, strict=True)]
@@ -317,7 +317,7 @@ def weave(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False
     return scene.finish("weave", layout=None, reach=8.0, exposure=1.05)
 
 
-def _strand(scene: Scene, knot: Floats, span: Floats, tone: Floats, fray: Floats, wear: Floats) -> None:
+def _lay_strand(scene: Scene, knot: Floats, span: Floats, tone: Floats, fray: Floats, wear: Floats) -> None:
     """Lay a two-ply rope from `knot` along `span`, with the label of the net."""
     length = float(np.hypot(*span))
     window = scene.window((knot[0] + span[0] / 2, knot[1] + span[1] / 2), length / 2 + 5)

@@ -68,6 +68,6 @@ class Sample:
         return f"Sample({self.name!r}, {shape}, known: {', '.join(known) or 'nothing'})"
 
 
-def generator(name: str, seed: object) -> np.random.Generator:
+def make_generator(name: str, seed: object) -> np.random.Generator:
     """Return the generator of sample `name`: a seed gives unrelated numbers to each sample."""
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence([as_seed(seed), *name.encode()])))

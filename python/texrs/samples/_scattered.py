@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_size
-from texrs.samples._noise import Floats, mix, palette, ramp, scatter, shades, softest, spread
-from texrs.samples._sample import MIN_SIDE, Sample, generator
+from texrs.samples._noise import Floats, mix, palette, ramp, scatter, shades, soft_minimum, spread
+from texrs.samples._sample import MIN_SIDE, Sample, make_generator
 from texrs.samples._scene import Scene, Window
 
 
@@ -46,9 +46,9 @@ def pebbles(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fal
     >>> sample.image.shape, int(sample.labels.max()) == len(sample.centres)
     ((64, 96, 3), True)
     """
-    rng = generator("pebbles", seed)
+    rng = make_generator("pebbles", seed)
     scene = Scene.around(as_size(size, minimum=MIN_SIDE), rng, wrap=wrap, margin=36)
-    _sand(scene)
+    _lay_sand(scene)
     points = spread(scene.period, rng, 26.0, 5)
     weight = rng.uniform(-70, 70, len(points))
     bend = [0.8 * scene.noise(30, 14) + 0.12 * scene.noise(8, 3) for _ in "yx"]
@@ -64,7 +64,7 @@ def pebbles(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fal
         away = (points - point + np.array(scene.period) / 2) % scene.period
         away -= np.array(scene.period) / 2
         near = np.argsort((away**2).sum(1))[1:13]
-        edge = _cell(
+        edge = _measure_cell(
             window.y + bend[0][rows, cols], window.x + bend[1][rows, cols], away[near], weight[i] - weight[near]
         )
         inner = edge - np.float32(1.5)
@@ -121,7 +121,7 @@ def dots(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
     >>> samples.dots((64, 64), seed=3).layout
     'disjoint'
     """
-    rng = generator("dots", seed)
+    rng = make_generator("dots", seed)
     scene = Scene.around(as_size(size, minimum=MIN_SIDE), rng, wrap=wrap, margin=24)
     fibre = scene.noise(12, 1, stretch=(1, 5)) + scene.noise(12, 1, stretch=(5, 1))
     scene.height += np.float32(0.07) * fibre + np.float32(0.05) * scene.noise(4, 1, gain=0.9)
@@ -187,7 +187,7 @@ def leaves_and_flowers(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap:
     >>> bool((sample.mask == (sample.labels > 0)).all())
     True
     """
-    rng = generator("leaves_and_flowers", seed)
+    rng = make_generator("leaves_and_flowers", seed)
     scene = Scene.around(as_size(size, minimum=MIN_SIDE), rng, wrap=wrap, margin=36)
     scene.albedo[:] = palette("1d2415")[0]
     mottle, crinkle = scene.noise(12, 2, gain=0.5), scene.noise(12, 4)
@@ -199,13 +199,13 @@ def leaves_and_flowers(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap:
         length, angle = rng.uniform(17, 27), rng.uniform(0, 2 * pi)
         window = scene.window((place[0], place[1]), length / 2 + 1.5)
         tone = greens[rng.integers(len(greens))] * rng.uniform(0.7, 1.2)
-        _leaf(scene, window, length, angle, 5.0 * k / len(places), tone, mottle, crinkle)
+        _lay_leaf(scene, window, length, angle, 5.0 * k / len(places), tone, mottle, crinkle)
     petal_tones = palette(
         "d9d2c4", "b98aa0", "c9a24a", "8d7fae", "a9b07a", "a5483f", "cfa89a", "7f9a5c",
     )  # fmt: skip
     for centre in scatter(scene.period, rng, 44.0, 39.0):
         tone = petal_tones[rng.integers(len(petal_tones))] * rng.uniform(0.8, 1.12)
-        _flower(scene, (centre[0], centre[1]), rng.uniform(14.5, 18.5), tone, crinkle)
+        _lay_flower(scene, (centre[0], centre[1]), rng.uniform(14.5, 18.5), tone, crinkle)
     return scene.finish("leaves_and_flowers", layout="disjoint", reach=18.0, exposure=0.9)
 
 
@@ -239,7 +239,7 @@ def beans(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False
     >>> samples.beans((96, 96)).centres.shape[1]
     2
     """
-    rng = generator("beans", seed)
+    rng = make_generator("beans", seed)
     scene = Scene.around(as_size(size, minimum=MIN_SIDE), rng, wrap=wrap, margin=30)
     scene.albedo[:] = palette("2a1c15")[0]
     scene.height += np.float32(0.3) * scene.noise(6) - 6
@@ -253,7 +253,9 @@ def beans(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False
             window = scene.window((dart[0], dart[1]), 17)
             rows, cols = window.where
             below = scene.label[rows, cols]
-            shapes = [_bean(window, float(angle), float(rng.uniform(12.5, 15))) for angle in rng.uniform(0, 2 * pi, 5)]
+            shapes = [
+                _measure_bean(window, float(angle), float(rng.uniform(12.5, 15))) for angle in rng.uniform(0, 2 * pi, 5)
+            ]
             cover = [float((below[rho < 1] > 0).mean()) for rho, _, _ in shapes]
             least = int(np.argmin(cover))
             if cover[least] > taken:
@@ -271,7 +273,7 @@ def beans(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False
     return scene.finish("beans", layout="disjoint", reach=12.0, exposure=0.95)
 
 
-def _sand(scene: Scene) -> None:
+def _lay_sand(scene: Scene) -> None:
     """Lay dark sand over the whole scene."""
     fine, soft = scene.noise(3, 1, gain=1.0), scene.noise(40, 4)
     scene.height += np.float32(0.3) * fine + np.float32(0.35) * soft
@@ -280,17 +282,17 @@ def _sand(scene: Scene) -> None:
     scene.albedo[:] = mix(scene.albedo, palette("a89c86")[0], 0.8 * grains)
 
 
-def _cell(y: Floats, x: Floats, others: NDArray[np.float64], lead: NDArray[np.float64]) -> Floats:
+def _measure_cell(y: Floats, x: Floats, others: NDArray[np.float64], lead: NDArray[np.float64]) -> Floats:
     """Return the smooth distance to the border of the power cell of the origin among `others`."""
     edges = []
     for other, more in zip(others, lead, strict=True):
         length = float(np.hypot(*other))
         half = (length**2 + more) / (2 * length)
         edges.append((half - other[0] / length * y - other[1] / length * x).astype(np.float32))
-    return softest(edges, 0.36)
+    return soft_minimum(edges, 0.36)
 
 
-def _leaf(
+def _lay_leaf(
     scene: Scene,
     window: Window,
     length: float,
@@ -319,7 +321,7 @@ def _leaf(
     scene.paint(window, inside, height.astype(np.float32), albedo, gloss=0.10)
 
 
-def _flower(scene: Scene, centre: tuple[float, float], radius: float, tone: Floats, crinkle: Floats) -> None:
+def _lay_flower(scene: Scene, centre: tuple[float, float], radius: float, tone: Floats, crinkle: Floats) -> None:
     """Lay one flower of five to eight petals over everything, as a new element."""
     rng, label = scene.rng, scene.add(centre)
     window = scene.window(centre, 22)
@@ -352,7 +354,7 @@ def _flower(scene: Scene, centre: tuple[float, float], radius: float, tone: Floa
     scene.paint(window, r < 1, heart.astype(np.float32), albedo, label=label, over=True)
 
 
-def _bean(window: Window, angle: float, half: float) -> tuple[Floats, Floats, Floats]:
+def _measure_bean(window: Window, angle: float, half: float) -> tuple[Floats, Floats, Floats]:
     """Return the squared radius (1 at the rim) of a bean, and the coordinates along and across."""
     along = np.float32(cos(angle)) * window.y + np.float32(sin(angle)) * window.x
     across = np.float32(cos(angle)) * window.x - np.float32(sin(angle)) * window.y

@@ -184,7 +184,7 @@ class Scene:
         image = np.rint(np.clip(picture, 0, 1) * 255).astype(np.uint8)
         if not truth:
             return Sample(name, image)
-        centres, labels = relabel(self._crop(self.label), self._inside())
+        centres, labels = relabel(self._crop(self.label), self._move_inside())
         return Sample(name, image, centres, labels, labels > 0 if mask is None else mask(labels), layout)
 
     def _crop(self, fine: NDArray[_Number]) -> NDArray[_Number]:
@@ -192,7 +192,7 @@ class Scene:
         (top, left), (height, width) = self.origin, self.size
         return np.ascontiguousarray(fine[::_FINE, ::_FINE][top : top + height, left : left + width])
 
-    def _inside(self) -> NDArray[np.float64]:
+    def _move_inside(self) -> NDArray[np.float64]:
         """Return the centroids in the picture's pixels."""
         box = np.array(self.period, np.float64)
         # The picture's own pixels come first: -0.5 <= centre < period - 0.5.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_size
 from texrs.samples._noise import Floats, clouds, encode, mix, palette, ramp, shades
-from texrs.samples._sample import MIN_SIDE, Sample, generator
+from texrs.samples._sample import MIN_SIDE, Sample, make_generator
 
 _CUBE = (64, 64, 64)
 _STRIPE = 9.0
@@ -46,7 +46,7 @@ def stripes(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     >>> samples.stripes((32, 32, 40)).frames.shape
     (32, 32, 40, 3, 3)
     """
-    rng = generator("stripes", seed)
+    rng = make_generator("stripes", seed)
     shape = as_size(size, axes=3, minimum=MIN_SIDE)
     p = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), -1).astype(np.float32)
     source, frames = p.copy(), np.zeros((*shape, 3, 3), np.float32)
@@ -99,7 +99,7 @@ def particles(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     >>> sample.centres.shape[1], sample.layout
     (3, 'disjoint')
     """
-    rng = generator("particles", seed)
+    rng = make_generator("particles", seed)
     shape = as_size(size, axes=3, minimum=MIN_SIDE)
     box = np.array(shape, np.float64)
     grain, cloud = clouds(shape, rng, coarse=4, gain=1.0), clouds(shape, rng, coarse=24, gain=0.6)
@@ -115,7 +115,7 @@ def particles(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
         # Half axes are at most 6, and a voxel must stay between two.
         if len(centres) and (away**2).sum(1).min() < 13.2**2:
             continue
-        rho, index = _ellipsoid(dart, shape, rng.uniform(3.4, 6.0, 3), rng)
+        rho, index = _measure_ellipsoid(dart, shape, rng.uniform(3.4, 6.0, 3), rng)
         centres.append(dart)
         tone = tones[(len(centres) - 1) % 3] * rng.uniform(0.85, 1.15)
         shade = 1 + np.float32(0.12) * cloud[index] + np.float32(0.06) * grain[index]
@@ -158,7 +158,7 @@ def weave_solid(size: Sequence[int] = _CUBE, *, seed: int = 0, wrap: bool = Fals
     >>> samples.weave_solid((32, 32, 32)).image.shape
     (32, 32, 32, 3)
     """
-    rng = generator("weave_solid", seed)
+    rng = make_generator("weave_solid", seed)
     shape = as_size(size, axes=3, minimum=MIN_SIDE)
     period = shape if wrap else tuple(32 * -(-n // 32) for n in shape)
     counts = [2 * max(round(n / 32), 1) for n in period]
@@ -221,7 +221,7 @@ def wood_solid(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     >>> samples.wood_solid((32, 48, 32)).mask.dtype
     dtype('bool')
     """
-    rng = generator("wood_solid", seed)
+    rng = make_generator("wood_solid", seed)
     shape = as_size(size, axes=3, minimum=MIN_SIDE)
     z, y, x = (a.astype(np.float32) for a in np.ogrid[tuple(slice(0, n) for n in shape)])
     wander = clouds(shape, rng, coarse=60, fine=10, stretch=(1, 3, 1))
@@ -248,7 +248,7 @@ def wood_solid(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     return Sample("wood_solid", _quantise(albedo, rng), mask=late > 0.5)
 
 
-def _ellipsoid(
+def _measure_ellipsoid(
     centre: NDArray[np.float64], shape: tuple[int, ...], half_axes: NDArray[np.float64], rng: np.random.Generator
 ) -> tuple[Floats, tuple[NDArray[np.intp], ...]]:
     """Return the radius (1 at the surface) in a window of the torus around a turned ellipsoid."""

@@ -8,8 +8,8 @@ from math import cos, pi, sin
 import numpy as np
 
 from texrs._arrays import as_size
-from texrs.samples._noise import fold, mix, palette, ramp, shades, softest, spread
-from texrs.samples._sample import MIN_SIDE, Sample, generator
+from texrs.samples._noise import fold, mix, palette, ramp, shades, soft_minimum, spread
+from texrs.samples._sample import MIN_SIDE, Sample, make_generator
 from texrs.samples._scene import Scene
 
 
@@ -43,7 +43,7 @@ def bark(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
     """
     from scipy.spatial import cKDTree
 
-    rng = generator("bark", seed)
+    rng = make_generator("bark", seed)
     scene = Scene.around(as_size(size, minimum=MIN_SIDE), rng, wrap=wrap, margin=24)
     long = 2.9
     points = spread((scene.period[0], scene.period[1] * 3), rng, 42.0, 2) / np.array([1.0, 3.0])
@@ -97,7 +97,7 @@ def grit(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
     >>> samples.grit((64, 64)).centres is None
     True
     """
-    rng = generator("grit", seed)
+    rng = make_generator("grit", seed)
     scene = Scene.around(as_size(size, minimum=MIN_SIDE), rng, wrap=wrap, margin=16)
     scene.albedo[:] = palette("3a342d")[0]
     speckle, rough = scene.noise(3, gain=0.9), scene.noise(6, 1, gain=0.7)
@@ -108,7 +108,7 @@ def grit(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
         rows, cols = window.where
         angles = (np.arange(6) + rng.uniform(-0.4, 0.4, 6)) * (pi / 3) + rng.uniform(0, pi)
         planes = radius * rng.uniform(0.75, 1.15, 6)
-        edge = softest(
+        edge = soft_minimum(
             [
                 np.float32(d) - np.float32(sin(a)) * window.y - np.float32(cos(a)) * window.x
                 for a, d in zip(angles, planes, strict=True)

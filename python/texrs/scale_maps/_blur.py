@@ -12,12 +12,12 @@ def blur(values: Floats, sigma: float) -> Floats:
     """Return values blurred by a Gaussian, or by three boxes of its variance where that is cheaper."""
     if sigma < 3:
         return np.asarray(ndimage.gaussian_filter(values, sigma, mode="nearest"))
-    for width in _boxes(sigma):
+    for width in _choose_boxes(sigma):
         values = ndimage.uniform_filter(values, width, mode="nearest")
     return values
 
 
-def _boxes(sigma: float) -> list[int]:
+def _choose_boxes(sigma: float) -> list[int]:
     """Return three odd widths whose boxes together have the variance of a Gaussian."""
     ideal = np.sqrt(4 * sigma**2 + 1)
     low = int(ideal) - 1 + int(ideal) % 2

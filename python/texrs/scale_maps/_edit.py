@@ -145,7 +145,7 @@ def _set(logs: Floats, value: object, region: object = None, feather: object = N
 
 def _vary(logs: Floats, gain: object, region: object = None, feather: object = None) -> Floats:
     inside = weights(region, feather, logs.shape)
-    away = logs - _mean(logs, inside)
+    away = logs - _average(logs, inside)
     return np.asarray(logs + (as_number(gain, "gain", -8, 8) - 1) * away * inside)
 
 
@@ -182,7 +182,7 @@ def _duplicate(logs: Floats, region: object, to: object, mode: object = "copy", 
     source, share = logs[tuple(here)], inside[tuple(here)]
     part = logs[tuple(there)]
     result = logs.copy()
-    result[tuple(there)] += share * (source - (part if mode == "copy" else _mean(logs, inside)))
+    result[tuple(there)] += share * (source - (part if mode == "copy" else _average(logs, inside)))
     return result
 
 
@@ -197,7 +197,7 @@ def _smooth(logs: Floats, sigma: object, region: object = None, feather: object 
     return np.asarray(logs + (blurred - logs) * weights(region, feather, logs.shape))
 
 
-def _mean(logs: Floats, inside: Floats) -> float:
+def _average(logs: Floats, inside: Floats) -> float:
     total = float(np.sum(inside, dtype=np.float64))
     return float(np.sum(logs * inside, dtype=np.float64)) / total if total > 0 else 0.0
 

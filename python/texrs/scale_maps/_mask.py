@@ -117,7 +117,7 @@ def from_mask(
 
 def _refuse_bare(mask: Bools, known: Bools | None) -> None:
     marked = np.count_nonzero(mask if known is None else mask & known)
-    total = _area(mask, known)
+    total = _count_area(mask, known)
     if total == 0:
         raise InvalidInput("known: no pixel of the mask is known; there must be some to measure")
     if marked in (0, total):
@@ -131,13 +131,13 @@ def _refuse_bare(mask: Bools, known: Bools | None) -> None:
 def _measure(mask: Bools, known: Bools | None, what: str, window: int | None) -> Floats:
     """Return log S as the mask has it."""
     size = mask.shape[0], mask.shape[1]
-    features, spacing, power = _features(mask, known, what)
+    features, spacing, power = _find_features(mask, known, what)
     if window is None:
         window = int(np.clip(_PERIODS * spacing, SMALLEST, max(SMALLEST, min(size) / 3)))
     lattice = Lattice.of(size, window)
     density, enough, rows, columns = lattice.densities(features, known)
     typical = float(np.median(density[enough]))
-    if typical <= 0 or _area(mask, known) < _FEWEST * spacing**2:
+    if typical <= 0 or _count_area(mask, known) < _FEWEST * spacing**2:
         raise InvalidInput(
             f"mask: holds too few features to count them in windows of {window} pixels; a mask with more of them, a "
             "larger window, or a scale by angles is needed"
@@ -154,31 +154,31 @@ def _measure(mask: Bools, known: Bools | None, what: str, window: int | None) ->
     return lattice.spread(logs)
 
 
-def _features(mask: Bools, known: Bools | None, what: str) -> tuple[Array, float, float]:
+def _find_features(mask: Bools, known: Bools | None, what: str) -> tuple[Array, float, float]:
     """Return what is counted at each pixel, how far apart features are, and the power of S in their density's inverse."""
     if what == "skeleton":
         from skimage.morphology import skeletonize
 
         lines = skeletonize(mask) if known is None else skeletonize(mask & known) & known
-        return lines.view(np.uint8), _spacing(int(np.count_nonzero(lines)), mask, known), 1.0
+        return lines.view(np.uint8), _measure_spacing(int(np.count_nonzero(lines)), mask, known), 1.0
     if what == "count":
-        points = _middles(mask, known)
+        points = _mark_middles(mask, known)
         number = max(1, int(points.sum(dtype=np.int64))) / 2
-        return points, float(np.sqrt(_area(mask, known) / number)), 0.5
-    outlines = _outlines(mask, known)
+        return points, float(np.sqrt(_count_area(mask, known) / number)), 0.5
+    outlines = _count_outlines(mask, known)
     # A line through a feature enters and leaves it, and there are lines along two axes.
-    return outlines, _spacing(int(outlines.sum(dtype=np.int64)) / 4, mask, known), 1.0
+    return outlines, _measure_spacing(int(outlines.sum(dtype=np.int64)) / 4, mask, known), 1.0
 
 
-def _spacing(lines: float, mask: Bools, known: Bools | None) -> float:
-    return _area(mask, known) / max(0.25, lines)
+def _measure_spacing(lines: float, mask: Bools, known: Bools | None) -> float:
+    return _count_area(mask, known) / max(0.25, lines)
 
 
-def _area(mask: Bools, known: Bools | None) -> int:
+def _count_area(mask: Bools, known: Bools | None) -> int:
     return mask.size if known is None else int(np.count_nonzero(known))
 
 
-def _outlines(mask: Bools, known: Bools | None) -> NDArray[np.uint8]:
+def _count_outlines(mask: Bools, known: Bools | None) -> NDArray[np.uint8]:
     """Count at each pixel how many of its neighbours, the next row's and the next column's, differ from it."""
     count = np.zeros(mask.shape, np.uint8)
     for part, first, second in (
@@ -192,7 +192,7 @@ def _outlines(mask: Bools, known: Bools | None) -> NDArray[np.uint8]:
     return count
 
 
-def _middles(mask: Bools, known: Bools | None) -> NDArray[np.uint16]:
+def _mark_middles(mask: Bools, known: Bools | None) -> NDArray[np.uint16]:
     """Put 2 at the middle of each feature; 1 if the border or a hole cuts it, for half of those have theirs beyond."""
     labels, number = ndimage.label(mask if known is None else mask & known, np.ones((3, 3)))
     cut = np.zeros(number + 1, np.bool_)

@@ -142,14 +142,14 @@ def picture(scale: object, largest: float | None = None) -> NDArray[np.uint8]:
     step = 0.5 if reach <= 1.5 else 1.0 if reach <= 3 else 2.0
     dot = max(2, len(logs) // 256)
     ticks = [step * k for k in range(-floor(reach / step), floor(reach / step) + 1)]
-    bar = _bar(max(32, len(logs)), reach, ticks, dot)
+    bar = _draw_bar(max(32, len(logs)), reach, ticks, dot)
     shown = np.full((len(bar), logs.shape[1], 3), _PAPER, np.float32)
-    shown[: len(logs)] = _colours(logs / reach) * (1 - 0.35 * _contours(logs / step))[..., np.newaxis]
+    shown[: len(logs)] = _colour(logs / reach) * (1 - 0.35 * _mark_contours(logs / step))[..., np.newaxis]
     seen: NDArray[np.uint8] = np.rint(np.concatenate([shown, bar], 1) * 255).astype(np.uint8)
     return seen
 
 
-def _colours(at: Floats) -> Floats:
+def _colour(at: Floats) -> Floats:
     """Return the colours of values from -1 to 1."""
     table = np.array([[int(c[k : k + 2], 16) for k in (0, 2, 4)] for c in _COLOURS], np.float32) / 255
     place = (np.clip(at, -1, 1) + 1) * ((len(table) - 1) / 2)
@@ -158,7 +158,7 @@ def _colours(at: Floats) -> Floats:
     return np.asarray(table[first] * (1 - share) + table[first + 1] * share, np.float32)
 
 
-def _contours(levels: Floats) -> NDArray[np.bool_]:
+def _mark_contours(levels: Floats) -> NDArray[np.bool_]:
     """Mark the pixels next to which a whole number is passed."""
     cells = np.floor(levels)
     marked = np.zeros(levels.shape, np.bool_)
@@ -167,12 +167,12 @@ def _contours(levels: Floats) -> NDArray[np.bool_]:
     return marked
 
 
-def _bar(height: int, reach: float, ticks: list[float], dot: int) -> Floats:
+def _draw_bar(height: int, reach: float, ticks: list[float], dot: int) -> Floats:
     """Draw the bar, its ticks and their labels."""
     left, width = 4 * dot, 7 * dot
     bar = np.full((height, left + width + 17 * dot, 3), _PAPER, np.float32)
     top, bottom = 3 * dot, height - 3 * dot
-    bar[top:bottom, left : left + width] = _colours(np.linspace(1, -1, bottom - top, dtype=np.float32))[:, np.newaxis]
+    bar[top:bottom, left : left + width] = _colour(np.linspace(1, -1, bottom - top, dtype=np.float32))[:, np.newaxis]
     # The normal size first: where there is no room for all, it is labelled.
     free = np.ones(height, np.bool_)
     for tick in sorted(ticks, key=abs):

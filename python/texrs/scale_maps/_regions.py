@@ -43,11 +43,11 @@ def weights(region: object, feather: object, size: tuple[int, ...]) -> Floats:
     """
     if region is None:
         return np.ones(size, np.float32)
-    shape = _numbers(region)
+    shape = _as_numbers(region)
     rows, columns = np.arange(size[0])[:, np.newaxis], np.arange(size[1])
     if shape is None:
         points = as_points(region, "region", 3)
-        outside = _polygon(points, size)
+        outside = _measure_polygon(points, size)
         side = float(np.ptp(points, axis=0).min())
     elif len(shape) == 4:
         top, left, bottom, right = shape
@@ -74,7 +74,7 @@ def weights(region: object, feather: object, size: tuple[int, ...]) -> Floats:
 
 def centre(region: object) -> NDArray[np.float64]:
     """Return the middle of a region."""
-    shape = _numbers(region)
+    shape = _as_numbers(region)
     if shape is None:
         points = as_points(region, "region", 3)
         return np.asarray((points.min(0) + points.max(0)) / 2)
@@ -102,7 +102,7 @@ def stroke(points: NDArray[np.float64], radius: float, size: tuple[int, ...]) ->
     return np.asarray((1 - nearest**2) ** 2, np.float32)
 
 
-def _numbers(region: object) -> list[float] | None:
+def _as_numbers(region: object) -> list[float] | None:
     """Return the numbers of a rectangle or a disc; None where there are points."""
     values: Any = region
     if isinstance(values, list | tuple | np.ndarray) and len(values) in (3, 4) and np.ndim(values[0]) == 0:
@@ -115,7 +115,7 @@ def _numbers(region: object) -> list[float] | None:
     )
 
 
-def _polygon(points: NDArray[np.float64], size: tuple[int, ...]) -> NDArray[np.float64]:
+def _measure_polygon(points: NDArray[np.float64], size: tuple[int, ...]) -> NDArray[np.float64]:
     """Return how far each pixel is outside a polygon, by the even-odd rule."""
     inside = np.zeros(size, np.bool_)
     rows, columns = np.arange(size[0])[:, np.newaxis], np.arange(size[1])

@@ -43,14 +43,14 @@ def follow(logs: Floats, trend: str, known: Bools | None = None) -> Floats:
     rows, columns = places
     # From the middle of what is known: where that is a line or a point, the surface is flat in the other direction.
     middle = float(rows.mean()), float(columns.mean())
-    basis = np.stack(_terms(rows, columns, middle, size, trend), -1)
+    basis = np.stack(_list_terms(rows, columns, middle, size, trend), -1)
     if trend == "plane":
         # Noise is that of the logarithm, so large scales have more of it.
         weights = np.exp(-values)
-        found = _robust(basis * weights[:, np.newaxis], np.ones_like(values))
+        found = _fit_robustly(basis * weights[:, np.newaxis], np.ones_like(values))
     else:
-        found = _robust(basis, values)
-    terms = _terms(np.arange(size[0])[:, np.newaxis], np.arange(size[1]), middle, size, trend)
+        found = _fit_robustly(basis, values)
+    terms = _list_terms(np.arange(size[0])[:, np.newaxis], np.arange(size[1]), middle, size, trend)
     surface: NDArray[Any] = np.zeros(size)
     for amount, term in zip(found, terms, strict=True):
         surface += amount * term
@@ -68,7 +68,7 @@ def gradient(
     rows, columns = rows[places], columns[places]
     middle, reach = (rows.mean(), columns.mean()), max(1.0, float(np.ptp(rows)), float(np.ptp(columns)))
     basis = np.stack([np.ones(len(rows)), (rows - middle[0]) / reach, (columns - middle[1]) / reach], -1)
-    found = _robust(basis, values[places].astype(np.float64))
+    found = _fit_robustly(basis, values[places].astype(np.float64))
     return float(found[1]) / reach, float(found[2]) / reach
 
 
@@ -81,7 +81,7 @@ def _thin_out(known: Bools) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return rows, columns
 
 
-def _terms(
+def _list_terms(
     rows: NDArray[np.intp], columns: NDArray[np.intp], middle: tuple[float, float], size: tuple[int, ...], trend: str
 ) -> list[NDArray[np.float64]]:
     """Return what a surface is the sum of, at the places of a lattice."""
@@ -90,7 +90,7 @@ def _terms(
     return [*terms, y * y, y * x, x * x] if trend == "quadratic" else terms
 
 
-def _robust(basis: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _fit_robustly(basis: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Fit by Huber's weights. A direction in which nothing is known stays flat."""
     weights: NDArray[Any] = np.ones_like(values)
     found = np.zeros(basis.shape[1])

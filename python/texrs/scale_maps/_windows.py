@@ -69,26 +69,26 @@ class Lattice:
             holes a window sees what is on one side alone.
 
         """
-        area = self._cells(np.ones(self.size, np.uint8) if known is None else known.view(np.uint8))
-        total = self._windows(area)
+        area = self._sum_cells(np.ones(self.size, np.uint8) if known is None else known.view(np.uint8))
+        total = self._sum_windows(area)
         enough = total >= _LEAST_AREA * (self.across * self.cell) ** 2
         if not enough.any():
             enough = total > 0
         shares = np.maximum(total, 1)
         rows, columns = (
-            at - self._windows(area * at) / shares
+            at - self._sum_windows(area * at) / shares
             for at in np.meshgrid(*(self.cell * np.arange(n, dtype=np.float64) for n in area.shape), indexing="ij")
         )
-        return self._windows(self._cells(features)) / shares, enough, rows, columns
+        return self._sum_windows(self._sum_cells(features)) / shares, enough, rows, columns
 
-    def _cells(self, values: Array) -> NDArray[np.float64]:
+    def _sum_cells(self, values: Array) -> NDArray[np.float64]:
         """Return the sums over the cells."""
         starts = [np.arange(0, n, self.cell) for n in self.size]
         # Rows first: contiguous, and what is left of them is small.
         rows = np.add.reduceat(values, starts[0], axis=0, dtype=np.int32)
         return np.add.reduceat(rows, starts[1], axis=1, dtype=np.int64).astype(np.float64)
 
-    def _windows(self, cells: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _sum_windows(self, cells: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the sums over the windows around the cells: whole numbers, so in float64 exact."""
         reach = self.across // 2
         for axis in (0, 1):

@@ -17,7 +17,7 @@ from texrs._arrays import as_image, as_list
 from texrs._typing import Array, Bools, Frames, Interpolation, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.kernels.gather import gather
-from texrs.source_map._pixels import Pixels, bands, label_pieces, number_pairs
+from texrs.source_map._pixels import Pixels, divide_bands, label_pieces, number_pairs
 
 __all__ = ["Reuse", "SourceMap"]
 
@@ -342,10 +342,10 @@ class SourceMap:
             raise InvalidInput(f"inner: needs outputs of sizes {self.shapes}, got {[m.shape for m in maps]}")
         if any(m.shapes != maps[0].shapes for m in maps):
             raise InvalidInput("inner: all maps must look into the same exemplars")
-        inners = pixels_of(maps)
+        inners = chain_pixels(maps)
         place = np.empty(self.shape, np.uint32 if inners.count < 2**32 else np.uint64)
         rest = np.zeros_like(self.coordinates)
-        for band in bands(self.shape):
+        for band in divide_bands(self.shape):
             near = np.floor(self.coordinates[band] + np.float32(0.5)).astype(np.int64)
             place[band] = inners.places(near, self.exemplar[band])
             rest[band] = self.coordinates[band] - near.astype(np.float32)
@@ -388,7 +388,7 @@ class SourceMap:
         [[[1.0, 2.0], [0.0, 0.0]]]
 
         """
-        return cls._pick(pixels_of(maps), place, label, None, None, maps[0].shapes, label if overwrite else None)
+        return cls._pick(chain_pixels(maps), place, label, None, None, maps[0].shapes, label if overwrite else None)
 
     @classmethod
     def _pick(
@@ -408,7 +408,7 @@ class SourceMap:
         label = np.empty(place.shape, np.uint32) if out is None else out
         each = inners.framed or (frame is not None and frame.ndim > 3)
         frames = np.empty((*place.shape, axes, axes), np.float32) if each else None
-        for band in bands(place.shape):
+        for band in divide_bands(place.shape):
             at = place[band]
             coordinates[band], exemplar[band] = inners.coordinates[at], inners.exemplar[at]
             if rest is not None:
@@ -568,7 +568,7 @@ class SourceMap:
             raise FileError(f"{path}: is damaged ({error})") from None
 
 
-def pixels_of(maps: Sequence[SourceMap]) -> Pixels:
+def chain_pixels(maps: Sequence[SourceMap]) -> Pixels:
     """Return the pixels of maps, one map after the other."""
     axes = maps[0].axes
     counts = [int(m.label.max()) + 1 if m.label.size else 0 for m in maps]

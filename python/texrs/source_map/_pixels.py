@@ -64,7 +64,7 @@ BAND = 1 << 18
 """Pixels that are composed at once."""
 
 
-def bands(shape: tuple[int, ...]) -> Iterator[slice]:
+def divide_bands(shape: tuple[int, ...]) -> Iterator[slice]:
     """Cut the first axis into bands, so that what is computed for each pixel needs little memory."""
     step = max(1, BAND // max(1, math.prod(shape[1:])))
     for start in range(0, shape[0], step):
@@ -114,14 +114,14 @@ def number_pairs(
 
     most = (int(outer.max()) + 1) * pixels.labels if outer.size else 0
     if most > max(1 << 22, place.size):
-        found = np.unique(np.concatenate([np.unique(pairs(band)) for band in bands(place.shape)]))
-        for band in bands(place.shape):
+        found = np.unique(np.concatenate([np.unique(pairs(band)) for band in divide_bands(place.shape)]))
+        for band in divide_bands(place.shape):
             out[band] = np.searchsorted(found, pairs(band))
         return found
     seen = np.zeros(most, bool)
-    for band in bands(place.shape):
+    for band in divide_bands(place.shape):
         seen[pairs(band)] = True
     number = (np.cumsum(seen, dtype=np.uint32) - np.uint32(1)).astype(np.uint32)
-    for band in bands(place.shape):
+    for band in divide_bands(place.shape):
         out[band] = number[pairs(band)]
     return np.flatnonzero(seen).astype(np.uint64)

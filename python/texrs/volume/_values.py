@@ -41,16 +41,16 @@ def check_field(field: object, axes: int) -> Field | None:
     return field
 
 
-def axes_of(image: Array) -> int:
+def guess_axes(image: Array) -> int:
     """Return how many axes are taken not to be channels: up to 4 along the last one of three are channels."""
     return {2: 2, 4: 3}.get(image.ndim, 2 if image.ndim == 3 and image.shape[-1] <= 4 else 3)
 
 
-def colours_of(image: ArrayLike, name: str, axes: int | None) -> Floats:
+def as_colours(image: ArrayLike, name: str, axes: int | None) -> Floats:
     """Return the colours of a picture or a volume in [0, 1], channels last."""
     if axes is None:
         with suppress(ValueError, TypeError):  # Of what is no array `as_image` tells.
-            axes = axes_of(np.asarray(image))
+            axes = guess_axes(np.asarray(image))
     count = 3 if axes is None else axes
     if count not in (2, 3):
         raise InvalidInput(f"axes: needs 2 or 3, got {axes!r}")

@@ -13,7 +13,7 @@ from texrs.errors import InvalidInput
 from texrs.fields import Field
 from texrs.source_map import SourceMap
 from texrs.volume import statistics, structure
-from texrs.volume._values import axes_of, check_field
+from texrs.volume._values import check_field, guess_axes
 from texrs.volume.reuse import CellReuse, cell_reuse
 
 __all__ = ["Comparison", "compare"]
@@ -85,7 +85,7 @@ class Comparison:
         rows = [("", "exemplar", "output", "output/exemplar")]
 
         def row(name: str, pair: tuple[float, float], form: str) -> None:
-            rows.append((name, format(pair[0], form), format(pair[1], form), f"{_ratio(pair):.2f}"))
+            rows.append((name, format(pair[0], form), format(pair[1], form), f"{_divide(pair):.2f}"))
 
         for k, (before, after) in enumerate(self.shares.T.tolist()):
             row(f"share of class {k}", (before, after), ".3f")
@@ -97,9 +97,9 @@ class Comparison:
             row(f"{d}0 % are not above", (first.deciles[d - 1], second.deciles[d - 1]), ".0f")
         row("mean frequency", self.frequency, ".4f")
         row("isolated voxels", self.isolated, ".4f")
-        rows.append(("distance of two-point correlations", "", f"{_distance(self.two_point):.3f}", ""))
-        rows.append(("distance of lineal paths", "", f"{_distance(self.lineal_path):.3f}", ""))
-        rows.append(("distance of autocorrelations", "", f"{_distance(self.autocorrelation):.3f}", ""))
+        rows.append(("distance of two-point correlations", "", f"{_measure_distance(self.two_point):.3f}", ""))
+        rows.append(("distance of lineal paths", "", f"{_measure_distance(self.lineal_path):.3f}", ""))
+        rows.append(("distance of autocorrelations", "", f"{_measure_distance(self.autocorrelation):.3f}", ""))
         rows.append(("distance of values", "", f"{self.values:.3f}", ""))
         rows.append(("change from plane to plane / median", "", f"{self.seams[0]:.2f} to {self.seams[1]:.2f}", ""))
         if self.orientation is not None:
@@ -170,7 +170,7 @@ def compare(
 
     """
     first, second = np.asarray(exemplar), np.asarray(output)
-    count = as_int(axes_of(first) if axes is None else axes, "axes", 2, 3)
+    count = as_int(guess_axes(first) if axes is None else axes, "axes", 2, 3)
     first, second = (as_image(a, n, minimum=16, axes=count) for a, n in ((first, "exemplar"), (second, "output")))
     if (first.dtype, first.shape[-1]) != (second.dtype, second.shape[-1]):
         raise InvalidInput(
@@ -180,12 +180,12 @@ def compare(
     if source is not None and (not isinstance(source, SourceMap) or source.shape != second.shape[:count]):
         raise InvalidInput(f"source: needs the source map of the output, over {second.shape[:count]}")
     if classes is None:
-        labels = _labels(first, "exemplar"), _labels(second, "output")
+        labels = _as_labels(first, "exemplar"), _as_labels(second, "output")
         kinds = int(max(a.max() for a in labels)) + 1
         pick = tuple(range(1, kinds)) if chosen is None else _choose(chosen, kinds)
         before, after = (np.asarray(a / max(kinds - 1, 1), np.float32) for a in labels)
     else:
-        first, second = _one_range(first, second)
+        first, second = _share_range(first, second)
         found = statistics.classes(first, classes, axes=count)
         labels = found.of(first, axes=count), found.of(second, axes=count)
         kinds = len(found.centres)
@@ -231,7 +231,7 @@ def _turn_normal(field: Field, shape: tuple[int, ...], normal: NDArray[np.float6
     return float(np.degrees(np.arccos(np.minimum(cosine, 1))).mean())
 
 
-def _one_range(first: Array, second: Array) -> tuple[Array, Array]:
+def _share_range(first: Array, second: Array) -> tuple[Array, Array]:
     """Bring floats to [0, 1] by the exemplar's range, where that goes beyond; integers have theirs."""
     low, high = (float(f(first)) for f in (np.min, np.max))
     if first.dtype.kind != "f" or (low >= 0 and high <= 1):
@@ -240,7 +240,7 @@ def _one_range(first: Array, second: Array) -> tuple[Array, Array]:
     return tuple(np.clip((a.astype(np.float64) - low) / (high - low), 0, 1) for a in (first, second))  # type: ignore[return-value]
 
 
-def _labels(array: Array, name: str) -> Array:
+def _as_labels(array: Array, name: str) -> Array:
     if array.shape[-1] != 1 or array.dtype.kind not in "bui" or array.min() < 0 or array.max() > 255:
         raise InvalidInput(f"{name}: labels are whole numbers from 0 to 255, without channels")
     return array[..., 0].astype(np.uint8)
@@ -253,11 +253,11 @@ def _choose(chosen: object, kinds: int) -> tuple[int, ...]:
     return tuple(as_int(k, "chosen", 0, kinds - 1) for k in several)
 
 
-def _ratio(pair: tuple[float, float]) -> float:
+def _divide(pair: tuple[float, float]) -> float:
     return pair[1] / pair[0] if pair[0] else float("nan")
 
 
-def _distance(pair: NDArray[np.float64]) -> float:
+def _measure_distance(pair: NDArray[np.float64]) -> float:
     """Return the mean absolute difference where both are known."""
     off = np.abs(pair[1] - pair[0])
     return float(off[np.isfinite(off)].mean())

@@ -55,7 +55,7 @@ def paint(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArray[np.uin
     if least < 0:
         raise InvalidInput(f"labels: must be at least 0, got {least}")
     if colours is None:
-        table = _table(min(largest + 1, _MOST_COLOURS))
+        table = _make_table(min(largest + 1, _MOST_COLOURS))
         if largest >= len(table):
             # Of very many labels some share a colour, though never that of the ground.
             array = np.where(array < len(table), array, array % (_MOST_COLOURS - 1) + 1)
@@ -123,7 +123,7 @@ def surface(
     return np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int64)
 
 
-def _table(count: int) -> Array:
+def _make_table(count: int) -> Array:
     """Return colours of hues that go round by the golden section, of three brightnesses in turn."""
     k = np.arange(count)
     hue = 6 * (k * _GOLDEN % 1)

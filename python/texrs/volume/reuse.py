@@ -83,7 +83,7 @@ def coherence(source: SourceMap, axis: int, field: Field | None = None) -> Bools
         at = np.float32(0) if along else np.float32(1)
         first = source.coordinates[i][here[1:]]
         second = source.coordinates[i + int(at)][there[1:]]
-        off = np.abs(second - first - _step(source, field, i, here[1:], along))
+        off = np.abs(second - first - _find_steps(source, field, i, here[1:], along))
         out[i] &= off.max(axis=-1) < _CLOSE
     return out
 
@@ -121,7 +121,7 @@ def cell_reuse(source: SourceMap, field: Field | None = None, *, cell: int = 8) 
     side = as_int(cell, "cell", 1, 2**20)
     joined = [coherence(source, axis, field) for axis in range(source.axes)]
     patch = label_pieces(joined, source.shape)[1]
-    use = np.concatenate([_cell_use(source, number, side) for number in range(len(source.shapes))])
+    use = np.concatenate([_count_cell_use(source, number, side) for number in range(len(source.shapes))])
     return CellReuse(
         float(sum(map(np.count_nonzero, joined)) / max(sum(j.size for j in joined), 1)),
         float(np.bincount(patch).max()) / source.label.size,
@@ -130,7 +130,7 @@ def cell_reuse(source: SourceMap, field: Field | None = None, *, cell: int = 8) 
     )
 
 
-def _cell_use(source: SourceMap, number: int, side: int) -> Floats:
+def _count_cell_use(source: SourceMap, number: int, side: int) -> Floats:
     """Return the uses of a voxel of each cell of an exemplar, on average."""
     shape = np.array(source.shapes[number])
     cells = -(-shape // side)
@@ -144,7 +144,7 @@ def _cell_use(source: SourceMap, number: int, side: int) -> Floats:
     return np.asarray(used / size.ravel(), np.float32)
 
 
-def _step(source: SourceMap, field: Field | None, i: int, here: tuple[slice, ...], along: int) -> Floats:
+def _find_steps(source: SourceMap, field: Field | None, i: int, here: tuple[slice, ...], along: int) -> Floats:
     """Return J e of the voxels of one plane."""
     if field is not None:
         if field.constant is not None:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from texrs._arrays import as_int
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
-from texrs.volume._values import as_region, colours_of, correlate, drop_first, drop_last
+from texrs.volume._values import as_colours, as_region, correlate, drop_first, drop_last
 
 __all__ = ["Classes", "Particles", "classes", "lightness", "lineal_path", "particles", "two_point"]
 
@@ -66,10 +66,10 @@ class Classes:
                [1, 1]], dtype=uint8)
 
         """
-        colours = colours_of(image, "image", axes)
+        colours = as_colours(image, "image", axes)
         if colours.shape[-1] != self.centres.shape[1]:
             raise InvalidInput(f"image: needs {self.centres.shape[1]} colour channels, got {colours.shape[-1]}")
-        return self._nearest(colours)
+        return self._find_nearest(colours)
 
     def shares(self, image: ArrayLike, *, axes: int | None = None) -> NDArray[np.float64]:
         """Return the share of each class.
@@ -103,7 +103,7 @@ class Classes:
         labels = self.of(image, axes=axes)
         return np.bincount(labels.ravel(), minlength=len(self.centres)) / labels.size
 
-    def _nearest(self, colours: Floats) -> NDArray[np.uint8]:
+    def _find_nearest(self, colours: Floats) -> NDArray[np.uint8]:
         best = np.full(colours.shape[:-1], np.inf, np.float32)
         label = np.zeros(colours.shape[:-1], np.uint8)
         for k, centre in enumerate(self.centres):
@@ -166,7 +166,7 @@ def lightness(image: ArrayLike, *, axes: int | None = None) -> Floats:
            [0.2, 0.2]], dtype=float32)
 
     """
-    return np.asarray(colours_of(image, "image", axes).mean(axis=-1, dtype=np.float32))
+    return np.asarray(as_colours(image, "image", axes).mean(axis=-1, dtype=np.float32))
 
 
 def classes(exemplar: ArrayLike, count: int = 4, *, axes: int | None = None) -> Classes:
@@ -201,7 +201,7 @@ def classes(exemplar: ArrayLike, count: int = 4, *, axes: int | None = None) -> 
 
     """
     k = as_int(count, "count", 2, 16)
-    colours = colours_of(exemplar, "exemplar", axes)
+    colours = as_colours(exemplar, "exemplar", axes)
     flat = colours.reshape(-1, colours.shape[-1])
     rng = np.random.default_rng(0)
     if len(flat) > _SAMPLE:
@@ -210,7 +210,7 @@ def classes(exemplar: ArrayLike, count: int = 4, *, axes: int | None = None) -> 
     k = min(k, len(points))
     best, least = points[:k].astype(np.float64), np.inf
     for _ in range(_RESTARTS):
-        centres, spread = _means(points, weights.astype(np.float64), k, rng)
+        centres, spread = _find_means(points, weights.astype(np.float64), k, rng)
         if spread < least * (1 - 1e-9):
             best, least = centres, spread
     return Classes(np.ascontiguousarray(best[np.argsort(best.mean(axis=1), kind="stable")], np.float32))
@@ -333,25 +333,25 @@ def particles(mask: ArrayLike, *, least: int = 8) -> Particles:
     )
 
 
-def _means(
+def _find_means(
     points: Floats, weights: NDArray[np.float64], k: int, rng: np.random.Generator
 ) -> tuple[NDArray[np.float64], float]:
     """Return k centres by Lloyd's turns, and the spread about them; starts are spread out by their distance."""
     p = points.astype(np.float64)
     centres = p[rng.choice(len(p), 1, p=weights / weights.sum())]
     while len(centres) < k:
-        far = _squared(p, centres).min(axis=1) * weights
+        far = _measure_squares(p, centres).min(axis=1) * weights
         centres = np.concatenate([centres, p[rng.choice(len(p), 1, p=far / far.sum())]])
     for _ in range(_TURNS):
-        label = _squared(p, centres).argmin(axis=1)
+        label = _measure_squares(p, centres).argmin(axis=1)
         total = np.asarray(np.bincount(label, weights, k), np.float64)
         moved = np.stack([np.asarray(np.bincount(label, weights * c, k), np.float64) for c in p.T], axis=1)
         moved = np.where(total[:, np.newaxis] > 0, moved / np.maximum(total, 1e-30)[:, np.newaxis], centres)
         if np.abs(moved - centres).max() < 1e-6:
             break
         centres = moved
-    return centres, float((_squared(p, centres).min(axis=1) * weights).sum())
+    return centres, float((_measure_squares(p, centres).min(axis=1) * weights).sum())
 
 
-def _squared(points: NDArray[np.float64], centres: NDArray[np.float64]) -> NDArray[np.float64]:
+def _measure_squares(points: NDArray[np.float64], centres: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([((points - c) ** 2).sum(axis=1) for c in centres], axis=1)

@@ -106,8 +106,8 @@ def frequency(values: ArrayLike, *, window: int | None = None, whole: bool = Fal
         raise InvalidInput(f"values: each side must be at least 16, got {v.shape}")
     side = min(64, *v.shape) if window is None else as_int(window, "window", 16, min(v.shape))
     if whole or v.ndim == 2:
-        return _mean_frequency([v], side)
-    return _mean_frequency([plane for axis in range(3) for plane in np.moveaxis(v, axis, 0)], side)
+        return _average_frequency([v], side)
+    return _average_frequency([plane for axis in range(3) for plane in np.moveaxis(v, axis, 0)], side)
 
 
 def seam_planes(values: ArrayLike, *, wrap: bool | Sequence[bool] = False) -> tuple[NDArray[np.float64], ...]:
@@ -258,7 +258,7 @@ def texture_normal(values: ArrayLike) -> NDArray[np.float64]:
     True
 
     """
-    tensor = _structure(as_values(values), 0.0)
+    tensor = _measure_structure(as_values(values), 0.0)
     vectors = np.linalg.eigh(tensor.reshape(-1, *tensor.shape[-2:]).mean(axis=0))[1]
     normal: NDArray[np.float64] = vectors[:, -1]
     return normal * (1 if normal[np.abs(normal).argmax()] > 0 else -1)
@@ -313,7 +313,7 @@ def orientation_errors(
     if n.shape != (v.ndim,) or not 1e-12 < float(np.abs(n).max()) < 1e12:
         raise InvalidInput(f"normal: needs {v.ndim} numbers, not all zero, got shape {n.shape}")
     inner = (slice(edge, -edge or None, each),) * v.ndim
-    tensor = _structure(v, 4.0)[inner]
+    tensor = _measure_structure(v, 4.0)[inner]
     out = np.empty(tensor.shape[: v.ndim], np.float32)
     for i, plane in enumerate(tensor):  # A plane at once: a dense field of a large volume is many times its size.
         found = np.linalg.eigh(plane)[1][..., -1]
@@ -328,7 +328,7 @@ def orientation_errors(
     return out
 
 
-def _structure(v: Floats, sigma: float) -> NDArray[np.float64]:
+def _measure_structure(v: Floats, sigma: float) -> NDArray[np.float64]:
     from scipy.ndimage import gaussian_filter
 
     gradients = [gaussian_filter(v, 1.0, order=[int(a == b) for b in range(v.ndim)]) for a in range(v.ndim)]
@@ -341,7 +341,7 @@ def _structure(v: Floats, sigma: float) -> NDArray[np.float64]:
     return tensor
 
 
-def _mean_frequency(arrays: list[Floats], side: int) -> float:
+def _average_frequency(arrays: list[Floats], side: int) -> float:
     """Return the mean over some arrays of the mean frequency of each; NaN where none changes at all."""
     axes = arrays[0].ndim
     weights, square = np.ones((side,) * axes, np.float32), np.zeros((side,) * axes)
@@ -357,7 +357,7 @@ def _mean_frequency(arrays: list[Floats], side: int) -> float:
     found = []
     for v in arrays:
         power = np.zeros(at.shape)
-        for start in product(*(_starts(n, side) for n in v.shape)):
+        for start in product(*(_list_starts(n, side) for n in v.shape)):
             part = v[tuple(slice(s, s + side) for s in start)]
             power += np.abs(np.fft.rfftn((part - part.mean(dtype=np.float64)) * weights)) ** 2
         power *= share
@@ -366,6 +366,6 @@ def _mean_frequency(arrays: list[Floats], side: int) -> float:
     return float(np.mean(found)) if found else float("nan")
 
 
-def _starts(length: int, side: int) -> list[int]:
+def _list_starts(length: int, side: int) -> list[int]:
     count = max(1, -(-(length - side) * 2 // side) + 1)
     return sorted({round(float(start)) for start in np.linspace(0, length - side, count)})

@@ -9,7 +9,7 @@ import numpy as np
 
 from texrs._typing import Floats
 from texrs.exemplar import Exemplar
-from texrs.exemplar.patches import index_patches, mark_corners, usual_side
+from texrs.exemplar.patches import choose_usual_side, index_patches, mark_corners
 from texrs.exemplar.segmentation import Segmentation
 from texrs.exemplar.symmetry import NONE, Flip
 from texrs.kernels.patch_search import PatchIndex
@@ -62,7 +62,7 @@ def make_plan(
     """
     if literal:
         parts, options = replace(parts, kind="none", lattice=None), replace(options, mirror=False)
-    guide, extent = exemplar.guidance, side or usual_side(min(exemplar.shape))
+    guide, extent = exemplar.guidance, side or choose_usual_side(min(exemplar.shape))
     mirrors = exemplar.mirrors if options.mirror else (NONE,)
     moves = settle_moves(exemplar, parts, options, mirrors)
     return Plan(guide, parts, choose_patches(guide, parts, mirrors, extent), mirrors, moves, extent, literal)

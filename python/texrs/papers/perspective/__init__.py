@@ -49,7 +49,7 @@ from texrs.papers.perspective.literal import average_windows
 from texrs.papers.perspective.request import Method, Request
 from texrs.papers.perspective.sizes import Outside, Sizes, bring_within, choose_sizes
 from texrs.source_map import SourceMap
-from texrs.source_map._pixels import bands
+from texrs.source_map._pixels import divide_bands
 from texrs.synthesis import Synthesis
 
 __all__ = ["perspective"]
@@ -150,7 +150,7 @@ def perspective(
     sizes = choose_sizes(asked.scale, asked.target, asked.sizes)
     wanted, outside = bring_within(asked.scale, asked.target, sizes)
     if outside.share > 0 and asked.strength > 0:
-        warnings.warn(outside.sentence(sizes), stacklevel=2)
+        warnings.warn(outside.describe(sizes), stacklevel=2)
     asked = replace(asked, target=wanted)
     atlas = make_atlas(asked, sizes)
     source, stages, levels = grow_coordinates(asked, atlas, progress)
@@ -198,7 +198,7 @@ def measure_scale_error(asked: Request, atlas: Atlas, source: SourceMap) -> floa
     """Return the median of |log S_e(S(p)) - log S_o(p)|: how well the synthesiser chose by scale."""
     sizes = np.log([c.factor for c in atlas.copies]).mean(axis=1).astype(np.float32)
     shown = source.render(asked.scale, interpolation="linear")
-    for band in bands(asked.target.shape):
+    for band in divide_bands(asked.target.shape):
         part = shown[band]
         np.log(part, out=part)
         part += sizes[source.label[band]]

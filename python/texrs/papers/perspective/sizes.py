@@ -13,7 +13,7 @@ from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.exemplar.atlas import LARGEST, SMALLEST, extend_sizes
 
-__all__ = ["Outside", "Sizes", "bring_within", "choose_sizes", "count_supply"]
+__all__ = ["Outside", "Sizes", "bring_within", "choose_sizes", "count_samples"]
 
 Sizes: TypeAlias = Literal["auto"] | bool | Sequence[float]
 
@@ -32,7 +32,7 @@ def choose_sizes(scale: Floats, target: Floats, asked: Sizes) -> tuple[float, ..
             return (1.0,)
     elif not (isinstance(asked, str) and asked == "auto"):
         return _check_sizes(asked)
-    elif count_supply(scale, target) >= PLENTY:
+    elif count_samples(scale, target) >= PLENTY:
         return (1.0,)
     return extend_sizes(FACTORS, scale, (float(target.min()), float(target.max())))
 
@@ -45,7 +45,7 @@ def _check_sizes(asked: object) -> tuple[float, ...]:
     raise InvalidInput(f"augment_scales: needs 'auto', True, False or up to 16 sizes from 1/8 to 4, got {asked!r}")
 
 
-def count_supply(scale: Floats, target: Floats) -> float:
+def count_samples(scale: Floats, target: Floats) -> float:
     """Return how many samples of about the wanted scale the exemplar has for each point, where it has the fewest."""
     mine, theirs = np.sort(np.log(scale), axis=None), np.log(target).ravel()
     bins = np.arange(theirs.min(), theirs.max() + ALIKE, ALIKE)
@@ -63,7 +63,7 @@ class Outside:
     share: float
     factor: float
 
-    def sentence(self, sizes: Sequence[float]) -> str:
+    def describe(self, sizes: Sequence[float]) -> str:
         """Return what to tell the caller."""
         way = "augment_scales='auto' would resize it" if len(sizes) == 1 else "nor have its resized copies"
         return (

@@ -90,7 +90,7 @@ class _Texture:
 
     def __getitem__(self, index: Any) -> Array:
         """Return a part: ``texture[z0:z1, y0:y1, x0:x1]``, of any integers; a single one takes its axis away."""
-        region, single = self._part(index)
+        region, single = self._as_region(index)
         self._check(region)
         image = self._show(self._world.read(region))
         return image[tuple(0 if s else slice(None) for s in single)]
@@ -124,13 +124,13 @@ class _Texture:
             The work was stopped.
 
         """
-        start = self._origin(origin)
+        start = self._as_origin(origin)
         region = Region(as_size(size, axes=self.axes), start, (False,) * self.axes)
         self._check(region)
         places = self._world.read(region, progress)
         field = self._field
         if field is not None and field.constant is None and any(start):
-            field = _Moved(field, start)
+            field = _Translated(field, start)
         coordinates = (places / np.float32(ONE)).astype(np.float32, copy=False)
         source = SourceMap.from_coordinates(coordinates, self._exemplar.shape, frame=field)
         image = self._show(places)
@@ -144,7 +144,7 @@ class _Texture:
         }
         return Synthesis(image, source, {"composite": image}, report)
 
-    def _origin(self, origin: object) -> tuple[int, ...]:
+    def _as_origin(self, origin: object) -> tuple[int, ...]:
         values = [origin] * self.axes if isinstance(origin, numbers.Integral) else origin
         if isinstance(values, Sequence | np.ndarray) and len(values) == self.axes:
             ends = [_as_end(v) for v in values]
@@ -152,7 +152,7 @@ class _Texture:
                 return tuple(int(v) for v in values)
         raise InvalidInput(f"origin: needs {self.axes} integers within {FAR}, got {origin!r}")
 
-    def _part(self, index: object) -> tuple[Region, list[bool]]:
+    def _as_region(self, index: object) -> tuple[Region, list[bool]]:
         """Read what stands between the brackets."""
         parts = index if isinstance(index, tuple) else (index,)
         if len(parts) != self.axes:
@@ -336,12 +336,12 @@ class SolidTexture(_Texture):
                     np.arange(a, min(a + TILE, n)) - (n - 1) / 2 for a, n in zip((top, left), sides, strict=True)
                 )
                 at = middle + rows[:, np.newaxis, np.newaxis] * steps[0] + columns[:, np.newaxis] * steps[1]
-                places = self._between(at.reshape(-1, 3), progress)
+                places = self._interpolate_places(at.reshape(-1, 3), progress)
                 shown = gather(image, places, interpolation=self._how)
                 out[top : top + TILE, left : left + TILE] = shown.reshape(len(rows), len(columns), *out.shape[2:])
         return out
 
-    def _between(self, at: NDArray[np.float64], progress: Progress | None) -> NDArray[np.float32]:
+    def _interpolate_places(self, at: NDArray[np.float64], progress: Progress | None) -> NDArray[np.float32]:
         """Return the places of points between voxels: S(p) + J(p) (q - p)."""
         voxel = np.floor(at + 0.5).astype(np.int64)
         found = self._world.pick(voxel, progress)
@@ -352,7 +352,7 @@ class SolidTexture(_Texture):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class _Moved(Field):
+class _Translated(Field):
     """A field as it lies over a window: seen from its first voxel."""
 
     field: Field

@@ -118,7 +118,7 @@ class World:
         high = [(o + n - 1) // side + 1 for o, n in zip(box.origin, box.shape, strict=True)]
         wanted = np.ones([b - a for a, b in zip(low, high, strict=True)], bool)
         for part, places in self.parts(low, wanted, progress, stage):
-            here, there = _overlap(box, part)
+            here, there = _intersect(box, part)
             out[here] = places[there]
         return out
 
@@ -154,16 +154,16 @@ class World:
             index = tuple(i + b for i, b in zip(at, low, strict=True))
             if (places := kept.get((stage, *index))) is not None:
                 missing[tuple(at)] = False
-                yield self._box(index, (1,) * self.axes, side), places
+                yield self._make_region(index, (1,) * self.axes, side), places
         radius = self.windows.levels[self.stages[stage].level].radius
-        boxes = list(_boxes(missing, side, self.reach(stage, radius)))
+        boxes = list(_divide_missing(missing, side, self.reach(stage, radius)))
         if len(boxes) > 1 and self.stages[stage].level:
             # What the coarsest level sees beyond each box is larger than the box.
             self._prepare(missing, low, stage, progress)
         for start, stop in boxes:
             first = [a + b for a, b in zip(start, low, strict=True)]
             counts = [b - a for a, b in zip(start, stop, strict=True)]
-            part = self._box(first, counts, side)
+            part = self._make_region(first, counts, side)
             places = self.make(part, stage, progress)
             for step in product(*(range(n) for n in counts)):
                 cell = places[tuple(slice(i * side, (i + 1) * side) for i in step)]
@@ -179,7 +179,7 @@ class World:
             region = box.grown(margin)
             places = windows.initialise(region, windows.frames(0, region), NOTHING, progress, margin=margin)
         else:
-            region, frames = self._seen(box, stage)
+            region, frames = self._find_region(box, stage)
             if here.level and here.number == 0:
                 parents = region.parents()
                 below = self.read(parents, progress, stage - 1).reshape(-1)
@@ -191,7 +191,7 @@ class World:
             ).places
         return places.reshape(*region.shape, self.axes)[box.inside(region)]
 
-    def _seen(self, box: Region, stage: int) -> tuple[Region, NDArray[np.int16]]:
+    def _find_region(self, box: Region, stage: int) -> tuple[Region, NDArray[np.int16]]:
         """Return the region that a box of a stage is made from, with its frames.
 
         How far one must look hangs on the frames in sight, so the region grows until it holds what they ask for.
@@ -211,7 +211,7 @@ class World:
         """Grow the coarsest level below all that is missing, at once."""
         at = np.argwhere(missing)
         first, last = at.min(axis=0), at.max(axis=0) + 1
-        region = self._box((first + np.array(low)).tolist(), (last - first).tolist(), self.stages[stage].side)
+        region = self._make_region((first + np.array(low)).tolist(), (last - first).tolist(), self.stages[stage].side)
         while self.stages[stage].level:
             here = self.stages[stage]
             region = region.grown(self.reach(stage, self.windows.levels[here.level].radius))
@@ -220,12 +220,12 @@ class World:
             stage -= 1
         self.read(region, progress, stage)
 
-    def _box(self, first: Sequence[int], counts: Sequence[int], side: int) -> Region:
+    def _make_region(self, first: Sequence[int], counts: Sequence[int], side: int) -> Region:
         """Return the region of some cells of the kept lattice."""
         return Region(tuple(n * side for n in counts), tuple(i * side for i in first), (False,) * self.axes)
 
 
-def _overlap(a: Region, b: Region) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
+def _intersect(a: Region, b: Region) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
     """Return what two regions have in common as slices of the one and of the other."""
     starts = [max(o, p) for o, p in zip(a.origin, b.origin, strict=True)]
     stops = [min(o + n, p + m) for o, n, p, m in zip(a.origin, a.shape, b.origin, b.shape, strict=True)]
@@ -235,13 +235,13 @@ def _overlap(a: Region, b: Region) -> tuple[tuple[slice, ...], tuple[slice, ...]
     return here, there
 
 
-def _boxes(missing: Bools, side: int, margin: int) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
+def _divide_missing(missing: Bools, side: int, margin: int) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
     """Return boxes, as first and last cells, that together hold all that is missing: few, and with little else.
 
     A box costs its points, and those of the margin around it. It is divided where two halves, each cut down to what is
     missing in it, cost less, and where it is too large to be made at once.
     """
-    found = _hull(missing)
+    found = _find_bounds(missing)
     if found is None:
         return
     start, stop = found
@@ -260,7 +260,7 @@ def _boxes(missing: Bools, side: int, margin: int) -> Iterator[tuple[tuple[int, 
             tuple(cut if a == axis else slice(start[a], stop[a]) for a in range(missing.ndim))
             for cut in (slice(start[axis], middle), slice(middle, stop[axis]))
         ]
-        total = sum(cost(_hull(missing[half])) for half in pair)
+        total = sum(cost(_find_bounds(missing[half])) for half in pair)
         if total < best or (too_large and axis == longest and halves is None):
             best, halves = total, pair
     if halves is None:
@@ -268,14 +268,14 @@ def _boxes(missing: Bools, side: int, margin: int) -> Iterator[tuple[tuple[int, 
         return
     for half in halves:
         offset = [s.start for s in half]
-        for a, b in _boxes(missing[half], side, margin):
+        for a, b in _divide_missing(missing[half], side, margin):
             yield (
                 tuple(x + o for x, o in zip(a, offset, strict=True)),
                 tuple(x + o for x, o in zip(b, offset, strict=True)),
             )
 
 
-def _hull(missing: Bools) -> tuple[tuple[int, ...], tuple[int, ...]] | None:
+def _find_bounds(missing: Bools) -> tuple[tuple[int, ...], tuple[int, ...]] | None:
     """Return the first and the last cell along each axis, one beyond it, that are missing."""
     start, stop = [], []
     for axis in range(missing.ndim):

@@ -16,7 +16,7 @@ from texrs._progress import stage
 from texrs._typing import Bools, Floats, Progress
 from texrs.elements import Elements, Layout
 from texrs.kernels.warp import from_points, mesh
-from texrs.papers.splice.deformation import Deformation, deform, deform_by_energy, removal_mask, rigid_shifts
+from texrs.papers.splice.deformation import Deformation, deform, deform_by_energy, find_rigid_shifts, mark_removed
 from texrs.papers.splice.matching import Match
 
 __all__ = ["BackwardWarp", "warp_backwards"]
@@ -61,7 +61,7 @@ def warp_backwards(
     size : (int, int)
         Rows and columns of the output.
     method : {None, "paper", "preview"}
-        As of `texrs.splice`.
+        As for `texrs.splice`.
     listed : bool
         Whether the match is an edit that only lists moved points: then what moves changes its neighbourhood alone.
     progress : callable
@@ -94,7 +94,7 @@ def _draw_mesh(
         first = (max(top - 1, 0), max(left - 1, 0))
         part = (slice(first[0], bottom + 2), slice(first[1], right + 2))
     drawn = mesh(target[part], rigid[part], void=deformation.removed[part], size=size, progress=progress)
-    place = _nearest_pixels(drawn.coordinates, rigid[part].shape) + first
+    place = _find_nearest_pixels(drawn.coordinates, rigid[part].shape) + first
     return BackwardWarp(place, drawn.covered, target, drawn.triangles, drawn.flipped, drawn.flipped_heavy)
 
 
@@ -104,20 +104,20 @@ def _draw_preview(match: Match, size: tuple[int, int]) -> BackwardWarp:
     origin = np.array(extension.origin)
     loose = from_points(match.starts - origin, match.targets, extension.mask.shape, size=size)
     target = np.moveaxis(np.indices(extension.mask.shape), 0, -1) + origin * 1.0
-    return BackwardWarp(_nearest_pixels(loose.coordinates, extension.mask.shape), loose.triangle > 0, target)
+    return BackwardWarp(_find_nearest_pixels(loose.coordinates, extension.mask.shape), loose.triangle > 0, target)
 
 
 def _draw_elements(match: Match, size: tuple[int, int]) -> BackwardWarp:
     """Draw the ground as triangles between the elements, and these whole above it."""
     extension = match.extension
     shape, origin = np.array(extension.mask.shape), np.array(extension.origin)
-    shift = rigid_shifts(match)
+    shift = find_rigid_shifts(match)
     corners = np.array([[y, x] for y in (0, shape[0] - 1) for x in (0, shape[1] - 1)], float)
     start = np.concatenate([extension.points - origin, corners])
     end = np.concatenate([extension.points + shift, corners + origin])
     loose = from_points(start, end, (int(shape[0]), int(shape[1])), size=size)
-    place = _nearest_pixels(loose.coordinates, extension.mask.shape)
-    ground = (extension.instance == 0) & ~removal_mask(extension, match.assigned)
+    place = _find_nearest_pixels(loose.coordinates, extension.mask.shape)
+    ground = (extension.instance == 0) & ~mark_removed(extension, match.assigned)
     known = (loose.triangle > 0) & ground[place[..., 0], place[..., 1]]
     moved = np.zeros((len(shift) + 1, 2), np.intp)
     moved[1:] = shift
@@ -132,7 +132,7 @@ def _draw_elements(match: Match, size: tuple[int, int]) -> BackwardWarp:
     return BackwardWarp(place, known, target)
 
 
-def _nearest_pixels(coordinates: Floats, shape: tuple[int, ...]) -> NDArray[np.intp]:
+def _find_nearest_pixels(coordinates: Floats, shape: tuple[int, ...]) -> NDArray[np.intp]:
     """Return the nearest pixels, which lie inside."""
     places = np.floor(coordinates + np.float32(0.5)).astype(np.intp)
     return np.asarray(np.clip(places, 0, np.array(shape[:2]) - 1), np.intp)

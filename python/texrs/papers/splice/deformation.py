@@ -18,7 +18,7 @@ from texrs.papers.splice.extension import Extension
 from texrs.papers.splice.interpolation import interpolate
 from texrs.papers.splice.matching import Match
 
-__all__ = ["Deformation", "deform", "deform_by_energy", "removal_mask", "rigid_shifts"]
+__all__ = ["Deformation", "deform", "deform_by_energy", "find_rigid_shifts", "mark_removed"]
 
 SHRINKAGE = 0.9
 """How far what is erased moves towards its middle."""
@@ -49,9 +49,9 @@ def deform(a: Elements, match: Match) -> Deformation:
     if a.layout != Layout.DISJOINT:
         return deform_by_energy(a, match)
     extension = match.extension
-    shift = interpolate(*_constraints(match))
+    shift = interpolate(*_list_constraints(match))
     # Ground beside what shrinks is drawn out over the place of that: a pixel of it less is a hole of many.
-    removed = removal_mask(extension, match.assigned, grown=int(extension.originals > 0))
+    removed = mark_removed(extension, match.assigned, grown=int(extension.originals > 0))
     return Deformation(_add_places(shift, extension.origin), extension.instance > 0, removed)
 
 
@@ -75,7 +75,7 @@ def _add_places(shift: NDArray[np.float64], origin: tuple[int, int]) -> NDArray[
 # --- disjoint elements -----------------------------------------------------------------------------------------------
 
 
-def _constraints(match: Match) -> tuple[Bools, NDArray[np.float32]]:
+def _list_constraints(match: Match) -> tuple[Bools, NDArray[np.float32]]:
     """Return what does not go along with the ground, and how far its pixels move, (2, H, W).
 
     Elements move whole. What is erased shrinks besides towards its middle: it then leaves a smaller hole. But where a picture
@@ -86,7 +86,7 @@ def _constraints(match: Match) -> tuple[Bools, NDArray[np.float32]]:
     number = extension.instance if still else extension.piece
     middle = extension.points if still else np.concatenate([extension.points, extension.stray_points])
     shift = np.zeros((2, len(middle) + 1), np.float32)
-    shift[:, 1:] = rigid_shifts(match, middle).T
+    shift[:, 1:] = find_rigid_shifts(match, middle).T
     # Where it is to be at once: copies of whole pictures cost more than what is computed here.
     given = np.empty((2, *number.shape), np.float32)
     for along, place in zip(shift, given, strict=True):
@@ -102,7 +102,7 @@ def _constraints(match: Match) -> tuple[Bools, NDArray[np.float32]]:
     return number > 0, given
 
 
-def rigid_shifts(match: Match, points: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+def find_rigid_shifts(match: Match, points: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
     """Return the whole pixels that every element moves by; those that go nowhere go along with the ones around them.
 
     So do further ``points`` that follow those of the extension, where some are given.
@@ -123,7 +123,7 @@ def rigid_shifts(match: Match, points: NDArray[np.float64] | None = None) -> NDA
     return shift
 
 
-def removal_mask(extension: Extension, assigned: NDArray[np.intp], grown: int = 1) -> Bools:
+def mark_removed(extension: Extension, assigned: NDArray[np.intp], grown: int = 1) -> Bools:
     """Mark what is erased: elements that go nowhere, and strays, with the pixels around them."""
     from scipy.ndimage import maximum_filter
 

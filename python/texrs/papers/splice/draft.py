@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from texrs._typing import Bools
 from texrs.elements import Elements, Layout
 from texrs.papers.splice.backward_warp import BackwardWarp
-from texrs.papers.splice.deformation import rigid_shifts
+from texrs.papers.splice.deformation import find_rigid_shifts
 from texrs.papers.splice.foreground import split_foreground
 from texrs.papers.splice.matching import Match
 from texrs.papers.splice.refine import Draft
@@ -51,7 +51,7 @@ def _label_elements(match: Match, warp: BackwardWarp, at: NDArray[np.intp]) -> t
     number = extension.instance.take(at)
     label = np.where(known, goal.take(number), 0).astype(np.uint32)
     shift = np.zeros((2, len(goal)), np.intp)
-    shift[:, 1:] = rigid_shifts(match).T
+    shift[:, 1:] = find_rigid_shifts(match).T
     rows, columns = np.ogrid[: known.shape[0], : known.shape[1]]
     here = warp.place[..., 0] + shift[0].take(number) == rows - extension.origin[0]
     here &= warp.place[..., 1] + shift[1].take(number) == columns - extension.origin[1]

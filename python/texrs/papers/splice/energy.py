@@ -18,7 +18,7 @@ from texrs._typing import Bools
 from texrs.errors import InvalidInput
 from texrs.papers.splice.factors import factorise
 
-__all__ = ["coarseness", "energy_matrix", "minimise_energy"]
+__all__ = ["choose_coarseness", "make_energy_matrix", "minimise_energy"]
 
 Points = NDArray[np.float64]
 
@@ -54,7 +54,7 @@ def minimise_energy(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upri
     """
     if not len(pins):
         raise InvalidInput("a: has no element in the picture to move")
-    whole, step = rigid.shape, coarseness(rigid.shape)
+    whole, step = rigid.shape, choose_coarseness(rigid.shape)
     if step > 1:
         rigid, pins = _downsample_mask(rigid, step), pins // step
     shape = rigid.shape
@@ -62,7 +62,7 @@ def minimise_energy(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upri
     out = np.empty((*shape, 2))
     keys = [content_hash("energy", np.packbits(rigid), shape, at, upright and axis, upright) for axis in (0, 1)]
     # Without the decoupling both axes have one matrix.
-    factors = factorise({keys[axis]: partial(energy_matrix, rigid, at, axis, upright=upright) for axis in (0, 1)})
+    factors = factorise({keys[axis]: partial(make_energy_matrix, rigid, at, axis, upright=upright) for axis in (0, 1)})
     for axis in (0, 1):
         right = np.zeros(rigid.size)
         np.add.at(right, at, GOAL * shift[:, axis])
@@ -70,7 +70,7 @@ def minimise_energy(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upri
     return out if step == 1 else _upsample(out, whole, step)
 
 
-def coarseness(shape: Sequence[int]) -> int:
+def choose_coarseness(shape: Sequence[int]) -> int:
     """Return how many pixels apart those are that a connected figure is solved for."""
     step = 1
     while math.prod(-(-n // step) for n in shape) > MOST:
@@ -95,13 +95,13 @@ def _upsample(coarse: NDArray[np.float64], shape: Sequence[int], step: int) -> N
     return coarse
 
 
-def energy_matrix(rigid: Bools, pins: NDArray[np.intp], axis: int, *, upright: bool, loose: float = LOOSE) -> Any:
+def make_energy_matrix(rigid: Bools, pins: NDArray[np.intp], axis: int, *, upright: bool, loose: float = LOOSE) -> Any:
     """Return the matrix of Eq. 5 for the displacement along an axis: lambda_G P + lambda_R (1 - U)^T w (1 - U)."""
     from scipy.sparse import dia_array
 
     coupling, small = (0.0, 1.0) if upright else (1.0, 1e-3)
     size, columns = rigid.size, rigid.shape[1]
-    u = neighbour_weights(rigid, axis, coupling, small)
+    u = weigh_neighbours(rigid, axis, coupling, small)
     u /= u.sum(axis=0)
     root = np.sqrt(RIGID * np.where(rigid, 1.0, loose))
     steps = (-columns, columns, -1, 1)
@@ -128,7 +128,7 @@ def tie_diagonals(shape: tuple[int, ...], goal: NDArray[np.float64]) -> tuple[ND
     return np.array([diagonal.ravel(), *upper, *lower]), [0, *steps, *(-s for s in steps)]
 
 
-def neighbour_weights(rigid: Bools, axis: int, coupling: float, small: float) -> NDArray[np.float64]:
+def weigh_neighbours(rigid: Bools, axis: int, coupling: float, small: float) -> NDArray[np.float64]:
     """Return u_pq of each pixel p and its neighbours q above, below, left and right; 0 where there is none.
 
     Table 1 and Figure 5 are worded for the displacement along columns; along rows the axes change places.

@@ -84,7 +84,7 @@ def extend(
     With ``whole=False`` every element of the picture itself is kept, also those that the border cuts; with ``exact`` every
     pixel is.
     """
-    layout, low, high = _bounds(entry, size, margin, exact=exact)
+    layout, low, high = _find_bounds(entry, size, margin, exact=exact)
     shape = np.array(entry.mask.shape)
     offset = (np.array(size) - shape) // 2
     first, last = low + offset, high + offset
@@ -113,7 +113,7 @@ def extend(
 @remember(256)
 def count_elements(entry: Elements, size: tuple[int, int], margin: int) -> int:
     """Count the elements that `extend` finds, without what it makes of them."""
-    layout, low, high = _bounds(entry, size, margin, exact=False)
+    layout, low, high = _find_bounds(entry, size, margin, exact=False)
     places, of, flips = layout.within(low.astype(np.float64), (high - 1).astype(np.float64))
     if entry.layout != Layout.DISJOINT:
         return len(of)
@@ -128,7 +128,7 @@ def lay_out(entry: Elements, *, beyond: bool) -> PointLayout:
     return PointLayout.of(entry.points, entry.mask.shape, entry.wrap, beyond=beyond)
 
 
-def _bounds(
+def _find_bounds(
     entry: Elements, size: tuple[int, int], margin: int, *, exact: bool
 ) -> tuple[PointLayout, NDArray[np.intp], NDArray[np.intp]]:
     """Return the layout of a texture as its pixels go on, and the first pixel and the one after the last, in its own."""
@@ -216,7 +216,7 @@ def _place_elements(
     spots, centres = _round_half_up(places), _round_half_up(parts.points)
     wanted = parts.whole[of]
     wanted[:originals] = True
-    shapes, reach = _shapes(entry, parts, np.unique(of[wanted]).tolist(), centres, width)
+    shapes, reach = _list_shapes(entry, parts, np.unique(of[wanted]).tolist(), centres, width)
     beyond = ((spots + reach[0, of] < 0) | (spots + reach[1, of] >= limits)).any(axis=1)
     beyond[:originals] = False
     number = instance.reshape(-1)
@@ -238,7 +238,7 @@ def _place_elements(
     return kept, turns
 
 
-def _shapes(
+def _list_shapes(
     entry: Elements, parts: Foreground, wanted: list[int], centres: NDArray[np.intp], width: int
 ) -> tuple[dict[int, tuple[NDArray[np.intp], NDArray[np.intp]]], NDArray[np.intp]]:
     """Return of each wanted element its pixels and how far they lie from its centre, in an array of that width.

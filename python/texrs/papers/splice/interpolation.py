@@ -24,14 +24,14 @@ ROUNDS = 2
 """Rounds in which the ground between the pixels that it is solved for is smoothed."""
 
 
-def interpolate(held: Bools, given: NDArray[np.float32]) -> NDArray[np.float64]:
+def interpolate(constrained: Bools, displacement: NDArray[np.float32]) -> NDArray[np.float64]:
     """Return the displacement of every pixel where some are constrained, and the rest goes along smoothly.
 
     Parameters
     ----------
-    held : (H, W) bool
+    constrained : (H, W) bool
         Pixels whose displacement is given: elements; elsewhere is ground.
-    given : (2, H, W) float32
+    displacement : (2, H, W) float32
         How far they move along rows and columns.
 
     Returns
@@ -39,27 +39,27 @@ def interpolate(held: Bools, given: NDArray[np.float32]) -> NDArray[np.float64]:
     (H, W, 2) float64
 
     """
-    out = np.empty((*held.shape, 2))
+    out = np.empty((*constrained.shape, 2))
     # One for all: to fetch new memory takes longer than to compute what is in it.
-    wide = np.empty((held.shape[0] + 2, held.shape[1] + 2), np.float32)
-    for axis, coarse in enumerate(_solve_laplace(held[::STEP, ::STEP], given[:, ::STEP, ::STEP])):
-        field = _upsample(coarse, held.shape)
-        np.copyto(field, given[axis], where=held)
+    wide = np.empty((constrained.shape[0] + 2, constrained.shape[1] + 2), np.float32)
+    for axis, coarse in enumerate(_solve_laplace(constrained[::STEP, ::STEP], displacement[:, ::STEP, ::STEP])):
+        field = _upsample(coarse, constrained.shape)
+        np.copyto(field, displacement[axis], where=constrained)
         for _ in range(ROUNDS):
             _smooth(field, wide)
-            np.copyto(field, given[axis], where=held)
+            np.copyto(field, displacement[axis], where=constrained)
         out[..., axis] = field
     return out
 
 
-def _solve_laplace(held: Bools, given: NDArray[np.float32]) -> NDArray[np.float64]:
+def _solve_laplace(constrained: Bools, displacement: NDArray[np.float32]) -> NDArray[np.float64]:
     """Return the displacement that is at each pixel of the ground the mean of those beside it."""
-    shape, free = held.shape, ~held
-    out = np.where(held, given, 0.0).astype(np.float64)
+    shape, free = constrained.shape, ~constrained
+    out = np.where(constrained, displacement, 0.0).astype(np.float64)
     if not free.any():
         return out
     key = content_hash("interpolate", np.packbits(free), shape)
-    solver = factorise({key: lambda: _laplacian(free)})[key]
+    solver = factorise({key: lambda: _make_laplacian(free)})[key]
     flow = np.zeros((2, *shape))
     # What an element's pixel hands to the ground beside it; the ground itself has nothing yet.
     flow[:, :-1] += out[:, 1:]
@@ -97,7 +97,7 @@ def _smooth(field: NDArray[np.float32], wide: NDArray[np.float32]) -> None:
     field *= 0.25
 
 
-def _laplacian(free: Bools) -> Any:
+def _make_laplacian(free: Bools) -> Any:
     """Return the sparse matrix of the Laplace equation at the free pixels, the others being given."""
     from scipy.sparse import coo_array
 

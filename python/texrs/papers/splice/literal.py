@@ -39,7 +39,7 @@ def match_literally(a: Elements, b: Elements, size: tuple[int, int], *, align: b
     count = extension.originals
     extension = replace(extension, points=extension.points[:count], element=extension.element[:count])
     mine, theirs = extension.points, b.points
-    scale = _mean_distance(mine) / _mean_distance(theirs)
+    scale = _measure_mean_distance(mine) / _measure_mean_distance(theirs)
     best: Match | None = None
     for angle in find_turns(a, b) if align else [0.0]:
         turn = math.radians(angle)
@@ -54,7 +54,7 @@ def match_literally(a: Elements, b: Elements, size: tuple[int, int], *, align: b
     return best
 
 
-def _mean_distance(points: Points) -> float:
+def _measure_mean_distance(points: Points) -> float:
     count = min(NEIGHBOURS, len(points) - 1)
     if count < 1:
         raise InvalidInput("a: has too few elements for a layout")

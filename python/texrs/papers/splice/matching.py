@@ -22,7 +22,7 @@ from texrs.papers.splice.entry import remember
 from texrs.papers.splice.extension import Extension, count_elements, extend, lay_out
 from texrs.papers.splice.foreground import split_foreground
 
-__all__ = ["Match", "element_points", "find_turns", "match_edit", "match_layouts"]
+__all__ = ["Match", "find_turns", "list_element_points", "match_edit", "match_layouts"]
 
 Points = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ TURN = 0.75
 """A turn must cost so much less than a smaller one: lattices have several that cost nearly the same."""
 OFFSETS, NEARER = 6, 0.9
 """Offsets of a connected figure's layout that are tried along each axis, and how much less one must cost."""
-ROOM = 1.08
+CLEARANCE = 1.08
 """Least distance of elements in their diameters."""
 
 
@@ -91,7 +91,7 @@ class Match:
         }
 
 
-def element_points(entry: Elements) -> Points:
+def list_element_points(entry: Elements) -> Points:
     """Return the elements that may be moved: also foreground that none was found for, where elements are disjoint."""
     disjoint = entry.layout == Layout.DISJOINT
     return split_foreground(entry).points if disjoint else entry.points
@@ -103,7 +103,7 @@ def match_layouts(a: Elements, b: Elements, size: tuple[int, int], *, align: boo
     layout = lay_out(b, beyond=True)
     scale, gain, disjoint = unit / layout.scale, 1.0, a.layout == Layout.DISJOINT
     if disjoint:
-        gain = _room_gain(a, scale * nearest_distances(layout.points, 1)[:, 0])
+        gain = _measure_gain(a, scale * nearest_distances(layout.points, 1)[:, 0])
     beyond = BEYOND * unit
     turns = find_turns(a, b) if align else [0.0]
     asked = [_place_targets(layout, scale * gain, angle, size, beyond) for angle in turns]
@@ -147,7 +147,7 @@ def find_directions(entry: Elements) -> tuple[float, ...]:
     return directions(entry.points)
 
 
-def _room_gain(a: Elements, distances: Points) -> float:
+def _measure_gain(a: Elements, distances: Points) -> float:
     """Return what a layout must grow by so that disjoint elements have room; ``distances``: to the nearest, at A's spacing."""
     parts = split_foreground(a)
     area = np.bincount(parts.core.ravel(), minlength=len(parts.points) + 1)[1:][parts.whole]
@@ -155,7 +155,7 @@ def _room_gain(a: Elements, distances: Points) -> float:
         return 1.0
     # Not the largest and the nearest: the few that still collide are pushed apart, and the rest stay dense.
     diameter = 2 * math.sqrt(float(np.percentile(area, 75)) / math.pi)
-    return max(1.0, ROOM * diameter / max(float(np.percentile(distances, 25)), 1e-9))
+    return max(1.0, CLEARANCE * diameter / max(float(np.percentile(distances, 25)), 1e-9))
 
 
 def _place_targets(
@@ -200,7 +200,7 @@ def _extend_until(a: Elements, size: tuple[int, int], unit: float, needed: float
 
 def match_edit(a: Elements, steps: Sequence[Step]) -> tuple[Match, bool]:
     """Match a texture with its own layout, edited; also tell whether the edit only lists moved points."""
-    points = element_points(a)
+    points = list_element_points(a)
     trial = apply_steps(points, len(points), steps, len(a.points))
     shrink = math.prod(min(1.0, float(np.min(s.get("factor", 1.0)))) for s in steps if s["op"] == "scale")
     far = float(np.abs(trial.points - points).max()) / shrink

@@ -30,10 +30,10 @@ class Stages(Mapping[str, Array]):
     ) -> None:
         extension = match.extension
         origin = np.array(extension.origin)
-        shown = picture(a.image)
+        shown = to_picture(a.image)
         self._draw: dict[str, Callable[[], Array]] = {"points of a": lambda: mark_points(shown, a.points, RED)}
         if b is not None:
-            self._draw["points of b"] = lambda: mark_points(picture(b.image), b.points, BLUE)
+            self._draw["points of b"] = lambda: mark_points(to_picture(b.image), b.points, BLUE)
         self._draw |= {
             "mask": lambda: dim_ground(shown, a.mask),
             "matching": lambda: draw_lines(
@@ -61,7 +61,7 @@ class Stages(Mapping[str, Array]):
         return len(self._draw)
 
 
-def picture(image: Array) -> Picture:
+def to_picture(image: Array) -> Picture:
     """Return 8-bit RGB of anything."""
     return np.rint(as_rgb(to_unit(as_image(image))) * 255).astype(np.uint8)
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from texrs._typing import Bools
 from texrs.elements import Elements, Layout
 from texrs.papers.splice.backward_warp import BackwardWarp
-from texrs.papers.splice.energy import coarseness
+from texrs.papers.splice.energy import choose_coarseness
 from texrs.papers.splice.interpolation import STEP
-from texrs.papers.splice.matching import Match, element_points
+from texrs.papers.splice.matching import Match, list_element_points
 from texrs.papers.splice.pictures import Stages
 from texrs.papers.splice.refine import Draft
 from texrs.source_map import SourceMap
@@ -37,10 +37,10 @@ def compose(
     """Return the result of a splice from what its stages made."""
     shape = (a.mask.shape[0], a.mask.shape[1])
     size = label.shape
-    frames = _frames(filled.mirrored)
+    frames = _make_frames(filled.mirrored)
     source = SourceMap.from_coordinates(places.astype(np.float32), shape, label=label, frame=frames)
     image = source.render(a.image, interpolation="nearest")
-    step = STEP if a.layout == Layout.DISJOINT else coarseness(match.extension.mask.shape)
+    step = STEP if a.layout == Layout.DISJOINT else choose_coarseness(match.extension.mask.shape)
     report: dict[str, Any] = {
         "method": method or "default",
         "seed": seed,
@@ -57,7 +57,7 @@ def compose(
     return Synthesis(image, source, Stages(a, b, match, warp.target, draft, filled, image), report)
 
 
-def _frames(mirrored: Bools) -> NDArray[np.float32] | None:
+def _make_frames(mirrored: Bools) -> NDArray[np.float32] | None:
     """Return the Jacobians of pixels, some of which show the texture mirrored; none where none does."""
     if not mirrored.any():
         return None
@@ -69,7 +69,7 @@ def _frames(mirrored: Bools) -> NDArray[np.float32] | None:
 
 def _list_matches(a: Elements, match: Match) -> list[dict[str, Any]]:
     """Return which element goes where, in JSON types."""
-    points = element_points(a)
+    points = list_element_points(a)
     return [
         {
             "target": [round(float(v), 3) for v in goal],
