@@ -45,7 +45,7 @@ mod engine;
 mod foundation;
 mod kernels;
 
-pub use engine::{appearance, blocks, coherence, guide, optimize, pyramid};
+pub use engine::{appearance, blocks, coherence, guide, optimize, pyramid, stitcher};
 pub use foundation::error::{Error, Result};
 pub use foundation::{error, fixed, grid, hash, par, pca};
 pub use kernels::{

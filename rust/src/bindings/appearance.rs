@@ -52,7 +52,7 @@ type PartsOut<'py> = (
     i32,
 );
 
-fn fixed<T: Copy, const D: usize>(argument: &'static str, values: &[T]) -> Result<[T; D]> {
+pub(super) fn fixed<T: Copy, const D: usize>(argument: &'static str, values: &[T]) -> Result<[T; D]> {
     values.try_into().map_err(|_| Error::Shape {
         argument,
         expected: vec![D],
@@ -76,22 +76,22 @@ pub(super) fn frames<const D: usize>(values: &[i16]) -> Result<Frames<'_, D>> {
 }
 
 /// Values of the exemplar's samples and of the output's points, weights, and samples by value.
-type GuideIn<'py> = (
+pub(super) type GuideIn<'py> = (
     PyReadonlyArray1<'py, i16>,
     PyReadonlyArray1<'py, i16>,
     PyReadonlyArray1<'py, u16>,
     PyReadonlyArray1<'py, u32>,
 );
-type GuideSlices<'a> = Option<(&'a [i16], &'a [i16], &'a [u16], &'a [u32])>;
+pub(super) type GuideSlices<'a> = Option<(&'a [i16], &'a [i16], &'a [u16], &'a [u32])>;
 
-fn slices<'a>(guide: &'a Option<GuideIn<'_>>) -> PyResult<GuideSlices<'a>> {
+pub(super) fn slices<'a>(guide: &'a Option<GuideIn<'_>>) -> PyResult<GuideSlices<'a>> {
     Ok(match guide {
         Some((a, b, c, d)) => Some((a.as_slice()?, b.as_slice()?, c.as_slice()?, d.as_slice()?)),
         None => None,
     })
 }
 
-fn guide<'a>(arrays: GuideSlices<'a>, samples: usize, points: usize) -> Result<Option<Guide<'a>>> {
+pub(super) fn guide<'a>(arrays: GuideSlices<'a>, samples: usize, points: usize) -> Result<Option<Guide<'a>>> {
     arrays
         .map(|(a, b, c, d)| Guide::new(grouped("guide", a)?, b, c, samples, points)?.ordered(d))
         .transpose()

@@ -13,6 +13,7 @@ mod patch_search;
 mod poisson;
 mod seam;
 mod sparse;
+mod stitcher;
 mod warp;
 
 use std::cell::Cell;
@@ -120,6 +121,8 @@ mod _rust {
     use super::set_threads;
     #[pymodule_export]
     use super::sparse::Cholesky;
+    #[pymodule_export]
+    use super::stitcher::Stitcher;
     #[pymodule_export]
     use super::warp::{warp_mesh, warp_points};
 

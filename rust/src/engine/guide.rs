@@ -121,13 +121,20 @@ impl<'a> Guide<'a> {
         self.weight(point) > 0
     }
 
+    /// The values of a sample.
+    pub(crate) fn value(&self, sample: usize) -> Colour {
+        self.exemplar[sample]
+    }
+
+    /// What a squared difference of one costs at a point, in 1 / 256.
     #[inline(always)]
-    fn weight(&self, point: usize) -> u16 {
+    pub(crate) fn weight(&self, point: usize) -> u16 {
         self.weight[point.min(self.weight.len() - 1)]
     }
 
+    /// The values that are wanted at a point.
     #[inline(always)]
-    fn wanted(&self, point: usize) -> Colour {
+    pub(crate) fn wanted(&self, point: usize) -> Colour {
         match self.output {
             Wanted::All(values) => values[point],
             Wanted::First(values) => [values[point], 0, 0, 0],

@@ -22,7 +22,7 @@ use crate::foundation::grid::Grid;
 
 /// Calls `f(p, q)` for each point `p` that has a next point `q` along an axis, in row-major order.
 #[inline(always)]
-fn links<const D: usize>(grid: &Grid<D>, axis: usize, mut f: impl FnMut(usize, usize)) {
+pub(crate) fn links<const D: usize>(grid: &Grid<D>, axis: usize, mut f: impl FnMut(usize, usize)) {
     let (stride, length) = (grid.strides()[axis], grid.shape()[axis]);
     for block in (0..grid.len()).step_by(stride * length) {
         for i in 0..length {

@@ -1,12 +1,16 @@
-//! Fourier transforms: of lines of complex numbers, and of images of real ones. The only file that names the FFT crates.
+//! Fourier transforms: of lines of complex numbers, and of images and volumes of real ones. The only folder that names the
+//! FFT crates.
 //!
 //! None is normalised: there and back multiplies by the number of points.
+
+mod volumes;
 
 use std::sync::Arc;
 
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 pub(crate) use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftNum, FftPlanner};
+pub(crate) use volumes::Volumes;
 
 /// Rows of an image that are transposed at a time.
 const GROUP: usize = 8;

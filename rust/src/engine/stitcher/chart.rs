@@ -1,0 +1,385 @@
+//! A chart: the map of one patch from the output into the exemplar, up to the place of its centre.
+
+use super::canvas::{Canvas, Window};
+use crate::foundation::fixed::{Frame, Frames, ONE, Place, apply, inverse};
+use crate::foundation::grid::Grid;
+
+/// Nodes of the coarse lattice along an axis that a bent chart is integrated on.
+const NODES: usize = 16;
+/// Most steps of the conjugate gradients; as good as solved long before.
+const STEPS: usize = 60;
+/// Shares of a bent patch's side that are tried where the field bends much.
+const SHRINK: [f32; 4] = [1.0, 0.8, 0.65, 0.5];
+/// How much of the frame of the centre may be lost in the inner part of a bent patch.
+const ADAPT: f32 = 0.7;
+/// Beyond this a point of a bent patch is left to others.
+const TORN: f32 = 0.45;
+/// Where a field has a pole, patches are so many times smaller, and rigid.
+const POLE: f32 = 1.75;
+
+/// The map of a patch: where its points look, relative to where its centre does.
+pub(super) struct Chart<const D: usize> {
+    pub window: Window<D>,
+    /// Of each point of the window.
+    pub steps: Vec<Place<D>>,
+    /// Whether a point of the window is in the patch; never those of the window's border.
+    pub mask: Vec<bool>,
+    /// How far the chart is from the field at each point; empty where there is one frame for all.
+    pub distortion: Vec<f32>,
+    /// The Jacobian at the centre.
+    pub frame: Frame<D>,
+    /// Whether the chart is the frame of the centre alone.
+    pub rigid: bool,
+}
+
+impl<const D: usize> Chart<D> {
+    /// The chart of a patch of `side` samples of the exemplar around a point, bent with the field or rigid.
+    pub fn new(canvas: &Canvas<D>, frames: Frames<'_, D>, centre: [i32; D], side: f32, bend: bool) -> Option<Self> {
+        let here: [usize; D] = std::array::from_fn(|a| canvas.grid.resolve(a, centre[a] as isize));
+        let frame = frames.at(canvas.grid.index(here));
+        let mut side = side;
+        let varies = matches!(frames, Frames::Dense(_));
+        if bend && varies {
+            let mut shares = SHRINK.iter();
+            let fits = |share: f32| {
+                let chart = Self::rigid(canvas, frames, frame, centre, 0.6 * share * side);
+                chart.is_some_and(|c| mean(&c.distortion, &c.mask) < ADAPT)
+            };
+            side *= *shares.find(|&&s| fits(s)).unwrap_or(&SHRINK[3]);
+            let bent = Self::bent(canvas, frames, frame, centre, side);
+            if bent.as_ref().is_some_and(|c| c.has(centre)) {
+                return bent;
+            }
+            side /= POLE;
+        }
+        Self::rigid(canvas, frames, frame, centre, side)
+    }
+
+    /// The box around a centre that holds a patch, and one point more on each side.
+    fn window(canvas: &Canvas<D>, frame: &Frame<D>, centre: [i32; D], side: f32, more: f32) -> Option<Window<D>> {
+        let back = inverse(frame);
+        let (mut low, mut high) = ([0; D], [0; D]);
+        for axis in 0..D {
+            let reach: i64 = back[axis].iter().map(|&x| i64::from(x.abs())).sum();
+            let half = (side * 0.5 * reach as f32 / ONE as f32 * more).ceil() as i32 + 1;
+            // A patch must not meet itself around a cyclic axis.
+            let most = canvas.grid.shape()[axis] as i32;
+            let half = if canvas.grid.wrap()[axis] { half.min((most - 1) / 2) } else { half.min(1 << 20) };
+            low[axis] = centre[axis] - half;
+            high[axis] = centre[axis] + half + 1;
+        }
+        canvas.window(low, high)
+    }
+
+    /// A chart of one frame.
+    pub fn rigid(
+        canvas: &Canvas<D>,
+        frames: Frames<'_, D>,
+        frame: Frame<D>,
+        centre: [i32; D],
+        side: f32,
+    ) -> Option<Self> {
+        let window = Self::window(canvas, &frame, centre, side, 1.0)?;
+        Some(Self::affine(window, canvas, frames, frame, centre, Some(side)))
+    }
+
+    /// A chart of one frame over a given window: of a patch's side, or of all of it.
+    pub fn affine(
+        window: Window<D>,
+        canvas: &Canvas<D>,
+        frames: Frames<'_, D>,
+        frame: Frame<D>,
+        centre: [i32; D],
+        side: Option<f32>,
+    ) -> Self {
+        let n = window.grid.len();
+        let mut steps = Vec::with_capacity(n);
+        for i in 0..n {
+            let at = window.at(window.grid.point(i));
+            steps.push(apply(&frame, std::array::from_fn(|a| at[a] - centre[a])));
+        }
+        let mut chart = Self {
+            mask: Vec::new(),
+            distortion: Vec::new(),
+            window,
+            steps,
+            frame,
+            rigid: true,
+        };
+        if let Frames::Dense(all) = frames {
+            chart.distortion = chart.window.points.iter().map(|&p| difference(&frame, &all[p as usize])).collect();
+        }
+        chart.mask = chart.inside(canvas, side);
+        chart
+    }
+
+    /// A chart integrated from the field: the map whose derivatives are nearest to the frames.
+    fn bent(canvas: &Canvas<D>, frames: Frames<'_, D>, frame: Frame<D>, centre: [i32; D], side: f32) -> Option<Self> {
+        let Frames::Dense(all) = frames else { return None };
+        let window = Self::window(canvas, &frame, centre, side, 1.2)?;
+        let mesh = Mesh::new(&window, all);
+        let potentials: Vec<Vec<f64>> = (0..D).map(|i| mesh.integrate(i)).collect();
+        let at = |p: [f64; D]| -> [f64; D] { std::array::from_fn(|i| mesh.at(&potentials[i], p)) };
+        let middle = at(std::array::from_fn(|a| f64::from(centre[a] - window.low[a])));
+        let n = window.grid.len();
+        let mut steps = Vec::with_capacity(n);
+        for i in 0..n {
+            let value = at(window.grid.point(i).map(|x| x as f64));
+            let step: Place<D> = std::array::from_fn(|a| ((value[a] - middle[a]) * f64::from(ONE)).round() as i32);
+            steps.push(step);
+        }
+        let mut chart = Self {
+            mask: Vec::new(),
+            distortion: vec![0.0; n],
+            window,
+            steps,
+            frame,
+            rigid: false,
+        };
+        chart.measure(all);
+        chart.mask = chart.inside(canvas, Some(side));
+        for (mask, &d) in chart.mask.iter_mut().zip(&chart.distortion) {
+            *mask &= d < TORN;
+        }
+        chart.keep_connected(centre);
+        Some(chart)
+    }
+
+    /// How far the chart's derivatives are from the frames.
+    fn measure(&mut self, frames: &[Frame<D>]) {
+        let (grid, strides) = (self.window.grid, self.window.grid.strides());
+        for i in 0..grid.len() {
+            let point = grid.point(i);
+            let mut slope = frames[self.window.points[i] as usize];
+            for axis in 0..D {
+                if grid.shape()[axis] < 2 {
+                    continue;
+                }
+                let p = if point[axis] + 1 < grid.shape()[axis] { i } else { i - strides[axis] };
+                let (a, b) = (self.steps[p], self.steps[p + strides[axis]]);
+                for row in 0..D {
+                    slope[row][axis] = (b[row] - a[row]).clamp(-32000, 32000) as i16;
+                }
+            }
+            self.distortion[i] = difference(&slope, &frames[self.window.points[i] as usize]);
+        }
+    }
+
+    /// The points within half a side of the centre along each axis of the exemplar, but for the window's border where
+    /// the canvas goes on.
+    fn inside(&self, canvas: &Canvas<D>, side: Option<f32>) -> Vec<bool> {
+        let half = side.map_or(i32::MAX, |s| ((s * 0.5 - 0.01) * ONE as f32) as i32);
+        let grid = &self.window.grid;
+        (0..grid.len())
+            .map(|i| {
+                let (point, at) = (grid.point(i), self.window.at(grid.point(i)));
+                let border = (0..D).any(|a| {
+                    let (n, open) = (canvas.grid.shape()[a] as i32, !canvas.grid.wrap()[a]);
+                    (point[a] == 0 && !(open && at[a] == 0))
+                        || (point[a] + 1 == grid.shape()[a] && !(open && at[a] + 1 == n))
+                });
+                !border && self.steps[i].iter().all(|x| x.abs() <= half)
+            })
+            .collect()
+    }
+
+    /// Whether a point of the canvas is in the patch.
+    fn has(&self, centre: [i32; D]) -> bool {
+        self.index(centre).is_some_and(|i| self.mask[i])
+    }
+
+    fn index(&self, at: [i32; D]) -> Option<usize> {
+        let mut point = [0; D];
+        for axis in 0..D {
+            let i = at[axis] - self.window.low[axis];
+            if i < 0 || i as usize >= self.window.grid.shape()[axis] {
+                return None;
+            }
+            point[axis] = i as usize;
+        }
+        Some(self.window.grid.index(point))
+    }
+
+    /// Leaves only what hangs together with the centre.
+    fn keep_connected(&mut self, centre: [i32; D]) {
+        let Some(start) = self.index(centre).filter(|&i| self.mask[i]) else {
+            self.mask.fill(false);
+            return;
+        };
+        let connected = flood(&self.window.grid, &self.mask, &[start]);
+        self.mask = connected;
+    }
+}
+
+/// The points of a mask that hang together with some of it.
+pub(super) fn flood<const D: usize>(grid: &Grid<D>, mask: &[bool], from: &[usize]) -> Vec<bool> {
+    let mut reached = vec![false; mask.len()];
+    let mut open = Vec::new();
+    for &i in from {
+        if mask[i] && !reached[i] {
+            reached[i] = true;
+            open.push(i);
+        }
+    }
+    let strides = grid.strides();
+    while let Some(i) = open.pop() {
+        let point = grid.point(i);
+        for axis in 0..D {
+            let mut visit = |j: usize| {
+                if mask[j] && !reached[j] {
+                    reached[j] = true;
+                    open.push(j);
+                }
+            };
+            if point[axis] > 0 {
+                visit(i - strides[axis]);
+            }
+            if point[axis] + 1 < grid.shape()[axis] {
+                visit(i + strides[axis]);
+            }
+        }
+    }
+    reached
+}
+
+/// Root mean square, over the axes, of the difference of two frames.
+fn difference<const D: usize>(a: &Frame<D>, b: &Frame<D>) -> f32 {
+    let mut sum = 0.0;
+    for i in 0..D {
+        for j in 0..D {
+            let d = f32::from(a[i][j]) - f32::from(b[i][j]);
+            sum += d * d;
+        }
+    }
+    (sum / D as f32).sqrt() / ONE as f32
+}
+
+/// Mean of the values in a mask; 0 for none.
+fn mean(values: &[f32], mask: &[bool]) -> f32 {
+    let (mut sum, mut count) = (0.0f64, 0.0);
+    for (&v, _) in values.iter().zip(mask).filter(|(_, m)| **m) {
+        sum += f64::from(v);
+        count += 1.0;
+    }
+    if count > 0.0 { (sum / count) as f32 } else { 0.0 }
+}
+
+/// A coarse lattice over a window, with the frames at its nodes.
+struct Mesh<const D: usize> {
+    grid: Grid<D>,
+    spacing: [f64; D],
+    frames: Vec<Frame<D>>,
+}
+
+impl<const D: usize> Mesh<D> {
+    fn new(window: &Window<D>, frames: &[Frame<D>]) -> Self {
+        let shape = window.grid.shape();
+        let nodes = shape.map(|n| n.min(NODES + 1).max(1));
+        let spacing = std::array::from_fn(|a| (shape[a] - 1) as f64 / (nodes[a].max(2) - 1) as f64);
+        // Never empty, as the window is not.
+        let grid = Grid::new(nodes, [false; D]).unwrap_or(window.grid);
+        let mut at = Vec::with_capacity(grid.len());
+        for i in 0..grid.len() {
+            let node = grid.point(i);
+            let near: [usize; D] = std::array::from_fn(|a| (node[a] as f64 * spacing[a]).round() as usize);
+            at.push(frames[window.points[window.grid.index(near)] as usize]);
+        }
+        Self { grid, spacing, frames: at }
+    }
+
+    /// The potential of one row of the frames, by least squares: conjugate gradients on the normal equations.
+    fn integrate(&self, row: usize) -> Vec<f64> {
+        let (n, strides) = (self.grid.len(), self.grid.strides());
+        let edges = |f: &mut dyn FnMut(usize, usize, usize)| {
+            for i in 0..n {
+                let point = self.grid.point(i);
+                for axis in 0..D {
+                    if point[axis] + 1 < self.grid.shape()[axis] {
+                        f(axis, i, i + strides[axis]);
+                    }
+                }
+            }
+        };
+        let slope = |axis: usize, i: usize, j: usize| {
+            let both = f64::from(self.frames[i][row][axis]) + f64::from(self.frames[j][row][axis]);
+            both * 0.5 / f64::from(ONE) * self.spacing[axis]
+        };
+        let weight = |axis: usize| 1.0 / (self.spacing[axis] * self.spacing[axis]).max(1e-9);
+        let apply = |x: &[f64], out: &mut [f64]| {
+            out.fill(0.0);
+            edges(&mut |axis, i, j| {
+                let d = (x[j] - x[i]) * weight(axis);
+                out[j] += d;
+                out[i] -= d;
+            });
+        };
+        // From the frame in the middle, which is most of it.
+        let middle = &self.frames[self.grid.index(self.grid.shape().map(|s| s / 2))][row];
+        let mut x: Vec<f64> = (0..n)
+            .map(|i| {
+                let p = self.grid.point(i);
+                (0..D).map(|a| f64::from(middle[a]) / f64::from(ONE) * p[a] as f64 * self.spacing[a]).sum()
+            })
+            .collect();
+        let (mut residual, mut image) = (vec![0.0; n], vec![0.0; n]);
+        apply(&x, &mut image);
+        edges(&mut |axis, i, j| {
+            let d = slope(axis, i, j) * weight(axis);
+            residual[j] += d;
+            residual[i] -= d;
+        });
+        residual.iter_mut().zip(&image).for_each(|(r, a)| *r -= a);
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+        let mut direction = residual.clone();
+        let mut norm = dot(&residual, &residual);
+        for _ in 0..STEPS {
+            if norm < 1e-8 {
+                break;
+            }
+            apply(&direction, &mut image);
+            let length = norm / dot(&direction, &image).max(1e-300);
+            for i in 0..n {
+                x[i] += length * direction[i];
+                residual[i] -= length * image[i];
+            }
+            let new = dot(&residual, &residual);
+            let keep = new / norm;
+            norm = new;
+            for i in 0..n {
+                direction[i] = residual[i] + keep * direction[i];
+            }
+        }
+        x
+    }
+
+    /// A potential at a point of the window, between its nodes.
+    fn at(&self, potential: &[f64], point: [f64; D]) -> f64 {
+        let shape = self.grid.shape();
+        let (mut first, mut part) = ([0; D], [0.0; D]);
+        for axis in 0..D {
+            if shape[axis] < 2 {
+                continue;
+            }
+            let x = point[axis] / self.spacing[axis].max(1e-9);
+            first[axis] = (x as usize).min(shape[axis] - 2);
+            part[axis] = x - first[axis] as f64;
+        }
+        let mut sum = 0.0;
+        for corner in 0..1usize << D {
+            let (mut node, mut w) = (first, 1.0);
+            for axis in 0..D {
+                let side = corner >> axis & 1;
+                if shape[axis] < 2 {
+                    w *= (1 - side) as f64;
+                } else {
+                    node[axis] += side;
+                    w *= if side == 1 { part[axis] } else { 1.0 - part[axis] };
+                }
+            }
+            if w != 0.0 {
+                sum += w * potential[self.grid.index(node)];
+            }
+        }
+        sum
+    }
+}

@@ -1,0 +1,335 @@
+//! Healing: elements that are torn are grown whole, or given up to what is around them.
+//!
+//! What a patch shows of one element of the exemplar is an instance. It pays for what it lacks, or for what there is of
+//! it where that is less: a whole element and none are free. Moves are cuts in small windows, kept if the sum of seams
+//! and instances falls.
+
+use std::collections::HashMap;
+
+use super::canvas::{Canvas, FREE, HELD, Window};
+use super::chart::{Chart, flood};
+use super::cut::{Cutting, Proposal};
+use super::{Patch, Stitching};
+use crate::Result;
+use crate::foundation::fixed::{Frames, Place};
+use crate::foundation::grid::Grid;
+use crate::foundation::par;
+use crate::kernels::seam::links;
+
+/// What a missing point of an instance costs.
+const LACK: f64 = 0.3;
+/// Rounds over all instances.
+const ROUNDS: usize = 2;
+/// An instance with more of its points is whole.
+const WHOLE: f64 = 0.97;
+/// One with fewer is not grown, and one with more is not given up.
+const GROW: f64 = 0.35;
+const DROP: f64 = 0.7;
+/// Neighbours that an instance may be given up to.
+const NEIGHBOURS: usize = 4;
+
+/// A patch and an element of the exemplar.
+type Key = (u32, u32);
+
+/// The points that show one element through one patch.
+struct Instance<const D: usize> {
+    key: Key,
+    /// One of its points, and how far the others lie from it.
+    anchor: [usize; D],
+    low: [i32; D],
+    high: [i32; D],
+}
+
+/// A change of the canvas that makes it better.
+struct Move<const D: usize> {
+    gain: f64,
+    patch: u32,
+    chart: Chart<D>,
+    cutting: Cutting<D>,
+    proposal: Vec<Place<D>>,
+    counts: Vec<(Key, i64)>,
+}
+
+impl<const D: usize> Stitching<'_, D> {
+    /// Heals torn elements; returns how many moves were made.
+    pub(super) fn heal(&mut self) -> Result<usize> {
+        let mut moves = 0;
+        if !self.cutter.source.has_elements() {
+            return Ok(0);
+        }
+        for _ in 0..ROUNDS {
+            let (instances, mut counts) = self.instances();
+            let mut torn: Vec<(f64, usize)> = (0..instances.len())
+                .filter(|&k| !self.at_an_end(&instances[k]) && self.share(instances[k].key, &counts) < WHOLE)
+                .map(|k| (self.lack(instances[k].key, counts[&instances[k].key]), k))
+                .collect();
+            torn.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+            for (_, k) in torn {
+                self.monitor.check()?;
+                let share = self.share(instances[k].key, &counts);
+                if share <= 0.0 || share >= WHOLE {
+                    continue;
+                }
+                if let Some(best) = self.best_move(&instances[k], share, &counts)? {
+                    self.apply(&best);
+                    for (key, change) in &best.counts {
+                        *counts.entry(*key).or_insert(0) += change;
+                    }
+                    moves += 1;
+                }
+            }
+        }
+        Ok(moves)
+    }
+
+    /// The instance that a point shows, if any.
+    #[inline(always)]
+    fn instance(&self, patch: u32, place: Place<D>) -> Option<Key> {
+        if patch == FREE || patch == HELD {
+            return None;
+        }
+        let element = self.cutter.source.element(place);
+        (element > 0).then_some((patch, element))
+    }
+
+    /// All instances, and how many points each has.
+    fn instances(&self) -> (Vec<Instance<D>>, HashMap<Key, i64>) {
+        let canvas = &self.canvas;
+        let mut all: Vec<Instance<D>> = Vec::new();
+        let mut numbers: HashMap<Key, usize> = HashMap::new();
+        let mut counts: HashMap<Key, i64> = HashMap::new();
+        for p in 0..canvas.grid.len() {
+            let Some(key) = self.instance(canvas.patches[p], canvas.places[p]) else { continue };
+            let point = canvas.grid.point(p);
+            *counts.entry(key).or_insert(0) += 1;
+            let number = *numbers.entry(key).or_insert_with(|| {
+                all.push(Instance { key, anchor: point, low: [0; D], high: [0; D] });
+                all.len() - 1
+            });
+            let instance = &mut all[number];
+            for a in 0..D {
+                let n = canvas.grid.shape()[a] as i32;
+                let mut step = point[a] as i32 - instance.anchor[a] as i32;
+                if canvas.grid.wrap()[a] {
+                    step = (step + n / 2).rem_euclid(n) - n / 2;
+                }
+                instance.low[a] = instance.low[a].min(step);
+                instance.high[a] = instance.high[a].max(step);
+            }
+        }
+        (all, counts)
+    }
+
+    /// Whether an instance is cut off by an end of the canvas: it cannot be whole.
+    fn at_an_end(&self, instance: &Instance<D>) -> bool {
+        let grid = &self.canvas.grid;
+        (0..D).any(|a| {
+            let at = instance.anchor[a] as i32;
+            !grid.wrap()[a]
+                && (at + instance.low[a] <= 0 || at + instance.high[a] >= grid.shape()[a] as i32 - 1)
+        })
+    }
+
+    /// Points that an instance has where it is whole.
+    fn size(&self, (patch, element): Key) -> f64 {
+        f64::from(self.cutter.source.size(element)) * self.patches[patch as usize].scale
+    }
+
+    fn share(&self, key: Key, counts: &HashMap<Key, i64>) -> f64 {
+        counts.get(&key).copied().unwrap_or(0) as f64 / self.size(key).max(1.0)
+    }
+
+    /// What an instance of so many points pays.
+    fn lack(&self, key: Key, count: i64) -> f64 {
+        LACK * (count as f64).min((self.size(key) - count as f64).max(0.0))
+    }
+
+    /// The best of growing an instance and of giving it up; none where both make it worse.
+    fn best_move(
+        &self,
+        instance: &Instance<D>,
+        share: f64,
+        counts: &HashMap<Key, i64>,
+    ) -> Result<Option<Move<D>>> {
+        let mut options = Vec::new();
+        if share >= GROW {
+            options.push((instance.key.0, true));
+        }
+        if share < DROP {
+            for patch in self.neighbours(instance) {
+                options.push((patch, false));
+            }
+        }
+        let made = par::map(options.len(), |k| {
+            let (patch, grow) = options[k];
+            self.attempt(instance, patch, grow, counts)
+        });
+        let mut best: Option<Move<D>> = None;
+        for attempt in made {
+            if let Some(found) = attempt?
+                && best.as_ref().is_none_or(|b| found.gain > b.gain)
+            {
+                best = Some(found);
+            }
+        }
+        Ok(best)
+    }
+
+    /// The patches around an instance, those with the most points first.
+    fn neighbours(&self, instance: &Instance<D>) -> Vec<u32> {
+        let Some(window) = self.bounds(instance, 5) else { return Vec::new() };
+        let mut found: Vec<(u32, usize)> = Vec::new();
+        for &p in &window.points {
+            let patch = self.canvas.patches[p as usize];
+            if patch == FREE || patch == HELD || patch == instance.key.0 {
+                continue;
+            }
+            match found.iter_mut().find(|f| f.0 == patch) {
+                Some(f) => f.1 += 1,
+                None => found.push((patch, 1)),
+            }
+        }
+        found.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(&b.0)));
+        found.iter().take(NEIGHBOURS).map(|f| f.0).collect()
+    }
+
+    fn bounds(&self, instance: &Instance<D>, margin: i32) -> Option<Window<D>> {
+        let at = |a: usize| instance.anchor[a] as i32;
+        self.canvas.window(
+            std::array::from_fn(|a| at(a) + instance.low[a] - margin),
+            std::array::from_fn(|a| at(a) + instance.high[a] + margin + 1),
+        )
+    }
+
+    /// One move, if it makes the canvas better.
+    fn attempt(
+        &self,
+        instance: &Instance<D>,
+        patch: u32,
+        grow: bool,
+        counts: &HashMap<Key, i64>,
+    ) -> Result<Option<Move<D>>> {
+        let margin = if grow {
+            // As far as the rest of it may lie.
+            let reach = self.size(instance.key).powf(1.0 / D as f64) * 1.6;
+            let longest = (0..D).map(|a| instance.high[a] - instance.low[a]).max().unwrap_or(0);
+            (reach as i32 - longest / 2).max(4)
+        } else {
+            5
+        };
+        let Some(window) = self.bounds(instance, margin) else { return Ok(None) };
+        let to: &Patch<D> = &self.patches[patch as usize];
+        let Some(chart) = self.chart_of(to, window) else { return Ok(None) };
+        let mut proposal = Proposal::new(&chart, to.place);
+        let (canvas, n) = (&self.canvas, chart.window.grid.len());
+        let own: Vec<bool> = (0..n)
+            .map(|i| {
+                let p = chart.window.points[i] as usize;
+                self.instance(canvas.patches[p], canvas.places[p]) == Some(instance.key)
+            })
+            .collect();
+        proposal.core = if grow {
+            let whole: Vec<bool> = (0..n)
+                .map(|i| chart.mask[i] && self.cutter.source.element(proposal.places[i]) == instance.key.1)
+                .collect();
+            let from: Vec<usize> = (0..n).filter(|&i| own[i]).collect();
+            let mut core = widen(&chart.window.grid, &flood(&chart.window.grid, &whole, &from));
+            core.iter_mut().zip(&chart.mask).for_each(|(c, m)| *c &= m);
+            core
+        } else {
+            if (0..n).any(|i| own[i] && !chart.mask[i]) {
+                return Ok(None);
+            }
+            own
+        };
+        if !proposal.core.contains(&true) {
+            return Ok(None);
+        }
+        let cutting = self.cutter.cut(canvas, &proposal, self.monitor)?;
+        let mut changes: Vec<(Key, i64)> = Vec::new();
+        let mut change = |key: Option<Key>, by: i64| {
+            if let Some(key) = key {
+                match changes.iter_mut().find(|c| c.0 == key) {
+                    Some(c) => c.1 += by,
+                    None => changes.push((key, by)),
+                }
+            }
+        };
+        for i in 0..n {
+            if cutting.take[i] {
+                let p = chart.window.points[i] as usize;
+                change(self.instance(canvas.patches[p], canvas.places[p]), -1);
+                change(self.instance(patch, proposal.places[i]), 1);
+            }
+        }
+        let mut gain = self.cutter.value(canvas, &proposal) - cutting.value;
+        for &(key, by) in &changes {
+            let now = counts.get(&key).copied().unwrap_or(0);
+            gain += self.lack(key, now) - self.lack(key, now + by);
+        }
+        let places = std::mem::take(&mut proposal.places);
+        drop(proposal);
+        Ok((gain > 1e-3).then_some(Move { gain, patch, chart, cutting, proposal: places, counts: changes }))
+    }
+
+    /// What a patch shows in a window.
+    fn chart_of(&self, patch: &Patch<D>, window: Window<D>) -> Option<Chart<D>> {
+        let frames: Frames<'_, D> = self.frames;
+        let mut chart = if patch.rigid {
+            Chart::affine(window, &self.canvas, frames, patch.frame, patch.centre, None)
+        } else {
+            let mut chart = Chart::new(&self.canvas, frames, patch.centre, patch.side, true)?;
+            for i in 0..chart.mask.len() {
+                chart.mask[i] &= window.holds(chart.window.at(chart.window.grid.point(i)));
+            }
+            chart
+        };
+        let grid = self.cutter.source.grid();
+        for (mask, step) in chart.mask.iter_mut().zip(&chart.steps) {
+            let place: Place<D> =
+                std::array::from_fn(|a| step[a].wrapping_add(patch.place[a]));
+            *mask &= super::inside(grid, place);
+        }
+        Some(chart)
+    }
+
+    fn apply(&mut self, best: &Move<D>) {
+        let chart = &best.chart;
+        commit(&mut self.canvas, chart, &best.proposal, &best.cutting, best.patch);
+    }
+}
+
+/// Writes what a cut took into the canvas.
+pub(super) fn commit<const D: usize>(
+    canvas: &mut Canvas<D>,
+    chart: &Chart<D>,
+    places: &[Place<D>],
+    cutting: &Cutting<D>,
+    patch: u32,
+) {
+    for (i, &p) in chart.window.points.iter().enumerate() {
+        let p = p as usize;
+        // Pairs across a cyclic end of the window are not its own.
+        canvas.seams[p] = cutting.seams[i];
+        if cutting.take[i] {
+            canvas.free -= usize::from(canvas.patches[p] == FREE);
+            canvas.patches[p] = patch;
+            canvas.places[p] = places[i];
+            if let Some(d) = canvas.distortion.get_mut(p) {
+                *d = chart.distortion.get(i).copied().unwrap_or(0.0);
+            }
+        }
+    }
+}
+
+/// A mask, and all beside it.
+fn widen<const D: usize>(grid: &Grid<D>, mask: &[bool]) -> Vec<bool> {
+    let mut wide = mask.to_vec();
+    for axis in 0..D {
+        links(grid, axis, |p, q| {
+            wide[p] |= mask[q];
+            wide[q] |= mask[p];
+        });
+    }
+    wide
+}

@@ -1,0 +1,367 @@
+//! The stitcher: patches of an exemplar pulled into the output through any map, and cut where it shows least.
+//!
+//! 1. *chart*: a patch is a box of the exemplar, mapped from the output by the frames around its centre;
+//! 2. *search*: the places at which it fits what is there already, exactly, for all places at once;
+//! 3. *cut*: the best few are cut in by minimum cuts that judge the pairs which result, and the cheapest stays;
+//! 4. *heal*: elements that are torn are grown whole, or given up.
+//!
+//! Kwatra, Schödl, Essa, Turk, Bobick, *Graphcut textures*, SIGGRAPH 2003. Departures: patches follow a field; a cut
+//! judges the pair that results, not how far the two pictures differ; elements are known to it.
+
+mod canvas;
+mod chart;
+mod cut;
+mod heal;
+mod search;
+mod source;
+
+use std::collections::HashMap;
+
+use crate::engine::guide::Guide;
+use crate::foundation::fixed::{Frame, Frames, ONE, Place, apply};
+use crate::foundation::grid::{Grid, Region};
+use crate::foundation::hash::Noise;
+use crate::foundation::par::{self, Monitor};
+use crate::{Error, Result};
+
+use canvas::{Canvas, HELD};
+use chart::Chart;
+pub use cut::Weights;
+use cut::{Cutter, Proposal};
+use search::{Charges, Index};
+pub use source::{Adjacency, Elements, Source};
+
+/// A patch is left out where all around its centre is covered, within this share of the step.
+const CORE: f32 = 0.45;
+/// Points that fields are sampled at to learn how much they enlarge.
+const PROBES: usize = 4096;
+
+/// What the stitcher is asked for.
+#[derive(Debug, Clone, Copy)]
+pub struct Options {
+    /// Side of a patch, in samples of the exemplar.
+    pub patch: f32,
+    /// Share of it by which neighbours overlap.
+    pub overlap: f32,
+    /// Places that are cut in, of which the cheapest stays.
+    pub candidates: usize,
+    /// Whether patches bend with the field, or are turned and scaled as a whole.
+    pub bend: bool,
+    /// What seams cost.
+    pub weights: Weights,
+    /// Cost of places that have been shown more often than others.
+    pub repetition: f32,
+    /// Cost of going on exactly where a neighbour ends.
+    pub continuation: f32,
+    /// Whether torn elements are healed.
+    pub heal: bool,
+    /// Chooses the texture.
+    pub seed: u64,
+}
+
+/// Points that are given: none, or one flag and one place a point.
+#[derive(Debug, Clone, Copy)]
+pub struct Given<'a, const D: usize> {
+    /// Which.
+    pub points: &'a [bool],
+    /// Where they look.
+    pub places: &'a [Place<D>],
+}
+
+/// What has been stitched.
+#[derive(Debug, Clone)]
+pub struct Stitched<const D: usize> {
+    /// Where each point looks.
+    pub places: Vec<Place<D>>,
+    /// The patch that each point shows.
+    pub patches: Vec<u32>,
+    /// The Jacobian at the centre of each patch.
+    pub frames: Vec<Frame<D>>,
+    /// Mean cost of the seams, a point.
+    pub seams: f64,
+    /// Moves by which elements were healed.
+    pub healed: usize,
+}
+
+/// A patch that has been cut in.
+#[derive(Debug, Clone, Copy)]
+struct Patch<const D: usize> {
+    centre: [i32; D],
+    /// Where the centre looks.
+    place: Place<D>,
+    frame: Frame<D>,
+    side: f32,
+    rigid: bool,
+    /// Points of the output to a sample of the exemplar.
+    scale: f64,
+}
+
+/// The state of the work.
+struct Stitching<'a, const D: usize> {
+    cutter: Cutter<'a, D>,
+    frames: Frames<'a, D>,
+    options: Options,
+    canvas: Canvas<D>,
+    index: Index<D>,
+    patches: Vec<Patch<D>>,
+    /// Patches by what they show at the origin, where one frame serves all: what goes on exactly is one patch.
+    offsets: HashMap<Place<D>, u32>,
+    noise: Noise,
+    monitor: &'a Monitor,
+}
+
+/// Fills a region with patches of a source.
+///
+/// # Errors
+/// Options out of their range, arrays of other sizes than the region's, or a monitor that was cancelled.
+#[allow(clippy::too_many_arguments)] // the inputs of the engine's other starts
+pub fn stitch<const D: usize>(
+    source: &Source<D>,
+    region: &Region<D>,
+    frames: Frames<'_, D>,
+    guide: Option<&Guide<'_>>,
+    given: Given<'_, D>,
+    options: &Options,
+    monitor: &Monitor,
+) -> Result<Stitched<D>> {
+    check(region, frames, given, options)?;
+    let mut canvas = Canvas::new(region.grid, matches!(frames, Frames::Dense(_)))?;
+    for (p, _) in given.points.iter().enumerate().filter(|(_, held)| **held) {
+        canvas.patches[p] = HELD;
+        canvas.places[p] = given.places[p];
+        canvas.free -= 1;
+    }
+    let mut this = Stitching {
+        cutter: Cutter { source, weights: options.weights, guide },
+        frames,
+        options: *options,
+        index: Index::new(source, guide),
+        canvas,
+        patches: Vec::new(),
+        offsets: HashMap::new(),
+        noise: Noise::new(options.seed).part(2),
+        monitor,
+    };
+    this.fill()?;
+    let healed = if options.heal { this.heal()? } else { 0 };
+    let mut canvas = this.canvas;
+    for place in &mut canvas.places {
+        *place = bring_around(source.grid(), *place);
+    }
+    let total: f64 = canvas.seams.iter().flatten().map(|&s| f64::from(s)).sum();
+    Ok(Stitched {
+        seams: total / canvas.grid.len() as f64,
+        places: canvas.places,
+        patches: canvas.patches,
+        frames: this.patches.iter().map(|p| p.frame).collect(),
+        healed,
+    })
+}
+
+fn check<const D: usize>(
+    region: &Region<D>,
+    frames: Frames<'_, D>,
+    given: Given<'_, D>,
+    options: &Options,
+) -> Result<()> {
+    let n = region.grid.len();
+    frames.check(n)?;
+    for got in [given.points.len(), given.places.len()] {
+        if got != given.points.len() || !(got == 0 || got == n) {
+            return Err(Error::Shape { argument: "held", expected: region.grid.shape().to_vec(), got: vec![got] });
+        }
+    }
+    if !(4.0..=4096.0).contains(&options.patch)
+        || !(0.0..=0.8).contains(&options.overlap)
+        || !(1..=64).contains(&options.candidates)
+    {
+        return Err(Error::value(
+            "patch",
+            format!("patches of 4 to 4096 samples, overlaps up to 0.8 and 1 to 64 candidates are allowed, got {options:?}"),
+        ));
+    }
+    let w = &options.weights;
+    let costs = [w.colour, w.contact, w.jump, w.depth, w.joint, w.surprise, w.distortion, w.guide];
+    let others = [options.repetition, options.continuation];
+    if !costs.iter().chain(&others).all(|x| (0.0..=100.0).contains(x)) {
+        return Err(Error::value("weights", format!("0 to 100 are allowed, got {options:?}")));
+    }
+    Ok(())
+}
+
+impl<const D: usize> Stitching<'_, D> {
+    /// Lays patches from a lattice of centres, and then wherever something is left.
+    fn fill(&mut self) -> Result<()> {
+        let grid = self.canvas.grid;
+        let step = (self.options.patch * (1.0 - self.options.overlap) * self.least_scale()).max(2.0);
+        let axes: Vec<Vec<i32>> = (0..D).map(|a| centres(grid.shape()[a], grid.wrap()[a], step)).collect();
+        let count: usize = axes.iter().map(Vec::len).product();
+        self.monitor.expect(self.canvas.free as u64);
+        for k in 0..count {
+            let (mut rest, mut centre) = (k, [0; D]);
+            for a in (0..D).rev() {
+                centre[a] = axes[a][rest % axes[a].len()];
+                rest /= axes[a].len();
+            }
+            let reach = (CORE * self.options.patch * (1.0 - self.options.overlap) * self.scale(centre)) as i32;
+            if !self.all_covered(centre, reach.max(1)) {
+                self.lay(centre, self.options.patch)?;
+            }
+        }
+        let mut next = 0;
+        while let Some(p) = (next..grid.len()).find(|&p| !self.canvas.covered(p as u32)) {
+            next = p;
+            let at = grid.point(p).map(|x| x as i32);
+            let before = self.canvas.free;
+            self.lay(self.middle(at), self.options.patch)?;
+            for share in [1.0, 0.5, 0.25] {
+                if !self.canvas.covered(p as u32) {
+                    self.lay(at, (self.options.patch * share).max(4.0))?;
+                }
+            }
+            if self.canvas.free == before || !self.canvas.covered(p as u32) {
+                // A chart that cannot even hold its centre: show any sample there.
+                self.canvas.patches[p] = self.patches.len().saturating_sub(1) as u32;
+                self.canvas.free -= 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// The middle of what is not covered near a point.
+    fn middle(&self, at: [i32; D]) -> [i32; D] {
+        let reach = (self.options.patch * 0.5 * self.scale(at)) as i32;
+        let window = self.canvas.window(at.map(|x| x - reach), at.map(|x| x + reach + 1));
+        let Some(window) = window else { return at };
+        let (mut sum, mut count) = ([0i64; D], 0i64);
+        for (i, &p) in window.points.iter().enumerate() {
+            if !self.canvas.covered(p) {
+                let q = window.at(window.grid.point(i));
+                (0..D).for_each(|a| sum[a] += i64::from(q[a]));
+                count += 1;
+            }
+        }
+        if count == 0 { at } else { sum.map(|s| s.div_euclid(count) as i32) }
+    }
+
+    /// Cuts in the best patch around a point.
+    fn lay(&mut self, centre: [i32; D], side: f32) -> Result<()> {
+        let o = &self.options;
+        let Some(chart) = Chart::new(&self.canvas, self.frames, centre, side, o.bend) else { return Ok(()) };
+        let useful = |(&p, &m): (&u32, &bool)| m && !self.canvas.covered(p);
+        if !chart.window.points.iter().zip(&chart.mask).any(useful) {
+            return Ok(());
+        }
+        let charges = Charges { repetition: o.repetition, continuation: o.continuation };
+        let noise = self.noise.part(self.patches.len() as u32);
+        let guide = self.cutter.guide;
+        let found =
+            self.index.best(self.cutter.source, &self.canvas, &chart, guide, &charges, o.candidates, &noise);
+        let cuts = par::map(found.len(), |k| {
+            self.cutter.cut(&self.canvas, &Proposal::new(&chart, found[k]), self.monitor)
+        });
+        let mut best = None;
+        for (k, cut) in cuts.into_iter().enumerate() {
+            let cut = cut?;
+            if best.as_ref().is_none_or(|(_, b): &(usize, cut::Cutting<D>)| cut.value < b.value) {
+                best = Some((k, cut));
+            }
+        }
+        let Some((k, cutting)) = best else { return Ok(()) };
+        let places = Proposal::new(&chart, found[k]).places;
+        let number = self.number(&chart, centre, found[k], side);
+        let before = self.canvas.free;
+        heal::commit(&mut self.canvas, &chart, &places, &cutting, number);
+        self.index.note(found[k], side);
+        self.monitor.advance((before - self.canvas.free) as u64)
+    }
+
+    /// The number of a patch: where one frame serves all, what goes on where another ends is the same.
+    fn number(&mut self, chart: &Chart<D>, centre: [i32; D], place: Place<D>, side: f32) -> u32 {
+        let next = self.patches.len() as u32;
+        let patch = Patch {
+            centre,
+            place,
+            frame: chart.frame,
+            side,
+            rigid: chart.rigid,
+            scale: 1.0 / determinant(&chart.frame).abs().max(1e-6),
+        };
+        if let Frames::Constant(frame) = self.frames {
+            let grid = self.cutter.source.grid();
+            let ahead = apply(&frame, centre);
+            let origin: Place<D> = std::array::from_fn(|a| {
+                let offset = place[a].wrapping_sub(ahead[a]);
+                if grid.wrap()[a] { offset.rem_euclid(grid.shape()[a] as i32 * ONE) } else { offset }
+            });
+            let number = *self.offsets.entry(origin).or_insert(next);
+            if number != next {
+                return number;
+            }
+        }
+        self.patches.push(patch);
+        next
+    }
+
+    fn all_covered(&self, centre: [i32; D], reach: i32) -> bool {
+        let window = self.canvas.window(centre.map(|x| x - reach), centre.map(|x| x + reach + 1));
+        window.is_none_or(|w| w.points.iter().all(|&p| self.canvas.covered(p)))
+    }
+
+    /// How much features are enlarged at a point.
+    fn scale(&self, at: [i32; D]) -> f32 {
+        let grid = &self.canvas.grid;
+        let point = std::array::from_fn(|a| grid.resolve(a, at[a] as isize));
+        enlargement(&self.frames.at(grid.index(point)))
+    }
+
+    /// How much they are enlarged where that is least, but for the very least.
+    fn least_scale(&self) -> f32 {
+        let n = self.canvas.grid.len();
+        let every = if matches!(self.frames, Frames::Constant(_)) { n } else { (n / PROBES).max(1) };
+        let mut scales: Vec<f32> = (0..n).step_by(every).map(|p| enlargement(&self.frames.at(p))).collect();
+        scales.sort_by(f32::total_cmp);
+        scales[scales.len() / 50]
+    }
+}
+
+/// Centres of patches along an axis.
+fn centres(n: usize, wrap: bool, step: f32) -> Vec<i32> {
+    if wrap {
+        let count = (n as f32 / step).ceil().max(1.0) as usize;
+        return (0..count).map(|i| (i * n / count) as i32).collect();
+    }
+    let last = n as i32 - 1;
+    let count = (last as f32 / step).ceil() as usize;
+    (0..=count).map(|i| ((i as f32 * step) as i32).min(last)).collect()
+}
+
+/// A place brought around the axes along which an exemplar repeats: the sample nearest to it is one of its own.
+fn bring_around<const D: usize>(grid: &Grid<D>, place: Place<D>) -> Place<D> {
+    std::array::from_fn(|a| {
+        let (n, half) = (grid.shape()[a] as i32 * ONE, ONE / 2);
+        if grid.wrap()[a] { (place[a].wrapping_add(half)).rem_euclid(n) - half } else { place[a] }
+    })
+}
+
+/// Whether a place lies in an exemplar, along the axes that end.
+fn inside<const D: usize>(grid: &Grid<D>, place: Place<D>) -> bool {
+    (0..D).all(|a| grid.wrap()[a] || (0..=(grid.shape()[a] as i32 - 1) * ONE).contains(&place[a]))
+}
+
+/// How much features are enlarged by a frame, by length.
+fn enlargement<const D: usize>(frame: &Frame<D>) -> f32 {
+    (determinant(frame).abs().max(1e-6) as f32).powf(-1.0 / D as f32)
+}
+
+/// The determinant of a Jacobian.
+fn determinant<const D: usize>(frame: &Frame<D>) -> f64 {
+    let m = frame.map(|row| row.map(|x| f64::from(x) / f64::from(ONE)));
+    match D {
+        2 => m[0][0] * m[1][1] - m[0][1] * m[1][0],
+        _ => {
+            let minor = |a: usize, b: usize| m[1][a] * m[2][b] - m[1][b] * m[2][a];
+            m[0][0] * minor(1, 2) - m[0][1] * minor(0, 2) + m[0][2] * minor(0, 1)
+        }
+    }
+}

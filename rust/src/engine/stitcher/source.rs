@@ -1,0 +1,246 @@
+//! What patches are cut from: an exemplar's samples, with what is known of the elements that they belong to.
+
+use crate::foundation::fixed::{BITS, ONE, Place, nearest};
+use crate::foundation::grid::Grid;
+use crate::foundation::memory;
+use crate::{Error, Result};
+
+/// Channels of a colour, at most; missing ones are zero.
+pub const CHANNELS: usize = 4;
+/// A colour in units of the exemplar's mean standard deviation.
+pub type Colour = [f32; CHANNELS];
+/// Beyond this a sample is as deep inside of its element as any.
+const DEEP: f32 = 7.0;
+
+/// What is known of the elements of an exemplar; each array is empty or has an entry a sample.
+#[derive(Debug, Clone, Copy)]
+pub struct Elements<'a> {
+    /// Number of the element that a sample belongs to, from 1; 0 for none.
+    pub labels: &'a [u32],
+    /// Distance to the background, 0 in the background. A sample may lie in an element, but have no number.
+    pub depth: &'a [f32],
+}
+
+/// How surprising it is to see two classes of samples side by side.
+#[derive(Debug, Clone, Copy)]
+pub struct Adjacency<'a> {
+    /// Class of each sample; empty where this is not to be judged.
+    pub classes: &'a [u8],
+    /// Cost of each pair of classes, a square table.
+    pub costs: &'a [f32],
+}
+
+/// What a place shows.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Look {
+    pub colour: Colour,
+    pub depth: f32,
+    pub element: u32,
+    pub class: u8,
+    /// Whether it lies in an element, or beside one.
+    pub beside: bool,
+}
+
+/// An exemplar that patches are cut from.
+#[derive(Debug, Clone)]
+pub struct Source<const D: usize> {
+    grid: Grid<D>,
+    channels: usize,
+    looks: Vec<Look>,
+    /// Samples of each element.
+    sizes: Vec<u32>,
+    costs: Vec<f32>,
+    classes: usize,
+}
+
+impl<const D: usize> Source<D> {
+    /// Prepares `colours`, points of `grid` by `channels`. A cyclic axis is one along which the exemplar repeats.
+    ///
+    /// # Errors
+    /// Arrays of other sizes, colours that are not finite, and classes that the table lacks.
+    pub fn new(
+        colours: &[f32],
+        grid: Grid<D>,
+        channels: usize,
+        elements: Elements<'_>,
+        adjacency: Adjacency<'_>,
+    ) -> Result<Self> {
+        let n = grid.len();
+        if !(1..=CHANNELS).contains(&channels) || n.checked_mul(channels) != Some(colours.len()) {
+            return Err(Error::Shape {
+                argument: "colours",
+                expected: vec![n, channels.clamp(1, CHANNELS)],
+                got: vec![colours.len()],
+            });
+        }
+        for (argument, got) in [
+            ("labels", elements.labels.len()),
+            ("depth", elements.depth.len()),
+            ("classes", adjacency.classes.len()),
+        ] {
+            if got != 0 && got != n {
+                return Err(Error::Shape {
+                    argument,
+                    expected: vec![n],
+                    got: vec![got],
+                });
+            }
+        }
+        if !colours.iter().chain(elements.depth).chain(adjacency.costs).all(|x| x.is_finite()) {
+            return Err(Error::value("colours", "finite values are allowed"));
+        }
+        let classes = (adjacency.costs.len() as f64).sqrt() as usize;
+        if classes * classes != adjacency.costs.len()
+            || adjacency.classes.iter().any(|&c| usize::from(c) >= classes)
+        {
+            return Err(Error::value("classes", "needs a square table of costs that has every class"));
+        }
+        let most = elements.labels.iter().max().map_or(0, |&m| m as usize);
+        if most > n {
+            return Err(Error::value("labels", format!("{most} of {n} samples; at most one element a sample")));
+        }
+        let mut this = Self {
+            grid,
+            channels,
+            looks: memory::filled("the samples of an exemplar", Look::EMPTY, n)?,
+            sizes: vec![0; most + 1],
+            costs: adjacency.costs.to_vec(),
+            classes,
+        };
+        let (mean, deviation) = spread(colours, channels);
+        for (i, look) in this.looks.iter_mut().enumerate() {
+            for c in 0..channels {
+                look.colour[c] = (colours[i * channels + c] - mean[c]) / deviation;
+            }
+            look.depth = elements.depth.get(i).map_or(0.0, |d| d.clamp(0.0, DEEP));
+            look.element = elements.labels.get(i).copied().unwrap_or(0);
+            look.class = adjacency.classes.get(i).copied().unwrap_or(0);
+            this.sizes[look.element as usize] += 1;
+        }
+        this.widen();
+        Ok(this)
+    }
+
+    /// Marks samples beside those of elements: a joint then stays as wide as two samples.
+    fn widen(&mut self) {
+        for at in 0..self.looks.len() {
+            let point = self.grid.point(at);
+            let mut beside = self.looks[at].depth > 0.0;
+            for axis in 0..D {
+                for step in [-1, 1] {
+                    if let Some(i) = self.grid.inside(axis, point[axis] as isize + step) {
+                        let mut near = point;
+                        near[axis] = i;
+                        beside |= self.looks[self.grid.index(near)].depth > 0.0;
+                    }
+                }
+            }
+            self.looks[at].beside = beside;
+        }
+    }
+
+    /// The exemplar's grid.
+    pub fn grid(&self) -> &Grid<D> {
+        &self.grid
+    }
+
+    /// Channels that count.
+    pub(super) fn channels(&self) -> usize {
+        self.channels
+    }
+
+    /// Whether there are elements.
+    pub(super) fn has_elements(&self) -> bool {
+        self.sizes.len() > 1
+    }
+
+    /// Samples of an element.
+    pub(super) fn size(&self, element: u32) -> u32 {
+        self.sizes[element as usize]
+    }
+
+    /// The element that a place shows, 0 for none.
+    #[inline(always)]
+    pub(super) fn element(&self, place: Place<D>) -> u32 {
+        self.looks[self.sample(place)].element
+    }
+
+    /// Colours of all samples.
+    pub(super) fn colours(&self) -> impl Iterator<Item = &Colour> {
+        self.looks.iter().map(|look| &look.colour)
+    }
+
+    /// Cost of seeing two classes side by side; 0 where that is not judged.
+    #[inline(always)]
+    pub(super) fn surprise(&self, a: u8, b: u8) -> f32 {
+        let at = usize::from(a) * self.classes + usize::from(b);
+        self.costs.get(at).copied().unwrap_or(0.0)
+    }
+
+    /// Row-major position of the sample nearest to a place.
+    #[inline(always)]
+    pub(super) fn sample(&self, place: Place<D>) -> usize {
+        let near = nearest(place);
+        let shape = self.grid.shape();
+        (0..D).fold(0, |at, axis| at * shape[axis] + self.grid.resolve(axis, near[axis] as isize))
+    }
+
+    /// What a place shows: its colour between samples, all else of the nearest one.
+    #[inline]
+    pub(super) fn look(&self, place: Place<D>) -> Look {
+        let mut look = self.looks[self.sample(place)];
+        if place.iter().any(|x| x & (ONE - 1) != 0) {
+            look.colour = self.interpolate(place);
+        }
+        look
+    }
+
+    fn interpolate(&self, place: Place<D>) -> Colour {
+        let shape = self.grid.shape();
+        let (mut at, mut weight) = ([[0; 2]; D], [[0.0; 2]; D]);
+        for axis in 0..D {
+            let whole = (place[axis] >> BITS) as isize;
+            let part = (place[axis] & (ONE - 1)) as f32 / ONE as f32;
+            at[axis] = [self.grid.resolve(axis, whole), self.grid.resolve(axis, whole + 1)];
+            weight[axis] = [1.0 - part, part];
+        }
+        let mut colour = [0.0; CHANNELS];
+        for corner in 0..1usize << D {
+            let (mut index, mut w) = (0, 1.0f32);
+            for axis in 0..D {
+                let side = corner >> axis & 1;
+                index = index * shape[axis] + at[axis][side];
+                w *= weight[axis][side];
+            }
+            let from = &self.looks[index].colour;
+            for c in 0..CHANNELS {
+                colour[c] += w * from[c];
+            }
+        }
+        colour
+    }
+}
+
+impl Look {
+    const EMPTY: Self = Self {
+        colour: [0.0; CHANNELS],
+        depth: 0.0,
+        element: 0,
+        class: 0,
+        beside: false,
+    };
+}
+
+/// Mean of each channel, and the mean standard deviation of all; 1 for an exemplar of one colour.
+fn spread(colours: &[f32], channels: usize) -> ([f32; CHANNELS], f32) {
+    let n = (colours.len() / channels).max(1) as f64;
+    let (mut mean, mut total) = ([0.0f32; CHANNELS], 0.0);
+    for c in 0..channels {
+        let values = || colours.iter().skip(c).step_by(channels).map(|&x| f64::from(x));
+        let middle = values().sum::<f64>() / n;
+        mean[c] = middle as f32;
+        total += (values().map(|x| (x - middle).powi(2)).sum::<f64>() / n).sqrt();
+    }
+    let deviation = (total / channels as f64) as f32;
+    (mean, if deviation > 1e-6 { deviation } else { 1.0 })
+}
