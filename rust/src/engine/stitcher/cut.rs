@@ -7,20 +7,18 @@
 
 use super::canvas::{Canvas, FREE, HELD, Window};
 use super::chart::Chart;
+use super::energy::{Energy, capacity};
 use super::source::{CHANNELS, Look, Source};
 use crate::engine::guide::Guide;
 use crate::foundation::fixed::Place;
 use crate::foundation::par::Monitor;
 use crate::kernels::seam::links;
-use crate::kernels::seam::maxflow::{Graph, Solver};
 use crate::Result;
 
-/// Capacities are costs times this.
-const SCALE: f32 = 16384.0;
 /// Added to every pair, so that ties go to the shorter seam.
 const SHORTEST: f32 = 2e-3;
 /// Costs of one pair are at most this, so that sums stay within 32 bits.
-const MOST: f32 = 1000.0;
+pub(super) const MOST: f32 = 1000.0;
 /// Beyond this, colours of two elements are as different as can be.
 const UNLIKE: f32 = 1.5;
 /// What a guide's cost of unrelated windows is.
@@ -70,12 +68,27 @@ pub(super) struct Cutting<const D: usize> {
 
 /// What a point of a window must do.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Tie {
+pub(super) enum Tie {
     /// It shows nothing, and will not.
     Out,
     Old,
     New,
     Either,
+}
+
+/// What a pair of neighbours costs by what they show; negative where it is none.
+#[derive(Clone, Copy)]
+pub(super) struct Pair {
+    /// The first one keeps what it has, and the next one takes the patch.
+    pub old_new: f32,
+    /// The other way round.
+    pub new_old: f32,
+    /// Both keep what they have.
+    pub kept: f32,
+}
+
+impl Pair {
+    const NONE: Self = Self { old_new: -1.0, new_old: -1.0, kept: 0.0 };
 }
 
 impl<'a, const D: usize> Proposal<'a, D> {
@@ -100,42 +113,17 @@ pub(super) struct Cutter<'a, const D: usize> {
 }
 
 impl<const D: usize> Cutter<'_, D> {
-    /// Cuts a patch into the canvas.
-    pub fn cut(&self, canvas: &Canvas<D>, patch: &Proposal<'_, D>, monitor: &Monitor) -> Result<Cutting<D>> {
+    /// Cuts a patch into the canvas: coarsely, where that tells enough to compare it with others (see [`Energy`]).
+    pub fn cut(
+        &self,
+        canvas: &Canvas<D>,
+        patch: &Proposal<'_, D>,
+        coarse: bool,
+        monitor: &Monitor,
+    ) -> Result<Cutting<D>> {
         let (window, n) = (patch.window, patch.window.grid.len());
         let ties: Vec<Tie> = (0..n).map(|i| tie(canvas, patch, i)).collect();
-        let look = |place: Place<D>| self.source.look(place);
-        let mut new: Vec<Look> = Vec::with_capacity(n);
-        let mut old: Vec<Look> = Vec::with_capacity(n);
-        for i in 0..n {
-            let p = window.points[i];
-            match ties[i] {
-                Tie::Out => {
-                    let none = look([0; D]);
-                    old.push(none);
-                    new.push(none);
-                }
-                Tie::Old if !patch.mask[i] => {
-                    let kept = look(canvas.places[p as usize]);
-                    old.push(kept);
-                    new.push(kept);
-                }
-                _ if !canvas.covered(p) => {
-                    let taken = look(patch.places[i]);
-                    old.push(taken);
-                    new.push(taken);
-                }
-                _ => {
-                    old.push(look(canvas.places[p as usize]));
-                    new.push(look(patch.places[i]));
-                }
-            }
-        }
-        // Where the patch shows what is there already there is no seam.
-        let same: Vec<bool> = (0..n)
-            .map(|i| canvas.places[window.points[i] as usize] == patch.places[i] && canvas.covered(window.points[i]))
-            .collect();
-        let mut terminal = vec![0i32; n];
+        let mut energy = Energy::new(window.grid);
         let mut unary = vec![[0.0f32; 2]; n];
         for i in 0..n {
             if ties[i] == Tie::Out || !patch.mask[i] {
@@ -143,20 +131,65 @@ impl<const D: usize> Cutter<'_, D> {
             }
             unary[i] = self.points(canvas, patch, i);
             if ties[i] == Tie::Either {
-                terminal[i] = capacity(unary[i][1] - unary[i][0]);
+                energy.terminal[i] = capacity(unary[i][1] - unary[i][0]);
             }
         }
-        let empty: [Vec<i32>; D] = std::array::from_fn(|_| vec![0; n]);
-        let mut forward = empty;
-        let mut pairs: [Vec<[f32; 3]>; D] = std::array::from_fn(|_| vec![[-1.0; 3]; n]);
+        let pairs = self.pairs(canvas, patch, &ties);
         for axis in 0..D {
-            let (forward, pairs) = (&mut forward[axis], &mut pairs[axis]);
+            energy.add_pairs(axis, &ties, &pairs[axis]);
+        }
+        let sink = energy.minimise(coarse, monitor)?;
+        let take: Vec<bool> = (0..n).map(|i| ties[i] == Tie::New || ties[i] == Tie::Either && sink[i]).collect();
+        let mut value: f64 = (0..n).map(|i| f64::from(unary[i][usize::from(take[i])])).sum();
+        let mut seams: Vec<[f32; D]> = window.points.iter().map(|&p| canvas.seams[p as usize]).collect();
+        for axis in 0..D {
             links(&window.grid, axis, |p, q| {
-                let (a, b) = (ties[p], ties[q]);
-                if a == Tie::Out || b == Tie::Out || !(patch.mask[p] || patch.mask[q]) {
+                let Pair { old_new, new_old, kept } = pairs[axis][p];
+                if old_new >= 0.0 {
+                    seams[p][axis] = match (take[p], take[q]) {
+                        (true, true) => 0.0,
+                        (true, false) => new_old,
+                        (false, true) => old_new,
+                        (false, false) => kept,
+                    };
+                }
+                value += f64::from(seams[p][axis]);
+            });
+        }
+        Ok(Cutting { value, take, seams })
+    }
+
+    /// What each point shows that keeps what it has, and that takes the patch: the same where it has no choice.
+    fn looks(&self, canvas: &Canvas<D>, patch: &Proposal<'_, D>, ties: &[Tie]) -> [Vec<Look>; 2] {
+        let n = ties.len();
+        let (mut old, mut new) = (Vec::with_capacity(n), Vec::with_capacity(n));
+        for i in 0..n {
+            let p = patch.window.points[i];
+            let kept = canvas.covered(p).then(|| self.source.look(canvas.places[p as usize]));
+            let taken = (patch.mask[i] || kept.is_none()).then(|| self.source.look(patch.places[i]));
+            // A point out of the patch that shows nothing is in no pair.
+            let any = kept.or(taken).unwrap_or(Look::EMPTY);
+            old.push(kept.unwrap_or(any));
+            new.push(taken.unwrap_or(any));
+        }
+        [old, new]
+    }
+
+    /// The costs of all pairs along each axis.
+    fn pairs(&self, canvas: &Canvas<D>, patch: &Proposal<'_, D>, ties: &[Tie]) -> [Vec<Pair>; D] {
+        let points = &patch.window.points;
+        let [old, new] = self.looks(canvas, patch, ties);
+        // Where the patch shows what is there already there is no seam.
+        let same: Vec<bool> = (0..ties.len())
+            .map(|i| canvas.places[points[i] as usize] == patch.places[i] && canvas.covered(points[i]))
+            .collect();
+        let mut pairs: [Vec<Pair>; D] = std::array::from_fn(|_| vec![Pair::NONE; ties.len()]);
+        for (axis, pairs) in pairs.iter_mut().enumerate() {
+            links(&patch.window.grid, axis, |p, q| {
+                if ties[p] == Tie::Out || ties[q] == Tie::Out || !(patch.mask[p] || patch.mask[q]) {
                     return;
                 }
-                let kept = canvas.seams[window.points[p] as usize][axis];
+                let kept = canvas.seams[points[p] as usize][axis];
                 let crossing = |same_left: bool, same_right: bool, left: &[Look], right: &[Look]| {
                     if same_left {
                         0.0
@@ -166,61 +199,14 @@ impl<const D: usize> Cutter<'_, D> {
                         self.pair(left, right, p, q)
                     }
                 };
-                let e01 = crossing(same[p], same[q], &old, &new);
-                let e10 = crossing(same[q], same[p], &new, &old);
-                pairs[p] = [e01, e10, kept];
-                let kept = kept.min(e01 + e10);
-                match (a, b) {
-                    (Tie::Either, Tie::Either) => {
-                        let (c01, c10, c00) = (capacity(e01), capacity(e10), capacity(kept));
-                        let c00 = c00.min(c01 + c10);
-                        terminal[p] += c10 - c00;
-                        terminal[q] -= c10;
-                        forward[p] = c01 + c10 - c00;
-                    }
-                    (Tie::Old, Tie::Either) => terminal[q] += capacity(e01) - capacity(kept),
-                    (Tie::New, Tie::Either) => terminal[q] -= capacity(e10),
-                    (Tie::Either, Tie::Old) => terminal[p] += capacity(e10) - capacity(kept),
-                    (Tie::Either, Tie::New) => terminal[p] -= capacity(e01),
-                    _ => {}
-                }
+                pairs[p] = Pair {
+                    old_new: crossing(same[p], same[q], &old, &new),
+                    new_old: crossing(same[q], same[p], &new, &old),
+                    kept,
+                };
             });
         }
-        let backward = vec![0i32; n];
-        let graph = Graph {
-            grid: window.grid,
-            terminal: &terminal,
-            forward: std::array::from_fn(|a| &forward[a][..]),
-            backward: [&backward[..]; D],
-        };
-        let cut = Solver::default().min_cut(&graph, monitor)?;
-        let take: Vec<bool> = (0..n)
-            .map(|i| match ties[i] {
-                Tie::New => true,
-                Tie::Either => cut.sink[i],
-                _ => false,
-            })
-            .collect();
-        let mut value = 0.0;
-        for i in 0..n {
-            value += f64::from(unary[i][usize::from(take[i])]);
-        }
-        let mut seams: Vec<[f32; D]> = window.points.iter().map(|&p| canvas.seams[p as usize]).collect();
-        for axis in 0..D {
-            links(&window.grid, axis, |p, q| {
-                let [e01, e10, kept] = pairs[axis][p];
-                if e01 >= 0.0 {
-                    seams[p][axis] = match (take[p], take[q]) {
-                        (true, true) => 0.0,
-                        (true, false) => e10,
-                        (false, true) => e01,
-                        (false, false) => kept,
-                    };
-                }
-                value += f64::from(seams[p][axis]);
-            });
-        }
-        Ok(Cutting { value, take, seams })
+        pairs
     }
 
     /// What the window of a patch costs as it is.
@@ -300,10 +286,4 @@ fn distance(a: &Look, b: &Look) -> f32 {
         sum += (a.colour[c] - b.colour[c]).abs();
     }
     sum
-}
-
-#[inline(always)]
-fn capacity(cost: f32) -> i32 {
-    let scaled = cost.clamp(-MOST, MOST) * SCALE;
-    (if scaled < 0.0 { scaled - 0.5 } else { scaled + 0.5 }) as i32
 }

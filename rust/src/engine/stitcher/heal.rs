@@ -245,7 +245,7 @@ impl<const D: usize> Stitching<'_, D> {
         if !proposal.core.contains(&true) {
             return Ok(None);
         }
-        let cutting = self.cutter.cut(canvas, &proposal, self.monitor)?;
+        let cutting = self.cutter.cut(canvas, &proposal, false, self.monitor)?;
         let mut changes: Vec<(Key, i64)> = Vec::new();
         let mut change = |key: Option<Key>, by: i64| {
             if let Some(key) = key {

@@ -11,6 +11,7 @@
 mod canvas;
 mod chart;
 mod cut;
+mod energy;
 mod heal;
 mod search;
 mod source;
@@ -257,8 +258,9 @@ impl<const D: usize> Stitching<'_, D> {
         let guide = self.cutter.guide;
         let found =
             self.index.best(self.cutter.source, &self.canvas, &chart, guide, &charges, o.candidates, &noise);
+        let alone = found.len() == 1;
         let cuts = par::map(found.len(), |k| {
-            self.cutter.cut(&self.canvas, &Proposal::new(&chart, found[k]), self.monitor)
+            self.cutter.cut(&self.canvas, &Proposal::new(&chart, found[k]), !alone, self.monitor)
         });
         let mut best = None;
         for (k, cut) in cuts.into_iter().enumerate() {
@@ -267,8 +269,12 @@ impl<const D: usize> Stitching<'_, D> {
                 best = Some((k, cut));
             }
         }
-        let Some((k, cutting)) = best else { return Ok(()) };
-        let places = Proposal::new(&chart, found[k]).places;
+        let Some((k, mut cutting)) = best else { return Ok(()) };
+        let proposal = Proposal::new(&chart, found[k]);
+        if !alone {
+            cutting = self.cutter.cut(&self.canvas, &proposal, false, self.monitor)?;
+        }
+        let places = proposal.places;
         let number = self.number(&chart, centre, found[k], side);
         let before = self.canvas.free;
         heal::commit(&mut self.canvas, &chart, &places, &cutting, number);

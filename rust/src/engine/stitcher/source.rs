@@ -222,7 +222,7 @@ impl<const D: usize> Source<D> {
 }
 
 impl Look {
-    const EMPTY: Self = Self {
+    pub(super) const EMPTY: Self = Self {
         colour: [0.0; CHANNELS],
         depth: 0.0,
         element: 0,
