@@ -10,6 +10,7 @@ __all__ = [
     "Cholesky",
     "Correlation",
     "PatchIndex",
+    "Stitcher",
     "cohere",
     "complete",
     "decode_image",
@@ -150,6 +151,32 @@ def seam_labels(
     backward: Sequence[NDArray[float32]],
     wrap: Sequence[bool],
 ) -> tuple[NDArray[bool_], float]: ...
+
+@final
+class Stitcher:
+    def __new__(
+        cls,
+        colours: NDArray[float32],
+        shape: Sequence[int],
+        wrap: Sequence[bool],
+        labels: NDArray[uint32],
+        depth: NDArray[float32],
+        classes: NDArray[uint8],
+        costs: NDArray[float32],
+    ) -> Stitcher: ...
+    def stitch(
+        self,
+        place: tuple[Sequence[int], Sequence[int], Sequence[bool]],
+        jacobians: NDArray[int16],
+        patch: tuple[float, float, int, bool, bool],
+        weights: Sequence[float],
+        charges: Sequence[float],
+        seed: int,
+        held: NDArray[bool_],
+        given: NDArray[int32],
+        demand: tuple[NDArray[int16], NDArray[int16], NDArray[uint16], NDArray[uint32]] | None,
+        progress: Callable[[float], object] | None,
+    ) -> tuple[NDArray[int32], NDArray[uint32], NDArray[int16], float, int]: ...
 
 @final
 class Appearance:

@@ -12,8 +12,10 @@ import numpy as np
 from texrs._arrays import as_image, as_int, as_wrap, guidance, to_unit
 from texrs._cache import Cache, content_hash
 from texrs._engine.coherence import Similarity, find_similar
+from texrs._engine.stitcher import Stitcher
 from texrs._typing import Array, Floats, Path, Progress
 from texrs.errors import FileError, InvalidInput
+from texrs.exemplar.adjacency import measure_adjacency
 from texrs.exemplar.analysis import (
     COARSEST,
     Analysis,
@@ -23,6 +25,7 @@ from texrs.exemplar.analysis import (
     count_levels,
     measure_repeat,
 )
+from texrs.exemplar.instances import Instances, as_instances, find_instances
 from texrs.exemplar.regularity import measure_direction
 from texrs.exemplar.segmentation import ElementOptions, Segmentation, segment
 from texrs.exemplar.symmetry import Flip, find_mirrors
@@ -231,6 +234,18 @@ class Exemplar:
         )
 
     @property
+    def instances(self) -> Instances | None:
+        """The separate elements, in two or three axes; None where nothing says for sure that there are any."""
+        if self.labels:
+            return self.remember("instances", lambda: as_instances(self._pixels[..., 0], self.repeat))
+        return self.remember("instances", lambda: find_instances(self.colours, self.repeat))
+
+    @property
+    def stitcher(self) -> Stitcher:
+        """The exemplar as patches are cut from it: with its elements, and which colours lie side by side."""
+        return self.remember("stitcher", self._make_stitcher)
+
+    @property
     def mirrors(self) -> tuple[Flip, ...]:
         """The mirror images that a picture is like, itself first: (rows mirrored, columns mirrored) of each."""
         return self.remember("mirrors", lambda: find_mirrors(self.guidance))
@@ -344,6 +359,17 @@ class Exemplar:
             raise FileError(f"{path}: is damaged ({error})") from None
         made._facts["analysis", (2,), COARSEST] = analysis
         return made
+
+    def _make_stitcher(self) -> Stitcher:
+        beside, found = measure_adjacency(self.colours, self.repeat), self.instances
+        return Stitcher(
+            self.colours,
+            wrap=self.repeat,
+            classes=beside.classes,
+            costs=beside.costs,
+            labels=None if found is None else found.labels,
+            depth=None if found is None else found.depth,
+        )
 
     def _measure(self, levels: int) -> tuple[bool, ...]:
         return measure_repeat(self.colours, axes=self._axes, levels=levels) if self._repeat is None else self._repeat

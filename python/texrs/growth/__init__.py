@@ -7,19 +7,19 @@ what may be asked, `scales` growth from an atlas of scaled copies, `balance` wha
 """
 
 from texrs.growth.constraints import Conditions, Constraints, Guide, Surroundings
-from texrs.growth.engine import Grown, Start, grow
+from texrs.growth.engine import Grown, Patches, Start, grow, keep
 from texrs.growth.scales import FROM_ATLAS, grow_from_atlas, to_finest
-from texrs.growth.settings import EVERY, Settings
+from texrs.growth.settings import Settings
 from texrs.growth.start import from_draft, from_patches
 from texrs.growth.windows import Windows
 
 __all__ = [
-    "EVERY",
     "FROM_ATLAS",
     "Conditions",
     "Constraints",
     "Grown",
     "Guide",
+    "Patches",
     "Settings",
     "Start",
     "Surroundings",
@@ -28,5 +28,6 @@ __all__ = [
     "from_patches",
     "grow",
     "grow_from_atlas",
+    "keep",
     "to_finest",
 ]

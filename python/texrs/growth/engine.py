@@ -25,10 +25,23 @@ from numpy.typing import NDArray
 
 from texrs._engine.appearance import Corrected
 from texrs._engine.pyramid import Region, upsample
-from texrs._typing import Array, Progress
+from texrs._typing import Array, Floats, Progress
 from texrs.growth.constraints import NOTHING, Asked
 
-__all__ = ["Ask", "Corrector", "FramesAt", "Grown", "LevelDone", "Places", "Show", "Start", "grow", "nothing"]
+__all__ = [
+    "Ask",
+    "Corrector",
+    "FramesAt",
+    "Grown",
+    "LevelDone",
+    "Patches",
+    "Places",
+    "Show",
+    "Start",
+    "grow",
+    "keep",
+    "nothing",
+]
 
 Places: TypeAlias = NDArray[np.int32]
 FramesAt: TypeAlias = Callable[[Region, int], NDArray[np.int16]]
@@ -55,6 +68,37 @@ class Corrector(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Patches:
+    """The patches that places come from.
+
+    Attributes
+    ----------
+    labels : (points) uint32
+        The patch of each point.
+    frames : (patches, A, A) float32
+        The Jacobian at the centre of each.
+    bent : bool
+        Whether they follow the field inside, too.
+    seams : float
+        Mean cost of the seams at a point.
+    healed : int
+        Moves by which torn elements were made whole, or given up.
+
+    """
+
+    labels: NDArray[np.uint32]
+    frames: Floats
+    bent: bool
+    seams: float
+    healed: int
+
+    def report(self) -> dict[str, Any]:
+        """Return the figures as JSON types."""
+        count = len(np.unique(self.labels))
+        return {"patches": count, "bent": self.bent, "seams": round(self.seams, 6), "healed": self.healed}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Start:
     """How an output begins.
 
@@ -63,14 +107,15 @@ class Start:
     level : int
         The first level.
     make : callable
-        Returns its places: of a region, with its frames, what is asked of it, and the progress to report.
+        Returns its places, and the patches that they come from, if any: of a region, with its frames, what is asked of it,
+        and the progress to report.
     name : str
         Of its picture among the stages; empty where there is none to show.
 
     """
 
     level: int
-    make: Callable[[Region, NDArray[np.int16], Asked, Progress | None], Places]
+    make: Callable[[Region, NDArray[np.int16], Asked, Progress | None], tuple[Places, Patches | None]]
     name: str = ""
 
 
@@ -99,17 +144,32 @@ class Grown:
         What was done, from the first level on.
     stages : mapping of str to array
         Pictures of the start and of each level but the last, whose places are the result.
+    patches : Patches, optional
+        Those of the start, where nothing was changed after it.
 
     """
 
     places: Places
     levels: tuple[LevelDone, ...]
     stages: Mapping[str, Array]
+    patches: Patches | None = None
 
 
 def nothing(level: int, region: Region, spacing: int) -> Asked:
     """Ask for nothing beside the texture."""
     return NOTHING
+
+
+def keep(
+    places: Places,
+    level: int,
+    region: Region,
+    frames: NDArray[np.int16],
+    asked: Asked,
+    progress: Progress | None,
+) -> Corrected:
+    """Correct nothing: what was stitched is whole."""
+    return Corrected(places, 0, 0.0)
 
 
 def grow(
@@ -152,22 +212,24 @@ def grow(
     regions = [region]
     for _ in range(start.level, levels - 1):
         regions.insert(0, regions[0].parents())
-    places, before = np.zeros(0, np.int32), region
+    places, patches, before = np.zeros(0, np.int32), None, region
     done: list[LevelDone] = []
     stages: dict[str, Array] = {}
     for level, here in enumerate(regions, start=start.level):
         spacing = 1 << (levels - 1 - level)
         jacobians, asked = frames(here, spacing), ask(level, here, spacing)
         if level == start.level:
-            places = asked.place(start.make(here, jacobians, asked, progress))
+            places, patches = start.make(here, jacobians, asked, progress)
+            places = asked.place(places)
             if start.name and show is not None:
                 stages[start.name] = show(places, here, spacing)
         else:
             places = asked.place(upsample(places, before, here, jacobians))
         found = correct(places, level, here, jacobians, asked, progress)
         places, before = found.places, here
+        patches = patches if found.passes == 0 and level == start.level else None
         # What is coarser than the exemplar's coarsest level has nothing to show.
         if show is not None and 0 <= level < levels - 1:
             stages[f"level {level + 1}"] = show(places, here, spacing)
         done.append(LevelDone(here.shape, found.passes, found.changed))
-    return Grown(places, tuple(done), stages)
+    return Grown(places, tuple(done), stages, patches)

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["EVERY", "Settings", "Step"]
-
-EVERY = 1 << 62
-"""As many pairs of windows as there are."""
+__all__ = ["Settings", "Step"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,52 +11,70 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._engine.pyramid import ONE, Region
+from texrs._engine.stitcher import Weights
 from texrs._progress import stage
-from texrs._typing import Floats, Progress
+from texrs._typing import Progress
+from texrs.exemplar import Exemplar
 from texrs.growth.constraints import Asked
-from texrs.growth.engine import Places, Start
-from texrs.quilting import Picture, quilt
-from texrs.source_map import SourceMap
+from texrs.growth.engine import Patches, Places, Start
 
 __all__ = ["from_draft", "from_patches"]
 
-PATCH, OVERLAP = 0.45, 0.2
-"""Side of a patch and overlap of neighbours, as shares of the exemplar's shorter side: larger ones copy too much of it in
-one piece."""
+PATCH = {2: 0.45, 3: 0.68}
+"""Side of a patch, as a share of the exemplar's shorter side: larger ones copy too much of it in one piece."""
+OVERLAP = {2: 0.33, 3: 0.4}
+"""Share of it by which neighbours overlap."""
+SEPARATE, ANY = Weights(surprise=0.5), Weights()
+"""What seams cost where the elements are known, and where they are not."""
 
 
-def from_patches(colours: Floats, level: int, seed: int) -> Start:
+def from_patches(exemplar: Exemplar, level: int, seed: int, *, candidates: int = 3, bend: bool | None = None) -> Start:
     """Return the start from patches stitched along minimum cuts: cuts keep elements whole.
 
     Parameters
     ----------
-    colours : (H, W, C) float32
-        What decisions are made on (`texrs.Exemplar.guidance`).
+    exemplar : Exemplar
+        What patches are cut from.
     level : int
         Of full resolution, where it starts.
     seed : int
         Chooses the patches.
+    candidates : int
+        Places that are tried for each, of which the best stays.
+    bend : bool, optional
+        Whether patches bend with a field; None: where the exemplar has no separate elements, which would be bent too.
     """
+    axes, side = exemplar.axes, min(exemplar.shape)
 
-    def make(region: Region, frames: NDArray[np.int16], asked: Asked, progress: Progress | None) -> Places:
-        shape = (colours.shape[0], colours.shape[1])
-        side = min(shape)
-        picture = Picture(colours, SourceMap.identity(shape), np.zeros(shape, np.float32))
-        source = quilt(
-            [picture],
-            (region.shape[0], region.shape[1]),
-            patch=round(PATCH * side),
-            overlap=round(OVERLAP * side),
-            wrap=(region.wrap[0], region.wrap[1]),
-            shares=np.ones(1),
+    def make(
+        region: Region, frames: NDArray[np.int16], asked: Asked, progress: Progress | None
+    ) -> tuple[Places, Patches]:
+        stitcher = exemplar.stitcher
+        varies = len(frames) > 1
+        bent = varies and (not stitcher.separate if bend is None else bend)
+        made = stitcher.stitch(
+            region,
+            frames,
+            patch=max(4.0, PATCH[axes] * side),
+            overlap=OVERLAP[axes],
+            candidates=candidates,
+            bend=bent,
+            weights=SEPARATE if stitcher.separate else ANY,
             seed=seed,
-            progress=stage(progress, "patches") or (lambda _: None),
+            held=asked.held,
+            given=asked.given,
+            demand=asked.demand,
+            progress=stage(progress, "patches"),
         )
-        return np.asarray(np.rint(source.coordinates.reshape(-1) * np.float32(ONE)), np.int32)
+        # Points that were given are a patch of their own.
+        jacobians = np.concatenate([made.frames, np.eye(axes)[np.newaxis] * ONE]) / ONE
+        labels = np.minimum(made.patches, np.uint32(len(made.frames)))
+        patches = Patches(labels, jacobians.astype(np.float32), bent, made.seams, made.healed)
+        return made.places, patches
 
     return Start(level, make, "patches")
 
 
 def from_draft(level: int, draft: Callable[[Region], Places]) -> Start:
     """Return the start from places that are there already: of the region of a level, which may be overwritten."""
-    return Start(level, lambda region, frames, asked, progress: draft(region))
+    return Start(level, lambda region, frames, asked, progress: (draft(region), None))

@@ -55,7 +55,7 @@ class Windows:
         progress: Progress | None = None,
     ) -> Grown:
         """Grow a bounded region, whose borders are free, from a start: `initialise` unless another is given."""
-        first = start or Start(0, self.initialise, "blocks")
+        first = start or Start(0, lambda *given: (self.initialise(*given), None), "blocks")
         frames = partial(to_fixed, self.field)
         return grow(region, len(self.levels), first, self.correct, frames, ask=ask, show=show, progress=progress)
 

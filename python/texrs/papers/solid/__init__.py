@@ -37,23 +37,20 @@ Departures, with their reasons:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from texrs._engine.pyramid import ONE, Region
+from texrs._engine.pyramid import ONE, Region, to_fixed
 from texrs._typing import Array, Interpolation, Progress
 from texrs.exemplar import Exemplar
-from texrs.exemplar.analysis import COARSEST, count_levels
 from texrs.fields import Field
-from texrs.growth import Constraints, Grown, Guide, Start, Windows, from_patches
-from texrs.growth.engine import Places
-from texrs.papers.solid.gate import Trial, choose_trial_region
+from texrs.growth import Constraints, Grown, Guide, Windows, from_patches, grow, keep
+from texrs.growth.engine import Places, Show
 from texrs.papers.solid.literal import grow_as_printed
 from texrs.papers.solid.request import Method, Request
-from texrs.papers.solid.settings import QUALITIES, Quality
+from texrs.papers.solid.settings import CANDIDATES, FAST, Quality
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
@@ -68,6 +65,7 @@ def solid(
     seed: int = 0,
     wrap: bool | Sequence[bool] = False,
     quality: Quality = "preserve",
+    bend: bool | None = None,
     method: Method = None,
     constraints: Constraints | None = None,
     guide: Guide | None = None,
@@ -91,9 +89,11 @@ def solid(
     wrap : bool or (bool, bool, bool)
         Axes along which the result is to repeat: planes, rows, columns.
     quality : {"preserve", "fast", "optimise"}
-        How much work is done. "preserve" keeps low-frequency features. "fast" does a third of the work. "optimise" straightens
-        lattices and walls; it is checked on a trial, and "preserve" is done instead, and reported, where it would
-        lose anything.
+        How much work is done. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
+        three times as many places for each patch. "fast" corrects blocks point by point, for textures without elements.
+    bend : bool, optional
+        Whether patches bend with the field, as courses and nets need, or are turned and scaled as a whole, as separate
+        elements do; None goes by whether the exemplar has separate elements.
     method : {None, "paper"}
         Which algorithm. "paper": the literal one, kept for comparison. It has no ``quality``, takes no constraints
         and no guide, and looks the exemplar up at the nearest sample unless ``interpolation`` says otherwise.
@@ -113,7 +113,7 @@ def solid(
     Returns
     -------
     Synthesis
-        The volume, in the exemplar's dtype; its source map, whose frame is the field; as stages, pictures of the
+        The volume, in the exemplar's dtype; its source map, whose frames are those of its patches; as stages, pictures of the
         middle plane at each level; and a report.
 
     Raises
@@ -154,6 +154,7 @@ def solid(
         seed=seed,
         wrap=wrap,
         quality=quality,
+        bend=bend,
         method=method,
         constraints=constraints,
         guide=guide,
@@ -171,6 +172,7 @@ def synthesize(
     seed: int = 0,
     wrap: bool | Sequence[bool] = False,
     quality: Quality = "preserve",
+    bend: bool | None = None,
     method: Method = None,
     constraints: Constraints | None = None,
     guide: Guide | None = None,
@@ -194,9 +196,11 @@ def synthesize(
     wrap : bool or (bool, bool)
         Axes along which the result is to repeat: rows, columns.
     quality : {"preserve", "fast", "optimise"}
-        How much work is done. "preserve" keeps low-frequency features. "fast" does a third of the work. "optimise" straightens
-        lattices and walls; it is checked on a trial, and "preserve" is done instead, and reported, where it would
-        lose anything.
+        How much work is done. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
+        three times as many places for each patch. "fast" corrects blocks point by point, for textures without elements.
+    bend : bool, optional
+        Whether patches bend with the field, as courses and nets need, or are turned and scaled as a whole, as separate
+        elements do; None goes by whether the exemplar has separate elements.
     method : {None, "paper"}
         Which algorithm. "paper": the literal one, kept for comparison. It has no ``quality``, takes no constraints
         and no guide, and looks the exemplar up at the nearest sample unless ``interpolation`` says otherwise.
@@ -216,8 +220,8 @@ def synthesize(
     Returns
     -------
     Synthesis
-        The picture, in the exemplar's dtype; its source map, whose frame is the field; pictures of the stages; and a
-        report.
+        The picture, in the exemplar's dtype; its source map, whose frames are those of its patches; pictures of the
+        stages; and a report.
 
     Raises
     ------
@@ -256,6 +260,7 @@ def synthesize(
         seed=seed,
         wrap=wrap,
         quality=quality,
+        bend=bend,
         method=method,
         constraints=constraints,
         guide=guide,
@@ -266,50 +271,43 @@ def synthesize(
 
 
 def grow_texture(asked: Request, progress: Progress | None) -> Synthesis:
-    """Follow the paper: analyse the exemplar, grow coordinates from coarse to fine, and look the exemplar up through them."""
-    quality, trial = asked.quality, None
+    """Grow the source map, coarse to fine or from patches, and look the exemplar up through it."""
     show = partial(show_places, asked.exemplar.pixels)
     if asked.method == "paper":
         grown = grow_as_printed(asked.exemplar, asked.field, asked.seed, asked.region, show, progress)
+    elif asked.quality == "fast":
+        windows = analyse(asked)
+        grown = windows.grow(asked.region, ask=asked.conditions.at, show=show, progress=progress)
     else:
-        if quality == "optimise":
-            trial = try_optimise(asked, progress)
-            quality = "optimise" if trial.accepted else "preserve"
-        windows = analyse(asked, quality)
-        start = choose_start(asked, quality)
-        grown = windows.grow(asked.region, start=start, ask=asked.conditions.at, show=show, progress=progress)
-    last = {f"level {count_levels(asked.exemplar.shape, COARSEST)}": show(grown.places, asked.region, 1)}
-    coordinates = as_coordinates(grown.places, asked.region)
-    source = SourceMap.from_coordinates(coordinates, asked.exemplar.shape, frame=asked.field)
+        grown = stitch(asked, show, progress)
+    source = as_source(asked, grown)
     composite = source.render(asked.exemplar.image, interpolation=asked.interpolation)
+    last = {} if grown.patches else {f"level {len(grown.levels)}": show(grown.places, asked.region, 1)}
     stages = {**grown.stages, **last, "composite": composite}
-    return Synthesis(asked.conditions.show(composite), source, stages, describe(asked, quality, trial, grown))
+    return Synthesis(asked.conditions.show(composite), source, stages, describe(asked, grown))
 
 
-def analyse(asked: Request, quality: Quality) -> Windows:
-    """Step 1: the exemplar's pyramid of windows, and how much is done at each level."""
-    settings = QUALITIES[quality]
-    levels = asked.exemplar.analyse(settings.radii).levels
-    if len(levels) == 1:
-        settings = replace(settings, exhaustive=0)  # The coarsest level is the finest, too.
-    return Windows(levels, settings, asked.seed, asked.field)
+def stitch(asked: Request, show: Show, progress: Progress | None) -> Grown:
+    """Put patches together along minimum cuts, at full resolution: nothing has to be corrected."""
+    start = from_patches(asked.exemplar, 0, asked.seed, candidates=CANDIDATES[asked.quality], bend=asked.bend)
+    frames = partial(to_fixed, asked.field)
+    return grow(asked.region, 1, start, keep, frames, ask=asked.conditions.at, show=show, progress=progress)
 
 
-def choose_start(asked: Request, quality: Quality) -> Start | None:
-    """Step 2: start from stitched patches in pictures that nothing turns or guides; none is the patch-based initialisation."""
-    free = asked.field is None and asked.conditions.free
-    # Of what is thinner there is nothing to cut.
-    if quality != "preserve" or not free or asked.exemplar.axes != 2 or min(asked.region.shape) < COARSEST:
-        return None
-    return from_patches(asked.exemplar.guidance, len(asked.exemplar.analyse().levels) - 1, asked.seed)
+def analyse(asked: Request) -> Windows:
+    """Return the exemplar's pyramid of windows, and how much is done at each level."""
+    return Windows(asked.exemplar.analyse(FAST.radii).levels, FAST, asked.seed, asked.field)
 
 
-def try_optimise(asked: Request, progress: Progress | None) -> Trial:
-    """Grow the middle of the output by "optimise", and judge it."""
-    part = choose_trial_region(asked.region, asked.exemplar.pixels)
-    told = None if progress is None else lambda name, share: progress(f"trial: {name}", share)
-    tried = analyse(asked, "optimise").grow(part, progress=told)
-    return Trial.of(asked.exemplar.pixels, as_coordinates(tried.places, part), asked.field)
+def as_source(asked: Request, grown: Grown) -> SourceMap:
+    """Return places as a source map: its frames are those of rigid patches, else the field's."""
+    coordinates, shape = as_coordinates(grown.places, asked.region), asked.exemplar.shape
+    if grown.patches is None:
+        return SourceMap.from_coordinates(coordinates, shape, frame=asked.field)
+    rigid = asked.field is not None and asked.field.constant is None and not grown.patches.bent
+    frame = grown.patches.frames if rigid else asked.field
+    labels = grown.patches.labels.reshape(asked.region.shape)
+    return SourceMap.from_coordinates(coordinates, shape, label=labels, frame=frame)
 
 
 def as_coordinates(places: Places, region: Region) -> Array:
@@ -329,23 +327,32 @@ def show_places(image: Array, places: Places, region: Region, spacing: int) -> A
     return image[at]
 
 
-def describe(asked: Request, quality: Quality, trial: Trial | None, grown: Grown) -> dict[str, Any]:
+def describe(asked: Request, grown: Grown) -> dict[str, Any]:
     """Return the report: JSON types."""
+    levels = [done.report() for done in grown.levels]
     if asked.method == "paper":
-        levels = [{"shape": list(done.shape), "passes": done.passes} for done in grown.levels]
-    else:
-        known = asked.exemplar.analyse(QUALITIES[quality].radii).levels[-len(grown.levels) :]
-        spacing = ({"spacing": round(here.spacing, 6)} for here in known)
-        levels = [{"shape": None, **own, **done.report()} for own, done in zip(spacing, grown.levels, strict=True)]
+        levels = [{"shape": level["shape"], "passes": level["passes"]} for level in levels]
+    elif asked.quality == "fast":
+        known = asked.exemplar.analyse(FAST.radii).levels[-len(levels) :]
+        levels = [{**level, "spacing": round(here.spacing, 6)} for here, level in zip(known, levels, strict=True)]
     return {
         "method": asked.method or "default",
-        "quality": None if asked.method else quality,
-        "trial": None if trial is None else trial.report(),
+        "quality": None if asked.method else asked.quality,
         "seed": asked.seed,
         "field": None if asked.field is None else asked.field.describe(),
         "repeats": list(asked.exemplar.repeat),
         "interpolation": asked.interpolation,
         "held": asked.conditions.count,
         "guided": asked.conditions.maps is not None,
+        "elements": _count_elements(asked),
+        "stitched": None if grown.patches is None else grown.patches.report(),
         "levels": levels,
     }
+
+
+def _count_elements(asked: Request) -> int | None:
+    """Return how many separate elements were found, where they were looked for."""
+    if asked.method == "paper" or asked.quality == "fast":
+        return None
+    found = asked.exemplar.instances
+    return 0 if found is None else found.count

@@ -79,7 +79,7 @@ def grow_as_printed(
     while max(coarsest.shape) > 1:
         first, coarsest = first - 1, coarsest.parents()
     zero = np.zeros(coarsest.points * len(region.shape), np.int32)
-    start = Start(first, lambda region, frames, asked, progress: zero)
+    start = Start(first, lambda region, frames, asked, progress: (zero, None))
     # A_l: the field at the places of the level's points.
     frames = partial(to_fixed, field)
     return grow(region, levels, start, Correction(exemplar, seed, first), frames, show=show, progress=progress)

@@ -41,6 +41,8 @@ class Request:
         Chooses the texture.
     quality : {"preserve", "fast", "optimise"}
         How much work is done.
+    bend : bool, optional
+        Whether patches bend with the field; none leaves it to the exemplar.
     method : {None, "paper"}
         Which algorithm.
     conditions : Conditions
@@ -55,6 +57,7 @@ class Request:
     field: Field | None
     seed: int
     quality: Quality
+    bend: bool | None
     method: Method
     conditions: Conditions
     interpolation: Interpolation
@@ -70,6 +73,7 @@ class Request:
         seed: int,
         wrap: bool | Sequence[bool],
         quality: Quality,
+        bend: bool | None,
         method: Method,
         constraints: Constraints | None,
         guide: Guide | None,
@@ -83,16 +87,15 @@ class Request:
         if method == "paper" and (constraints is not None or guide is not None):
             what = "constraints" if constraints is not None else "guide"
             raise InvalidInput(f"{what}: the paper's method knows none; leave out {what}, or method='paper'")
-        checked = as_quality(quality)
-        if checked == "optimise" and min(region.shape) < COARSEST:
-            checked = "preserve"  # What is so thin cannot be judged by a trial.
+        if bend is not None and not isinstance(bend, bool):
+            raise InvalidInput(f"bend: needs True, False or None, got {bend!r}")
         how = as_interpolation(interpolation, known, "nearest" if method == "paper" else "cubic")
         turned = as_field(field, axes)
         if turned is not None:
             turned = turned.over(region.shape)
         check_memory(known.pixels, region, turned, memory_limit)
         conditions = Conditions.of(known.pixels, region.shape, constraints, guide)
-        return cls(known, region, turned, as_seed(seed), checked, method, conditions, how)
+        return cls(known, region, turned, as_seed(seed), as_quality(quality), bend, method, conditions, how)
 
 
 def as_field(field: object, axes: int) -> Field | None:

@@ -1,0 +1,210 @@
+"""The stitcher: patches of an exemplar pulled into the output through any map, and cut where it shows least."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs import _rust
+from texrs._arrays import as_float, as_int, as_seed
+from texrs._engine.appearance import Demand, Report
+from texrs._engine.pyramid import Region, flatten
+from texrs._typing import Floats
+from texrs.errors import InvalidInput
+
+__all__ = ["Stitched", "Stitcher", "Weights"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Weights:
+    """What a seam costs: each 0 to 100.
+
+    Attributes
+    ----------
+    colour : float
+        Squared differences of the colours on both sides, in the exemplar's standard deviations.
+    contact, jump, depth, joint : float
+        Two elements in contact; an element that is cut off; a seam inside of one; elements nearer than two samples.
+    surprise : float
+        Colours that are seldom seen side by side.
+    distortion : float
+        A point whose patch is bent against the field.
+    guide : float
+        A point that does not show what is asked.
+
+    """
+
+    colour: float = 0.1
+    contact: float = 1.0
+    jump: float = 1.0
+    depth: float = 0.15
+    joint: float = 0.5
+    surprise: float = 1.0
+    distortion: float = 0.03
+    guide: float = 0.05
+
+
+class Stitched(NamedTuple):
+    """What has been stitched.
+
+    Attributes
+    ----------
+    places : (points * A) int32
+        In units of 1/4096 of a sample.
+    patches : (points) uint32
+        The patch that each point shows; one beyond the last for points that were given.
+    frames : (patches, A, A) int16
+        The Jacobian at the centre of each, in units of 1/4096.
+    seams : float
+        Mean cost of the seams at a point.
+    healed : int
+        Moves by which elements were made whole, or given up.
+
+    """
+
+    places: NDArray[np.int32]
+    patches: NDArray[np.uint32]
+    frames: NDArray[np.int16]
+    seams: float
+    healed: int
+
+
+class Stitcher:
+    """An exemplar that patches are cut from.
+
+    Parameters
+    ----------
+    colours : (..., C) float32
+        Up to four channels of any scale, of two or three axes.
+    wrap : one bool an axis
+        Axes along which the exemplar repeats.
+    classes : uint8 array
+        Class of each sample.
+    costs : (K, K) float32
+        How surprising two classes side by side are.
+    labels : uint32 array, optional
+        Number of the element of each sample, from 1; 0 for none.
+    depth : float32 array, optional
+        Distance of each sample to the background.
+
+    Raises
+    ------
+    InvalidInput
+        Arrays that do not belong together.
+
+    """
+
+    def __init__(
+        self,
+        colours: Floats,
+        *,
+        wrap: Sequence[bool],
+        classes: NDArray[np.uint8],
+        costs: Floats,
+        labels: NDArray[np.uint32] | None = None,
+        depth: Floats | None = None,
+    ) -> None:
+        self.shape = colours.shape[:-1]
+        self._inner = _rust.Stitcher(
+            np.ascontiguousarray(colours.reshape(-1, colours.shape[-1]), np.float32),
+            self.shape,
+            wrap,
+            np.zeros(0, np.uint32) if labels is None else np.ascontiguousarray(labels.reshape(-1)),
+            np.zeros(0, np.float32) if depth is None else np.ascontiguousarray(depth.reshape(-1)),
+            np.ascontiguousarray(classes.reshape(-1)),
+            np.ascontiguousarray(costs.reshape(-1)),
+        )
+        self.separate = labels is not None
+        self.nbytes = 32 * int(np.prod(self.shape, dtype=np.int64))
+
+    def stitch(
+        self,
+        region: Region,
+        frames: NDArray[np.int16],
+        *,
+        patch: float,
+        overlap: float = 0.4,
+        candidates: int = 3,
+        bend: bool = False,
+        heal: bool = True,
+        weights: Weights = Weights(),
+        repetition: float = 0.15,
+        continuation: float = 4.0,
+        seed: int = 0,
+        held: NDArray[np.bool_] | None = None,
+        given: NDArray[np.int32] | None = None,
+        demand: Demand | None = None,
+        progress: Report | None = None,
+    ) -> Stitched:
+        """Fill a region with patches.
+
+        Parameters
+        ----------
+        region : Region
+            What to fill.
+        frames : (1 or points, A, A) int16
+            Jacobians over the region (see `texrs._engine.pyramid.to_fixed`).
+        patch : float
+            Side of a patch in samples of the exemplar, 4 to 4096.
+        overlap : float
+            Share of it by which neighbours overlap, 0 to 0.8.
+        candidates : int
+            Places that are cut in, of which the cheapest stays; 1 to 64.
+        bend : bool
+            Whether patches bend with the field, or are turned and scaled as a whole.
+        heal : bool
+            Whether torn elements are grown whole, or given up.
+        weights : Weights
+            What seams cost.
+        repetition, continuation : float
+            Cost of places that have been shown more often than others, and of going on exactly where a neighbour ends, 0
+            to 100; places that have nothing to do with each other differ by 2.
+        seed : int
+            Chooses the texture.
+        held : (points) bool, optional
+            Points that keep their places.
+        given : (points * A) int32, optional
+            The places of the held points; those of others do not count.
+        demand : Demand, optional
+            What else the points are to show.
+        progress : callable, optional
+            Called with the share that is done; raising stops the work.
+
+        Returns
+        -------
+        Stitched
+
+        Raises
+        ------
+        InvalidInput
+            An option out of its range, or arrays of other sizes than the region's.
+        Cancelled
+            The work was stopped.
+
+        """
+        axes = len(self.shape)
+        if len(region.shape) != axes:
+            raise InvalidInput(f"region: the exemplar has {axes} axes, got {region.shape}")
+        places, patches, jacobians, seams, healed = self._inner.stitch(
+            region.place,
+            frames,
+            (
+                as_float(patch, "patch", 4, 4096),
+                as_float(overlap, "overlap", 0, 0.8),
+                as_int(candidates, "candidates", 1, 64),
+                bend,
+                heal,
+            ),
+            list(astuple(weights)),
+            [as_float(repetition, "repetition", 0, 100), as_float(continuation, "continuation", 0, 100)],
+            as_seed(seed),
+            flatten(held),
+            np.zeros(0, np.int32) if given is None else given,
+            demand,
+            progress,
+        )
+        return Stitched(places, patches, jacobians.reshape(-1, axes, axes), seams, healed)

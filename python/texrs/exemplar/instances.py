@@ -1,0 +1,203 @@
+"""Separate elements of an exemplar by their colours: what lies in a background that hangs together.
+
+The colours are a small palette, and the background is the part of it that, taken away, leaves many bounded pieces, while
+it hangs together itself. It is only taken for one where nothing speaks against it: textures without such a background
+are better cut by which colours are seen side by side (`texrs.exemplar.adjacency`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from texrs._typing import Array, Bools, Floats
+from texrs.exemplar.adjacency import classify
+
+__all__ = ["Instances", "find_instances"]
+
+COLOURS = 6
+"""Of the palette."""
+LEAST = 6
+"""Pieces, and samples of a piece, that count."""
+LARGEST = 0.15
+"""Of all pieces, that one may have: more of it is no element."""
+FAIR, CONTRAST, SHARE, COMPACT = 0.9, 4.0, 0.65, 0.9
+"""What must be reached: score of the background; change of colours at the borders of pieces over that elsewhere; most of the
+exemplar that is not background; share of the pieces that are shorter than half of the exemplar."""
+PAD = 12
+"""Samples around an exemplar that repeats, for distances: beyond this a sample is as deep inside as any."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Instances:
+    """The elements of an exemplar.
+
+    Attributes
+    ----------
+    labels : uint32 array
+        Number of the element of each sample, 0 for none. Samples that two elements touch by have none.
+    depth : float32 array
+        Distance of each sample to the background, 0 in it.
+
+    """
+
+    labels: NDArray[np.uint32]
+    depth: Floats
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return int(self.labels.max(initial=0))
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the arrays."""
+        return self.labels.nbytes + self.depth.nbytes
+
+
+class _Pieces(NamedTuple):
+    score: float
+    mask: Bools
+    labels: NDArray[np.intp]
+
+
+def find_instances(colours: Floats, wrap: Sequence[bool]) -> Instances | None:
+    """Find the separate elements of an exemplar.
+
+    Parameters
+    ----------
+    colours : (..., C) float32
+        The exemplar, of two or three axes.
+    wrap : one bool an axis
+        Axes along which it repeats.
+
+    Returns
+    -------
+    Instances or None
+        None where no background hangs together and leaves bounded pieces.
+
+    Examples
+    --------
+    >>> import texrs
+    >>> from texrs.exemplar.instances import find_instances
+    >>> stones = texrs.Exemplar(texrs.samples.particles((48, 48, 48)).image, axes=3)
+    >>> find_instances(stones.colours, stones.repeat).count > 10
+    True
+
+    """
+    axes = colours.ndim - 1
+    # A little smoother than it is: grain would tear pieces.
+    modes = ["wrap" if closed else "nearest" for closed in wrap]
+    smooth = np.stack([ndimage.gaussian_filter(colours[..., c], 0.7, mode=modes) for c in range(colours.shape[-1])], -1)
+    palette = classify(smooth, COLOURS)
+    best: _Pieces | None = None
+    background: list[int] = []
+    while len(background) < COLOURS - 1:
+        tries = [_try_background(palette, [*background, c], wrap) for c in range(COLOURS) if c not in background]
+        colour = max(range(len(tries)), key=lambda k: tries[k].score)
+        if best is not None and tries[colour].score <= best.score + 0.005:
+            break
+        best = tries[colour]
+        background.append([c for c in range(COLOURS) if c not in background][colour])
+    if best is None or not _stand_out(colours, best, wrap):
+        return None
+    padding = [(PAD, PAD)] * axes
+    whole = np.pad(best.mask, padding, mode="wrap" if all(wrap) else "edge")
+    depth = ndimage.distance_transform_edt(whole)[(slice(PAD, -PAD),) * axes]
+    return Instances(best.labels.astype(np.uint32), depth.astype(np.float32))
+
+
+def _try_background(palette: NDArray[np.uint8], colours: list[int], wrap: Sequence[bool]) -> _Pieces:
+    """Return the pieces that are left without some colours: as they are, or apart where they touch by a sample."""
+    mask = ~np.isin(palette, colours)
+    ground = np.bincount(label_components(~mask, wrap).ravel())[1:]
+    whole = ground.max(initial=0) / max(ground.sum(), 1)
+    found = [_score_pieces(mask, mask, whole, wrap)]
+    apart = ndimage.binary_erosion(mask, border_value=1)
+    if apart.sum() > 0.25 * mask.sum():
+        pieces = _score_pieces(mask, apart, whole, wrap)
+        found.append(pieces._replace(score=0.96 * pieces.score))
+    return max(found, key=lambda pieces: pieces.score)
+
+
+def _score_pieces(mask: Bools, apart: Bools, whole: float, wrap: Sequence[bool]) -> _Pieces:
+    labels = label_components(apart, wrap)
+    sizes = np.bincount(labels.ravel())[1:]
+    if len(sizes) < LEAST:
+        return _Pieces(0.0, mask, labels)
+    bounded = sizes[(sizes >= LEAST) & (sizes <= LARGEST * sizes.sum())].sum() / sizes.sum()
+    return _Pieces(float(bounded * whole**2), mask, labels)
+
+
+def _stand_out(colours: Floats, pieces: _Pieces, wrap: Sequence[bool]) -> bool:
+    """Whether pieces are elements: few samples of all, short, and of other colours than what is around them."""
+    if pieces.score < FAIR or pieces.mask.mean() > SHARE:
+        return False
+    sizes = np.bincount(pieces.labels.ravel())[1:]
+    boxes = ndimage.find_objects(pieces.labels)
+    short = [
+        all(closed or 2 * (s.stop - s.start) <= n for s, n, closed in zip(box, pieces.labels.shape, wrap, strict=True))
+        for box in boxes
+    ]
+    if sizes[short].sum() < COMPACT * sizes.sum():
+        return False
+    border, rest = [], []
+    for axis in range(pieces.mask.ndim):
+        near, far = (
+            np.take(pieces.mask, k, axis)
+            for k in (range(pieces.mask.shape[axis] - 2), range(2, pieces.mask.shape[axis]))
+        )
+        change = np.linalg.norm(
+            np.take(colours, range(2, colours.shape[axis]), axis)
+            - np.take(colours, range(colours.shape[axis] - 2), axis),
+            axis=-1,
+        )
+        border.append(change[near != far])
+        rest.append(change[near == far])
+    means = [float(np.concatenate(part).mean(dtype=np.float64)) for part in (border, rest)]
+    return means[0] >= CONTRAST * max(means[1], 1e-6)
+
+
+def label_components(mask: Bools, wrap: Sequence[bool]) -> NDArray[np.intp]:
+    """Return the connected parts of a mask, numbered from 1, around the axes that repeat."""
+    labels, count = ndimage.label(mask)
+    roots = np.arange(count + 1)
+
+    def root(k: int) -> int:
+        while roots[k] != k:
+            k = roots[k]
+        return k
+
+    for axis, closed in enumerate(wrap):
+        if closed:
+            first, last = np.take(labels, 0, axis).ravel(), np.take(labels, -1, axis).ravel()
+            both = (first > 0) & (last > 0)
+            for a, b in np.unique(np.stack([first[both], last[both]], -1), axis=0):
+                low, high = sorted((root(a), root(b)))
+                roots[high] = low
+    parts = np.array([root(k) for k in range(count + 1)])
+    return np.asarray(np.unique(parts, return_inverse=True)[1][labels], np.intp)
+
+
+def as_instances(classes: Array, wrap: Sequence[bool]) -> Instances | None:
+    """Return the elements of an exemplar of labels: connected parts of any class but that which hangs together most."""
+    parts = {int(c): label_components(classes == c, wrap) for c in np.unique(classes)}
+    largest = {c: np.bincount(p.ravel())[1:].max() / classes.size for c, p in parts.items()}
+    ground = max(largest, key=lambda c: (largest[c], -c))
+    mask = classes != ground
+    labels, count = np.zeros(classes.shape, np.uint32), 0
+    for c, part in parts.items():
+        if c != ground:
+            labels[part > 0] = (part[part > 0] + count).astype(np.uint32)
+            count += int(part.max())
+    sizes = np.bincount(labels.ravel())[1:]
+    if len(sizes) < LEAST or sizes.max() > LARGEST * sizes.sum() or mask.mean() > SHARE:
+        return None
+    padding = [(PAD, PAD)] * classes.ndim
+    depth = ndimage.distance_transform_edt(np.pad(mask, padding, mode="wrap" if all(wrap) else "edge"))
+    return Instances(labels, depth[(slice(PAD, -PAD),) * classes.ndim].astype(np.float32))
