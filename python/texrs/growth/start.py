@@ -28,7 +28,7 @@ SEPARATE, ANY = Weights(surprise=0.5), Weights()
 """What seams cost where the elements are known, and where they are not."""
 
 
-def from_patches(exemplar: Exemplar, level: int, seed: int, *, candidates: int = 3, bend: bool | None = None) -> Start:
+def from_patches(exemplar: Exemplar, level: int, seed: int, *, candidates: int = 4, bend: bool | None = None) -> Start:
     """Return the start from patches stitched along minimum cuts: cuts keep elements whole.
 
     Parameters

@@ -65,7 +65,7 @@ impl Stitcher {
         jacobians: PyReadonlyArray3In<'py>,
         patch: (f32, f32, usize, bool, bool),
         weights: [f32; 8],
-        charges: [f32; 2],
+        charges: [f32; 3],
         seed: u64,
         held: PyReadonlyArray1<'py, bool>,
         given: PyReadonlyArray1<'py, i32>,
@@ -83,6 +83,7 @@ impl Stitcher {
             weights: Weights { colour, contact, jump, depth, joint, surprise, distortion, guide: asked },
             repetition: charges[0],
             continuation: charges[1],
+            balance: charges[2],
             seed,
         };
         let (jacobians, held, given) = (jacobians.as_slice()?, held.as_slice()?, given.as_slice()?);

@@ -18,7 +18,7 @@ FAST = replace(Settings(), passes=(4, 2, 2), reaches=(2, 2, 1), rounds=4, candid
 ON_DEMAND = replace(FAST, passes=(2, 1, 2), reaches=(1, 1, 1), rounds=2, candidates=192, repetition=0.0)
 """What a point can see of its surroundings is paid for at the border of every window: it sees little."""
 
-CANDIDATES: dict[Quality, int] = {"preserve": 3, "optimise": 9}
+CANDIDATES: dict[Quality, int] = {"preserve": 4, "optimise": 12}
 """Places that are tried for each patch."""
 
 

@@ -6,6 +6,7 @@
 
 use std::collections::HashMap;
 
+use super::balance::Balance;
 use super::canvas::{Canvas, FREE, HELD, Window};
 use super::chart::{Chart, flood};
 use super::cut::{Cutting, Proposal};
@@ -43,6 +44,7 @@ struct Instance<const D: usize> {
 /// A change of the canvas that makes it better.
 struct Move<const D: usize> {
     gain: f64,
+    balance: Balance,
     patch: u32,
     chart: Chart<D>,
     cutting: Cutting<D>,
@@ -262,14 +264,18 @@ impl<const D: usize> Stitching<'_, D> {
                 change(self.instance(patch, proposal.places[i]), 1);
             }
         }
+        let source = self.cutter.source;
+        let balance = self.balance.after(source, canvas, &proposal, &cutting);
+        let worth = f64::from(self.options.balance / self.options.patch);
         let mut gain = self.cutter.value(canvas, &proposal) - cutting.value;
+        gain += worth * (self.balance.excess(source) - balance.excess(source));
         for &(key, by) in &changes {
             let now = counts.get(&key).copied().unwrap_or(0);
             gain += self.lack(key, now) - self.lack(key, now + by);
         }
         let places = std::mem::take(&mut proposal.places);
         drop(proposal);
-        Ok((gain > 1e-3).then_some(Move { gain, patch, chart, cutting, proposal: places, counts: changes }))
+        Ok((gain > 1e-3).then_some(Move { gain, patch, chart, cutting, proposal: places, counts: changes, balance }))
     }
 
     /// What a patch shows in a window.
@@ -294,6 +300,7 @@ impl<const D: usize> Stitching<'_, D> {
     }
 
     fn apply(&mut self, best: &Move<D>) {
+        self.balance = best.balance.clone();
         let chart = &best.chart;
         commit(&mut self.canvas, chart, &best.proposal, &best.cutting, best.patch);
     }

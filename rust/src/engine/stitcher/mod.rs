@@ -8,6 +8,7 @@
 //! Kwatra, Schödl, Essa, Turk, Bobick, *Graphcut textures*, SIGGRAPH 2003. Departures: patches follow a field; a cut
 //! judges the pair that results, not how far the two pictures differ; elements are known to it.
 
+mod balance;
 mod canvas;
 mod chart;
 mod cut;
@@ -25,6 +26,7 @@ use crate::foundation::hash::Noise;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
+use balance::Balance;
 use canvas::{Canvas, HELD};
 use chart::Chart;
 pub use cut::Weights;
@@ -54,6 +56,8 @@ pub struct Options {
     pub repetition: f32,
     /// Cost of going on exactly where a neighbour ends.
     pub continuation: f32,
+    /// Cost of points of classes that are shown more often than in the exemplar: of as many as a side of a patch has.
+    pub balance: f32,
     /// Whether torn elements are healed.
     pub heal: bool,
     /// Chooses the texture.
@@ -107,6 +111,7 @@ struct Stitching<'a, const D: usize> {
     patches: Vec<Patch<D>>,
     /// Patches by what they show at the origin, where one frame serves all: what goes on exactly is one patch.
     offsets: HashMap<Place<D>, u32>,
+    balance: Balance,
     noise: Noise,
     monitor: &'a Monitor,
 }
@@ -137,6 +142,7 @@ pub fn stitch<const D: usize>(
         frames,
         options: *options,
         index: Index::new(source, guide),
+        balance: Balance::new(source, &canvas),
         canvas,
         patches: Vec::new(),
         offsets: HashMap::new(),
@@ -183,7 +189,7 @@ fn check<const D: usize>(
     }
     let w = &options.weights;
     let costs = [w.colour, w.contact, w.jump, w.depth, w.joint, w.surprise, w.distortion, w.guide];
-    let others = [options.repetition, options.continuation];
+    let others = [options.repetition, options.continuation, options.balance];
     if !costs.iter().chain(&others).all(|x| (0.0..=100.0).contains(x)) {
         return Err(Error::value("weights", format!("0 to 100 are allowed, got {options:?}")));
     }
@@ -259,13 +265,18 @@ impl<const D: usize> Stitching<'_, D> {
         let found =
             self.index.best(self.cutter.source, &self.canvas, &chart, guide, &charges, o.candidates, &noise);
         let alone = found.len() == 1;
+        let source = self.cutter.source;
+        let worth = f64::from(o.balance / side);
         let cuts = par::map(found.len(), |k| {
-            self.cutter.cut(&self.canvas, &Proposal::new(&chart, found[k]), !alone, self.monitor)
+            let patch = Proposal::new(&chart, found[k]);
+            let mut cut = self.cutter.cut(&self.canvas, &patch, !alone, self.monitor)?;
+            cut.value += worth * self.balance.after(source, &self.canvas, &patch, &cut).excess(source);
+            Ok(cut)
         });
-        let mut best = None;
+        let mut best: Option<(usize, cut::Cutting<D>)> = None;
         for (k, cut) in cuts.into_iter().enumerate() {
             let cut = cut?;
-            if best.as_ref().is_none_or(|(_, b): &(usize, cut::Cutting<D>)| cut.value < b.value) {
+            if best.as_ref().is_none_or(|(_, b)| cut.value < b.value) {
                 best = Some((k, cut));
             }
         }
@@ -274,6 +285,7 @@ impl<const D: usize> Stitching<'_, D> {
         if !alone {
             cutting = self.cutter.cut(&self.canvas, &proposal, false, self.monitor)?;
         }
+        self.balance = self.balance.after(source, &self.canvas, &proposal, &cutting);
         let places = proposal.places;
         let number = self.number(&chart, centre, found[k], side);
         let before = self.canvas.free;

@@ -51,6 +51,8 @@ pub struct Source<const D: usize> {
     sizes: Vec<u32>,
     costs: Vec<f32>,
     classes: usize,
+    /// Share of the samples that are of each class.
+    shares: Vec<f64>,
 }
 
 impl<const D: usize> Source<D> {
@@ -106,7 +108,11 @@ impl<const D: usize> Source<D> {
             sizes: vec![0; most + 1],
             costs: adjacency.costs.to_vec(),
             classes,
+            shares: vec![0.0; classes],
         };
+        for &class in adjacency.classes {
+            this.shares[usize::from(class)] += 1.0 / n as f64;
+        }
         let (mean, deviation) = spread(colours, channels);
         for (i, look) in this.looks.iter_mut().enumerate() {
             for c in 0..channels {
@@ -157,6 +163,17 @@ impl<const D: usize> Source<D> {
     /// Samples of an element.
     pub(super) fn size(&self, element: u32) -> u32 {
         self.sizes[element as usize]
+    }
+
+    /// Share of the samples that are of each class.
+    pub(super) fn shares(&self) -> &[f64] {
+        &self.shares
+    }
+
+    /// The class of the sample that a place shows.
+    #[inline(always)]
+    pub(super) fn class(&self, place: Place<D>) -> usize {
+        usize::from(self.looks[self.sample(place)].class)
     }
 
     /// The element that a place shows, 0 for none.

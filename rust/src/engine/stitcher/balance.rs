@@ -1,0 +1,65 @@
+//! Classes in balance: what a canvas shows too often is dear, and what it shows too seldom is cheap.
+//!
+//! Cuts are cheapest where nothing is to be cut, so without a counterweight the rare things of an exemplar get rarer.
+
+use super::canvas::Canvas;
+use super::cut::{Cutting, Proposal};
+use super::source::Source;
+
+/// How many points of each class a canvas shows.
+#[derive(Clone)]
+pub(super) struct Balance {
+    counts: Vec<i64>,
+    covered: i64,
+}
+
+impl Balance {
+    pub(super) fn new<const D: usize>(source: &Source<D>, canvas: &Canvas<D>) -> Self {
+        let mut this = Self { counts: vec![0; source.shares().len()], covered: 0 };
+        for p in 0..canvas.grid.len() {
+            if canvas.covered(p as u32) {
+                this.add(source.class(canvas.places[p]), 1);
+                this.covered += 1;
+            }
+        }
+        this
+    }
+
+    #[inline(always)]
+    fn add(&mut self, class: usize, by: i64) {
+        if let Some(count) = self.counts.get_mut(class) {
+            *count += by;
+        }
+    }
+
+    /// The balance after a cut.
+    pub(super) fn after<const D: usize>(
+        &self,
+        source: &Source<D>,
+        canvas: &Canvas<D>,
+        patch: &Proposal<'_, D>,
+        cutting: &Cutting<D>,
+    ) -> Self {
+        let mut next = Self { counts: self.counts.clone(), covered: self.covered };
+        if next.counts.is_empty() {
+            return next;
+        }
+        for (i, &p) in patch.window.points.iter().enumerate() {
+            if cutting.take[i] {
+                if canvas.covered(p) {
+                    next.add(source.class(canvas.places[p as usize]), -1);
+                } else {
+                    next.covered += 1;
+                }
+                next.add(source.class(patch.places[i]), 1);
+            }
+        }
+        next
+    }
+
+    /// Points that would have to be of another class for the shares to be those of the exemplar.
+    pub(super) fn excess<const D: usize>(&self, source: &Source<D>) -> f64 {
+        let wrong = |(&count, &share): (&i64, &f64)| (count as f64 - share * self.covered as f64).abs();
+        self.counts.iter().zip(source.shares()).map(wrong).sum::<f64>() / 2.0
+    }
+}
