@@ -52,7 +52,10 @@ type PartsOut<'py> = (
     i32,
 );
 
-pub(super) fn fixed<T: Copy, const D: usize>(argument: &'static str, values: &[T]) -> Result<[T; D]> {
+pub(super) fn fixed<T: Copy, const D: usize>(
+    argument: &'static str,
+    values: &[T],
+) -> Result<[T; D]> {
     values.try_into().map_err(|_| Error::Shape {
         argument,
         expected: vec![D],
@@ -91,7 +94,11 @@ pub(super) fn slices<'a>(guide: &'a Option<GuideIn<'_>>) -> PyResult<GuideSlices
     })
 }
 
-pub(super) fn guide<'a>(arrays: GuideSlices<'a>, samples: usize, points: usize) -> Result<Option<Guide<'a>>> {
+pub(super) fn guide<'a>(
+    arrays: GuideSlices<'a>,
+    samples: usize,
+    points: usize,
+) -> Result<Option<Guide<'a>>> {
     arrays
         .map(|(a, b, c, d)| Guide::new(grouped("guide", a)?, b, c, samples, points)?.ordered(d))
         .transpose()

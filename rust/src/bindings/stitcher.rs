@@ -41,8 +41,14 @@ impl Stitcher {
     ) -> PyResult<Self> {
         let channels = colours.shape()[1];
         let colours = colours.as_slice()?;
-        let elements = Elements { labels: labels.as_slice()?, depth: depth.as_slice()? };
-        let adjacency = Adjacency { classes: classes.as_slice()?, costs: costs.as_slice()? };
+        let elements = Elements {
+            labels: labels.as_slice()?,
+            depth: depth.as_slice()?,
+        };
+        let adjacency = Adjacency {
+            classes: classes.as_slice()?,
+            costs: costs.as_slice()?,
+        };
         run(py, None, |_| match shape.len() {
             2 => {
                 let grid = Grid::new(fixed("shape", &shape)?, fixed("wrap", &wrap)?)?;
@@ -73,14 +79,32 @@ impl Stitcher {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<StitchedOut<'py>> {
         let (side, overlap, candidates, bend, heal) = patch;
-        let [colour, contact, jump, depth, joint, surprise, distortion, asked] = weights;
+        let [
+            colour,
+            contact,
+            jump,
+            depth,
+            joint,
+            surprise,
+            distortion,
+            asked,
+        ] = weights;
         let options = Options {
             patch: side,
             overlap,
             candidates,
             bend,
             heal,
-            weights: Weights { colour, contact, jump, depth, joint, surprise, distortion, guide: asked },
+            weights: Weights {
+                colour,
+                contact,
+                jump,
+                depth,
+                joint,
+                surprise,
+                distortion,
+                guide: asked,
+            },
             repetition: charges[0],
             continuation: charges[1],
             balance: charges[2],
@@ -93,12 +117,28 @@ impl Stitcher {
                 run(py, progress, |monitor| -> Result<_> {
                     let region = region(&place)?;
                     let guide = guide(demand, $source.grid().len(), region.grid.len())?;
-                    let given = Given { points: held, places: grouped("given", given)? };
+                    let given = Given {
+                        points: held,
+                        places: grouped("given", given)?,
+                    };
                     let frames = frames(jacobians)?;
-                    let made =
-                        stitcher::stitch($source, &region, frames, guide.as_ref(), given, &options, monitor)?;
+                    let made = stitcher::stitch(
+                        $source,
+                        &region,
+                        frames,
+                        guide.as_ref(),
+                        given,
+                        &options,
+                        monitor,
+                    )?;
                     let frames = made.frames.as_flattened().as_flattened().to_vec();
-                    Ok((made.places.into_flattened(), made.patches, frames, made.seams, made.healed))
+                    Ok((
+                        made.places.into_flattened(),
+                        made.patches,
+                        frames,
+                        made.seams,
+                        made.healed,
+                    ))
                 })
             };
         }
@@ -107,7 +147,13 @@ impl Stitcher {
             Either::Three(source) => stitched!(source),
         }?;
         let out = |x| PyArray1::from_vec(py, x);
-        Ok((out(places), PyArray1::from_vec(py, patches), PyArray1::from_vec(py, frames), seams, healed))
+        Ok((
+            out(places),
+            PyArray1::from_vec(py, patches),
+            PyArray1::from_vec(py, frames),
+            seams,
+            healed,
+        ))
     }
 }
 

@@ -73,6 +73,23 @@ impl<const D: usize> Grid<D> {
         point
     }
 
+    /// All points, in row-major order: cheaper than [`Self::point`] of each position.
+    pub fn points(&self) -> impl Iterator<Item = [usize; D]> + use<D> {
+        let shape = self.shape;
+        let mut next = [0; D];
+        (0..self.len()).map(move |_| {
+            let point = next;
+            for axis in (0..D).rev() {
+                next[axis] += 1;
+                if next[axis] < shape[axis] {
+                    break;
+                }
+                next[axis] = 0;
+            }
+            point
+        })
+    }
+
     /// Coordinate `i` brought onto the axis: around it where it wraps, to the nearest end where it does not.
     pub fn resolve(&self, axis: usize, i: isize) -> usize {
         let n = self.shape[axis] as isize;
@@ -223,6 +240,7 @@ mod tests {
             prop_assert_eq!(grid.index(grid.point(index)), index);
             let dot: usize = grid.point(index).iter().zip(grid.strides()).map(|(p, s)| p * s).sum();
             prop_assert_eq!(dot, index);
+            prop_assert_eq!(grid.points().nth(index), Some(grid.point(index)));
         }
     }
 }

@@ -3,8 +3,8 @@
 //! Cuts are cheapest where nothing is to be cut, so without a counterweight the rare things of an exemplar get rarer.
 
 use super::canvas::Canvas;
-use super::cut::{Cutting, Proposal};
 use super::source::Source;
+use crate::foundation::fixed::Place;
 
 /// How many points of each class a canvas shows.
 #[derive(Clone)]
@@ -15,7 +15,10 @@ pub(super) struct Balance {
 
 impl Balance {
     pub(super) fn new<const D: usize>(source: &Source<D>, canvas: &Canvas<D>) -> Self {
-        let mut this = Self { counts: vec![0; source.shares().len()], covered: 0 };
+        let mut this = Self {
+            counts: vec![0; source.shares().len()],
+            covered: 0,
+        };
         for p in 0..canvas.grid.len() {
             if canvas.covered(p as u32) {
                 this.add(source.class(canvas.places[p]), 1);
@@ -32,26 +35,30 @@ impl Balance {
         }
     }
 
-    /// The balance after a cut.
+    /// The balance after some points have taken other places.
     pub(super) fn after<const D: usize>(
         &self,
         source: &Source<D>,
         canvas: &Canvas<D>,
-        patch: &Proposal<'_, D>,
-        cutting: &Cutting<D>,
+        points: &[u32],
+        places: &[Place<D>],
+        take: &[bool],
     ) -> Self {
-        let mut next = Self { counts: self.counts.clone(), covered: self.covered };
+        let mut next = Self {
+            counts: self.counts.clone(),
+            covered: self.covered,
+        };
         if next.counts.is_empty() {
             return next;
         }
-        for (i, &p) in patch.window.points.iter().enumerate() {
-            if cutting.take[i] {
+        for (i, &p) in points.iter().enumerate() {
+            if take[i] {
                 if canvas.covered(p) {
                     next.add(source.class(canvas.places[p as usize]), -1);
                 } else {
                     next.covered += 1;
                 }
-                next.add(source.class(patch.places[i]), 1);
+                next.add(source.class(places[i]), 1);
             }
         }
         next
@@ -59,7 +66,13 @@ impl Balance {
 
     /// Points that would have to be of another class for the shares to be those of the exemplar.
     pub(super) fn excess<const D: usize>(&self, source: &Source<D>) -> f64 {
-        let wrong = |(&count, &share): (&i64, &f64)| (count as f64 - share * self.covered as f64).abs();
-        self.counts.iter().zip(source.shares()).map(wrong).sum::<f64>() / 2.0
+        let wrong =
+            |(&count, &share): (&i64, &f64)| (count as f64 - share * self.covered as f64).abs();
+        self.counts
+            .iter()
+            .zip(source.shares())
+            .map(wrong)
+            .sum::<f64>()
+            / 2.0
     }
 }

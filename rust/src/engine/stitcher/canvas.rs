@@ -45,7 +45,11 @@ impl<const D: usize> Canvas<D> {
             places: memory::filled("the places of a region", [0; D], n)?,
             patches: memory::filled("the patches of a region", FREE, n)?,
             seams: memory::filled("the seams of a region", [0.0; D], n)?,
-            distortion: memory::filled("the distortion of a region", 0.0, if bent { n } else { 0 })?,
+            distortion: memory::filled(
+                "the distortion of a region",
+                0.0,
+                if bent { n } else { 0 },
+            )?,
             free: n,
         })
     }
@@ -84,9 +88,10 @@ impl<const D: usize> Canvas<D> {
             grid,
             points: Vec::with_capacity(grid.len()),
         };
-        for i in 0..grid.len() {
-            let at = window.at(grid.point(i));
-            let point: [usize; D] = std::array::from_fn(|axis| self.grid.resolve(axis, at[axis] as isize));
+        for point in grid.points() {
+            let at = window.at(point);
+            let point: [usize; D] =
+                std::array::from_fn(|axis| self.grid.resolve(axis, at[axis] as isize));
             window.points.push(self.grid.index(point) as u32);
         }
         Some(window)

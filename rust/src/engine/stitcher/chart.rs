@@ -34,7 +34,13 @@ pub(super) struct Chart<const D: usize> {
 
 impl<const D: usize> Chart<D> {
     /// The chart of a patch of `side` samples of the exemplar around a point, bent with the field or rigid.
-    pub fn new(canvas: &Canvas<D>, frames: Frames<'_, D>, centre: [i32; D], side: f32, bend: bool) -> Option<Self> {
+    pub fn new(
+        canvas: &Canvas<D>,
+        frames: Frames<'_, D>,
+        centre: [i32; D],
+        side: f32,
+        bend: bool,
+    ) -> Option<Self> {
         let here: [usize; D] = std::array::from_fn(|a| canvas.grid.resolve(a, centre[a] as isize));
         let frame = frames.at(canvas.grid.index(here));
         let mut side = side;
@@ -56,7 +62,13 @@ impl<const D: usize> Chart<D> {
     }
 
     /// The box around a centre that holds a patch, and one point more on each side.
-    fn window(canvas: &Canvas<D>, frame: &Frame<D>, centre: [i32; D], side: f32, more: f32) -> Option<Window<D>> {
+    fn window(
+        canvas: &Canvas<D>,
+        frame: &Frame<D>,
+        centre: [i32; D],
+        side: f32,
+        more: f32,
+    ) -> Option<Window<D>> {
         let back = inverse(frame);
         let (mut low, mut high) = ([0; D], [0; D]);
         for axis in 0..D {
@@ -64,7 +76,11 @@ impl<const D: usize> Chart<D> {
             let half = (side * 0.5 * reach as f32 / ONE as f32 * more).ceil() as i32 + 1;
             // A patch must not meet itself around a cyclic axis.
             let most = canvas.grid.shape()[axis] as i32;
-            let half = if canvas.grid.wrap()[axis] { half.min((most - 1) / 2) } else { half.min(1 << 20) };
+            let half = if canvas.grid.wrap()[axis] {
+                half.min((most - 1) / 2)
+            } else {
+                half.min(1 << 20)
+            };
             low[axis] = centre[axis] - half;
             high[axis] = centre[axis] + half + 1;
         }
@@ -80,7 +96,14 @@ impl<const D: usize> Chart<D> {
         side: f32,
     ) -> Option<Self> {
         let window = Self::window(canvas, &frame, centre, side, 1.0)?;
-        Some(Self::affine(window, canvas, frames, frame, centre, Some(side)))
+        Some(Self::affine(
+            window,
+            canvas,
+            frames,
+            frame,
+            centre,
+            Some(side),
+        ))
     }
 
     /// A chart of one frame over a given window: of a patch's side, or of all of it.
@@ -94,8 +117,8 @@ impl<const D: usize> Chart<D> {
     ) -> Self {
         let n = window.grid.len();
         let mut steps = Vec::with_capacity(n);
-        for i in 0..n {
-            let at = window.at(window.grid.point(i));
+        for point in window.grid.points() {
+            let at = window.at(point);
             steps.push(apply(&frame, std::array::from_fn(|a| at[a] - centre[a])));
         }
         let mut chart = Self {
@@ -107,25 +130,41 @@ impl<const D: usize> Chart<D> {
             rigid: true,
         };
         if let Frames::Dense(all) = frames {
-            chart.distortion = chart.window.points.iter().map(|&p| difference(&frame, &all[p as usize])).collect();
+            chart.distortion = chart
+                .window
+                .points
+                .iter()
+                .map(|&p| difference(&frame, &all[p as usize]))
+                .collect();
         }
         chart.mask = chart.inside(canvas, side);
         chart
     }
 
     /// A chart integrated from the field: the map whose derivatives are nearest to the frames.
-    fn bent(canvas: &Canvas<D>, frames: Frames<'_, D>, frame: Frame<D>, centre: [i32; D], side: f32) -> Option<Self> {
-        let Frames::Dense(all) = frames else { return None };
+    fn bent(
+        canvas: &Canvas<D>,
+        frames: Frames<'_, D>,
+        frame: Frame<D>,
+        centre: [i32; D],
+        side: f32,
+    ) -> Option<Self> {
+        let Frames::Dense(all) = frames else {
+            return None;
+        };
         let window = Self::window(canvas, &frame, centre, side, 1.2)?;
         let mesh = Mesh::new(&window, all);
         let potentials: Vec<Vec<f64>> = (0..D).map(|i| mesh.integrate(i)).collect();
         let at = |p: [f64; D]| -> [f64; D] { std::array::from_fn(|i| mesh.at(&potentials[i], p)) };
-        let middle = at(std::array::from_fn(|a| f64::from(centre[a] - window.low[a])));
+        let middle = at(std::array::from_fn(|a| {
+            f64::from(centre[a] - window.low[a])
+        }));
         let n = window.grid.len();
         let mut steps = Vec::with_capacity(n);
-        for i in 0..n {
-            let value = at(window.grid.point(i).map(|x| x as f64));
-            let step: Place<D> = std::array::from_fn(|a| ((value[a] - middle[a]) * f64::from(ONE)).round() as i32);
+        for point in window.grid.points() {
+            let value = at(point.map(|x| x as f64));
+            let step: Place<D> =
+                std::array::from_fn(|a| ((value[a] - middle[a]) * f64::from(ONE)).round() as i32);
             steps.push(step);
         }
         let mut chart = Self {
@@ -148,14 +187,17 @@ impl<const D: usize> Chart<D> {
     /// How far the chart's derivatives are from the frames.
     fn measure(&mut self, frames: &[Frame<D>]) {
         let (grid, strides) = (self.window.grid, self.window.grid.strides());
-        for i in 0..grid.len() {
-            let point = grid.point(i);
+        for (i, point) in grid.points().enumerate() {
             let mut slope = frames[self.window.points[i] as usize];
             for axis in 0..D {
                 if grid.shape()[axis] < 2 {
                     continue;
                 }
-                let p = if point[axis] + 1 < grid.shape()[axis] { i } else { i - strides[axis] };
+                let p = if point[axis] + 1 < grid.shape()[axis] {
+                    i
+                } else {
+                    i - strides[axis]
+                };
                 let (a, b) = (self.steps[p], self.steps[p + strides[axis]]);
                 for row in 0..D {
                     slope[row][axis] = (b[row] - a[row]).clamp(-32000, 32000) as i16;
@@ -170,9 +212,10 @@ impl<const D: usize> Chart<D> {
     fn inside(&self, canvas: &Canvas<D>, side: Option<f32>) -> Vec<bool> {
         let half = side.map_or(i32::MAX, |s| ((s * 0.5 - 0.01) * ONE as f32) as i32);
         let grid = &self.window.grid;
-        (0..grid.len())
-            .map(|i| {
-                let (point, at) = (grid.point(i), self.window.at(grid.point(i)));
+        grid.points()
+            .enumerate()
+            .map(|(i, point)| {
+                let at = self.window.at(point);
                 let border = (0..D).any(|a| {
                     let (n, open) = (canvas.grid.shape()[a] as i32, !canvas.grid.wrap()[a]);
                     (point[a] == 0 && !(open && at[a] == 0))
@@ -261,7 +304,11 @@ fn mean(values: &[f32], mask: &[bool]) -> f32 {
         sum += f64::from(v);
         count += 1.0;
     }
-    if count > 0.0 { (sum / count) as f32 } else { 0.0 }
+    if count > 0.0 {
+        (sum / count) as f32
+    } else {
+        0.0
+    }
 }
 
 /// A coarse lattice over a window, with the frames at its nodes.
@@ -281,10 +328,15 @@ impl<const D: usize> Mesh<D> {
         let mut at = Vec::with_capacity(grid.len());
         for i in 0..grid.len() {
             let node = grid.point(i);
-            let near: [usize; D] = std::array::from_fn(|a| (node[a] as f64 * spacing[a]).round() as usize);
+            let near: [usize; D] =
+                std::array::from_fn(|a| (node[a] as f64 * spacing[a]).round() as usize);
             at.push(frames[window.points[window.grid.index(near)] as usize]);
         }
-        Self { grid, spacing, frames: at }
+        Self {
+            grid,
+            spacing,
+            frames: at,
+        }
     }
 
     /// The potential of one row of the frames, by least squares: conjugate gradients on the normal equations.
@@ -318,7 +370,9 @@ impl<const D: usize> Mesh<D> {
         let mut x: Vec<f64> = (0..n)
             .map(|i| {
                 let p = self.grid.point(i);
-                (0..D).map(|a| f64::from(middle[a]) / f64::from(ONE) * p[a] as f64 * self.spacing[a]).sum()
+                (0..D)
+                    .map(|a| f64::from(middle[a]) / f64::from(ONE) * p[a] as f64 * self.spacing[a])
+                    .sum()
             })
             .collect();
         let (mut residual, mut image) = (vec![0.0; n], vec![0.0; n]);
@@ -373,7 +427,11 @@ impl<const D: usize> Mesh<D> {
                     w *= (1 - side) as f64;
                 } else {
                     node[axis] += side;
-                    w *= if side == 1 { part[axis] } else { 1.0 - part[axis] };
+                    w *= if side == 1 {
+                        part[axis]
+                    } else {
+                        1.0 - part[axis]
+                    };
                 }
             }
             if w != 0.0 {

@@ -9,16 +9,19 @@ use super::canvas::{Canvas, FREE, HELD, Window};
 use super::chart::Chart;
 use super::energy::{Energy, capacity};
 use super::source::{CHANNELS, Look, Source};
+use crate::Result;
 use crate::engine::guide::Guide;
 use crate::foundation::fixed::Place;
+use crate::foundation::grid::Grid;
 use crate::foundation::par::Monitor;
-use crate::kernels::seam::links;
-use crate::Result;
+use crate::kernels::seam::{links, steps};
 
 /// Added to every pair, so that ties go to the shorter seam.
 const SHORTEST: f32 = 2e-3;
 /// Costs of one pair are at most this, so that sums stay within 32 bits.
 pub(super) const MOST: f32 = 1000.0;
+/// Windows of more points are cut coarsely first.
+const LARGE: usize = 4096;
 /// Beyond this, colours of two elements are as different as can be.
 const UNLIKE: f32 = 1.5;
 /// What a guide's cost of unrelated windows is.
@@ -64,6 +67,8 @@ pub(super) struct Cutting<const D: usize> {
     pub take: Vec<bool>,
     /// Seams of the window, as in the canvas.
     pub seams: Vec<[f32; D]>,
+    /// Whether it runs between blocks of points.
+    coarse: bool,
 }
 
 /// What a point of a window must do.
@@ -88,7 +93,13 @@ pub(super) struct Pair {
 }
 
 impl Pair {
-    const NONE: Self = Self { old_new: -1.0, new_old: -1.0, kept: 0.0 };
+    const NONE: Self = Self {
+        old_new: -1.0,
+        new_old: -1.0,
+        kept: 0.0,
+    };
+    /// Instead of a cost: that is still to be found.
+    const JUDGED: f32 = -2.0;
 }
 
 impl<'a, const D: usize> Proposal<'a, D> {
@@ -105,46 +116,54 @@ impl<'a, const D: usize> Proposal<'a, D> {
     }
 }
 
-/// What cuts are made with.
-pub(super) struct Cutter<'a, const D: usize> {
-    pub source: &'a Source<D>,
-    pub weights: Weights,
-    pub guide: Option<&'a Guide<'a>>,
+/// What a point of a window shows, and how far that is apart.
+#[derive(Clone, Copy)]
+struct Looks {
+    old: Look,
+    new: Look,
+    apart: f32,
 }
 
-impl<const D: usize> Cutter<'_, D> {
-    /// Cuts a patch into the canvas: coarsely, where that tells enough to compare it with others (see [`Energy`]).
-    pub fn cut(
+/// What a cut costs, by what its points take.
+struct Costs<const D: usize> {
+    /// Of each point that keeps what it has, and that takes the patch.
+    points: Vec<[f32; 2]>,
+    pairs: [Vec<Pair>; D],
+}
+
+impl<const D: usize> Costs<D> {
+    /// The cut that gives some points the patch.
+    fn settle(
         &self,
         canvas: &Canvas<D>,
-        patch: &Proposal<'_, D>,
+        window: &Window<D>,
+        ties: &[Tie],
+        sink: &[bool],
         coarse: bool,
-        monitor: &Monitor,
-    ) -> Result<Cutting<D>> {
-        let (window, n) = (patch.window, patch.window.grid.len());
-        let ties: Vec<Tie> = (0..n).map(|i| tie(canvas, patch, i)).collect();
-        let mut energy = Energy::new(window.grid);
-        let mut unary = vec![[0.0f32; 2]; n];
-        for i in 0..n {
-            if ties[i] == Tie::Out || !patch.mask[i] {
-                continue;
-            }
-            unary[i] = self.points(canvas, patch, i);
-            if ties[i] == Tie::Either {
-                energy.terminal[i] = capacity(unary[i][1] - unary[i][0]);
-            }
-        }
-        let pairs = self.pairs(canvas, patch, &ties);
-        for axis in 0..D {
-            energy.add_pairs(axis, &ties, &pairs[axis]);
-        }
-        let sink = energy.minimise(coarse, monitor)?;
-        let take: Vec<bool> = (0..n).map(|i| ties[i] == Tie::New || ties[i] == Tie::Either && sink[i]).collect();
-        let mut value: f64 = (0..n).map(|i| f64::from(unary[i][usize::from(take[i])])).sum();
-        let mut seams: Vec<[f32; D]> = window.points.iter().map(|&p| canvas.seams[p as usize]).collect();
+    ) -> Cutting<D> {
+        let take: Vec<bool> = ties
+            .iter()
+            .zip(sink)
+            .map(|(&t, &s)| t == Tie::New || t == Tie::Either && s)
+            .collect();
+        let mut value: f64 = self
+            .points
+            .iter()
+            .zip(&take)
+            .map(|(c, &t)| f64::from(c[usize::from(t)]))
+            .sum();
+        let mut seams: Vec<[f32; D]> = window
+            .points
+            .iter()
+            .map(|&p| canvas.seams[p as usize])
+            .collect();
         for axis in 0..D {
             links(&window.grid, axis, |p, q| {
-                let Pair { old_new, new_old, kept } = pairs[axis][p];
+                let Pair {
+                    old_new,
+                    new_old,
+                    kept,
+                } = self.pairs[axis][p];
                 if old_new >= 0.0 {
                     seams[p][axis] = match (take[p], take[q]) {
                         (true, true) => 0.0,
@@ -156,57 +175,197 @@ impl<const D: usize> Cutter<'_, D> {
                 value += f64::from(seams[p][axis]);
             });
         }
-        Ok(Cutting { value, take, seams })
-    }
-
-    /// What each point shows that keeps what it has, and that takes the patch: the same where it has no choice.
-    fn looks(&self, canvas: &Canvas<D>, patch: &Proposal<'_, D>, ties: &[Tie]) -> [Vec<Look>; 2] {
-        let n = ties.len();
-        let (mut old, mut new) = (Vec::with_capacity(n), Vec::with_capacity(n));
-        for i in 0..n {
-            let p = patch.window.points[i];
-            let kept = canvas.covered(p).then(|| self.source.look(canvas.places[p as usize]));
-            let taken = (patch.mask[i] || kept.is_none()).then(|| self.source.look(patch.places[i]));
-            // A point out of the patch that shows nothing is in no pair.
-            let any = kept.or(taken).unwrap_or(Look::EMPTY);
-            old.push(kept.unwrap_or(any));
-            new.push(taken.unwrap_or(any));
+        Cutting {
+            value,
+            take,
+            seams,
+            coarse,
         }
-        [old, new]
+    }
+}
+
+/// What cuts are made with.
+pub(super) struct Cutter<'a, const D: usize> {
+    pub source: &'a Source<D>,
+    pub weights: Weights,
+    pub guide: Option<&'a Guide<'a>>,
+}
+
+impl<const D: usize> Cutter<'_, D> {
+    /// Cuts a patch into the canvas.
+    pub fn cut(
+        &self,
+        canvas: &Canvas<D>,
+        patch: &Proposal<'_, D>,
+        monitor: &Monitor,
+    ) -> Result<Cutting<D>> {
+        let coarse = self.cut_coarsely(canvas, patch, monitor)?;
+        self.refine(canvas, patch, coarse, monitor)
     }
 
-    /// The costs of all pairs along each axis.
-    fn pairs(&self, canvas: &Canvas<D>, patch: &Proposal<'_, D>, ties: &[Tie]) -> [Vec<Pair>; D] {
-        let points = &patch.window.points;
-        let [old, new] = self.looks(canvas, patch, ties);
-        // Where the patch shows what is there already there is no seam.
-        let same: Vec<bool> = (0..ties.len())
-            .map(|i| canvas.places[points[i] as usize] == patch.places[i] && canvas.covered(points[i]))
-            .collect();
-        let mut pairs: [Vec<Pair>; D] = std::array::from_fn(|_| vec![Pair::NONE; ties.len()]);
+    /// Cuts a patch in between blocks of two points a side, if it is large: enough to compare it with others.
+    pub fn cut_coarsely(
+        &self,
+        canvas: &Canvas<D>,
+        patch: &Proposal<'_, D>,
+        monitor: &Monitor,
+    ) -> Result<Cutting<D>> {
+        let n = patch.window.grid.len();
+        let ties: Vec<Tie> = (0..n).map(|i| tie(canvas, patch, i)).collect();
+        let coarse = n > LARGE;
+        let (energy, costs) = self.energy(canvas, patch, &ties, coarse);
+        let sink = if coarse {
+            energy.minimise_coarsely(monitor)
+        } else {
+            energy.minimise(monitor)
+        }?;
+        Ok(costs.settle(canvas, patch.window, &ties, &sink, coarse))
+    }
+
+    /// Cuts a patch in that was cut coarsely: points away from that cut are settled.
+    pub fn refine(
+        &self,
+        canvas: &Canvas<D>,
+        patch: &Proposal<'_, D>,
+        coarse: Cutting<D>,
+        monitor: &Monitor,
+    ) -> Result<Cutting<D>> {
+        if !coarse.coarse {
+            return Ok(coarse);
+        }
+        let grid = &patch.window.grid;
+        let mut ties: Vec<Tie> = (0..grid.len()).map(|i| tie(canvas, patch, i)).collect();
+        let mut band = vec![false; grid.len()];
+        for axis in 0..D {
+            links(grid, axis, |p, q| {
+                if ties[p] != Tie::Out && ties[q] != Tie::Out && coarse.take[p] != coarse.take[q] {
+                    band[p] = true;
+                    band[q] = true;
+                }
+            });
+        }
+        let band = widen(grid, &widen(grid, &band));
+        for i in 0..grid.len() {
+            if ties[i] == Tie::Either && !band[i] {
+                ties[i] = if coarse.take[i] { Tie::New } else { Tie::Old };
+            }
+        }
+        let (energy, costs) = self.energy(canvas, patch, &ties, false);
+        let sink = energy.minimise(monitor)?;
+        Ok(costs.settle(canvas, patch.window, &ties, &sink, false))
+    }
+
+    /// The energy of a cut, and the costs that it is made of.
+    fn energy(
+        &self,
+        canvas: &Canvas<D>,
+        patch: &Proposal<'_, D>,
+        ties: &[Tie],
+        coarse: bool,
+    ) -> (Energy<D>, Costs<D>) {
+        let mut energy = Energy::new(patch.window.grid);
+        let mut points = vec![[0.0f32; 2]; ties.len()];
+        for i in 0..ties.len() {
+            if ties[i] == Tie::Out || !patch.mask[i] {
+                continue;
+            }
+            points[i] = self.points(canvas, patch, i);
+            if ties[i] == Tie::Either {
+                energy.terminal[i] = capacity(points[i][1] - points[i][0]);
+            }
+        }
+        let pairs = self.pairs(canvas, patch, ties, coarse);
+        for axis in 0..D {
+            energy.add_pairs(axis, ties, &pairs[axis]);
+        }
+        (energy, Costs { points, pairs })
+    }
+
+    /// The costs of all pairs along each axis; in a coarse cut only of those in two blocks.
+    fn pairs(
+        &self,
+        canvas: &Canvas<D>,
+        patch: &Proposal<'_, D>,
+        ties: &[Tie],
+        coarse: bool,
+    ) -> [Vec<Pair>; D] {
+        let (points, grid, n) = (&patch.window.points, &patch.window.grid, ties.len());
+        // Pairs that show the same whatever is cut need not be judged, nor what they show.
+        let mut judged = vec![false; n];
+        let mut pairs: [Vec<Pair>; D] = std::array::from_fn(|_| vec![Pair::NONE; n]);
         for (axis, pairs) in pairs.iter_mut().enumerate() {
-            links(&patch.window.grid, axis, |p, q| {
+            steps(grid, axis, |at, p, q| {
                 if ties[p] == Tie::Out || ties[q] == Tie::Out || !(patch.mask[p] || patch.mask[q]) {
                     return;
                 }
                 let kept = canvas.seams[points[p] as usize][axis];
-                let crossing = |same_left: bool, same_right: bool, left: &[Look], right: &[Look]| {
-                    if same_left {
-                        0.0
-                    } else if same_right {
-                        kept
-                    } else {
-                        self.pair(left, right, p, q)
-                    }
-                };
+                let block = coarse && at % 2 == 0;
                 pairs[p] = Pair {
-                    old_new: crossing(same[p], same[q], &old, &new),
-                    new_old: crossing(same[q], same[p], &new, &old),
+                    old_new: kept,
+                    new_old: kept,
                     kept,
                 };
+                if ties[p] != ties[q] || ties[p] == Tie::Either && !block {
+                    pairs[p].old_new = Pair::JUDGED;
+                    judged[p] = true;
+                    judged[q] = true;
+                }
+            });
+        }
+        let looks = self.looks(canvas, patch, &judged);
+        // Where the patch shows what is there already there is no seam.
+        let same = |i: usize| {
+            canvas.covered(points[i]) && canvas.places[points[i] as usize] == patch.places[i]
+        };
+        for (axis, pairs) in pairs.iter_mut().enumerate() {
+            links(grid, axis, |p, q| {
+                if pairs[p].old_new != Pair::JUDGED {
+                    return;
+                }
+                let (l, r, kept) = (&looks[p], &looks[q], pairs[p].kept);
+                let apart = l.apart * l.apart + r.apart * r.apart;
+                let (p_same, q_same) = (same(p), same(q));
+                let cross = |left_same: bool, right_same: bool, left: &Look, right: &Look| match (
+                    left_same, right_same,
+                ) {
+                    (true, _) => 0.0,
+                    (_, true) => kept,
+                    _ => self.pair(left, right, apart),
+                };
+                pairs[p].old_new = cross(p_same, q_same, &l.old, &r.new);
+                pairs[p].new_old = cross(q_same, p_same, &l.new, &r.old);
             });
         }
         pairs
+    }
+
+    /// What each point shows that keeps what it has, and that takes the patch; the same where it has no choice.
+    fn looks(&self, canvas: &Canvas<D>, patch: &Proposal<'_, D>, judged: &[bool]) -> Vec<Looks> {
+        let mut looks = vec![
+            Looks {
+                old: Look::EMPTY,
+                new: Look::EMPTY,
+                apart: 0.0
+            };
+            judged.len()
+        ];
+        for (i, here) in looks.iter_mut().enumerate() {
+            if !judged[i] {
+                continue;
+            }
+            let p = patch.window.points[i];
+            let kept = canvas
+                .covered(p)
+                .then(|| self.source.look(canvas.places[p as usize]));
+            let taken =
+                (patch.mask[i] || kept.is_none()).then(|| self.source.look(patch.places[i]));
+            // A point out of the patch that shows nothing is in no pair.
+            let any = kept.or(taken).unwrap_or(Look::EMPTY);
+            here.old = kept.unwrap_or(any);
+            here.new = taken.unwrap_or(any);
+            here.apart = distance(&here.old, &here.new);
+        }
+        looks
     }
 
     /// What the window of a patch costs as it is.
@@ -235,22 +394,23 @@ impl<const D: usize> Cutter<'_, D> {
         if let Some(guide) = self.guide {
             let places = [canvas.places[p as usize], patch.places[i]];
             for (cost, place) in costs.iter_mut().zip(places) {
-                *cost += self.weights.guide * guide.cost(p as usize, self.source.sample(place)) as f32 / UNRELATED;
+                *cost += self.weights.guide
+                    * guide.cost(p as usize, self.source.sample(place)) as f32
+                    / UNRELATED;
             }
         }
-        if canvas.covered(p) { costs } else { [0.0, costs[1]] }
+        if canvas.covered(p) {
+            costs
+        } else {
+            [0.0, costs[1]]
+        }
     }
 
-    /// What is seen where `p` keeps what is on the left, and `q` what is on the right.
+    /// What is seen where one look is beside another, and how far the pictures are apart there.
     #[inline(always)]
-    fn pair(&self, left: &[Look], right: &[Look], p: usize, q: usize) -> f32 {
+    fn pair(&self, l: &Look, r: &Look, apart: f32) -> f32 {
         let w = &self.weights;
-        let (l, r) = (&left[p], &right[q]);
-        let mut cost = SHORTEST;
-        if w.colour > 0.0 {
-            let (a, b) = (distance(l, &right[p]), distance(&left[q], r));
-            cost += w.colour * (a * a + b * b) / 8.0;
-        }
+        let mut cost = SHORTEST + w.colour * apart / 8.0;
         if w.surprise > 0.0 {
             cost += w.surprise * self.source.surprise(l.class, r.class);
         }
@@ -269,8 +429,23 @@ impl<const D: usize> Cutter<'_, D> {
     }
 }
 
+/// A mask, and all beside it.
+pub(super) fn widen<const D: usize>(grid: &Grid<D>, mask: &[bool]) -> Vec<bool> {
+    let mut wide = mask.to_vec();
+    for axis in 0..D {
+        links(grid, axis, |p, q| {
+            wide[p] |= mask[q];
+            wide[q] |= mask[p];
+        });
+    }
+    wide
+}
+
 fn tie<const D: usize>(canvas: &Canvas<D>, patch: &Proposal<'_, D>, i: usize) -> Tie {
-    match (canvas.patches[patch.window.points[i] as usize], patch.mask[i]) {
+    match (
+        canvas.patches[patch.window.points[i] as usize],
+        patch.mask[i],
+    ) {
         (FREE, false) => Tie::Out,
         (FREE, true) => Tie::New,
         (HELD, _) | (_, false) => Tie::Old,

@@ -1,8 +1,7 @@
-//! The energy of a cut, and its least: exactly, or coarse first and then in a band along the coarse cut.
+//! The energy of a cut, and its least: exactly, or among the cuts between blocks of two points a side.
 //!
-//! Lombaert, Sun, Grady and Xu, *A multilevel banded graph cuts method for fast image segmentation*, ICCV 2005: blocks of
-//! two points a side take one label each, which is the same energy under fewer labellings; then only points in blocks
-//! along the border of the labels are free. Large windows would take most of the time otherwise.
+//! Lombaert, Sun, Grady and Xu, *A multilevel banded graph cuts method for fast image segmentation*, ICCV 2005: large windows
+//! are cut between blocks first, and then only points along that cut are free. They would take most of the time otherwise.
 
 use super::cut::{MOST, Pair, Tie};
 use crate::Result;
@@ -13,8 +12,6 @@ use crate::kernels::seam::maxflow::{Graph, Solver};
 
 /// Capacities are costs times this.
 const SCALE: f32 = 16384.0;
-/// Windows of more points are cut coarsely first.
-const LARGE: usize = 4096;
 
 /// Costs of labels, source for what is kept and sink for what is taken, in whole numbers.
 pub(super) struct Energy<const D: usize> {
@@ -28,7 +25,11 @@ pub(super) struct Energy<const D: usize> {
 impl<const D: usize> Energy<D> {
     pub fn new(grid: Grid<D>) -> Self {
         let n = grid.len();
-        Self { grid, terminal: vec![0; n], forward: std::array::from_fn(|_| vec![0; n]) }
+        Self {
+            grid,
+            terminal: vec![0; n],
+            forward: std::array::from_fn(|_| vec![0; n]),
+        }
     }
 
     /// Adds the costs of the pairs along an axis; those of points without a choice go to their neighbours.
@@ -56,15 +57,14 @@ impl<const D: usize> Energy<D> {
         });
     }
 
-    /// Which points take the patch at the least cost; a coarse answer is that of blocks alone.
-    pub fn minimise(mut self, coarse: bool, monitor: &Monitor) -> Result<Vec<bool>> {
-        if self.grid.len() <= LARGE {
-            return self.solve(monitor);
-        }
-        let blocks = self.grid.shape().map(|n| n.div_ceil(2));
-        let blocks = Grid::new(blocks, [false; D])?;
-        let block: Vec<u32> =
-            (0..self.grid.len()).map(|i| blocks.index(self.grid.point(i).map(|x| x / 2)) as u32).collect();
+    /// Which points take the patch at the least cost, where all points of a block take it or none.
+    pub fn minimise_coarsely(&self, monitor: &Monitor) -> Result<Vec<bool>> {
+        let blocks = Grid::new(self.grid.shape().map(|n| n.div_ceil(2)), [false; D])?;
+        let block: Vec<u32> = self
+            .grid
+            .points()
+            .map(|point| blocks.index(point.map(|x| x / 2)) as u32)
+            .collect();
         let mut small = Self::new(blocks);
         for (&b, &t) in block.iter().zip(&self.terminal) {
             small.terminal[b as usize] += t;
@@ -76,41 +76,12 @@ impl<const D: usize> Energy<D> {
                 }
             });
         }
-        let labels = small.solve(monitor)?;
-        let spread = |b: &u32| labels[*b as usize];
-        if coarse {
-            return Ok(block.iter().map(spread).collect());
-        }
-        let band = border(&blocks, &labels);
-        self.fix(&block, &labels, &band);
-        let fine = self.solve(monitor)?;
-        let chosen = |(b, &f): (&u32, &bool)| if band[*b as usize] { f } else { spread(b) };
-        Ok(block.iter().zip(&fine).map(chosen).collect())
+        let labels = small.minimise(monitor)?;
+        Ok(block.iter().map(|b| labels[*b as usize]).collect())
     }
 
-    /// Gives points out of a band the labels of their blocks.
-    fn fix(&mut self, block: &[u32], labels: &[bool], band: &[bool]) {
-        let free = |p: usize| band[block[p] as usize];
-        for axis in 0..D {
-            let (terminal, forward) = (&mut self.terminal, &mut self.forward[axis]);
-            links(&self.grid, axis, |p, q| {
-                let cost = std::mem::take(&mut forward[p]);
-                match (free(p), free(q)) {
-                    (true, true) => forward[p] = cost,
-                    (true, false) if labels[block[q] as usize] => terminal[p] -= cost,
-                    (false, true) if !labels[block[p] as usize] => terminal[q] += cost,
-                    _ => {}
-                }
-            });
-        }
-        for (p, terminal) in self.terminal.iter_mut().enumerate() {
-            if !free(p) {
-                *terminal = 0;
-            }
-        }
-    }
-
-    fn solve(&self, monitor: &Monitor) -> Result<Vec<bool>> {
+    /// Which points take the patch at the least cost.
+    pub fn minimise(&self, monitor: &Monitor) -> Result<Vec<bool>> {
         let backward = vec![0; self.grid.len()];
         let graph = Graph {
             grid: self.grid,
@@ -122,23 +93,13 @@ impl<const D: usize> Energy<D> {
     }
 }
 
-/// The blocks whose neighbours have another label.
-fn border<const D: usize>(blocks: &Grid<D>, labels: &[bool]) -> Vec<bool> {
-    let mut band = vec![false; labels.len()];
-    for axis in 0..D {
-        links(blocks, axis, |p, q| {
-            if labels[p] != labels[q] {
-                band[p] = true;
-                band[q] = true;
-            }
-        });
-    }
-    band
-}
-
 /// A cost as a capacity, rounded to the nearest.
 #[inline(always)]
 pub(super) fn capacity(cost: f32) -> i32 {
     let scaled = cost.clamp(-MOST, MOST) * SCALE;
-    (if scaled < 0.0 { scaled - 0.5 } else { scaled + 0.5 }) as i32
+    (if scaled < 0.0 {
+        scaled - 0.5
+    } else {
+        scaled + 0.5
+    }) as i32
 }

@@ -4,18 +4,15 @@
 //! it where that is less: a whole element and none are free. Moves are cuts in small windows, kept if the sum of seams
 //! and instances falls.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet, VecDeque};
 
-use super::balance::Balance;
 use super::canvas::{Canvas, FREE, HELD, Window};
 use super::chart::{Chart, flood};
-use super::cut::{Cutting, Proposal};
+use super::cut::{Cutting, Proposal, widen};
 use super::{Patch, Stitching};
 use crate::Result;
 use crate::foundation::fixed::{Frames, Place};
-use crate::foundation::grid::Grid;
 use crate::foundation::par;
-use crate::kernels::seam::links;
 
 /// What a missing point of an instance costs.
 const LACK: f64 = 0.3;
@@ -26,6 +23,8 @@ const WHOLE: f64 = 0.97;
 /// One with fewer is not grown, and one with more is not given up.
 const GROW: f64 = 0.35;
 const DROP: f64 = 0.7;
+/// Instances that are looked at together.
+const BATCH: usize = 4;
 /// Neighbours that an instance may be given up to.
 const NEIGHBOURS: usize = 4;
 
@@ -44,12 +43,19 @@ struct Instance<const D: usize> {
 /// A change of the canvas that makes it better.
 struct Move<const D: usize> {
     gain: f64,
-    balance: Balance,
     patch: u32,
     chart: Chart<D>,
     cutting: Cutting<D>,
     proposal: Vec<Place<D>>,
     counts: Vec<(Key, i64)>,
+}
+
+impl<const D: usize> Move<D> {
+    /// Whether two moves see some of the same points.
+    fn meets(&self, other: &Self) -> bool {
+        let mine: HashSet<u32> = self.chart.window.points.iter().copied().collect();
+        other.chart.window.points.iter().any(|p| mine.contains(p))
+    }
 }
 
 impl<const D: usize> Stitching<'_, D> {
@@ -62,23 +68,35 @@ impl<const D: usize> Stitching<'_, D> {
         for _ in 0..ROUNDS {
             let (instances, mut counts) = self.instances();
             let mut torn: Vec<(f64, usize)> = (0..instances.len())
-                .filter(|&k| !self.at_an_end(&instances[k]) && self.share(instances[k].key, &counts) < WHOLE)
+                .filter(|&k| {
+                    !self.at_an_end(&instances[k]) && self.share(instances[k].key, &counts) < WHOLE
+                })
                 .map(|k| (self.lack(instances[k].key, counts[&instances[k].key]), k))
                 .collect();
             torn.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-            for (_, k) in torn {
+            let mut torn: VecDeque<usize> = torn.into_iter().map(|(_, k)| k).collect();
+            while !torn.is_empty() {
                 self.monitor.check()?;
-                let share = self.share(instances[k].key, &counts);
-                if share <= 0.0 || share >= WHOLE {
-                    continue;
-                }
-                if let Some(best) = self.best_move(&instances[k], share, &counts)? {
+                let batch: Vec<usize> = torn.drain(..BATCH.min(torn.len())).collect();
+                let found = par::map(batch.len(), |i| {
+                    self.best_move(&instances[batch[i]], &counts)
+                });
+                let (mut done, mut again): (Vec<Move<D>>, Vec<usize>) = (Vec::new(), Vec::new());
+                for (&k, found) in batch.iter().zip(found) {
+                    let Some(best) = found? else { continue };
+                    // What another move of the batch has changed must be looked at anew.
+                    if done.iter().any(|other| other.meets(&best)) {
+                        again.push(k);
+                        continue;
+                    }
                     self.apply(&best);
                     for (key, change) in &best.counts {
                         *counts.entry(*key).or_insert(0) += change;
                     }
                     moves += 1;
+                    done.push(best);
                 }
+                again.into_iter().rev().for_each(|k| torn.push_front(k));
             }
         }
         Ok(moves)
@@ -100,12 +118,18 @@ impl<const D: usize> Stitching<'_, D> {
         let mut all: Vec<Instance<D>> = Vec::new();
         let mut numbers: HashMap<Key, usize> = HashMap::new();
         let mut counts: HashMap<Key, i64> = HashMap::new();
-        for p in 0..canvas.grid.len() {
-            let Some(key) = self.instance(canvas.patches[p], canvas.places[p]) else { continue };
-            let point = canvas.grid.point(p);
+        for (p, point) in canvas.grid.points().enumerate() {
+            let Some(key) = self.instance(canvas.patches[p], canvas.places[p]) else {
+                continue;
+            };
             *counts.entry(key).or_insert(0) += 1;
             let number = *numbers.entry(key).or_insert_with(|| {
-                all.push(Instance { key, anchor: point, low: [0; D], high: [0; D] });
+                all.push(Instance {
+                    key,
+                    anchor: point,
+                    low: [0; D],
+                    high: [0; D],
+                });
                 all.len() - 1
             });
             let instance = &mut all[number];
@@ -128,7 +152,8 @@ impl<const D: usize> Stitching<'_, D> {
         (0..D).any(|a| {
             let at = instance.anchor[a] as i32;
             !grid.wrap()[a]
-                && (at + instance.low[a] <= 0 || at + instance.high[a] >= grid.shape()[a] as i32 - 1)
+                && (at + instance.low[a] <= 0
+                    || at + instance.high[a] >= grid.shape()[a] as i32 - 1)
         })
     }
 
@@ -150,9 +175,12 @@ impl<const D: usize> Stitching<'_, D> {
     fn best_move(
         &self,
         instance: &Instance<D>,
-        share: f64,
         counts: &HashMap<Key, i64>,
     ) -> Result<Option<Move<D>>> {
+        let share = self.share(instance.key, counts);
+        if share <= 0.0 || share >= WHOLE {
+            return Ok(None);
+        }
         let mut options = Vec::new();
         if share >= GROW {
             options.push((instance.key.0, true));
@@ -179,7 +207,9 @@ impl<const D: usize> Stitching<'_, D> {
 
     /// The patches around an instance, those with the most points first.
     fn neighbours(&self, instance: &Instance<D>) -> Vec<u32> {
-        let Some(window) = self.bounds(instance, 5) else { return Vec::new() };
+        let Some(window) = self.bounds(instance, 5) else {
+            return Vec::new();
+        };
         let mut found: Vec<(u32, usize)> = Vec::new();
         for &p in &window.points {
             let patch = self.canvas.patches[p as usize];
@@ -213,15 +243,22 @@ impl<const D: usize> Stitching<'_, D> {
     ) -> Result<Option<Move<D>>> {
         let margin = if grow {
             // As far as the rest of it may lie.
-            let reach = self.size(instance.key).powf(1.0 / D as f64) * 1.6;
-            let longest = (0..D).map(|a| instance.high[a] - instance.low[a]).max().unwrap_or(0);
-            (reach as i32 - longest / 2).max(4)
+            let reach = self.size(instance.key).powf(1.0 / D as f64) * 1.4;
+            let longest = (0..D)
+                .map(|a| instance.high[a] - instance.low[a])
+                .max()
+                .unwrap_or(0);
+            (reach as i32 - longest).max(4)
         } else {
             5
         };
-        let Some(window) = self.bounds(instance, margin) else { return Ok(None) };
+        let Some(window) = self.bounds(instance, margin) else {
+            return Ok(None);
+        };
         let to: &Patch<D> = &self.patches[patch as usize];
-        let Some(chart) = self.chart_of(to, window) else { return Ok(None) };
+        let Some(chart) = self.chart_of(to, window) else {
+            return Ok(None);
+        };
         let mut proposal = Proposal::new(&chart, to.place);
         let (canvas, n) = (&self.canvas, chart.window.grid.len());
         let own: Vec<bool> = (0..n)
@@ -232,10 +269,16 @@ impl<const D: usize> Stitching<'_, D> {
             .collect();
         proposal.core = if grow {
             let whole: Vec<bool> = (0..n)
-                .map(|i| chart.mask[i] && self.cutter.source.element(proposal.places[i]) == instance.key.1)
+                .map(|i| {
+                    chart.mask[i]
+                        && self.cutter.source.element(proposal.places[i]) == instance.key.1
+                })
                 .collect();
             let from: Vec<usize> = (0..n).filter(|&i| own[i]).collect();
-            let mut core = widen(&chart.window.grid, &flood(&chart.window.grid, &whole, &from));
+            let mut core = widen(
+                &chart.window.grid,
+                &flood(&chart.window.grid, &whole, &from),
+            );
             core.iter_mut().zip(&chart.mask).for_each(|(c, m)| *c &= m);
             core
         } else {
@@ -247,7 +290,7 @@ impl<const D: usize> Stitching<'_, D> {
         if !proposal.core.contains(&true) {
             return Ok(None);
         }
-        let cutting = self.cutter.cut(canvas, &proposal, false, self.monitor)?;
+        let cutting = self.cutter.cut(canvas, &proposal, self.monitor)?;
         let mut changes: Vec<(Key, i64)> = Vec::new();
         let mut change = |key: Option<Key>, by: i64| {
             if let Some(key) = key {
@@ -265,7 +308,13 @@ impl<const D: usize> Stitching<'_, D> {
             }
         }
         let source = self.cutter.source;
-        let balance = self.balance.after(source, canvas, &proposal, &cutting);
+        let balance = self.balance.after(
+            source,
+            canvas,
+            &chart.window.points,
+            &proposal.places,
+            &cutting.take,
+        );
         let worth = f64::from(self.options.balance / self.options.patch);
         let mut gain = self.cutter.value(canvas, &proposal) - cutting.value;
         gain += worth * (self.balance.excess(source) - balance.excess(source));
@@ -275,14 +324,28 @@ impl<const D: usize> Stitching<'_, D> {
         }
         let places = std::mem::take(&mut proposal.places);
         drop(proposal);
-        Ok((gain > 1e-3).then_some(Move { gain, patch, chart, cutting, proposal: places, counts: changes, balance }))
+        Ok((gain > 1e-3).then_some(Move {
+            gain,
+            patch,
+            chart,
+            cutting,
+            proposal: places,
+            counts: changes,
+        }))
     }
 
     /// What a patch shows in a window.
     fn chart_of(&self, patch: &Patch<D>, window: Window<D>) -> Option<Chart<D>> {
         let frames: Frames<'_, D> = self.frames;
         let mut chart = if patch.rigid {
-            Chart::affine(window, &self.canvas, frames, patch.frame, patch.centre, None)
+            Chart::affine(
+                window,
+                &self.canvas,
+                frames,
+                patch.frame,
+                patch.centre,
+                None,
+            )
         } else {
             let mut chart = Chart::new(&self.canvas, frames, patch.centre, patch.side, true)?;
             for i in 0..chart.mask.len() {
@@ -292,17 +355,28 @@ impl<const D: usize> Stitching<'_, D> {
         };
         let grid = self.cutter.source.grid();
         for (mask, step) in chart.mask.iter_mut().zip(&chart.steps) {
-            let place: Place<D> =
-                std::array::from_fn(|a| step[a].wrapping_add(patch.place[a]));
+            let place: Place<D> = std::array::from_fn(|a| step[a].wrapping_add(patch.place[a]));
             *mask &= super::inside(grid, place);
         }
         Some(chart)
     }
 
     fn apply(&mut self, best: &Move<D>) {
-        self.balance = best.balance.clone();
+        self.balance = self.balance.after(
+            self.cutter.source,
+            &self.canvas,
+            &best.chart.window.points,
+            &best.proposal,
+            &best.cutting.take,
+        );
         let chart = &best.chart;
-        commit(&mut self.canvas, chart, &best.proposal, &best.cutting, best.patch);
+        commit(
+            &mut self.canvas,
+            chart,
+            &best.proposal,
+            &best.cutting,
+            best.patch,
+        );
     }
 }
 
@@ -327,16 +401,4 @@ pub(super) fn commit<const D: usize>(
             }
         }
     }
-}
-
-/// A mask, and all beside it.
-fn widen<const D: usize>(grid: &Grid<D>, mask: &[bool]) -> Vec<bool> {
-    let mut wide = mask.to_vec();
-    for axis in 0..D {
-        links(grid, axis, |p, q| {
-            wide[p] |= mask[q];
-            wide[q] |= mask[p];
-        });
-    }
-    wide
 }

@@ -138,7 +138,11 @@ pub fn stitch<const D: usize>(
         canvas.free -= 1;
     }
     let mut this = Stitching {
-        cutter: Cutter { source, weights: options.weights, guide },
+        cutter: Cutter {
+            source,
+            weights: options.weights,
+            guide,
+        },
         frames,
         options: *options,
         index: Index::new(source, guide),
@@ -175,7 +179,11 @@ fn check<const D: usize>(
     frames.check(n)?;
     for got in [given.points.len(), given.places.len()] {
         if got != given.points.len() || !(got == 0 || got == n) {
-            return Err(Error::Shape { argument: "held", expected: region.grid.shape().to_vec(), got: vec![got] });
+            return Err(Error::Shape {
+                argument: "held",
+                expected: region.grid.shape().to_vec(),
+                got: vec![got],
+            });
         }
     }
     if !(4.0..=4096.0).contains(&options.patch)
@@ -184,14 +192,32 @@ fn check<const D: usize>(
     {
         return Err(Error::value(
             "patch",
-            format!("patches of 4 to 4096 samples, overlaps up to 0.8 and 1 to 64 candidates are allowed, got {options:?}"),
+            format!(
+                "patches of 4 to 4096 samples, overlaps up to 0.8 and 1 to 64 candidates are allowed, got {options:?}"
+            ),
         ));
     }
     let w = &options.weights;
-    let costs = [w.colour, w.contact, w.jump, w.depth, w.joint, w.surprise, w.distortion, w.guide];
+    let costs = [
+        w.colour,
+        w.contact,
+        w.jump,
+        w.depth,
+        w.joint,
+        w.surprise,
+        w.distortion,
+        w.guide,
+    ];
     let others = [options.repetition, options.continuation, options.balance];
-    if !costs.iter().chain(&others).all(|x| (0.0..=100.0).contains(x)) {
-        return Err(Error::value("weights", format!("0 to 100 are allowed, got {options:?}")));
+    if !costs
+        .iter()
+        .chain(&others)
+        .all(|x| (0.0..=100.0).contains(x))
+    {
+        return Err(Error::value(
+            "weights",
+            format!("0 to 100 are allowed, got {options:?}"),
+        ));
     }
     Ok(())
 }
@@ -200,8 +226,11 @@ impl<const D: usize> Stitching<'_, D> {
     /// Lays patches from a lattice of centres, and then wherever something is left.
     fn fill(&mut self) -> Result<()> {
         let grid = self.canvas.grid;
-        let step = (self.options.patch * (1.0 - self.options.overlap) * self.least_scale()).max(2.0);
-        let axes: Vec<Vec<i32>> = (0..D).map(|a| centres(grid.shape()[a], grid.wrap()[a], step)).collect();
+        let step =
+            (self.options.patch * (1.0 - self.options.overlap) * self.least_scale()).max(2.0);
+        let axes: Vec<Vec<i32>> = (0..D)
+            .map(|a| centres(grid.shape()[a], grid.wrap()[a], step))
+            .collect();
         let count: usize = axes.iter().map(Vec::len).product();
         self.monitor.expect(self.canvas.free as u64);
         for k in 0..count {
@@ -210,7 +239,9 @@ impl<const D: usize> Stitching<'_, D> {
                 centre[a] = axes[a][rest % axes[a].len()];
                 rest /= axes[a].len();
             }
-            let reach = (CORE * self.options.patch * (1.0 - self.options.overlap) * self.scale(centre)) as i32;
+            let reach =
+                (CORE * self.options.patch * (1.0 - self.options.overlap) * self.scale(centre))
+                    as i32;
             if !self.all_covered(centre, reach.max(1)) {
                 self.lay(centre, self.options.patch)?;
             }
@@ -238,7 +269,9 @@ impl<const D: usize> Stitching<'_, D> {
     /// The middle of what is not covered near a point.
     fn middle(&self, at: [i32; D]) -> [i32; D] {
         let reach = (self.options.patch * 0.5 * self.scale(at)) as i32;
-        let window = self.canvas.window(at.map(|x| x - reach), at.map(|x| x + reach + 1));
+        let window = self
+            .canvas
+            .window(at.map(|x| x - reach), at.map(|x| x + reach + 1));
         let Some(window) = window else { return at };
         let (mut sum, mut count) = ([0i64; D], 0i64);
         for (i, &p) in window.points.iter().enumerate() {
@@ -248,29 +281,56 @@ impl<const D: usize> Stitching<'_, D> {
                 count += 1;
             }
         }
-        if count == 0 { at } else { sum.map(|s| s.div_euclid(count) as i32) }
+        if count == 0 {
+            at
+        } else {
+            sum.map(|s| s.div_euclid(count) as i32)
+        }
     }
 
     /// Cuts in the best patch around a point.
     fn lay(&mut self, centre: [i32; D], side: f32) -> Result<()> {
         let o = &self.options;
-        let Some(chart) = Chart::new(&self.canvas, self.frames, centre, side, o.bend) else { return Ok(()) };
+        let Some(chart) = Chart::new(&self.canvas, self.frames, centre, side, o.bend) else {
+            return Ok(());
+        };
         let useful = |(&p, &m): (&u32, &bool)| m && !self.canvas.covered(p);
         if !chart.window.points.iter().zip(&chart.mask).any(useful) {
             return Ok(());
         }
-        let charges = Charges { repetition: o.repetition, continuation: o.continuation };
+        let charges = Charges {
+            repetition: o.repetition,
+            continuation: o.continuation,
+        };
         let noise = self.noise.part(self.patches.len() as u32);
         let guide = self.cutter.guide;
-        let found =
-            self.index.best(self.cutter.source, &self.canvas, &chart, guide, &charges, o.candidates, &noise);
-        let alone = found.len() == 1;
+        let found = self.index.best(
+            self.cutter.source,
+            &self.canvas,
+            &chart,
+            guide,
+            &charges,
+            o.candidates,
+            &noise,
+        );
         let source = self.cutter.source;
         let worth = f64::from(o.balance / side);
         let cuts = par::map(found.len(), |k| {
             let patch = Proposal::new(&chart, found[k]);
-            let mut cut = self.cutter.cut(&self.canvas, &patch, !alone, self.monitor)?;
-            cut.value += worth * self.balance.after(source, &self.canvas, &patch, &cut).excess(source);
+            let mut cut = self
+                .cutter
+                .cut_coarsely(&self.canvas, &patch, self.monitor)?;
+            cut.value += worth
+                * self
+                    .balance
+                    .after(
+                        source,
+                        &self.canvas,
+                        &chart.window.points,
+                        &patch.places,
+                        &cut.take,
+                    )
+                    .excess(source);
             Ok(cut)
         });
         let mut best: Option<(usize, cut::Cutting<D>)> = None;
@@ -280,12 +340,20 @@ impl<const D: usize> Stitching<'_, D> {
                 best = Some((k, cut));
             }
         }
-        let Some((k, mut cutting)) = best else { return Ok(()) };
+        let Some((k, coarse)) = best else {
+            return Ok(());
+        };
         let proposal = Proposal::new(&chart, found[k]);
-        if !alone {
-            cutting = self.cutter.cut(&self.canvas, &proposal, false, self.monitor)?;
-        }
-        self.balance = self.balance.after(source, &self.canvas, &proposal, &cutting);
+        let cutting = self
+            .cutter
+            .refine(&self.canvas, &proposal, coarse, self.monitor)?;
+        self.balance = self.balance.after(
+            source,
+            &self.canvas,
+            &chart.window.points,
+            &proposal.places,
+            &cutting.take,
+        );
         let places = proposal.places;
         let number = self.number(&chart, centre, found[k], side);
         let before = self.canvas.free;
@@ -310,7 +378,11 @@ impl<const D: usize> Stitching<'_, D> {
             let ahead = apply(&frame, centre);
             let origin: Place<D> = std::array::from_fn(|a| {
                 let offset = place[a].wrapping_sub(ahead[a]);
-                if grid.wrap()[a] { offset.rem_euclid(grid.shape()[a] as i32 * ONE) } else { offset }
+                if grid.wrap()[a] {
+                    offset.rem_euclid(grid.shape()[a] as i32 * ONE)
+                } else {
+                    offset
+                }
             });
             let number = *self.offsets.entry(origin).or_insert(next);
             if number != next {
@@ -322,7 +394,9 @@ impl<const D: usize> Stitching<'_, D> {
     }
 
     fn all_covered(&self, centre: [i32; D], reach: i32) -> bool {
-        let window = self.canvas.window(centre.map(|x| x - reach), centre.map(|x| x + reach + 1));
+        let window = self
+            .canvas
+            .window(centre.map(|x| x - reach), centre.map(|x| x + reach + 1));
         window.is_none_or(|w| w.points.iter().all(|&p| self.canvas.covered(p)))
     }
 
@@ -336,8 +410,15 @@ impl<const D: usize> Stitching<'_, D> {
     /// How much they are enlarged where that is least, but for the very least.
     fn least_scale(&self) -> f32 {
         let n = self.canvas.grid.len();
-        let every = if matches!(self.frames, Frames::Constant(_)) { n } else { (n / PROBES).max(1) };
-        let mut scales: Vec<f32> = (0..n).step_by(every).map(|p| enlargement(&self.frames.at(p))).collect();
+        let every = if matches!(self.frames, Frames::Constant(_)) {
+            n
+        } else {
+            (n / PROBES).max(1)
+        };
+        let mut scales: Vec<f32> = (0..n)
+            .step_by(every)
+            .map(|p| enlargement(&self.frames.at(p)))
+            .collect();
         scales.sort_by(f32::total_cmp);
         scales[scales.len() / 50]
     }
@@ -351,14 +432,20 @@ fn centres(n: usize, wrap: bool, step: f32) -> Vec<i32> {
     }
     let last = n as i32 - 1;
     let count = (last as f32 / step).ceil() as usize;
-    (0..=count).map(|i| ((i as f32 * step) as i32).min(last)).collect()
+    (0..=count)
+        .map(|i| ((i as f32 * step) as i32).min(last))
+        .collect()
 }
 
 /// A place brought around the axes along which an exemplar repeats: the sample nearest to it is one of its own.
 fn bring_around<const D: usize>(grid: &Grid<D>, place: Place<D>) -> Place<D> {
     std::array::from_fn(|a| {
         let (n, half) = (grid.shape()[a] as i32 * ONE, ONE / 2);
-        if grid.wrap()[a] { (place[a].wrapping_add(half)).rem_euclid(n) - half } else { place[a] }
+        if grid.wrap()[a] {
+            (place[a].wrapping_add(half)).rem_euclid(n) - half
+        } else {
+            place[a]
+        }
     })
 }
 

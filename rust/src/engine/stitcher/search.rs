@@ -65,24 +65,41 @@ impl<const D: usize> Index<D> {
     pub fn new(source: &Source<D>, guide: Option<&Guide<'_>>) -> Self {
         let grid = *source.grid();
         let size: [usize; D] = std::array::from_fn(|a| {
-            if grid.wrap()[a] { grid.shape()[a] } else { Volumes::fast(grid.shape()[a]) }
+            if grid.wrap()[a] {
+                grid.shape()[a]
+            } else {
+                Volumes::fast(grid.shape()[a])
+            }
         });
-        let plan = Volumes::new(if D == 2 { [size[0], 1, size[1]] } else { [size[0], size[1], size[D - 1]] });
+        let plan = Volumes::new(if D == 2 {
+            [size[0], 1, size[1]]
+        } else {
+            [size[0], size[1], size[D - 1]]
+        });
         let mut this = Self {
             grid,
             size,
             plan,
-            colours: Squares { values: Vec::new(), squares: Vec::new() },
+            colours: Squares {
+                values: Vec::new(),
+                squares: Vec::new(),
+            },
             guide: None,
             shown: vec![0.0; grid.len()],
             total: 0.0,
         };
         let channels = source.channels();
-        let colours: Vec<Vec<f32>> = (0..channels).map(|c| source.colours().map(|x| x[c]).collect()).collect();
+        let colours: Vec<Vec<f32>> = (0..channels)
+            .map(|c| source.colours().map(|x| x[c]).collect())
+            .collect();
         this.colours = this.squares(&colours);
         this.guide = guide.map(|guide| {
             let values: Vec<Vec<f32>> = (0..CHANNELS)
-                .map(|c| (0..grid.len()).map(|k| f32::from(guide.value(k)[c])).collect::<Vec<f32>>())
+                .map(|c| {
+                    (0..grid.len())
+                        .map(|k| f32::from(guide.value(k)[c]))
+                        .collect::<Vec<f32>>()
+                })
                 .filter(|plane| plane.iter().any(|&x| x != 0.0))
                 .collect();
             this.squares(&values)
@@ -121,7 +138,11 @@ impl<const D: usize> Index<D> {
         let (centre, reach) = (nearest(place), side.ceil() as i32);
         let mut axes: Vec<Vec<(usize, f32)>> = Vec::with_capacity(D);
         for a in 0..D {
-            let reach = reach.min(if self.grid.wrap()[a] { (self.grid.shape()[a] as i32 - 1) / 2 } else { reach });
+            let reach = reach.min(if self.grid.wrap()[a] {
+                (self.grid.shape()[a] as i32 - 1) / 2
+            } else {
+                reach
+            });
             let near = (-reach..=reach).filter_map(|d| {
                 let at = self.grid.inside(a, (centre[a] + d) as isize)?;
                 Some((at, (1.0 - d.abs() as f32 / side).max(0.0)))
@@ -155,7 +176,9 @@ impl<const D: usize> Index<D> {
         count: usize,
         noise: &Noise,
     ) -> Vec<Place<D>> {
-        let Some((low, high)) = extent(chart) else { return Vec::new() };
+        let Some((low, high)) = extent(chart) else {
+            return Vec::new();
+        };
         // Position i of the template is the place i - first of the centre.
         let first: [i32; D] = std::array::from_fn(|a| low[a] >> BITS);
         let last: [usize; D] = std::array::from_fn(|a| {
@@ -182,17 +205,40 @@ impl<const D: usize> Index<D> {
         }
         let mut spectrum = vec![Complex::default(); self.colours.squares.len()];
         if points > 0 {
-            self.correlate(&self.colours, &known, 1.0 / (points as f32 * source.channels() as f32), &mut spectrum);
+            self.correlate(
+                &self.colours,
+                &known,
+                1.0 / (points as f32 * source.channels() as f32),
+                &mut spectrum,
+            );
         }
         if let (Some((template, points)), Some(squares)) = (&asked, &self.guide) {
-            self.correlate(squares, template, 2.0 / (*points as f32 * UNRELATED), &mut spectrum);
+            self.correlate(
+                squares,
+                template,
+                2.0 / (*points as f32 * UNRELATED),
+                &mut spectrum,
+            );
         }
         let scores = self.plan.inverse(spectrum);
-        self.pick(&scores, first, last, charges, &self.continuations(canvas, chart), count)
+        self.pick(
+            &scores,
+            first,
+            last,
+            charges,
+            &self.continuations(canvas, chart),
+            count,
+        )
     }
 
     /// The points of a chart that are covered already.
-    fn known(&self, source: &Source<D>, canvas: &Canvas<D>, chart: &Chart<D>, first: [i32; D]) -> (Template, usize) {
+    fn known(
+        &self,
+        source: &Source<D>,
+        canvas: &Canvas<D>,
+        chart: &Chart<D>,
+        first: [i32; D],
+    ) -> (Template, usize) {
         let mut template = Template::new(self.points(), source.channels());
         let mut points = 0;
         for (i, &p) in chart.window.points.iter().enumerate() {
@@ -209,7 +255,12 @@ impl<const D: usize> Index<D> {
     }
 
     /// What is asked of the points of a chart; none where nothing is.
-    fn asked(&self, guide: &Guide<'_>, chart: &Chart<D>, first: [i32; D]) -> Option<(Template, usize)> {
+    fn asked(
+        &self,
+        guide: &Guide<'_>,
+        chart: &Chart<D>,
+        first: [i32; D],
+    ) -> Option<(Template, usize)> {
         let mut template = Template::new(self.points(), self.guide.as_ref()?.values.len());
         let mut points = 0;
         for (i, &p) in chart.window.points.iter().enumerate() {
@@ -234,7 +285,11 @@ impl<const D: usize> Index<D> {
         for a in 0..D {
             let n = self.size[a] as i32;
             let i = near[a] - first[a];
-            let i = if self.grid.wrap()[a] { i.rem_euclid(n) } else { i };
+            let i = if self.grid.wrap()[a] {
+                i.rem_euclid(n)
+            } else {
+                i
+            };
             if !(0..n).contains(&i) {
                 return None;
             }
@@ -244,7 +299,13 @@ impl<const D: usize> Index<D> {
     }
 
     /// Adds the spectrum of the sums of squared differences to a template, less what is the same for all.
-    fn correlate(&self, squares: &Squares, template: &Template, scale: f32, out: &mut [Complex<f32>]) {
+    fn correlate(
+        &self,
+        squares: &Squares,
+        template: &Template,
+        scale: f32,
+        out: &mut [Complex<f32>],
+    ) {
         let scale = scale / self.points() as f32;
         let weight = self.plan.forward(&template.weight);
         for ((out, e), w) in out.iter_mut().zip(&squares.squares).zip(&weight) {
@@ -293,13 +354,14 @@ impl<const D: usize> Index<D> {
         let mean = (self.total / self.grid.len() as f64) as f32;
         let sides = Grid::new(last.map(|n| n + 1), [false; D]);
         let Ok(sides) = sides else { return Vec::new() };
-        let mut values: Vec<f32> = (0..sides.len())
-            .map(|k| {
-                let point = sides.point(k);
+        let mut values: Vec<f32> = sides
+            .points()
+            .map(|point| {
                 let score = scores[self.position(point)];
                 if charges.repetition > 0.0 && mean > 0.0 {
-                    let at: [usize; D] =
-                        std::array::from_fn(|a| self.grid.resolve(a, point[a] as isize - first[a] as isize));
+                    let at: [usize; D] = std::array::from_fn(|a| {
+                        self.grid.resolve(a, point[a] as isize - first[a] as isize)
+                    });
                     score + charges.repetition * (self.shown[self.grid.index(at)] / mean).min(OFTEN)
                 } else {
                     score
@@ -325,7 +387,9 @@ impl<const D: usize> Index<D> {
             }
             let point = sides.point(best.1);
             found.push(std::array::from_fn(|a| (point[a] as i32 - first[a]) * ONE));
-            self.around(&sides, point.map(|x| x as i32), APART as i32, |k| values[k] = f32::INFINITY);
+            self.around(&sides, point.map(|x| x as i32), APART as i32, |k| {
+                values[k] = f32::INFINITY
+            });
         }
         found
     }
@@ -354,7 +418,10 @@ impl<const D: usize> Index<D> {
 
 impl Template {
     fn new(points: usize, channels: usize) -> Self {
-        Self { weight: vec![0.0; points], values: vec![vec![0.0; points]; channels] }
+        Self {
+            weight: vec![0.0; points],
+            values: vec![vec![0.0; points]; channels],
+        }
     }
 
     #[inline(always)]

@@ -88,18 +88,29 @@ impl<const D: usize> Source<D> {
                 });
             }
         }
-        if !colours.iter().chain(elements.depth).chain(adjacency.costs).all(|x| x.is_finite()) {
+        if !colours
+            .iter()
+            .chain(elements.depth)
+            .chain(adjacency.costs)
+            .all(|x| x.is_finite())
+        {
             return Err(Error::value("colours", "finite values are allowed"));
         }
         let classes = (adjacency.costs.len() as f64).sqrt() as usize;
         if classes * classes != adjacency.costs.len()
             || adjacency.classes.iter().any(|&c| usize::from(c) >= classes)
         {
-            return Err(Error::value("classes", "needs a square table of costs that has every class"));
+            return Err(Error::value(
+                "classes",
+                "needs a square table of costs that has every class",
+            ));
         }
         let most = elements.labels.iter().max().map_or(0, |&m| m as usize);
         if most > n {
-            return Err(Error::value("labels", format!("{most} of {n} samples; at most one element a sample")));
+            return Err(Error::value(
+                "labels",
+                format!("{most} of {n} samples; at most one element a sample"),
+            ));
         }
         let mut this = Self {
             grid,
@@ -199,7 +210,9 @@ impl<const D: usize> Source<D> {
     pub(super) fn sample(&self, place: Place<D>) -> usize {
         let near = nearest(place);
         let shape = self.grid.shape();
-        (0..D).fold(0, |at, axis| at * shape[axis] + self.grid.resolve(axis, near[axis] as isize))
+        (0..D).fold(0, |at, axis| {
+            at * shape[axis] + self.grid.resolve(axis, near[axis] as isize)
+        })
     }
 
     /// What a place shows: its colour between samples, all else of the nearest one.
@@ -218,7 +231,10 @@ impl<const D: usize> Source<D> {
         for axis in 0..D {
             let whole = (place[axis] >> BITS) as isize;
             let part = (place[axis] & (ONE - 1)) as f32 / ONE as f32;
-            at[axis] = [self.grid.resolve(axis, whole), self.grid.resolve(axis, whole + 1)];
+            at[axis] = [
+                self.grid.resolve(axis, whole),
+                self.grid.resolve(axis, whole + 1),
+            ];
             weight[axis] = [1.0 - part, part];
         }
         let mut colour = [0.0; CHANNELS];
@@ -253,7 +269,13 @@ fn spread(colours: &[f32], channels: usize) -> ([f32; CHANNELS], f32) {
     let n = (colours.len() / channels).max(1) as f64;
     let (mut mean, mut total) = ([0.0f32; CHANNELS], 0.0);
     for c in 0..channels {
-        let values = || colours.iter().skip(c).step_by(channels).map(|&x| f64::from(x));
+        let values = || {
+            colours
+                .iter()
+                .skip(c)
+                .step_by(channels)
+                .map(|&x| f64::from(x))
+        };
         let middle = values().sum::<f64>() / n;
         mean[c] = middle as f32;
         total += (values().map(|x| (x - middle).powi(2)).sum::<f64>() / n).sqrt();

@@ -61,7 +61,9 @@ impl Volumes {
             for row in 0..rows {
                 line.copy_from_slice(&volume[(plane * rows + row) * columns..][..columns]);
                 // The lengths are those of the plan, so the transform cannot refuse them.
-                let _ = self.real.process_with_scratch(&mut line, &mut spectrum, &mut work);
+                let _ = self
+                    .real
+                    .process_with_scratch(&mut line, &mut spectrum, &mut work);
                 for (column, &value) in spectrum.iter().enumerate() {
                     out[column * rows + row] = value;
                 }

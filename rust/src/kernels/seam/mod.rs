@@ -23,6 +23,16 @@ use crate::foundation::grid::Grid;
 /// Calls `f(p, q)` for each point `p` that has a next point `q` along an axis, in row-major order.
 #[inline(always)]
 pub(crate) fn links<const D: usize>(grid: &Grid<D>, axis: usize, mut f: impl FnMut(usize, usize)) {
+    steps(grid, axis, |_, p, q| f(p, q));
+}
+
+/// The same with the coordinate of `p` along the axis: `f(i, p, q)`.
+#[inline(always)]
+pub(crate) fn steps<const D: usize>(
+    grid: &Grid<D>,
+    axis: usize,
+    mut f: impl FnMut(usize, usize, usize),
+) {
     let (stride, length) = (grid.strides()[axis], grid.shape()[axis]);
     for block in (0..grid.len()).step_by(stride * length) {
         for i in 0..length {
@@ -35,7 +45,7 @@ pub(crate) fn links<const D: usize>(grid: &Grid<D>, axis: usize, mut f: impl FnM
                 continue;
             };
             for k in 0..stride {
-                f(from + k, to + k);
+                f(i, from + k, to + k);
             }
         }
     }
