@@ -18,6 +18,7 @@ WITHIN = {
         "blocks": {"appearance", "guide"},
         "optimize": {"appearance", "guide"},
         "coherence": {"appearance"},
+        "stitcher": {"guide"},
     },
 }
 """What modules use of their own layer. The foundation and the bindings are of one piece."""

@@ -14,6 +14,7 @@ import solid_checks as checks
 import texrs
 from texrs import fields, samples
 from texrs._engine.pyramid import ONE, Region, to_fixed, upsample
+from texrs.growth import Settings, Windows
 from texrs.source_map import SourceMap
 
 FIELDS = {
@@ -110,7 +111,7 @@ def test_turned_exemplars_are_what_the_frame_says():
 
 
 def grown(image, size, *, contrast=1.0, acceptance=2.0, votes=(0, 0, 0), blocks=True, field=None):
-    """Grow a volume by the kernels alone: the default, or without a part of it."""
+    """Grow a volume by blocks and their correction, kernel by kernel, or without a part of it."""
     analysis = texrs.Exemplar(image, axes=3).analyse()
     regions = [Region.whole((size,) * 3)]
     while len(regions) < len(analysis.levels):
@@ -150,11 +151,12 @@ def grown(image, size, *, contrast=1.0, acceptance=2.0, votes=(0, 0, 0), blocks=
     return texrs.Synthesis(picture, source)
 
 
-def test_the_kernels_alone_make_the_default():
+def test_the_kernels_alone_grow_what_windows_do():
     particles = exemplar("particles").image
     made_by_kernels = grown(particles, 32)
-    result = texrs.solid(particles, 32)
-    np.testing.assert_array_equal(made_by_kernels.source.coordinates, result.source.coordinates)
+    levels = texrs.Exemplar(particles, axes=3).analyse().levels
+    places = Windows(levels, Settings(), 0).grow(Region.whole((32, 32, 32))).places
+    np.testing.assert_array_equal(made_by_kernels.source.coordinates.reshape(-1), places / np.float32(ONE))
 
 
 ABLATIONS = {

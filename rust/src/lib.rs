@@ -35,6 +35,7 @@
 //! | [`blocks`] | patch-based initialisation: cells filled by pieces that fit -> `appearance`, `guide` |
 //! | [`pyramid`] | from one resolution to the next |
 //! | [`optimize`] | coordinates corrected until every window is like one of the exemplar -> `appearance`, `guide` |
+//! | [`stitcher`] | patches pulled through frames, cut where it shows least, healed -> `guide` |
 //! | [`coherence`] | k-coherence: similarity sets, and correction among their candidates -> `appearance` |
 //!
 //! The topmost layer, `bindings`, is the Python module `texrs._rust` (feature `python`).

@@ -45,7 +45,7 @@ class Weights:
     joint: float = 0.5
     surprise: float = 1.0
     distortion: float = 0.03
-    guide: float = 0.05
+    guide: float = 0.5
 
 
 class Stitched(NamedTuple):
@@ -134,7 +134,7 @@ class Stitcher:
         weights: Weights = Weights(),
         repetition: float = 0.15,
         continuation: float = 4.0,
-        balance: float = 8.0,
+        balance: float = 4.0,
         seed: int = 0,
         held: NDArray[np.bool_] | None = None,
         given: NDArray[np.int32] | None = None,

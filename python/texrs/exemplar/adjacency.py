@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.cluster.vq import kmeans, vq
 
 from texrs._typing import Floats
 
@@ -48,6 +47,8 @@ def classify(colours: Floats, count: int) -> NDArray[np.uint8]:
 
     ``colours`` is (..., C); a picture of few colours keeps them as its classes.
     """
+    from scipy.cluster.vq import kmeans, vq
+
     flat = np.ascontiguousarray(colours.reshape(-1, colours.shape[-1]), np.float64)
     step = max(1, len(flat) // SAMPLES)
     # Every so many, at places that no period of a texture follows.

@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from texrs._typing import Array, Bools, Floats
 from texrs.exemplar.adjacency import classify
@@ -26,9 +25,10 @@ LEAST = 6
 """Pieces, and samples of a piece, that count."""
 LARGEST = 0.15
 """Of all pieces, that one may have: more of it is no element."""
-FAIR, CONTRAST, SHARE, COMPACT = 0.9, 4.0, 0.65, 0.9
-"""What must be reached: score of the background; change of colours at the borders of pieces over that elsewhere; most of the
-exemplar that is not background; share of the pieces that are shorter than half of the exemplar."""
+FAIR, SHARE, COMPACT, EXPLAINED, PLAIN = 0.9, 0.65, 0.9, 0.3, 0.45
+"""What must be reached: score of the background; most of the exemplar that is not background; share of the pieces that are
+shorter than half of the exemplar; share of the variance of colours that the two explain; most variance of the background,
+as a share of all."""
 PAD = 12
 """Samples around an exemplar that repeats, for distances: beyond this a sample is as deep inside as any."""
 
@@ -90,6 +90,8 @@ def find_instances(colours: Floats, wrap: Sequence[bool]) -> Instances | None:
     True
 
     """
+    from scipy import ndimage
+
     axes = colours.ndim - 1
     # A little smoother than it is: grain would tear pieces.
     modes = ["wrap" if closed else "nearest" for closed in wrap]
@@ -114,6 +116,8 @@ def find_instances(colours: Floats, wrap: Sequence[bool]) -> Instances | None:
 
 def _try_background(palette: NDArray[np.uint8], colours: list[int], wrap: Sequence[bool]) -> _Pieces:
     """Return the pieces that are left without some colours: as they are, or apart where they touch by a sample."""
+    from scipy import ndimage
+
     mask = ~np.isin(palette, colours)
     ground = np.bincount(label_components(~mask, wrap).ravel())[1:]
     whole = ground.max(initial=0) / max(ground.sum(), 1)
@@ -135,7 +139,9 @@ def _score_pieces(mask: Bools, apart: Bools, whole: float, wrap: Sequence[bool])
 
 
 def _stand_out(colours: Floats, pieces: _Pieces, wrap: Sequence[bool]) -> bool:
-    """Whether pieces are elements: few samples of all, short, and of other colours than what is around them."""
+    """Whether pieces are elements: few samples of all, short, and in a plain background of another colour."""
+    from scipy import ndimage
+
     if pieces.score < FAIR or pieces.mask.mean() > SHARE:
         return False
     sizes = np.bincount(pieces.labels.ravel())[1:]
@@ -146,25 +152,20 @@ def _stand_out(colours: Floats, pieces: _Pieces, wrap: Sequence[bool]) -> bool:
     ]
     if sizes[short].sum() < COMPACT * sizes.sum():
         return False
-    border, rest = [], []
-    for axis in range(pieces.mask.ndim):
-        near, far = (
-            np.take(pieces.mask, k, axis)
-            for k in (range(pieces.mask.shape[axis] - 2), range(2, pieces.mask.shape[axis]))
-        )
-        change = np.linalg.norm(
-            np.take(colours, range(2, colours.shape[axis]), axis)
-            - np.take(colours, range(colours.shape[axis] - 2), axis),
-            axis=-1,
-        )
-        border.append(change[near != far])
-        rest.append(change[near == far])
-    means = [float(np.concatenate(part).mean(dtype=np.float64)) for part in (border, rest)]
-    return means[0] >= CONTRAST * max(means[1], 1e-6)
+    samples = colours.reshape(-1, colours.shape[-1])
+    inside = pieces.mask.reshape(-1)
+    variances = [
+        float(part.var(axis=0, dtype=np.float64).sum()) for part in (samples, samples[inside], samples[~inside])
+    ]
+    share, whole = float(inside.mean()), max(variances[0], 1e-12)
+    explained = 1 - (share * variances[1] + (1 - share) * variances[2]) / whole
+    return explained >= EXPLAINED and variances[2] <= PLAIN * whole
 
 
 def label_components(mask: Bools, wrap: Sequence[bool]) -> NDArray[np.intp]:
     """Return the connected parts of a mask, numbered from 1, around the axes that repeat."""
+    from scipy import ndimage
+
     labels, count = ndimage.label(mask)
     roots = np.arange(count + 1)
 
@@ -186,6 +187,8 @@ def label_components(mask: Bools, wrap: Sequence[bool]) -> NDArray[np.intp]:
 
 def as_instances(classes: Array, wrap: Sequence[bool]) -> Instances | None:
     """Return the elements of an exemplar of labels: connected parts of any class but that which hangs together most."""
+    from scipy import ndimage
+
     parts = {int(c): label_components(classes == c, wrap) for c in np.unique(classes)}
     largest = {c: np.bincount(p.ravel())[1:].max() / classes.size for c, p in parts.items()}
     ground = max(largest, key=lambda c: (largest[c], -c))

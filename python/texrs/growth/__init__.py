@@ -10,7 +10,7 @@ from texrs.growth.constraints import Conditions, Constraints, Guide, Surrounding
 from texrs.growth.engine import Grown, Patches, Start, grow, keep
 from texrs.growth.scales import FROM_ATLAS, grow_from_atlas, to_finest
 from texrs.growth.settings import Settings
-from texrs.growth.start import from_draft, from_patches
+from texrs.growth.start import from_draft, from_patches, patch_side
 from texrs.growth.windows import Windows
 
 __all__ = [
@@ -29,5 +29,6 @@ __all__ = [
     "grow",
     "grow_from_atlas",
     "keep",
+    "patch_side",
     "to_finest",
 ]

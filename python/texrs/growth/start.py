@@ -18,12 +18,16 @@ from texrs.exemplar import Exemplar
 from texrs.growth.constraints import Asked
 from texrs.growth.engine import Patches, Places, Start
 
-__all__ = ["from_draft", "from_patches"]
+__all__ = ["from_draft", "from_patches", "patch_side"]
 
 PATCH = {2: 0.45, 3: 0.68}
 """Side of a patch, as a share of the exemplar's shorter side: larger ones copy too much of it in one piece."""
+MOST = {2: 256.0, 3: 64.0}
+"""Side of a patch at most: cuts of larger ones take long, and gain nothing."""
 OVERLAP = {2: 0.33, 3: 0.4}
 """Share of it by which neighbours overlap."""
+GUIDED = 0.4
+"""How much smaller patches are that follow a map or values: within one the exemplar's own trend goes on."""
 SEPARATE, ANY = Weights(surprise=0.5), Weights()
 """What seams cost where the elements are known, and where they are not."""
 
@@ -44,7 +48,7 @@ def from_patches(exemplar: Exemplar, level: int, seed: int, *, candidates: int =
     bend : bool, optional
         Whether patches bend with a field; None: where the exemplar has no separate elements, which would be bent too.
     """
-    axes, side = exemplar.axes, min(exemplar.shape)
+    axes, side = exemplar.axes, patch_side(exemplar.shape)
 
     def make(
         region: Region, frames: NDArray[np.int16], asked: Asked, progress: Progress | None
@@ -55,7 +59,7 @@ def from_patches(exemplar: Exemplar, level: int, seed: int, *, candidates: int =
         made = stitcher.stitch(
             region,
             frames,
-            patch=max(4.0, PATCH[axes] * side),
+            patch=max(6.0, side * (1.0 if asked.demand is None else GUIDED)),
             overlap=OVERLAP[axes],
             candidates=candidates,
             bend=bent,
@@ -73,6 +77,11 @@ def from_patches(exemplar: Exemplar, level: int, seed: int, *, candidates: int =
         return made.places, patches
 
     return Start(level, make, "patches")
+
+
+def patch_side(shape: tuple[int, ...]) -> float:
+    """Return the side of the patches of an exemplar, in samples."""
+    return min(MOST[len(shape)], PATCH[len(shape)] * min(shape))
 
 
 def from_draft(level: int, draft: Callable[[Region], Places]) -> Start:

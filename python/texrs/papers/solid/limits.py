@@ -7,9 +7,12 @@ from texrs._engine.pyramid import Region
 from texrs._typing import Array
 from texrs.errors import LimitExceeded
 from texrs.fields import Field
+from texrs.growth import patch_side
 
 __all__ = ["check_memory"]
 
+CUT = 1000
+"""Bytes of a point of a patch: places that are tried at once, what they show, pairs and capacities."""
 LIMIT = 8 << 30
 """Bytes that a synthesis may take unless another limit is given."""
 
@@ -19,14 +22,15 @@ def estimate_bytes(image: Array, region: Region, field: Field | None) -> int:
 
     A point of the output has its place four times over (12 bytes an axis triple), what its window shows, its value and
     where the field varies its frame; the coarser levels add a seventh. A sample of the exemplar has its vector
-    and its colours.
+    and its colours, what patches show of it and their spectra. A point of a patch has all that a cut is made from.
     """
     axes = len(region.shape)
     point = 4 * 4 * axes + 12 + 2 * image.itemsize * image.shape[-1] + 6
     if field is not None and field.constant is None:
         point += 2 * axes * axes
     samples = image.size // image.shape[-1]
-    return int(region.points * point * 8 // 7 + samples * (56 + 8 * image.shape[-1]) * 8 // 7 + (24 << 20))
+    patch = min(region.points, round((1.5 * patch_side(image.shape[:axes])) ** axes))
+    return int(region.points * point * 8 // 7 + samples * (160 + 8 * image.shape[-1]) + patch * CUT + (24 << 20))
 
 
 def check_memory(image: Array, region: Region, field: Field | None, limit: object) -> None:
