@@ -344,11 +344,11 @@ def test_optimise_tries_more_places(name, size):
 
 
 def test_more_places_make_cheaper_seams():
-    pebbles, field = samples.pebbles((96, 96)).image, fields.circular(axes=2)
+    pebbles, field = samples.pebbles((160, 160)).image, fields.circular(axes=2)
     seams = [
         np.mean(
             [
-                texrs.synthesize(pebbles, 160, seed=s, quality=q, field=field).report["stitched"]["seams"]
+                texrs.synthesize(pebbles, 256, seed=s, quality=q, field=field).report["stitched"]["seams"]
                 for s in range(4)
             ]
         )

@@ -57,11 +57,11 @@ def synthesize_around_what_is_held() -> Parts:
 
 @case
 def synthesize_by_optimising() -> Parts:
-    """One exemplar passes the trial, and one does not."""
+    """An exemplar with separate elements, and one without."""
     parts: dict[str, object] = {}
     for name, exemplar in {"accepted": clear("scales", 64, 64, wrap=True), "refused": deep("bricks", 64, 64)}.items():
         result = texrs.synthesize(exemplar, (96, 80), quality="optimise", wrap=True)
-        parts |= {f"{name} {part}": value for part, value in parts_of(result, report=[*GROWN, "trial"]).items()}
+        parts |= {f"{name} {part}": value for part, value in parts_of(result, report=[*GROWN, "stitched"]).items()}
     return parts
 
 
@@ -90,7 +90,7 @@ def solid_that_repeats() -> Parts:
 @case
 def solid_by_optimising() -> Parts:
     result = texrs.solid(floats("wood_solid", *CUBE), 16, quality="optimise")
-    return parts_of(result, report=[*GROWN, "trial"])
+    return parts_of(result, report=[*GROWN, "stitched"])
 
 
 @case
