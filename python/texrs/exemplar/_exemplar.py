@@ -252,8 +252,14 @@ class Exemplar:
 
     @property
     def directedness(self) -> float:
-        """How much the edges of a picture agree in direction, or in two at right angles: 0 not at all, 1 wholly."""
-        return self.remember("directedness", lambda: measure_direction(self.guidance))
+        """How much edges agree in direction, or in two at right angles: 0 not at all, 1 wholly.
+
+        Of a volume: of that of its three middle planes where they agree most.
+        """
+        if self._axes == 2:
+            return self.remember("directedness", lambda: measure_direction(self.guidance))
+        planes = (np.take(self.guidance, n // 2, axis) for axis, n in enumerate(self.shape))
+        return self.remember("directedness", lambda: max(measure_direction(plane) for plane in planes))
 
     def segment(self, options: ElementOptions = ElementOptions(), *, progress: Progress | None = None) -> Segmentation:
         """Return the background and the elements of a picture, and the lattice that they may lie on.

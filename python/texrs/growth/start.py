@@ -28,6 +28,8 @@ OVERLAP = {2: 0.33, 3: 0.4}
 """Share of it by which neighbours overlap."""
 GUIDED = 0.4
 """How much smaller patches are that follow a map or values: within one the exemplar's own trend goes on."""
+DIRECTED = 0.3
+"""Textures whose edges agree in direction so much go on along it: their patches bend with a field."""
 SEPARATE, ANY = Weights(surprise=0.5), Weights()
 """What seams cost where the elements are known, and where they are not."""
 
@@ -46,7 +48,7 @@ def from_patches(exemplar: Exemplar, level: int, seed: int, *, candidates: int =
     candidates : int
         Places that are tried for each, of which the best stays.
     bend : bool, optional
-        Whether patches bend with a field; None: where the exemplar has no separate elements, which would be bent too.
+        Whether patches bend with a field; None: where the exemplar's edges have a direction, and no separate elements.
     """
     axes, side = exemplar.axes, patch_side(exemplar.shape)
 
@@ -55,7 +57,8 @@ def from_patches(exemplar: Exemplar, level: int, seed: int, *, candidates: int =
     ) -> tuple[Places, Patches]:
         stitcher = exemplar.stitcher
         varies = len(frames) > 1
-        bent = varies and (not stitcher.separate if bend is None else bend)
+        directed = not stitcher.separate and exemplar.directedness >= DIRECTED
+        bent = varies and (directed if bend is None else bend)
         made = stitcher.stitch(
             region,
             frames,

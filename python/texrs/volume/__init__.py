@@ -14,10 +14,12 @@ Statistics, each of which can be used alone, most of them for pictures too; `com
 `seam_planes` `speckle`      traces of an algorithm: its lattice, and speckle
 `slice_distances`            whether each slice has the values of the exemplar
 `coherence` `cell_reuse`     which parts of the exemplar are used, in how large pieces
+`integrity`                  whether elements are whole, apart, and of one colour
 ===========================  ===============================================================
 """
 
 from texrs.volume.compare import Comparison, compare
+from texrs.volume.integrity import Integrity, integrity
 from texrs.volume.labels import paint, surface
 from texrs.volume.pictures import cube, oblique, slices, turntable
 from texrs.volume.reuse import CellReuse, cell_reuse, coherence
@@ -36,6 +38,7 @@ __all__ = [
     "CellReuse",
     "Classes",
     "Comparison",
+    "Integrity",
     "Particles",
     "autocorrelation",
     "cell_reuse",
@@ -44,6 +47,7 @@ __all__ = [
     "compare",
     "cube",
     "frequency",
+    "integrity",
     "lightness",
     "lineal_path",
     "oblique",

@@ -10,10 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from texrs._arrays import as_image, as_int
 from texrs._typing import Array
 from texrs.errors import InvalidInput
+from texrs.exemplar import Exemplar
 from texrs.fields import Field
 from texrs.source_map import SourceMap
 from texrs.volume import statistics, structure
 from texrs.volume._values import check_field, guess_axes
+from texrs.volume.integrity import Integrity, integrity
 from texrs.volume.reuse import CellReuse, cell_reuse
 
 __all__ = ["Comparison", "compare"]
@@ -53,6 +55,8 @@ class Comparison:
         nothing.
     reuse : CellReuse or None
         Use of the exemplar. None without a source map.
+    integrity : Integrity or None
+        How whole the elements are. None without a source map, or without separate elements.
 
     """
 
@@ -68,6 +72,7 @@ class Comparison:
     orientation: NDArray[np.float64] | None
     turned: float | None
     reuse: CellReuse | None
+    integrity: Integrity | None
 
     @property
     def relative_shares(self) -> NDArray[np.float64]:
@@ -111,6 +116,12 @@ class Comparison:
             rows.append(("largest patch / output", "", f"{self.reuse.largest:.3f}", ""))
             rows.append(("most used cell / mean", "", f"{self.reuse.most_used:.1f}", ""))
             rows.append(("cells not used", "", f"{self.reuse.unused:.3f}", ""))
+        if self.integrity is not None:
+            row("contacts without a border in 1000", self.integrity.contacts, ".2f")
+            row("largest part / all elements", self.integrity.largest, ".3f")
+            row("parts of several colours", self.integrity.mixed, ".3f")
+            rows.append(("torn elements / all", "", f"{self.integrity.torn:.3f}", ""))
+            rows.append(("crumbs in 100 000", "", f"{self.integrity.crumbs:.1f}", ""))
         widths = [max(len(r[i]) for r in rows) for i in range(4)]
         lines = [r[0].ljust(widths[0]) + "".join("  " + r[i].rjust(widths[i]) for i in (1, 2, 3)) for r in rows]
         return "\n".join(line.rstrip() for line in lines)
@@ -137,7 +148,7 @@ def compare(
     exemplar, output : array_like
         (H, W[, C]) or (D, H, W[, C]), of one dtype and one number of channels, of any sizes of at least 16 a side.
     source : SourceMap, optional
-        That of the output: adds what is reused.
+        That of the output: adds what is reused, and whether elements are whole.
     field : Field, optional
         What the output followed: adds the orientation of its layers, and says when neighbours are coherent. What it
         leaves open is set by the size of the output (`texrs.fields.Field.over`).
@@ -219,6 +230,7 @@ def compare(
         orientation,
         turned,
         None if source is None else cell_reuse(source, field),
+        None if source is None else integrity(Exemplar(np.asarray(exemplar), axes=count), source),
     )
 
 

@@ -94,9 +94,10 @@ def solid(
     bend : bool, optional
         Whether patches bend with the field, as courses and nets need, or are turned and scaled as a whole, as separate
         elements do; None goes by whether the exemplar has separate elements.
-    method : {None, "paper"}
-        Which algorithm. "paper": the literal one, kept for comparison. It has no ``quality``, takes no constraints
-        and no guide, and looks the exemplar up at the nearest sample unless ``interpolation`` says otherwise.
+    method : {None, "paper", "paper-compensated"}
+        Which algorithm. "paper": the literal one, kept for comparison; "paper-compensated": the same with the windows of
+        Lefebvre and Hoppe, which the paper leaves out. They have no ``quality``, take no constraints
+        and no guide, and look the exemplar up at the nearest sample unless ``interpolation`` says otherwise.
     constraints : Constraints, optional
         Voxels that are given, by their values or by where they look in the exemplar (`texrs.Constraints`).
     guide : Guide, optional
@@ -201,9 +202,10 @@ def synthesize(
     bend : bool, optional
         Whether patches bend with the field, as courses and nets need, or are turned and scaled as a whole, as separate
         elements do; None goes by whether the exemplar has separate elements.
-    method : {None, "paper"}
-        Which algorithm. "paper": the literal one, kept for comparison. It has no ``quality``, takes no constraints
-        and no guide, and looks the exemplar up at the nearest sample unless ``interpolation`` says otherwise.
+    method : {None, "paper", "paper-compensated"}
+        Which algorithm. "paper": the literal one, kept for comparison; "paper-compensated": the same with the windows of
+        Lefebvre and Hoppe, which the paper leaves out. They have no ``quality``, take no constraints
+        and no guide, and look the exemplar up at the nearest sample unless ``interpolation`` says otherwise.
     constraints : Constraints, optional
         Pixels that are given, by their values or by where they look in the exemplar (`texrs.Constraints`).
     guide : Guide, optional
@@ -273,8 +275,16 @@ def synthesize(
 def grow_texture(asked: Request, progress: Progress | None) -> Synthesis:
     """Grow the source map, coarse to fine or from patches, and look the exemplar up through it."""
     show = partial(show_places, asked.exemplar.pixels)
-    if asked.method == "paper":
-        grown = grow_as_printed(asked.exemplar, asked.field, asked.seed, asked.region, show, progress)
+    if asked.method is not None:
+        grown = grow_as_printed(
+            asked.exemplar,
+            asked.field,
+            asked.seed,
+            asked.region,
+            show,
+            compensated=asked.method == "paper-compensated",
+            progress=progress,
+        )
     elif asked.quality == "fast":
         windows = analyse(asked)
         grown = windows.grow(asked.region, ask=asked.conditions.at, show=show, progress=progress)
@@ -330,7 +340,7 @@ def show_places(image: Array, places: Places, region: Region, spacing: int) -> A
 def describe(asked: Request, grown: Grown) -> dict[str, Any]:
     """Return the report: JSON types."""
     levels = [done.report() for done in grown.levels]
-    if asked.method == "paper":
+    if asked.method is not None:
         levels = [{"shape": level["shape"], "passes": level["passes"]} for level in levels]
     elif asked.quality == "fast":
         known = asked.exemplar.analyse(FAST.radii).levels[-len(levels) :]
@@ -352,7 +362,7 @@ def describe(asked: Request, grown: Grown) -> dict[str, Any]:
 
 def _count_elements(asked: Request) -> int | None:
     """Return how many separate elements were found, where they were looked for."""
-    if asked.method == "paper" or asked.quality == "fast":
+    if asked.method is not None or asked.quality == "fast":
         return None
     found = asked.exemplar.instances
     return 0 if found is None else found.count

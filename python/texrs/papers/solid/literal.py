@@ -48,7 +48,14 @@ PASSES = 2
 
 
 def grow_as_printed(
-    exemplar: Exemplar, field: Field | None, seed: int, region: Region, show: Show, progress: Progress | None = None
+    exemplar: Exemplar,
+    field: Field | None,
+    seed: int,
+    region: Region,
+    show: Show,
+    *,
+    compensated: bool = False,
+    progress: Progress | None = None,
 ) -> Grown:
     """Synthesise S_0, of one voxel, to S_L (section 3.2).
 
@@ -66,6 +73,9 @@ def grow_as_printed(
         The output.
     show : callable
         Makes pictures of the levels that are corrected.
+    compensated : bool
+        Whether windows are compensated for where the lattice makes them look, as Lefebvre and Hoppe (2006) do and the
+        paper does not.
     progress : callable, optional
         Called with the stage and the share of it that is done.
 
@@ -82,7 +92,8 @@ def grow_as_printed(
     start = Start(first, lambda region, frames, asked, progress: (zero, None))
     # A_l: the field at the places of the level's points.
     frames = partial(to_fixed, field)
-    return grow(region, levels, start, Correction(exemplar, seed, first), frames, show=show, progress=progress)
+    correction = Correction(exemplar, seed, first, compensated)
+    return grow(region, levels, start, correction, frames, show=show, progress=progress)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,6 +104,7 @@ class Correction:
     seed: int
     first: int
     """Number of the coarsest level of the output; below zero where the exemplar has none so coarse."""
+    compensated: bool
 
     def __call__(
         self,
@@ -117,7 +129,14 @@ class Correction:
             level, k=K, n=N, numbers=NUMBERS, progress=stage(progress, f"similarity sets, {of}")
         )
         found = correct(
-            levels[level], sets, places, region, frames, passes=PASSES, compensated=False, progress=stage(progress, of)
+            levels[level],
+            sets,
+            places,
+            region,
+            frames,
+            passes=PASSES,
+            compensated=self.compensated,
+            progress=stage(progress, of),
         )
         return Corrected(found, PASSES, 0.0)
 

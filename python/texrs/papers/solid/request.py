@@ -22,7 +22,7 @@ from texrs.volume._values import check_field
 
 __all__ = ["Method", "Request", "as_field", "as_interpolation"]
 
-Method: TypeAlias = Literal["paper"] | None
+Method: TypeAlias = Literal["paper", "paper-compensated"] | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,7 +43,7 @@ class Request:
         How much work is done.
     bend : bool, optional
         Whether patches bend with the field; none leaves it to the exemplar.
-    method : {None, "paper"}
+    method : {None, "paper", "paper-compensated"}
         Which algorithm.
     conditions : Conditions
         What is asked beside the texture.
@@ -83,13 +83,13 @@ class Request:
         """Return the request of a caller, or raise what is wrong with it."""
         known = as_exemplar(exemplar, axes=axes, minimum=COARSEST)
         region = Region.whole(as_size(size, axes=axes), as_wrap(wrap, axes=axes))
-        as_method(method, None, "paper")
-        if method == "paper" and (constraints is not None or guide is not None):
+        as_method(method, None, "paper", "paper-compensated")
+        if method is not None and (constraints is not None or guide is not None):
             what = "constraints" if constraints is not None else "guide"
-            raise InvalidInput(f"{what}: the paper's method knows none; leave out {what}, or method='paper'")
+            raise InvalidInput(f"{what}: the paper's method knows none; leave out {what}, or method={method!r}")
         if bend is not None and not isinstance(bend, bool):
             raise InvalidInput(f"bend: needs True, False or None, got {bend!r}")
-        how = as_interpolation(interpolation, known, "nearest" if method == "paper" else "cubic")
+        how = as_interpolation(interpolation, known, "cubic" if method is None else "nearest")
         turned = as_field(field, axes)
         if turned is not None:
             turned = turned.over(region.shape)

@@ -1,0 +1,207 @@
+"""Whether the separate elements of an exemplar are whole in what was made from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Array, Floats
+from texrs.exemplar import Exemplar, as_exemplar
+from texrs.exemplar.instances import Instances, label_components
+from texrs.source_map import SourceMap
+
+__all__ = ["Integrity", "integrity"]
+
+FOLLOW = 1.6
+"""Neighbours whose places are farther apart than this many samples, with their frames, are of two pieces."""
+WHOLE, CRUMB = 0.9, 0.3
+"""A piece with more of its element is whole, and one with less a crumb."""
+LEAST = 40
+"""Points of a part that is judged by its colours."""
+SECOND = 0.12
+"""Share of a part that a second colour has where it is of several."""
+
+
+@dataclass(frozen=True, slots=True)
+class Integrity:
+    """How whole elements are. Pairs are of the exemplar and of the output.
+
+    Attributes
+    ----------
+    contacts : tuple of float
+        Pairs of neighbours, in 1000 points, that lie in elements of other colours: there should be a border between.
+    largest : tuple of float
+        Share of the elements' points that lie in the largest part that hangs together.
+    mixed : tuple of float
+        Share of these parts that show several colours of elements.
+    density : tuple of float
+        Parts in 100 000 points.
+    torn : float
+        Share of the output's points in elements whose piece has less than 0.9 of its element. Pieces at an end of the
+        output are not counted.
+    crumbs : float
+        Pieces with less than 0.3 of their element, in 100 000 points.
+
+    """
+
+    contacts: tuple[float, float]
+    largest: tuple[float, float]
+    mixed: tuple[float, float]
+    density: tuple[float, float]
+    torn: float
+    crumbs: float
+
+
+def integrity(exemplar: Array | Exemplar, source: SourceMap, *, axes: int = 3) -> Integrity | None:
+    """Measure whether the separate elements of an exemplar are whole in what was made from it.
+
+    Parameters
+    ----------
+    exemplar : array or Exemplar
+        What was looked up.
+    source : SourceMap
+        Of the picture or the volume that was made from it alone.
+    axes : int
+        Of an array, 2 or 3.
+
+    Returns
+    -------
+    Integrity or None
+        None where the exemplar has no separate elements (`texrs.Exemplar.instances`).
+
+    Raises
+    ------
+    InvalidInput
+        Not an image.
+
+    Examples
+    --------
+    >>> import texrs
+    >>> particles = texrs.samples.particles((48, 48, 48)).image
+    >>> made = texrs.solid(particles, 48, seed=1)
+    >>> found = texrs.volume.integrity(particles, made.source)
+    >>> found.torn < 0.1, found.largest[1] < 0.3
+    (True, True)
+
+    """
+    known = as_exemplar(exemplar, axes=axes)
+    found = known.instances
+    if found is None:
+        return None
+    tones = _average_elements(known.colours, found)
+    own = SourceMap.identity(known.shape)
+    before, after = (_Shown.of(found, tones, m, known.repeat if m is own else None) for m in (own, source))
+    torn, crumbs = after.measure_pieces(found, source)
+    return Integrity(
+        (before.count_contacts(), after.count_contacts()),
+        (before.largest, after.largest),
+        (before.measure_mixed(), after.measure_mixed()),
+        (before.density, after.density),
+        torn,
+        crumbs,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shown:
+    """The elements that a map shows: of each point its number, the samples that it shows, and connected parts."""
+
+    elements: NDArray[np.uint32]
+    inside: NDArray[np.bool_]
+    tones: Floats
+    parts: NDArray[np.intp]
+    sizes: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, found: Instances, tones: Floats, source: SourceMap, wrap: tuple[bool, ...] | None) -> _Shown:
+        elements = source.render(found.labels, interpolation="nearest")
+        inside = source.render(found.depth, interpolation="nearest") > 0
+        parts = label_components(elements > 0, wrap or (False,) * elements.ndim)
+        return cls(elements, inside, tones, parts, np.bincount(parts.reshape(-1))[1:])
+
+    @property
+    def largest(self) -> float:
+        return round(float(self.sizes.max(initial=0) / max(self.sizes.sum(), 1)), 4)
+
+    @property
+    def density(self) -> float:
+        return round(float((self.sizes >= LEAST).sum() / self.parts.size * 1e5), 2)
+
+    def count_contacts(self) -> float:
+        """Count the pairs of neighbours in elements of other colours, in 1000 points."""
+        total = 0
+        for axis in range(self.elements.ndim):
+            (p, q), (m, n) = (_pair(a, axis) for a in (self.elements, self.inside))
+            both = m & n & (p > 0) & (q > 0) & (p != q)
+            total += int((np.linalg.norm(self.tones[p[both]] - self.tones[q[both]], axis=-1) > 1).sum())
+        return round(total / self.elements.size * 1e3, 3)
+
+    def measure_mixed(self) -> float:
+        """Return the share of parts in which a second colour has more than its share."""
+        from scipy import ndimage
+
+        judged = np.flatnonzero(self.sizes >= LEAST) + 1
+        several = 0
+        boxes = ndimage.find_objects(self.parts)
+        for part in judged:
+            box = boxes[part - 1]
+            seen = self.elements[box][self.parts[box] == part]
+            main = self.tones[np.bincount(seen).argmax()]
+            other = np.linalg.norm(self.tones - main, axis=-1) > 1
+            several += bool(other[seen].mean() > SECOND)
+        return round(several / max(len(judged), 1), 4)
+
+    def measure_pieces(self, found: Instances, source: SourceMap) -> tuple[float, float]:
+        """Return the share of points in torn pieces, and the crumbs in 100 000 points."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        shape, index = self.elements.shape, np.arange(self.elements.size).reshape(self.elements.shape)
+        edges = []
+        frames = None if source.frame is None else source.frames()
+        reach = np.ones(shape) if frames is None else np.linalg.norm(frames, axis=(-2, -1)) / len(shape) ** 0.5
+        for axis in range(self.elements.ndim):
+            (p, q), (i, j) = (_pair(a, axis) for a in (self.elements, index))
+            step = np.diff(source.coordinates, axis=axis)
+            # Around the ends of an exemplar that repeats, too.
+            sides = np.array(found.labels.shape)
+            step = np.linalg.norm(np.minimum(np.abs(step), np.abs(sides - np.abs(step))), axis=-1)
+            follow = (p > 0) & (p == q) & (step <= FOLLOW * np.maximum(_pair(reach, axis)[0], 1))
+            edges.append(np.stack([i[follow], j[follow]]))
+        rows, columns = np.concatenate(edges, axis=1)
+        graph = coo_array((np.ones(len(rows), bool), (rows, columns)), shape=(index.size,) * 2)
+        pieces = connected_components(graph, directed=False)[1]
+        # A point stands for as much of the exemplar as its frame has room for.
+        worth = np.ones(index.size) if frames is None else np.abs(np.linalg.det(frames)).reshape(-1)
+        inside = self.elements.reshape(-1) > 0
+        sizes = np.bincount(pieces[inside], worth[inside], minlength=pieces.max() + 1)
+        whole = np.bincount(found.labels.reshape(-1))[self.elements.reshape(-1)]
+        share = sizes[pieces] / np.maximum(whole, 1)
+        ends = np.zeros(shape, bool)
+        for axis in range(len(shape)):
+            np.moveaxis(ends, axis, 0)[[0, -1]] = True
+        cut = np.zeros(len(sizes), bool)
+        cut[pieces[ends.reshape(-1)]] = True
+        judged = inside & ~cut[pieces] & (whole >= LEAST)
+        crumbs = len(np.unique(pieces[judged & (share < CRUMB)]))
+        return (
+            round(float((judged & (share < WHOLE)).sum() / max(judged.sum(), 1)), 4),
+            round(crumbs / index.size * 1e5, 2),
+        )
+
+
+def _average_elements(colours: Floats, found: Instances) -> Floats:
+    """Return the mean colour of each element, in standard deviations of the exemplar."""
+    flat = colours.reshape(-1, colours.shape[-1]).astype(np.float64)
+    labels = found.labels.reshape(-1)
+    counts = np.maximum(np.bincount(labels), 1)
+    means = [np.bincount(labels, channel) / counts for channel in flat.T]
+    return np.asarray(np.stack(means, axis=-1) / max(float(flat.std(axis=0).mean()), 1e-12), np.float32)
+
+
+def _pair(array: Array, axis: int) -> tuple[Array, Array]:
+    """Return each point but the last along an axis, and the next one."""
+    n = array.shape[axis]
+    return np.take(array, range(n - 1), axis), np.take(array, range(1, n), axis)
