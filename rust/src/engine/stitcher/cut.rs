@@ -20,8 +20,8 @@ use crate::kernels::seam::{links, steps};
 const SHORTEST: f32 = 2e-3;
 /// Costs of one pair are at most this, so that sums stay within 32 bits.
 pub(super) const MOST: f32 = 1000.0;
-/// Windows of more points are cut coarsely first.
-const LARGE: usize = 4096;
+/// Windows of more points are cut between blocks of such a side first.
+const LARGE: [(usize, usize); 1] = [(4096, 2)];
 /// Beyond this, colours of two elements are as different as can be.
 const UNLIKE: f32 = 1.5;
 /// What a guide's cost of unrelated windows is.
@@ -67,8 +67,8 @@ pub(super) struct Cutting<const D: usize> {
     pub take: Vec<bool>,
     /// Seams of the window, as in the canvas.
     pub seams: Vec<[f32; D]>,
-    /// Whether it runs between blocks of points.
-    coarse: bool,
+    /// Side of the blocks of points that it runs between.
+    block: usize,
 }
 
 /// What a point of a window must do.
@@ -139,7 +139,7 @@ impl<const D: usize> Costs<D> {
         window: &Window<D>,
         ties: &[Tie],
         sink: &[bool],
-        coarse: bool,
+        block: usize,
     ) -> Cutting<D> {
         let take: Vec<bool> = ties
             .iter()
@@ -179,7 +179,7 @@ impl<const D: usize> Costs<D> {
             value,
             take,
             seams,
-            coarse,
+            block,
         }
     }
 }
@@ -203,7 +203,7 @@ impl<const D: usize> Cutter<'_, D> {
         self.refine(canvas, patch, coarse, monitor)
     }
 
-    /// Cuts a patch in between blocks of two points a side, if it is large: enough to compare it with others.
+    /// Cuts a patch in between blocks of points, if it is large: enough to compare it with others.
     pub fn cut_coarsely(
         &self,
         canvas: &Canvas<D>,
@@ -211,18 +211,16 @@ impl<const D: usize> Cutter<'_, D> {
         monitor: &Monitor,
     ) -> Result<Cutting<D>> {
         let n = patch.window.grid.len();
+        let block = LARGE
+            .iter()
+            .find(|(least, _)| n > *least)
+            .map_or(1, |&(_, side)| side);
         let ties: Vec<Tie> = (0..n).map(|i| tie(canvas, patch, i)).collect();
-        let coarse = n > LARGE;
-        let (energy, costs) = self.energy(canvas, patch, &ties, coarse);
-        let sink = if coarse {
-            energy.minimise_coarsely(monitor)
-        } else {
-            energy.minimise(monitor)
-        }?;
-        Ok(costs.settle(canvas, patch.window, &ties, &sink, coarse))
+        self.solve(canvas, patch, &ties, block, monitor)
     }
 
-    /// Cuts a patch in that was cut coarsely: points away from that cut are settled.
+    /// Cuts a patch in that was cut coarsely: by blocks half as large, then half of that; points away from the cut are
+    /// settled.
     pub fn refine(
         &self,
         canvas: &Canvas<D>,
@@ -230,29 +228,44 @@ impl<const D: usize> Cutter<'_, D> {
         coarse: Cutting<D>,
         monitor: &Monitor,
     ) -> Result<Cutting<D>> {
-        if !coarse.coarse {
-            return Ok(coarse);
-        }
         let grid = &patch.window.grid;
-        let mut ties: Vec<Tie> = (0..grid.len()).map(|i| tie(canvas, patch, i)).collect();
-        let mut band = vec![false; grid.len()];
-        for axis in 0..D {
-            links(grid, axis, |p, q| {
-                if ties[p] != Tie::Out && ties[q] != Tie::Out && coarse.take[p] != coarse.take[q] {
-                    band[p] = true;
-                    band[q] = true;
-                }
-            });
-        }
-        let band = widen(grid, &widen(grid, &band));
-        for i in 0..grid.len() {
-            if ties[i] == Tie::Either && !band[i] {
-                ties[i] = if coarse.take[i] { Tie::New } else { Tie::Old };
+        let mut best = coarse;
+        while best.block > 1 {
+            let mut ties: Vec<Tie> = (0..grid.len()).map(|i| tie(canvas, patch, i)).collect();
+            let mut band = vec![false; grid.len()];
+            for axis in 0..D {
+                links(grid, axis, |p, q| {
+                    if ties[p] != Tie::Out && ties[q] != Tie::Out && best.take[p] != best.take[q] {
+                        band[p] = true;
+                        band[q] = true;
+                    }
+                });
             }
+            for _ in 0..best.block {
+                band = widen(grid, &band);
+            }
+            for i in 0..grid.len() {
+                if ties[i] == Tie::Either && !band[i] {
+                    ties[i] = if best.take[i] { Tie::New } else { Tie::Old };
+                }
+            }
+            best = self.solve(canvas, patch, &ties, best.block / 2, monitor)?;
         }
-        let (energy, costs) = self.energy(canvas, patch, &ties, false);
-        let sink = energy.minimise(monitor)?;
-        Ok(costs.settle(canvas, patch.window, &ties, &sink, false))
+        Ok(best)
+    }
+
+    /// The least cut between blocks of a side.
+    fn solve(
+        &self,
+        canvas: &Canvas<D>,
+        patch: &Proposal<'_, D>,
+        ties: &[Tie],
+        block: usize,
+        monitor: &Monitor,
+    ) -> Result<Cutting<D>> {
+        let (energy, costs) = self.energy(canvas, patch, ties, block);
+        let sink = energy.minimise(block, monitor)?;
+        Ok(costs.settle(canvas, patch.window, ties, &sink, block))
     }
 
     /// The energy of a cut, and the costs that it is made of.
@@ -261,7 +274,7 @@ impl<const D: usize> Cutter<'_, D> {
         canvas: &Canvas<D>,
         patch: &Proposal<'_, D>,
         ties: &[Tie],
-        coarse: bool,
+        block: usize,
     ) -> (Energy<D>, Costs<D>) {
         let mut energy = Energy::new(patch.window.grid);
         let mut points = vec![[0.0f32; 2]; ties.len()];
@@ -274,20 +287,20 @@ impl<const D: usize> Cutter<'_, D> {
                 energy.terminal[i] = capacity(points[i][1] - points[i][0]);
             }
         }
-        let pairs = self.pairs(canvas, patch, ties, coarse);
+        let pairs = self.pairs(canvas, patch, ties, block);
         for axis in 0..D {
             energy.add_pairs(axis, ties, &pairs[axis]);
         }
         (energy, Costs { points, pairs })
     }
 
-    /// The costs of all pairs along each axis; in a coarse cut only of those in two blocks.
+    /// The costs of all pairs along each axis; of those within a block only what is kept.
     fn pairs(
         &self,
         canvas: &Canvas<D>,
         patch: &Proposal<'_, D>,
         ties: &[Tie],
-        coarse: bool,
+        block: usize,
     ) -> [Vec<Pair>; D] {
         let (points, grid, n) = (&patch.window.points, &patch.window.grid, ties.len());
         // Pairs that show the same whatever is cut need not be judged, nor what they show.
@@ -299,13 +312,13 @@ impl<const D: usize> Cutter<'_, D> {
                     return;
                 }
                 let kept = canvas.seams[points[p] as usize][axis];
-                let block = coarse && at % 2 == 0;
+                let within = at % block + 1 < block;
                 pairs[p] = Pair {
                     old_new: kept,
                     new_old: kept,
                     kept,
                 };
-                if ties[p] != ties[q] || ties[p] == Tie::Either && !block {
+                if ties[p] != ties[q] || ties[p] == Tie::Either && !within {
                     pairs[p].old_new = Pair::JUDGED;
                     judged[p] = true;
                     judged[q] = true;

@@ -1,4 +1,4 @@
-//! The energy of a cut, and its least: exactly, or among the cuts between blocks of two points a side.
+//! The energy of a cut, and its least: exactly, or among the cuts between blocks of a few points a side.
 //!
 //! Lombaert, Sun, Grady and Xu, *A multilevel banded graph cuts method for fast image segmentation*, ICCV 2005: large windows
 //! are cut between blocks first, and then only points along that cut are free. They would take most of the time otherwise.
@@ -57,13 +57,16 @@ impl<const D: usize> Energy<D> {
         });
     }
 
-    /// Which points take the patch at the least cost, where all points of a block take it or none.
-    pub fn minimise_coarsely(&self, monitor: &Monitor) -> Result<Vec<bool>> {
-        let blocks = Grid::new(self.grid.shape().map(|n| n.div_ceil(2)), [false; D])?;
+    /// Which points take the patch at the least cost, where all points of a block of a side take it or none.
+    pub fn minimise(&self, side: usize, monitor: &Monitor) -> Result<Vec<bool>> {
+        if side < 2 {
+            return self.solve(monitor);
+        }
+        let blocks = Grid::new(self.grid.shape().map(|n| n.div_ceil(side)), [false; D])?;
         let block: Vec<u32> = self
             .grid
             .points()
-            .map(|point| blocks.index(point.map(|x| x / 2)) as u32)
+            .map(|point| blocks.index(point.map(|x| x / side)) as u32)
             .collect();
         let mut small = Self::new(blocks);
         for (&b, &t) in block.iter().zip(&self.terminal) {
@@ -76,12 +79,11 @@ impl<const D: usize> Energy<D> {
                 }
             });
         }
-        let labels = small.minimise(monitor)?;
+        let labels = small.solve(monitor)?;
         Ok(block.iter().map(|b| labels[*b as usize]).collect())
     }
 
-    /// Which points take the patch at the least cost.
-    pub fn minimise(&self, monitor: &Monitor) -> Result<Vec<bool>> {
+    fn solve(&self, monitor: &Monitor) -> Result<Vec<bool>> {
         let backward = vec![0; self.grid.len()];
         let graph = Graph {
             grid: self.grid,
