@@ -443,7 +443,7 @@ def held(mask, **what):
         (STRIPES, {"wrap": (True, False)}, "wrap: needs True, False or 3"),
         (STRIPES, {"quality": "best"}, "quality: allowed are preserve, fast and optimise; got 'best'"),
         (STRIPES, {"quality": None}, "quality: allowed are"),
-        (STRIPES, {"method": "default"}, "method: allowed are None and 'paper'"),
+        (STRIPES, {"method": "default"}, "method: allowed are None, 'paper' and 'paper-compensated'"),
         (texrs.Exemplar(WEAVE), {}, "exemplar: needs an Exemplar with axes=3, got one with axes=2"),
         (texrs.Exemplar(STRIPES[:15], axes=3), {}, "exemplar: each side must be at least 16"),
         (MANY, {}, "labels: up to 4096 classes"),

@@ -139,7 +139,7 @@ WRONG = [
     ("solid v.npy -o out.tif --field none.npz", "none.npz: there is no such file"),
     ("solid v.npy -o out.tif --wrap xxy", "--wrap: needs axes among x, y and z"),
     ("solid v.npy -o out.tif --quality best", "--quality: allowed are preserve, fast and optimise; got 'best'"),
-    ("solid v.npy -o out.tif --method literal", "--method: allowed are default and paper"),
+    ("solid v.npy -o out.tif --method literal", "--method: allowed are default, paper and paper-compensated"),
     ("solid v.npy -o out.tif --interpolation best", "--interpolation: allowed are default, nearest, linear and cubic"),
     ("solid v.npy -o out.tif --seed -1", "--seed: needs an integer from 0"),
     ("solid v.npy -o out.tif --labels --size 20", "--labels: classes need one channel, got 3"),

@@ -1,18 +1,14 @@
 """SOLID as printed (``method="paper"``), and what the departures of the default are for."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 
 import texrs
 from texrs import fields, samples, volume
 from texrs._engine.appearance import Appearance
-from texrs._engine.coherence import correct
 from texrs._engine.pyramid import ONE
 from texrs._threads import threads
 from texrs.errors import InvalidInput
-from texrs.papers.solid import literal as _solid_literal
 from texrs.papers.solid.literal import bring_inside
 
 SIZE = 48
@@ -81,7 +77,7 @@ def test_what_it_does_not_do():
     given = texrs.Constraints(mask=np.ones((32, 32), bool), values=weave[:32, :32])
     with pytest.raises(InvalidInput, match="constraints: the paper's method knows none"):
         texrs.synthesize(weave, 32, method="paper", constraints=given)
-    with pytest.raises(InvalidInput, match="method: allowed are None and 'paper'"):
+    with pytest.raises(InvalidInput, match="method: allowed are None, 'paper' and 'paper-compensated'"):
         texrs.synthesize(weave, 32, method="su")
     with pytest.raises(ValueError, match="stop"):
         texrs.synthesize(weave, 32, method="paper", progress=stop)
@@ -145,20 +141,17 @@ def test_turned_textures_lie_wrong_and_are_too_fine(stripes):
     assert 0.9 < size[None] < 1.1 < 1.15 < size["paper"]
 
 
-def test_most_of_which_compensation_cures(stripes, monkeypatch):
+def test_most_of_which_compensation_cures(stripes):
     """Neighbours read where the diagonal leads, not where the lattice makes it end: the paper leaves it out."""
     field = fields.slant_3d()
     normal = volume.texture_normal(volume.lightness(stripes))
     off = []
-    for compensated in (False, True):
-        monkeypatch.setattr(_solid_literal, "correct", partial(_with, compensated))
-        seen = volume.lightness(grow(stripes, field).image)
+    for method in ("paper", "paper-compensated"):
+        made = grow(stripes, field, method)
+        assert made.report["method"] == method
+        seen = volume.lightness(made.image)
         off.append(np.median(volume.orientation_errors(seen, field.over(seen.shape), normal, margin=6)))
     assert off[1] < 0.8 * off[0]
-
-
-def _with(wanted, *arrays, **options):
-    return correct(*arrays, **(options | {"compensated": wanted}))
 
 
 def test_rare_particles_are_lost():

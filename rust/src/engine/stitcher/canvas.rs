@@ -38,7 +38,7 @@ pub(super) struct Window<const D: usize> {
 
 impl<const D: usize> Canvas<D> {
     /// An empty canvas.
-    pub fn new(grid: Grid<D>, bent: bool) -> Result<Self> {
+    pub(super) fn new(grid: Grid<D>, bent: bool) -> Result<Self> {
         let n = grid.len();
         Ok(Self {
             grid,
@@ -56,18 +56,18 @@ impl<const D: usize> Canvas<D> {
 
     /// Whether a point shows something.
     #[inline(always)]
-    pub fn covered(&self, point: u32) -> bool {
+    pub(super) fn covered(&self, point: u32) -> bool {
         self.patches[point as usize] != FREE
     }
 
     /// How far a point's patch is from the field.
     #[inline(always)]
-    pub fn distortion(&self, point: u32) -> f32 {
+    pub(super) fn distortion(&self, point: u32) -> f32 {
         self.distortion.get(point as usize).copied().unwrap_or(0.0)
     }
 
     /// The window from `low` to `high`, which is not in it; cut off where an axis ends.
-    pub fn window(&self, low: [i32; D], high: [i32; D]) -> Option<Window<D>> {
+    pub(super) fn window(&self, low: [i32; D], high: [i32; D]) -> Option<Window<D>> {
         let (mut first, mut shape) = ([0; D], [0; D]);
         for axis in 0..D {
             let n = self.grid.shape()[axis] as i32;
@@ -101,12 +101,12 @@ impl<const D: usize> Canvas<D> {
 impl<const D: usize> Window<D> {
     /// Where a point of the window lies on the canvas, not brought around.
     #[inline(always)]
-    pub fn at(&self, point: [usize; D]) -> [i32; D] {
+    pub(super) fn at(&self, point: [usize; D]) -> [i32; D] {
         std::array::from_fn(|axis| self.low[axis] + point[axis] as i32)
     }
 
     /// Whether a point of the canvas lies in the window.
-    pub fn holds(&self, at: [i32; D]) -> bool {
+    pub(super) fn holds(&self, at: [i32; D]) -> bool {
         (0..D).all(|a| (self.low[a]..self.low[a] + self.grid.shape()[a] as i32).contains(&at[a]))
     }
 }

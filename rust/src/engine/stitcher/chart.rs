@@ -34,7 +34,7 @@ pub(super) struct Chart<const D: usize> {
 
 impl<const D: usize> Chart<D> {
     /// The chart of a patch of `side` samples of the exemplar around a point, bent with the field or rigid.
-    pub fn new(
+    pub(super) fn new(
         canvas: &Canvas<D>,
         frames: Frames<'_, D>,
         centre: [i32; D],
@@ -88,7 +88,7 @@ impl<const D: usize> Chart<D> {
     }
 
     /// A chart of one frame.
-    pub fn rigid(
+    pub(super) fn rigid(
         canvas: &Canvas<D>,
         frames: Frames<'_, D>,
         frame: Frame<D>,
@@ -107,7 +107,7 @@ impl<const D: usize> Chart<D> {
     }
 
     /// A chart of one frame over a given window: of a patch's side, or of all of it.
-    pub fn affine(
+    pub(super) fn affine(
         window: Window<D>,
         canvas: &Canvas<D>,
         frames: Frames<'_, D>,
@@ -321,7 +321,7 @@ struct Mesh<const D: usize> {
 impl<const D: usize> Mesh<D> {
     fn new(window: &Window<D>, frames: &[Frame<D>]) -> Self {
         let shape = window.grid.shape();
-        let nodes = shape.map(|n| n.min(NODES + 1).max(1));
+        let nodes = shape.map(|n| n.clamp(1, NODES + 1));
         let spacing = std::array::from_fn(|a| (shape[a] - 1) as f64 / (nodes[a].max(2) - 1) as f64);
         // Never empty, as the window is not.
         let grid = Grid::new(nodes, [false; D]).unwrap_or(window.grid);

@@ -104,7 +104,7 @@ impl Pair {
 
 impl<'a, const D: usize> Proposal<'a, D> {
     /// A chart with its centre at a place.
-    pub fn new(chart: &'a Chart<D>, place: Place<D>) -> Self {
+    pub(super) fn new(chart: &'a Chart<D>, place: Place<D>) -> Self {
         let add = |s: &Place<D>| std::array::from_fn(|a| s[a].wrapping_add(place[a]));
         Self {
             window: &chart.window,
@@ -193,7 +193,7 @@ pub(super) struct Cutter<'a, const D: usize> {
 
 impl<const D: usize> Cutter<'_, D> {
     /// Cuts a patch into the canvas.
-    pub fn cut(
+    pub(super) fn cut(
         &self,
         canvas: &Canvas<D>,
         patch: &Proposal<'_, D>,
@@ -204,7 +204,7 @@ impl<const D: usize> Cutter<'_, D> {
     }
 
     /// Cuts a patch in between blocks of points, if it is large: enough to compare it with others.
-    pub fn cut_coarsely(
+    pub(super) fn cut_coarsely(
         &self,
         canvas: &Canvas<D>,
         patch: &Proposal<'_, D>,
@@ -221,7 +221,7 @@ impl<const D: usize> Cutter<'_, D> {
 
     /// Cuts a patch in that was cut coarsely: by blocks half as large, then half of that; points away from the cut are
     /// settled.
-    pub fn refine(
+    pub(super) fn refine(
         &self,
         canvas: &Canvas<D>,
         patch: &Proposal<'_, D>,
@@ -382,7 +382,7 @@ impl<const D: usize> Cutter<'_, D> {
     }
 
     /// What the window of a patch costs as it is.
-    pub fn value(&self, canvas: &Canvas<D>, patch: &Proposal<'_, D>) -> f64 {
+    pub(super) fn value(&self, canvas: &Canvas<D>, patch: &Proposal<'_, D>) -> f64 {
         let mut value = 0.0;
         for i in 0..patch.window.grid.len() {
             if patch.mask[i] {

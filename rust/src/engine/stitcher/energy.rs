@@ -23,7 +23,7 @@ pub(super) struct Energy<const D: usize> {
 }
 
 impl<const D: usize> Energy<D> {
-    pub fn new(grid: Grid<D>) -> Self {
+    pub(super) fn new(grid: Grid<D>) -> Self {
         let n = grid.len();
         Self {
             grid,
@@ -33,7 +33,7 @@ impl<const D: usize> Energy<D> {
     }
 
     /// Adds the costs of the pairs along an axis; those of points without a choice go to their neighbours.
-    pub fn add_pairs(&mut self, axis: usize, ties: &[Tie], pairs: &[Pair]) {
+    pub(super) fn add_pairs(&mut self, axis: usize, ties: &[Tie], pairs: &[Pair]) {
         let (terminal, forward) = (&mut self.terminal, &mut self.forward[axis]);
         links(&self.grid, axis, |p, q| {
             if pairs[p].old_new < 0.0 {
@@ -58,7 +58,7 @@ impl<const D: usize> Energy<D> {
     }
 
     /// Which points take the patch at the least cost, where all points of a block of a side take it or none.
-    pub fn minimise(&self, side: usize, monitor: &Monitor) -> Result<Vec<bool>> {
+    pub(super) fn minimise(&self, side: usize, monitor: &Monitor) -> Result<Vec<bool>> {
         if side < 2 {
             return self.solve(monitor);
         }

@@ -145,7 +145,14 @@ pub fn stitch<const D: usize>(
         },
         frames,
         options: *options,
-        index: Index::new(source, guide),
+        index: Index::new(
+            source,
+            guide,
+            Charges {
+                repetition: options.repetition,
+                continuation: options.continuation,
+            },
+        ),
         balance: Balance::new(source, &canvas),
         canvas,
         patches: Vec::new(),
@@ -298,10 +305,6 @@ impl<const D: usize> Stitching<'_, D> {
         if !chart.window.points.iter().zip(&chart.mask).any(useful) {
             return Ok(());
         }
-        let charges = Charges {
-            repetition: o.repetition,
-            continuation: o.continuation,
-        };
         let noise = self.noise.part(self.patches.len() as u32);
         let guide = self.cutter.guide;
         let found = self.index.best(
@@ -309,7 +312,6 @@ impl<const D: usize> Stitching<'_, D> {
             &self.canvas,
             &chart,
             guide,
-            &charges,
             o.candidates,
             &noise,
         );
@@ -470,3 +472,6 @@ fn determinant<const D: usize>(frame: &Frame<D>) -> f64 {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -43,6 +43,7 @@ pub(super) struct Index<const D: usize> {
     plan: Volumes,
     colours: Squares,
     guide: Option<Squares>,
+    charges: Charges,
     /// How often what lies around each sample has been shown.
     shown: Vec<f32>,
     total: f64,
@@ -62,7 +63,7 @@ struct Template {
 
 impl<const D: usize> Index<D> {
     /// Transforms a source, and the values of a guide.
-    pub fn new(source: &Source<D>, guide: Option<&Guide<'_>>) -> Self {
+    pub(super) fn new(source: &Source<D>, guide: Option<&Guide<'_>>, charges: Charges) -> Self {
         let grid = *source.grid();
         let size: [usize; D] = std::array::from_fn(|a| {
             if grid.wrap()[a] {
@@ -85,6 +86,7 @@ impl<const D: usize> Index<D> {
                 squares: Vec::new(),
             },
             guide: None,
+            charges,
             shown: vec![0.0; grid.len()],
             total: 0.0,
         };
@@ -134,7 +136,7 @@ impl<const D: usize> Index<D> {
     }
 
     /// Notes that a patch of a side has been shown around a sample.
-    pub fn note(&mut self, place: Place<D>, side: f32) {
+    pub(super) fn note(&mut self, place: Place<D>, side: f32) {
         let (centre, reach) = (nearest(place), side.ceil() as i32);
         let mut axes: Vec<Vec<(usize, f32)>> = Vec::with_capacity(D);
         for a in 0..D {
@@ -166,13 +168,12 @@ impl<const D: usize> Index<D> {
     }
 
     /// The places of the centre of a chart that fit best, the best one first; at most `count`.
-    pub fn best(
+    pub(super) fn best(
         &self,
         source: &Source<D>,
         canvas: &Canvas<D>,
         chart: &Chart<D>,
         guide: Option<&Guide<'_>>,
-        charges: &Charges,
         count: usize,
         noise: &Noise,
     ) -> Vec<Place<D>> {
@@ -225,7 +226,6 @@ impl<const D: usize> Index<D> {
             &scores,
             first,
             last,
-            charges,
             &self.continuations(canvas, chart),
             count,
         )
@@ -347,7 +347,6 @@ impl<const D: usize> Index<D> {
         scores: &[f32],
         first: [i32; D],
         last: [usize; D],
-        charges: &Charges,
         continued: &[[i32; D]],
         count: usize,
     ) -> Vec<Place<D>> {
@@ -358,20 +357,22 @@ impl<const D: usize> Index<D> {
             .points()
             .map(|point| {
                 let score = scores[self.position(point)];
-                if charges.repetition > 0.0 && mean > 0.0 {
+                if self.charges.repetition > 0.0 && mean > 0.0 {
                     let at: [usize; D] = std::array::from_fn(|a| {
                         self.grid.resolve(a, point[a] as isize - first[a] as isize)
                     });
-                    score + charges.repetition * (self.shown[self.grid.index(at)] / mean).min(OFTEN)
+                    score
+                        + self.charges.repetition
+                            * (self.shown[self.grid.index(at)] / mean).min(OFTEN)
                 } else {
                     score
                 }
             })
             .collect();
-        if charges.continuation > 0.0 {
+        if self.charges.continuation > 0.0 {
             for centre in continued {
                 let at = std::array::from_fn(|a| centre[a] + first[a]);
-                self.around(&sides, at, NEAR, |k| values[k] += charges.continuation);
+                self.around(&sides, at, NEAR, |k| values[k] += self.charges.continuation);
             }
         }
         let mut found = Vec::with_capacity(count);

@@ -6,9 +6,9 @@ use crate::foundation::memory;
 use crate::{Error, Result};
 
 /// Channels of a colour, at most; missing ones are zero.
-pub const CHANNELS: usize = 4;
+pub(super) const CHANNELS: usize = 4;
 /// A colour in units of the exemplar's mean standard deviation.
-pub type Colour = [f32; CHANNELS];
+pub(super) type Colour = [f32; CHANNELS];
 /// Beyond this a sample is as deep inside of its element as any.
 const DEEP: f32 = 7.0;
 

@@ -34,7 +34,7 @@ impl Volumes {
     pub(crate) fn fast(n: usize) -> usize {
         let smooth = |mut m: usize| {
             for p in [2, 3, 5] {
-                while m % p == 0 {
+                while m.is_multiple_of(p) {
                     m /= p;
                 }
             }

@@ -1,0 +1,366 @@
+//! The stitcher's parts against slow twins, and what must hold of all that it stitches.
+
+use proptest::prelude::*;
+
+use super::canvas::{Canvas, FREE};
+use super::chart::Chart;
+use super::cut::{Pair, Tie};
+use super::energy::Energy;
+use super::search::{Charges, Index};
+use super::source::CHANNELS;
+use super::*;
+use crate::foundation::fixed::identity;
+
+const NO_ELEMENTS: Elements<'static> = Elements {
+    labels: &[],
+    depth: &[],
+};
+const NO_CLASSES: Adjacency<'static> = Adjacency {
+    classes: &[],
+    costs: &[],
+};
+const NOTHING_GIVEN: Given<'static, 2> = Given {
+    points: &[],
+    places: &[],
+};
+const OPTIONS: Options = Options {
+    patch: 8.0,
+    overlap: 0.4,
+    candidates: 3,
+    bend: false,
+    weights: Weights {
+        colour: 0.1,
+        contact: 1.0,
+        jump: 1.0,
+        depth: 0.15,
+        joint: 0.5,
+        surprise: 0.0,
+        distortion: 0.03,
+        guide: 0.5,
+    },
+    repetition: 0.1,
+    continuation: 4.0,
+    balance: 1.0,
+    heal: true,
+    seed: 1,
+};
+
+fn noise(seed: u64, n: usize) -> Vec<f32> {
+    let noise = Noise::new(seed);
+    (0..n)
+        .map(|i| noise.uniform([i as u32, 0, 0, 0]) as f32)
+        .collect()
+}
+
+fn source(shape: [usize; 2], wrap: [bool; 2]) -> Source<2> {
+    let grid = Grid::new(shape, wrap).unwrap();
+    let colours = noise(7, grid.len() * 2);
+    Source::new(&colours, grid, 2, NO_ELEMENTS, NO_CLASSES).unwrap()
+}
+
+fn region(shape: [usize; 2], wrap: [bool; 2]) -> Region<2> {
+    Region::new(Grid::new(shape, wrap).unwrap(), [0; 2]).unwrap()
+}
+
+#[test]
+fn the_best_place_is_that_of_a_slow_search() {
+    for wrap in [[false, false], [true, false], [true, true]] {
+        let source = source([13, 17], wrap);
+        let grid = Grid::new([20, 20], [false; 2]).unwrap();
+        let mut canvas = Canvas::<2>::new(grid, false).unwrap();
+        for p in 0..grid.len() {
+            let [row, column] = grid.point(p);
+            if (8..11).contains(&row) && (7..14).contains(&column) {
+                canvas.patches[p] = 0;
+                canvas.places[p] = [(row as i32 * 5 % 13) * ONE, (column as i32 * 3 % 17) * ONE];
+            }
+        }
+        let turned = [[0, ONE as i16], [-(ONE as i16), 0]];
+        for frame in [identity(), turned] {
+            let frames = Frames::Constant(frame);
+            let chart = Chart::new(&canvas, frames, [10, 10], 7.0, false).unwrap();
+            let free = Charges {
+                repetition: 0.0,
+                continuation: 0.0,
+            };
+            let index = Index::new(&source, None, free);
+            let found = index.best(&source, &canvas, &chart, None, 1, &Noise::new(0));
+            let cost = |place: Place<2>| -> Option<f32> {
+                let mut sum = 0.0;
+                for (i, &p) in chart.window.points.iter().enumerate() {
+                    let there = std::array::from_fn(|a| chart.steps[i][a] + place[a]);
+                    if chart.mask[i] && !inside(source.grid(), there) {
+                        return None;
+                    }
+                    if chart.mask[i] && canvas.covered(p) {
+                        let (a, b) = (
+                            source.look(canvas.places[p as usize]).colour,
+                            source.look(there).colour,
+                        );
+                        sum += (0..CHANNELS).map(|c| (a[c] - b[c]).powi(2)).sum::<f32>();
+                    }
+                }
+                Some(sum)
+            };
+            let best = source
+                .grid()
+                .points()
+                .filter_map(|p| cost(p.map(|x| x as i32 * ONE)))
+                .fold(f32::INFINITY, f32::min);
+            let reached = cost(found[0]).unwrap();
+            assert!(
+                (reached - best).abs() <= 1e-3 * (1.0 + best),
+                "{reached} {best}"
+            );
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn the_least_cut_is_that_of_all_labellings(seed in 0u64..500) {
+        let grid = Grid::new([3, 3], [false; 2]).unwrap();
+        let ties: Vec<Tie> = noise(seed, 9)
+            .iter()
+            .map(|x| match (x * 6.0) as u32 {
+                0 => Tie::Old,
+                1 => Tie::New,
+                _ => Tie::Either,
+            })
+            .collect();
+        let costs = noise(seed + 1000, 18 * 2);
+        let mut pairs = [Vec::new(), Vec::new()];
+        for (axis, pairs) in pairs.iter_mut().enumerate() {
+            for (p, point) in grid.points().enumerate() {
+                let at = (axis * 9 + p) * 2;
+                let there = point[axis] < 2;
+                let kept = if seed % 2 == 0 { 0.0 } else { costs[at].min(costs[at + 1]) };
+                pairs.push(Pair {
+                    old_new: if there { costs[at] } else { -1.0 },
+                    new_old: costs[at + 1],
+                    kept,
+                });
+            }
+        }
+        let value = |take: &[bool]| -> f32 {
+            let mut sum = 0.0;
+            for (axis, pairs) in pairs.iter().enumerate() {
+                crate::kernels::seam::links(&grid, axis, |p, q| {
+                    sum += match (take[p], take[q]) {
+                        (false, true) => pairs[p].old_new,
+                        (true, false) => pairs[p].new_old,
+                        (false, false) => pairs[p].kept,
+                        (true, true) => 0.0,
+                    };
+                });
+            }
+            sum
+        };
+        let fits = |take: &[bool]| {
+            ties.iter().zip(take).all(|(tie, &t)| match tie {
+                Tie::Old => !t,
+                Tie::New => t,
+                _ => true,
+            })
+        };
+        let best = (0..512u32)
+            .map(|code| (0..9).map(|i| code >> i & 1 == 1).collect::<Vec<bool>>())
+            .filter(|take| fits(take))
+            .map(|take| value(&take))
+            .fold(f32::INFINITY, f32::min);
+        let solve = |side| {
+            let mut energy = Energy::new(grid);
+            for (axis, pairs) in pairs.iter().enumerate() {
+                energy.add_pairs(axis, &ties, pairs);
+            }
+            let sink = energy.minimise(side, &Monitor::default()).unwrap();
+            let take: Vec<bool> = ties
+                .iter()
+                .zip(&sink)
+                .map(|(&t, &s)| t == Tie::New || t == Tie::Either && s)
+                .collect();
+            value(&take)
+        };
+        prop_assert!((solve(1) - best).abs() < 1e-3);
+        prop_assert!(solve(2) >= best - 1e-3);
+    }
+
+    #[test]
+    fn every_point_shows_a_sample(
+        rows in 1usize..40,
+        columns in 1usize..40,
+        wrap in any::<[bool; 2]>(),
+        closed in any::<[bool; 2]>(),
+        turn in 0.0f64..6.0,
+        seed in 0u64..1000,
+    ) {
+        let source = source([16, 20], closed);
+        let region = region([rows, columns], wrap);
+        let [c, s] = [turn.cos(), turn.sin()].map(|x| (x * f64::from(ONE)).round() as i16);
+        let dense: Vec<Frame<2>> = (0..region.grid.len())
+            .map(|p| if p % 2 == 0 { [[c, -s], [s, c]] } else { identity() })
+            .collect();
+        for (frames, bend) in [
+            (Frames::Constant([[c, -s], [s, c]]), false),
+            (Frames::Dense(&dense), false),
+            (Frames::Dense(&dense), true),
+        ] {
+            let options = Options { bend, seed, ..OPTIONS };
+            let made = stitch(&source, &region, frames, None, NOTHING_GIVEN, &options, &Monitor::default()).unwrap();
+            prop_assert_eq!(made.places.len(), region.grid.len());
+            prop_assert!(made.patches.iter().all(|&p| (p as usize) < made.frames.len().max(1)));
+            let shape = source.grid().shape();
+            for &place in &made.places {
+                let near = crate::foundation::fixed::nearest(place);
+                prop_assert!((0..2).all(|a| (0..shape[a] as i32).contains(&near[a])));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_bent_chart_of_one_frame_is_the_rigid_one() {
+    let grid = Grid::new([40, 40], [false; 2]).unwrap();
+    let canvas = Canvas::<2>::new(grid, true).unwrap();
+    let frame = [[3000, -1200], [1200, 3000]];
+    let dense = vec![frame; grid.len()];
+    let bent = Chart::new(&canvas, Frames::Dense(&dense), [20, 20], 12.0, true).unwrap();
+    assert!(!bent.rigid);
+    for (i, point) in bent.window.grid.points().enumerate() {
+        let at = bent.window.at(point);
+        let step = apply(&frame, [at[0] - 20, at[1] - 20]);
+        assert!((0..2).all(|a| (bent.steps[i][a] - step[a]).abs() <= 8));
+        assert!(bent.distortion[i] < 0.01);
+    }
+}
+
+#[test]
+fn what_is_given_stays() {
+    let source = source([16, 16], [false; 2]);
+    let region = region([24, 24], [false, true]);
+    let points: Vec<bool> = (0..24 * 24).map(|p| p % 7 == 0).collect();
+    let places = vec![[3 * ONE, 5 * ONE]; 24 * 24];
+    let given = Given {
+        points: &points,
+        places: &places,
+    };
+    let frames = Frames::Constant(identity());
+    let made = stitch(
+        &source,
+        &region,
+        frames,
+        None,
+        given,
+        &OPTIONS,
+        &Monitor::default(),
+    )
+    .unwrap();
+    for (p, &held) in points.iter().enumerate() {
+        assert!(!held || made.places[p] == [3 * ONE, 5 * ONE]);
+        assert_eq!(held, made.patches[p] == canvas::HELD);
+        assert_ne!(made.patches[p], FREE);
+    }
+}
+
+#[test]
+fn bad_arrays_and_options_are_refused() {
+    let grid = Grid::new([8, 8], [false; 2]).unwrap();
+    let colours = noise(1, 64);
+    let new = |colours: &[f32],
+               channels,
+               labels: &[u32],
+               depth: &[f32],
+               classes: &[u8],
+               costs: &[f32]| {
+        let elements = Elements { labels, depth };
+        Source::new(
+            colours,
+            grid,
+            channels,
+            elements,
+            Adjacency { classes, costs },
+        )
+    };
+    assert!(new(&colours, 1, &[], &[], &[], &[]).is_ok());
+    assert!(new(&colours, 0, &[], &[], &[], &[]).is_err());
+    assert!(new(&colours, 5, &[], &[], &[], &[]).is_err());
+    assert!(new(&colours[1..], 1, &[], &[], &[], &[]).is_err());
+    assert!(new(&[f32::NAN; 64], 1, &[], &[], &[], &[]).is_err());
+    assert!(new(&colours, 1, &[0; 3], &[], &[], &[]).is_err());
+    assert!(new(&colours, 1, &[u32::MAX; 64], &[], &[], &[]).is_err());
+    assert!(new(&colours, 1, &[], &[f32::INFINITY; 64], &[], &[]).is_err());
+    assert!(new(&colours, 1, &[], &[], &[2; 64], &[0.0; 4]).is_err());
+    assert!(new(&colours, 1, &[], &[], &[1; 64], &[0.0; 3]).is_err());
+    let source = source([16, 16], [false; 2]);
+    let region = region([9, 9], [false; 2]);
+    let frames = Frames::Constant(identity());
+    for options in [
+        Options {
+            patch: f32::NAN,
+            ..OPTIONS
+        },
+        Options {
+            patch: 2.0,
+            ..OPTIONS
+        },
+        Options {
+            overlap: 0.9,
+            ..OPTIONS
+        },
+        Options {
+            candidates: 0,
+            ..OPTIONS
+        },
+        Options {
+            repetition: -1.0,
+            ..OPTIONS
+        },
+        Options {
+            balance: f32::INFINITY,
+            ..OPTIONS
+        },
+    ] {
+        assert!(
+            stitch(
+                &source,
+                &region,
+                frames,
+                None,
+                NOTHING_GIVEN,
+                &options,
+                &Monitor::default()
+            )
+            .is_err()
+        );
+    }
+    let few = Given {
+        points: &[true],
+        places: &[[0; 2]],
+    };
+    assert!(
+        stitch(
+            &source,
+            &region,
+            frames,
+            None,
+            few,
+            &OPTIONS,
+            &Monitor::default()
+        )
+        .is_err()
+    );
+    let stopped = Monitor::default();
+    stopped.cancel();
+    assert!(
+        stitch(
+            &source,
+            &region,
+            frames,
+            None,
+            NOTHING_GIVEN,
+            &OPTIONS,
+            &stopped
+        )
+        .is_err()
+    );
+}
