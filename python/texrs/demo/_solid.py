@@ -34,17 +34,17 @@ def _solid(workshop: Workshop) -> str:
         if name not in seen:
             grown.append(figure(cube(example, CUBE), "Example", note=name.replace("_", " "), share=EDGE / SIZE))
             seen.add(name)
-        made = solid(example, SIZE, field=fields.parse(words), seed=3, quality="fast")
+        made = solid(example, SIZE, field=fields.parse(words), seed=3)
         grown.append(figure(cube(made.image, CUBE), words.partition(":")[0], note=f"--field {words}"))
     for i, (name, words) in enumerate(PICTURES, start=len(VOLUMES)):
         workshop.watch(i / total)
         picture = load_sample(name, SIDE).image
-        made = synthesize(picture, WIDTH, field=fields.parse(words, 2), seed=3, quality="fast")
+        made = synthesize(picture, WIDTH, field=fields.parse(words, 2), seed=3)
         drawn += [figure(picture, "Example", share=SIDE / WIDTH), figure(made.image, name, note=f"--field {words}")]
     return (
-        code("texrs solid volume.tif -o result.tif --size 80 --field circular:axis=y,radial=z --seed 3 --quality fast")
+        code("texrs solid volume.tif -o result.tif --size 80 --field circular:axis=y,radial=z --seed 3")
         + grid(grown, least=200)
-        + code("texrs synthesize weave.png -o result.png --size 256 --field zigzag:period=128,angle=30 --quality fast")
+        + code("texrs synthesize weave.png -o result.png --size 256 --field zigzag:period=128,angle=30")
         + grid(drawn, least=220)
     )
 
