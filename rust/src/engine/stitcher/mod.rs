@@ -14,6 +14,7 @@ mod chart;
 mod cut;
 mod energy;
 mod heal;
+mod mesh;
 mod search;
 mod source;
 
