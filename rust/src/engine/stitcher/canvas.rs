@@ -1,5 +1,6 @@
 //! What has been stitched so far, and windows of it.
 
+use super::source::{Look, Source};
 use crate::Result;
 use crate::foundation::fixed::Place;
 use crate::foundation::grid::Grid;
@@ -23,6 +24,17 @@ pub(super) struct Canvas<const D: usize> {
     pub distortion: Vec<f32>,
     /// Points without a patch.
     pub free: usize,
+}
+
+/// What a window of a canvas shows, point by point: read many times while patches are tried there.
+pub(super) struct View<const D: usize> {
+    pub places: Vec<Place<D>>,
+    pub patches: Vec<u32>,
+    pub seams: Vec<[f32; D]>,
+    /// Empty where nothing is bent.
+    pub distortion: Vec<f32>,
+    /// Of points that show something.
+    pub looks: Vec<Look>,
 }
 
 /// A box of a canvas; along cyclic axes it may reach over the end.
@@ -54,16 +66,37 @@ impl<const D: usize> Canvas<D> {
         })
     }
 
+    /// What a window shows.
+    pub(super) fn view(&self, window: &Window<D>, source: &Source<D>) -> View<D> {
+        let mut view = View {
+            places: Vec::with_capacity(window.points.len()),
+            patches: Vec::with_capacity(window.points.len()),
+            seams: Vec::with_capacity(window.points.len()),
+            distortion: Vec::new(),
+            looks: Vec::with_capacity(window.points.len()),
+        };
+        for &p in &window.points {
+            let p = p as usize;
+            view.places.push(self.places[p]);
+            view.patches.push(self.patches[p]);
+            view.seams.push(self.seams[p]);
+            view.looks.push(if self.patches[p] == FREE {
+                Look::EMPTY
+            } else {
+                source.look(self.places[p])
+            });
+        }
+        if !self.distortion.is_empty() {
+            let points = window.points.iter();
+            view.distortion = points.map(|&p| self.distortion[p as usize]).collect();
+        }
+        view
+    }
+
     /// Whether a point shows something.
     #[inline(always)]
     pub(super) fn covered(&self, point: u32) -> bool {
         self.patches[point as usize] != FREE
-    }
-
-    /// How far a point's patch is from the field.
-    #[inline(always)]
-    pub(super) fn distortion(&self, point: u32) -> f32 {
-        self.distortion.get(point as usize).copied().unwrap_or(0.0)
     }
 
     /// The window from `low` to `high`, which is not in it; cut off where an axis ends.

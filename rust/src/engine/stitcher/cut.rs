@@ -5,7 +5,9 @@
 //! inside of one. The cost of a pair that is cut already belongs to the state in which both are kept, so the energy
 //! stays submodular, and the cut exact.
 
-use super::canvas::{Canvas, FREE, HELD, Window};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use super::canvas::{FREE, HELD, View, Window};
 use super::chart::Chart;
 use super::energy::{Energy, capacity};
 use super::source::{CHANNELS, Look, Source};
@@ -14,6 +16,7 @@ use crate::engine::guide::Guide;
 use crate::foundation::fixed::Place;
 use crate::foundation::grid::Grid;
 use crate::foundation::par::Monitor;
+use crate::kernels::seam::maxflow::Solver;
 use crate::kernels::seam::{links, steps};
 
 /// Added to every pair, so that ties go to the shorter seam.
@@ -98,8 +101,6 @@ impl Pair {
         new_old: -1.0,
         kept: 0.0,
     };
-    /// Instead of a cost: that is still to be found.
-    const JUDGED: f32 = -2.0;
 }
 
 impl<'a, const D: usize> Proposal<'a, D> {
@@ -116,12 +117,22 @@ impl<'a, const D: usize> Proposal<'a, D> {
     }
 }
 
-/// What a point of a window shows, and how far that is apart.
+/// What a point of a window shows, how far that is apart, and whether it is the same place.
 #[derive(Clone, Copy)]
 struct Looks {
     old: Look,
     new: Look,
     apart: f32,
+    same: bool,
+}
+
+impl Looks {
+    const NONE: Self = Self {
+        old: Look::EMPTY,
+        new: Look::EMPTY,
+        apart: 0.0,
+        same: false,
+    };
 }
 
 /// What a cut costs, by what its points take.
@@ -135,7 +146,7 @@ impl<const D: usize> Costs<D> {
     /// The cut that gives some points the patch.
     fn settle(
         &self,
-        canvas: &Canvas<D>,
+        view: &View<D>,
         window: &Window<D>,
         ties: &[Tie],
         sink: &[bool],
@@ -152,11 +163,7 @@ impl<const D: usize> Costs<D> {
             .zip(&take)
             .map(|(c, &t)| f64::from(c[usize::from(t)]))
             .sum();
-        let mut seams: Vec<[f32; D]> = window
-            .points
-            .iter()
-            .map(|&p| canvas.seams[p as usize])
-            .collect();
+        let mut seams = view.seams.clone();
         for axis in 0..D {
             links(&window.grid, axis, |p, q| {
                 let Pair {
@@ -189,24 +196,31 @@ pub(super) struct Cutter<'a, const D: usize> {
     pub source: &'a Source<D>,
     pub weights: Weights,
     pub guide: Option<&'a Guide<'a>>,
+    /// Workspaces of cuts, as many as are made at once.
+    pub solvers: Mutex<Vec<Solver<D>>>,
 }
 
 impl<const D: usize> Cutter<'_, D> {
+    fn solvers(&self) -> MutexGuard<'_, Vec<Solver<D>>> {
+        // A workspace is of use whatever became of the work of another.
+        self.solvers.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Cuts a patch into the canvas.
     pub(super) fn cut(
         &self,
-        canvas: &Canvas<D>,
+        view: &View<D>,
         patch: &Proposal<'_, D>,
         monitor: &Monitor,
     ) -> Result<Cutting<D>> {
-        let coarse = self.cut_coarsely(canvas, patch, monitor)?;
-        self.refine(canvas, patch, coarse, monitor)
+        let coarse = self.cut_coarsely(view, patch, monitor)?;
+        self.refine(view, patch, coarse, monitor)
     }
 
     /// Cuts a patch in between blocks of points, if it is large: enough to compare it with others.
     pub(super) fn cut_coarsely(
         &self,
-        canvas: &Canvas<D>,
+        view: &View<D>,
         patch: &Proposal<'_, D>,
         monitor: &Monitor,
     ) -> Result<Cutting<D>> {
@@ -215,15 +229,15 @@ impl<const D: usize> Cutter<'_, D> {
             .iter()
             .find(|(least, _)| n > *least)
             .map_or(1, |&(_, side)| side);
-        let ties: Vec<Tie> = (0..n).map(|i| tie(canvas, patch, i)).collect();
-        self.solve(canvas, patch, &ties, block, monitor)
+        let ties: Vec<Tie> = (0..n).map(|i| tie(view, patch, i)).collect();
+        self.solve(view, patch, &ties, block, monitor)
     }
 
     /// Cuts a patch in that was cut coarsely: by blocks half as large, then half of that; points away from the cut are
     /// settled.
     pub(super) fn refine(
         &self,
-        canvas: &Canvas<D>,
+        view: &View<D>,
         patch: &Proposal<'_, D>,
         coarse: Cutting<D>,
         monitor: &Monitor,
@@ -231,7 +245,7 @@ impl<const D: usize> Cutter<'_, D> {
         let grid = &patch.window.grid;
         let mut best = coarse;
         while best.block > 1 {
-            let mut ties: Vec<Tie> = (0..grid.len()).map(|i| tie(canvas, patch, i)).collect();
+            let mut ties: Vec<Tie> = (0..grid.len()).map(|i| tie(view, patch, i)).collect();
             let mut band = vec![false; grid.len()];
             for axis in 0..D {
                 links(grid, axis, |p, q| {
@@ -249,7 +263,7 @@ impl<const D: usize> Cutter<'_, D> {
                     ties[i] = if best.take[i] { Tie::New } else { Tie::Old };
                 }
             }
-            best = self.solve(canvas, patch, &ties, best.block / 2, monitor)?;
+            best = self.solve(view, patch, &ties, best.block / 2, monitor)?;
         }
         Ok(best)
     }
@@ -257,37 +271,40 @@ impl<const D: usize> Cutter<'_, D> {
     /// The least cut between blocks of a side.
     fn solve(
         &self,
-        canvas: &Canvas<D>,
+        view: &View<D>,
         patch: &Proposal<'_, D>,
         ties: &[Tie],
         block: usize,
         monitor: &Monitor,
     ) -> Result<Cutting<D>> {
-        let (energy, costs) = self.energy(canvas, patch, ties, block);
-        let sink = energy.minimise(block, monitor)?;
-        Ok(costs.settle(canvas, patch.window, ties, &sink, block))
+        let (energy, costs) = self.energy(view, patch, ties, block);
+        let mut solver = self.solvers().pop().unwrap_or_default();
+        let sink = energy.minimise(block, &mut solver, monitor)?;
+        self.solvers().push(solver);
+        Ok(costs.settle(view, patch.window, ties, &sink, block))
     }
 
     /// The energy of a cut, and the costs that it is made of.
     fn energy(
         &self,
-        canvas: &Canvas<D>,
+        view: &View<D>,
         patch: &Proposal<'_, D>,
         ties: &[Tie],
         block: usize,
     ) -> (Energy<D>, Costs<D>) {
         let mut energy = Energy::new(patch.window.grid);
         let mut points = vec![[0.0f32; 2]; ties.len()];
-        for i in 0..ties.len() {
+        let free = self.guide.is_none() && patch.distortion.is_empty();
+        for i in 0..if free { 0 } else { ties.len() } {
             if ties[i] == Tie::Out || !patch.mask[i] {
                 continue;
             }
-            points[i] = self.points(canvas, patch, i);
+            points[i] = self.points(view, patch, i);
             if ties[i] == Tie::Either {
                 energy.terminal[i] = capacity(points[i][1] - points[i][0]);
             }
         }
-        let pairs = self.pairs(canvas, patch, ties, block);
+        let pairs = self.pairs(view, patch, ties, block);
         for axis in 0..D {
             energy.add_pairs(axis, ties, &pairs[axis]);
         }
@@ -297,125 +314,116 @@ impl<const D: usize> Cutter<'_, D> {
     /// The costs of all pairs along each axis; of those within a block only what is kept.
     fn pairs(
         &self,
-        canvas: &Canvas<D>,
+        view: &View<D>,
         patch: &Proposal<'_, D>,
         ties: &[Tie],
         block: usize,
     ) -> [Vec<Pair>; D] {
-        let (points, grid, n) = (&patch.window.points, &patch.window.grid, ties.len());
+        let (grid, n) = (&patch.window.grid, ties.len());
+        let none = |p: usize, q: usize| {
+            ties[p] == Tie::Out || ties[q] == Tie::Out || !(patch.mask[p] || patch.mask[q])
+        };
         // Pairs that show the same whatever is cut need not be judged, nor what they show.
+        let judge = |at: usize, p: usize, q: usize| {
+            ties[p] != ties[q] || ties[p] == Tie::Either && at % block + 1 == block
+        };
         let mut judged = vec![false; n];
-        let mut pairs: [Vec<Pair>; D] = std::array::from_fn(|_| vec![Pair::NONE; n]);
-        for (axis, pairs) in pairs.iter_mut().enumerate() {
+        for axis in 0..D {
             steps(grid, axis, |at, p, q| {
-                if ties[p] == Tie::Out || ties[q] == Tie::Out || !(patch.mask[p] || patch.mask[q]) {
-                    return;
-                }
-                let kept = canvas.seams[points[p] as usize][axis];
-                let within = at % block + 1 < block;
-                pairs[p] = Pair {
-                    old_new: kept,
-                    new_old: kept,
-                    kept,
-                };
-                if ties[p] != ties[q] || ties[p] == Tie::Either && !within {
-                    pairs[p].old_new = Pair::JUDGED;
+                if !none(p, q) && judge(at, p, q) {
                     judged[p] = true;
                     judged[q] = true;
                 }
             });
         }
-        let looks = self.looks(canvas, patch, &judged);
-        // Where the patch shows what is there already there is no seam.
-        let same = |i: usize| {
-            canvas.covered(points[i]) && canvas.places[points[i] as usize] == patch.places[i]
-        };
-        for (axis, pairs) in pairs.iter_mut().enumerate() {
-            links(grid, axis, |p, q| {
-                if pairs[p].old_new != Pair::JUDGED {
+        let looks = self.looks(view, patch, &judged);
+        std::array::from_fn(|axis| {
+            let mut pairs = vec![Pair::NONE; n];
+            steps(grid, axis, |at, p, q| {
+                if none(p, q) {
                     return;
                 }
-                let (l, r, kept) = (&looks[p], &looks[q], pairs[p].kept);
-                let apart = l.apart * l.apart + r.apart * r.apart;
-                let (p_same, q_same) = (same(p), same(q));
-                let cross = |left_same: bool, right_same: bool, left: &Look, right: &Look| match (
-                    left_same, right_same,
-                ) {
-                    (true, _) => 0.0,
-                    (_, true) => kept,
-                    _ => self.pair(left, right, apart),
+                let kept = view.seams[p][axis];
+                let (mut old_new, mut new_old) = (kept, kept);
+                if judge(at, p, q) {
+                    let (l, r) = (&looks[p], &looks[q]);
+                    let apart = l.apart * l.apart + r.apart * r.apart;
+                    // Where the patch shows what is there already there is no seam.
+                    old_new = match (l.same, r.same) {
+                        (true, _) => 0.0,
+                        (_, true) => kept,
+                        _ => self.pair(&l.old, &r.new, apart),
+                    };
+                    new_old = match (r.same, l.same) {
+                        (true, _) => 0.0,
+                        (_, true) => kept,
+                        _ => self.pair(&l.new, &r.old, apart),
+                    };
+                }
+                pairs[p] = Pair {
+                    old_new,
+                    new_old,
+                    kept,
                 };
-                pairs[p].old_new = cross(p_same, q_same, &l.old, &r.new);
-                pairs[p].new_old = cross(q_same, p_same, &l.new, &r.old);
             });
-        }
-        pairs
+            pairs
+        })
     }
 
     /// What each point shows that keeps what it has, and that takes the patch; the same where it has no choice.
-    fn looks(&self, canvas: &Canvas<D>, patch: &Proposal<'_, D>, judged: &[bool]) -> Vec<Looks> {
-        let mut looks = vec![
-            Looks {
-                old: Look::EMPTY,
-                new: Look::EMPTY,
-                apart: 0.0
-            };
-            judged.len()
-        ];
+    fn looks(&self, view: &View<D>, patch: &Proposal<'_, D>, judged: &[bool]) -> Vec<Looks> {
+        let mut looks = vec![Looks::NONE; judged.len()];
         for (i, here) in looks.iter_mut().enumerate() {
             if !judged[i] {
                 continue;
             }
-            let p = patch.window.points[i];
-            let kept = canvas
-                .covered(p)
-                .then(|| self.source.look(canvas.places[p as usize]));
-            let taken =
-                (patch.mask[i] || kept.is_none()).then(|| self.source.look(patch.places[i]));
-            // A point out of the patch that shows nothing is in no pair.
-            let any = kept.or(taken).unwrap_or(Look::EMPTY);
-            here.old = kept.unwrap_or(any);
-            here.new = taken.unwrap_or(any);
+            let covered = view.patches[i] != FREE;
+            here.old = view.looks[i];
+            here.new = if patch.mask[i] || !covered {
+                self.source.look(patch.places[i])
+            } else {
+                here.old
+            };
+            if !covered {
+                here.old = here.new;
+            }
+            here.same = covered && view.places[i] == patch.places[i];
             here.apart = distance(&here.old, &here.new);
         }
         looks
     }
 
     /// What the window of a patch costs as it is.
-    pub(super) fn value(&self, canvas: &Canvas<D>, patch: &Proposal<'_, D>) -> f64 {
+    pub(super) fn value(&self, view: &View<D>, patch: &Proposal<'_, D>) -> f64 {
         let mut value = 0.0;
         for i in 0..patch.window.grid.len() {
             if patch.mask[i] {
-                value += f64::from(self.points(canvas, patch, i)[0]);
+                value += f64::from(self.points(view, patch, i)[0]);
             }
         }
         for axis in 0..D {
             links(&patch.window.grid, axis, |p, _| {
-                value += f64::from(canvas.seams[patch.window.points[p] as usize][axis]);
+                value += f64::from(view.seams[p][axis]);
             });
         }
         value
     }
 
     /// What a point costs that keeps what it shows, or takes the patch.
-    fn points(&self, canvas: &Canvas<D>, patch: &Proposal<'_, D>, i: usize) -> [f32; 2] {
-        let p = patch.window.points[i];
-        let mut costs = [
-            self.weights.distortion * canvas.distortion(p),
-            self.weights.distortion * patch.distortion.get(i).copied().unwrap_or(0.0),
-        ];
+    fn points(&self, view: &View<D>, patch: &Proposal<'_, D>, i: usize) -> [f32; 2] {
+        let own = |all: &[f32]| self.weights.distortion * all.get(i).copied().unwrap_or(0.0);
+        let mut costs = [own(&view.distortion), own(patch.distortion)];
         if let Some(guide) = self.guide {
-            let places = [canvas.places[p as usize], patch.places[i]];
-            for (cost, place) in costs.iter_mut().zip(places) {
-                *cost += self.weights.guide
-                    * guide.cost(p as usize, self.source.sample(place)) as f32
-                    / UNRELATED;
+            let p = patch.window.points[i] as usize;
+            for (cost, place) in costs.iter_mut().zip([view.places[i], patch.places[i]]) {
+                let asked = guide.cost(p, self.source.sample(place)) as f32;
+                *cost += self.weights.guide * asked / UNRELATED;
             }
         }
-        if canvas.covered(p) {
-            costs
-        } else {
+        if view.patches[i] == FREE {
             [0.0, costs[1]]
+        } else {
+            costs
         }
     }
 
@@ -454,11 +462,8 @@ pub(super) fn widen<const D: usize>(grid: &Grid<D>, mask: &[bool]) -> Vec<bool> 
     wide
 }
 
-fn tie<const D: usize>(canvas: &Canvas<D>, patch: &Proposal<'_, D>, i: usize) -> Tie {
-    match (
-        canvas.patches[patch.window.points[i] as usize],
-        patch.mask[i],
-    ) {
+fn tie<const D: usize>(view: &View<D>, patch: &Proposal<'_, D>, i: usize) -> Tie {
+    match (view.patches[i], patch.mask[i]) {
         (FREE, false) => Tie::Out,
         (FREE, true) => Tie::New,
         (HELD, _) | (_, false) => Tie::Old,

@@ -58,9 +58,14 @@ impl<const D: usize> Energy<D> {
     }
 
     /// Which points take the patch at the least cost, where all points of a block of a side take it or none.
-    pub(super) fn minimise(&self, side: usize, monitor: &Monitor) -> Result<Vec<bool>> {
+    pub(super) fn minimise(
+        &self,
+        side: usize,
+        solver: &mut Solver<D>,
+        monitor: &Monitor,
+    ) -> Result<Vec<bool>> {
         if side < 2 {
-            return self.solve(monitor);
+            return self.solve(solver, monitor);
         }
         let blocks = Grid::new(self.grid.shape().map(|n| n.div_ceil(side)), [false; D])?;
         let block: Vec<u32> = self
@@ -79,11 +84,11 @@ impl<const D: usize> Energy<D> {
                 }
             });
         }
-        let labels = small.solve(monitor)?;
+        let labels = small.solve(solver, monitor)?;
         Ok(block.iter().map(|b| labels[*b as usize]).collect())
     }
 
-    fn solve(&self, monitor: &Monitor) -> Result<Vec<bool>> {
+    fn solve(&self, solver: &mut Solver<D>, monitor: &Monitor) -> Result<Vec<bool>> {
         let backward = vec![0; self.grid.len()];
         let graph = Graph {
             grid: self.grid,
@@ -91,7 +96,7 @@ impl<const D: usize> Energy<D> {
             forward: std::array::from_fn(|axis| &self.forward[axis][..]),
             backward: [&backward[..]; D],
         };
-        Ok(Solver::default().min_cut(&graph, monitor)?.sink)
+        Ok(solver.min_cut(&graph, monitor)?.sink)
     }
 }
 

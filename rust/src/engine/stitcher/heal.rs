@@ -290,7 +290,8 @@ impl<const D: usize> Stitching<'_, D> {
         if !proposal.core.contains(&true) {
             return Ok(None);
         }
-        let cutting = self.cutter.cut(canvas, &proposal, self.monitor)?;
+        let view = canvas.view(&chart.window, self.cutter.source);
+        let cutting = self.cutter.cut(&view, &proposal, self.monitor)?;
         let mut changes: Vec<(Key, i64)> = Vec::new();
         let mut change = |key: Option<Key>, by: i64| {
             if let Some(key) = key {
@@ -316,7 +317,7 @@ impl<const D: usize> Stitching<'_, D> {
             &cutting.take,
         );
         let worth = f64::from(self.options.balance / self.options.patch);
-        let mut gain = self.cutter.value(canvas, &proposal) - cutting.value;
+        let mut gain = self.cutter.value(&view, &proposal) - cutting.value;
         gain += worth * (self.balance.excess(source) - balance.excess(source));
         for &(key, by) in &changes {
             let now = counts.get(&key).copied().unwrap_or(0);

@@ -19,6 +19,7 @@ mod search;
 mod source;
 
 use std::collections::HashMap;
+use std::sync::Mutex;
 
 use crate::engine::guide::Guide;
 use crate::foundation::fixed::{Frame, Frames, ONE, Place, apply};
@@ -143,6 +144,7 @@ pub fn stitch<const D: usize>(
             source,
             weights: options.weights,
             guide,
+            solvers: Mutex::default(),
         },
         frames,
         options: *options,
@@ -317,12 +319,11 @@ impl<const D: usize> Stitching<'_, D> {
             &noise,
         );
         let source = self.cutter.source;
+        let view = self.canvas.view(&chart.window, source);
         let worth = f64::from(o.balance / side);
         let cuts = par::map(found.len(), |k| {
             let patch = Proposal::new(&chart, found[k]);
-            let mut cut = self
-                .cutter
-                .cut_coarsely(&self.canvas, &patch, self.monitor)?;
+            let mut cut = self.cutter.cut_coarsely(&view, &patch, self.monitor)?;
             cut.value += worth
                 * self
                     .balance
@@ -347,9 +348,7 @@ impl<const D: usize> Stitching<'_, D> {
             return Ok(());
         };
         let proposal = Proposal::new(&chart, found[k]);
-        let cutting = self
-            .cutter
-            .refine(&self.canvas, &proposal, coarse, self.monitor)?;
+        let cutting = self.cutter.refine(&view, &proposal, coarse, self.monitor)?;
         self.balance = self.balance.after(
             source,
             &self.canvas,

@@ -10,6 +10,7 @@ use super::search::{Charges, Index};
 use super::source::CHANNELS;
 use super::*;
 use crate::foundation::fixed::identity;
+use crate::kernels::seam::maxflow::Solver;
 
 const NO_ELEMENTS: Elements<'static> = Elements {
     labels: &[],
@@ -173,7 +174,7 @@ proptest! {
             for (axis, pairs) in pairs.iter().enumerate() {
                 energy.add_pairs(axis, &ties, pairs);
             }
-            let sink = energy.minimise(side, &Monitor::default()).unwrap();
+            let sink = energy.minimise(side, &mut Solver::default(), &Monitor::default()).unwrap();
             let take: Vec<bool> = ties
                 .iter()
                 .zip(&sink)
