@@ -92,7 +92,6 @@ def find_instances(colours: Floats, wrap: Sequence[bool]) -> Instances | None:
     """
     from scipy import ndimage
 
-    axes = colours.ndim - 1
     # A little smoother than it is: grain would tear pieces.
     modes = ["wrap" if closed else "nearest" for closed in wrap]
     smooth = np.stack([ndimage.gaussian_filter(colours[..., c], 0.7, mode=modes) for c in range(colours.shape[-1])], -1)
@@ -108,10 +107,16 @@ def find_instances(colours: Floats, wrap: Sequence[bool]) -> Instances | None:
         background.append([c for c in range(COLOURS) if c not in background][colour])
     if best is None or not _stand_out(colours, best, wrap):
         return None
-    padding = [(PAD, PAD)] * axes
-    whole = np.pad(best.mask, padding, mode="wrap" if all(wrap) else "edge")
-    depth = ndimage.distance_transform_edt(whole)[(slice(PAD, -PAD),) * axes]
-    return Instances(best.labels.astype(np.uint32), depth.astype(np.float32))
+    return Instances(best.labels.astype(np.uint32), _measure_depth(best.mask, wrap))
+
+
+def _measure_depth(mask: Bools, wrap: Sequence[bool]) -> Floats:
+    """Return the distance of each sample of a mask to the background."""
+    from scipy import ndimage
+
+    padded = np.pad(mask, PAD, mode="wrap" if all(wrap) else "edge")
+    depth = ndimage.distance_transform_edt(padded)[(slice(PAD, -PAD),) * mask.ndim]
+    return np.asarray(depth, np.float32)
 
 
 def _try_background(palette: NDArray[np.uint8], colours: list[int], wrap: Sequence[bool]) -> _Pieces:
@@ -187,8 +192,6 @@ def label_components(mask: Bools, wrap: Sequence[bool]) -> NDArray[np.intp]:
 
 def as_instances(classes: Array, wrap: Sequence[bool]) -> Instances | None:
     """Return the elements of an exemplar of labels: connected parts of any class but that which hangs together most."""
-    from scipy import ndimage
-
     parts = {int(c): label_components(classes == c, wrap) for c in np.unique(classes)}
     largest = {c: np.bincount(p.ravel())[1:].max() / classes.size for c, p in parts.items()}
     ground = max(largest, key=lambda c: (largest[c], -c))
@@ -201,6 +204,4 @@ def as_instances(classes: Array, wrap: Sequence[bool]) -> Instances | None:
     sizes = np.bincount(labels.ravel())[1:]
     if len(sizes) < LEAST or sizes.max() > LARGEST * sizes.sum() or mask.mean() > SHARE:
         return None
-    padding = [(PAD, PAD)] * classes.ndim
-    depth = ndimage.distance_transform_edt(np.pad(mask, padding, mode="wrap" if all(wrap) else "edge"))
-    return Instances(labels, depth[(slice(PAD, -PAD),) * classes.ndim].astype(np.float32))
+    return Instances(labels, _measure_depth(mask, wrap))

@@ -8,6 +8,8 @@ use crate::{Error, Result};
 const SHARE: usize = 25;
 /// First values that are as good as the wanted one.
 const ALIKE: i32 = 48;
+/// Cost of windows that have nothing to do with each other: what is asked counts in these units.
+pub(crate) const UNRELATED: f32 = 2.0 * 512.0 * 512.0;
 /// Values that 12 bits hold.
 const VALUES: i32 = 4096;
 

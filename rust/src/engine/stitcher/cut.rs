@@ -12,7 +12,7 @@ use super::chart::Chart;
 use super::energy::{Energy, capacity};
 use super::source::{CHANNELS, Look, Source};
 use crate::Result;
-use crate::engine::guide::Guide;
+use crate::engine::guide::{Guide, UNRELATED};
 use crate::foundation::fixed::Place;
 use crate::foundation::grid::Grid;
 use crate::foundation::par::Monitor;
@@ -27,8 +27,6 @@ pub(super) const MOST: f32 = 1000.0;
 const LARGE: [(usize, usize); 1] = [(4096, 2)];
 /// Beyond this, colours of two elements are as different as can be.
 const UNLIKE: f32 = 1.5;
-/// What a guide's cost of unrelated windows is.
-const UNRELATED: f32 = 2.0 * 512.0 * 512.0;
 
 /// What a seam costs.
 #[derive(Debug, Clone, Copy)]

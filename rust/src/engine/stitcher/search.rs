@@ -7,7 +7,7 @@
 use super::canvas::{Canvas, FREE};
 use super::chart::Chart;
 use super::source::{CHANNELS, Source};
-use crate::engine::guide::Guide;
+use crate::engine::guide::{Guide, UNRELATED};
 use crate::foundation::fft::{Complex, Volumes};
 use crate::foundation::fixed::{BITS, ONE, Place, nearest};
 use crate::foundation::grid::Grid;
@@ -21,8 +21,6 @@ const NEAR: i32 = 6;
 const FEW: u32 = 12;
 /// How often a place may have been shown beyond the mean, at most, as it counts.
 const OFTEN: f32 = 6.0;
-/// What a guide's cost of windows that have nothing to do with each other is: it counts in these units.
-const UNRELATED: f32 = 2.0 * 512.0 * 512.0;
 
 type Spectrum = Vec<Complex<f32>>;
 
@@ -191,8 +189,8 @@ impl<const D: usize> Index<D> {
                 ((far >> BITS) + first[a]).max(0) as usize
             }
         });
-        let (known, points) = self.known(source, canvas, chart, first);
-        let asked = guide.and_then(|guide| self.asked(guide, chart, first));
+        let (known, points) = self.splat_known(source, canvas, chart, first);
+        let asked = guide.and_then(|guide| self.splat_asked(guide, chart, first));
         if points == 0 && asked.is_none() {
             let sides = last.map(|n| n as u64 + 1);
             let draw = noise.below(sides.iter().product(), [0x70, 0, 0, 0]);
@@ -232,7 +230,7 @@ impl<const D: usize> Index<D> {
     }
 
     /// The points of a chart that are covered already.
-    fn known(
+    fn splat_known(
         &self,
         source: &Source<D>,
         canvas: &Canvas<D>,
@@ -255,7 +253,7 @@ impl<const D: usize> Index<D> {
     }
 
     /// What is asked of the points of a chart; none where nothing is.
-    fn asked(
+    fn splat_asked(
         &self,
         guide: &Guide<'_>,
         chart: &Chart<D>,
