@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_bool, as_float, as_image, as_int, as_mask, as_method, as_seed, as_wrap, guidance
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.blending import blend as correct_colours
+from texrs.completion._depth import fill_in_depth
 from texrs.completion._optimise import optimise, recover_scale
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
@@ -71,12 +72,14 @@ def complete(
         How large they are in ``exemplar``, in the units of ``scale_map``. None: 1 everywhere, as in a picture taken from the
         front; measured maps have a geometric mean of 1.
     method : {"patch", "optimise"}
-        How: "patch", patches that fit what is around, cut in [1]_; "optimise", windows corrected until each is like one of the
-        picture, or of ``exemplar``, resized where there is a scale map [2]_: for large holes, where patches would repeat what
-        is around.
+        How: "patch", patches that fit what is around, cut in [1]_; where the scale map is that of a plane, and there is no
+        ``exemplar``, patches of the plane, seen as they are seen in the hole. "optimise", windows corrected until each is
+        like one of the picture, or of ``exemplar``, resized where there is a scale map [2]_: for large holes, where patches
+        would repeat what is around.
     patch : int, optional
         Side of a patch in pixels, at least 4: about the size of what repeats. By default a sixth of the shorter side,
-        12 to 32; less where no place, or few, would be free of holes. "optimise" has no patches, and refuses one.
+        12 to 32, of a plane up to a quarter; less where no place, or few, would be free of holes. "optimise" has no
+        patches, and refuses one.
     boundary : int
         Width in pixels of the hole's boundary, which may be replaced too, 0 to 1024, so that the seam can run where it shows
         least. 0 leaves all that is known as it is.
@@ -144,7 +147,8 @@ def complete(
     watch = progress or (lambda stage, share: None)
 
     watch("complete", 0.0)
-    places, side, count = map_untouched(shapes), 0, 0
+    places, side, count = map_untouched(shapes), 0.0, 0
+    between = method == "optimise"
     scales = recover_scales(pictures, open_, scale_map, exemplar_scale_map) if open_.any() else None
     levels: list[dict[str, object]] = []
     wide = widen(open_, width, cyclic)
@@ -154,13 +158,26 @@ def complete(
         )
         count = int(places.label.max())
     elif open_.any():
-        places, side, count = fill_with_patches(
+        deep = None
+        if scales is not None and len(pictures) == 1 and not mirror:
+            deep = fill_in_depth(
+                pictures[0],
+                open_,
+                scales[0],
+                wide,
+                side=chosen,
+                wrap=(cyclic[0], cyclic[1]),
+                seed=seed,
+                progress=progress,
+            )
+        places, side, count = deep or fill_with_patches(
             pictures, open_, scales, chosen, ~wide, mirror=mirror, wrap=cyclic, seed=seed, watch=watch
         )
+        between = deep is not None
     new = find_places(places.label)
-    # What is kept maps to itself; of patches every coordinate is whole.
+    # What is kept maps to itself; of patches every coordinate is whole, but where they are seen in depth.
     result = pictures[0].copy()
-    if method == "optimise":
+    if between:
         result[new] = places.render(pictures, interpolation="cubic")[new]
     else:
         row, column = places.coordinates[new].astype(np.intp).T
@@ -185,7 +202,7 @@ def complete(
         "hole": float(open_.mean()),
         "scaled": scale_map is not None,
         "replaced_outside": int(np.count_nonzero(~open_[new])),
-        "patch": side,
+        "patch": round(side, 3),
         "patches": count,
         "mirror": mirror,
         "blend": screening,
@@ -264,7 +281,7 @@ def fill_with_patches(
     wrap: Sequence[bool],
     seed: int,
     watch: Progress,
-) -> tuple[SourceMap, int, int]:
+) -> tuple[SourceMap, float, int]:
     """Fill a hole with patches, and return the source map, the side of the patches and how many there are."""
     guides = guide_together(pictures)
     if scales is not None:

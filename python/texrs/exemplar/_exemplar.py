@@ -15,7 +15,6 @@ from texrs._engine.coherence import Similarity, find_similar
 from texrs._engine.stitcher import Stitcher
 from texrs._typing import Array, Floats, Path, Progress
 from texrs.errors import FileError, InvalidInput
-from texrs.exemplar.adjacency import measure_adjacency
 from texrs.exemplar.analysis import (
     COARSEST,
     Analysis,
@@ -28,6 +27,7 @@ from texrs.exemplar.analysis import (
 from texrs.exemplar.instances import Instances, as_instances, find_instances
 from texrs.exemplar.regularity import measure_direction
 from texrs.exemplar.segmentation import ElementOptions, Segmentation, segment
+from texrs.exemplar.stitching import make_stitcher
 from texrs.exemplar.symmetry import Flip, find_mirrors
 
 T = TypeVar("T")
@@ -243,7 +243,7 @@ class Exemplar:
     @property
     def stitcher(self) -> Stitcher:
         """The exemplar as patches are cut from it: with its elements, and which colours lie side by side."""
-        return self.remember("stitcher", self._make_stitcher)
+        return self.remember("stitcher", lambda: make_stitcher(self.colours, self.repeat, self.instances))
 
     @property
     def mirrors(self) -> tuple[Flip, ...]:
@@ -365,17 +365,6 @@ class Exemplar:
             raise FileError(f"{path}: is damaged ({error})") from None
         made._facts["analysis", (2,), COARSEST] = analysis
         return made
-
-    def _make_stitcher(self) -> Stitcher:
-        beside, found = measure_adjacency(self.colours, self.repeat), self.instances
-        return Stitcher(
-            self.colours,
-            wrap=self.repeat,
-            classes=beside.classes,
-            costs=beside.costs,
-            labels=None if found is None else found.labels,
-            depth=None if found is None else found.depth,
-        )
 
     def _measure(self, levels: int) -> tuple[bool, ...]:
         return measure_repeat(self.colours, axes=self._axes, levels=levels) if self._repeat is None else self._repeat

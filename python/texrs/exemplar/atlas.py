@@ -229,17 +229,17 @@ def find_box(
     return box[0], box[1], box[2], box[3]
 
 
-def pack(parts: Sequence[tuple[float, tuple[int, int, int, int] | None]], block: int) -> tuple[Copy, ...]:
-    """Lay copies on shelves, the highest first; the order of the copies stays."""
+def pack(parts: Sequence[tuple[float, tuple[int, int, int, int] | None]], block: int, gap: int = 0) -> tuple[Copy, ...]:
+    """Lay copies on shelves, the highest first, at least a gap apart; the order of the copies stays."""
     sizes = []
     for factor, box in parts:
         assert box is not None
         sizes.append((max(1, round((box[1] - box[0]) * factor)), max(1, round((box[3] - box[2]) * factor))))
-    width = max(-(-w // block) * block for _, w in sizes)
+    width = max(-(-(w + gap) // block) * block for _, w in sizes)
     origins: dict[int, tuple[int, int]] = {}
     top, left, height = 0, 0, 0
     for k in sorted(range(len(sizes)), key=lambda k: (-sizes[k][0], k)):
-        tall, wide = (-(-n // block) * block for n in sizes[k])
+        tall, wide = (-(-(n + gap) // block) * block for n in sizes[k])
         if left + wide > width:
             top, left, height = top + height, 0, 0
         origins[k] = (top, left)

@@ -17,6 +17,7 @@ from texrs._arrays import as_image, as_list
 from texrs._typing import Array, Bools, Frames, Interpolation, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.kernels.gather import gather
+from texrs.source_map._antialias import gather_smoothed
 from texrs.source_map._pixels import Pixels, divide_bands, label_pieces, number_pairs
 
 __all__ = ["Reuse", "SourceMap"]
@@ -233,6 +234,7 @@ class SourceMap:
         exemplars: Array | Sequence[Array],
         *,
         interpolation: Interpolation = "cubic",
+        antialias: bool = False,
         kind: Literal["colour", "normal"] = "colour",
         green: Literal["up", "down"] = "up",
     ) -> Array:
@@ -244,6 +246,8 @@ class SourceMap:
             Any map of the exemplar's height and width (and depth), any dtype and channels.
         interpolation : {"cubic", "linear", "nearest"}
             Between samples; use "nearest" for labels. Samples at whole coordinates are copied bit for bit.
+        antialias : bool
+            Whether the exemplar is smoothed where the frames say that it is shrunk. Not for labels, nor with "nearest".
         kind : {"colour", "normal"}
             "normal": a tangent-space normal map (channels x, y, z; unsigned values mean 2 v - 1). Its vectors turn
             with the local frame.
@@ -277,12 +281,22 @@ class SourceMap:
             if image.shape[: self.axes] != shape:
                 raise InvalidInput(f"exemplars: number {i} needs size {shape}, got {image.shape[: self.axes]}")
         out = gather(several, self.coordinates, self.exemplar, interpolation=interpolation)
+        if antialias and interpolation != "nearest":
+            out = gather_smoothed(out, several, self.coordinates, self.exemplar, self._shrunk(), interpolation)
         if kind == "colour":
             return out
         if kind != "normal" or green not in ("up", "down"):
             raise InvalidInput(f"kind, green: allowed are colour or normal, up or down; got {kind!r}, {green!r}")
         # Asked of the exemplars, for a part of them that a picture shows may have no negative value.
         return self._turn_normals(out, green, any(float(e[..., :3].min()) < 0 for e in images))
+
+    def _shrunk(self) -> NDArray[np.float32]:
+        """Return by how much each pixel's surroundings are smaller than in the exemplar, as a length."""
+        frame = self.frame_array()
+        if frame is None:
+            return np.ones(self.shape, np.float32)
+        shrunk = np.abs(np.linalg.det(frame)) ** np.float32(1 / self.axes)
+        return np.asarray(shrunk[self.label] if frame.ndim == 3 else shrunk, np.float32)
 
     def _turn_normals(self, normals: Array, green: str, signed: bool) -> Array:
         """Turn tangent-space normals with the frame: a surface h(S(p)) has the slope J^T grad h."""

@@ -1,4 +1,4 @@
-"""Which copies of an exemplar an atlas is made of, and what of a target they cannot give."""
+"""Whether an exemplar is a plane, which copies of it are made if not, and what of a target they cannot give."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from texrs._arrays import as_float
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.exemplar.atlas import LARGEST, SMALLEST, extend_sizes
+from texrs.scale_maps._plane import Plane
 
 __all__ = ["Outside", "Sizes", "bring_within", "choose_sizes", "count_samples"]
 
@@ -25,8 +26,10 @@ ALIKE = 0.1
 """Natural logarithm of a ratio of scales that are about the same."""
 
 
-def choose_sizes(scale: Floats, target: Floats, asked: Sizes) -> tuple[float, ...]:
-    """Return the sizes of the copies, the exemplar's own first."""
+def choose_sizes(scale: Floats, target: Floats, asked: Sizes, plane: Plane | None) -> tuple[float, ...]:
+    """Return the sizes of the copies, the exemplar's own first; those that a plane can be seen in."""
+    if plane is not None:
+        return (1.0, SMALLEST, LARGEST)
     if isinstance(asked, bool | np.bool_):
         if not asked:
             return (1.0,)

@@ -1,0 +1,362 @@
+"""A sheet: an exemplar laid out so that any place of it can be shown in any size by shifting patches.
+
+Of a plane seen in perspective that is the plane itself, flattened: what differs between places is how they are seen. Of any
+other exemplar it is a set of resized copies, as in an atlas.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import atan2, degrees
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._engine.pyramid import ONE
+from texrs._engine.stitcher import Stitcher
+from texrs._typing import Bools, Floats
+from texrs.exemplar.atlas import BARRED, NAT, Copy, fill_gaps, find_box, measure, pack, pick_known, resize
+from texrs.exemplar.instances import Instances, find_instances, label_components
+from texrs.exemplar.stitching import make_stitcher
+from texrs.kernels.gather import gather
+from texrs.scale_maps._plane import Plane
+
+__all__ = ["Copies", "Flattened", "Sheet", "code", "find_plane"]
+
+GAP = 8
+"""Samples between copies: patches that lie across it cost too much."""
+BLURRED = 1.8
+"""Of a flattened plane what would be enlarged by more is left out where there is enough else."""
+NEAR = 0.7
+"""Of the largest scale: what has at least so much of it is always there."""
+FAR = 3.0
+"""What would be enlarged by more is never laid out: next to the horizon lies more of a plane than anywhere else."""
+MOST = 1 << 19
+"""Samples of a flattened plane."""
+STEEP = 7.9
+"""Steps in a sheet from pixel to pixel, at most: what fixed point can hold."""
+FLAT, COPIED = 0.4, 0.3
+"""Side of a patch, as a share of the square root of the samples of the exemplar."""
+VARIES = 0.4
+"""Natural logarithm by which scales may differ across a patch that has one size."""
+GOOD, FAIR = 0.03, 0.08
+"""Residuals of a scale map that is a plane's beyond doubt, and of one that may be."""
+FORESHORTENED = 0.2
+"""How much steeper edges must get with distance where there is doubt: less than 1, for few lie just across the slope."""
+BANDS = 8
+"""Bands of scales that edges are compared in."""
+PLANAR = 0.02
+"""Residual of a target that is a plane."""
+FINE = 0.05
+"""Share of a target that may be finer, or coarser, than what the resolution of a sheet is chosen for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """What patches are cut from.
+
+    Attributes
+    ----------
+    shape : (int, int)
+        Of the exemplar.
+    colours : (rows, columns, C) float32
+        Of its samples.
+    logs : (rows, columns) float32
+        Logarithm of the scale of each.
+    free : (rows, columns) bool
+        Which of them may be shown.
+
+    """
+
+    shape: tuple[int, int]
+    colours: Floats
+    logs: Floats
+    free: Bools
+
+    weight: ClassVar[float]
+    """Cost of another scale than the wanted one, a squared natural logarithm: 1 is as much as of surroundings that have nothing
+    to do with each other."""
+    guide: ClassVar[float]
+    """How much of it counts in cuts."""
+    heal: ClassVar[bool]
+    """Whether torn elements are mended: of planes, mending takes longer than all the rest, and tears as much as it mends."""
+
+    @property
+    def elements(self) -> Instances | None:
+        """The separate elements of what may be shown."""
+        return self.stitcher[1]
+
+    @cached_property
+    def stitcher(self) -> tuple[Stitcher, Instances | None]:
+        """The sheet as patches are cut from it, and its elements."""
+        open_ = (False, False)
+        found = find_instances(self.colours, open_)
+        if found is not None:
+            # What is cut off by a border is another element than what goes on beyond it.
+            labels = label_components((found.labels > 0) & self.free, open_)
+            found = Instances(labels.astype(np.uint32), found.depth) if labels.any() else None
+        return make_stitcher(self.colours, open_, found), found
+
+    def values(self, strength: float) -> NDArray[np.int16]:
+        """Return what a demand compares: scales, by how much they count, and what is barred: (samples * 4)."""
+        values = np.zeros((*self.free.shape, 4), np.int16)
+        values[..., 0] = code(self.logs, strength)
+        values[..., 1] = np.where(self.free, 0, BARRED)
+        return values.reshape(-1)
+
+    def fix(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.int32]:
+        """Return the places of samples: (N, 2), in fixed point."""
+        return np.stack([rows, columns], axis=-1).astype(np.int32) * ONE
+
+    def describe(self) -> dict[str, Any]:
+        """Return what kind of sheet it is, as JSON types."""
+        raise NotImplementedError
+
+    def steps_at(self, scale: float) -> float:
+        """Return how many samples elements have for each pixel of an output that shows them in a scale."""
+        raise NotImplementedError
+
+    def side(self, target: Floats) -> float:
+        """Return the side of a patch for an output that is to follow a map, in samples of the sheet."""
+        raise NotImplementedError
+
+    def frames(self, target: Floats, wrap: Sequence[bool]) -> NDArray[np.int16]:
+        """Return the Jacobians of an output whose elements are to be as large as a map says, in fixed point."""
+        raise NotImplementedError
+
+    def locate(self, places: NDArray[np.int32]) -> tuple[Floats, Floats]:
+        """Return the places in the exemplar of places (N, 2) in fixed point, and the Jacobians there."""
+        raise NotImplementedError
+
+    def measure_error(self, places: NDArray[np.int32], target: Floats) -> float:
+        """Return the median of how far the logarithms of the scales at places (rows, columns, 2) are from a target's."""
+        raise NotImplementedError
+
+    def place(self, coordinates: Floats) -> NDArray[np.int32]:
+        """Return the places, in fixed point, of coordinates (N, 2) of the exemplar as it is."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, eq=False)
+class Flattened(Sheet):
+    """A plane seen in perspective, flattened.
+
+    Attributes
+    ----------
+    plane : Plane
+        How it lies.
+    origin : (float, float)
+        Point of the plane that the first sample shows.
+    resolution : float
+        Samples for each unit of the plane: the scale at which one is a pixel.
+
+    """
+
+    plane: Plane
+    origin: tuple[float, float]
+    resolution: float
+
+    weight, guide, heal = 0.4, 0.1, False
+
+    @classmethod
+    def of(cls, colours: Floats, plane: Plane, target: Floats, known: Bools | None = None) -> Flattened:
+        """Flatten an exemplar, as finely as a target needs; all of it where only part is known."""
+        shape = (colours.shape[0], colours.shape[1])
+        resolution = min(float(np.sqrt(np.prod(np.quantile(target, [FINE, 1 - FINE])))), plane.largest)
+        least = min(resolution / BLURRED, NEAR * plane.largest)
+        grid = np.moveaxis(np.indices(shape), 0, -1)
+        # What is held must be there too, though it is not copied.
+        spread = plane.flatten(grid)[plane.scales(grid) >= (least if known is None else min(least, resolution / FAR))]
+        low, high = spread.min(axis=0), spread.max(axis=0)
+        resolution = min(resolution, float(np.sqrt(MOST / np.prod(high - low + 1e-9))))
+        sides = [int(n) + 1 for n in (high - low) * resolution]
+        points = low + np.moveaxis(np.indices(sides), 0, -1) / resolution
+        at, scales = plane.project(points), plane.scales_of(points)
+        inside = ((at >= 0) & (at <= np.array(shape) - 1)).all(axis=-1) & (scales >= 0.98 * least)
+        if known is not None:
+            near = np.clip(np.rint(at), 0, np.array(shape) - 1).astype(np.intp)
+            inside &= known[near[..., 0], near[..., 1]]
+        shown = gather(colours, mirror(at, shape).astype(np.float32), interpolation="linear")
+        return cls(
+            shape, shown, np.log(scales).astype(np.float32), inside, plane, (float(low[0]), float(low[1])), resolution
+        )
+
+    def describe(self) -> dict[str, Any]:
+        """Return how the plane lies: the tilt in degrees as `texrs.scale_maps`, the ratio of its scales, and the fit."""
+        tilt = degrees(atan2(self.plane.down[0], -self.plane.down[1])) % 360
+        ratio = self.plane.largest / self.plane.least
+        return {
+            "kind": "plane",
+            "tilt": round(tilt, 3),
+            "ratio": round(ratio, 4),
+            "residual": round(self.plane.residual, 5),
+            "resolution": round(self.resolution, 5),
+        }
+
+    def steps_at(self, scale: float) -> float:
+        """Return it across the slope."""
+        return self.resolution / scale
+
+    def side(self, target: Floats) -> float:
+        """Return a share of what there is: patches bend with the map."""
+        return FLAT * float(np.sqrt(np.count_nonzero(self.free)))
+
+    def frames(self, target: Floats, wrap: Sequence[bool]) -> NDArray[np.int16]:
+        """Return the Jacobians of the plane, seen as large as a map says."""
+        other = None if any(wrap) else Plane.fit(target)
+        # A target that is a plane itself is seen as one.
+        frames = self.plane.jacobians(target, other if other is not None and other.residual < PLANAR else None)
+        fixed = np.clip(np.rint(frames * (self.resolution * ONE)), -STEEP * ONE, STEEP * ONE)
+        return np.ascontiguousarray(fixed.astype(np.int16).reshape(-1, 2, 2))
+
+    def locate(self, places: NDArray[np.int32]) -> tuple[Floats, Floats]:
+        """Return the coordinates, and how the plane is seen there."""
+        points = places / (ONE * self.resolution) + np.array(self.origin)
+        at = np.clip(self.plane.project(points), 0, np.array(self.shape) - 1)
+        seen = self.plane.unfold(points) / self.resolution
+        return at.astype(np.float32), seen.astype(np.float32)
+
+    def measure_error(self, places: NDArray[np.int32], target: Floats) -> float:
+        """Return the median, by the area of the plane that each pixel shows."""
+        if min(target.shape) < 2:
+            return 0.0
+        steps = np.stack([np.diff(places, axis=0)[:, :-1], np.diff(places, axis=1)[:-1]], axis=-1) / ONE
+        shown = np.maximum(np.abs(np.linalg.det(steps)), 1e-9)
+        asked = np.abs(np.linalg.det(self.plane.jacobians(target[:-1, :-1]) * self.resolution))
+        return float(np.median(np.abs(np.log(shown / asked)))) / 2
+
+    def place(self, coordinates: Floats) -> NDArray[np.int32]:
+        """Return where the plane shows what lies at coordinates."""
+        points = (self.plane.flatten(coordinates) - np.array(self.origin)) * self.resolution
+        return np.asarray(np.rint(np.clip(points, -1e5, 1e5) * ONE), np.int32)
+
+
+@dataclass(frozen=True, eq=False)
+class Copies(Sheet):
+    """Copies of an exemplar in several sizes, side by side.
+
+    Attributes
+    ----------
+    copies : tuple of Copy
+        Where each lies; the first is the exemplar as it is.
+    owner : (rows, columns) uint16
+        The copy of each sample.
+
+    """
+
+    copies: tuple[Copy, ...]
+    owner: NDArray[np.uint16]
+
+    weight, guide, heal = 6.0, 0.03, True
+
+    @classmethod
+    def of(
+        cls, colours: Floats, scale: Floats, sizes: Sequence[float], target: Floats, known: Bools | None = None
+    ) -> Copies:
+        """Resize an exemplar; of other copies than the first only what has scales of the target is kept."""
+        shape, logs = (colours.shape[0], colours.shape[1]), np.log(scale).astype(np.float32)
+        wanted = float(target.min()), float(target.max())
+        parts = [(size, find_box(logs, size, wanted, GAP)) for size in sizes]
+        copies = pack([p for p in parts if p[1] is not None], 1, GAP)
+        sides = measure(copies, 1)
+        shown = np.zeros((*sides, colours.shape[-1]), np.float32)
+        free, owner, sized = np.zeros(sides, bool), np.zeros(sides, np.uint16), np.zeros(sides, np.float32)
+        for number, copy in enumerate(copies):
+            here = tuple(slice(o, o + n) for o, n in zip(copy.origin, copy.shape, strict=True))
+            shown[here], owner[here] = resize(colours, copy), number
+            free[here] = True if known is None else pick_known(known, copy)
+            at = [
+                (np.arange(n) + 0.5) / f - 0.5 + o for n, f, o in zip(copy.shape, copy.factor, copy.first, strict=True)
+            ]
+            grid = np.stack(np.meshgrid(*at, indexing="ij"), axis=-1).astype(np.float32)
+            sized[here] = gather(logs, grid, interpolation="linear") + np.float32(np.log(copy.factor).mean())
+        fill_gaps(shown, copies, 1)
+        return cls(shape, shown, sized, free, copies, owner)
+
+    def describe(self) -> dict[str, Any]:
+        """Return the sizes of the copies."""
+        return {"kind": "copies", "sizes": [round(float(np.sqrt(np.prod(c.factor))), 4) for c in self.copies]}
+
+    def steps_at(self, scale: float) -> float:
+        """Return 1: sizes are those of the copies."""
+        return 1.0
+
+    def side(self, target: Floats) -> float:
+        """Return a share of the exemplar; less where the map changes by much within that."""
+        logs = np.log(target)
+        down, right = (np.gradient(logs, axis=k) if n > 1 else np.zeros_like(logs) for k, n in enumerate(logs.shape))
+        steep = np.hypot(down, right)
+        return min(COPIED * float(np.sqrt(np.prod(self.shape))), VARIES / max(float(np.quantile(steep, 0.75)), 1e-6))
+
+    def frames(self, target: Floats, wrap: Sequence[bool]) -> NDArray[np.int16]:
+        """Return the identity: sizes are those of the copies."""
+        return np.eye(2, dtype=np.int16)[np.newaxis] * np.int16(ONE)
+
+    def locate(self, places: NDArray[np.int32]) -> tuple[Floats, Floats]:
+        """Return the coordinates, and the sizes of the copies there."""
+        at = (places / np.float32(ONE)).astype(np.float32)
+        own = self.owner[self._nearest(places)]
+        factor, origin, first = (
+            np.array(list(values), np.float32)[own]
+            for values in zip(*((c.factor, c.origin, c.first) for c in self.copies), strict=True)
+        )
+        found = (at - origin + np.float32(0.5)) / factor - np.float32(0.5) + first
+        found = np.clip(found, 0, np.array(self.shape, np.float32) - 1)
+        return found, np.eye(2, dtype=np.float32) / factor[:, np.newaxis]
+
+    def measure_error(self, places: NDArray[np.int32], target: Floats) -> float:
+        """Return the median, by the scales of the samples."""
+        return float(np.median(np.abs(self.logs[self._nearest(places)] - np.log(target))))
+
+    def _nearest(self, places: NDArray[np.int32]) -> tuple[NDArray[np.intp], ...]:
+        """Return the rows and columns of the samples nearest to places."""
+        near = (places + ONE // 2) // ONE
+        return tuple(np.clip(near[..., k], 0, n - 1).astype(np.intp) for k, n in enumerate(self.free.shape))
+
+    def place(self, coordinates: Floats) -> NDArray[np.int32]:
+        """Return where the first copy shows what lies at coordinates."""
+        return np.asarray(np.rint((coordinates + np.array(self.copies[0].origin)) * ONE), np.int32)
+
+
+def find_plane(colours: Floats, scale: Floats) -> Plane | None:
+    """Return the plane that an exemplar is a picture of, if the evidence is good enough.
+
+    Maps that are measured are not quite those of a plane, and those of round things that get smaller are not far from it. Where
+    the fit is fair, edges decide: on a plane they get steeper along the slope with distance.
+    """
+    plane = Plane.fit(scale)
+    if plane is None or plane.residual > FAIR:
+        return None
+    return plane if plane.residual <= GOOD or _measure_foreshortening(colours, plane) >= FORESHORTENED else None
+
+
+def _measure_foreshortening(colours: Floats, plane: Plane) -> float:
+    """Return by how much steeper edges get along the slope than across it where scales fall: 1 where they lie that way."""
+    from scipy import ndimage
+
+    grey = ndimage.gaussian_filter(colours.mean(axis=-1, dtype=np.float64), 1.0)
+    rows, columns = np.gradient(grey)
+    along, across = (rows * d[0] + columns * d[1] for d in (plane.down, plane.across))
+    logs = np.log(plane.scales(np.moveaxis(np.indices(grey.shape), 0, -1)))
+    ends = np.quantile(logs, np.linspace(0, 1, BANDS + 1))
+    band = np.clip(np.searchsorted(ends, logs) - 1, 0, BANDS - 1).ravel()
+    means = [np.bincount(band, v.ravel(), BANDS) for v in (logs, along**2, across**2)]
+    count = np.maximum(np.bincount(band, minlength=BANDS), 1)
+    steep = np.log((means[1] + 1e-12) / (means[2] + 1e-12)) / 2
+    scales = means[0] / count
+    scales -= scales.mean()
+    return -float((scales * steep).sum() / max(float((scales**2).sum()), 1e-9))
+
+
+def code(logs: Floats, strength: float) -> NDArray[np.int16]:
+    """Return logarithms of scales in the 12 bits of a demand, by how much they count."""
+    return np.asarray(np.clip(np.rint(logs * (NAT * strength**0.5)), -2048, 2047), np.int16)
+
+
+def mirror(at: NDArray[np.float64], shape: tuple[int, int]) -> NDArray[np.float64]:
+    """Return coordinates beyond the borders of a picture, mirrored into it."""
+    ends = np.array([max(n - 1, 1) for n in shape])
+    return np.asarray(np.abs((at + ends) % (2 * ends) - ends), np.float64)

@@ -1,0 +1,84 @@
+"""Look-up without aliases: where a picture is shrunk, it is smoothed first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Array, Floats, Interpolation
+from texrs.kernels.gather import gather
+
+__all__ = ["gather_smoothed"]
+
+LEVELS = 2
+"""Smoothed pictures for each octave by which it is shrunk; between two of them what they show is mixed."""
+OCTAVES = 5.0
+"""By more than so many nothing is smoothed further."""
+STRAIGHT = 1.05
+"""What is shrunk by less is looked up as it is."""
+
+
+def gather_smoothed(
+    out: Array,
+    images: Sequence[Array],
+    coordinates: NDArray[np.float32],
+    exemplar: NDArray[np.uint16],
+    shrunk: Floats,
+    interpolation: Interpolation,
+) -> Array:
+    """Replace what is shrunk in a look-up by what is seen in smoothed pictures.
+
+    Parameters
+    ----------
+    out : array
+        The look-up as it is, of any shape with channels or without; overwritten.
+    images : sequence of array
+        What is looked up, each (..., C) or without channels.
+    coordinates, exemplar : (N, A) float32, (N) uint16
+        Where, and in which.
+    shrunk : (N) float
+        By how much, as a length: above 1 where the picture gets smaller.
+    interpolation : str
+        Between samples.
+
+    Returns
+    -------
+    array
+        ``out``.
+    """
+    from scipy import ndimage
+
+    axes = coordinates.shape[-1]
+    level = np.clip(np.log2(np.maximum(shrunk, 1)) * LEVELS, 0, OCTAVES * LEVELS).reshape(-1)
+    here = np.flatnonzero(level >= np.log2(STRAIGHT) * LEVELS)
+    if not here.size:
+        return out
+    level, at, which = level[here], coordinates.reshape(-1, axes)[here], exemplar.reshape(-1)[here]
+    channels = out.shape[exemplar.ndim :]
+    mixed = np.zeros((len(here), *channels), np.float64)
+    low = np.floor(level)
+    for k in np.unique(np.concatenate([low, low + 1])):
+        weight = 1 - np.abs(level - k)
+        near = np.flatnonzero(weight > 0)
+        if not near.size:
+            continue
+        # A pixel is a box as wide as one sample; one that is r times as wide has r^2 times its variance.
+        sigma = 0.5 * np.sqrt(4.0 ** (k / LEVELS) - 1)
+        for number, image in enumerate(images):
+            own = near[which[near] == number]
+            if own.size:
+                smooth = np.asarray(image, np.result_type(image.dtype, np.float32))
+                if k > 0:
+                    sigmas = (sigma,) * axes + (0,) * (image.ndim - axes)
+                    smooth = ndimage.gaussian_filter(smooth, sigmas, mode="nearest")
+                shown = gather(smooth, at[own], interpolation=interpolation)
+                mixed[own] += shown * weight[own].reshape(-1, *(1,) * len(channels))
+    if out.dtype.kind in "ui":
+        ends = np.iinfo(out.dtype)
+        mixed = np.clip(np.rint(mixed), ends.min, ends.max)
+    elif out.dtype.kind == "b":
+        mixed = mixed > 0.5
+    out.reshape(-1, *channels)[here] = mixed.astype(out.dtype)
+    return out

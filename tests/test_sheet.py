@@ -1,0 +1,125 @@
+"""Planes, sheets and look-up without aliases: what PERSPECTIVE is made of."""
+
+import numpy as np
+import pytest
+
+import perspective_checks as checks
+import texrs
+from texrs import SourceMap, samples, scale_maps
+from texrs._engine.pyramid import ONE
+from texrs.exemplar.sheet import Copies, Flattened, find_plane
+from texrs.scale_maps._plane import Plane
+
+
+@pytest.fixture(scope="module")
+def disc_floor():
+    """A plane seen from above, and the width of its elements: the square root of areas is the 3/2 power of that."""
+    floor = samples.tilted_discs((128, 128))
+    return floor.image, np.asarray(floor.scale_map ** (2 / 3), np.float32)
+
+
+@pytest.mark.parametrize("tilt", [90, 35, -112])
+def test_a_plane_is_recovered_and_its_projection_undone(tilt):
+    scale = scale_maps.from_angles((60, 90), 55, tilt)
+    plane = Plane.fit(scale)
+    assert plane is not None
+    assert plane.residual < 1e-4
+    grid = np.moveaxis(np.indices(scale.shape), 0, -1)
+    np.testing.assert_allclose(plane.scales(grid), scale, rtol=1e-4)
+    flat = plane.flatten(grid)
+    np.testing.assert_allclose(plane.project(flat), grid, atol=1e-6)
+    # Depth grows in the direction of the tilt.
+    away = np.degrees(np.arctan2(plane.down[0], -plane.down[1]))
+    assert (away - tilt + 180) % 360 - 180 == pytest.approx(0, abs=0.1)
+
+
+def test_the_jacobians_are_the_derivatives():
+    plane = Plane.fit(scale_maps.from_angles((40, 50), 50, 60))
+    points = plane.flatten(np.moveaxis(np.indices((40, 50)), 0, -1)[5:-5:7, 5:-5:7])
+    step = 1e-6
+    by = [(plane.project(points + step * e) - plane.project(points - step * e)) / (2 * step) for e in np.eye(2)]
+    np.testing.assert_allclose(plane.unfold(points), np.stack(by, axis=-1), rtol=1e-4, atol=1e-4)
+
+
+def test_a_plane_seen_as_it_is_stays_as_it_is():
+    scale = scale_maps.from_angles((40, 50), 50, 60)
+    plane = Plane.fit(scale)
+    grid = np.moveaxis(np.indices((40, 50)), 0, -1)
+    together = plane.unfold(plane.flatten(grid)) @ plane.jacobians(scale, plane)
+    np.testing.assert_allclose(together, np.broadcast_to(np.eye(2), together.shape), atol=2e-3)
+
+
+def test_a_map_that_hardly_varies_is_no_plane():
+    assert Plane.fit(np.ones((20, 20), np.float32)) is None
+    assert Plane.fit(scale_maps.from_angles((20, 20), 5, 90)) is None
+
+
+def test_round_things_that_get_smaller_are_no_plane(disc_floor):
+    image, scale = disc_floor
+    assert find_plane(texrs.Exemplar(image).guidance, scale) is not None
+    # A measured map strays, but edges tell.
+    rough = scale * np.exp(0.05 * np.sin(np.arange(128) / 3))[:, np.newaxis].astype(np.float32)
+    assert Plane.fit(rough).residual > 0.03
+    assert find_plane(texrs.Exemplar(image).guidance, rough) is not None
+    round_, theirs = checks.floor((128, 128))
+    assert find_plane(texrs.Exemplar(round_).guidance, theirs) is None
+
+
+def test_what_a_sheet_shows_is_the_exemplar(disc_floor):
+    image, scale = disc_floor
+    colours = texrs.Exemplar(image).guidance
+    flat = Flattened.of(colours, find_plane(colours, scale), scale)
+    copies = Copies.of(colours, scale, (1.0, 0.8, 1.25), scale)
+    for sheet in (flat, copies):
+        rows, columns = np.nonzero(sheet.free)
+        at, frames = sheet.locate(sheet.fix(rows, columns))
+        assert (at >= 0).all()
+        assert (at <= 127).all()
+        assert (np.linalg.det(frames) > 0).all()
+    grid = np.moveaxis(np.indices((128, 128)), 0, -1)[40:-8:9, 8:-8:9].reshape(-1, 2).astype(np.float32)
+    for sheet in (flat, copies):
+        places = sheet.place(grid)
+        np.testing.assert_allclose(sheet.locate(places)[0], grid, atol=0.01)
+        near = np.rint(places / ONE).astype(int)
+        assert sheet.free[near[:, 0], near[:, 1]].all()
+
+
+def test_elements_on_a_plane_are_whole():
+    floor = samples.tilted_discs((160, 160))
+    scale = np.asarray(floor.scale_map ** (2 / 3), np.float32)
+    result = texrs.perspective(floor.image, scale, (160, 200), seed=2)
+    assert result.report["sheet"]["kind"] == "plane"
+    assert result.report["scale_error"] < 0.05
+    # The frames say how the exemplar is seen: they agree with the differences of the coordinates inside of patches.
+    source = result.source
+    steps = np.diff(source.coordinates, axis=0)[:, :-1]
+    same = source.label[:-1, :-1] == source.label[1:, :-1]
+    away = np.linalg.norm(steps - source.frames()[:-1, :-1, :, 0], axis=-1)[same]
+    assert np.median(away) < 0.1
+
+
+def test_a_hole_in_a_plane_is_filled_in_depth(disc_floor):
+    image, scale = disc_floor
+    hole = np.zeros(scale.shape, bool)
+    hole[40:90, 40:90] = True
+    bare = np.where(hole[..., np.newaxis], 0, image).astype(np.uint8)
+    result = texrs.complete(bare, hole, scale_map=np.where(hole, np.nan, scale).astype(np.float32))
+    np.testing.assert_array_equal(result.image[~hole], image[~hole])
+    at = np.rint(result.source.coordinates[hole]).astype(int)
+    assert not hole[at[:, 0], at[:, 1]].any()
+    # Seen in depth, what is copied is turned and sized; copies of squares are neither.
+    assert np.abs(result.source.frames()[hole] - np.eye(2)).max() > 0.05
+    with texrs.threads(1):
+        alone = texrs.complete(bare, hole, scale_map=np.where(hole, np.nan, scale).astype(np.float32))
+    assert alone.image.tobytes() == result.image.tobytes()
+
+
+def test_what_is_shrunk_is_smoothed_first():
+    lines = np.tile(np.uint8([0, 250]), (64, 32))
+    at = np.stack(np.meshgrid(np.arange(16.0) * 4, np.arange(16.0) * 4, indexing="ij"), -1).astype(np.float32)
+    shrunk = SourceMap.from_coordinates(at, lines.shape, frame=np.float32([np.eye(2) * 4]))
+    assert shrunk.render(lines).std() == 0
+    assert abs(shrunk.render(lines, antialias=True)[:, 2:-2].astype(int) - 125).max() <= 8
+    assert (shrunk.render(lines, antialias=True, interpolation="nearest") == shrunk.render(lines)).all()
+    labels = SourceMap.identity(lines.shape)
+    np.testing.assert_array_equal(labels.render(lines, antialias=True), lines)
