@@ -1,10 +1,15 @@
+use std::sync::OnceLock;
+
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use super::appearance::{GuideIn, Where, fixed, frames, guide, region, slices};
 use super::{grouped, run};
 use crate::Result;
-use crate::engine::stitcher::{self, Adjacency, Elements, Given, Options, Source, Weights};
+use crate::engine::stitcher::{
+    self, Adjacency, Elements, Given, Options, Patch, Prepared, Shown, Source, Weights,
+};
+use crate::foundation::fixed::{Frame, ONE};
 use crate::foundation::grid::Grid;
 
 /// An exemplar that patches are cut from.
@@ -12,8 +17,27 @@ use crate::foundation::grid::Grid;
 pub(super) struct Stitcher(Either);
 
 enum Either {
-    Two(Source<2>),
-    Three(Source<3>),
+    Two(Known<2>),
+    Three(Known<3>),
+}
+
+/// A source, and what the search of it needs, once that was asked for.
+struct Known<const D: usize> {
+    source: Source<D>,
+    prepared: OnceLock<Prepared<D>>,
+}
+
+impl<const D: usize> Known<D> {
+    fn new(source: Source<D>) -> Self {
+        Self {
+            source,
+            prepared: OnceLock::new(),
+        }
+    }
+
+    fn prepared(&self) -> &Prepared<D> {
+        self.prepared.get_or_init(|| Prepared::new(&self.source))
+    }
 }
 
 /// Places, patches, the frame of each patch, the mean cost of seams, and moves that healed.
@@ -52,11 +76,13 @@ impl Stitcher {
         run(py, None, |_| match shape.len() {
             2 => {
                 let grid = Grid::new(fixed("shape", &shape)?, fixed("wrap", &wrap)?)?;
-                Source::new(colours, grid, channels, elements, adjacency).map(Either::Two)
+                Source::new(colours, grid, channels, elements, adjacency)
+                    .map(|source| Either::Two(Known::new(source)))
             }
             _ => {
                 let grid = Grid::new(fixed("shape", &shape)?, fixed("wrap", &wrap)?)?;
-                Source::new(colours, grid, channels, elements, adjacency).map(Either::Three)
+                Source::new(colours, grid, channels, elements, adjacency)
+                    .map(|source| Either::Three(Known::new(source)))
             }
         })
         .map(Self)
@@ -69,7 +95,7 @@ impl Stitcher {
         py: Python<'py>,
         place: Where,
         jacobians: PyReadonlyArray3In<'py>,
-        patch: (f32, f32, usize, bool, bool),
+        patch: PatchIn,
         weights: [f32; 8],
         charges: [f32; 3],
         seed: u64,
@@ -78,38 +104,7 @@ impl Stitcher {
         demand: Option<GuideIn<'py>>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<StitchedOut<'py>> {
-        let (side, overlap, candidates, bend, heal) = patch;
-        let [
-            colour,
-            contact,
-            jump,
-            depth,
-            joint,
-            surprise,
-            distortion,
-            asked,
-        ] = weights;
-        let options = Options {
-            patch: side,
-            overlap,
-            candidates,
-            bend,
-            heal,
-            weights: Weights {
-                colour,
-                contact,
-                jump,
-                depth,
-                joint,
-                surprise,
-                distortion,
-                guide: asked,
-            },
-            repetition: charges[0],
-            continuation: charges[1],
-            balance: charges[2],
-            seed,
-        };
+        let options = options(patch, weights, charges, seed);
         let (jacobians, held, given) = (jacobians.as_slice()?, held.as_slice()?, given.as_slice()?);
         let demand = slices(&demand)?;
         macro_rules! stitched {
@@ -143,8 +138,8 @@ impl Stitcher {
             };
         }
         let (places, patches, frames, seams, healed) = match &self.0 {
-            Either::Two(source) => stitched!(source),
-            Either::Three(source) => stitched!(source),
+            Either::Two(known) => stitched!(&known.source),
+            Either::Three(known) => stitched!(&known.source),
         }?;
         let out = |x| PyArray1::from_vec(py, x);
         Ok((
@@ -154,6 +149,175 @@ impl Stitcher {
             seams,
             healed,
         ))
+    }
+
+    /// What the seams cost between the points of a region that show different patches.
+    fn judge<'py>(
+        &self,
+        py: Python<'py>,
+        place: Where,
+        places: PyReadonlyArray1<'py, i32>,
+        patches: PyReadonlyArray1<'py, u32>,
+        weights: [f32; 8],
+    ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        let (places, patches) = (places.as_slice()?, patches.as_slice()?);
+        macro_rules! judged {
+            ($known:expr) => {
+                run(py, None, |_| {
+                    let region = region(&place)?;
+                    let places = grouped("places", places)?;
+                    stitcher::judge(&$known.source, &region.grid, places, patches, seam(weights))
+                        .map(Vec::into_flattened)
+                })
+            };
+        }
+        let seams = match &self.0 {
+            Either::Two(known) => judged!(known),
+            Either::Three(known) => judged!(known),
+        }?;
+        Ok(PyArray1::from_vec(py, seams))
+    }
+
+    /// Cuts patches into a region that is covered already, but for its ends.
+    #[allow(clippy::too_many_arguments)] // the arguments of the Python method
+    fn cover<'py>(
+        &self,
+        py: Python<'py>,
+        place: Where,
+        jacobians: PyReadonlyArray3In<'py>,
+        shown: ShownIn<'py>,
+        patch: PatchIn,
+        weights: [f32; 8],
+        charges: [f32; 3],
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<ShownOut<'py>> {
+        let options = options(patch, weights, charges, 0);
+        let (places, patches, seams, distortion, table) = &shown;
+        let (places, patches, seams) = (places.as_slice()?, patches.as_slice()?, seams.as_slice()?);
+        let (distortion, table) = (distortion.as_slice()?, table.as_slice()?);
+        let jacobians = jacobians.as_slice()?;
+        macro_rules! covered {
+            ($known:expr, $columns:literal) => {
+                run(py, progress, |monitor| -> Result<_> {
+                    let rows: &[[i32; $columns]] = grouped("table", table)?;
+                    let shown = Shown {
+                        places: grouped("places", places)?.to_vec(),
+                        patches: patches.to_vec(),
+                        seams: grouped("seams", seams)?.to_vec(),
+                        distortion: distortion.to_vec(),
+                        table: rows.iter().map(|row| read(row)).collect(),
+                    };
+                    let made = stitcher::cover(
+                        &$known.source,
+                        $known.prepared(),
+                        &region(&place)?,
+                        frames(jacobians)?,
+                        shown,
+                        &options,
+                        monitor,
+                    )?;
+                    let table: Vec<i32> = made.table.iter().flat_map(write).collect();
+                    Ok((
+                        made.places.into_flattened(),
+                        made.patches,
+                        made.seams.into_flattened(),
+                        made.distortion,
+                        table,
+                    ))
+                })
+            };
+        }
+        let (places, patches, seams, distortion, table) = match &self.0 {
+            Either::Two(known) => covered!(known, 10),
+            Either::Three(known) => covered!(known, 17),
+        }?;
+        Ok((
+            PyArray1::from_vec(py, places),
+            PyArray1::from_vec(py, patches),
+            PyArray1::from_vec(py, seams),
+            PyArray1::from_vec(py, distortion),
+            PyArray1::from_vec(py, table),
+        ))
+    }
+}
+
+/// Side, overlap, candidates, and whether to bend and to heal.
+type PatchIn = (f32, f32, usize, bool, bool);
+
+/// Places, patches, seams, distortion, and the table of patches.
+type ShownIn<'py> = (
+    PyReadonlyArray1<'py, i32>,
+    PyReadonlyArray1<'py, u32>,
+    PyReadonlyArray1<'py, f32>,
+    PyReadonlyArray1<'py, f32>,
+    PyReadonlyArray1<'py, i32>,
+);
+type ShownOut<'py> = (
+    Bound<'py, PyArray1<i32>>,
+    Bound<'py, PyArray1<u32>>,
+    Bound<'py, PyArray1<f32>>,
+    Bound<'py, PyArray1<f32>>,
+    Bound<'py, PyArray1<i32>>,
+);
+
+/// A patch from its row: centre, place, frame, side in units of 1/4096, and whether it is rigid.
+fn read<const D: usize>(row: &[i32]) -> Patch<D> {
+    let frame: Frame<D> =
+        std::array::from_fn(|i| std::array::from_fn(|j| row[2 * D + i * D + j] as i16));
+    Patch {
+        centre: std::array::from_fn(|a| row[a]),
+        place: std::array::from_fn(|a| row[D + a]),
+        frame,
+        side: row[2 * D + D * D] as f32 / ONE as f32,
+        rigid: row[2 * D + D * D + 1] != 0,
+    }
+}
+
+/// The row of a patch.
+fn write<const D: usize>(patch: &Patch<D>) -> Vec<i32> {
+    let frame = patch.frame.as_flattened().iter().map(|&x| i32::from(x));
+    let mut row: Vec<i32> = patch.centre.into_iter().chain(patch.place).chain(frame).collect();
+    row.push((patch.side * ONE as f32) as i32);
+    row.push(i32::from(patch.rigid));
+    row
+}
+
+fn seam(weights: [f32; 8]) -> Weights {
+    let [
+        colour,
+        contact,
+        jump,
+        depth,
+        joint,
+        surprise,
+        distortion,
+        guide,
+    ] = weights;
+    Weights {
+        colour,
+        contact,
+        jump,
+        depth,
+        joint,
+        surprise,
+        distortion,
+        guide,
+    }
+}
+
+fn options(patch: PatchIn, weights: [f32; 8], charges: [f32; 3], seed: u64) -> Options {
+    let (side, overlap, candidates, bend, heal) = patch;
+    Options {
+        patch: side,
+        overlap,
+        candidates,
+        bend,
+        heal,
+        weights: seam(weights),
+        repetition: charges[0],
+        continuation: charges[1],
+        balance: charges[2],
+        seed,
     }
 }
 

@@ -24,6 +24,8 @@ pub(super) struct Canvas<const D: usize> {
     pub distortion: Vec<f32>,
     /// Points without a patch.
     pub free: usize,
+    /// Whether it is a part of something larger: points at its ends then stay as they are.
+    pub part: bool,
 }
 
 /// What a window of a canvas shows, point by point: read many times while patches are tried there.
@@ -63,6 +65,7 @@ impl<const D: usize> Canvas<D> {
                 if bent { n } else { 0 },
             )?,
             free: n,
+            part: false,
         })
     }
 

@@ -58,6 +58,27 @@ impl<const D: usize> Chart<D> {
         Self::rigid(canvas, frames, frame, centre, side)
     }
 
+    /// The chart of a patch that fills a window as far as `most` samples of the exemplar go, bent with the field or rigid.
+    pub(super) fn over(
+        window: Window<D>,
+        canvas: &Canvas<D>,
+        frames: Frames<'_, D>,
+        most: f32,
+        bend: bool,
+    ) -> Self {
+        let sides = window.grid.shape();
+        let centre = std::array::from_fn(|a| window.low[a] + sides[a] as i32 / 2);
+        let here = centre.map(|x| x as usize);
+        let frame = frames.at(canvas.grid.index(here));
+        if bend {
+            let bent = Self::integrated(window.clone(), canvas, frames, frame, centre, most);
+            if let Some(chart) = bent.filter(|c| c.has(centre)) {
+                return chart;
+            }
+        }
+        Self::affine(window, canvas, frames, frame, centre, Some(most))
+    }
+
     /// The box around a centre that holds a patch, and one point more on each side.
     fn window(
         canvas: &Canvas<D>,
@@ -146,10 +167,22 @@ impl<const D: usize> Chart<D> {
         centre: [i32; D],
         side: f32,
     ) -> Option<Self> {
+        let window = Self::window(canvas, &frame, centre, side, 1.2)?;
+        Self::integrated(window, canvas, frames, frame, centre, side)
+    }
+
+    /// The same over a given window.
+    fn integrated(
+        window: Window<D>,
+        canvas: &Canvas<D>,
+        frames: Frames<'_, D>,
+        frame: Frame<D>,
+        centre: [i32; D],
+        side: f32,
+    ) -> Option<Self> {
         let Frames::Dense(all) = frames else {
             return None;
         };
-        let window = Self::window(canvas, &frame, centre, side, 1.2)?;
         let mesh = Mesh::new(&window, all);
         let potentials: Vec<Vec<f64>> = (0..D).map(|i| mesh.integrate(i)).collect();
         let at = |p: [f64; D]| -> [f64; D] { std::array::from_fn(|i| mesh.at(&potentials[i], p)) };
@@ -214,7 +247,10 @@ impl<const D: usize> Chart<D> {
             .map(|(i, point)| {
                 let at = self.window.at(point);
                 let border = (0..D).any(|a| {
-                    let (n, open) = (canvas.grid.shape()[a] as i32, !canvas.grid.wrap()[a]);
+                    let (n, open) = (
+                        canvas.grid.shape()[a] as i32,
+                        !canvas.grid.wrap()[a] && !canvas.part,
+                    );
                     (point[a] == 0 && !(open && at[a] == 0))
                         || (point[a] + 1 == grid.shape()[a] && !(open && at[a] + 1 == n))
                 });
@@ -283,7 +319,7 @@ pub(super) fn flood<const D: usize>(grid: &Grid<D>, mask: &[bool], from: &[usize
 }
 
 /// Root mean square, over the axes, of the difference of two frames.
-fn difference<const D: usize>(a: &Frame<D>, b: &Frame<D>) -> f32 {
+pub(super) fn difference<const D: usize>(a: &Frame<D>, b: &Frame<D>) -> f32 {
     let mut sum = 0.0;
     for i in 0..D {
         for j in 0..D {

@@ -427,7 +427,7 @@ impl<const D: usize> Cutter<'_, D> {
 
     /// What is seen where one look is beside another, and how far the pictures are apart there.
     #[inline(always)]
-    fn pair(&self, l: &Look, r: &Look, apart: f32) -> f32 {
+    pub(super) fn pair(&self, l: &Look, r: &Look, apart: f32) -> f32 {
         let w = &self.weights;
         let mut cost = SHORTEST + w.colour * apart / 8.0;
         if w.surprise > 0.0 {
@@ -471,7 +471,7 @@ fn tie<const D: usize>(view: &View<D>, patch: &Proposal<'_, D>, i: usize) -> Tie
 }
 
 #[inline(always)]
-fn distance(a: &Look, b: &Look) -> f32 {
+pub(super) fn distance(a: &Look, b: &Look) -> f32 {
     let mut sum = 0.0;
     for c in 0..CHANNELS {
         sum += (a.colour[c] - b.colour[c]).abs();

@@ -159,7 +159,7 @@ impl<const D: usize> Stitching<'_, D> {
 
     /// Points that an instance has where it is whole.
     fn size(&self, (patch, element): Key) -> f64 {
-        f64::from(self.cutter.source.size(element)) * self.patches[patch as usize].scale
+        f64::from(self.cutter.source.size(element)) * self.patches[patch as usize].scale()
     }
 
     fn share(&self, key: Key, counts: &HashMap<Key, i64>) -> f64 {
@@ -347,6 +347,9 @@ impl<const D: usize> Stitching<'_, D> {
                 patch.centre,
                 None,
             )
+        } else if self.canvas.part {
+            // What a bent patch shows hangs on the field around its centre, which may lie elsewhere.
+            return None;
         } else {
             let mut chart = Chart::new(&self.canvas, frames, patch.centre, patch.side, true)?;
             for i in 0..chart.mask.len() {

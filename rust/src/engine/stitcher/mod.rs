@@ -11,6 +11,7 @@
 mod balance;
 mod canvas;
 mod chart;
+mod cover;
 mod cut;
 mod energy;
 mod heal;
@@ -31,6 +32,7 @@ use crate::{Error, Result};
 use balance::Balance;
 use canvas::{Canvas, HELD};
 use chart::Chart;
+pub use cover::{Prepared, Shown, cover, judge};
 pub use cut::Weights;
 use cut::{Cutter, Proposal};
 use search::{Charges, Index};
@@ -91,16 +93,25 @@ pub struct Stitched<const D: usize> {
 }
 
 /// A patch that has been cut in.
-#[derive(Debug, Clone, Copy)]
-struct Patch<const D: usize> {
-    centre: [i32; D],
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Patch<const D: usize> {
+    /// Its middle, on the canvas.
+    pub centre: [i32; D],
     /// Where the centre looks.
-    place: Place<D>,
-    frame: Frame<D>,
-    side: f32,
-    rigid: bool,
+    pub place: Place<D>,
+    /// The Jacobian there.
+    pub frame: Frame<D>,
+    /// Whether it is that frame alone, or bent with the field.
+    pub rigid: bool,
+    /// Its side, in samples of the exemplar.
+    pub side: f32,
+}
+
+impl<const D: usize> Patch<D> {
     /// Points of the output to a sample of the exemplar.
-    scale: f64,
+    fn scale(&self) -> f64 {
+        1.0 / determinant(&self.frame).abs().max(1e-6)
+    }
 }
 
 /// The state of the work.
@@ -308,12 +319,18 @@ impl<const D: usize> Stitching<'_, D> {
         if !chart.window.points.iter().zip(&chart.mask).any(useful) {
             return Ok(());
         }
+        self.lay_chart(&chart, centre, side)
+    }
+
+    /// Cuts in the best patch of a chart.
+    fn lay_chart(&mut self, chart: &Chart<D>, centre: [i32; D], side: f32) -> Result<()> {
+        let o = &self.options;
         let noise = self.noise.part(self.patches.len() as u32);
         let guide = self.cutter.guide;
         let found = self.index.best(
             self.cutter.source,
             &self.canvas,
-            &chart,
+            chart,
             guide,
             o.candidates,
             &noise,
@@ -322,7 +339,7 @@ impl<const D: usize> Stitching<'_, D> {
         let view = self.canvas.view(&chart.window, source);
         let worth = f64::from(o.balance / side);
         let cuts = par::map(found.len(), |k| {
-            let patch = Proposal::new(&chart, found[k]);
+            let patch = Proposal::new(chart, found[k]);
             let mut cut = self.cutter.cut_coarsely(&view, &patch, self.monitor)?;
             cut.value += worth
                 * self
@@ -347,7 +364,7 @@ impl<const D: usize> Stitching<'_, D> {
         let Some((k, coarse)) = best else {
             return Ok(());
         };
-        let proposal = Proposal::new(&chart, found[k]);
+        let proposal = Proposal::new(chart, found[k]);
         let cutting = self.cutter.refine(&view, &proposal, coarse, self.monitor)?;
         self.balance = self.balance.after(
             source,
@@ -357,9 +374,9 @@ impl<const D: usize> Stitching<'_, D> {
             &cutting.take,
         );
         let places = proposal.places;
-        let number = self.number(&chart, centre, found[k], side);
+        let number = self.number(chart, centre, found[k], side);
         let before = self.canvas.free;
-        heal::commit(&mut self.canvas, &chart, &places, &cutting, number);
+        heal::commit(&mut self.canvas, chart, &places, &cutting, number);
         self.index.note(found[k], side);
         self.monitor.advance((before - self.canvas.free) as u64)
     }
@@ -373,26 +390,29 @@ impl<const D: usize> Stitching<'_, D> {
             frame: chart.frame,
             side,
             rigid: chart.rigid,
-            scale: 1.0 / determinant(&chart.frame).abs().max(1e-6),
         };
-        if let Frames::Constant(frame) = self.frames {
-            let grid = self.cutter.source.grid();
-            let ahead = apply(&frame, centre);
-            let origin: Place<D> = std::array::from_fn(|a| {
-                let offset = place[a].wrapping_sub(ahead[a]);
-                if grid.wrap()[a] {
-                    offset.rem_euclid(grid.shape()[a] as i32 * ONE)
-                } else {
-                    offset
-                }
-            });
-            let number = *self.offsets.entry(origin).or_insert(next);
+        if matches!(self.frames, Frames::Constant(_)) {
+            let number = *self.offsets.entry(self.origin(&patch)).or_insert(next);
             if number != next {
                 return number;
             }
         }
         self.patches.push(patch);
         next
+    }
+
+    /// What a patch would show at the origin if it reached there.
+    fn origin(&self, patch: &Patch<D>) -> Place<D> {
+        let grid = self.cutter.source.grid();
+        let ahead = apply(&patch.frame, patch.centre);
+        std::array::from_fn(|a| {
+            let offset = patch.place[a].wrapping_sub(ahead[a]);
+            if grid.wrap()[a] {
+                offset.rem_euclid(grid.shape()[a] as i32 * ONE)
+            } else {
+                offset
+            }
+        })
     }
 
     fn all_covered(&self, centre: [i32; D], reach: i32) -> bool {

@@ -4,6 +4,8 @@
 //! already are written where the chart takes them, into a template of the exemplar's size, and the sum of squared
 //! differences of every shift is a correlation: SSD(s) = corr(E^2, W) - 2 corr(E, W T) + const.
 
+use std::sync::Arc;
+
 use super::canvas::{Canvas, FREE};
 use super::chart::Chart;
 use super::source::{CHANNELS, Source};
@@ -41,8 +43,8 @@ pub(super) struct Index<const D: usize> {
     grid: Grid<D>,
     /// Of the transforms, at least the exemplar's.
     size: [usize; D],
-    plan: Volumes,
-    colours: Squares,
+    plan: Arc<Volumes>,
+    colours: Arc<Squares>,
     guide: Option<Squares>,
     charges: Charges,
     /// How often what lies around each sample has been shown.
@@ -51,6 +53,7 @@ pub(super) struct Index<const D: usize> {
 }
 
 /// Spectra of values, and of the sum of their squares.
+#[derive(Default)]
 struct Squares {
     values: Vec<Spectrum>,
     squares: Spectrum,
@@ -73,19 +76,16 @@ impl<const D: usize> Index<D> {
                 Volumes::fast(grid.shape()[a])
             }
         });
-        let plan = Volumes::new(if D == 2 {
+        let plan = Arc::new(Volumes::new(if D == 2 {
             [size[0], 1, size[1]]
         } else {
             [size[0], size[1], size[D - 1]]
-        });
+        }));
         let mut this = Self {
             grid,
             size,
             plan,
-            colours: Squares {
-                values: Vec::new(),
-                squares: Vec::new(),
-            },
+            colours: Arc::default(),
             guide: None,
             charges,
             shown: vec![0.0; grid.len()],
@@ -95,7 +95,7 @@ impl<const D: usize> Index<D> {
         let colours: Vec<Vec<f32>> = (0..channels)
             .map(|c| source.colours().map(|x| x[c]).collect())
             .collect();
-        this.colours = this.squares(&colours);
+        this.colours = Arc::new(this.squares(&colours));
         this.guide = guide.map(|guide| {
             let values: Vec<Vec<f32>> = (0..CHANNELS)
                 .map(|c| {
@@ -108,6 +108,19 @@ impl<const D: usize> Index<D> {
             this.squares(&values)
         });
         this
+    }
+
+    /// The same source, of which nothing has been shown, with other charges and no guide.
+    pub(super) fn afresh(&self, charges: Charges) -> Self {
+        Self {
+            plan: Arc::clone(&self.plan),
+            colours: Arc::clone(&self.colours),
+            guide: None,
+            charges,
+            shown: vec![0.0; self.grid.len()],
+            total: 0.0,
+            ..*self
+        }
     }
 
     fn points(&self) -> usize {

@@ -1,0 +1,255 @@
+//! Patches cut into a part of something larger that is covered already.
+//!
+//! Endless outputs are covered layer by layer: boxes of one layer tile the world, and each is cut into what the boxes of the
+//! layer before show there. A part stays as it is at its ends, so that its neighbours fit, and what becomes of it hangs on
+//! nothing but what it shows before, and on the field inside.
+
+use std::collections::HashMap;
+use std::sync::Mutex;
+
+use super::canvas::{Canvas, Window};
+use super::chart::{Chart, difference};
+use super::cut::{Cutter, distance};
+use super::search::{Charges, Index};
+use super::source::Source;
+use super::{Balance, Given, Options, Patch, Stitching, Weights};
+use crate::foundation::fixed::{Frames, Place};
+use crate::foundation::grid::{Grid, Region};
+use crate::foundation::hash::Noise;
+use crate::foundation::par::Monitor;
+use crate::kernels::seam::links;
+use crate::{Error, Result};
+
+/// A box is divided where a patch would fill less of it.
+const FILLED: f64 = 0.5;
+/// Side of the smallest box that is divided.
+const SMALL: usize = 12;
+
+/// What the search needs of a source: made once, for many parts.
+pub struct Prepared<const D: usize>(Index<D>);
+
+impl<const D: usize> Prepared<D> {
+    /// Prepares a source.
+    pub fn new(source: &Source<D>) -> Self {
+        let charges = Charges {
+            repetition: 0.0,
+            continuation: 0.0,
+        };
+        Self(Index::new(source, None, charges))
+    }
+}
+
+/// What a part shows.
+#[derive(Debug, Clone)]
+pub struct Shown<const D: usize> {
+    /// Where each point looks.
+    pub places: Vec<Place<D>>,
+    /// The patch that each point shows.
+    pub patches: Vec<u32>,
+    /// Cost of the seam from each point to the next one along each axis (see [`judge`]).
+    pub seams: Vec<[f32; D]>,
+    /// How far the patch is from the field at each point; empty where one frame serves all, and where all patches are
+    /// rigid and this is not known.
+    pub distortion: Vec<f32>,
+    /// The patches, with their centres as seen from the part's first point.
+    pub table: Vec<Patch<D>>,
+}
+
+/// Returns what the seams of a part cost, between points that show different patches.
+///
+/// # Errors
+/// Arrays of other sizes than the region's.
+pub fn judge<const D: usize>(
+    source: &Source<D>,
+    grid: &Grid<D>,
+    places: &[Place<D>],
+    patches: &[u32],
+    weights: Weights,
+) -> Result<Vec<[f32; D]>> {
+    for got in [places.len(), patches.len()] {
+        check_length("places", grid, got)?;
+    }
+    let cutter = Cutter {
+        source,
+        weights,
+        guide: None,
+        solvers: Mutex::default(),
+    };
+    let mut seams = vec![[0.0; D]; grid.len()];
+    for axis in 0..D {
+        links(grid, axis, |p, q| {
+            if patches[p] != patches[q] {
+                let (l, r) = (source.look(places[p]), source.look(places[q]));
+                let apart = distance(&l, &r);
+                seams[p][axis] = cutter.pair(&l, &r, 2.0 * apart * apart);
+            }
+        });
+    }
+    Ok(seams)
+}
+
+/// Cuts patches into all of a part but its ends: one where the exemplar is large enough to fill it, else several.
+///
+/// # Errors
+/// Options out of their range, arrays of other sizes than the region's, or a monitor that was cancelled.
+pub fn cover<const D: usize>(
+    source: &Source<D>,
+    prepared: &Prepared<D>,
+    region: &Region<D>,
+    frames: Frames<'_, D>,
+    shown: Shown<D>,
+    options: &Options,
+    monitor: &Monitor,
+) -> Result<Shown<D>> {
+    let nothing = Given {
+        points: &[],
+        places: &[],
+    };
+    super::check(region, frames, nothing, options)?;
+    let canvas = paint(region, frames, shown.places, shown.patches, shown.seams, shown.distortion, &shown.table)?;
+    let mut this = Stitching {
+        cutter: Cutter {
+            source,
+            weights: options.weights,
+            guide: None,
+            solvers: Mutex::default(),
+        },
+        frames,
+        options: *options,
+        index: prepared.0.afresh(Charges {
+            repetition: options.repetition,
+            continuation: options.continuation,
+        }),
+        balance: Balance::new(source, &canvas),
+        canvas,
+        patches: shown.table,
+        offsets: HashMap::new(),
+        noise: Noise::new(options.seed),
+        monitor,
+    };
+    this.know_patches();
+    this.cover(region.grid.shape().map(|_| 0), region.grid.shape())?;
+    if options.heal {
+        this.heal()?;
+    }
+    Ok(this.show())
+}
+
+impl<const D: usize> Stitching<'_, D> {
+    /// Notes which patches there are, and what they have shown.
+    fn know_patches(&mut self) {
+        for (k, patch) in self.patches.iter().enumerate() {
+            self.index.note(patch.place, patch.side);
+            if matches!(self.frames, Frames::Constant(_)) {
+                self.offsets.entry(self.origin(patch)).or_insert(k as u32);
+            }
+        }
+    }
+
+    /// Cuts a patch into a box; smaller ones, that overlap by half, where one would leave too much of it as it is.
+    fn cover(&mut self, low: [usize; D], high: [usize; D]) -> Result<()> {
+        let Some(window) = self.window(low, high) else {
+            return Ok(());
+        };
+        let o = &self.options;
+        let bend = o.bend && matches!(self.frames, Frames::Dense(_));
+        let chart = Chart::over(window, &self.canvas, self.frames, o.patch, bend);
+        let filled = chart.mask.iter().filter(|m| **m).count() as f64;
+        let divide: [bool; D] = std::array::from_fn(|a| high[a] - low[a] >= SMALL);
+        if filled >= FILLED * chart.mask.len() as f64 || !divide.contains(&true) {
+            let sides = chart.window.grid.shape();
+            let centre = std::array::from_fn(|a| chart.window.low[a] + sides[a] as i32 / 2);
+            return self.lay_chart(&chart, centre, self.options.patch);
+        }
+        for corner in 0..1usize << D {
+            let (mut first, mut last) = (low, high);
+            for a in 0..D {
+                let part = if divide[a] { (high[a] - low[a]) * 2 / 3 } else { high[a] - low[a] };
+                if corner >> (D - 1 - a) & 1 == 0 {
+                    last[a] = low[a] + part;
+                } else if divide[a] {
+                    first[a] = high[a] - part;
+                } else {
+                    // Not divided along this axis: the first of both is all.
+                    last[a] = first[a];
+                }
+            }
+            self.cover(first, last)?;
+        }
+        Ok(())
+    }
+
+    fn window(&self, low: [usize; D], high: [usize; D]) -> Option<Window<D>> {
+        self.canvas.window(low.map(|x| x as i32), high.map(|x| x as i32))
+    }
+
+    /// What has become of the part, with the patches that are left.
+    fn show(self) -> Shown<D> {
+        let mut numbers = vec![u32::MAX; self.patches.len()];
+        self.canvas.patches.iter().for_each(|&p| numbers[p as usize] = 0);
+        let mut table = Vec::new();
+        for (number, patch) in numbers.iter_mut().zip(self.patches).filter(|(n, _)| **n == 0) {
+            *number = table.len() as u32;
+            table.push(patch);
+        }
+        let canvas = self.canvas;
+        Shown {
+            places: canvas.places,
+            patches: canvas.patches.iter().map(|&p| numbers[p as usize]).collect(),
+            seams: canvas.seams,
+            distortion: canvas.distortion,
+            table,
+        }
+    }
+}
+
+/// A canvas that shows what a part does.
+fn paint<const D: usize>(
+    region: &Region<D>,
+    frames: Frames<'_, D>,
+    places: Vec<Place<D>>,
+    patches: Vec<u32>,
+    seams: Vec<[f32; D]>,
+    distortion: Vec<f32>,
+    table: &[Patch<D>],
+) -> Result<Canvas<D>> {
+    let grid = region.grid;
+    for got in [places.len(), patches.len(), seams.len()] {
+        check_length("places", &grid, got)?;
+    }
+    if patches.iter().any(|&p| p as usize >= table.len()) {
+        return Err(Error::value("patches", "a number that the table lacks"));
+    }
+    let distortion = match frames {
+        Frames::Constant(_) => Vec::new(),
+        Frames::Dense(all) if distortion.is_empty() => all
+            .iter()
+            .zip(&patches)
+            .map(|(frame, &p)| difference(&table[p as usize].frame, frame))
+            .collect(),
+        Frames::Dense(_) => {
+            check_length("distortion", &grid, distortion.len())?;
+            distortion
+        }
+    };
+    Ok(Canvas {
+        grid,
+        places,
+        patches,
+        seams,
+        distortion,
+        free: 0,
+        part: true,
+    })
+}
+
+fn check_length<const D: usize>(argument: &'static str, grid: &Grid<D>, got: usize) -> Result<()> {
+    if got == grid.len() {
+        return Ok(());
+    }
+    Err(Error::Shape {
+        argument,
+        expected: grid.shape().to_vec(),
+        got: vec![got],
+    })
+}
