@@ -177,6 +177,23 @@ class Stitcher:
         demand: tuple[NDArray[int16], NDArray[int16], NDArray[uint16], NDArray[uint32]] | None,
         progress: Callable[[float], object] | None,
     ) -> tuple[NDArray[int32], NDArray[uint32], NDArray[int16], float, int]: ...
+    def judge(
+        self,
+        place: tuple[Sequence[int], Sequence[int], Sequence[bool]],
+        places: NDArray[int32],
+        patches: NDArray[uint32],
+        weights: Sequence[float],
+    ) -> NDArray[float32]: ...
+    def cover(
+        self,
+        place: tuple[Sequence[int], Sequence[int], Sequence[bool]],
+        jacobians: NDArray[int16],
+        shown: tuple[NDArray[int32], NDArray[uint32], NDArray[float32], NDArray[float32], NDArray[int32]],
+        patch: tuple[float, float, int, bool, bool],
+        weights: Sequence[float],
+        charges: Sequence[float],
+        progress: Callable[[float], object] | None,
+    ) -> tuple[NDArray[int32], NDArray[uint32], NDArray[float32], NDArray[float32], NDArray[int32]]: ...
 
 @final
 class Appearance:

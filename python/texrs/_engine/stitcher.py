@@ -16,7 +16,7 @@ from texrs._engine.pyramid import Region, flatten
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 
-__all__ = ["Stitched", "Stitcher", "Weights"]
+__all__ = ["Shown", "Stitched", "Stitcher", "Weights"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,6 +71,37 @@ class Stitched(NamedTuple):
     frames: NDArray[np.int16]
     seams: float
     healed: int
+
+
+class Shown(NamedTuple):
+    """What a part of something larger shows: arrays in one row.
+
+    Attributes
+    ----------
+    places : (points * A) int32
+        In units of 1/4096 of a sample.
+    patches : (points) uint32
+        The patch that each point shows, a row of the table.
+    seams : (points * A) float32
+        Cost of the seam from each point to the next one along each axis.
+    distortion : (points) float32
+        How far the patch is from the field; empty where one frame serves all.
+    table : (patches, K) int32
+        Of each patch: its centre, seen from the part's first point; where that looks; the Jacobian there; the side in units
+        of 1/4096 of a sample; and whether it is rigid.
+
+    """
+
+    places: NDArray[np.int32]
+    patches: NDArray[np.uint32]
+    seams: NDArray[np.float32]
+    distortion: NDArray[np.float32]
+    table: NDArray[np.int32]
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays."""
+        return sum(array.nbytes for array in self)
 
 
 class Stitcher:
@@ -213,3 +244,89 @@ class Stitcher:
             progress,
         )
         return Stitched(places, patches, jacobians.reshape(-1, axes, axes), seams, healed)
+
+    def judge(
+        self, region: Region, places: NDArray[np.int32], patches: NDArray[np.uint32], weights: Weights = Weights()
+    ) -> NDArray[np.float32]:
+        """Return what seams cost: (points * A), from each point to the next one along each axis that shows another patch.
+
+        Parameters
+        ----------
+        region : Region
+            Where they are.
+        places : (points * A) int32
+            Where each point looks.
+        patches : (points) uint32
+            Which patch it shows.
+        weights : Weights
+            What seams cost.
+
+        Raises
+        ------
+        InvalidInput
+            Arrays of other sizes than the region's.
+
+        """
+        return self._inner.judge(region.place, places, patches, list(astuple(weights)))
+
+    def cover(
+        self,
+        region: Region,
+        frames: NDArray[np.int16],
+        shown: Shown,
+        *,
+        patch: float,
+        candidates: int = 3,
+        bend: bool = False,
+        heal: bool = True,
+        weights: Weights = Weights(),
+        repetition: float = 0.15,
+        continuation: float = 4.0,
+        balance: float = 4.0,
+        progress: Report | None = None,
+    ) -> Shown:
+        """Cut a patch into a part of something larger, whose ends stay as they are.
+
+        What becomes of it hangs on what it shows and on its frames alone.
+
+        Parameters
+        ----------
+        region : Region
+            The part.
+        frames : (1 or points, A, A) int16
+            Jacobians over it.
+        shown : Shown
+            What it shows before.
+        patch : float
+            Side of a patch in samples of the exemplar, at most; where it does not fill the part there are several.
+        candidates, bend, heal, weights, repetition, continuation, progress
+            As for `stitch`; what is charged are the patches that the part shows already.
+        balance : float
+            Cost of points of classes in excess, as many as a side of a patch has.
+
+        Returns
+        -------
+        Shown
+
+        Raises
+        ------
+        InvalidInput
+            An option out of its range, or arrays of other sizes than the region's.
+        Cancelled
+            The work was stopped.
+
+        """
+        made = self._inner.cover(
+            region.place,
+            frames,
+            (*shown[:4], np.ascontiguousarray(shown.table.reshape(-1))),
+            (as_float(patch, "patch", 4, 4096), 0.0, as_int(candidates, "candidates", 1, 64), bend, heal),
+            list(astuple(weights)),
+            [
+                as_float(repetition, "repetition", 0, 100),
+                as_float(continuation, "continuation", 0, 100),
+                as_float(balance, "balance", 0, 100),
+            ],
+            progress,
+        )
+        return Shown(*made[:4], made[4].reshape(-1, shown.table.shape[1]))

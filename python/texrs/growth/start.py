@@ -18,7 +18,7 @@ from texrs.exemplar import Exemplar
 from texrs.growth.constraints import Asked
 from texrs.growth.engine import Patches, Places, Start
 
-__all__ = ["from_draft", "from_patches", "patch_side"]
+__all__ = ["bends_with", "from_draft", "from_patches", "patch_side", "weights_of"]
 
 PATCH = {2: 0.45, 3: 0.68}
 """Side of a patch, as a share of the exemplar's shorter side: larger ones copy too much of it in one piece."""
@@ -56,9 +56,7 @@ def from_patches(exemplar: Exemplar, level: int, seed: int, *, candidates: int =
         region: Region, frames: NDArray[np.int16], asked: Asked, progress: Progress | None
     ) -> tuple[Places, Patches]:
         stitcher = exemplar.stitcher
-        varies = len(frames) > 1
-        directed = not stitcher.separate and exemplar.directedness >= DIRECTED
-        bent = varies and (directed if bend is None else bend)
+        bent = bends_with(exemplar, len(frames) > 1, bend)
         made = stitcher.stitch(
             region,
             frames,
@@ -66,7 +64,7 @@ def from_patches(exemplar: Exemplar, level: int, seed: int, *, candidates: int =
             overlap=OVERLAP[axes],
             candidates=candidates,
             bend=bent,
-            weights=SEPARATE if stitcher.separate else ANY,
+            weights=weights_of(exemplar),
             seed=seed,
             held=asked.held,
             given=asked.given,
@@ -80,6 +78,18 @@ def from_patches(exemplar: Exemplar, level: int, seed: int, *, candidates: int =
         return made.places, patches
 
     return Start(level, make, "patches")
+
+
+def bends_with(exemplar: Exemplar, varies: bool, bend: bool | None = None) -> bool:
+    """Return whether patches bend with a field: as asked, or where edges have a direction and elements are not separate."""
+    if bend is not None or not varies:
+        return varies and bool(bend)
+    return not exemplar.stitcher.separate and exemplar.directedness >= DIRECTED
+
+
+def weights_of(exemplar: Exemplar) -> Weights:
+    """Return what seams cost in what is made from an exemplar."""
+    return SEPARATE if exemplar.stitcher.separate else ANY
 
 
 def patch_side(shape: tuple[int, ...]) -> float:

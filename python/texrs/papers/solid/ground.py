@@ -1,0 +1,120 @@
+"""What lies under the layers of an unbounded texture: boxes of the exemplar, each from a hashed place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._engine.noise import uniform
+from texrs._engine.pyramid import ONE, Region, to_fixed
+from texrs.fields import Field
+from texrs.growth.engine import Places
+
+__all__ = ["Ground"]
+
+BENT = 0.7
+"""Boxes in which frames differ by more are divided: by the root mean square over the axes."""
+LEAST = 4
+"""Boxes of such a side are not divided for that."""
+
+Row = tuple[tuple[int, ...], tuple[int, ...], NDArray[np.int64]]
+"""The centre of a box, where that looks, and the Jacobian there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """Boxes that tile the world; what a box shows hangs on the seed, its number and the field inside alone.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Of the exemplar.
+    repeat : tuple of bool
+        Axes along which it repeats.
+    side : int
+        Of a box.
+    seed : int
+        Chooses the places.
+    field : Field, optional
+        How boxes are turned and scaled.
+
+    """
+
+    shape: tuple[int, ...]
+    repeat: tuple[bool, ...]
+    side: int
+    seed: int
+    field: Field | None
+
+    def show(self, region: Region) -> tuple[Places, NDArray[np.uint32], NDArray[np.int32]]:
+        """Return the places of a region, the box of each point, and the table of boxes (`texrs._engine.stitcher.Shown`)."""
+        axes = len(self.shape)
+        places = np.empty((*region.shape, axes), np.int32)
+        boxes = np.empty(region.shape, np.uint32)
+        table: list[list[int]] = []
+        ends = [(o // self.side, (o + n - 1) // self.side + 1) for o, n in zip(region.origin, region.shape, strict=True)]
+        for index in product(*(range(*end) for end in ends)):
+            for low, high, (centre, place, frame) in self.boxes(index):
+                start = [max(a, o) for a, o in zip(low, region.origin, strict=True)]
+                stop = [min(b, o + n) for b, o, n in zip(high, region.origin, region.shape, strict=True)]
+                if any(a >= b for a, b in zip(start, stop, strict=True)):
+                    continue
+                here = tuple(slice(a - o, b - o) for a, b, o in zip(start, stop, region.origin, strict=True))
+                found: NDArray[np.int64] = np.array(place, np.int64)
+                for axis in range(axes):
+                    line = np.arange(start[axis], stop[axis]) - centre[axis]
+                    found = found + line.reshape(-1, *(1,) * (axes - axis)) * frame[:, axis]
+                places[here], boxes[here] = found, len(table)
+                seen = [c - o for c, o in zip(centre, region.origin, strict=True)]
+                table.append([*seen, *place, *frame.reshape(-1).tolist(), self.side * ONE, 1])
+        return places.reshape(-1), boxes.reshape(-1), np.array(table, np.int32)
+
+    def boxes(self, index: Sequence[int]) -> Iterator[tuple[tuple[int, ...], tuple[int, ...], Row]]:
+        """Return a box of the lattice, from its first point to one beyond its last; in parts, where it does not fit."""
+        low = tuple(i * self.side for i in index)
+        parts = self._divide(low, tuple(a + self.side for a in low))
+        for number, (start, stop, centre, frame, ends) in enumerate(parts):
+            draws = [uniform(self.seed, *(i % (1 << 32) for i in index), 4 * number + a) for a in range(len(index))]
+            place = tuple(ONE * int(a + u * (b - a + 1)) for u, (a, b) in zip(draws, ends, strict=True))
+            yield start, stop, (centre, place, frame)
+
+    def _divide(
+        self, low: tuple[int, ...], high: tuple[int, ...]
+    ) -> Iterator[
+        tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...], NDArray[np.int64], list[tuple[int, int]]]
+    ]:
+        """Return the parts of a box, with their centres, frames, and the samples that the centre may look at."""
+        axes = len(low)
+        centre = tuple((a + b) // 2 for a, b in zip(low, high, strict=True))
+        corners = np.array(list(product(*((a, b - 1) for a, b in zip(low, high, strict=True)))))
+        frame, others = self._frames(centre, corners)
+        steps = (corners - centre) @ frame.T
+        ends, fits = [], True
+        for n, closed, least, most in zip(self.shape, self.repeat, steps.min(axis=0), steps.max(axis=0), strict=True):
+            first, last = (0, n - 1) if closed else (-(int(least) // ONE), n - 1 - -(-int(most) // ONE))
+            fits &= first <= last
+            ends.append((first, last) if first <= last else (n // 2, n // 2))
+        side = max(b - a for a, b in zip(low, high, strict=True))
+        apart = np.sqrt(((others - frame) ** 2).sum(axis=(1, 2)).max() / axes) / ONE if len(others) else 0.0
+        if (fits or side <= 1) and (apart <= BENT or side <= LEAST):
+            yield low, high, centre, frame, ends
+            return
+        for corner in product((False, True), repeat=axes):
+            start = tuple(c if up else a for a, c, up in zip(low, centre, corner, strict=True))
+            stop = tuple(b if up else c for b, c, up in zip(high, centre, corner, strict=True))
+            if all(a < b for a, b in zip(start, stop, strict=True)):
+                yield from self._divide(start, stop)
+
+    def _frames(
+        self, centre: tuple[int, ...], corners: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the Jacobians in the middle of a box, and at its corners where they may be others."""
+        if self.field is None or self.field.constant is not None:
+            frame = to_fixed(self.field, Region.whole((1,) * len(centre)))[0]
+            return frame.astype(np.int64), np.zeros((0, len(centre), len(centre)), np.int64)
+        found = np.rint(self.field.jacobians(np.concatenate([[centre], corners])) * ONE).astype(np.int64)
+        return found[0], found[1:]
