@@ -29,7 +29,7 @@ FIELDS: dict[str, Callable[[int], fields.Field | None]] = {
 
 def texture(axes: int = 3, field: str = "none", **options: object) -> texrs.SolidTexture | texrs.PlaneTexture:
     kind, exemplar = (texrs.SolidTexture, SOLID) if axes == 3 else (texrs.PlaneTexture, PLANE)
-    return kind(exemplar, field=FIELDS[field](axes), **({"seed": 5} | options))  # type: ignore[arg-type]
+    return kind(exemplar, field=FIELDS[field](axes), **({"seed": 5, "quality": "fast"} | options))  # type: ignore[arg-type]
 
 
 def box(axes: int, start: int, stop: int) -> tuple[slice, ...]:

@@ -1,7 +1,7 @@
 """Unbounded textures put together from patches: tilings of the world by boxes, each laid over the one before.
 
 The lowest layer are boxes of the exemplar from hashed places (`texrs.papers.solid.ground`). Each layer above is the same
-tiling, shifted along the diagonal. A box of it is a patch, of the best of several places, cut into what the layer before
+tiling, shifted. A box of it is a patch, of the best of several places, cut into what the layer before
 shows there (`Stitcher.cover`), and the torn elements inside are healed. Its ends stay as they are, so that boxes of a layer
 do not know of each other: what a box becomes hangs on the boxes of the layer before that it meets, 2^A of them, and on the
 field inside. So any part can be made by itself, and is the same however it is asked for.
@@ -30,12 +30,19 @@ from texrs.fields import Field
 from texrs.growth import patch_side
 from texrs.growth.engine import Places
 from texrs.growth.start import bends_with, weights_of
+from texrs.papers.solid.boxes import Box, intersect, join
 from texrs.papers.solid.ground import Ground
 
 __all__ = ["WORK", "Layers", "Seen"]
 
-SHIFTS = {2: (0.0, 0.5, 0.25, 0.75), 3: (0.0, 0.5, 0.25)}
-"""By how much of a side each layer is shifted: the ends of one lie in the middle of others."""
+SHIFTS = {
+    2: ((0.0, 0.0), (0.5, 0.5), (0.5, 0.0), (0.0, 0.5)),
+    3: ((0.0, 0.0, 0.0), (0.5, 0.5, 0.5), (0.25, 0.25, 0.25)),
+}
+"""By how much of a side each layer is shifted: the ends of one lie in the middle of others. In three dimensions each more
+doubles what a window hangs on."""
+LARGER = 1.2
+"""How much larger boxes are than patches in rows: less of each is left."""
 LARGEST = {2: 512, 3: 80}
 """Side of a box at most, where a field enlarges."""
 FITS = 0.9
@@ -91,10 +98,10 @@ class Layers:
         self.exemplar, self.field, self.candidates = exemplar, field, candidates
         self.axes = exemplar.axes
         self.side = _find_side(exemplar, field, seed)
-        self.shifts = tuple(round(share * self.side) for share in SHIFTS[self.axes])
+        self.shifts = tuple(tuple(round(share * self.side) for share in shift) for shift in SHIFTS[self.axes])
         self.bent = bends_with(exemplar, field is not None and field.constant is None)
         self.ground = Ground(exemplar.shape, exemplar.repeat, self.side, seed, field)
-        self._kept: Cache[Key, Shown] = Cache(cache_bytes, lambda shown: shown.nbytes)
+        self._kept: Cache[Key, Box] = Cache(cache_bytes, lambda box: box.nbytes)
 
     @property
     def cached(self) -> int:
@@ -108,15 +115,15 @@ class Layers:
     def read(self, box: Region, progress: Progress | None = None) -> Places:
         """Return the places of a box, (..., A) int32."""
         out = np.empty((*box.shape, self.axes), np.int32)
-        for region, shown in self._make_all(self._meeting(len(self.shifts) - 1, box), progress):
-            here, there = _intersect(box, region)
-            out[here] = shown.places.reshape(*region.shape, self.axes)[there]
+        for part in self._make_all(self._meeting(len(self.shifts) - 1, box), progress):
+            here, there = intersect(box, part.region)
+            out[here] = part.show(there)
         return self._bring_around(out)
 
     def look(self, box: Region, progress: Progress | None = None) -> Seen:
         """Return the places of a box with the patches that they come from."""
         parts = list(self._make_all(self._meeting(len(self.shifts) - 1, box), progress))
-        shown = _join(box, parts)
+        shown = join(box, parts)
         frames = shown.table[:, 2 * self.axes : -2].reshape(-1, self.axes, self.axes) / np.float32(ONE)
         places = self._bring_around(shown.places.reshape(*box.shape, self.axes))
         return Seen(places, shown.patches.reshape(box.shape), frames.astype(np.float32))
@@ -124,23 +131,23 @@ class Layers:
     def pick(self, points: NDArray[np.int64], progress: Progress | None = None) -> Places:
         """Return the places of single points (N, A) of the world: (N, A) int32."""
         last = len(self.shifts) - 1
-        cells, number = np.unique((points - self.shifts[last]) // self.side, axis=0, return_inverse=True)
+        cells, number = np.unique((points - np.array(self.shifts[last])) // self.side, axis=0, return_inverse=True)
         number = number.reshape(-1)
         order = np.argsort(number, kind="stable")
         first = np.searchsorted(number[order], np.arange(len(cells) + 1))
         out = np.empty((len(points), self.axes), np.int32)
         keys = [(last, *cell) for cell in cells.tolist()]
-        for k, (region, shown) in enumerate(self._make_all(keys, progress)):
+        whole = (slice(0, self.side),) * self.axes
+        for k, box in enumerate(self._make_all(keys, progress)):
             here = order[first[k] : first[k + 1]]
-            at = np.ravel_multi_index(tuple((points[here] - region.origin).T), region.shape)
-            out[here] = shown.places.reshape(-1, self.axes)[at]
+            out[here] = box.show(whole)[tuple((points[here] - box.region.origin).T)]
         return self._bring_around(out)
 
-    def _make_all(self, keys: Sequence[Key], progress: Progress | None) -> Iterator[tuple[Region, Shown]]:
+    def _make_all(self, keys: Sequence[Key], progress: Progress | None) -> Iterator[Box]:
         """Return some boxes, one after the other."""
         advance = stage(progress, "patches")
         total = len(self._find_missing(keys)) if advance else 0
-        work: Cache[Key, Shown] = Cache(WORK, lambda shown: shown.nbytes)
+        work: Cache[Key, Box] = Cache(WORK, lambda box: box.nbytes)
         made = 0
 
         def begin() -> Callable[[float], object] | None:
@@ -149,7 +156,7 @@ class Layers:
             return None if advance is None else lambda share: advance(min(1.0, (before + share) / max(total, 1)))
 
         for key in keys:
-            yield self._region(key), self._get(key, work, begin)
+            yield self._get(key, work, begin)
 
     def _find_missing(self, keys: Sequence[Key]) -> set[Key]:
         """Return the boxes that must be made for some."""
@@ -162,32 +169,33 @@ class Layers:
                 todo += self._below(key)
         return found
 
-    def _get(self, key: Key, work: Cache[Key, Shown], begin: Callable[[], Callable[[float], object] | None]) -> Shown:
+    def _get(self, key: Key, work: Cache[Key, Box], begin: Callable[[], Callable[[float], object] | None]) -> Box:
         """Return a box: one that is kept, or made from those below it."""
-        shown = work.get(key) or self._kept.get(key)
-        if shown is None:
-            below = [(self._region(k), self._get(k, work, begin)) for k in self._below(key)]
-            shown = self._make(key, below, begin())
-            self._kept.put(key, shown)
-        work.put(key, shown)
-        return shown
+        box = work.get(key) or self._kept.get(key)
+        if box is None:
+            below = [self._get(k, work, begin) for k in self._below(key)]
+            box = self._make(key, below, begin())
+            self._kept.put(key, box)
+        work.put(key, box)
+        return box
 
-    def _make(
-        self, key: Key, below: Sequence[tuple[Region, Shown]], advance: Callable[[float], object] | None
-    ) -> Shown:
+    def _make(self, key: Key, below: Sequence[Box], advance: Callable[[float], object] | None) -> Box:
         """Cut a patch into what the layer below shows in a box."""
-        region, stitcher = self._region(key), self.exemplar.stitcher
+        region = self._region(key)
         frames = to_fixed(self.field, region)
-        return stitcher.cover(
+        shown = self.exemplar.stitcher.cover(
             region,
             frames,
-            _join(region, below) if below else self._show_ground(region),
+            join(region, below) if below else self._show_ground(region),
             patch=max(6.0, FITS * min(self.exemplar.shape)),
             candidates=self.candidates,
             bend=self.bent,
+            # What lies below is cut again: elements are healed in the end.
+            heal=key[0] == len(self.shifts) - 1,
             weights=weights_of(self.exemplar),
             progress=advance,
         )
+        return Box.pack(region, shown, bent=self.bent)
 
     def _show_ground(self, region: Region) -> Shown:
         """Return what the lowest layer shows, with its seams."""
@@ -209,15 +217,14 @@ class Layers:
 
     def _meeting(self, layer: int, box: Region) -> list[Key]:
         """Return the boxes of a layer that have points in a region."""
-        shift = self.shifts[layer]
         ends = [
             range((o - shift) // self.side, (o + n - 1 - shift) // self.side + 1)
-            for o, n in zip(box.origin, box.shape, strict=True)
+            for o, n, shift in zip(box.origin, box.shape, self.shifts[layer], strict=True)
         ]
         return [(layer, *index) for index in product(*ends)]
 
     def _region(self, key: Key) -> Region:
-        origin = tuple(i * self.side + self.shifts[key[0]] for i in key[1:])
+        origin = tuple(i * self.side + shift for i, shift in zip(key[1:], self.shifts[key[0]], strict=True))
         return Region((self.side,) * self.axes, origin, (False,) * self.axes)
 
     def _bring_around(self, places: Places) -> Places:
@@ -228,47 +235,14 @@ class Layers:
         return places
 
 
-def _join(box: Region, parts: Sequence[tuple[Region, Shown]]) -> Shown:
-    """Return what a box shows that parts hold together; patches of several parts that are the same are one."""
-    axes = len(box.shape)
-    places, seams = (np.empty((*box.shape, axes), kind) for kind in (np.int32, np.float32))
-    labels = np.empty(box.shape, np.int64)
-    bent = parts[0][1].distortion.size > 0
-    distortion = np.empty(box.shape if bent else 0, np.float32)
-    tables, before = [], 0
-    for region, shown in parts:
-        here, there = _intersect(box, region)
-        places[here] = shown.places.reshape(*region.shape, axes)[there]
-        seams[here] = shown.seams.reshape(*region.shape, axes)[there]
-        labels[here] = shown.patches.reshape(region.shape)[there].astype(np.int64) + before
-        if bent:
-            distortion[here] = shown.distortion.reshape(region.shape)[there]
-        table = shown.table.copy()
-        table[:, :axes] += np.subtract(region.origin, box.origin, dtype=np.int32)
-        tables.append(table)
-        before += len(table)
-    known, same = np.unique(np.concatenate(tables), axis=0, return_inverse=True)
-    numbers = same.reshape(-1)[labels.reshape(-1)]
-    left = np.bincount(numbers, minlength=len(known)) > 0
-    patches = (np.cumsum(left) - 1)[numbers].astype(np.uint32)
-    return Shown(places.reshape(-1), patches, seams.reshape(-1), distortion.reshape(-1), known[left])
-
-
-def _intersect(a: Region, b: Region) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
-    """Return what two regions have in common as slices of the one and of the other."""
-    starts = [max(o, p) for o, p in zip(a.origin, b.origin, strict=True)]
-    stops = [min(o + n, p + m) for o, n, p, m in zip(a.origin, a.shape, b.origin, b.shape, strict=True)]
-    here, there = (
-        tuple(slice(s - o, t - o) for s, t, o in zip(starts, stops, r.origin, strict=True)) for r in (a, b)
-    )
-    return here, there
-
-
 def _find_side(exemplar: Exemplar, field: Field | None, seed: int) -> int:
-    """Return the side of the boxes: that of a patch, as large as the field makes it at most places around the origin."""
-    side, axes = patch_side(exemplar.shape), exemplar.axes
+    """Return the side of the boxes: that of a patch, as large as the field makes it at most places around the origin.
+
+    Where it makes things smaller a box is divided where it must be; where it made boxes too small, elements would be torn.
+    """
+    side, axes = LARGER * patch_side(exemplar.shape), exemplar.axes
     if field is not None:
         points = np.random.default_rng(seed).uniform(-_FAR, _FAR, (1 if field.constant is not None else _PROBES, axes))
         scales = np.abs(np.linalg.det(field.frames(points))) ** (1 / axes)
-        side *= float(np.median(scales[np.isfinite(scales)]))
+        side *= float(np.quantile(scales[np.isfinite(scales)], 0.9))
     return int(np.clip(round(side), 12, LARGEST[axes]))

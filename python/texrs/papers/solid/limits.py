@@ -33,10 +33,10 @@ def estimate_bytes(image: Array, region: Region, field: Field | None) -> int:
     return int(region.points * point * 8 // 7 + samples * (160 + 8 * image.shape[-1]) + patch * CUT + (24 << 20))
 
 
-def check_memory(image: Array, region: Region, field: Field | None, limit: object) -> None:
-    """Refuse what would take more memory than allowed, before anything is allocated."""
+def check_memory(image: Array, region: Region, field: Field | None, limit: object, beside: int = 0) -> None:
+    """Refuse what would take more memory than allowed, with so many bytes beside it, before anything is allocated."""
     most = LIMIT if limit is None else as_int(limit, "memory_limit", 1, 1 << 62)
-    total = estimate_bytes(image, region, field)
+    total = estimate_bytes(image, region, field) + beside
     if total > most:
         raise LimitExceeded(
             f"size: {region.shape} would take {total / 2**30:.1f} GiB, more than the limit of "

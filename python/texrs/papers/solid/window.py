@@ -22,7 +22,8 @@ from texrs.growth.engine import Places
 from texrs.kernels.gather import gather
 from texrs.papers.solid.limits import check_memory
 from texrs.papers.solid.request import as_field, as_interpolation
-from texrs.papers.solid.settings import ON_DEMAND
+from texrs.papers.solid.layers import WORK, Layers
+from texrs.papers.solid.settings import CANDIDATES, ON_DEMAND, Quality, as_quality
 from texrs.papers.solid.world import World
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
@@ -50,18 +51,24 @@ class _Texture:
         *,
         field: Field | None = None,
         seed: int = 0,
+        quality: Quality = "preserve",
         interpolation: Interpolation | None = None,
         cache_bytes: int = 256 << 20,
         memory_limit: int | None = None,
     ) -> None:
         known = as_exemplar(exemplar, axes=self.axes, minimum=COARSEST)
         self._exemplar, self._how = known, as_interpolation(interpolation, known, "cubic")
-        self._field, self._seed = as_field(field, self.axes), as_seed(seed)
+        self._field, self._seed, self._quality = as_field(field, self.axes), as_seed(seed), as_quality(quality)
         limit = as_int(cache_bytes, "cache_bytes", 0, 1 << 48)
-        check_memory(known.pixels, Region.whole((1,) * self.axes), self._field, memory_limit)
         self._memory_limit = memory_limit
-        levels = known.analyse(ON_DEMAND.radii).levels
-        self._world = World(Windows(levels, ON_DEMAND, self._seed, self._field), limit)
+        self._check(Region.whole((1,) * self.axes))
+        self._world: World | Layers
+        if self._quality == "fast":
+            levels = known.analyse(ON_DEMAND.radii).levels
+            self._world = World(Windows(levels, ON_DEMAND, self._seed, self._field), limit)
+        else:
+            tried = CANDIDATES[self._quality]
+            self._world = Layers(known, self._field, self._seed, candidates=tried, cache_bytes=limit)
 
     @property
     def exemplar(self) -> Exemplar:
@@ -112,7 +119,8 @@ class _Texture:
         Returns
         -------
         Synthesis
-            The image, and a source map whose frame is the field as it lies over the window.
+            The image; its source map, whose labels are the patches of the window, counted within it, and whose frames are
+            those of rigid patches, else the field as it lies over the window; and a report.
 
         Raises
         ------
@@ -127,15 +135,10 @@ class _Texture:
         start = self._as_origin(origin)
         region = Region(as_size(size, axes=self.axes), start, (False,) * self.axes)
         self._check(region)
-        places = self._world.read(region, progress)
-        field = self._field
-        if field is not None and field.constant is None and any(start):
-            field = _Translated(field, start)
-        coordinates = (places / np.float32(ONE)).astype(np.float32, copy=False)
-        source = SourceMap.from_coordinates(coordinates, self._exemplar.shape, frame=field)
+        places, source = self._look(region, progress)
         image = self._show(places)
         report = {
-            "quality": "on demand",
+            "quality": self._quality,
             "seed": self._seed,
             "origin": list(start),
             "field": None if self._field is None else self._field.describe(),
@@ -143,6 +146,20 @@ class _Texture:
             "interpolation": self._how,
         }
         return Synthesis(image, source, {"composite": image}, report)
+
+    def _look(self, region: Region, progress: Progress | None) -> tuple[Places, SourceMap]:
+        """Return the places of a window, and its source map: its frames are those of rigid patches, else the field's."""
+        field, start = self._field, region.origin
+        varies = field is not None and field.constant is None
+        if field is not None and varies and any(start):
+            field = _Translated(field, start)
+        if isinstance(self._world, World):
+            places, label, frame = self._world.read(region, progress), None, field
+        else:
+            seen = self._world.look(region, progress)
+            places, label, frame = seen.places, seen.labels, seen.frames if varies and not self._world.bent else field
+        coordinates = (places / np.float32(ONE)).astype(np.float32, copy=False)
+        return places, SourceMap.from_coordinates(coordinates, self._exemplar.shape, label=label, frame=frame)
 
     def _as_origin(self, origin: object) -> tuple[int, ...]:
         values = [origin] * self.axes if isinstance(origin, numbers.Integral) else origin
@@ -181,7 +198,8 @@ class _Texture:
         return Region(as_size(tuple(shape), axes=self.axes), tuple(origin), (False,) * self.axes), single
 
     def _check(self, region: Region) -> None:
-        check_memory(self._exemplar.pixels, region, self._field, self._memory_limit)
+        beside = 0 if self._quality == "fast" else WORK
+        check_memory(self._exemplar.pixels, region, self._field, self._memory_limit, beside)
 
     def _show(self, places: Places) -> Array:
         """Look the exemplar up, a band of points at a time."""
@@ -212,6 +230,9 @@ class PlaneTexture(_Texture):
         a centre or a length that was left open is that of the unbounded field. None leaves it as it is.
     seed : int
         Chooses the texture, 0 to 2^64 - 1; the same seed gives the same bytes.
+    quality : {"preserve", "fast", "optimise"}
+        How much work is done. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
+        three times as many places for each patch. "fast" corrects blocks point by point, for textures without elements.
     interpolation : {"nearest", "linear", "cubic"}, optional
         Between the exemplar's samples. None is "cubic". Labels are looked up at the nearest sample whatever it says.
     cache_bytes : int
@@ -256,6 +277,9 @@ class SolidTexture(_Texture):
         stands: a centre or a length that was left open is that of the unbounded field. None leaves it as it is.
     seed : int
         Chooses the texture, 0 to 2^64 - 1; the same seed gives the same bytes.
+    quality : {"preserve", "fast", "optimise"}
+        How much work is done. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
+        three times as many places for each patch. "fast" corrects blocks point by point, for textures without elements.
     interpolation : {"nearest", "linear", "cubic"}, optional
         Between the exemplar's samples. None is "cubic". Labels are looked up at the nearest sample whatever it says.
     cache_bytes : int

@@ -12,7 +12,7 @@ use super::chart::{Chart, difference};
 use super::cut::{Cutter, distance};
 use super::search::{Charges, Index};
 use super::source::Source;
-use super::{Balance, Given, Options, Patch, Stitching, Weights};
+use super::{Balance, Given, Options, Patch, Stitching, Weights, enlargement};
 use crate::foundation::fixed::{Frames, Place};
 use crate::foundation::grid::{Grid, Region};
 use crate::foundation::hash::Noise;
@@ -22,6 +22,8 @@ use crate::{Error, Result};
 
 /// A box is divided where a patch would fill less of it.
 const FILLED: f64 = 0.5;
+/// Windows that are covered have more points with a choice: those of more points are cut between larger blocks first.
+const COVERED: &[(usize, usize)] = &[(1 << 15, 4), (4096, 2)];
 /// Side of the smallest box that is divided.
 const SMALL: usize = 12;
 
@@ -73,6 +75,7 @@ pub fn judge<const D: usize>(
         source,
         weights,
         guide: None,
+        blocks: COVERED,
         solvers: Mutex::default(),
     };
     let mut seams = vec![[0.0; D]; grid.len()];
@@ -112,6 +115,7 @@ pub fn cover<const D: usize>(
             source,
             weights: options.weights,
             guide: None,
+            blocks: COVERED,
             solvers: Mutex::default(),
         },
         frames,
@@ -159,7 +163,9 @@ impl<const D: usize> Stitching<'_, D> {
         if filled >= FILLED * chart.mask.len() as f64 || !divide.contains(&true) {
             let sides = chart.window.grid.shape();
             let centre = std::array::from_fn(|a| chart.window.low[a] + sides[a] as i32 / 2);
-            return self.lay_chart(&chart, centre, self.options.patch);
+            let longest = sides.into_iter().max().unwrap_or(1) as f32;
+            let side = (longest / enlargement(&chart.frame)).min(self.options.patch);
+            return self.lay_chart(&chart, centre, side);
         }
         for corner in 0..1usize << D {
             let (mut first, mut last) = (low, high);

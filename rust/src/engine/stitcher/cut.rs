@@ -24,7 +24,7 @@ const SHORTEST: f32 = 2e-3;
 /// Costs of one pair are at most this, so that sums stay within 32 bits.
 pub(super) const MOST: f32 = 1000.0;
 /// Windows of more points are cut between blocks of such a side first.
-const LARGE: [(usize, usize); 1] = [(4096, 2)];
+pub(super) const LARGE: &[(usize, usize)] = &[(4096, 2)];
 /// Beyond this, colours of two elements are as different as can be.
 const UNLIKE: f32 = 1.5;
 
@@ -194,6 +194,8 @@ pub(super) struct Cutter<'a, const D: usize> {
     pub source: &'a Source<D>,
     pub weights: Weights,
     pub guide: Option<&'a Guide<'a>>,
+    /// Windows of more points are cut between blocks of such a side first, the largest ones before the others.
+    pub blocks: &'static [(usize, usize)],
     /// Workspaces of cuts, as many as are made at once.
     pub solvers: Mutex<Vec<Solver<D>>>,
 }
@@ -223,7 +225,8 @@ impl<const D: usize> Cutter<'_, D> {
         monitor: &Monitor,
     ) -> Result<Cutting<D>> {
         let n = patch.window.grid.len();
-        let block = LARGE
+        let block = self
+            .blocks
             .iter()
             .find(|(least, _)| n > *least)
             .map_or(1, |&(_, side)| side);

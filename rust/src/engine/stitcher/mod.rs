@@ -34,7 +34,7 @@ use canvas::{Canvas, HELD};
 use chart::Chart;
 pub use cover::{Prepared, Shown, cover, judge};
 pub use cut::Weights;
-use cut::{Cutter, Proposal};
+use cut::{Cutter, LARGE, Proposal};
 use search::{Charges, Index};
 pub use source::{Adjacency, Elements, Source};
 
@@ -155,6 +155,7 @@ pub fn stitch<const D: usize>(
             source,
             weights: options.weights,
             guide,
+            blocks: LARGE,
             solvers: Mutex::default(),
         },
         frames,

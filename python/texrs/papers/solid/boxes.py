@@ -1,0 +1,127 @@
+"""Finished boxes of an unbounded texture, packed: what they show follows from the patches and their table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._engine.pyramid import Region
+from texrs._engine.stitcher import Shown
+from texrs.growth.engine import Places
+
+__all__ = ["Box", "intersect", "join"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Box:
+    """What a box shows.
+
+    Attributes
+    ----------
+    region : Region
+        Where it is.
+    patches : (...) array
+        The patch that each point shows, in as few bytes as they take.
+    table : (patches, K) int32
+        As in `texrs._engine.stitcher.Shown`, with centres as seen from the first point.
+    cut : (M,) uint32
+        Positions in the row of all seams that cost something.
+    costs : (M,) float32
+        What they cost.
+    places : (..., A) int32
+        Where each point looks; empty where all patches are rigid, and it follows from their frames.
+    distortion : (...) float32
+        Likewise.
+
+    """
+
+    region: Region
+    patches: NDArray[np.unsignedinteger]
+    table: NDArray[np.int32]
+    cut: NDArray[np.uint32]
+    costs: NDArray[np.float32]
+    places: Places
+    distortion: NDArray[np.float32]
+
+    @classmethod
+    def pack(cls, region: Region, shown: Shown, *, bent: bool) -> Box:
+        """Return a box in few bytes; bent patches cannot be told from their table."""
+        cut = np.flatnonzero(shown.seams)
+        kind = np.min_scalar_type(len(shown.table))
+        return cls(
+            region,
+            shown.patches.reshape(region.shape).astype(kind),
+            shown.table,
+            cut.astype(np.uint32),
+            shown.seams[cut],
+            shown.places.reshape(*region.shape, -1) if bent else np.zeros(0, np.int32),
+            shown.distortion.reshape(region.shape) if bent else np.zeros(0, np.float32),
+        )
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays."""
+        return sum(a.nbytes for a in (self.patches, self.table, self.cut, self.costs, self.places, self.distortion))
+
+    def show(self, there: tuple[slice, ...]) -> Places:
+        """Return the places of a part, (..., A) int32."""
+        if self.places.size:
+            return self.places[there]
+        patches = self.patches[there]
+        axes = patches.ndim
+        centre, place = self.table[:, :axes], self.table[:, axes : 2 * axes]
+        frame = self.table[:, 2 * axes : -2].reshape(-1, axes, axes)
+        # S(p) = place + J (p - centre), of which all but J p is the patch's own.
+        out: Places = (place - np.einsum("kij,kj->ki", frame, centre)).astype(np.int32)[patches]
+        for axis in range(axes):
+            line = np.arange(there[axis].start, there[axis].stop, dtype=np.int32)
+            line = line.reshape(-1, *(1,) * (axes - 1 - axis))
+            same = (frame == frame[0]).all()
+            for row in range(axes):
+                column = frame[0, row, axis] if same else frame[:, row, axis][patches]
+                out[..., row] += column * line
+        return out
+
+    def seams(self) -> NDArray[np.float32]:
+        """Return what all seams cost, (..., A)."""
+        axes = self.patches.ndim
+        out = np.zeros(self.patches.size * axes, np.float32)
+        out[self.cut] = self.costs
+        return out.reshape(*self.patches.shape, axes)
+
+
+def join(box: Region, parts: Sequence[Box]) -> Shown:
+    """Return what a box shows that parts hold together; patches of several parts that are the same are one."""
+    axes = len(box.shape)
+    places, seams = (np.empty((*box.shape, axes), kind) for kind in (np.int32, np.float32))
+    labels = np.empty(box.shape, np.int64)
+    bent = parts[0].places.size > 0
+    distortion = np.empty(box.shape if bent else 0, np.float32)
+    tables, before = [], 0
+    for part in parts:
+        here, there = intersect(box, part.region)
+        places[here] = part.show(there)
+        seams[here] = part.seams()[there]
+        labels[here] = part.patches[there].astype(np.int64) + before
+        if bent:
+            distortion[here] = part.distortion[there]
+        table = part.table.copy()
+        table[:, :axes] += np.subtract(part.region.origin, box.origin, dtype=np.int32)
+        tables.append(table)
+        before += len(table)
+    known, same = np.unique(np.concatenate(tables), axis=0, return_inverse=True)
+    numbers = same.reshape(-1)[labels.reshape(-1)]
+    left = np.bincount(numbers, minlength=len(known)) > 0
+    patches = (np.cumsum(left) - 1)[numbers].astype(np.uint32)
+    return Shown(places.reshape(-1), patches, seams.reshape(-1), distortion.reshape(-1), known[left])
+
+
+def intersect(a: Region, b: Region) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
+    """Return what two regions have in common as slices of the one and of the other."""
+    starts = [max(o, p) for o, p in zip(a.origin, b.origin, strict=True)]
+    stops = [min(o + n, p + m) for o, n, p, m in zip(a.origin, a.shape, b.origin, b.shape, strict=True)]
+    here, there = (tuple(slice(s - o, max(s, t) - o) for s, t, o in zip(starts, stops, r.origin, strict=True)) for r in (a, b))
+    return here, there
