@@ -21,14 +21,14 @@ from texrs.papers.solid.boxes import Box, intersect, join
 from texrs.papers.solid.ground import Ground
 
 SOLID = samples.particles((32, 32, 32)).image
-PLANE = samples.load("pebbles").image[:64, :64]
+PLANE = samples.dots((48, 48)).image
 FIELDS: dict[str, Callable[[int], fields.Field | None]] = {
     "none": lambda axes: None,
     "turned": lambda axes: fields.slant(30, axes=axes),
     "circular": lambda axes: fields.circular(centre=(4,) * axes, axes=axes),
     "ramp": lambda axes: fields.scale_ramp(0.4, 1.8, length=60, axes=axes),
 }
-SIDE = {2: 160, 3: 36}
+SIDE = {2: 120, 3: 24}
 
 
 @cache
@@ -57,10 +57,10 @@ def part(axes: int, origin: tuple[int, ...], size: tuple[int, ...], *, field: st
         return texture(axes, field).window(origin, size).image
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(
-    st.tuples(*[st.integers(-SIDE[2] // 2, SIDE[2] // 2 - 50)] * 2),
-    st.tuples(*[st.integers(1, 50)] * 2),
+    st.tuples(*[st.integers(-SIDE[2] // 2, SIDE[2] // 2 - 40)] * 2),
+    st.tuples(*[st.integers(1, 40)] * 2),
     st.sampled_from(list(FIELDS)),
     st.sampled_from([0, 1 << 14, 1 << 24]),
     st.sampled_from([1, 2, 7]),
@@ -79,13 +79,13 @@ def test_random_windows(
 def test_random_windows_of_volumes(field: str) -> None:
     rng = np.random.default_rng(3)
     shared = texture(3, field)
-    for k in range(6):
-        size = rng.integers(1, 16, 3)
+    for k in range(4):
+        size = rng.integers(1, 12, 3)
         origin = [int(rng.integers(-SIDE[3] // 2, SIDE[3] // 2 - n)) for n in size]
-        if k == 3:
+        if k == 2:
             shared.clear()
         with texrs.threads((1, 2, 7)[k % 3]):
-            found = (texture(3, field, cache_bytes=0) if k == 5 else shared).window(origin, size.tolist())
+            found = (texture(3, field, cache_bytes=0) if k == 3 else shared).window(origin, size.tolist())
         inside = tuple(slice(o + SIDE[3] // 2, o + SIDE[3] // 2 + int(n)) for o, n in zip(origin, size, strict=True))
         assert np.array_equal(found.image, whole(3, field)[inside])
     assert np.array_equal(view(found.source, SOLID), found.image)
@@ -101,7 +101,7 @@ def test_other_processes_make_the_same(method: str) -> None:
         assert np.array_equal(pool.submit(work).result(), wanted)
 
 
-@pytest.mark.parametrize(("axes", "start"), [(2, -(10**9)), (2, 10**9 - 30), (3, 10**9 - 20)])
+@pytest.mark.parametrize(("axes", "start"), [(2, -(10**9)), (2, 10**9 - 30)])
 def test_far_from_the_origin(axes: int, start: int) -> None:
     shared = texture(axes)
     a = shared[box(axes, start, start + 20)]
@@ -121,21 +121,20 @@ def test_slices_are_picked_from_the_same_texture() -> None:
 
 def test_seams_are_no_worse_than_those_of_a_bounded_texture() -> None:
     """Boxes laid over each other may look at what they cover from all sides."""
-    for name in ("pebbles", "weave"):
-        known = texrs.Exemplar(samples.load(name).image[:128, :128])
+    for image in (samples.load("pebbles").image[:96, :96], samples.bricks((96, 96)).image):
+        known = texrs.Exemplar(image)
         for field in (None, fields.circular(centre=(-40, -40), axes=2)):
             plain = layers.Layers(known, field, 1, candidates=4, cache_bytes=1 << 26)
-            here = Region((256, 256), (0, 0), (False, False))
+            here = Region((200, 200), (0, 0), (False, False))
             parts = list(plain._make_all(plain._meeting(len(plain.shifts) - 1, here), None))
             found = float(join(here, parts).seams.sum()) / here.points
-            wanted = texrs.synthesize(known, 256, field=field, seed=1).report["stitched"]["seams"]
-            assert found < 1.5 * wanted
+            wanted = texrs.synthesize(known, 200, field=field, seed=1).report["stitched"]["seams"]
+            assert found < 1.6 * wanted
 
 
 def test_nothing_is_torn() -> None:
-    known = texrs.Exemplar(samples.particles((40, 40, 40)).image, axes=3)
-    made = texrs.SolidTexture(known, seed=2, field=fields.circular(centre=(0, 0, 0))).window(10, 40)
-    found = volume.integrity(known, made.source)
+    made = texture(3, "circular", seed=2).window(10, 32)
+    found = volume.integrity(exemplar(3), made.source)
     assert found is not None
     assert found.torn < 0.1
     assert found.contacts[1] < 0.5
@@ -154,6 +153,7 @@ def test_what_is_kept_is_bounded_and_forgotten() -> None:
 def test_the_map_has_the_frames_of_its_patches() -> None:
     field = fields.circular(centre=(0, 0), axes=2)
     found = texrs.PlaneTexture(exemplar(2), field=field, seed=1).window((40, -50), (60, 70))
+    assert found.source.label is not None
     frames = found.source.frames()
     # Those of rigid patches: few, and about as the field.
     assert 1 < len(np.unique(frames.reshape(-1, 4), axis=0)) <= found.source.label.max() + 1

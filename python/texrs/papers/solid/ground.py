@@ -41,6 +41,8 @@ class Ground:
         Chooses the places.
     field : Field, optional
         How boxes are turned and scaled.
+    lattice : (A, A) array, optional
+        Rows by which the exemplar repeats itself, in samples: where one frame serves all, boxes are in step.
 
     """
 
@@ -49,6 +51,7 @@ class Ground:
     side: int
     seed: int
     field: Field | None
+    lattice: NDArray[np.int64] | None = None
 
     def show(self, region: Region) -> tuple[Places, NDArray[np.uint32], NDArray[np.int32]]:
         """Return the places of a region, the box of each point, and the table of boxes (`texrs._engine.stitcher.Shown`)."""
@@ -80,7 +83,14 @@ class Ground:
         for number, (start, stop, centre, frame, ends) in enumerate(parts):
             draws = [uniform(self.seed, *(i % (1 << 32) for i in index), 4 * number + a) for a in range(len(index))]
             place = tuple(ONE * int(a + u * (b - a + 1)) for u, (a, b) in zip(draws, ends, strict=True))
+            if self.lattice is not None and self.constant:
+                place = _step_in(place, frame @ np.array(centre), self.lattice * ONE, ends)
             yield start, stop, (centre, place, frame)
+
+    @property
+    def constant(self) -> bool:
+        """Whether one frame serves all."""
+        return self.field is None or self.field.constant is not None
 
     def _divide(
         self, low: tuple[int, ...], high: tuple[int, ...]
@@ -113,8 +123,22 @@ class Ground:
         self, centre: tuple[int, ...], corners: NDArray[np.int64]
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return the Jacobians in the middle of a box, and at its corners where they may be others."""
-        if self.field is None or self.field.constant is not None:
+        if self.constant:
             frame = to_fixed(self.field, Region.whole((1,) * len(centre)))[0]
             return frame.astype(np.int64), np.zeros((0, len(centre), len(centre)), np.int64)
         found = np.rint(self.field.jacobians(np.concatenate([[centre], corners])) * ONE).astype(np.int64)
         return found[0], found[1:]
+
+
+def _step_in(
+    place: tuple[int, ...], ahead: NDArray[np.int64], lattice: NDArray[np.int64], ends: list[tuple[int, int]]
+) -> tuple[int, ...]:
+    """Return the place nearest to one that is a multiple of a lattice from where one frame leads, if there is one."""
+    near = np.rint(np.linalg.solve(lattice.T.astype(np.float64), (np.array(place) - ahead).astype(np.float64)))
+    steps = np.array(list(product((-1, 0, 1), repeat=len(place))))
+    found = ahead + (near.astype(np.int64) + steps) @ lattice
+    low, high = np.array(ends).T * ONE
+    found = found[((found >= low) & (found <= high)).all(axis=1)]
+    if not len(found):
+        return place
+    return tuple(int(x) for x in found[((found - place) ** 2).sum(axis=1).argmin()])

@@ -26,6 +26,7 @@ from texrs._engine.stitcher import Shown
 from texrs._progress import stage
 from texrs._typing import Floats, Progress
 from texrs.exemplar import Exemplar
+from texrs.exemplar.regularity import find_lattice
 from texrs.fields import Field
 from texrs.growth import patch_side
 from texrs.growth.engine import Places
@@ -100,7 +101,7 @@ class Layers:
         self.side = _find_side(exemplar, field, seed)
         self.shifts = tuple(tuple(round(share * self.side) for share in shift) for shift in SHIFTS[self.axes])
         self.bent = bends_with(exemplar, field is not None and field.constant is None)
-        self.ground = Ground(exemplar.shape, exemplar.repeat, self.side, seed, field)
+        self.ground = Ground(exemplar.shape, exemplar.repeat, self.side, seed, field, _find_rows(exemplar, field))
         self._kept: Cache[Key, Box] = Cache(cache_bytes, lambda box: box.nbytes)
 
     @property
@@ -246,3 +247,11 @@ def _find_side(exemplar: Exemplar, field: Field | None, seed: int) -> int:
         scales = np.abs(np.linalg.det(field.frames(points))) ** (1 / axes)
         side *= float(np.quantile(scales[np.isfinite(scales)], 0.9))
     return int(np.clip(round(side), 12, LARGEST[axes]))
+
+
+def _find_rows(exemplar: Exemplar, field: Field | None) -> NDArray[np.int64] | None:
+    """Return the vectors by which a picture repeats itself, where boxes can be in step: one frame serves all."""
+    if exemplar.axes != 2 or (field is not None and field.constant is None):
+        return None
+    lattice = find_lattice(exemplar.guidance)
+    return None if lattice is None else np.array([lattice.a, lattice.b], np.int64)

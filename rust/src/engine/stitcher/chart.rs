@@ -331,7 +331,7 @@ pub(super) fn difference<const D: usize>(a: &Frame<D>, b: &Frame<D>) -> f32 {
 }
 
 /// Mean of the values in a mask; 0 for none.
-fn mean(values: &[f32], mask: &[bool]) -> f32 {
+pub(super) fn mean(values: &[f32], mask: &[bool]) -> f32 {
     let (mut sum, mut count) = (0.0f64, 0.0);
     for (&v, _) in values.iter().zip(mask).filter(|(_, m)| **m) {
         sum += f64::from(v);

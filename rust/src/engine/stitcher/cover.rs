@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use std::sync::Mutex;
 
 use super::canvas::{Canvas, Window};
-use super::chart::{Chart, difference};
+use super::chart::{Chart, difference, mean};
 use super::cut::{Cutter, distance};
 use super::search::{Charges, Index};
 use super::source::Source;
@@ -22,6 +22,8 @@ use crate::{Error, Result};
 
 /// A box is divided where a patch would fill less of it.
 const FILLED: f64 = 0.5;
+/// One is divided too where a patch would be so far from the field, on average, while it shows more than half of a patch.
+const STRAY: f32 = 0.2;
 /// Windows that are covered have more points with a choice: those of more points are cut between larger blocks first.
 const COVERED: &[(usize, usize)] = &[(1 << 15, 4), (4096, 2)];
 /// Side of the smallest box that is divided.
@@ -158,13 +160,15 @@ impl<const D: usize> Stitching<'_, D> {
         let o = &self.options;
         let bend = o.bend && matches!(self.frames, Frames::Dense(_));
         let chart = Chart::over(window, &self.canvas, self.frames, o.patch, bend);
+        let sides = chart.window.grid.shape();
+        let longest = sides.into_iter().max().unwrap_or(1) as f32;
+        let side = (longest / enlargement(&chart.frame)).min(o.patch);
         let filled = chart.mask.iter().filter(|m| **m).count() as f64;
+        let fills = filled >= FILLED * chart.mask.len() as f64;
+        let strays = side > 0.5 * o.patch && mean(&chart.distortion, &chart.mask) > STRAY;
         let divide: [bool; D] = std::array::from_fn(|a| high[a] - low[a] >= SMALL);
-        if filled >= FILLED * chart.mask.len() as f64 || !divide.contains(&true) {
-            let sides = chart.window.grid.shape();
+        if fills && !strays || !divide.contains(&true) {
             let centre = std::array::from_fn(|a| chart.window.low[a] + sides[a] as i32 / 2);
-            let longest = sides.into_iter().max().unwrap_or(1) as f32;
-            let side = (longest / enlargement(&chart.frame)).min(self.options.patch);
             return self.lay_chart(&chart, centre, side);
         }
         for corner in 0..1usize << D {
