@@ -276,7 +276,12 @@ fn read<const D: usize>(row: &[i32]) -> Patch<D> {
 /// The row of a patch.
 fn write<const D: usize>(patch: &Patch<D>) -> Vec<i32> {
     let frame = patch.frame.as_flattened().iter().map(|&x| i32::from(x));
-    let mut row: Vec<i32> = patch.centre.into_iter().chain(patch.place).chain(frame).collect();
+    let mut row: Vec<i32> = patch
+        .centre
+        .into_iter()
+        .chain(patch.place)
+        .chain(frame)
+        .collect();
     row.push((patch.side * ONE as f32) as i32);
     row.push(i32::from(patch.rigid));
     row

@@ -96,7 +96,8 @@ class Box:
 def join(box: Region, parts: Sequence[Box]) -> Shown:
     """Return what a box shows that parts hold together; patches of several parts that are the same are one."""
     axes = len(box.shape)
-    places, seams = (np.empty((*box.shape, axes), kind) for kind in (np.int32, np.float32))
+    places: Places = np.empty((*box.shape, axes), np.int32)
+    seams: NDArray[np.float32] = np.empty((*box.shape, axes), np.float32)
     labels = np.empty(box.shape, np.int64)
     bent = parts[0].places.size > 0
     distortion = np.empty(box.shape if bent else 0, np.float32)
@@ -123,5 +124,7 @@ def intersect(a: Region, b: Region) -> tuple[tuple[slice, ...], tuple[slice, ...
     """Return what two regions have in common as slices of the one and of the other."""
     starts = [max(o, p) for o, p in zip(a.origin, b.origin, strict=True)]
     stops = [min(o + n, p + m) for o, n, p, m in zip(a.origin, a.shape, b.origin, b.shape, strict=True)]
-    here, there = (tuple(slice(s - o, max(s, t) - o) for s, t, o in zip(starts, stops, r.origin, strict=True)) for r in (a, b))
+    here, there = (
+        tuple(slice(s - o, max(s, t) - o) for s, t, o in zip(starts, stops, r.origin, strict=True)) for r in (a, b)
+    )
     return here, there

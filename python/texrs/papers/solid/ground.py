@@ -59,7 +59,9 @@ class Ground:
         places = np.empty((*region.shape, axes), np.int32)
         boxes = np.empty(region.shape, np.uint32)
         table: list[list[int]] = []
-        ends = [(o // self.side, (o + n - 1) // self.side + 1) for o, n in zip(region.origin, region.shape, strict=True)]
+        ends = [
+            (o // self.side, (o + n - 1) // self.side + 1) for o, n in zip(region.origin, region.shape, strict=True)
+        ]
         for index in product(*(range(*end) for end in ends)):
             for low, high, (centre, place, frame) in self.boxes(index):
                 start = [max(a, o) for a, o in zip(low, region.origin, strict=True)]
@@ -83,20 +85,18 @@ class Ground:
         for number, (start, stop, centre, frame, ends) in enumerate(parts):
             draws = [uniform(self.seed, *(i % (1 << 32) for i in index), 4 * number + a) for a in range(len(index))]
             place = tuple(ONE * int(a + u * (b - a + 1)) for u, (a, b) in zip(draws, ends, strict=True))
-            if self.lattice is not None and self.constant:
+            if self.lattice is not None and self._varying is None:
                 place = _step_in(place, frame @ np.array(centre), self.lattice * ONE, ends)
             yield start, stop, (centre, place, frame)
 
     @property
-    def constant(self) -> bool:
-        """Whether one frame serves all."""
-        return self.field is None or self.field.constant is not None
+    def _varying(self) -> Field | None:
+        """The field, unless one frame serves all."""
+        return None if self.field is None or self.field.constant is not None else self.field
 
     def _divide(
         self, low: tuple[int, ...], high: tuple[int, ...]
-    ) -> Iterator[
-        tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...], NDArray[np.int64], list[tuple[int, int]]]
-    ]:
+    ) -> Iterator[tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...], NDArray[np.int64], list[tuple[int, int]]]]:
         """Return the parts of a box, with their centres, frames, and the samples that the centre may look at."""
         axes = len(low)
         centre = tuple((a + b) // 2 for a, b in zip(low, high, strict=True))
@@ -123,10 +123,11 @@ class Ground:
         self, centre: tuple[int, ...], corners: NDArray[np.int64]
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return the Jacobians in the middle of a box, and at its corners where they may be others."""
-        if self.constant:
+        varying = self._varying
+        if varying is None:
             frame = to_fixed(self.field, Region.whole((1,) * len(centre)))[0]
             return frame.astype(np.int64), np.zeros((0, len(centre), len(centre)), np.int64)
-        found = np.rint(self.field.jacobians(np.concatenate([[centre], corners])) * ONE).astype(np.int64)
+        found = np.rint(varying.jacobians(np.concatenate([[centre], corners])) * ONE).astype(np.int64)
         return found[0], found[1:]
 
 

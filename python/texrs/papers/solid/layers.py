@@ -204,13 +204,10 @@ class Layers:
         larger = Region(tuple(n + 1 for n in region.shape), region.origin, region.wrap)
         places, boxes, table = self.ground.show(larger)
         seams = self.exemplar.stitcher.judge(larger, places, boxes, weights_of(self.exemplar))
-        here = (slice(0, -1),) * self.axes
-
-        def crop(values: NDArray[np.generic]) -> NDArray[np.generic]:
-            whole = values.reshape(*larger.shape, -1)[here]
-            return np.ascontiguousarray(whole).reshape(-1)
-
-        return Shown(crop(places), crop(boxes), crop(seams), np.zeros(0, np.float32), table)
+        here = region.inside(larger)
+        near = seams.reshape(*larger.shape, -1)[here].reshape(-1)
+        shown = places.reshape(*larger.shape, -1)[here].reshape(-1)
+        return Shown(shown, boxes.reshape(larger.shape)[here].reshape(-1), near, np.zeros(0, np.float32), table)
 
     def _below(self, key: Key) -> list[Key]:
         """Return the boxes of the layer below that a box is cut into; none above the ground."""

@@ -20,9 +20,9 @@ from texrs.fields import Field
 from texrs.growth import Windows
 from texrs.growth.engine import Places
 from texrs.kernels.gather import gather
+from texrs.papers.solid.layers import WORK, Layers
 from texrs.papers.solid.limits import check_memory
 from texrs.papers.solid.request import as_field, as_interpolation
-from texrs.papers.solid.layers import WORK, Layers
 from texrs.papers.solid.settings import CANDIDATES, ON_DEMAND, Quality, as_quality
 from texrs.papers.solid.world import World
 from texrs.source_map import SourceMap
@@ -154,12 +154,13 @@ class _Texture:
         if field is not None and varies and any(start):
             field = _Translated(field, start)
         if isinstance(self._world, World):
-            places, label, frame = self._world.read(region, progress), None, field
-        else:
-            seen = self._world.look(region, progress)
-            places, label, frame = seen.places, seen.labels, seen.frames if varies and not self._world.bent else field
+            places = self._world.read(region, progress)
+            coordinates = (places / np.float32(ONE)).astype(np.float32, copy=False)
+            return places, SourceMap.from_coordinates(coordinates, self._exemplar.shape, frame=field)
+        places, labels, frames = self._world.look(region, progress)
         coordinates = (places / np.float32(ONE)).astype(np.float32, copy=False)
-        return places, SourceMap.from_coordinates(coordinates, self._exemplar.shape, label=label, frame=frame)
+        frame = frames if varies and not self._world.bent else field
+        return places, SourceMap.from_coordinates(coordinates, self._exemplar.shape, label=labels, frame=frame)
 
     def _as_origin(self, origin: object) -> tuple[int, ...]:
         values = [origin] * self.axes if isinstance(origin, numbers.Integral) else origin

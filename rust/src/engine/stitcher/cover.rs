@@ -111,7 +111,15 @@ pub fn cover<const D: usize>(
         places: &[],
     };
     super::check(region, frames, nothing, options)?;
-    let canvas = paint(region, frames, shown.places, shown.patches, shown.seams, shown.distortion, &shown.table)?;
+    let canvas = paint(
+        region,
+        frames,
+        shown.places,
+        shown.patches,
+        shown.seams,
+        shown.distortion,
+        &shown.table,
+    )?;
     let mut this = Stitching {
         cutter: Cutter {
             source,
@@ -174,7 +182,11 @@ impl<const D: usize> Stitching<'_, D> {
         for corner in 0..1usize << D {
             let (mut first, mut last) = (low, high);
             for a in 0..D {
-                let part = if divide[a] { (high[a] - low[a]) * 2 / 3 } else { high[a] - low[a] };
+                let part = if divide[a] {
+                    (high[a] - low[a]) * 2 / 3
+                } else {
+                    high[a] - low[a]
+                };
                 if corner >> (D - 1 - a) & 1 == 0 {
                     last[a] = low[a] + part;
                 } else if divide[a] {
@@ -190,22 +202,34 @@ impl<const D: usize> Stitching<'_, D> {
     }
 
     fn window(&self, low: [usize; D], high: [usize; D]) -> Option<Window<D>> {
-        self.canvas.window(low.map(|x| x as i32), high.map(|x| x as i32))
+        self.canvas
+            .window(low.map(|x| x as i32), high.map(|x| x as i32))
     }
 
     /// What has become of the part, with the patches that are left.
     fn show(self) -> Shown<D> {
         let mut numbers = vec![u32::MAX; self.patches.len()];
-        self.canvas.patches.iter().for_each(|&p| numbers[p as usize] = 0);
+        self.canvas
+            .patches
+            .iter()
+            .for_each(|&p| numbers[p as usize] = 0);
         let mut table = Vec::new();
-        for (number, patch) in numbers.iter_mut().zip(self.patches).filter(|(n, _)| **n == 0) {
+        for (number, patch) in numbers
+            .iter_mut()
+            .zip(self.patches)
+            .filter(|(n, _)| **n == 0)
+        {
             *number = table.len() as u32;
             table.push(patch);
         }
         let canvas = self.canvas;
         Shown {
             places: canvas.places,
-            patches: canvas.patches.iter().map(|&p| numbers[p as usize]).collect(),
+            patches: canvas
+                .patches
+                .iter()
+                .map(|&p| numbers[p as usize])
+                .collect(),
             seams: canvas.seams,
             distortion: canvas.distortion,
             table,
