@@ -1,7 +1,8 @@
 """Windows of unbounded textures: time and memory.
 
-Run ``python benches/solid_window.py [--volume N]``. Processor seconds are those of all threads together; a machine that does
-nothing else needs them divided by its cores. ``--volume`` also writes a volume of N voxels a side to disk, slab by slab.
+Run ``python benches/solid_window.py [--quality Q] [--volume N]``. Processor seconds are those of all threads together; a
+machine that does nothing else needs them divided by its cores. ``--volume`` also writes a volume of N voxels a side to
+disk, slab by slab.
 """
 
 from __future__ import annotations
@@ -35,26 +36,28 @@ def peak() -> str:
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--volume", type=int, default=0)
+    parser.add_argument("--quality", choices=("preserve", "optimise", "fast"), default="preserve")
     asked = parser.parse_args()
     exemplar, picture = samples.particles().image, samples.load("weave").image
     exemplar, picture = texrs.Exemplar(exemplar, axes=3), texrs.Exemplar(picture)
-    exemplar.analyse()
-    picture.analyse()
+    for known in (exemplar, picture):
+        known.analyse()
+        _ = known.stitcher
     for field in (None, fields.circular(), fields.zigzag()):
-        texture = texrs.SolidTexture(exemplar, field=field, seed=1)
+        texture = texrs.SolidTexture(exemplar, field=field, seed=1, quality=asked.quality)
         name = "none" if field is None else field.describe().split(",")[0].split(" of")[0]
         measured(f"64^3, field {name}, cold", lambda t=texture: t[0:64, 0:64, 0:64])
         measured(f"64^3, field {name}, its neighbour", lambda t=texture: t[0:64, 0:64, 64:128])
         measured(f"64^3, field {name}, again", lambda t=texture: t[0:64, 0:64, 32:96])
-    texture = texrs.SolidTexture(exemplar, seed=1)
+    texture = texrs.SolidTexture(exemplar, seed=1, quality=asked.quality)
     measured("slice of 256^2 across (1, 1, 1), cold", lambda: texture.slice((0, 0, 0), (1, 1, 1), size=256))
-    plane = texrs.PlaneTexture(picture, seed=1)
+    plane = texrs.PlaneTexture(picture, seed=1, quality=asked.quality)
     measured("256^2, cold", lambda: plane[0:256, 0:256])
     measured("256^2, its neighbour", lambda: plane[0:256, 256:512])
     measured("2048^2, cold", lambda: plane[5000:7048, 0:2048])
     print(peak())
     if side := asked.volume:
-        texture = texrs.SolidTexture(exemplar, seed=1)
+        texture = texrs.SolidTexture(exemplar, seed=1, quality=asked.quality)
         slabs = (texture[z : min(z + 32, side), 0:side, 0:side] for z in range(0, side, 32))
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder, "large.npy")

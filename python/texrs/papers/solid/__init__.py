@@ -9,9 +9,10 @@ and 2006). The flow:
 3. cut in at the best of several places; torn elements are healed (`texrs._engine.stitcher`);
 4. look the exemplar up through the coordinates.
 
-With ``quality="fast"`` and in unbounded textures steps 2 and 3 are those of the paper: coordinates are upsampled from level
-to level with the field's Jacobian (Eq. 1 and 2), and corrected by the windows around each point, warped by the field
-(Eq. 3 and 4). Both are the engine of `texrs.growth`.
+With ``quality="fast"`` steps 2 and 3 are those of the paper: coordinates are upsampled from level to level with the field's
+Jacobian (Eq. 1 and 2), and corrected by the windows around each point, warped by the field (Eq. 3 and 4). Both are the engine
+of `texrs.growth`. Unbounded textures lay patches over each other in tilings of the world (`texrs.papers.solid.layers`), so
+that a patch hangs on few others; with ``quality="fast"`` they are a chain of corrections (`texrs.papers.solid.world`).
 
 Departures, with their reasons:
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numbers
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -24,6 +23,7 @@ from texrs.papers.solid.layers import WORK, Layers
 from texrs.papers.solid.limits import check_memory
 from texrs.papers.solid.request import as_field, as_interpolation
 from texrs.papers.solid.settings import CANDIDATES, ON_DEMAND, Quality, as_quality
+from texrs.papers.solid.translated import Translated
 from texrs.papers.solid.world import World
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
@@ -152,7 +152,7 @@ class _Texture:
         field, start = self._field, region.origin
         varies = field is not None and field.constant is None
         if field is not None and varies and any(start):
-            field = _Translated(field, start)
+            field = Translated(field, start)
         if isinstance(self._world, World):
             places = self._world.read(region, progress)
             coordinates = (places / np.float32(ONE)).astype(np.float32, copy=False)
@@ -234,6 +234,7 @@ class PlaneTexture(_Texture):
     quality : {"preserve", "fast", "optimise"}
         How much work is done. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
         three times as many places for each patch. "fast" corrects blocks point by point, for textures without elements.
+        They are different textures.
     interpolation : {"nearest", "linear", "cubic"}, optional
         Between the exemplar's samples. None is "cubic". Labels are looked up at the nearest sample whatever it says.
     cache_bytes : int
@@ -281,6 +282,7 @@ class SolidTexture(_Texture):
     quality : {"preserve", "fast", "optimise"}
         How much work is done. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
         three times as many places for each patch. "fast" corrects blocks point by point, for textures without elements.
+        They are different textures.
     interpolation : {"nearest", "linear", "cubic"}, optional
         Between the exemplar's samples. None is "cubic". Labels are looked up at the nearest sample whatever it says.
     cache_bytes : int
@@ -374,31 +376,6 @@ class SolidTexture(_Texture):
         if self._field is not None:
             rest = np.einsum("...ij,...j->...i", self._field.jacobians(voxel), rest)
         return np.asarray(found / np.float32(ONE) + rest, np.float32)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class _Translated(Field):
-    """A field as it lies over a window: seen from its first voxel."""
-
-    field: Field
-    by: tuple[int, ...]
-
-    @property
-    def axes(self) -> int:  # type: ignore[override]
-        return self.field.axes
-
-    @property
-    def _rigid(self) -> bool:  # type: ignore[override]
-        return self.field._rigid
-
-    def _frames(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        return self.field._frames(points + self.by)
-
-    def _content(self) -> tuple[Any, ...] | None:
-        return None if self.field.key is None else (self.field.key, self.by)
-
-    def describe(self) -> str:
-        return f"{self.field.describe()}; seen from ({', '.join(map(str, self.by))})"
 
 
 def _as_end(value: object) -> int | None:
