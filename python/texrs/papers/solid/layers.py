@@ -1,10 +1,10 @@
 """Unbounded textures put together from patches: tilings of the world by boxes, each laid over the one before.
 
 The lowest layer are boxes of the exemplar from hashed places (`texrs.papers.solid.ground`). Each layer above is the same
-tiling, shifted. A box of it is a patch, of the best of several places, cut into what the layer before
-shows there (`Stitcher.cover`), and the torn elements inside are healed. Its ends stay as they are, so that boxes of a layer
-do not know of each other: what a box becomes hangs on the boxes of the layer before that it meets, 2^A of them, and on the
-field inside. So any part can be made by itself, and is the same however it is asked for.
+tiling, shifted. A box of it is a patch, of the best of several places, cut into what the layer before shows there
+(`Stitcher.cover`); where the last layer leaves an element torn inside a box, it is healed. The ends of a box stay as they
+are, so that boxes of a layer do not know of each other: what a box becomes hangs on the boxes of the layer before that it
+meets, 2^A of them, and on the field inside. So any part can be made by itself, and is the same however it is asked for.
 
 In rows and columns, or in classes of centres as corners, edges and interiors, a patch would hang on many more: in three
 dimensions a window of 32^3 on some 900 instead of 75. Cuts into what is covered already are no worse for it: a patch is
