@@ -77,13 +77,13 @@ def test_random_windows(origin: tuple[int, ...], size: tuple[int, ...], field: s
 def test_random_windows_of_volumes(field: str) -> None:
     rng = np.random.default_rng(3)
     shared = texture(3, field)
-    for k in range(4):
+    for k in range(3):
         size = rng.integers(1, 12, 3)
         origin = [int(rng.integers(-SIDE[3] // 2, SIDE[3] // 2 - n)) for n in size]
-        if k == 2:
+        if k == 1:
             shared.clear()
         with texrs.threads((1, 2, 7)[k % 3]):
-            found = (texture(3, field, cache_bytes=0) if k == 3 else shared).window(origin, size.tolist())
+            found = (texture(3, field, cache_bytes=0) if k == 2 else shared).window(origin, size.tolist())
         inside = tuple(slice(o + SIDE[3] // 2, o + SIDE[3] // 2 + int(n)) for o, n in zip(origin, size, strict=True))
         assert np.array_equal(found.image, whole(3, field)[inside])
     assert np.array_equal(view(found.source, SOLID), found.image)
@@ -119,15 +119,15 @@ def test_slices_are_picked_from_the_same_texture() -> None:
 
 def test_seams_are_no_worse_than_those_of_a_bounded_texture() -> None:
     """Boxes laid over each other may look at what they cover from all sides."""
-    for image in (samples.load("pebbles").image[:96, :96], samples.bricks((96, 96)).image):
+    turned = fields.circular(centre=(-40, -40), axes=2)
+    for image, field in ((samples.load("pebbles").image[:96, :96], None), (samples.bricks((96, 96)).image, turned)):
         known = texrs.Exemplar(image)
-        for field in (None, fields.circular(centre=(-40, -40), axes=2)):
-            plain = layers.Layers(known, field, 1, candidates=4, cache_bytes=1 << 26)
-            here = Region((200, 200), (0, 0), (False, False))
-            parts = list(plain._make_all(plain._meeting(len(plain.shifts) - 1, here), None))
-            found = float(join(here, parts).seams.sum()) / here.points
-            wanted = texrs.synthesize(known, 200, field=field, seed=1).report["stitched"]["seams"]
-            assert found < 1.6 * wanted
+        plain = layers.Layers(known, field, 1, candidates=4, cache_bytes=1 << 26)
+        here = Region((200, 200), (0, 0), (False, False))
+        parts = list(plain._make_all(plain._meeting(len(plain.shifts) - 1, here), None))
+        found = float(join(here, parts).seams.sum()) / here.points
+        wanted = texrs.synthesize(known, 200, field=field, seed=1).report["stitched"]["seams"]
+        assert found < 1.6 * wanted
 
 
 def test_nothing_is_torn() -> None:
