@@ -7,11 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import texrs
 from texrs import SourceMap, samples
 from texrs.quilting import Picture, quilt
 from texrs.quilting._finder import halve
 from texrs.quilting._quilt import find_calm_lines
-from texrs.quilting._windows import Window, deal_exemplars, divide_axis
+from texrs.quilting._windows import Span, Window, deal_exemplars, divide_axis
 
 
 def picture(image: np.ndarray, *, mirrored: bool = False) -> Picture:
@@ -99,6 +100,60 @@ def test_same_seed_same_map_and_other_seeds_others(pebbles: np.ndarray) -> None:
     assert (one.coordinates != other.coordinates).any(axis=-1).mean() > 0.5
 
 
+@pytest.mark.parametrize("wrap", [(True, True), (True, False), (False, False)])
+def test_threads_change_nothing(pebbles: np.ndarray, wrap: tuple[bool, bool]) -> None:
+    maps = []
+    for count in (1, 2, 7):
+        with texrs.threads(count):
+            maps.append(made([picture(pebbles), picture(pebbles, mirrored=True)], wrap=wrap))
+    assert all((m.coordinates == maps[0].coordinates).all() for m in maps)
+    assert all((m.label == maps[0].label).all() for m in maps)
+
+
+def test_seams_run_between_elements() -> None:
+    """Colours say nothing here, but the depth does."""
+    image = np.full((96, 96, 3), 128, np.uint8)
+    rows, columns = np.mgrid[:96, :96] % 24
+    depth = np.maximum(0, 8 - np.hypot(rows - 12, columns - 12)).astype(np.float32)
+    crossed = []
+    for known in (np.zeros_like(depth), depth):
+        plain = picture(image)
+        source = made([Picture(plain.colours, plain.source, known)], size=(192, 192))
+        beside = [~source.continues(axis, wrap=True) for axis in range(2)]
+        crossed.append(np.mean([source.render(depth)[seam].mean() for seam in beside]))
+    assert crossed[1] < 0.6 * crossed[0]
+
+
+@pytest.mark.parametrize("size", [(16, 16), (17, 200), (40, 41)])
+def test_a_texture_smaller_than_a_patch_is_stitched_around(pebbles: np.ndarray, size: tuple[int, int]) -> None:
+    source = made([picture(pebbles)], size=size)
+    assert source.shape == size
+    # Each axis has two patches at least, so a step over the wrap is none from one end of a patch to its other.
+    for axis in range(2):
+        apart = np.abs(source.coordinates - np.roll(source.coordinates, -1, axis)).max(axis=-1)
+        ends = np.take(apart, -1, axis)
+        assert (ends <= 1).mean() > 0.5
+
+
+@given(start=st.integers(0, 60), extent=st.integers(1, 64), wrap=st.booleans())
+def test_surroundings_are_the_pixels_beside(start: int, extent: int, wrap: bool) -> None:
+    length = 64
+    if not wrap:
+        start = min(start, length - extent)
+    span = Span(start, extent, 0, 0)
+    window = Window(span, Span(0, 1, 0, 0))
+    around = window.surround((length, 1), (wrap, False))
+    lines = np.arange(length)[:, np.newaxis]
+    seen = lines[around.index][:, 0].tolist()
+    own = [(start + i) % length for i in range(extent)]
+    assert seen[around.inner[0]] == own
+    others = {(start - 1) % length, (start + extent) % length} - set(own) if wrap else {start - 1, start + extent}
+    expected = set(own) | {line for line in others if 0 <= line < length}
+    assert around.closed[0] == (wrap and extent + 2 > length)
+    assert set(seen) == (set(own) if around.closed[0] else expected)
+    assert len(seen) == len(set(seen))
+
+
 def test_a_map_of_shares_stays_where_it_is(pebbles: np.ndarray) -> None:
     other = 255 - pebbles
     shares = np.zeros((200, 240, 2))
@@ -109,7 +164,7 @@ def test_a_map_of_shares_stays_where_it_is(pebbles: np.ndarray) -> None:
         SourceMap(p.source.coordinates, np.full_like(p.source.exemplar, k), p.source.label, None, size)
         for k, p in enumerate((first, second))
     ]
-    both = [Picture(p.colours, s, p.penalty) for p, s in zip((first, second), sources, strict=True)]
+    both = [Picture(p.colours, s, p.depth) for p, s in zip((first, second), sources, strict=True)]
     source = made(both, shares=shares)
     assert (source.exemplar[:, 40:80] == 0).mean() > 0.9
     assert (source.exemplar[:, 160:200] == 1).mean() > 0.9

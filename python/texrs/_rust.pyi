@@ -1,5 +1,5 @@
 from collections.abc import Callable, Sequence
-from typing import Any, Final, final
+from typing import Any, Final, TypeAlias, final
 
 from numpy import bool_, float32, float64, int16, int32, int64, uint8, uint16, uint32
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ __all__ = [
     "Cholesky",
     "Correlation",
     "PatchIndex",
+    "PatchSamples",
     "Stitcher",
     "cohere",
     "complete",
@@ -34,6 +35,8 @@ __all__ = [
 ]
 
 VERSION: Final[str]
+
+_Pasting: TypeAlias = tuple[tuple[int, ...], NDArray[uint32], NDArray[float32], NDArray[bool_], NDArray[bool_]]
 
 def set_threads(threads: int) -> int: ...
 def philox(counter: tuple[int, int, int, int] | Sequence[int], key: tuple[int, int] | Sequence[int]) -> list[int]: ...
@@ -194,6 +197,14 @@ class Stitcher:
         charges: Sequence[float],
         progress: Callable[[float], object] | None,
     ) -> tuple[NDArray[int32], NDArray[uint32], NDArray[float32], NDArray[float32], NDArray[int32]]: ...
+
+@final
+class PatchSamples:
+    def __new__(
+        cls, colours: NDArray[float32], depth: NDArray[float32], weights: tuple[float, float]
+    ) -> PatchSamples: ...
+    def judge(self, window: _Pasting, patches: NDArray[uint32]) -> list[float]: ...
+    def cut(self, window: _Pasting, patch: NDArray[uint32]) -> tuple[NDArray[bool_], NDArray[float32]]: ...
 
 @final
 class Appearance:

@@ -13,10 +13,13 @@ from texrs import _rust
 from texrs._arrays import as_float, as_int, as_seed
 from texrs._engine.appearance import Demand, Report
 from texrs._engine.pyramid import Region, flatten
-from texrs._typing import Floats
+from texrs._typing import Bools, Floats
 from texrs.errors import InvalidInput
 
-__all__ = ["Shown", "Stitched", "Stitcher", "Weights"]
+__all__ = ["FREE", "Pasting", "Samples", "Shown", "Stitched", "Stitcher", "Weights"]
+
+FREE = 2**32 - 1
+"""What a pixel shows that shows nothing yet."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -330,3 +333,64 @@ class Stitcher:
             progress,
         )
         return Shown(*made[:4], made[4].reshape(-1, shown.table.shape[1]))
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pasting:
+    """A window of an output that patches are cut into.
+
+    Attributes
+    ----------
+    shown : (h, w) uint32
+        The sample that each pixel shows, or `FREE`.
+    seams : (h, w, 2) float32
+        Cost of the seam from each pixel to the next one along each axis.
+    mask, core : (h, w) bool
+        Pixels that a patch covers, and those that must take it.
+
+    """
+
+    shown: NDArray[np.uint32]
+    seams: Floats
+    mask: Bools
+    core: Bools
+
+    def pack(self) -> tuple[tuple[int, ...], NDArray[np.uint32], Floats, Bools, Bools]:
+        """Return the shape, and the arrays in a row."""
+        shown, seams = np.ascontiguousarray(self.shown), np.ascontiguousarray(self.seams)
+        return self.shown.shape, shown.reshape(-1), seams.reshape(-1), self.mask.reshape(-1), self.core.reshape(-1)
+
+
+class Samples:
+    """Samples of pictures in one row, from which patches are cut that another search has found and that lie as they are.
+
+    Parameters
+    ----------
+    colours : (n, C) float32
+        Up to four channels of any scale.
+    depth : (n) float32
+        How deep inside of an element each lies, in pixels; 0 between elements.
+    weights : (float, float)
+        What a seam costs by colour and depth, as in `Weights`.
+
+    """
+
+    def __init__(self, colours: Floats, depth: Floats, weights: tuple[float, float]) -> None:
+        self._inner = _rust.PatchSamples(np.ascontiguousarray(colours), np.ascontiguousarray(depth), weights)
+
+    def judge(self, pasting: Pasting, patches: NDArray[np.uint32]) -> list[float]:
+        """Return what the seams of a window cost once each of some patches is cut into it, alone.
+
+        Parameters
+        ----------
+        pasting : Pasting
+            What they are cut into.
+        patches : (k, h, w) uint32
+            The sample that each pixel would show; of pixels outside the mask any.
+
+        """
+        return self._inner.judge(pasting.pack(), patches.reshape(len(patches), -1))
+
+    def cut(self, pasting: Pasting, patch: NDArray[np.uint32]) -> tuple[Bools, Floats]:
+        """Cut a patch (h, w) into a window: the pixels that take it, and the window's seams as they are then."""
+        take, seams = self._inner.cut(pasting.pack(), patch.reshape(-1))
+        return take.reshape(patch.shape), seams.reshape(*patch.shape, 2)

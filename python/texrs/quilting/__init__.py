@@ -1,14 +1,19 @@
 """Patches of pictures stitched into a texture of any size.
 
-Raster order after Efros and Freeman, "Image quilting", SIGGRAPH 2001: each patch is cut into what lies there along one
-least seam for each neighbour. On a cyclic axis the last patch meets the first one again, so it is chosen and cut to fit both
+Raster order after Efros and Freeman, "Image quilting", SIGGRAPH 2001: each patch is cut into what lies there along the
+least seam. On a cyclic axis the last patch meets the first one again, so it is chosen and cut to fit both
 its neighbours.
 
 Departures, with their reasons:
 
-- Each seam is the exact minimum cut of its strip, which may turn back, and not a row-by-row recurrence.
-- Costs are plain differences. Divided by the local gradient, as Kwatra et al. have it, they lead the seams along strong
-  edges, and what is left of the seams shows there (gradient at seams 1.3 to 1.9 times the usual, 1.1 to 1.7 without).
+- A patch is cut into all that it overlaps at once, by the minimum cut of the stitcher (`texrs._engine.stitcher`), not into one
+  strip for each neighbour and row by row. What the seams cost that it covers is known: they are covered where that pays.
+- Costs are squared differences, which keep seams out of edges that do not meet. Divided by the local gradient, as Kwatra et al.
+  have it, they lead the seams along strong edges, and what is left of the seams shows there.
+- A seam also costs the depth inside of elements of the two pixels that meet. With that, differences at seams are 1.12 times the
+  usual over 22 textures, and .8 % beyond the 99th percentile; with plain differences in strips 1.32 and 2 %. With the
+  stitcher's cost for colours seldom side by side they are least (.94), but things that look alike are fused: coins, olives.
+- On a lattice a patch also pays for what it does not fit: a seam through plain ground does not show that it is out of step.
 - A patch is charged for showing what others show already, and for going on where a neighbour ends. A charge that
   multiplies the match would let the exact continuation of a neighbour, whose match costs nothing, win for ever.
 - A patch that shows the mirror image of what it overlaps is refused: along the axis of a mirror the two meet without a
@@ -75,7 +80,7 @@ def quilt(
     members = [[i for i, p in enumerate(pictures) if p.kind == kind] for kind in range(shares.shape[-1])]
     colours = [p.colours for p in pictures]
     finders = [Finder(colours, mine, shape) for mine in members]
-    canvas = Quilt(pictures, size)
+    canvas = Quilt(pictures, size, wrap)
     windows = [Window(r, c) for r in rows for c in columns]
     wanted = deal_exemplars(windows, size, shares, seed)
     for number, window in enumerate(windows):
@@ -89,9 +94,6 @@ def quilt(
         else:
             canvas.paste(window, finders[wanted[number]])
     progress(1.0)
-    if shares.ndim == 1:
-        # A cyclic texture may begin anywhere. Beside a map of shares it stays where it is.
-        for axis in range(2):
-            if wrap[axis]:
-                canvas.roll(axis, uniform(seed, axis, 0, 0, 6))
-    return canvas.finish()
+    # A cyclic texture may begin anywhere. Beside a map of shares it stays where it is.
+    rolled = {axis: uniform(seed, axis, 0, 0, 6) for axis in range(2) if wrap[axis] and shares.ndim == 1}
+    return canvas.finish(rolled)

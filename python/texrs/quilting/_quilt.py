@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._engine.stitcher import FREE, Pasting, Samples
 from texrs._typing import Bools, Floats
 from texrs.kernels.patch_search import Match
-from texrs.kernels.seam import Strip, cut_strips
 from texrs.quilting._finder import Finder
-from texrs.quilting._windows import Window
+from texrs.quilting._windows import Surroundings, Window
 from texrs.source_map import SourceMap, chain_pixels
 
 CANDIDATES = 3
 """Matches of the pool that are cut in."""
-REPETITION, GOOD, ON_LATTICE = 10.0, 0.1, 1.5
+REPETITION, GOOD, ON_LATTICE = 10.0, 0.1, 2.5
 """Charge for showing what all other patches show, in units of a match that is better than all but this share: where few
 places fit, as between things on plain ground, others would tear what they are put on. And on a lattice, where all places are
 much alike and must meet exactly, in units of a typical match."""
+COLOUR, DEPTH = 1.0, 1.0
+"""What a seam costs: squared differences of the colours, and the depth inside of elements of the pixels that meet there."""
 CONTINUATION = 2.0
 """Charge for going on with the piece of the exemplar that lies there already, in units of a typical match."""
 CELL = 8
@@ -40,8 +41,8 @@ class Picture:
     colours: Floats
     """(h, w, C)"""
     source: SourceMap
-    penalty: Floats
-    """(h, w): how much dearer a seam is at a pixel; its cost is multiplied by one more than this."""
+    depth: Floats
+    """(h, w): how deep inside an element each pixel is, 0 between elements, where seams are cheap."""
     regular: bool = False
     """Whether it repeats on a lattice."""
 
@@ -57,25 +58,22 @@ class Quilt:
     The pixels of all pictures stand in one row; what a texture shows at a pixel is a place in that row.
     """
 
-    def __init__(self, pictures: Sequence[Picture], size: tuple[int, int]) -> None:
+    def __init__(self, pictures: Sequence[Picture], size: tuple[int, int], wrap: tuple[bool, bool]) -> None:
         channels = pictures[0].colours.shape[2]
         self.pictures = pictures
         self.size = size
-        self.place = np.zeros(size, np.uint32)
+        self.wrap = wrap
+        self.place = np.full(size, FREE, np.uint32)
         self.label = np.zeros(size, np.uint32)
+        self.seams = np.zeros((*size, 2), np.float32)
         self.pastes = 0
         self.pixels = chain_pixels([p.source for p in pictures])
         self.all_colours = np.concatenate([p.colours.reshape(-1, channels) for p in pictures])
-        self.all_penalties = np.concatenate([p.penalty.ravel() for p in pictures])
+        depth = np.concatenate([p.depth.ravel() for p in pictures])
+        self.samples = Samples(self.all_colours, depth, (COLOUR, DEPTH))
         self.all_hands = np.concatenate([np.linalg.det(p.source.frames()).ravel() > 0 for p in pictures])
         self.cells = np.concatenate([number_cells(p.source).ravel() for p in pictures])
         self.used = np.zeros(int(self.cells.max()) + 1)
-
-    def box(self, match: Match, window: Window) -> tuple[slice, slice]:
-        """Return the part of a picture that a match copies."""
-        return slice(match.row, match.row + window.rows.extent), slice(
-            match.column, match.column + window.columns.extent
-        )
 
     def list_places(self, matches: Sequence[Match], window: Window, step: int = 1) -> NDArray[np.uint32]:
         """Return the places in the row that matches copy, or of each ``step``-th row and column: (matches, rows, columns)."""
@@ -89,7 +87,7 @@ class Quilt:
     def paste(self, window: Window, finder: Finder) -> None:
         """Cut the most promising matches into what is there, and keep the one that shows and repeats the least."""
         old, known = self.place[window.index(self.size)], window.mark_known()
-        colours = self.all_colours.take(old, axis=0)
+        colours = self.all_colours.take(old, axis=0, mode="clip")
         pool = finder.find_pool(colours, known)
         shown = self.list_places(
             [Match(m.cost, finder.members[m.exemplar], m.row, m.column) for m in pool], window, CELL
@@ -103,40 +101,38 @@ class Quilt:
         free = np.flatnonzero(mirrored <= MIRRORED) if (mirrored <= MIRRORED).any() else np.arange(len(pool))
         best = sorted(free.tolist(), key=lambda k: pool[k].cost / usual + charges[k])[:CANDIDATES]
         exact = finder.refine([pool[k] for k in best], colours, known)
-        seams = self.cut(window, colours, self.all_penalties.take(old), exact)
-        usual = float(np.median([value for value, _ in seams])) or 1.0
-        chosen = min(range(len(best)), key=lambda i: seams[i][0] / usual + charges[best[i]])
-        self.lay(window, exact[chosen], seams[chosen][1])
+        around = window.surround(self.size, self.wrap)
+        pasting = self.open_pasting(window, around)
+        patches = np.zeros((len(best), *pasting.shown.shape), np.uint32)
+        patches[:, *around.inner] = self.list_places(exact, window)
+        seams = self.samples.judge(pasting, patches)
+        least = float(np.median(seams)) or 1.0
+        if regular:
+            # A seam through plain ground would not tell a place that is out of step.
+            charges += [m.cost / usual for m in pool]
+        chosen = min(range(len(best)), key=lambda i: seams[i] / least + charges[best[i]])
+        taken, self.seams[around.index] = self.samples.cut(pasting, patches[chosen])
+        self.lay(window, exact[chosen], taken[around.inner])
 
-    def lay(self, window: Window, match: Match, mask: Bools | Literal[True] = True) -> None:
+    def lay(self, window: Window, match: Match, mask: Bools | None = None) -> None:
         """Lay a patch, or what of it a mask marks."""
         at, [places] = window.index(self.size), self.list_places([match], window)
-        self.place[at] = np.where(mask, places, self.place[at])
-        self.label[at] = np.where(mask, np.uint32(self.pastes), self.label[at])
+        self.place[at] = places if mask is None else np.where(mask, places, self.place[at])
+        self.label[at] = self.pastes if mask is None else np.where(mask, np.uint32(self.pastes), self.label[at])
         self.used[np.unique(self.cells[places[::CELL, ::CELL]])] += 1
         self.pastes += 1
 
-    def cut(
-        self, window: Window, colours: Floats, penalty: Floats, matches: Sequence[Match]
-    ) -> list[tuple[float, Bools]]:
-        """Cut matches in along one seam for each overlap: what the seams cost, and where each match is taken."""
-        bands, strips = window.list_overlaps(), []
-        for match in matches:
-            picture, box = self.pictures[match.exemplar], self.box(match, window)
-            fresh, dear = picture.colours[box], picture.penalty[box]
-            for axis, after, band in bands:
-                sides = (colours[band], fresh[band]) if after else (fresh[band], colours[band])
-                strips.append(Strip(*sides, axis, dear[band] + penalty[band]))
-        cuts = iter(cut_strips(strips, cost="paper"))
-        found = []
-        for _ in matches:
-            taken, value = np.ones(window.shape, bool), 0.0
-            for _, after, band in bands:
-                seam = next(cuts)
-                taken[band] &= seam.mask == after
-                value += seam.value
-            found.append((value, taken))
-        return found
+    def open_pasting(self, window: Window, around: Surroundings) -> Pasting:
+        """Return what lies where a patch is to lie and beside it, and what it may cover of it."""
+        shown = self.place[around.index]
+        mask, core = np.zeros(shown.shape, bool), np.zeros(shown.shape, bool)
+        mask[around.inner], core[around.inner] = True, window.mark_core()
+        for axis in np.flatnonzero(around.closed):
+            # It meets itself there, so its ends stay what they are.
+            for line in (0, -1):
+                ends = np.moveaxis(mask, axis, 0)[line]
+                ends &= np.moveaxis(shown, axis, 0)[line] == FREE
+        return Pasting(shown, self.seams[around.index], mask, core)
 
     def measure_likeness(
         self, shown: NDArray[np.uint32], known: Bools, old: NDArray[np.uint32]
@@ -156,17 +152,20 @@ class Quilt:
         shares: NDArray[np.float64] = self.used[self.cells[shown]].mean(axis=(1, 2)) / self.pastes
         return shares
 
-    def roll(self, axis: int, chance: float) -> None:
-        """Let a cyclic axis begin at one of the calm lines, so that the border of the texture does not follow an edge."""
-        lines = np.moveaxis(self.place, axis, 0)
-        found = find_calm_lines(self.all_colours[lines[: CALM + 1]])
-        start = found[int(chance * len(found))]
-        # One after the other, so that no more than one is there twice.
-        self.place = np.roll(self.place, -start, axis)
-        self.label = np.roll(self.label, -start, axis)
+    def finish(self, rolled: Mapping[int, float]) -> SourceMap:
+        """Return the map into the exemplars; the quilt is used up.
 
-    def finish(self) -> SourceMap:
-        """Return the map into the exemplars; the quilt is used up."""
+        The axes in ``rolled`` begin at one of the calm lines, so that the border of the texture does not follow an edge: at
+        the first one for 0, and at the last for 1.
+        """
+        del self.seams
+        for axis, chance in rolled.items():
+            lines = np.moveaxis(self.place, axis, 0)
+            found = find_calm_lines(self.all_colours[lines[: CALM + 1]])
+            start = found[int(chance * len(found))]
+            # One after the other, so that no more than one is there twice.
+            self.place = np.roll(self.place, -start, axis)
+            self.label = np.roll(self.label, -start, axis)
         return SourceMap.pick([p.source for p in self.pictures], self.place, self.label, overwrite=True)
 
 

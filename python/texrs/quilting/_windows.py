@@ -59,33 +59,62 @@ class Window:
         """Rows and columns of the patch."""
         return self.rows.extent, self.columns.extent
 
-    def list_overlaps(self) -> list[tuple[int, bool, tuple[slice, slice]]]:
-        """Return the overlaps: the axis that the seam crosses, whether the patch lies after it, and where it is."""
-        whole = slice(None)
-        found = []
-        for axis, span in enumerate((self.rows, self.columns)):
-            for width, part, after in (
-                (span.before, slice(0, span.before), True),
-                (span.after, slice(span.extent - span.after, None), False),
-            ):
-                if width:
-                    found.append((axis, after, (part, whole) if axis == 0 else (whole, part)))
-        return found
-
     def mark_known(self) -> Bools:
         """Mark what other patches cover."""
         known = np.zeros(self.shape, bool)
-        for _, _, band in self.list_overlaps():
-            known[band] = True
+        for axis, span in enumerate((self.rows, self.columns)):
+            lines = np.moveaxis(known, axis, 0)
+            lines[: span.before] = True
+            lines[span.extent - span.after :] = True
         return known
+
+    def mark_core(self) -> Bools:
+        """Mark the middle, which the patch covers in any case: what no other does, or else where its overlaps meet."""
+        rows, columns = (
+            slice(min(s.before, s.extent - s.after - 1), max(s.before, s.extent - s.after - 1) + 1)
+            for s in (self.rows, self.columns)
+        )
+        core = np.zeros(self.shape, bool)
+        core[rows, columns] = True
+        return core
 
     def index(self, size: tuple[int, int]) -> Any:
         """Return the index of its pixels in a texture of this size, around the edges."""
-        ends = [s.start + s.extent <= n for s, n in zip((self.rows, self.columns), size, strict=True)]
-        if all(ends):
-            return tuple(slice(s.start, s.start + s.extent) for s in (self.rows, self.columns))
-        places = ((s.start + np.arange(s.extent)) % n for s, n in zip((self.rows, self.columns), size, strict=True))
-        return np.ix_(*places)
+        return index_box([(s.start, s.start + s.extent) for s in (self.rows, self.columns)], size)
+
+    def surround(self, size: tuple[int, int], wrap: tuple[bool, bool]) -> Surroundings:
+        """Return the patch and the pixels beside it, as far as there are others."""
+        ends, inner, closed = [], [], []
+        for span, length, cyclic in zip((self.rows, self.columns), size, wrap, strict=True):
+            low, high = span.start - 1, span.start + span.extent + 1
+            own = cyclic and high - low > length
+            if own:
+                low, high = low + 1, high - 1
+            elif not cyclic:
+                low, high = max(low, 0), min(high, length)
+            ends.append((low, high))
+            inner.append(slice(span.start - low, span.start - low + span.extent))
+            closed.append(own)
+        return Surroundings(index_box(ends, size), (inner[0], inner[1]), (closed[0], closed[1]))
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """Where a patch lies, with the pixels beside it."""
+
+    index: Any
+    """Of them all in the texture."""
+    inner: tuple[slice, slice]
+    """The patch among them."""
+    closed: tuple[bool, bool]
+    """Axes around which it goes, so that beside it there is only itself."""
+
+
+def index_box(ends: Sequence[tuple[int, int]], size: tuple[int, int]) -> Any:
+    """Return the index of a box in a texture of this size, around the edges."""
+    if all(low >= 0 and high <= n for (low, high), n in zip(ends, size, strict=True)):
+        return tuple(slice(low, high) for low, high in ends)
+    return np.ix_(*(np.arange(low, high) % n for (low, high), n in zip(ends, size, strict=True)))
 
 
 def deal_exemplars(

@@ -122,7 +122,7 @@ mod _rust {
     #[pymodule_export]
     use super::sparse::Cholesky;
     #[pymodule_export]
-    use super::stitcher::Stitcher;
+    use super::stitcher::{PatchSamples, Stitcher};
     #[pymodule_export]
     use super::warp::{warp_mesh, warp_points};
 

@@ -7,7 +7,8 @@ use super::appearance::{GuideIn, Where, fixed, frames, guide, region, slices};
 use super::{grouped, run};
 use crate::Result;
 use crate::engine::stitcher::{
-    self, Adjacency, Elements, Given, Options, Patch, Prepared, Shown, Source, Weights,
+    self, Adjacency, Elements, Given, Options, Pasted, Pasting, Patch, Prepared, Samples, Shown,
+    Source, Weights,
 };
 use crate::foundation::fixed::{Frame, ONE};
 use crate::foundation::grid::Grid;
@@ -327,3 +328,81 @@ fn options(patch: PatchIn, weights: [f32; 8], charges: [f32; 3], seed: u64) -> O
 }
 
 type PyReadonlyArray3In<'py> = numpy::PyReadonlyArray3<'py, i16>;
+
+/// Samples that patches are cut from, in a row.
+#[pyclass(frozen)]
+pub(super) struct PatchSamples(Samples);
+
+/// What a window shows, the seams of it, the points that a patch covers, and those that must take it.
+type PastingIn<'py> = (
+    [usize; 2],
+    PyReadonlyArray1<'py, u32>,
+    PyReadonlyArray1<'py, f32>,
+    PyReadonlyArray1<'py, bool>,
+    PyReadonlyArray1<'py, bool>,
+);
+
+/// The points that take a patch, and the seams of the window then.
+type PastedOut<'py> = (Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<f32>>);
+
+fn pasting<'a>(window: &'a PastingIn<'_>) -> PyResult<Pasting<'a>> {
+    let (shape, shown, seams, mask, core) = window;
+    Ok(Pasting {
+        shape: *shape,
+        shown: shown.as_slice()?,
+        seams: grouped("seams", seams.as_slice()?)?,
+        mask: mask.as_slice()?,
+        core: core.as_slice()?,
+    })
+}
+
+#[pymethods]
+impl PatchSamples {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        colours: PyReadonlyArray2<'_, f32>,
+        depth: PyReadonlyArray1<'_, f32>,
+        weights: (f32, f32),
+    ) -> PyResult<Self> {
+        let channels = colours.shape()[1];
+        let (colours, depth) = (colours.as_slice()?, depth.as_slice()?);
+        let weights = Weights {
+            colour: weights.0,
+            depth: weights.1,
+            ..Weights::NONE
+        };
+        run(py, None, |_| {
+            Samples::new(colours, channels, depth, weights)
+        })
+        .map(Self)
+    }
+
+    fn judge(
+        &self,
+        py: Python<'_>,
+        window: PastingIn<'_>,
+        patches: PyReadonlyArray2<'_, u32>,
+    ) -> PyResult<Vec<f64>> {
+        let points = patches.shape()[1].max(1);
+        let patches: Vec<&[u32]> = patches.as_slice()?.chunks(points).collect();
+        let pasting = pasting(&window)?;
+        run(py, None, |monitor| {
+            self.0.judge(&pasting, &patches, monitor)
+        })
+    }
+
+    fn cut<'py>(
+        &self,
+        py: Python<'py>,
+        window: PastingIn<'py>,
+        patch: PyReadonlyArray1<'py, u32>,
+    ) -> PyResult<PastedOut<'py>> {
+        let (pasting, patch) = (pasting(&window)?, patch.as_slice()?);
+        let Pasted { take, seams } = run(py, None, |monitor| self.0.cut(&pasting, patch, monitor))?;
+        Ok((
+            PyArray1::from_vec(py, take),
+            PyArray1::from_vec(py, seams.into_flattened()),
+        ))
+    }
+}

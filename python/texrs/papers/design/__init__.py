@@ -18,7 +18,8 @@ Departures, with their reasons:
 - An element that the border of the exemplar cuts only slides along that border; elements keep out of each other.
 - In a cut, the inside of an element is a hard constraint, and a context band of its surroundings is offered with it:
   otherwise the minimum cut makes a wholly overlapped element vanish.
-- Where patches of the large texture meet, cuts are dearer inside elements, so seams run between them.
+- Where patches of the large texture meet, cuts pay the square of the difference, and for the depth inside of the elements that
+  meet there, so seams run between them and out of edges that do not fit (see `texrs.quilting`).
 - Where elements of one shape lie in a heap they take each other's places, turned and scaled to the shape that they fill; in a
   heap of leaves most rest. If all moved there would be nothing left to lie on. An element brings only background along, not
   pieces of its neighbours.
@@ -31,7 +32,7 @@ Departures, with their reasons:
 - The differences that the colours are corrected to are those of the sources on both sides of a seam, where the paper
   takes those of the picture itself; some weight on the values keeps the colours from drifting.
 
-``method="paper"`` leaves the departures out (`texrs.papers.design.literal`), but for the torus.
+``method="paper"`` leaves the departures out (`texrs.papers.design.literal`), but for the torus and the squares.
 """
 
 from __future__ import annotations

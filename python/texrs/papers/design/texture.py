@@ -22,22 +22,21 @@ __all__ = ["correct_colours", "stitch_tiles"]
 
 PATCH, OVERLAP = 0.6, 0.25
 """Side of a patch and overlap of two, as shares of the exemplar's shorter side."""
-WHOLENESS, JOINTED = 8.0, 2.0
-"""How many times dearer a seam is inside an element than between elements. And where elements of a lattice lie close, as bricks
-do: the joints between them go on across every seam, and one that kept to them would show."""
+DEEP = 6.0
+"""Depth in pixels from which on all of an element is as deep."""
 CLOSE = 0.5
 """Share of the exemplar that elements cover from which on they lie close."""
 
 
 def stitch_tiles(plans: Sequence[Plan], tiles: Sequence[Tile], arguments: Arguments, seed: int) -> SourceMap:
     """Stitch patches of the tiles into a texture of any size, on the torus where it wraps (section 3.1, step 4)."""
-    penalties = [penalise_seams(plan) for plan in plans]
+    depths = [measure_depth(plan) for plan in plans]
     pictures = []
     for tile in tiles:
         which = int(tile.source.exemplar[0, 0])
-        penalty = gather(penalties[which], tile.source.coordinates, interpolation="nearest")
-        pictures.append(Picture(tile.colours, tile.source, penalty, plans[which].parts.lattice is not None))
-    side = min(min(p.shape) for p in penalties)
+        depth = gather(depths[which], tile.source.coordinates, interpolation="nearest")
+        pictures.append(Picture(tile.colours, tile.source, depth, plans[which].parts.lattice is not None))
+    side = min(min(d.shape) for d in depths)
     return quilt(
         pictures,
         arguments.size,
@@ -50,13 +49,17 @@ def stitch_tiles(plans: Sequence[Plan], tiles: Sequence[Tile], arguments: Argume
     )
 
 
-def penalise_seams(plan: Plan) -> Floats:
-    """Return how much dearer a seam is at each pixel of an exemplar: inside elements, so that seams run between them."""
+def measure_depth(plan: Plan) -> Floats:
+    """Return how deep inside an element each pixel of an exemplar is, so that seams run between them.
+
+    Not where elements of a lattice lie close, as bricks do: the joints between them go on across every seam, and one that
+    kept to them would show.
+    """
     parts = plan.parts
-    if parts.kind not in ("components", "labels"):
-        return np.zeros(plan.guide.shape[:2], np.float32)
     jointed = parts.lattice is not None and (parts.elements > 0).mean() > CLOSE
-    return (JOINTED if jointed else WHOLENESS) * parts.measure_depth(3)
+    if jointed or parts.kind not in ("components", "labels"):
+        return np.zeros(plan.guide.shape[:2], np.float32)
+    return DEEP * parts.measure_depth(DEEP)
 
 
 def correct_colours(composite: SourceMap, picture: Array, arguments: Arguments) -> tuple[Array, dict[str, Any]]:

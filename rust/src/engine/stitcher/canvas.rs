@@ -135,6 +135,16 @@ impl<const D: usize> Canvas<D> {
 }
 
 impl<const D: usize> Window<D> {
+    /// A window of a shape, which is all that there is.
+    pub(super) fn alone(shape: [usize; D]) -> Result<Self> {
+        let grid = Grid::new(shape, [false; D])?;
+        Ok(Self {
+            low: [0; D],
+            grid,
+            points: (0..grid.len() as u32).collect(),
+        })
+    }
+
     /// Where a point of the window lies on the canvas, not brought around.
     #[inline(always)]
     pub(super) fn at(&self, point: [usize; D]) -> [i32; D] {

@@ -11,6 +11,7 @@ use super::canvas::{FREE, HELD, View, Window};
 use super::chart::Chart;
 use super::energy::{Energy, capacity};
 use super::source::{CHANNELS, Look, Source};
+use super::weights::Weights;
 use crate::Result;
 use crate::engine::guide::{Guide, UNRELATED};
 use crate::foundation::fixed::Place;
@@ -27,27 +28,6 @@ pub(super) const MOST: f32 = 1000.0;
 pub(super) const LARGE: &[(usize, usize)] = &[(4096, 2)];
 /// Beyond this, colours of two elements are as different as can be.
 const UNLIKE: f32 = 1.5;
-
-/// What a seam costs.
-#[derive(Debug, Clone, Copy)]
-pub struct Weights {
-    /// Squared differences of the colours on both sides.
-    pub colour: f32,
-    /// Two elements in contact.
-    pub contact: f32,
-    /// A jump of the depth: an element that is cut off.
-    pub jump: f32,
-    /// A seam inside of an element, by its depth on both sides.
-    pub depth: f32,
-    /// An element beside another one's border: joints stay as wide as two samples.
-    pub joint: f32,
-    /// Classes that are seldom side by side.
-    pub surprise: f32,
-    /// A point whose patch is bent against the field.
-    pub distortion: f32,
-    /// A point that does not show what is asked.
-    pub guide: f32,
-}
 
 /// A patch at a place.
 pub(super) struct Proposal<'a, const D: usize> {
@@ -230,6 +210,18 @@ impl<const D: usize> Cutter<'_, D> {
             .iter()
             .find(|(least, _)| n > *least)
             .map_or(1, |&(_, side)| side);
+        self.cut_between(view, patch, block, monitor)
+    }
+
+    /// Cuts a patch in between blocks of points of a side.
+    pub(super) fn cut_between(
+        &self,
+        view: &View<D>,
+        patch: &Proposal<'_, D>,
+        block: usize,
+        monitor: &Monitor,
+    ) -> Result<Cutting<D>> {
+        let n = patch.window.grid.len();
         let ties: Vec<Tie> = (0..n).map(|i| tie(view, patch, i)).collect();
         self.solve(view, patch, &ties, block, monitor)
     }
@@ -241,6 +233,18 @@ impl<const D: usize> Cutter<'_, D> {
         view: &View<D>,
         patch: &Proposal<'_, D>,
         coarse: Cutting<D>,
+        monitor: &Monitor,
+    ) -> Result<Cutting<D>> {
+        self.refine_within(view, patch, coarse, 0, monitor)
+    }
+
+    /// The same, with all points free that lie within some steps of the cut, but at least as many as a block has.
+    pub(super) fn refine_within(
+        &self,
+        view: &View<D>,
+        patch: &Proposal<'_, D>,
+        coarse: Cutting<D>,
+        reach: usize,
         monitor: &Monitor,
     ) -> Result<Cutting<D>> {
         let grid = &patch.window.grid;
@@ -256,7 +260,7 @@ impl<const D: usize> Cutter<'_, D> {
                     }
                 });
             }
-            for _ in 0..best.block {
+            for _ in 0..best.block.max(reach) {
                 band = widen(grid, &band);
             }
             for i in 0..grid.len() {

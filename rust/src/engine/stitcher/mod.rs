@@ -7,6 +7,8 @@
 //!
 //! Kwatra, Schödl, Essa, Turk, Bobick, *Graphcut textures*, SIGGRAPH 2003. Departures: patches follow a field; a cut
 //! judges the pair that results, not how far the two pictures differ; elements are known to it.
+//!
+//! [`Samples`] is the third step alone, for patches that lie as they are and are found by others.
 
 mod balance;
 mod canvas;
@@ -14,10 +16,12 @@ mod chart;
 mod cover;
 mod cut;
 mod energy;
+mod flat;
 mod heal;
 mod mesh;
 mod search;
 mod source;
+mod weights;
 
 use std::collections::HashMap;
 use std::sync::Mutex;
@@ -33,10 +37,11 @@ use balance::Balance;
 use canvas::{Canvas, HELD};
 use chart::Chart;
 pub use cover::{Prepared, Shown, cover, judge};
-pub use cut::Weights;
 use cut::{Cutter, LARGE, Proposal};
+pub use flat::{Pasted, Pasting, Samples};
 use search::{Charges, Index};
 pub use source::{Adjacency, Elements, Source};
+pub use weights::Weights;
 
 /// A patch is left out where all around its centre is covered, within this share of the step.
 const CORE: f32 = 0.45;
@@ -219,23 +224,9 @@ fn check<const D: usize>(
             ),
         ));
     }
-    let w = &options.weights;
-    let costs = [
-        w.colour,
-        w.contact,
-        w.jump,
-        w.depth,
-        w.joint,
-        w.surprise,
-        w.distortion,
-        w.guide,
-    ];
-    let others = [options.repetition, options.continuation, options.balance];
-    if !costs
-        .iter()
-        .chain(&others)
-        .all(|x| (0.0..=100.0).contains(x))
-    {
+    options.weights.check()?;
+    let charges = [options.repetition, options.continuation, options.balance];
+    if !charges.iter().all(|x| (0.0..=100.0).contains(x)) {
         return Err(Error::value(
             "weights",
             format!("0 to 100 are allowed, got {options:?}"),

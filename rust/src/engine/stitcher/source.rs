@@ -124,11 +124,8 @@ impl<const D: usize> Source<D> {
         for &class in adjacency.classes {
             this.shares[usize::from(class)] += 1.0 / n as f64;
         }
-        let (mean, deviation) = spread(colours, channels);
+        this.colour(colours);
         for (i, look) in this.looks.iter_mut().enumerate() {
-            for c in 0..channels {
-                look.colour[c] = (colours[i * channels + c] - mean[c]) / deviation;
-            }
             look.depth = elements.depth.get(i).map_or(0.0, |d| d.clamp(0.0, DEEP));
             look.element = elements.labels.get(i).copied().unwrap_or(0);
             look.class = adjacency.classes.get(i).copied().unwrap_or(0);
@@ -136,6 +133,56 @@ impl<const D: usize> Source<D> {
         }
         this.widen();
         Ok(this)
+    }
+
+    /// Samples in a row, each so deep inside of an element: all that is known of them is what they show.
+    ///
+    /// # Errors
+    /// Arrays of other sizes, a grid without room for them, and values that are not finite.
+    pub(super) fn row(
+        colours: &[f32],
+        grid: Grid<D>,
+        channels: usize,
+        depth: &[f32],
+    ) -> Result<Self> {
+        let n = depth.len();
+        if !(1..=CHANNELS).contains(&channels)
+            || n > grid.len()
+            || n.checked_mul(channels) != Some(colours.len())
+        {
+            return Err(Error::Shape {
+                argument: "colours",
+                expected: vec![n, channels.clamp(1, CHANNELS)],
+                got: vec![colours.len()],
+            });
+        }
+        if !colours.iter().chain(depth).all(|x| x.is_finite()) {
+            return Err(Error::value("colours", "finite values are allowed"));
+        }
+        let mut this = Self {
+            grid,
+            channels,
+            looks: memory::filled("the samples of pictures", Look::EMPTY, grid.len())?,
+            sizes: vec![0; 2],
+            costs: Vec::new(),
+            classes: 0,
+            shares: Vec::new(),
+        };
+        this.colour(colours);
+        for (look, d) in this.looks.iter_mut().zip(depth) {
+            look.depth = d.clamp(0.0, DEEP);
+        }
+        Ok(this)
+    }
+
+    /// Gives the samples their colours.
+    fn colour(&mut self, colours: &[f32]) {
+        let (mean, deviation) = spread(colours, self.channels);
+        for (look, colour) in self.looks.iter_mut().zip(colours.chunks(self.channels)) {
+            for c in 0..self.channels {
+                look.colour[c] = (colour[c] - mean[c]) / deviation;
+            }
+        }
     }
 
     /// Marks samples beside those of elements: a joint then stays as wide as two samples.

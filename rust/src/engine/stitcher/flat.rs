@@ -1,0 +1,362 @@
+//! The flat case: patches that lie as they are, cut into a window of what another search has laid.
+//!
+//! Places are numbers of samples in one row, which may be those of many pictures: nothing is asked of what lies beside a
+//! sample.
+
+use std::sync::Mutex;
+
+use super::canvas::{FREE, View, Window};
+use super::cut::{Cutter, Proposal};
+use super::source::{Look, Source};
+use super::weights::Weights;
+use crate::foundation::fixed::{ONE, Place};
+use crate::foundation::grid::Grid;
+use crate::foundation::par::{self, Monitor};
+use crate::{Error, Result};
+
+/// Samples stand in lines of so many, as a coordinate has no room for all of a row.
+const LINE: usize = 1 << 14;
+/// Windows of more points are cut between blocks of such a side: to be compared, and to be laid.
+const JUDGED: (usize, usize) = (1 << 12, 4);
+const CUT: (usize, usize) = (1 << 15, 2);
+/// How far points may lie from a cut between blocks that are cut once more, each alone.
+const REACH: usize = 8;
+
+/// A window of an output, and what a patch may do to it; all arrays have one entry a point.
+#[derive(Debug, Clone, Copy)]
+pub struct Pasting<'a> {
+    /// Rows and columns.
+    pub shape: [usize; 2],
+    /// The sample that each point shows; `u32::MAX` where there is none yet.
+    pub shown: &'a [u32],
+    /// Cost of the seam from each point to the next one along each axis.
+    pub seams: &'a [[f32; 2]],
+    /// Points that a patch covers.
+    pub mask: &'a [bool],
+    /// Points that must take it.
+    pub core: &'a [bool],
+}
+
+/// A patch, cut into a window.
+#[derive(Debug, Clone)]
+pub struct Pasted {
+    /// The points that take the patch.
+    pub take: Vec<bool>,
+    /// Seams of the window, as they are then.
+    pub seams: Vec<[f32; 2]>,
+}
+
+/// Samples that patches are cut from, in a row.
+#[derive(Debug, Clone)]
+pub struct Samples {
+    source: Source<2>,
+    count: usize,
+    weights: Weights,
+}
+
+impl Samples {
+    /// Samples of some colours, each so deep inside of an element, and what a seam costs.
+    ///
+    /// # Errors
+    /// Arrays of other sizes, values that are not finite or out of their range, and too many samples.
+    pub fn new(colours: &[f32], channels: usize, depth: &[f32], weights: Weights) -> Result<Self> {
+        weights.check()?;
+        let count = depth.len();
+        if count >= FREE as usize {
+            return Err(Error::value(
+                "depth",
+                format!("fewer than {FREE} samples are allowed, got {count}"),
+            ));
+        }
+        let grid = Grid::new([count.div_ceil(LINE), LINE.min(count)], [false; 2])?;
+        let source = Source::row(colours, grid, channels, depth)?;
+        Ok(Self {
+            source,
+            count,
+            weights,
+        })
+    }
+
+    /// What the seams of a window cost once each of some patches is cut into it, alone. A patch is the sample that each point
+    /// would show; large ones are cut between blocks of points, which is enough to compare them.
+    ///
+    /// # Errors
+    /// Arrays of other sizes than the window's, samples that are not there, or a monitor that was cancelled.
+    pub fn judge(
+        &self,
+        pasting: &Pasting<'_>,
+        patches: &[&[u32]],
+        monitor: &Monitor,
+    ) -> Result<Vec<f64>> {
+        let (window, view) = self.open(pasting)?;
+        let cutter = self.cutter();
+        let block = side(&window, JUDGED);
+        let values = par::map(patches.len(), |k| {
+            let patch = self.propose(pasting, &window, patches[k])?;
+            Ok(cutter.cut_between(&view, &patch, block, monitor)?.value)
+        });
+        values.into_iter().collect()
+    }
+
+    /// Cuts a patch into a window: between any of its points, unless it is very large.
+    ///
+    /// # Errors
+    /// As of [`Self::judge`].
+    pub fn cut(&self, pasting: &Pasting<'_>, patch: &[u32], monitor: &Monitor) -> Result<Pasted> {
+        let (window, view) = self.open(pasting)?;
+        let patch = self.propose(pasting, &window, patch)?;
+        let cutter = self.cutter();
+        let coarse = cutter.cut_between(&view, &patch, side(&window, CUT), monitor)?;
+        let cut = cutter.refine_within(&view, &patch, coarse, REACH, monitor)?;
+        Ok(Pasted {
+            take: cut.take,
+            seams: cut.seams,
+        })
+    }
+
+    fn cutter(&self) -> Cutter<'_, 2> {
+        Cutter {
+            source: &self.source,
+            weights: self.weights,
+            guide: None,
+            // Each cut says how finely it is made.
+            blocks: &[],
+            solvers: Mutex::default(),
+        }
+    }
+
+    /// A window, and what it shows.
+    fn open(&self, pasting: &Pasting<'_>) -> Result<(Window<2>, View<2>)> {
+        let window = Window::alone(pasting.shape)?;
+        let n = window.points.len();
+        for (argument, got) in [
+            ("shown", pasting.shown.len()),
+            ("seams", pasting.seams.len()),
+            ("mask", pasting.mask.len()),
+            ("core", pasting.core.len()),
+        ] {
+            if got != n {
+                return Err(Error::Shape {
+                    argument,
+                    expected: pasting.shape.to_vec(),
+                    got: vec![got],
+                });
+            }
+        }
+        let costs = pasting.seams.as_flattened();
+        if !costs.iter().all(|s| (0.0..=f32::MAX).contains(s)) {
+            return Err(Error::value("seams", "costs of at least 0 are allowed"));
+        }
+        let mut view = View {
+            places: pasting.shown.iter().map(|&k| place(k)).collect(),
+            patches: vec![FREE; n],
+            seams: pasting.seams.to_vec(),
+            distortion: Vec::new(),
+            looks: vec![Look::EMPTY; n],
+        };
+        for (i, &sample) in pasting.shown.iter().enumerate() {
+            if sample != FREE {
+                self.find("shown", sample)?;
+                view.patches[i] = 0;
+                view.looks[i] = self.source.look(view.places[i]);
+            }
+        }
+        Ok((window, view))
+    }
+
+    /// A patch that is to be cut into a window.
+    fn propose<'a>(
+        &self,
+        pasting: &Pasting<'a>,
+        window: &'a Window<2>,
+        samples: &[u32],
+    ) -> Result<Proposal<'a, 2>> {
+        if samples.len() != pasting.mask.len() {
+            return Err(Error::Shape {
+                argument: "patches",
+                expected: pasting.shape.to_vec(),
+                got: vec![samples.len()],
+            });
+        }
+        for (&sample, _) in samples.iter().zip(pasting.mask).filter(|(_, mask)| **mask) {
+            self.find("patches", sample)?;
+        }
+        Ok(Proposal {
+            window,
+            mask: pasting.mask,
+            places: samples.iter().map(|&k| place(k)).collect(),
+            distortion: &[],
+            core: pasting.core.to_vec(),
+        })
+    }
+
+    fn find(&self, argument: &'static str, sample: u32) -> Result<()> {
+        if (sample as usize) < self.count {
+            return Ok(());
+        }
+        Err(Error::value(
+            argument,
+            format!(
+                "there are {} samples, and {sample} is asked for",
+                self.count
+            ),
+        ))
+    }
+}
+
+/// The side of the blocks that a window is cut between.
+fn side(window: &Window<2>, (most, block): (usize, usize)) -> usize {
+    if window.points.len() > most { block } else { 1 }
+}
+
+/// Where a sample of the row stands.
+fn place(sample: u32) -> Place<2> {
+    let at = sample as usize;
+    [(at / LINE) as i32 * ONE, (at % LINE) as i32 * ONE]
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::foundation::hash::Noise;
+    use crate::kernels::seam::links;
+
+    const SHAPE: [usize; 2] = [3, 3];
+    const WEIGHTS: Weights = Weights {
+        colour: 1.0,
+        depth: 0.5,
+        ..Weights::NONE
+    };
+
+    /// As many samples as two windows have; all have the mean of the standard deviation 1 once they are prepared.
+    fn samples(seed: u64, weights: Weights) -> Samples {
+        let noise = Noise::new(seed);
+        let colours: Vec<f32> = (0..18)
+            .map(|i| noise.uniform([i, 0, 0, 0]) as f32)
+            .collect();
+        let depth: Vec<f32> = (0..18)
+            .map(|i| (noise.uniform([i, 1, 0, 0]) * 8.0 - 2.0).max(0.0) as f32)
+            .collect();
+        Samples::new(&colours, 1, &depth, weights).unwrap()
+    }
+
+    fn pasting<'a>(
+        shown: &'a [u32],
+        seams: &'a [[f32; 2]],
+        mask: &'a [bool],
+        core: &'a [bool],
+    ) -> Pasting<'a> {
+        Pasting {
+            shape: SHAPE,
+            shown,
+            seams,
+            mask,
+            core,
+        }
+    }
+
+    proptest! {
+        /// The pairs that result are judged, and seams that are covered are gone.
+        #[test]
+        fn the_cut_is_the_least_of_all(seed in 0u64..500) {
+            let samples = samples(seed, WEIGHTS);
+            let noise = Noise::new(seed + 1000);
+            let shown: Vec<u32> = (0..9).collect();
+            let patch: Vec<u32> = (9..18).collect();
+            let seams: Vec<[f32; 2]> = (0..9)
+                .map(|i| [0, 1].map(|a| if seed % 2 == 0 { 0.0 } else { noise.uniform([i, a, 2, 0]) as f32 * 0.004 }))
+                .collect();
+            let mask: Vec<bool> = (0..9).map(|i| noise.uniform([i, 0, 1, 0]) < 0.8).collect();
+            let core: Vec<bool> = (0..9).map(|i| i == 4 && mask[4]).collect();
+            let look = |sample: u32| samples.source.look(place(sample));
+            let pair = |l: u32, r: u32, p: usize, q: usize| {
+                // What the patch does not cover is not compared.
+                let apart = |i: usize| {
+                    if mask[i] { look(shown[i]).colour[0] - look(patch[i]).colour[0] } else { 0.0 }
+                };
+                let depth = look(l).depth.min(6.0) + look(r).depth.min(6.0);
+                2e-3 + (apart(p).powi(2) + apart(q).powi(2)) / 8.0 + 0.5 * depth / 6.0
+            };
+            let grid = Grid::new(SHAPE, [false; 2]).unwrap();
+            let value = |take: &[bool]| {
+                let mut sum = 0.0;
+                for axis in 0..2 {
+                    links(&grid, axis, |p, q| {
+                        sum += match (take[p], take[q]) {
+                            (false, true) => pair(shown[p], patch[q], p, q),
+                            (true, false) => pair(patch[p], shown[q], p, q),
+                            (false, false) => seams[p][axis],
+                            (true, true) => 0.0,
+                        };
+                    });
+                }
+                sum
+            };
+            let best = (0..512u32)
+                .map(|code| (0..9).map(|i| code >> i & 1 == 1).collect::<Vec<bool>>())
+                .filter(|take| (0..9).all(|i| (!take[i] || mask[i]) && (take[i] || !core[i])))
+                .map(|take| value(&take))
+                .fold(f32::INFINITY, f32::min);
+            let window = pasting(&shown, &seams, &mask, &core);
+            let found = samples.cut(&window, &patch, &Monitor::default()).unwrap();
+            prop_assert!((value(&found.take) - best).abs() < 1e-3, "{} {best}", value(&found.take));
+            let left: f32 = found.seams.as_flattened().iter().sum();
+            let ends: f32 = [2, 5, 8].map(|i| seams[i][1]).iter().sum::<f32>() + [6, 7, 8].map(|i| seams[i][0]).iter().sum::<f32>();
+            prop_assert!((left - ends - best).abs() < 1e-3);
+            let judged = samples.judge(&window, &[&patch], &Monitor::default()).unwrap();
+            prop_assert!(judged[0] >= f64::from(best) - 1e-3);
+        }
+    }
+
+    #[test]
+    fn what_shows_nothing_takes_the_patch() {
+        let samples = samples(1, WEIGHTS);
+        let (shown, patch) = ([FREE, FREE, 2, FREE, FREE, 5, 6, 7, 8], [9; 9]);
+        let mask = [true, true, true, true, true, true, false, false, false];
+        let found = samples.cut(
+            &pasting(&shown, &[[0.0; 2]; 9], &mask, &[false; 9]),
+            &patch,
+            &Monitor::default(),
+        );
+        let take = found.unwrap().take;
+        assert_eq!([take[0], take[1], take[3], take[4]], [true; 4]);
+        assert_eq!(take[6..], [false; 3]);
+    }
+
+    #[test]
+    fn bad_arrays_are_refused() {
+        let samples = samples(1, WEIGHTS);
+        let (shown, seams, none) = ([0; 9], [[0.0; 2]; 9], [true; 9]);
+        let cut = |pasting: Pasting<'_>, patch: &[u32]| {
+            samples.cut(&pasting, patch, &Monitor::default()).is_err()
+        };
+        let fine = pasting(&shown, &seams, &none, &none);
+        assert!(!cut(fine, &[1; 9]));
+        assert!(cut(fine, &[1; 8]));
+        assert!(cut(fine, &[18; 9]));
+        assert!(cut(pasting(&[18; 9], &seams, &none, &none), &[1; 9]));
+        assert!(cut(pasting(&shown[..8], &seams, &none, &none), &[1; 9]));
+        assert!(cut(pasting(&shown, &[[-1.0; 2]; 9], &none, &none), &[1; 9]));
+        assert!(cut(
+            pasting(&shown, &[[f32::NAN; 2]; 9], &none, &none),
+            &[1; 9]
+        ));
+        assert!(cut(
+            Pasting {
+                shape: [0, 9],
+                ..fine
+            },
+            &[1; 9]
+        ));
+        assert!(Samples::new(&[0.0; 9], 1, &[0.0; 8], WEIGHTS).is_err());
+        assert!(Samples::new(&[f32::NAN; 8], 1, &[0.0; 8], WEIGHTS).is_err());
+        assert!(Samples::new(&[], 1, &[], WEIGHTS).is_err());
+        let wrong = Weights {
+            depth: -1.0,
+            ..WEIGHTS
+        };
+        assert!(Samples::new(&[0.0; 8], 1, &[0.0; 8], wrong).is_err());
+    }
+}
