@@ -57,6 +57,10 @@ def test_a_map_that_hardly_varies_is_no_plane():
 def test_round_things_that_get_smaller_are_no_plane(disc_floor):
     image, scale = disc_floor
     assert find_plane(texrs.Exemplar(image).guidance, scale) is not None
+    # Of areas it is the same plane.
+    areas = find_plane(texrs.Exemplar(image).guidance, scale**1.5)
+    assert areas.power == pytest.approx(2 / 3)
+    assert areas.slope == pytest.approx(find_plane(texrs.Exemplar(image).guidance, scale).slope, rel=1e-3)
     # A measured map strays, but edges tell.
     rough = scale * np.exp(0.05 * np.sin(np.arange(128) / 3))[:, np.newaxis].astype(np.float32)
     assert Plane.fit(rough).residual > 0.03

@@ -12,7 +12,7 @@ from truth.table import Parts, case, parts_of, rounded
 
 # --- PERSPECTIVE -----------------------------------------------------------------------------------------------------
 
-SCALED = ("sizes", "outside", "scale_error", "levels")
+SCALED = ("sheet", "outside", "scale_error", "stitched")
 
 
 @case

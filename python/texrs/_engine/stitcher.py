@@ -334,6 +334,7 @@ class Stitcher:
         )
         return Shown(*made[:4], made[4].reshape(-1, shown.table.shape[1]))
 
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Pasting:
     """A window of an output that patches are cut into.

@@ -68,6 +68,7 @@ def fill_in_depth(
     plane = find_plane(colours, asked)
     if plane is None:
         return None
+    asked = asked**plane.power
     sheet = Flattened.of(colours, plane, asked[wide][np.newaxis], whole)
     if not sheet.free.any():
         return None

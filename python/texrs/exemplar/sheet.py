@@ -46,6 +46,8 @@ GOOD, FAIR = 0.03, 0.08
 """Residuals of a scale map that is a plane's beyond doubt, and of one that may be."""
 FORESHORTENED = 0.2
 """How much steeper edges must get with distance where there is doubt: less than 1, for few lie just across the slope."""
+AREAS, BETTER, SURE = 2 / 3, 0.5, 1e-3
+"""Power of a map of areas that is one of widths, and how much better it must fit to be taken for one."""
 BANDS = 8
 """Bands of scales that edges are compared in."""
 PLANAR = 0.02
@@ -324,10 +326,13 @@ class Copies(Sheet):
 def find_plane(colours: Floats, scale: Floats) -> Plane | None:
     """Return the plane that an exemplar is a picture of, if the evidence is good enough.
 
-    Maps that are measured are not quite those of a plane, and those of round things that get smaller are not far from it. Where
-    the fit is fair, edges decide: on a plane they get steeper along the slope with distance.
+    A map may hold the widths of elements, or the square roots of their areas, which are the 3/2 power of those; the plane is
+    one of widths (see `Plane.power`). Maps that are measured are not quite those of a plane, and those of round things that get
+    smaller are not far from it. Where the fit is fair, edges decide: on a plane they get steeper along the slope with distance.
     """
-    plane = Plane.fit(scale)
+    plane, other = Plane.fit(scale), Plane.fit(scale, AREAS)
+    if plane is not None and other is not None and other.residual < BETTER * AREAS * plane.residual - SURE:
+        plane = other
     if plane is None or plane.residual > FAIR:
         return None
     return plane if plane.residual <= GOOD or _measure_foreshortening(colours, plane) >= FORESHORTENED else None

@@ -40,6 +40,8 @@ class Plane:
         Scales of the picture.
     residual : float
         Root mean square of the difference of the logarithms of the map and of this.
+    power : float
+        S is this power of the scale map.
 
     """
 
@@ -51,11 +53,12 @@ class Plane:
     least: float
     largest: float
     residual: float
+    power: float = 1.0
 
     @classmethod
-    def fit(cls, scale: Floats) -> Plane | None:
-        """Return the plane that a scale map, (rows, columns), says; none where it is seen from the front."""
-        logs = np.log(scale)
+    def fit(cls, scale: Floats, power: float = 1.0) -> Plane | None:
+        """Return the plane that a power of a scale map, (rows, columns), says; none where it is seen from the front."""
+        logs = np.log(scale) * np.float32(power)
         surface = np.exp(follow(logs, "plane")).astype(np.float64)
         least, largest = float(surface.min()), float(surface.max())
         if largest < LEVEL * least:
@@ -75,7 +78,7 @@ class Plane:
             return None
         down = rise[0] / slope, rise[1] / slope
         residual = float(np.sqrt(np.mean((np.log(surface) - logs) ** 2)))
-        return cls(middle, at, slope, down, (-down[1], down[0]), least, largest, residual)
+        return cls(middle, at, slope, down, (-down[1], down[0]), least, largest, residual, power)
 
     @property
     def kappa(self) -> float:

@@ -16,7 +16,7 @@ Departures, with their reasons:
   larger than a window: by four fifths fewer cells of the pictures look torn.
 - An exemplar that is a plane is flattened. Its elements are the same everywhere then, and any of them can be seen at any
   depth; without that a ramp finds only a strip of the exemplar for each of its rows, and repeats it. Whether it is a plane is
-  told by the fit of S to a linear function, and said in the report.
+  told by the fit of S, or of its power 2/3 where the map is one of areas, to a linear function, and said in the report.
 - What is no plane is offered in several sizes, which add to what there is of a scale. The scale is a cost of showing a patch
   at a place, (log S_e - log S_o)^2, not a channel of windows: ratios of scales are what is seen. The output's map stays as
   asked.
@@ -71,7 +71,8 @@ def perspective(
     exemplar : (H, W) or (H, W, C) array, or Exemplar
         Any real dtype and channels; each side at least 16.
     scale_map : (H, W) float array
-        How large the exemplar's elements are at each pixel, positive; only ratios count (`texrs.scale_maps`).
+        How large the exemplar's elements are at each pixel, positive; only ratios count (`texrs.scale_maps`). Widths, or the
+        square roots of areas.
     size : int or (int, int)
         Rows and columns of the result.
     target : (rows, columns) float array, optional
@@ -147,9 +148,15 @@ def perspective(
     wanted, outside = bring_within(asked.scale, asked.target, sizes)
     if outside.share > 0 and asked.strength > 0:
         warnings.warn(outside.describe(sizes), stacklevel=2)
-    asked = replace(asked, target=wanted)
+    if plane is not None:
+        # From here on scales are widths.
+        asked = replace(asked, scale=asked.scale**plane.power, target=wanted**plane.power)
+    else:
+        asked = replace(asked, target=wanted)
     sheet: Sheet = (
-        Copies.of(colours, asked.scale, sizes, wanted) if plane is None else Flattened.of(colours, plane, wanted)
+        Copies.of(colours, asked.scale, sizes, asked.target)
+        if plane is None
+        else Flattened.of(colours, plane, asked.target)
     )
     found = stitch_sheet(
         sheet,
