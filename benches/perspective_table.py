@@ -4,9 +4,9 @@
         [--variants default,alone,plain,paper] [--evaluator <texture_quality.py>] [--out table.md] [--pictures DIR]
 
 Without a folder: a generated floor of discs. With one: each `NAME.png` in it beside which a `NAME-scale.npy` stands, the square
-root of area ratios, S^1.5. Variants: `alone` has no resized copies, `copies` five and no plane, `plain` has no weight of scales. With `--evaluator`, a module that
-has `perspective_agreement`, its rank correlation and slope are columns; the lines `drawn` are what it says of discs that are
-drawn to the same target, without synthesis.
+root of area ratios, S^1.5. Variants: `alone` has no resized copies, `copies` five and no plane, `plain` has no weight of
+scales. With `--evaluator`, a module that has `perspective_agreement`, its rank correlation and slope are columns; the lines
+`drawn` are what it says of discs that are drawn to the same target, without synthesis.
 """
 
 from __future__ import annotations
