@@ -12,11 +12,9 @@ from texrs._engine.appearance import Appearance, Corrected, Demand
 from texrs._engine.pyramid import ONE, Region, to_fixed
 from texrs.errors import InvalidInput
 from texrs.exemplar.analysis import count_levels
-from texrs.exemplar.atlas import RADIUS, Atlas, find_tones, resampling_matrix
-from texrs.growth import FROM_ATLAS, Surroundings, Windows, from_draft, grow, grow_from_atlas
-from texrs.growth.balance import Balance
+from texrs.exemplar.atlas import RADIUS, Atlas, resampling_matrix
+from texrs.growth import FROM_ATLAS, Surroundings, from_draft, grow, grow_from_atlas
 from texrs.growth.constraints import Asked
-from texrs.growth.scales import Scales
 
 
 @pytest.fixture(scope="module")
@@ -112,55 +110,6 @@ def test_held_blocks_need_a_place_each():
         exemplar.blocks(region, to_fixed(None, region), held=np.ones(256, bool), given=np.zeros(4, np.int32))
 
 
-def scales_of(values, order=None):
-    """Return a guide of scales alone."""
-    mine = np.zeros((len(values[0]), 4), np.int16)
-    mine[:, 0] = values[0]
-    asked = np.asarray(values[1], np.int16)
-    order = np.arange(len(mine)) if order is None else order
-    return Demand(mine.ravel(), asked, np.array([1264], np.uint16), order.astype(np.uint32))
-
-
-def test_shares_are_those_of_samples_of_the_scales_that_are_asked_for():
-    # Three quarters of the output ask for scales whose samples are dark, a quarter for those of bright ones.
-    guide = scales_of((np.repeat([0, 500], [90, 10]), np.repeat([0, 500], [30, 10])))
-    tones = find_tones(np.repeat(np.float32([0.1, 0.9]), [90, 10])[:, np.newaxis], guide.order)
-    shares = Balance.of(tones, guide).shares
-    np.testing.assert_allclose(shares[0, [0, -1]], [0.75, 0.25])
-    assert shares.sum() == pytest.approx(1)
-    # Nothing of the scale: all counts.
-    none = Balance.of(tones, scales_of((np.repeat([0, 500], [90, 10]), np.full(5, 2000)))).shares
-    np.testing.assert_allclose(none[0, [0, -1]], [0.9, 0.1])
-    # A barred sample counts for nothing.
-    barred = Balance.of(tones, scales_of((np.zeros(100), np.zeros(5)), np.arange(95))).shares
-    np.testing.assert_allclose(barred[0, [0, -1]], [90 / 95, 5 / 95])
-
-
-def test_what_is_in_excess_becomes_dearer_and_what_is_missing_cheaper():
-    guide = scales_of((np.zeros(100), np.zeros(50)))
-    tones = find_tones(np.repeat(np.float32([0, 1]), 50)[:, np.newaxis], guide.order)
-    balance = Balance.of(tones, guide)
-    balance.note(np.zeros(100, np.int32), (1, 100), 0.2)  # All points show the first sample.
-    np.testing.assert_allclose(balance.costs[0, [0, -1]], [0.2, -0.2])
-    values = balance.onto(guide).exemplar.reshape(-1, 4)
-    # 0.4 of what unrelated windows cost, as a square under the weight.
-    assert (values[:50, 2] == round((0.4 * 2 * 512**2 * 256 / 1264) ** 0.5)).all()
-    assert not values[50:].any()
-    assert not values[:, [0, 1, 3]].any()
-
-
-def test_balanced_colours_are_nearer_to_the_exemplars(floor):
-    scale, far = np.asarray(floor.scale_map, np.float32), []
-    mine = np.sort(floor.image.reshape(-1, 3), axis=0)
-    for balance in (0.0, 0.2):
-        atlas = atlas_of(floor.image, scale, coarsest=16, tones=balance > 0)
-        settings = replace(FROM_ATLAS, balance=balance)
-        grown = grow_from_atlas(atlas, Region.whole((96, 80)), scale, settings=settings, seed=3)
-        shown = atlas.source(grown.places, (96, 80)).render(floor.image, interpolation="nearest")
-        far.append(np.abs(np.sort(shown.reshape(-1, 3), axis=0).astype(float) - mine).mean())
-    assert far[1] < 0.7 * far[0]
-
-
 # --- the levels ------------------------------------------------------------------------------------------------------
 
 
@@ -197,15 +146,3 @@ def test_any_start_and_any_corrector_can_be_handed_in():
         {"shape": [7, 10], "passes": 1, "changed": 0.25},
         {"shape": [14, 20], "passes": 2, "changed": 0.25},
     ]
-
-
-def test_passes_with_a_balance_are_those_in_parts(floor):
-    """The corrector looks at the colours every other pass, and what it did adds up."""
-    scale = np.asarray(floor.scale_map, np.float32)
-    atlas = atlas_of(floor.image, scale, tones=True)
-    settings = replace(FROM_ATLAS, passes=(5, 3, 2), balance=1e-12)
-    grown = grow_from_atlas(atlas, Region.whole((48, 40)), scale[:48, :40], settings=settings, seed=3)
-    assert [done.passes for done in grown.levels] == [5, 2]
-    windows = Windows(tuple(level.appearance for level in atlas.levels), replace(settings, settled=0.0), 3)
-    whole = windows.grow(Region.whole((48, 40)), ask=Scales(atlas, settings, scale[:48, :40]).at)
-    np.testing.assert_array_equal(grown.places, whole.places)

@@ -24,7 +24,7 @@ from texrs.source_map import SourceMap
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-__all__ = ["BINS", "LARGEST", "RADIUS", "SMALLEST", "Atlas", "AtlasLevel", "Copy", "code_logs", "extend_sizes"]
+__all__ = ["LARGEST", "RADIUS", "SMALLEST", "Atlas", "AtlasLevel", "Copy", "code_logs", "extend_sizes"]
 
 RADIUS = 2
 """Of a window."""
@@ -38,8 +38,6 @@ BARRED = 2047
 """What a barred sample shows in the fourth value of a demand, and no output asks for."""
 RESIZED = 0.1
 """What it costs to be taken from a copy of another size, as a share of what a scale costs that is as far off."""
-BINS = 16
-"""Of a histogram of colours."""
 BAND = 1 << 15
 """Places that are located at once."""
 
@@ -76,15 +74,12 @@ class AtlasLevel:
         The logarithm of each sample's scale, and of its copy's size; nothing; whether it is barred.
     order : (any) uint32
         The samples that are not barred, by their scale.
-    tones : (channels, samples) uint8, optional
-        The bin of each sample in the histogram of each channel.
 
     """
 
     appearance: Appearance
     values: NDArray[np.int16]
     order: NDArray[np.uint32]
-    tones: NDArray[np.uint8] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,7 +111,6 @@ class Atlas:
         levels: int,
         wanted: tuple[float, float] | None = None,
         known: Bools | None = None,
-        tones: bool = False,
     ) -> Atlas:
         """Return the atlas of an exemplar.
 
@@ -134,8 +128,6 @@ class Atlas:
             Least and largest scale that is asked for: of other copies than the first only what has them is kept.
         known : (H, W) bool, optional
             What may be copied; None is all.
-        tones : bool
-            Whether to tell the bins of colours, at all levels but the finest.
         """
         shape, block = (colours.shape[0], colours.shape[1]), 1 << (levels - 1)
         logs = np.zeros(shape, np.float32) if scale is None else np.log(scale).astype(np.float32)
@@ -157,8 +149,7 @@ class Atlas:
                 packed = halve(packed)
             values = code_values(copies, logs, free, packed.shape[:2], 1 << k)
             order = sort_by_scale(values)
-            bins = find_tones(packed, order) if tones and k > 0 and order.size > 0 else None
-            made.append(AtlasLevel(Appearance(packed, axes=2, radius=RADIUS), values, order, bins))
+            made.append(AtlasLevel(Appearance(packed, axes=2, radius=RADIUS), values, order))
         return cls(shape, copies, tuple(reversed(made)))
 
     @property
@@ -351,14 +342,6 @@ def sort_by_scale(values: NDArray[np.int16]) -> NDArray[np.uint32]:
         return np.zeros(0, np.uint32)
     order = np.argsort(scale, kind="stable")
     return np.asarray(order[~barred[order]], np.uint32)
-
-
-def find_tones(packed: Floats, order: NDArray[np.uint32]) -> NDArray[np.uint8]:
-    """Return the bin of each sample in the histogram of each channel, which spans those in ``order``."""
-    flat = packed.reshape(-1, packed.shape[-1])
-    low, high = flat[order].min(axis=0), flat[order].max(axis=0)
-    place = (flat - low) * (BINS / np.maximum(high - low, np.float32(1e-6)))
-    return np.ascontiguousarray(np.clip(place, 0, BINS - 1).T.astype(np.uint8))
 
 
 def code_logs(logs: Array) -> NDArray[np.int16]:

@@ -2,13 +2,13 @@
 
 `texrs.growth.engine` is the loop over the levels, which takes a start, a corrector, and what is asked of the output
 beside the texture; `windows` is the engine's own start and corrector; `start` holds the other starts, `constraints`
-what may be asked, `sheets` patches of the sizes that a map asks for, `scales` growth from an atlas of scaled copies,
-`balance` what keeps its colours in balance, and `settings` the numbers.
+what may be asked, `sheets` patches of the sizes that a map asks for, `scales` growth from an atlas of scaled copies, and
+`settings` the numbers.
 """
 
 from texrs.growth.constraints import Conditions, Constraints, Guide, Surroundings
 from texrs.growth.engine import Grown, Patches, Start, grow, keep
-from texrs.growth.scales import FROM_ATLAS, grow_from_atlas, to_finest
+from texrs.growth.scales import FROM_ATLAS, grow_from_atlas
 from texrs.growth.settings import Settings
 from texrs.growth.sheets import FromSheet, stitch_sheet
 from texrs.growth.start import from_draft, from_patches, patch_side
@@ -33,5 +33,4 @@ __all__ = [
     "keep",
     "patch_side",
     "stitch_sheet",
-    "to_finest",
 ]

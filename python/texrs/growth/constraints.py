@@ -13,7 +13,6 @@ from texrs._engine.appearance import Demand
 from texrs._engine.pyramid import ONE, Region
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
-from texrs.growth.balance import Balance
 from texrs.kernels.gather import gather
 
 __all__ = ["NOTHING", "Asked", "Conditions", "Constraints", "Guide", "Pins", "Surroundings", "average_points"]
@@ -138,8 +137,6 @@ class Asked:
         The places of these, in units of 1/4096 of a sample; none where they have them already.
     surrounds : bool
         Whether the start receives the held points, and grows from them.
-    balance : Balance, optional
-        What keeps the colours of the output in balance.
 
     """
 
@@ -147,7 +144,6 @@ class Asked:
     held: Bools | None = None
     given: NDArray[np.int32] | None = None
     surrounds: bool = False
-    balance: Balance | None = None
 
     def place(self, places: NDArray[np.int32]) -> NDArray[np.int32]:
         """Return places with those that are given put in."""

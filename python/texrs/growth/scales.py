@@ -1,4 +1,4 @@
-"""Growth from an atlas: elements of the sizes that a map asks for, their colours in balance, around what is held."""
+"""Growth from an atlas: elements of the sizes that a map asks for, around what is held."""
 
 from __future__ import annotations
 
@@ -8,16 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._engine.appearance import Demand
-from texrs._engine.pyramid import ONE, Region
+from texrs._engine.pyramid import Region
 from texrs._typing import Floats, Progress
 from texrs.exemplar.atlas import Atlas, code_logs
-from texrs.growth.balance import Balance
 from texrs.growth.constraints import Asked, Held, average_points
 from texrs.growth.engine import Grown, Show
 from texrs.growth.settings import Settings
 from texrs.growth.windows import Windows
 
-__all__ = ["FROM_ATLAS", "Scales", "grow_from_atlas", "to_finest"]
+__all__ = ["FROM_ATLAS", "Scales", "grow_from_atlas"]
 
 FROM_ATLAS = Settings(passes=(12, 8, 4), reaches=(2, 2, 2), coarsest=32, rounds=6, candidates=1024)
 """Where much of an atlas has not the wanted scale, more is tried, and coarser levels have more to tell apart."""
@@ -38,7 +37,7 @@ class Scales:
     atlas : Atlas
         What is copied from.
     settings : Settings
-        Their weights and balance count.
+        Their weights count.
     target : (rows, columns) float32, optional
         The scales that are wanted; none where sizes do not count.
     strength : float
@@ -61,8 +60,7 @@ class Scales:
         weight = np.array([min(round(WEIGHT * share), 65535)], np.uint16)
         demand = Demand(here.values, self._ask_scales(region, spacing), weight, here.order)
         held, given = (None, None) if self.held is None else self.held.at(region, spacing)
-        balance = None if here.tones is None or not weight[0] else Balance.of(here.tones, demand)
-        return Asked(demand, held, given, True, balance)
+        return Asked(demand, held, given, True)
 
     def _ask_scales(self, region: Region, spacing: int) -> NDArray[np.int16]:
         """Return the mean logarithm of the target at each point, (points)."""
@@ -122,9 +120,3 @@ def grow_from_atlas(
     windows = Windows(tuple(level.appearance for level in atlas.levels), settings, seed)
     scales = Scales(atlas, settings, target, strength, held)
     return windows.grow(region, ask=scales.at, show=show, progress=progress)
-
-
-def to_finest(places: NDArray[np.int32], spacing: int) -> NDArray[np.int32]:
-    """Return places of a level, whose points are so many pixels apart, as places of the finest: whole samples."""
-    at = (np.rint(places / np.float32(ONE)) + 0.5) * spacing - 0.5
-    return np.asarray(np.rint(at * ONE), np.int32)

@@ -39,9 +39,6 @@ class Settings:
         all.
     exhaustive : int
         Most pairs of windows that are compared, each with each, in a pass of the coarsest level; beyond that none are.
-    balance : float
-        How much the excess of a colour adds to its cost every other pass, at all levels but the finest, where costs
-        that change would break up what is whole.
 
     """
 
@@ -61,7 +58,6 @@ class Settings:
     coherence: float = 0.2
     settled: float = 0.005
     exhaustive: int = 0
-    balance: float = 0.0
 
     def at(self, level: int, levels: int) -> Step:
         """Return what is done at a level, counted from the coarsest."""

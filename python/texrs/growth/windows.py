@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -18,9 +17,6 @@ from texrs.growth.engine import Ask, Grown, Places, Show, Start, grow, nothing
 from texrs.growth.settings import Settings, Step
 
 __all__ = ["Windows"]
-
-TURN = 2
-"""Passes, of which each corrects every other point, between two looks at the balance of colours."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,45 +108,28 @@ class Windows:
         here, step, s = self.levels[level], self.step(level), self.settings
         wanted = step.passes if passes is None else passes
         advance = stage(progress, f"level {level + 1} of {len(self.levels)}")
-        demand, balance = asked.demand, asked.balance
-        turn = wanted if balance is None else TURN
-        found, done, made = Corrected(places, 0, 0.0), 0, 0
-        while done < wanted:
-            if balance is not None and asked.demand is not None:
-                balance.note(found.places, here.shape, s.balance)
-                demand = balance.onto(asked.demand)
-            found = here.correct(
-                found.places,
-                region,
-                frames,
-                passes=min(turn, wanted - done),
-                first=first + done,
-                exhaustive=level == 0 and self._count_pairs(region, asked) <= s.exhaustive,
-                reach=step.reach,
-                acceptance=s.acceptance,
-                coherence=s.coherence,
-                vote=min(step.vote, here.radius),
-                # Costs that change let nothing settle.
-                settled=s.settled if balance is None else 0.0,
-                # The noise of a level is its own.
-                seed=(self.seed + 0x9E3779B97F4A7C15 * (level + 1)) % (1 << 64),
-                held=asked.held,
-                demand=demand,
-                overwrite=True,
-                progress=_scale_progress(advance, done / wanted, turn / wanted),
-            )
-            made, done = done + found.passes, done + turn
-        return found._replace(passes=made)
+        return here.correct(
+            places,
+            region,
+            frames,
+            passes=wanted,
+            first=first,
+            exhaustive=level == 0 and self._count_pairs(region, asked) <= s.exhaustive,
+            reach=step.reach,
+            acceptance=s.acceptance,
+            coherence=s.coherence,
+            vote=min(step.vote, here.radius),
+            settled=s.settled,
+            # The noise of a level is its own.
+            seed=(self.seed + 0x9E3779B97F4A7C15 * (level + 1)) % (1 << 64),
+            held=asked.held,
+            demand=asked.demand,
+            overwrite=True,
+            progress=advance,
+        )
 
     def _count_pairs(self, region: Region, asked: Asked) -> int:
         """Return how many pairs of windows of the coarsest level there are to compare."""
         demand = asked.demand
         drawn = 0 if demand is None else demand.order.size
         return region.points * (drawn or int(np.prod(self.levels[0].shape)))
-
-
-def _scale_progress(
-    advance: Callable[[float], object] | None, start: float, share: float
-) -> Callable[[float], object] | None:
-    """Return what a kernel may call that does a part of a level's passes."""
-    return None if advance is None else lambda done: advance(min(1.0, start + share * done))
