@@ -81,11 +81,10 @@ def test_what_a_sheet_shows_is_the_exemplar(disc_floor):
         assert (at <= 127).all()
         assert (np.linalg.det(frames) > 0).all()
     grid = np.moveaxis(np.indices((128, 128)), 0, -1)[40:-8:9, 8:-8:9].reshape(-1, 2).astype(np.float32)
-    for sheet in (flat, copies):
-        places = sheet.place(grid)
-        np.testing.assert_allclose(sheet.locate(places)[0], grid, atol=0.01)
-        near = np.rint(places / ONE).astype(int)
-        assert sheet.free[near[:, 0], near[:, 1]].all()
+    places = flat.place(grid)
+    np.testing.assert_allclose(flat.locate(places)[0], grid, atol=0.01)
+    near = np.rint(places / ONE).astype(int)
+    assert flat.free[near[:, 0], near[:, 1]].all()
 
 
 def test_elements_on_a_plane_are_whole():
@@ -100,6 +99,16 @@ def test_elements_on_a_plane_are_whole():
     same = source.label[:-1, :-1] == source.label[1:, :-1]
     away = np.linalg.norm(steps - source.frames()[:-1, :-1, :, 0], axis=-1)[same]
     assert np.median(away) < 0.1
+
+
+def test_maps_of_widths_and_of_areas_ask_for_the_same(disc_floor):
+    image, scale = disc_floor
+    ramp = np.geomspace(0.7, 1.3, 96, dtype=np.float32)[:, np.newaxis].repeat(96, axis=1)
+    wide, large = (texrs.perspective(image, scale**p, 96, target=ramp**p, seed=1) for p in (1, 1.5))
+    sizes = [np.log(np.abs(np.linalg.det(made.source.frames()))) / 2 for made in (wide, large)]
+    shown = [s - 1.5 * np.log(made.source.render(scale)) for s, made in zip(sizes, (wide, large), strict=True)]
+    assert np.median(np.abs(shown[0] - shown[1])) < 0.02
+    assert max(made.report["scale_error"] for made in (wide, large)) < 0.05
 
 
 def test_a_hole_in_a_plane_is_filled_in_depth(disc_floor):

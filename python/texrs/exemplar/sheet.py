@@ -6,6 +6,7 @@ other exemplar it is a set of resized copies, as in an atlas.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from texrs._engine.pyramid import ONE
 from texrs._engine.stitcher import Stitcher
 from texrs._typing import Bools, Floats
-from texrs.exemplar.atlas import BARRED, NAT, Copy, fill_gaps, find_box, measure, pack, pick_known, resize
+from texrs.exemplar.atlas import BARRED, NAT, Copy, fill_gaps, find_box, measure, pack, resize
 from texrs.exemplar.instances import Instances, find_instances, label_components
 from texrs.exemplar.stitching import make_stitcher
 from texrs.kernels.gather import gather
@@ -57,7 +58,7 @@ FINE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Sheet:
+class Sheet(ABC):
     """What patches are cut from.
 
     Attributes
@@ -113,33 +114,25 @@ class Sheet:
         """Return the places of samples: (N, 2), in fixed point."""
         return np.stack([rows, columns], axis=-1).astype(np.int32) * ONE
 
+    @abstractmethod
     def describe(self) -> dict[str, Any]:
         """Return what kind of sheet it is, as JSON types."""
-        raise NotImplementedError
 
-    def steps_at(self, scale: float) -> float:
-        """Return how many samples elements have for each pixel of an output that shows them in a scale."""
-        raise NotImplementedError
-
+    @abstractmethod
     def side(self, target: Floats) -> float:
         """Return the side of a patch for an output that is to follow a map, in samples of the sheet."""
-        raise NotImplementedError
 
+    @abstractmethod
     def frames(self, target: Floats, wrap: Sequence[bool]) -> NDArray[np.int16]:
         """Return the Jacobians of an output whose elements are to be as large as a map says, in fixed point."""
-        raise NotImplementedError
 
+    @abstractmethod
     def locate(self, places: NDArray[np.int32]) -> tuple[Floats, Floats]:
         """Return the places in the exemplar of places (N, 2) in fixed point, and the Jacobians there."""
-        raise NotImplementedError
 
+    @abstractmethod
     def measure_error(self, places: NDArray[np.int32], target: Floats) -> float:
         """Return the median of how far the logarithms of the scales at places (rows, columns, 2) are from a target's."""
-        raise NotImplementedError
-
-    def place(self, coordinates: Floats) -> NDArray[np.int32]:
-        """Return the places, in fixed point, of coordinates (N, 2) of the exemplar as it is."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +192,7 @@ class Flattened(Sheet):
         }
 
     def steps_at(self, scale: float) -> float:
-        """Return it across the slope."""
+        """Return how many samples elements have, across the slope, for each pixel of an output that shows them in a scale."""
         return self.resolution / scale
 
     def side(self, target: Floats) -> float:
@@ -255,9 +248,7 @@ class Copies(Sheet):
     weight, guide, heal = 6.0, 0.03, True
 
     @classmethod
-    def of(
-        cls, colours: Floats, scale: Floats, sizes: Sequence[float], target: Floats, known: Bools | None = None
-    ) -> Copies:
+    def of(cls, colours: Floats, scale: Floats, sizes: Sequence[float], target: Floats) -> Copies:
         """Resize an exemplar; of other copies than the first only what has scales of the target is kept."""
         shape, logs = (colours.shape[0], colours.shape[1]), np.log(scale).astype(np.float32)
         wanted = float(target.min()), float(target.max())
@@ -269,7 +260,7 @@ class Copies(Sheet):
         for number, copy in enumerate(copies):
             here = tuple(slice(o, o + n) for o, n in zip(copy.origin, copy.shape, strict=True))
             shown[here], owner[here] = resize(colours, copy), number
-            free[here] = True if known is None else pick_known(known, copy)
+            free[here] = True
             at = [
                 (np.arange(n) + 0.5) / f - 0.5 + o for n, f, o in zip(copy.shape, copy.factor, copy.first, strict=True)
             ]
@@ -281,10 +272,6 @@ class Copies(Sheet):
     def describe(self) -> dict[str, Any]:
         """Return the sizes of the copies."""
         return {"kind": "copies", "sizes": [round(float(np.sqrt(np.prod(c.factor))), 4) for c in self.copies]}
-
-    def steps_at(self, scale: float) -> float:
-        """Return 1: sizes are those of the copies."""
-        return 1.0
 
     def side(self, target: Floats) -> float:
         """Return a share of the exemplar; less where the map changes by much within that."""
@@ -317,10 +304,6 @@ class Copies(Sheet):
         """Return the rows and columns of the samples nearest to places."""
         near = (places + ONE // 2) // ONE
         return tuple(np.clip(near[..., k], 0, n - 1).astype(np.intp) for k, n in enumerate(self.free.shape))
-
-    def place(self, coordinates: Floats) -> NDArray[np.int32]:
-        """Return where the first copy shows what lies at coordinates."""
-        return np.asarray(np.rint((coordinates + np.array(self.copies[0].origin)) * ONE), np.int32)
 
 
 def find_plane(colours: Floats, scale: Floats) -> Plane | None:

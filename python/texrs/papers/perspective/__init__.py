@@ -161,7 +161,7 @@ def perspective(
     found = stitch_sheet(
         sheet,
         Region.whole(wanted.shape, asked.wrap),
-        wanted,
+        asked.target,
         strength=asked.strength,
         seed=asked.seed,
         progress=progress,

@@ -30,6 +30,7 @@ from texrs._typing import Bools, Progress
 from texrs.growth import Windows
 from texrs.growth.constraints import NOTHING
 from texrs.growth.engine import Places
+from texrs.papers.solid.boxes import intersect
 
 __all__ = ["World", "blocks_reach", "window_reach"]
 
@@ -118,7 +119,7 @@ class World:
         high = [(o + n - 1) // side + 1 for o, n in zip(box.origin, box.shape, strict=True)]
         wanted = np.ones([b - a for a, b in zip(low, high, strict=True)], bool)
         for part, places in self.parts(low, wanted, progress, stage):
-            here, there = _intersect(box, part)
+            here, there = intersect(box, part)
             out[here] = places[there]
         return out
 
@@ -223,16 +224,6 @@ class World:
     def _make_region(self, first: Sequence[int], counts: Sequence[int], side: int) -> Region:
         """Return the region of some cells of the kept lattice."""
         return Region(tuple(n * side for n in counts), tuple(i * side for i in first), (False,) * self.axes)
-
-
-def _intersect(a: Region, b: Region) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
-    """Return what two regions have in common as slices of the one and of the other."""
-    starts = [max(o, p) for o, p in zip(a.origin, b.origin, strict=True)]
-    stops = [min(o + n, p + m) for o, n, p, m in zip(a.origin, a.shape, b.origin, b.shape, strict=True)]
-    here, there = (
-        tuple(slice(s - o, max(s, t) - o) for s, t, o in zip(starts, stops, r.origin, strict=True)) for r in (a, b)
-    )
-    return here, there
 
 
 def _divide_missing(missing: Bools, side: int, margin: int) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
