@@ -164,6 +164,7 @@ class Stitcher:
         overlap: float = 0.4,
         candidates: int = 3,
         bend: bool = False,
+        recover: float = 0.5,
         heal: bool = True,
         weights: Weights = Weights(),
         repetition: float = 0.15,
@@ -191,6 +192,8 @@ class Stitcher:
             Places that are cut in, of which the cheapest stays; 1 to 64.
         bend : bool
             Whether patches bend with the field, or are turned and scaled as a whole.
+        recover : float
+            Patches that cover the worst seams again, as a share of all, 0 to 4. They stay where seams cost less then.
         heal : bool
             Whether torn elements are grown whole, or given up.
         weights : Weights
@@ -231,6 +234,7 @@ class Stitcher:
                 as_float(patch, "patch", 4, 4096),
                 as_float(overlap, "overlap", 0, 0.8),
                 as_int(candidates, "candidates", 1, 64),
+                as_float(recover, "recover", 0, 4),
                 bend,
                 heal,
             ),
@@ -323,7 +327,7 @@ class Stitcher:
             region.place,
             frames,
             (*shown[:4], np.ascontiguousarray(shown.table.reshape(-1))),
-            (as_float(patch, "patch", 4, 4096), 0.0, as_int(candidates, "candidates", 1, 64), bend, heal),
+            (as_float(patch, "patch", 4, 4096), 0.0, as_int(candidates, "candidates", 1, 64), 0.0, bend, heal),
             list(astuple(weights)),
             [
                 as_float(repetition, "repetition", 0, 100),

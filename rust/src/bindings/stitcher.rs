@@ -242,8 +242,8 @@ impl Stitcher {
     }
 }
 
-/// Side, overlap, candidates, and whether to bend and to heal.
-type PatchIn = (f32, f32, usize, bool, bool);
+/// Side, overlap, candidates, share of them that covers the worst seams, and whether to bend and to heal.
+type PatchIn = (f32, f32, usize, f32, bool, bool);
 
 /// Places, patches, seams, distortion, and the table of patches.
 type ShownIn<'py> = (
@@ -312,12 +312,13 @@ fn seam(weights: [f32; 8]) -> Weights {
 }
 
 fn options(patch: PatchIn, weights: [f32; 8], charges: [f32; 3], seed: u64) -> Options {
-    let (side, overlap, candidates, bend, heal) = patch;
+    let (side, overlap, candidates, recover, bend, heal) = patch;
     Options {
         patch: side,
         overlap,
         candidates,
         bend,
+        recover,
         heal,
         weights: seam(weights),
         repetition: charges[0],

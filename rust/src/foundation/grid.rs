@@ -56,6 +56,7 @@ impl<const D: usize> Grid<D> {
     }
 
     /// Row-major position of a point.
+    #[inline(always)]
     pub fn index(&self, point: [usize; D]) -> usize {
         point
             .iter()
@@ -64,6 +65,7 @@ impl<const D: usize> Grid<D> {
     }
 
     /// The point at a row-major position.
+    #[inline(always)]
     pub fn point(&self, mut index: usize) -> [usize; D] {
         let mut point = [0; D];
         for axis in (0..D).rev() {
@@ -91,6 +93,7 @@ impl<const D: usize> Grid<D> {
     }
 
     /// Coordinate `i` brought onto the axis: around it where it wraps, to the nearest end where it does not.
+    #[inline(always)]
     pub fn resolve(&self, axis: usize, i: isize) -> usize {
         let n = self.shape[axis] as isize;
         if (0..n).contains(&i) {

@@ -1,6 +1,7 @@
 //! What has been stitched so far, and windows of it.
 
-use super::source::{Look, Source};
+use super::chart::Chart;
+use super::cut::Cutting;
 use crate::Result;
 use crate::foundation::fixed::Place;
 use crate::foundation::grid::Grid;
@@ -26,17 +27,6 @@ pub(super) struct Canvas<const D: usize> {
     pub free: usize,
     /// Whether it is a part of something larger: points at its ends then stay as they are.
     pub part: bool,
-}
-
-/// What a window of a canvas shows, point by point: read many times while patches are tried there.
-pub(super) struct View<const D: usize> {
-    pub places: Vec<Place<D>>,
-    pub patches: Vec<u32>,
-    pub seams: Vec<[f32; D]>,
-    /// Empty where nothing is bent.
-    pub distortion: Vec<f32>,
-    /// Of points that show something.
-    pub looks: Vec<Look>,
 }
 
 /// A box of a canvas; along cyclic axes it may reach over the end.
@@ -69,31 +59,27 @@ impl<const D: usize> Canvas<D> {
         })
     }
 
-    /// What a window shows.
-    pub(super) fn view(&self, window: &Window<D>, source: &Source<D>) -> View<D> {
-        let mut view = View {
-            places: Vec::with_capacity(window.points.len()),
-            patches: Vec::with_capacity(window.points.len()),
-            seams: Vec::with_capacity(window.points.len()),
-            distortion: Vec::new(),
-            looks: Vec::with_capacity(window.points.len()),
-        };
-        for &p in &window.points {
+    /// Shows what a cut gave to a patch.
+    pub(super) fn take(
+        &mut self,
+        chart: &Chart<D>,
+        places: &[Place<D>],
+        cutting: &Cutting<D>,
+        patch: u32,
+    ) {
+        let points = &chart.window.points;
+        for &(i, axis, cost) in &cutting.seams {
+            self.seams[points[i as usize] as usize][usize::from(axis)] = cost;
+        }
+        for (i, &p) in points.iter().enumerate().filter(|(i, _)| cutting.take[*i]) {
             let p = p as usize;
-            view.places.push(self.places[p]);
-            view.patches.push(self.patches[p]);
-            view.seams.push(self.seams[p]);
-            view.looks.push(if self.patches[p] == FREE {
-                Look::EMPTY
-            } else {
-                source.look(self.places[p])
-            });
+            self.free -= usize::from(self.patches[p] == FREE);
+            self.patches[p] = patch;
+            self.places[p] = places[i];
+            if let Some(d) = self.distortion.get_mut(p) {
+                *d = chart.distortion.get(i).copied().unwrap_or(0.0);
+            }
         }
-        if !self.distortion.is_empty() {
-            let points = window.points.iter();
-            view.distortion = points.map(|&p| self.distortion[p as usize]).collect();
-        }
-        view
     }
 
     /// Whether a point shows something.

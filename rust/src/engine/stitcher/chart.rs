@@ -13,6 +13,8 @@ const ADAPT: f32 = 0.7;
 const TORN: f32 = 0.45;
 /// Where a field has a pole, patches are so many times smaller, and rigid.
 const POLE: f32 = 1.75;
+/// Boxes of bent patches are so many times larger.
+const BENT: f32 = 1.2;
 
 /// The map of a patch: where its points look, relative to where its centre does.
 pub(super) struct Chart<const D: usize> {
@@ -79,14 +81,28 @@ impl<const D: usize> Chart<D> {
         Self::affine(window, canvas, frames, frame, centre, Some(most))
     }
 
-    /// The box around a centre that holds a patch, and one point more on each side.
-    fn window(
+    /// The first point and the one after the last of the box around a centre that holds a patch, bent or not, and one point
+    /// more on each side.
+    pub(super) fn reach(
+        canvas: &Canvas<D>,
+        frames: Frames<'_, D>,
+        centre: [i32; D],
+        side: f32,
+        bend: bool,
+    ) -> ([i32; D], [i32; D]) {
+        let here: [usize; D] = std::array::from_fn(|a| canvas.grid.resolve(a, centre[a] as isize));
+        let frame = frames.at(canvas.grid.index(here));
+        let bend = bend && matches!(frames, Frames::Dense(_));
+        Self::bounds(canvas, &frame, centre, side, if bend { BENT } else { 1.0 })
+    }
+
+    fn bounds(
         canvas: &Canvas<D>,
         frame: &Frame<D>,
         centre: [i32; D],
         side: f32,
         more: f32,
-    ) -> Option<Window<D>> {
+    ) -> ([i32; D], [i32; D]) {
         let back = inverse(frame);
         let (mut low, mut high) = ([0; D], [0; D]);
         for axis in 0..D {
@@ -102,6 +118,17 @@ impl<const D: usize> Chart<D> {
             low[axis] = centre[axis] - half;
             high[axis] = centre[axis] + half + 1;
         }
+        (low, high)
+    }
+
+    fn window(
+        canvas: &Canvas<D>,
+        frame: &Frame<D>,
+        centre: [i32; D],
+        side: f32,
+        more: f32,
+    ) -> Option<Window<D>> {
+        let (low, high) = Self::bounds(canvas, frame, centre, side, more);
         canvas.window(low, high)
     }
 
@@ -167,7 +194,7 @@ impl<const D: usize> Chart<D> {
         centre: [i32; D],
         side: f32,
     ) -> Option<Self> {
-        let window = Self::window(canvas, &frame, centre, side, 1.2)?;
+        let window = Self::window(canvas, &frame, centre, side, BENT)?;
         Self::integrated(window, canvas, frames, frame, centre, side)
     }
 

@@ -5,19 +5,19 @@
 //! nothing but what it shows before, and on the field inside.
 
 use std::collections::HashMap;
-use std::sync::Mutex;
 
 use super::canvas::{Canvas, Window};
 use super::chart::{Chart, difference, mean};
-use super::cut::{Cutter, distance};
+use super::cut::{Cutter, Run, runs};
+use super::pair::{Judge, distances};
 use super::search::{Charges, Index};
 use super::source::Source;
+use super::view::Looks;
 use super::{Balance, Given, Options, Patch, Stitching, Weights, enlargement};
 use crate::foundation::fixed::{Frames, Place};
 use crate::foundation::grid::{Grid, Region};
 use crate::foundation::hash::Noise;
 use crate::foundation::par::Monitor;
-use crate::kernels::seam::links;
 use crate::{Error, Result};
 
 /// A box is divided where a patch would fill less of it.
@@ -73,23 +73,27 @@ pub fn judge<const D: usize>(
     for got in [places.len(), patches.len()] {
         check_length("places", grid, got)?;
     }
-    let cutter = Cutter {
-        source,
-        weights,
-        guide: None,
-        blocks: COVERED,
-        solvers: Mutex::default(),
-    };
-    let mut seams = vec![[0.0; D]; grid.len()];
-    for axis in 0..D {
-        links(grid, axis, |p, q| {
-            if patches[p] != patches[q] {
-                let (l, r) = (source.look(places[p]), source.look(places[q]));
-                let apart = distance(&l, &r);
-                seams[p][axis] = cutter.pair(&l, &r, 2.0 * apart * apart);
-            }
-        });
+    let mut looks = Looks::default();
+    looks.fit(grid.len());
+    for (i, &place) in places.iter().enumerate() {
+        looks.set(i, &source.look(place));
     }
+    let judge = Judge { source, weights };
+    let mut seams = vec![[0.0; D]; grid.len()];
+    let (mut apart, mut costs, mut unlike) = (Vec::new(), Vec::new(), Vec::new());
+    runs(grid, |Run { axis, p, q, n }| {
+        let (l, r) = (looks.row(p, n), looks.row(q, n));
+        apart.resize(n, 0.0);
+        costs.resize(n, 0.0);
+        distances(l, r, &mut apart);
+        apart.iter_mut().for_each(|d| *d *= *d);
+        judge.pairs(l, r, [&apart, &apart], &mut unlike, &mut costs);
+        for k in 0..n {
+            if patches[p + k] != patches[q + k] {
+                seams[p + k][axis] = costs[k];
+            }
+        }
+    });
     Ok(seams)
 }
 
@@ -121,13 +125,7 @@ pub fn cover<const D: usize>(
         &shown.table,
     )?;
     let mut this = Stitching {
-        cutter: Cutter {
-            source,
-            weights: options.weights,
-            guide: None,
-            blocks: COVERED,
-            solvers: Mutex::default(),
-        },
+        cutter: Cutter::new(source, options.weights, None, COVERED),
         frames,
         options: *options,
         index: prepared.0.afresh(Charges {
@@ -139,6 +137,7 @@ pub fn cover<const D: usize>(
         patches: shown.table,
         offsets: HashMap::new(),
         noise: Noise::new(options.seed),
+        laid: 0,
         monitor,
     };
     this.know_patches();
@@ -177,7 +176,7 @@ impl<const D: usize> Stitching<'_, D> {
         let divide: [bool; D] = std::array::from_fn(|a| high[a] - low[a] >= SMALL);
         if fills && !strays || !divide.contains(&true) {
             let centre = std::array::from_fn(|a| chart.window.low[a] + sides[a] as i32 / 2);
-            return self.lay_chart(&chart, centre, side);
+            return self.cover_chart(chart, centre, side);
         }
         for corner in 0..1usize << D {
             let (mut first, mut last) = (low, high);

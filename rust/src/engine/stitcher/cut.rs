@@ -7,10 +7,12 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::canvas::{FREE, HELD, View, Window};
+use super::canvas::{FREE, Window};
 use super::chart::Chart;
-use super::energy::{Energy, capacity};
-use super::source::{CHANNELS, Look, Source};
+use super::energy::Energy;
+use super::pair::{Capacities, Judge, capacity, go_on};
+use super::source::Source;
+use super::view::{Looks, Tie, View};
 use super::weights::Weights;
 use crate::Result;
 use crate::engine::guide::{Guide, UNRELATED};
@@ -18,16 +20,11 @@ use crate::foundation::fixed::Place;
 use crate::foundation::grid::Grid;
 use crate::foundation::par::Monitor;
 use crate::kernels::seam::maxflow::Solver;
-use crate::kernels::seam::{links, steps};
 
-/// Added to every pair, so that ties go to the shorter seam.
-const SHORTEST: f32 = 2e-3;
-/// Costs of one pair are at most this, so that sums stay within 32 bits.
-pub(super) const MOST: f32 = 1000.0;
-/// Windows of more points are cut between blocks of such a side first.
+/// Windows of more points are cut between blocks of such a side first, to be laid.
 pub(super) const LARGE: &[(usize, usize)] = &[(4096, 2)];
-/// Beyond this, colours of two elements are as different as can be.
-const UNLIKE: f32 = 1.5;
+/// To be compared with others, pictures and volumes.
+const JUDGED: [&[(usize, usize)]; 2] = [&[(4096, 4)], &[(1 << 15, 4), (4096, 2)]];
 
 /// A patch at a place.
 pub(super) struct Proposal<'a, const D: usize> {
@@ -36,8 +33,6 @@ pub(super) struct Proposal<'a, const D: usize> {
     /// Of all points of the window.
     pub places: Vec<Place<D>>,
     pub distortion: &'a [f32],
-    /// Points that must take it; empty for none.
-    pub core: Vec<bool>,
 }
 
 /// What a cut comes to.
@@ -46,39 +41,10 @@ pub(super) struct Cutting<const D: usize> {
     pub value: f64,
     /// The points that take the patch.
     pub take: Vec<bool>,
-    /// Seams of the window, as in the canvas.
-    pub seams: Vec<[f32; D]>,
+    /// Seams that it makes: the first of two points, the axis, and the cost.
+    pub seams: Vec<(u32, u8, f32)>,
     /// Side of the blocks of points that it runs between.
     block: usize,
-}
-
-/// What a point of a window must do.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Tie {
-    /// It shows nothing, and will not.
-    Out,
-    Old,
-    New,
-    Either,
-}
-
-/// What a pair of neighbours costs by what they show; negative where it is none.
-#[derive(Clone, Copy)]
-pub(super) struct Pair {
-    /// The first one keeps what it has, and the next one takes the patch.
-    pub old_new: f32,
-    /// The other way round.
-    pub new_old: f32,
-    /// Both keep what they have.
-    pub kept: f32,
-}
-
-impl Pair {
-    const NONE: Self = Self {
-        old_new: -1.0,
-        new_old: -1.0,
-        kept: 0.0,
-    };
 }
 
 impl<'a, const D: usize> Proposal<'a, D> {
@@ -90,100 +56,73 @@ impl<'a, const D: usize> Proposal<'a, D> {
             mask: &chart.mask,
             places: chart.steps.iter().map(add).collect(),
             distortion: &chart.distortion,
-            core: Vec::new(),
         }
     }
 }
 
-/// What a point of a window shows, how far that is apart, and whether it is the same place.
-#[derive(Clone, Copy)]
-struct Looks {
-    old: Look,
-    new: Look,
-    apart: f32,
-    same: bool,
+/// What cuts are made in, one at a time.
+struct Workspace<const D: usize> {
+    solver: Solver<D>,
+    energy: Energy<D>,
+    patch: Patch,
+    costs: Costs,
 }
 
-impl Looks {
-    const NONE: Self = Self {
-        old: Look::EMPTY,
-        new: Look::EMPTY,
-        apart: 0.0,
-        same: false,
-    };
+/// What the points of a window show that take the patch.
+#[derive(Default)]
+struct Patch {
+    looks: Looks,
+    /// How far that is from what is there, squared.
+    apart: Vec<f32>,
+    /// 1 where it is the same place, else 0.
+    same: Vec<f32>,
+    /// Whether there is such a point.
+    meets: bool,
 }
 
-/// What a cut costs, by what its points take.
-struct Costs<const D: usize> {
-    /// Of each point that keeps what it has, and that takes the patch.
-    points: Vec<[f32; 2]>,
-    pairs: [Vec<Pair>; D],
-}
-
-impl<const D: usize> Costs<D> {
-    /// The cut that gives some points the patch.
-    fn settle(
-        &self,
-        view: &View<D>,
-        window: &Window<D>,
-        ties: &[Tie],
-        sink: &[bool],
-        block: usize,
-    ) -> Cutting<D> {
-        let take: Vec<bool> = ties
-            .iter()
-            .zip(sink)
-            .map(|(&t, &s)| t == Tie::New || t == Tie::Either && s)
-            .collect();
-        let mut value: f64 = self
-            .points
-            .iter()
-            .zip(&take)
-            .map(|(c, &t)| f64::from(c[usize::from(t)]))
-            .sum();
-        let mut seams = view.seams.clone();
-        for axis in 0..D {
-            links(&window.grid, axis, |p, q| {
-                let Pair {
-                    old_new,
-                    new_old,
-                    kept,
-                } = self.pairs[axis][p];
-                if old_new >= 0.0 {
-                    seams[p][axis] = match (take[p], take[q]) {
-                        (true, true) => 0.0,
-                        (true, false) => new_old,
-                        (false, true) => old_new,
-                        (false, false) => kept,
-                    };
-                }
-                value += f64::from(seams[p][axis]);
-            });
-        }
-        Cutting {
-            value,
-            take,
-            seams,
-            block,
-        }
-    }
+/// What the pairs of a row cost.
+#[derive(Default)]
+struct Costs {
+    old_new: Vec<f32>,
+    new_old: Vec<f32>,
+    unlike: Vec<f32>,
+    capacities: Capacities,
 }
 
 /// What cuts are made with.
 pub(super) struct Cutter<'a, const D: usize> {
-    pub source: &'a Source<D>,
-    pub weights: Weights,
+    pairs: Judge<'a, D>,
     pub guide: Option<&'a Guide<'a>>,
     /// Windows of more points are cut between blocks of such a side first, the largest ones before the others.
     pub blocks: &'static [(usize, usize)],
     /// Workspaces of cuts, as many as are made at once.
-    pub solvers: Mutex<Vec<Solver<D>>>,
+    workspaces: Mutex<Vec<Workspace<D>>>,
 }
 
-impl<const D: usize> Cutter<'_, D> {
-    fn solvers(&self) -> MutexGuard<'_, Vec<Solver<D>>> {
+impl<'a, const D: usize> Cutter<'a, D> {
+    pub(super) fn new(
+        source: &'a Source<D>,
+        weights: Weights,
+        guide: Option<&'a Guide<'a>>,
+        blocks: &'static [(usize, usize)],
+    ) -> Self {
+        Self {
+            pairs: Judge { source, weights },
+            guide,
+            blocks,
+            workspaces: Mutex::default(),
+        }
+    }
+
+    pub(super) fn source(&self) -> &'a Source<D> {
+        self.pairs.source
+    }
+
+    fn workspaces(&self) -> MutexGuard<'_, Vec<Workspace<D>>> {
         // A workspace is of use whatever became of the work of another.
-        self.solvers.lock().unwrap_or_else(PoisonError::into_inner)
+        self.workspaces
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Cuts a patch into the canvas.
@@ -204,13 +143,33 @@ impl<const D: usize> Cutter<'_, D> {
         patch: &Proposal<'_, D>,
         monitor: &Monitor,
     ) -> Result<Cutting<D>> {
-        let n = patch.window.grid.len();
-        let block = self
-            .blocks
-            .iter()
-            .find(|(least, _)| n > *least)
-            .map_or(1, |&(_, side)| side);
+        let block = block(patch.window, self.blocks);
         self.cut_between(view, patch, block, monitor)
+    }
+
+    /// Cuts a patch in between blocks of points that may be larger: enough to compare it with others.
+    pub(super) fn judge(
+        &self,
+        view: &View<D>,
+        patch: &Proposal<'_, D>,
+        monitor: &Monitor,
+    ) -> Result<Cutting<D>> {
+        let block = block(patch.window, self.blocks).max(block(patch.window, JUDGED[D - 2]));
+        self.cut_between(view, patch, block, monitor)
+    }
+
+    /// Cuts a patch in that was judged.
+    pub(super) fn cut_judged(
+        &self,
+        view: &View<D>,
+        patch: &Proposal<'_, D>,
+        judged: Cutting<D>,
+        monitor: &Monitor,
+    ) -> Result<Cutting<D>> {
+        if judged.block > block(patch.window, self.blocks) {
+            return self.cut(view, patch, monitor);
+        }
+        self.refine(view, patch, judged, monitor)
     }
 
     /// Cuts a patch in between blocks of points of a side.
@@ -221,9 +180,7 @@ impl<const D: usize> Cutter<'_, D> {
         block: usize,
         monitor: &Monitor,
     ) -> Result<Cutting<D>> {
-        let n = patch.window.grid.len();
-        let ties: Vec<Tie> = (0..n).map(|i| tie(view, patch, i)).collect();
-        self.solve(view, patch, &ties, block, monitor)
+        self.solve(view, patch, &view.ties, block, monitor)
     }
 
     /// Cuts a patch in that was cut coarsely: by blocks half as large, then half of that; points away from the cut are
@@ -250,16 +207,16 @@ impl<const D: usize> Cutter<'_, D> {
         let grid = &patch.window.grid;
         let mut best = coarse;
         while best.block > 1 {
-            let mut ties: Vec<Tie> = (0..grid.len()).map(|i| tie(view, patch, i)).collect();
+            let mut ties = view.ties.clone();
             let mut band = vec![false; grid.len()];
-            for axis in 0..D {
-                links(grid, axis, |p, q| {
+            runs(grid, |Run { p, q, n, .. }| {
+                for (p, q) in (p..p + n).zip(q..) {
                     if ties[p] != Tie::Out && ties[q] != Tie::Out && best.take[p] != best.take[q] {
                         band[p] = true;
                         band[q] = true;
                     }
-                });
-            }
+                }
+            });
             for _ in 0..best.block.max(reach) {
                 band = widen(grid, &band);
             }
@@ -282,147 +239,196 @@ impl<const D: usize> Cutter<'_, D> {
         block: usize,
         monitor: &Monitor,
     ) -> Result<Cutting<D>> {
-        let (energy, costs) = self.energy(view, patch, ties, block);
-        let mut solver = self.solvers().pop().unwrap_or_default();
-        let sink = energy.minimise(block, &mut solver, monitor)?;
-        self.solvers().push(solver);
-        Ok(costs.settle(view, patch.window, ties, &sink, block))
-    }
-
-    /// The energy of a cut, and the costs that it is made of.
-    fn energy(
-        &self,
-        view: &View<D>,
-        patch: &Proposal<'_, D>,
-        ties: &[Tie],
-        block: usize,
-    ) -> (Energy<D>, Costs<D>) {
-        let mut energy = Energy::new(patch.window.grid);
-        let mut points = vec![[0.0f32; 2]; ties.len()];
-        let free = self.guide.is_none() && patch.distortion.is_empty();
-        for i in 0..if free { 0 } else { ties.len() } {
-            if ties[i] == Tie::Out || !patch.mask[i] {
-                continue;
-            }
-            points[i] = self.points(view, patch, i);
-            if ties[i] == Tie::Either {
-                energy.terminal[i] = capacity(points[i][1] - points[i][0]);
-            }
-        }
-        let pairs = self.pairs(view, patch, ties, block);
-        for axis in 0..D {
-            energy.add_pairs(axis, ties, &pairs[axis]);
-        }
-        (energy, Costs { points, pairs })
-    }
-
-    /// The costs of all pairs along each axis; of those within a block only what is kept.
-    fn pairs(
-        &self,
-        view: &View<D>,
-        patch: &Proposal<'_, D>,
-        ties: &[Tie],
-        block: usize,
-    ) -> [Vec<Pair>; D] {
-        let (grid, n) = (&patch.window.grid, ties.len());
-        let none = |p: usize, q: usize| {
-            ties[p] == Tie::Out || ties[q] == Tie::Out || !(patch.mask[p] || patch.mask[q])
+        let grid = patch.window.grid;
+        let spare = self.workspaces().pop();
+        let mut work = match spare {
+            Some(spare) => spare,
+            None => Workspace {
+                solver: Solver::default(),
+                energy: Energy::new(grid, block)?,
+                patch: Patch::default(),
+                costs: Costs::default(),
+            },
         };
-        // Pairs that show the same whatever is cut need not be judged, nor what they show.
-        let judge = |at: usize, p: usize, q: usize| {
-            ties[p] != ties[q] || ties[p] == Tie::Either && at % block + 1 == block
-        };
-        let mut judged = vec![false; n];
-        for axis in 0..D {
-            steps(grid, axis, |at, p, q| {
-                if !none(p, q) && judge(at, p, q) {
-                    judged[p] = true;
-                    judged[q] = true;
-                }
-            });
+        self.look(view, patch, ties, &mut work.patch);
+        work.energy.clear(grid, block)?;
+        if self.guide.is_some() || !patch.distortion.is_empty() {
+            for (i, _) in ties.iter().enumerate().filter(|(_, t)| **t == Tie::Either) {
+                let [keep, take] = self.points(view, patch, i);
+                work.energy.add_point(i, capacity(take - keep));
+            }
         }
-        let looks = self.looks(view, patch, &judged);
-        std::array::from_fn(|axis| {
-            let mut pairs = vec![Pair::NONE; n];
-            steps(grid, axis, |at, p, q| {
-                if none(p, q) {
-                    return;
-                }
-                let kept = view.seams[p][axis];
-                let (mut old_new, mut new_old) = (kept, kept);
-                if judge(at, p, q) {
-                    let (l, r) = (&looks[p], &looks[q]);
-                    let apart = l.apart * l.apart + r.apart * r.apart;
-                    // Where the patch shows what is there already there is no seam.
-                    old_new = match (l.same, r.same) {
-                        (true, _) => 0.0,
-                        (_, true) => kept,
-                        _ => self.pair(&l.old, &r.new, apart),
-                    };
-                    new_old = match (r.same, l.same) {
-                        (true, _) => 0.0,
-                        (_, true) => kept,
-                        _ => self.pair(&l.new, &r.old, apart),
-                    };
-                }
-                pairs[p] = Pair {
-                    old_new,
-                    new_old,
-                    kept,
-                };
-            });
-            pairs
-        })
+        self.add_pairs(
+            &grid,
+            view,
+            &work.patch,
+            ties,
+            &mut work.energy,
+            &mut work.costs,
+        );
+        let take = work.energy.minimise(ties, &mut work.solver, monitor)?;
+        let cutting = self.settle(view, patch, take, block, &work.patch, &mut work.costs);
+        self.workspaces().push(work);
+        Ok(cutting)
     }
 
-    /// What each point shows that keeps what it has, and that takes the patch; the same where it has no choice.
-    fn looks(&self, view: &View<D>, patch: &Proposal<'_, D>, judged: &[bool]) -> Vec<Looks> {
-        let mut looks = vec![Looks::NONE; judged.len()];
-        for (i, here) in looks.iter_mut().enumerate() {
-            if !judged[i] {
-                continue;
-            }
+    /// What the points show that take the patch, as far as that is asked.
+    fn look(&self, view: &View<D>, patch: &Proposal<'_, D>, ties: &[Tie], out: &mut Patch) {
+        let n = ties.len();
+        let judged = judged(&patch.window.grid, ties);
+        out.looks.fit(n);
+        out.apart.resize(n, 0.0);
+        out.same.resize(n, 0.0);
+        out.meets = false;
+        for i in (0..n).filter(|&i| judged[i]) {
             let covered = view.patches[i] != FREE;
-            here.old = view.looks[i];
-            here.new = if patch.mask[i] || !covered {
-                self.source.look(patch.places[i])
-            } else {
-                here.old
-            };
-            if !covered {
-                here.old = here.new;
+            let same = covered && view.places[i] == patch.places[i];
+            out.meets |= same;
+            out.same[i] = f32::from(u8::from(same));
+            out.apart[i] = 0.0;
+            if patch.mask[i] {
+                let look = self.source().look(patch.places[i]);
+                out.looks.set(i, &look);
+                if covered {
+                    let apart = view.looks.distance(i, &look);
+                    out.apart[i] = apart * apart;
+                }
             }
-            here.same = covered && view.places[i] == patch.places[i];
-            here.apart = distance(&here.old, &here.new);
         }
-        looks
+    }
+
+    /// Costs of `n` pairs in a row, by which of the two takes the patch.
+    fn judge_pairs(&self, view: &View<D>, patch: &Patch, run: &Run, costs: &mut Costs) {
+        let (p, q, n) = (run.p, run.q, run.n);
+        costs.old_new.resize(n, 0.0);
+        costs.new_old.resize(n, 0.0);
+        let apart = [&patch.apart[p..p + n], &patch.apart[q..q + n]];
+        let (old, new) = (&view.looks, &patch.looks);
+        let unlike = &mut costs.unlike;
+        self.pairs.pairs(
+            old.row(p, n),
+            new.row(q, n),
+            apart,
+            unlike,
+            &mut costs.old_new,
+        );
+        self.pairs.pairs(
+            new.row(p, n),
+            old.row(q, n),
+            apart,
+            unlike,
+            &mut costs.new_old,
+        );
+        if patch.meets {
+            let kept = &view.seams[run.axis][p..p + n];
+            let (l, r) = (&patch.same[p..p + n], &patch.same[q..q + n]);
+            go_on(l, r, kept, &mut costs.old_new);
+            go_on(r, l, kept, &mut costs.new_old);
+        }
+    }
+
+    /// Adds what pairs cost whose points have a choice.
+    fn add_pairs(
+        &self,
+        grid: &Grid<D>,
+        view: &View<D>,
+        patch: &Patch,
+        ties: &[Tie],
+        energy: &mut Energy<D>,
+        costs: &mut Costs,
+    ) {
+        runs(grid, |run| {
+            if energy.side() > 1 {
+                energy.add_seams(ties, &run, &view.seams[run.axis][run.p..run.p + run.n]);
+            }
+            let Some(run) = energy.open(ties, &run) else {
+                return;
+            };
+            self.judge_pairs(view, patch, &run, costs);
+            let kept = &view.seams[run.axis][run.p..run.p + run.n];
+            let capacities = &mut costs.capacities;
+            capacities.set(&costs.old_new, &costs.new_old, kept);
+            energy.add_pairs(ties, &run, capacities);
+        });
+    }
+
+    /// The cut that gives some points the patch.
+    fn settle(
+        &self,
+        view: &View<D>,
+        proposal: &Proposal<'_, D>,
+        take: Vec<bool>,
+        block: usize,
+        patch: &Patch,
+        costs: &mut Costs,
+    ) -> Cutting<D> {
+        let mut value = self.value_of(view, proposal, |i| take[i]);
+        let mut seams = Vec::new();
+        runs(&proposal.window.grid, |run| {
+            let kept = &view.seams[run.axis];
+            for k in 0..run.n {
+                let (p, q) = (run.p + k, run.q + k);
+                let cost = match (take[p], take[q]) {
+                    (false, false) => continue,
+                    (true, true) => 0.0,
+                    _ if view.ties[p] == Tie::Out || view.ties[q] == Tie::Out => continue,
+                    (first, _) => {
+                        let one = Run { p, q, n: 1, ..run };
+                        self.judge_pairs(view, patch, &one, costs);
+                        if first {
+                            costs.new_old[0]
+                        } else {
+                            costs.old_new[0]
+                        }
+                    }
+                };
+                if cost != kept[p] {
+                    value += f64::from(cost) - f64::from(kept[p]);
+                    seams.push((p as u32, run.axis as u8, cost));
+                }
+            }
+        });
+        Cutting {
+            value,
+            take,
+            seams,
+            block,
+        }
     }
 
     /// What the window of a patch costs as it is.
     pub(super) fn value(&self, view: &View<D>, patch: &Proposal<'_, D>) -> f64 {
-        let mut value = 0.0;
-        for i in 0..patch.window.grid.len() {
-            if patch.mask[i] {
-                value += f64::from(self.points(view, patch, i)[0]);
+        self.value_of(view, patch, |_| false)
+    }
+
+    /// What the points cost of which some take the patch, and all seams as they are.
+    fn value_of(
+        &self,
+        view: &View<D>,
+        patch: &Proposal<'_, D>,
+        take: impl Fn(usize) -> bool,
+    ) -> f64 {
+        let mut value = view.total;
+        if self.guide.is_some() || !patch.distortion.is_empty() {
+            for (i, tie) in view.ties.iter().enumerate() {
+                if *tie == Tie::New || *tie == Tie::Either {
+                    value += f64::from(self.points(view, patch, i)[usize::from(take(i))]);
+                }
             }
-        }
-        for axis in 0..D {
-            links(&patch.window.grid, axis, |p, _| {
-                value += f64::from(view.seams[p][axis]);
-            });
         }
         value
     }
 
     /// What a point costs that keeps what it shows, or takes the patch.
     fn points(&self, view: &View<D>, patch: &Proposal<'_, D>, i: usize) -> [f32; 2] {
-        let own = |all: &[f32]| self.weights.distortion * all.get(i).copied().unwrap_or(0.0);
+        let weights = &self.pairs.weights;
+        let own = |all: &[f32]| weights.distortion * all.get(i).copied().unwrap_or(0.0);
         let mut costs = [own(&view.distortion), own(patch.distortion)];
         if let Some(guide) = self.guide {
             let p = patch.window.points[i] as usize;
             for (cost, place) in costs.iter_mut().zip([view.places[i], patch.places[i]]) {
-                let asked = guide.cost(p, self.source.sample(place)) as f32;
-                *cost += self.weights.guide * asked / UNRELATED;
+                let asked = guide.cost(p, self.source().sample(place)) as f32;
+                *cost += weights.guide * asked / UNRELATED;
             }
         }
         if view.patches[i] == FREE {
@@ -431,57 +437,66 @@ impl<const D: usize> Cutter<'_, D> {
             costs
         }
     }
+}
 
-    /// What is seen where one look is beside another, and how far the pictures are apart there.
-    #[inline(always)]
-    pub(super) fn pair(&self, l: &Look, r: &Look, apart: f32) -> f32 {
-        let w = &self.weights;
-        let mut cost = SHORTEST + w.colour * apart / 8.0;
-        if w.surprise > 0.0 {
-            cost += w.surprise * self.source.surprise(l.class, r.class);
-        }
-        if self.source.has_elements() {
-            let (inside, beside) = ((l.depth > 0.0, r.depth > 0.0), (l.beside, r.beside));
-            if inside.0 && inside.1 {
-                cost += w.contact * distance(l, r).min(UNLIKE);
+/// The side of the blocks that a window is cut between.
+fn block<const D: usize>(window: &Window<D>, sides: &[(usize, usize)]) -> usize {
+    let n = window.grid.len();
+    let side = sides.iter().find(|(most, _)| n > *most);
+    side.map_or(1, |&(_, side)| side)
+}
+
+/// Pairs of neighbours along an axis: `p` and `q`, and those that follow them in their rows.
+#[derive(Clone, Copy)]
+pub(super) struct Run {
+    pub axis: usize,
+    pub p: usize,
+    pub q: usize,
+    pub n: usize,
+}
+
+/// Calls `f` with the pairs of each row, along each axis.
+pub(super) fn runs<const D: usize>(grid: &Grid<D>, mut f: impl FnMut(Run)) {
+    let (shape, strides) = (grid.shape(), grid.strides());
+    let n = shape[D - 1];
+    for p in (0..grid.len()).step_by(n) {
+        let point = grid.point(p);
+        for axis in 0..D - 1 {
+            if point[axis] + 1 < shape[axis] {
+                let q = p + strides[axis];
+                f(Run { axis, p, q, n });
             }
-            if beside.0 && inside.1 || inside.0 && beside.1 {
-                cost += w.joint;
-            }
-            cost += w.depth * (l.depth.min(6.0) + r.depth.min(6.0)) / 6.0;
-            cost += w.jump * ((l.depth - r.depth).abs() - 1.0).clamp(0.0, 4.0) / 2.0;
         }
-        cost.min(MOST)
+        f(Run {
+            axis: D - 1,
+            p,
+            q: p + 1,
+            n: n - 1,
+        });
     }
+}
+
+/// Points that have a choice, or a neighbour that must do something else.
+fn judged<const D: usize>(grid: &Grid<D>, ties: &[Tie]) -> Vec<bool> {
+    let mut judged: Vec<bool> = ties.iter().map(|&t| t == Tie::Either).collect();
+    runs(grid, |Run { p, q, n, .. }| {
+        for k in 0..n {
+            let differ = ties[p + k] != ties[q + k];
+            judged[p + k] |= differ;
+            judged[q + k] |= differ;
+        }
+    });
+    judged
 }
 
 /// A mask, and all beside it.
 pub(super) fn widen<const D: usize>(grid: &Grid<D>, mask: &[bool]) -> Vec<bool> {
     let mut wide = mask.to_vec();
-    for axis in 0..D {
-        links(grid, axis, |p, q| {
-            wide[p] |= mask[q];
-            wide[q] |= mask[p];
-        });
-    }
+    runs(grid, |Run { p, q, n, .. }| {
+        for k in 0..n {
+            wide[p + k] |= mask[q + k];
+            wide[q + k] |= mask[p + k];
+        }
+    });
     wide
-}
-
-fn tie<const D: usize>(view: &View<D>, patch: &Proposal<'_, D>, i: usize) -> Tie {
-    match (view.patches[i], patch.mask[i]) {
-        (FREE, false) => Tie::Out,
-        (FREE, true) => Tie::New,
-        (HELD, _) | (_, false) => Tie::Old,
-        _ if patch.core.get(i).is_some_and(|&c| c) => Tie::New,
-        _ => Tie::Either,
-    }
-}
-
-#[inline(always)]
-pub(super) fn distance(a: &Look, b: &Look) -> f32 {
-    let mut sum = 0.0;
-    for c in 0..CHANNELS {
-        sum += (a.colour[c] - b.colour[c]).abs();
-    }
-    sum
 }

@@ -3,110 +3,174 @@
 //! Lombaert, Sun, Grady and Xu, *A multilevel banded graph cuts method for fast image segmentation*, ICCV 2005: large windows
 //! are cut between blocks first, and then only points along that cut are free. They would take most of the time otherwise.
 
-use super::cut::{MOST, Pair, Tie};
+use super::cut::Run;
+use super::pair::{Capacities, capacity};
+use super::view::Tie;
 use crate::Result;
 use crate::foundation::grid::Grid;
 use crate::foundation::par::Monitor;
-use crate::kernels::seam::links;
 use crate::kernels::seam::maxflow::{Graph, Solver};
 
-/// Capacities are costs times this.
-const SCALE: f32 = 16384.0;
-
-/// Costs of labels, source for what is kept and sink for what is taken, in whole numbers.
+/// Costs of labels, source for what is kept and sink for what is taken, in whole numbers, of blocks of points.
 pub(super) struct Energy<const D: usize> {
     grid: Grid<D>,
+    blocks: Grid<D>,
+    side: usize,
+    /// The block of each point along the last axis.
+    columns: Vec<u32>,
     /// What it costs more to take than to keep.
-    pub terminal: Vec<i32>,
-    /// What it costs that a point keeps and the next one along the axis takes. All else is in the terminals.
+    terminal: Vec<i32>,
+    /// What it costs that a block keeps and the next one along the axis takes. All else is in the terminals.
     forward: [Vec<i32>; D],
+    /// The other way round: nothing.
+    backward: Vec<i32>,
 }
 
 impl<const D: usize> Energy<D> {
-    pub(super) fn new(grid: Grid<D>) -> Self {
-        let n = grid.len();
-        Self {
+    /// No costs yet, of points that take the patch in blocks of a side, all of a block or none.
+    pub(super) fn new(grid: Grid<D>, side: usize) -> Result<Self> {
+        let mut this = Self {
             grid,
-            terminal: vec![0; n],
-            forward: std::array::from_fn(|_| vec![0; n]),
+            blocks: grid,
+            side,
+            columns: Vec::new(),
+            terminal: Vec::new(),
+            forward: std::array::from_fn(|_| Vec::new()),
+            backward: Vec::new(),
+        };
+        this.clear(grid, side)?;
+        Ok(this)
+    }
+
+    /// The same in place.
+    pub(super) fn clear(&mut self, grid: Grid<D>, side: usize) -> Result<()> {
+        self.grid = grid;
+        self.side = side;
+        self.blocks = Grid::new(grid.shape().map(|n| n.div_ceil(side)), [false; D])?;
+        self.columns.clear();
+        self.columns
+            .extend((0..grid.shape()[D - 1]).map(|x| (x / side) as u32));
+        let n = self.blocks.len();
+        let planes = [&mut self.terminal, &mut self.backward];
+        for plane in planes.into_iter().chain(&mut self.forward) {
+            plane.clear();
+            plane.resize(n, 0);
+        }
+        Ok(())
+    }
+
+    /// Side of a block.
+    pub(super) fn side(&self) -> usize {
+        self.side
+    }
+
+    /// The first block of a point's row, and the point's place in the row.
+    #[inline(always)]
+    fn row(&self, p: usize) -> (usize, usize) {
+        let mut point = self.grid.point(p);
+        let column = std::mem::take(&mut point[D - 1]);
+        (self.blocks.index(point.map(|x| x / self.side)), column)
+    }
+
+    /// Adds what it costs more to take than to keep.
+    pub(super) fn add_point(&mut self, p: usize, cost: i32) {
+        let (row, column) = self.row(p);
+        add(
+            &mut self.terminal[row + self.columns[column] as usize],
+            cost,
+        );
+    }
+
+    /// The pairs of a run from the first to the last one that is open: whose points have a choice that tells them apart.
+    pub(super) fn open(&self, ties: &[Tie], run: &Run) -> Option<Run> {
+        // Along the last axis blocks change within a run.
+        let apart = run.axis + 1 == D || self.row(run.p).0 != self.row(run.q).0;
+        let (l, r) = (&ties[run.p..][..run.n], &ties[run.q..][..run.n]);
+        let open = |(&a, &b): (&Tie, &Tie)| match (a, b) {
+            (Tie::Either, Tie::Either) => apart,
+            (Tie::Out, _) | (_, Tie::Out) => false,
+            _ => a != b,
+        };
+        let first = l.iter().zip(r).position(open)?;
+        let last = l.iter().zip(r).rposition(open)?;
+        Some(Run {
+            p: run.p + first,
+            q: run.q + first,
+            n: last + 1 - first,
+            ..*run
+        })
+    }
+
+    /// Adds the costs of a run of pairs; those of points without a choice go to their neighbours.
+    pub(super) fn add_pairs(&mut self, ties: &[Tie], run: &Run, costs: &Capacities) {
+        let ((p_row, p_column), (q_row, q_column)) = (self.row(run.p), self.row(run.q));
+        let (terminal, forward) = (&mut self.terminal[..], &mut self.forward[run.axis][..]);
+        for k in 0..run.n {
+            let p = p_row + self.columns[p_column + k] as usize;
+            let q = q_row + self.columns[q_column + k] as usize;
+            let (old_new, new_old, kept) = (costs.old_new[k], costs.new_old[k], costs.kept[k]);
+            match (ties[run.p + k], ties[run.q + k]) {
+                (Tie::Either, Tie::Either) => {
+                    // A seam inside of a block goes with it: see `add_seams`. One that is worse than the new one on both
+                    // sides will go, and counts as much as keeps the energy submodular.
+                    let kept = kept.min(old_new + new_old);
+                    if p != q {
+                        add(&mut terminal[p], new_old - kept);
+                        add(&mut terminal[q], -new_old);
+                        add(&mut forward[p], old_new + new_old - kept);
+                    }
+                }
+                (Tie::Old, Tie::Either) => add(&mut terminal[q], old_new - kept),
+                (Tie::New, Tie::Either) => add(&mut terminal[q], -new_old),
+                (Tie::Either, Tie::Old) => add(&mut terminal[p], new_old - kept),
+                (Tie::Either, Tie::New) => add(&mut terminal[p], -old_new),
+                _ => {}
+            }
         }
     }
 
-    /// Adds the costs of the pairs along an axis; those of points without a choice go to their neighbours.
-    pub(super) fn add_pairs(&mut self, axis: usize, ties: &[Tie], pairs: &[Pair]) {
-        let (terminal, forward) = (&mut self.terminal, &mut self.forward[axis]);
-        links(&self.grid, axis, |p, q| {
-            if pairs[p].old_new < 0.0 {
-                return;
+    /// Adds the seams of a run that lie inside of blocks, which go where those take the patch.
+    pub(super) fn add_seams(&mut self, ties: &[Tie], run: &Run, seams: &[f32]) {
+        let ((p_row, p_column), (q_row, q_column)) = (self.row(run.p), self.row(run.q));
+        for (k, &seam) in seams.iter().enumerate().filter(|(_, s)| **s > 0.0) {
+            let p = p_row + self.columns[p_column + k] as usize;
+            let q = q_row + self.columns[q_column + k] as usize;
+            let both = (ties[run.p + k], ties[run.q + k]) == (Tie::Either, Tie::Either);
+            if both && p == q {
+                add(&mut self.terminal[p], -capacity(seam));
             }
-            let (old_new, new_old) = (capacity(pairs[p].old_new), capacity(pairs[p].new_old));
-            // A seam that was worse than this one on both sides will go; it counts as much as keeps the energy submodular.
-            let kept = capacity(pairs[p].kept).min(old_new + new_old);
-            match (ties[p], ties[q]) {
-                (Tie::Either, Tie::Either) => {
-                    terminal[p] += new_old - kept;
-                    terminal[q] -= new_old;
-                    forward[p] = old_new + new_old - kept;
-                }
-                (Tie::Old, Tie::Either) => terminal[q] += old_new - kept,
-                (Tie::New, Tie::Either) => terminal[q] -= new_old,
-                (Tie::Either, Tie::Old) => terminal[p] += new_old - kept,
-                (Tie::Either, Tie::New) => terminal[p] -= old_new,
-                _ => {}
-            }
-        });
+        }
     }
 
-    /// Which points take the patch at the least cost, where all points of a block of a side take it or none.
+    /// Which points take the patch at the least cost: those that must, and of those that have a choice as it is best.
     pub(super) fn minimise(
         &self,
-        side: usize,
+        ties: &[Tie],
         solver: &mut Solver<D>,
         monitor: &Monitor,
     ) -> Result<Vec<bool>> {
-        if side < 2 {
-            return self.solve(solver, monitor);
-        }
-        let blocks = Grid::new(self.grid.shape().map(|n| n.div_ceil(side)), [false; D])?;
-        let block: Vec<u32> = self
-            .grid
-            .points()
-            .map(|point| blocks.index(point.map(|x| x / side)) as u32)
-            .collect();
-        let mut small = Self::new(blocks);
-        for (&b, &t) in block.iter().zip(&self.terminal) {
-            small.terminal[b as usize] += t;
-        }
-        for axis in 0..D {
-            links(&self.grid, axis, |p, q| {
-                if block[p] != block[q] {
-                    small.forward[axis][block[p] as usize] += self.forward[axis][p];
-                }
-            });
-        }
-        let labels = small.solve(solver, monitor)?;
-        Ok(block.iter().map(|b| labels[*b as usize]).collect())
-    }
-
-    fn solve(&self, solver: &mut Solver<D>, monitor: &Monitor) -> Result<Vec<bool>> {
-        let backward = vec![0; self.grid.len()];
         let graph = Graph {
-            grid: self.grid,
+            grid: self.blocks,
             terminal: &self.terminal,
             forward: std::array::from_fn(|axis| &self.forward[axis][..]),
-            backward: [&backward[..]; D],
+            backward: [&self.backward[..]; D],
         };
-        Ok(solver.min_cut(&graph, monitor)?.sink)
+        let sink = solver.min_cut(&graph, monitor)?.sink;
+        let mut take = Vec::with_capacity(ties.len());
+        for p in (0..ties.len()).step_by(self.columns.len()) {
+            let row = self.row(p).0;
+            take.extend(
+                ties[p..].iter().zip(&self.columns).map(|(&tie, &x)| {
+                    tie == Tie::New || tie == Tie::Either && sink[row + x as usize]
+                }),
+            );
+        }
+        Ok(take)
     }
 }
 
-/// A cost as a capacity, rounded to the nearest.
+/// Sums of many costs stay within 32 bits.
 #[inline(always)]
-pub(super) fn capacity(cost: f32) -> i32 {
-    let scaled = cost.clamp(-MOST, MOST) * SCALE;
-    (if scaled < 0.0 {
-        scaled - 0.5
-    } else {
-        scaled + 0.5
-    }) as i32
+fn add(sum: &mut i32, cost: i32) {
+    *sum = sum.saturating_add(cost);
 }

@@ -3,11 +3,10 @@
 //! Places are numbers of samples in one row, which may be those of many pictures: nothing is asked of what lies beside a
 //! sample.
 
-use std::sync::Mutex;
-
-use super::canvas::{FREE, View, Window};
+use super::canvas::{FREE, Window};
 use super::cut::{Cutter, Proposal};
-use super::source::{Look, Source};
+use super::source::Source;
+use super::view::View;
 use super::weights::Weights;
 use crate::foundation::fixed::{ONE, Place};
 use crate::foundation::grid::Grid;
@@ -108,21 +107,19 @@ impl Samples {
         let cutter = self.cutter();
         let coarse = cutter.cut_between(&view, &patch, side(&window, CUT), monitor)?;
         let cut = cutter.refine_within(&view, &patch, coarse, REACH, monitor)?;
+        let mut seams = pasting.seams.to_vec();
+        for (i, axis, cost) in cut.seams {
+            seams[i as usize][usize::from(axis)] = cost;
+        }
         Ok(Pasted {
             take: cut.take,
-            seams: cut.seams,
+            seams,
         })
     }
 
     fn cutter(&self) -> Cutter<'_, 2> {
-        Cutter {
-            source: &self.source,
-            weights: self.weights,
-            guide: None,
-            // Each cut says how finely it is made.
-            blocks: &[],
-            solvers: Mutex::default(),
-        }
+        // Each cut says how finely it is made.
+        Cutter::new(&self.source, self.weights, None, &[])
     }
 
     /// A window, and what it shows.
@@ -147,20 +144,21 @@ impl Samples {
         if !costs.iter().all(|s| (0.0..=f32::MAX).contains(s)) {
             return Err(Error::value("seams", "costs of at least 0 are allowed"));
         }
-        let mut view = View {
-            places: pasting.shown.iter().map(|&k| place(k)).collect(),
-            patches: vec![FREE; n],
-            seams: pasting.seams.to_vec(),
-            distortion: Vec::new(),
-            looks: vec![Look::EMPTY; n],
-        };
-        for (i, &sample) in pasting.shown.iter().enumerate() {
+        let mut patches = vec![FREE; n];
+        for (patch, &sample) in patches.iter_mut().zip(pasting.shown) {
             if sample != FREE {
                 self.find("shown", sample)?;
-                view.patches[i] = 0;
-                view.looks[i] = self.source.look(view.places[i]);
+                *patch = 0;
             }
         }
+        let view = View::bare(
+            pasting.shown.iter().map(|&k| place(k)).collect(),
+            patches,
+            [0, 1].map(|axis| pasting.seams.iter().map(|s| s[axis]).collect()),
+            pasting.mask,
+            pasting.core,
+            &self.source,
+        );
         Ok((window, view))
     }
 
@@ -186,7 +184,6 @@ impl Samples {
             mask: pasting.mask,
             places: samples.iter().map(|&k| place(k)).collect(),
             distortion: &[],
-            core: pasting.core.to_vec(),
         })
     }
 

@@ -6,9 +6,10 @@
 
 use std::collections::{HashMap, HashSet, VecDeque};
 
-use super::canvas::{Canvas, FREE, HELD, Window};
+use super::canvas::{FREE, HELD, Window};
 use super::chart::{Chart, flood};
 use super::cut::{Cutting, Proposal, widen};
+use super::view::View;
 use super::{Patch, Stitching};
 use crate::Result;
 use crate::foundation::fixed::{Frames, Place};
@@ -62,7 +63,7 @@ impl<const D: usize> Stitching<'_, D> {
     /// Heals torn elements; returns how many moves were made.
     pub(super) fn heal(&mut self) -> Result<usize> {
         let mut moves = 0;
-        if !self.cutter.source.has_elements() {
+        if !self.cutter.source().has_elements() {
             return Ok(0);
         }
         for _ in 0..ROUNDS {
@@ -108,7 +109,7 @@ impl<const D: usize> Stitching<'_, D> {
         if patch == FREE || patch == HELD {
             return None;
         }
-        let element = self.cutter.source.element(place);
+        let element = self.cutter.source().element(place);
         (element > 0).then_some((patch, element))
     }
 
@@ -159,7 +160,7 @@ impl<const D: usize> Stitching<'_, D> {
 
     /// Points that an instance has where it is whole.
     fn size(&self, (patch, element): Key) -> f64 {
-        f64::from(self.cutter.source.size(element)) * self.patches[patch as usize].scale()
+        f64::from(self.cutter.source().size(element)) * self.patches[patch as usize].scale()
     }
 
     fn share(&self, key: Key, counts: &HashMap<Key, i64>) -> f64 {
@@ -259,7 +260,7 @@ impl<const D: usize> Stitching<'_, D> {
         let Some(chart) = self.chart_of(to, window) else {
             return Ok(None);
         };
-        let mut proposal = Proposal::new(&chart, to.place);
+        let proposal = Proposal::new(&chart, to.place);
         let (canvas, n) = (&self.canvas, chart.window.grid.len());
         let own: Vec<bool> = (0..n)
             .map(|i| {
@@ -267,11 +268,11 @@ impl<const D: usize> Stitching<'_, D> {
                 self.instance(canvas.patches[p], canvas.places[p]) == Some(instance.key)
             })
             .collect();
-        proposal.core = if grow {
+        let core = if grow {
             let whole: Vec<bool> = (0..n)
                 .map(|i| {
                     chart.mask[i]
-                        && self.cutter.source.element(proposal.places[i]) == instance.key.1
+                        && self.cutter.source().element(proposal.places[i]) == instance.key.1
                 })
                 .collect();
             let from: Vec<usize> = (0..n).filter(|&i| own[i]).collect();
@@ -287,10 +288,16 @@ impl<const D: usize> Stitching<'_, D> {
             }
             own
         };
-        if !proposal.core.contains(&true) {
+        if !core.contains(&true) {
             return Ok(None);
         }
-        let view = canvas.view(&chart.window, self.cutter.source);
+        let view = View::new(
+            canvas,
+            &chart.window,
+            &chart.mask,
+            &core,
+            self.cutter.source(),
+        );
         let cutting = self.cutter.cut(&view, &proposal, self.monitor)?;
         let mut changes: Vec<(Key, i64)> = Vec::new();
         let mut change = |key: Option<Key>, by: i64| {
@@ -308,7 +315,7 @@ impl<const D: usize> Stitching<'_, D> {
                 change(self.instance(patch, proposal.places[i]), 1);
             }
         }
-        let source = self.cutter.source;
+        let source = self.cutter.source();
         let balance = self.balance.after(
             source,
             canvas,
@@ -323,8 +330,7 @@ impl<const D: usize> Stitching<'_, D> {
             let now = counts.get(&key).copied().unwrap_or(0);
             gain += self.lack(key, now) - self.lack(key, now + by);
         }
-        let places = std::mem::take(&mut proposal.places);
-        drop(proposal);
+        let places = proposal.places;
         Ok((gain > 1e-3).then_some(Move {
             gain,
             patch,
@@ -357,7 +363,7 @@ impl<const D: usize> Stitching<'_, D> {
             }
             chart
         };
-        let grid = self.cutter.source.grid();
+        let grid = self.cutter.source().grid();
         for (mask, step) in chart.mask.iter_mut().zip(&chart.steps) {
             let place: Place<D> = std::array::from_fn(|a| step[a].wrapping_add(patch.place[a]));
             *mask &= super::inside(grid, place);
@@ -367,42 +373,14 @@ impl<const D: usize> Stitching<'_, D> {
 
     fn apply(&mut self, best: &Move<D>) {
         self.balance = self.balance.after(
-            self.cutter.source,
+            self.cutter.source(),
             &self.canvas,
             &best.chart.window.points,
             &best.proposal,
             &best.cutting.take,
         );
         let chart = &best.chart;
-        commit(
-            &mut self.canvas,
-            chart,
-            &best.proposal,
-            &best.cutting,
-            best.patch,
-        );
-    }
-}
-
-/// Writes what a cut took into the canvas.
-pub(super) fn commit<const D: usize>(
-    canvas: &mut Canvas<D>,
-    chart: &Chart<D>,
-    places: &[Place<D>],
-    cutting: &Cutting<D>,
-    patch: u32,
-) {
-    for (i, &p) in chart.window.points.iter().enumerate() {
-        let p = p as usize;
-        // Pairs across a cyclic end of the window are not its own.
-        canvas.seams[p] = cutting.seams[i];
-        if cutting.take[i] {
-            canvas.free -= usize::from(canvas.patches[p] == FREE);
-            canvas.patches[p] = patch;
-            canvas.places[p] = places[i];
-            if let Some(d) = canvas.distortion.get_mut(p) {
-                *d = chart.distortion.get(i).copied().unwrap_or(0.0);
-            }
-        }
+        self.canvas
+            .take(chart, &best.proposal, &best.cutting, best.patch);
     }
 }

@@ -16,37 +16,35 @@ mod chart;
 mod cover;
 mod cut;
 mod energy;
+mod fill;
 mod flat;
 mod heal;
 mod mesh;
+mod pair;
+mod recover;
 mod search;
 mod source;
+mod view;
 mod weights;
 
 use std::collections::HashMap;
-use std::sync::Mutex;
 
 use crate::engine::guide::Guide;
 use crate::foundation::fixed::{Frame, Frames, ONE, Place, apply};
 use crate::foundation::grid::{Grid, Region};
 use crate::foundation::hash::Noise;
-use crate::foundation::par::{self, Monitor};
+use crate::foundation::par::Monitor;
 use crate::{Error, Result};
 
 use balance::Balance;
 use canvas::{Canvas, HELD};
 use chart::Chart;
 pub use cover::{Prepared, Shown, cover, judge};
-use cut::{Cutter, LARGE, Proposal};
+use cut::{Cutter, LARGE};
 pub use flat::{Pasted, Pasting, Samples};
 use search::{Charges, Index};
 pub use source::{Adjacency, Elements, Source};
 pub use weights::Weights;
-
-/// A patch is left out where all around its centre is covered, within this share of the step.
-const CORE: f32 = 0.45;
-/// Points that fields are sampled at to learn how much they enlarge.
-const PROBES: usize = 4096;
 
 /// What the stitcher is asked for.
 #[derive(Debug, Clone, Copy)]
@@ -67,6 +65,8 @@ pub struct Options {
     pub continuation: f32,
     /// Cost of points of classes that are shown more often than in the exemplar: of as many as a side of a patch has.
     pub balance: f32,
+    /// How many of the worst seams are covered again, as a share of the patches.
+    pub recover: f32,
     /// Whether torn elements are healed.
     pub heal: bool,
     /// Chooses the texture.
@@ -131,6 +131,8 @@ struct Stitching<'a, const D: usize> {
     offsets: HashMap<Place<D>, u32>,
     balance: Balance,
     noise: Noise,
+    /// Patches that have been looked for.
+    laid: u32,
     monitor: &'a Monitor,
 }
 
@@ -156,13 +158,7 @@ pub fn stitch<const D: usize>(
         canvas.free -= 1;
     }
     let mut this = Stitching {
-        cutter: Cutter {
-            source,
-            weights: options.weights,
-            guide,
-            blocks: LARGE,
-            solvers: Mutex::default(),
-        },
+        cutter: Cutter::new(source, options.weights, guide, LARGE),
         frames,
         options: *options,
         index: Index::new(
@@ -178,9 +174,11 @@ pub fn stitch<const D: usize>(
         patches: Vec::new(),
         offsets: HashMap::new(),
         noise: Noise::new(options.seed).part(2),
+        laid: 0,
         monitor,
     };
     this.fill()?;
+    this.recover()?;
     let healed = if options.heal { this.heal()? } else { 0 };
     let mut canvas = this.canvas;
     for place in &mut canvas.places {
@@ -216,11 +214,12 @@ fn check<const D: usize>(
     if !(4.0..=4096.0).contains(&options.patch)
         || !(0.0..=0.8).contains(&options.overlap)
         || !(1..=64).contains(&options.candidates)
+        || !(0.0..=4.0).contains(&options.recover)
     {
         return Err(Error::value(
             "patch",
             format!(
-                "patches of 4 to 4096 samples, overlaps up to 0.8 and 1 to 64 candidates are allowed, got {options:?}"
+                "patches of 4 to 4096 samples, overlaps up to 0.8, 1 to 64 candidates and 0 to 4 times as many again are allowed, got {options:?}"
             ),
         ));
     }
@@ -236,143 +235,6 @@ fn check<const D: usize>(
 }
 
 impl<const D: usize> Stitching<'_, D> {
-    /// Lays patches from a lattice of centres, and then wherever something is left.
-    fn fill(&mut self) -> Result<()> {
-        let grid = self.canvas.grid;
-        let step =
-            (self.options.patch * (1.0 - self.options.overlap) * self.least_scale()).max(2.0);
-        let axes: Vec<Vec<i32>> = (0..D)
-            .map(|a| centres(grid.shape()[a], grid.wrap()[a], step))
-            .collect();
-        let count: usize = axes.iter().map(Vec::len).product();
-        self.monitor.expect(self.canvas.free as u64);
-        for k in 0..count {
-            let (mut rest, mut centre) = (k, [0; D]);
-            for a in (0..D).rev() {
-                centre[a] = axes[a][rest % axes[a].len()];
-                rest /= axes[a].len();
-            }
-            let reach =
-                (CORE * self.options.patch * (1.0 - self.options.overlap) * self.scale(centre))
-                    as i32;
-            if !self.all_covered(centre, reach.max(1)) {
-                self.lay(centre, self.options.patch)?;
-            }
-        }
-        let mut next = 0;
-        while let Some(p) = (next..grid.len()).find(|&p| !self.canvas.covered(p as u32)) {
-            next = p;
-            let at = grid.point(p).map(|x| x as i32);
-            let before = self.canvas.free;
-            self.lay(self.middle(at), self.options.patch)?;
-            for share in [1.0, 0.5, 0.25] {
-                if !self.canvas.covered(p as u32) {
-                    self.lay(at, (self.options.patch * share).max(4.0))?;
-                }
-            }
-            if self.canvas.free == before || !self.canvas.covered(p as u32) {
-                // A chart that cannot even hold its centre: show any sample there.
-                self.canvas.patches[p] = self.patches.len().saturating_sub(1) as u32;
-                self.canvas.free -= 1;
-            }
-        }
-        Ok(())
-    }
-
-    /// The middle of what is not covered near a point.
-    fn middle(&self, at: [i32; D]) -> [i32; D] {
-        let reach = (self.options.patch * 0.5 * self.scale(at)) as i32;
-        let window = self
-            .canvas
-            .window(at.map(|x| x - reach), at.map(|x| x + reach + 1));
-        let Some(window) = window else { return at };
-        let (mut sum, mut count) = ([0i64; D], 0i64);
-        for (i, &p) in window.points.iter().enumerate() {
-            if !self.canvas.covered(p) {
-                let q = window.at(window.grid.point(i));
-                (0..D).for_each(|a| sum[a] += i64::from(q[a]));
-                count += 1;
-            }
-        }
-        if count == 0 {
-            at
-        } else {
-            sum.map(|s| s.div_euclid(count) as i32)
-        }
-    }
-
-    /// Cuts in the best patch around a point.
-    fn lay(&mut self, centre: [i32; D], side: f32) -> Result<()> {
-        let o = &self.options;
-        let Some(chart) = Chart::new(&self.canvas, self.frames, centre, side, o.bend) else {
-            return Ok(());
-        };
-        let useful = |(&p, &m): (&u32, &bool)| m && !self.canvas.covered(p);
-        if !chart.window.points.iter().zip(&chart.mask).any(useful) {
-            return Ok(());
-        }
-        self.lay_chart(&chart, centre, side)
-    }
-
-    /// Cuts in the best patch of a chart.
-    fn lay_chart(&mut self, chart: &Chart<D>, centre: [i32; D], side: f32) -> Result<()> {
-        let o = &self.options;
-        let noise = self.noise.part(self.patches.len() as u32);
-        let guide = self.cutter.guide;
-        let found = self.index.best(
-            self.cutter.source,
-            &self.canvas,
-            chart,
-            guide,
-            o.candidates,
-            &noise,
-        );
-        let source = self.cutter.source;
-        let view = self.canvas.view(&chart.window, source);
-        let worth = f64::from(o.balance / side);
-        let cuts = par::map(found.len(), |k| {
-            let patch = Proposal::new(chart, found[k]);
-            let mut cut = self.cutter.cut_coarsely(&view, &patch, self.monitor)?;
-            cut.value += worth
-                * self
-                    .balance
-                    .after(
-                        source,
-                        &self.canvas,
-                        &chart.window.points,
-                        &patch.places,
-                        &cut.take,
-                    )
-                    .excess(source);
-            Ok(cut)
-        });
-        let mut best: Option<(usize, cut::Cutting<D>)> = None;
-        for (k, cut) in cuts.into_iter().enumerate() {
-            let cut = cut?;
-            if best.as_ref().is_none_or(|(_, b)| cut.value < b.value) {
-                best = Some((k, cut));
-            }
-        }
-        let Some((k, coarse)) = best else {
-            return Ok(());
-        };
-        let proposal = Proposal::new(chart, found[k]);
-        let cutting = self.cutter.refine(&view, &proposal, coarse, self.monitor)?;
-        self.balance = self.balance.after(
-            source,
-            &self.canvas,
-            &chart.window.points,
-            &proposal.places,
-            &cutting.take,
-        );
-        let places = proposal.places;
-        let number = self.number(chart, centre, found[k], side);
-        let before = self.canvas.free;
-        heal::commit(&mut self.canvas, chart, &places, &cutting, number);
-        self.index.note(found[k], side);
-        self.monitor.advance((before - self.canvas.free) as u64)
-    }
-
     /// The number of a patch: where one frame serves all, what goes on where another ends is the same.
     fn number(&mut self, chart: &Chart<D>, centre: [i32; D], place: Place<D>, side: f32) -> u32 {
         let next = self.patches.len() as u32;
@@ -395,7 +257,7 @@ impl<const D: usize> Stitching<'_, D> {
 
     /// What a patch would show at the origin if it reached there.
     fn origin(&self, patch: &Patch<D>) -> Place<D> {
-        let grid = self.cutter.source.grid();
+        let grid = self.cutter.source().grid();
         let ahead = apply(&patch.frame, patch.centre);
         std::array::from_fn(|a| {
             let offset = patch.place[a].wrapping_sub(ahead[a]);
@@ -407,48 +269,12 @@ impl<const D: usize> Stitching<'_, D> {
         })
     }
 
-    fn all_covered(&self, centre: [i32; D], reach: i32) -> bool {
-        let window = self
-            .canvas
-            .window(centre.map(|x| x - reach), centre.map(|x| x + reach + 1));
-        window.is_none_or(|w| w.points.iter().all(|&p| self.canvas.covered(p)))
-    }
-
     /// How much features are enlarged at a point.
     fn scale(&self, at: [i32; D]) -> f32 {
         let grid = &self.canvas.grid;
         let point = std::array::from_fn(|a| grid.resolve(a, at[a] as isize));
         enlargement(&self.frames.at(grid.index(point)))
     }
-
-    /// How much they are enlarged where that is least, but for the very least.
-    fn least_scale(&self) -> f32 {
-        let n = self.canvas.grid.len();
-        let every = if matches!(self.frames, Frames::Constant(_)) {
-            n
-        } else {
-            (n / PROBES).max(1)
-        };
-        let mut scales: Vec<f32> = (0..n)
-            .step_by(every)
-            .map(|p| enlargement(&self.frames.at(p)))
-            .collect();
-        scales.sort_by(f32::total_cmp);
-        scales[scales.len() / 50]
-    }
-}
-
-/// Centres of patches along an axis.
-fn centres(n: usize, wrap: bool, step: f32) -> Vec<i32> {
-    if wrap {
-        let count = (n as f32 / step).ceil().max(1.0) as usize;
-        return (0..count).map(|i| (i * n / count) as i32).collect();
-    }
-    let last = n as i32 - 1;
-    let count = (last as f32 / step).ceil() as usize;
-    (0..=count)
-        .map(|i| ((i as f32 * step) as i32).min(last))
-        .collect()
 }
 
 /// A place brought around the axes along which an exemplar repeats: the sample nearest to it is one of its own.

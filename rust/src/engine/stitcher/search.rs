@@ -181,12 +181,14 @@ impl<const D: usize> Index<D> {
         }
     }
 
-    /// The places of the centre of a chart that fit best, the best one first; at most `count`.
+    /// The places of the centre of a chart that fit known points of it best, the best one first; at most `count`.
+    #[allow(clippy::too_many_arguments)] // what is searched for, and where
     pub(super) fn best(
         &self,
         source: &Source<D>,
         canvas: &Canvas<D>,
         chart: &Chart<D>,
+        known: &[bool],
         guide: Option<&Guide<'_>>,
         count: usize,
         noise: &Noise,
@@ -205,7 +207,7 @@ impl<const D: usize> Index<D> {
                 ((far >> BITS) + first[a]).max(0) as usize
             }
         });
-        let (known, points) = self.splat_known(source, canvas, chart, first);
+        let (known, points) = self.splat_known(source, canvas, chart, known, first);
         let asked = guide.and_then(|guide| self.splat_asked(guide, chart, first));
         if points == 0 && asked.is_none() {
             let sides = last.map(|n| n as u64 + 1);
@@ -251,18 +253,19 @@ impl<const D: usize> Index<D> {
         )
     }
 
-    /// The points of a chart that are covered already.
+    /// The points of a chart that are known.
     fn splat_known(
         &self,
         source: &Source<D>,
         canvas: &Canvas<D>,
         chart: &Chart<D>,
+        known: &[bool],
         first: [i32; D],
     ) -> (Template, usize) {
         let mut template = Template::new(self.points(), source.channels());
         let mut points = 0;
         for (i, &p) in chart.window.points.iter().enumerate() {
-            if !chart.mask[i] || !canvas.covered(p) {
+            if !known[i] {
                 continue;
             }
             if let Some(at) = self.splat(chart.steps[i], first) {

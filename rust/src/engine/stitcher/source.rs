@@ -262,34 +262,36 @@ impl<const D: usize> Source<D> {
         })
     }
 
-    /// What a place shows: its colour between samples, all else of the nearest one.
+    /// What a place shows: its colour between samples, all else of the nearest one. In volumes that colour is the nearest
+    /// one's too: measured, cuts are no worse by it, and it takes an eighth of the time.
     #[inline]
     pub(super) fn look(&self, place: Place<D>) -> Look {
         let mut look = self.looks[self.sample(place)];
-        if place.iter().any(|x| x & (ONE - 1) != 0) {
+        if D == 2 && place.iter().any(|x| x & (ONE - 1) != 0) {
             look.colour = self.interpolate(place);
         }
         look
     }
 
+    #[inline]
     fn interpolate(&self, place: Place<D>) -> Colour {
         let shape = self.grid.shape();
+        // Samples before and after the place, in steps of the row-major order.
         let (mut at, mut weight) = ([[0; 2]; D], [[0.0; 2]; D]);
-        for axis in 0..D {
+        let mut stride = 1;
+        for axis in (0..D).rev() {
             let whole = (place[axis] >> BITS) as isize;
             let part = (place[axis] & (ONE - 1)) as f32 / ONE as f32;
-            at[axis] = [
-                self.grid.resolve(axis, whole),
-                self.grid.resolve(axis, whole + 1),
-            ];
+            at[axis] = [whole, whole + 1].map(|i| self.grid.resolve(axis, i) * stride);
             weight[axis] = [1.0 - part, part];
+            stride *= shape[axis];
         }
         let mut colour = [0.0; CHANNELS];
         for corner in 0..1usize << D {
             let (mut index, mut w) = (0, 1.0f32);
             for axis in 0..D {
                 let side = corner >> axis & 1;
-                index = index * shape[axis] + at[axis][side];
+                index += at[axis][side];
                 w *= weight[axis][side];
             }
             let from = &self.looks[index].colour;

@@ -4,10 +4,12 @@ use proptest::prelude::*;
 
 use super::canvas::{Canvas, FREE};
 use super::chart::Chart;
-use super::cut::{Pair, Tie};
+use super::cut::runs;
 use super::energy::Energy;
+use super::pair::Capacities;
 use super::search::{Charges, Index};
 use super::source::CHANNELS;
+use super::view::Tie;
 use super::*;
 use crate::foundation::fixed::identity;
 use crate::kernels::seam::maxflow::Solver;
@@ -42,6 +44,7 @@ const OPTIONS: Options = Options {
     repetition: 0.1,
     continuation: 4.0,
     balance: 1.0,
+    recover: 0.5,
     heal: true,
     seed: 1,
 };
@@ -85,7 +88,9 @@ fn the_best_place_is_that_of_a_slow_search() {
                 continuation: 0.0,
             };
             let index = Index::new(&source, None, free);
-            let found = index.best(&source, &canvas, &chart, None, 1, &Noise::new(0));
+            let covered = |&p: &u32| canvas.covered(p);
+            let known: Vec<bool> = chart.window.points.iter().map(covered).collect();
+            let found = index.best(&source, &canvas, &chart, &known, None, 1, &Noise::new(0));
             let cost = |place: Place<2>| -> Option<f32> {
                 let mut sum = 0.0;
                 for (i, &p) in chart.window.points.iter().enumerate() {
@@ -136,23 +141,15 @@ proptest! {
                 let at = (axis * 9 + p) * 2;
                 let there = point[axis] < 2;
                 let kept = if seed % 2 == 0 { 0.0 } else { costs[at].min(costs[at + 1]) };
-                pairs.push(Pair {
-                    old_new: if there { costs[at] } else { -1.0 },
-                    new_old: costs[at + 1],
-                    kept,
-                });
+                // By whether the first and the next one take the patch.
+                pairs.push(if there { [[kept, costs[at]], [costs[at + 1], 0.0]] } else { [[0.0; 2]; 2] });
             }
         }
         let value = |take: &[bool]| -> f32 {
             let mut sum = 0.0;
             for (axis, pairs) in pairs.iter().enumerate() {
                 crate::kernels::seam::links(&grid, axis, |p, q| {
-                    sum += match (take[p], take[q]) {
-                        (false, true) => pairs[p].old_new,
-                        (true, false) => pairs[p].new_old,
-                        (false, false) => pairs[p].kept,
-                        (true, true) => 0.0,
-                    };
+                    sum += pairs[p][usize::from(take[p])][usize::from(take[q])];
                 });
             }
             sum
@@ -170,16 +167,17 @@ proptest! {
             .map(|take| value(&take))
             .fold(f32::INFINITY, f32::min);
         let solve = |side| {
-            let mut energy = Energy::new(grid);
-            for (axis, pairs) in pairs.iter().enumerate() {
-                energy.add_pairs(axis, &ties, pairs);
-            }
-            let sink = energy.minimise(side, &mut Solver::default(), &Monitor::default()).unwrap();
-            let take: Vec<bool> = ties
-                .iter()
-                .zip(&sink)
-                .map(|(&t, &s)| t == Tie::New || t == Tie::Either && s)
-                .collect();
+            let mut energy = Energy::new(grid, side).unwrap();
+            runs(&grid, |run| {
+                let plane = |a: usize, b: usize| -> Vec<f32> {
+                    (run.p..run.p + run.n).map(|p| pairs[run.axis][p][a][b]).collect()
+                };
+                energy.add_seams(&ties, &run, &plane(0, 0));
+                let mut costs = Capacities::default();
+                costs.set(&plane(0, 1), &plane(1, 0), &plane(0, 0));
+                energy.add_pairs(&ties, &run, &costs);
+            });
+            let take = energy.minimise(&ties, &mut Solver::default(), &Monitor::default()).unwrap();
             value(&take)
         };
         prop_assert!((solve(1) - best).abs() < 1e-3);

@@ -87,7 +87,7 @@ impl Tree {
 
 /// One point. Together, because every step needs all of it: 32 bytes in two dimensions, half a cache line.
 #[derive(Debug, Clone, Copy)]
-#[repr(align(32))]
+#[repr(align(8))]
 struct Node<const D: usize> {
     /// Residual capacity to the next (0) and the previous (1) point along each axis.
     residual: [[i32; 2]; D],

@@ -1,0 +1,336 @@
+//! Filling: patches from a lattice of centres, and then wherever something is left.
+//!
+//! Patches that see none of the same points are found side by side; which those are hangs on the field alone, never on how
+//! many threads there are.
+
+use std::collections::VecDeque;
+
+use super::chart::Chart;
+use super::cut::{Cutting, Proposal};
+use super::view::View;
+use super::{Stitching, enlargement};
+use crate::Result;
+use crate::foundation::fixed::{Frames, Place};
+use crate::foundation::grid::Grid;
+use crate::foundation::par;
+
+/// A patch is left out where all around its centre is covered, within this share of the step.
+const CORE: f32 = 0.45;
+/// Points that fields are sampled at to learn how much they enlarge.
+const PROBES: usize = 4096;
+/// Patches that are found side by side, at most.
+const BATCH: usize = 4;
+/// Centres ahead among which they are looked for.
+const AHEAD: usize = 256;
+
+/// A patch that has been cut, but not laid yet.
+pub(super) struct Found<const D: usize> {
+    chart: Chart<D>,
+    centre: [i32; D],
+    side: f32,
+    /// Where the centre looks, and where all points do.
+    place: Place<D>,
+    places: Vec<Place<D>>,
+    cutting: Cutting<D>,
+    /// What the window costs less with it.
+    pub gain: f64,
+}
+
+/// The first point of a box of the canvas and the one after its last, along cyclic axes perhaps over the end.
+type Reach<const D: usize> = ([i32; D], [i32; D]);
+
+impl<const D: usize> Stitching<'_, D> {
+    /// Fills the canvas.
+    pub(super) fn fill(&mut self) -> Result<()> {
+        self.monitor.expect(self.canvas.free as u64);
+        let mut ahead = self.centres();
+        while !ahead.is_empty() {
+            let batch = self.batch(&mut ahead);
+            let first = self.laid;
+            let found = par::map(batch.len(), |k| {
+                match self.chart(batch[k], self.options.patch) {
+                    Some(chart) => {
+                        let known = self.covered(&chart);
+                        self.find(
+                            chart,
+                            &known,
+                            batch[k],
+                            self.options.patch,
+                            first + k as u32,
+                        )
+                    }
+                    None => Ok(None),
+                }
+            });
+            self.laid += batch.len() as u32;
+            for found in found {
+                if let Some(found) = found? {
+                    self.lay(found)?;
+                }
+            }
+        }
+        self.fill_gaps()
+    }
+
+    /// The lattice of centres, in row-major order.
+    fn centres(&self) -> VecDeque<[i32; D]> {
+        let grid = &self.canvas.grid;
+        let step =
+            (self.options.patch * (1.0 - self.options.overlap) * self.least_scale()).max(2.0);
+        let axes: [Vec<i32>; D] =
+            std::array::from_fn(|a| along(grid.shape()[a], grid.wrap()[a], step));
+        let Ok(lattice) = Grid::new(std::array::from_fn(|a| axes[a].len()), [false; D]) else {
+            return VecDeque::new();
+        };
+        lattice
+            .points()
+            .map(|point| std::array::from_fn(|a| axes[a][point[a]]))
+            .collect()
+    }
+
+    /// Takes the next centres that see nothing of what those before them will change. They are never none.
+    fn batch(&self, ahead: &mut VecDeque<[i32; D]>) -> Vec<[i32; D]> {
+        let o = &self.options;
+        let (mut batch, mut waiting) = (Vec::new(), VecDeque::new());
+        let mut claimed: Vec<Reach<D>> = Vec::new();
+        while let Some(centre) = ahead.pop_front() {
+            let reach = Chart::reach(&self.canvas, self.frames, centre, o.patch, o.bend);
+            let free = !claimed.iter().any(|other| self.meet(&reach, other));
+            let core = (CORE * o.patch * (1.0 - o.overlap) * self.scale(centre)) as i32;
+            if free && self.all_covered(centre, core.max(1)) {
+                continue;
+            }
+            claimed.push(reach);
+            if free {
+                batch.push(centre);
+            } else {
+                waiting.push_back(centre);
+            }
+            if batch.len() == BATCH || claimed.len() == AHEAD {
+                break;
+            }
+        }
+        // Those that wait come before those that were not looked at.
+        waiting.append(ahead);
+        *ahead = waiting;
+        batch
+    }
+
+    /// Whether two boxes share points of the canvas.
+    fn meet(&self, a: &Reach<D>, b: &Reach<D>) -> bool {
+        let grid = &self.canvas.grid;
+        (0..D).all(|axis| {
+            let ((a0, a1), (b0, b1)) = ((a.0[axis], a.1[axis]), (b.0[axis], b.1[axis]));
+            if grid.wrap()[axis] {
+                let n = grid.shape()[axis] as i32;
+                (b0 - a0).rem_euclid(n) < a1 - a0 || (a0 - b0).rem_euclid(n) < b1 - b0
+            } else {
+                a0 < b1 && b0 < a1
+            }
+        })
+    }
+
+    /// Lays patches wherever something is left.
+    fn fill_gaps(&mut self) -> Result<()> {
+        let (grid, side) = (self.canvas.grid, self.options.patch);
+        let mut next = 0;
+        while let Some(p) = (next..grid.len()).find(|&p| !self.canvas.covered(p as u32)) {
+            next = p;
+            let at = grid.point(p).map(|x| x as i32);
+            let before = self.canvas.free;
+            self.cover_around(self.middle(at), side)?;
+            for share in [1.0, 0.5, 0.25] {
+                if !self.canvas.covered(p as u32) {
+                    self.cover_around(at, (side * share).max(4.0))?;
+                }
+            }
+            if self.canvas.free == before || !self.canvas.covered(p as u32) {
+                // A chart that cannot even hold its centre: show any sample there.
+                self.canvas.patches[p] = self.patches.len().saturating_sub(1) as u32;
+                self.canvas.free -= 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// Cuts in the best patch around a point.
+    fn cover_around(&mut self, centre: [i32; D], side: f32) -> Result<()> {
+        match self.chart(centre, side) {
+            Some(chart) => self.cover_chart(chart, centre, side),
+            None => Ok(()),
+        }
+    }
+
+    /// Cuts in the best patch of a chart.
+    pub(super) fn cover_chart(
+        &mut self,
+        chart: Chart<D>,
+        centre: [i32; D],
+        side: f32,
+    ) -> Result<()> {
+        let known = self.covered(&chart);
+        let found = self.find(chart, &known, centre, side, self.laid)?;
+        self.laid += 1;
+        match found {
+            Some(found) => self.lay(found),
+            None => Ok(()),
+        }
+    }
+
+    /// The chart of a patch around a point, if it shows something new.
+    fn chart(&self, centre: [i32; D], side: f32) -> Option<Chart<D>> {
+        let chart = Chart::new(&self.canvas, self.frames, centre, side, self.options.bend)?;
+        let useful = |(&p, &m): (&u32, &bool)| m && !self.canvas.covered(p);
+        let any = chart.window.points.iter().zip(&chart.mask).any(useful);
+        any.then_some(chart)
+    }
+
+    /// The points of a chart that are covered.
+    fn covered(&self, chart: &Chart<D>) -> Vec<bool> {
+        let points = chart.window.points.iter().zip(&chart.mask);
+        points.map(|(&p, &m)| m && self.canvas.covered(p)).collect()
+    }
+
+    /// Finds the best patch of a chart: one that fits the points that are known, and is cheapest once it is cut in.
+    pub(super) fn find(
+        &self,
+        chart: Chart<D>,
+        known: &[bool],
+        centre: [i32; D],
+        side: f32,
+        number: u32,
+    ) -> Result<Option<Found<D>>> {
+        let (o, source) = (&self.options, self.cutter.source());
+        let places = self.index.best(
+            source,
+            &self.canvas,
+            &chart,
+            known,
+            self.cutter.guide,
+            o.candidates,
+            &self.noise.part(number),
+        );
+        let view = View::new(&self.canvas, &chart.window, &chart.mask, &[], source);
+        let worth = f64::from(o.balance / side);
+        let excess = |patch: &Proposal<'_, D>, take: &[bool]| {
+            let points = &chart.window.points;
+            let after = self
+                .balance
+                .after(source, &self.canvas, points, &patch.places, take);
+            worth * after.excess(source)
+        };
+        let cuts = par::map(places.len(), |k| {
+            let patch = Proposal::new(&chart, places[k]);
+            let cut = self.cutter.judge(&view, &patch, self.monitor)?;
+            Ok((cut.value + excess(&patch, &cut.take), cut))
+        });
+        let mut best: Option<(f64, usize, Cutting<D>)> = None;
+        for (k, cut) in cuts.into_iter().enumerate() {
+            let (value, cut) = cut?;
+            if best.as_ref().is_none_or(|b| value < b.0) {
+                best = Some((value, k, cut));
+            }
+        }
+        let Some((_, k, judged)) = best else {
+            return Ok(None);
+        };
+        let patch = Proposal::new(&chart, places[k]);
+        let cutting = self
+            .cutter
+            .cut_judged(&view, &patch, judged, self.monitor)?;
+        let before = self.cutter.value(&view, &patch) + worth * self.balance.excess(source);
+        let after = cutting.value + excess(&patch, &cutting.take);
+        Ok(Some(Found {
+            centre,
+            side,
+            place: places[k],
+            places: patch.places,
+            gain: before - after,
+            cutting,
+            chart,
+        }))
+    }
+
+    /// Lays a patch.
+    pub(super) fn lay(&mut self, found: Found<D>) -> Result<()> {
+        let Found {
+            chart,
+            centre,
+            side,
+            place,
+            places,
+            cutting,
+            ..
+        } = found;
+        self.balance = self.balance.after(
+            self.cutter.source(),
+            &self.canvas,
+            &chart.window.points,
+            &places,
+            &cutting.take,
+        );
+        let number = self.number(&chart, centre, place, side);
+        let before = self.canvas.free;
+        self.canvas.take(&chart, &places, &cutting, number);
+        self.index.note(place, side);
+        self.monitor.advance((before - self.canvas.free) as u64)
+    }
+
+    /// The middle of what is not covered near a point.
+    fn middle(&self, at: [i32; D]) -> [i32; D] {
+        let reach = (self.options.patch * 0.5 * self.scale(at)) as i32;
+        let window = self
+            .canvas
+            .window(at.map(|x| x - reach), at.map(|x| x + reach + 1));
+        let Some(window) = window else { return at };
+        let (mut sum, mut count) = ([0i64; D], 0i64);
+        for (i, &p) in window.points.iter().enumerate() {
+            if !self.canvas.covered(p) {
+                let q = window.at(window.grid.point(i));
+                (0..D).for_each(|a| sum[a] += i64::from(q[a]));
+                count += 1;
+            }
+        }
+        if count == 0 {
+            at
+        } else {
+            sum.map(|s| s.div_euclid(count) as i32)
+        }
+    }
+
+    fn all_covered(&self, centre: [i32; D], reach: i32) -> bool {
+        let window = self
+            .canvas
+            .window(centre.map(|x| x - reach), centre.map(|x| x + reach + 1));
+        window.is_none_or(|w| w.points.iter().all(|&p| self.canvas.covered(p)))
+    }
+
+    /// How much they are enlarged where that is least, but for the very least.
+    fn least_scale(&self) -> f32 {
+        let n = self.canvas.grid.len();
+        let every = if matches!(self.frames, Frames::Constant(_)) {
+            n
+        } else {
+            (n / PROBES).max(1)
+        };
+        let mut scales: Vec<f32> = (0..n)
+            .step_by(every)
+            .map(|p| enlargement(&self.frames.at(p)))
+            .collect();
+        scales.sort_by(f32::total_cmp);
+        scales[scales.len() / 50]
+    }
+}
+
+/// Centres of patches along an axis.
+fn along(n: usize, wrap: bool, step: f32) -> Vec<i32> {
+    if wrap {
+        let count = (n as f32 / step).ceil().max(1.0) as usize;
+        return (0..count).map(|i| (i * n / count) as i32).collect();
+    }
+    let last = n as i32 - 1;
+    let count = (last as f32 / step).ceil() as usize;
+    (0..=count)
+        .map(|i| ((i as f32 * step) as i32).min(last))
+        .collect()
+}

@@ -1,0 +1,65 @@
+//! Re-covering: where seams show most, other patches are tried that need not fit what lies there.
+//!
+//! Kwatra et al., section 3.1: old seams count, so a patch stays only where what shows is less than before.
+
+use super::Stitching;
+use super::chart::Chart;
+use crate::Result;
+use crate::foundation::grid::Grid;
+
+/// What a patch must not fit lies within this share of a patch's side.
+const HOLE: f32 = 0.15;
+/// Side of a patch that covers a seam, as a share of others.
+const SIDE: f32 = 0.6;
+
+impl<const D: usize> Stitching<'_, D> {
+    /// Covers the worst seams again, a share of the patches that there are.
+    pub(super) fn recover(&mut self) -> Result<()> {
+        let count = (self.options.recover * self.patches.len() as f32).round() as usize;
+        if count == 0 {
+            return Ok(());
+        }
+        let side = (self.options.patch * SIDE).max(4.0);
+        for centre in self.worst(count)? {
+            let Some(chart) =
+                Chart::new(&self.canvas, self.frames, centre, side, self.options.bend)
+            else {
+                continue;
+            };
+            let hole = HOLE * self.options.patch * self.scale(centre);
+            let known: Vec<bool> = (chart.window.grid.points().zip(&chart.mask))
+                .map(|(point, &mask)| {
+                    let at = chart.window.at(point);
+                    let square = |a: usize| ((at[a] - centre[a]) as f32).powi(2);
+                    mask && (0..D).map(square).sum::<f32>() > hole * hole
+                })
+                .collect();
+            let found = self.find(chart, &known, centre, side, self.laid)?;
+            self.laid += 1;
+            if let Some(found) = found.filter(|f| f.gain > 1e-3) {
+                self.lay(found)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The middles of the seams in those cells of a lattice that have most of them, the worst first.
+    fn worst(&self, count: usize) -> Result<Vec<[i32; D]>> {
+        let grid = &self.canvas.grid;
+        let side = ((2.0 * HOLE * self.options.patch) as usize).max(2);
+        let cells = Grid::new(grid.shape().map(|n| n.div_ceil(side)), [false; D])?;
+        let mut sums = vec![(0.0f64, [0.0f64; D]); cells.len()];
+        for (point, seams) in grid.points().zip(&self.canvas.seams) {
+            let cost: f64 = seams.iter().map(|&s| f64::from(s)).sum();
+            if cost > 0.0 {
+                let (sum, middle) = &mut sums[cells.index(point.map(|x| x / side))];
+                *sum += cost;
+                (0..D).for_each(|a| middle[a] += cost * point[a] as f64);
+            }
+        }
+        let mut order: Vec<usize> = (0..sums.len()).filter(|&k| sums[k].0 > 0.0).collect();
+        order.sort_by(|&a, &b| sums[b].0.total_cmp(&sums[a].0).then(a.cmp(&b)));
+        let middle = |k: &usize| sums[*k].1.map(|x| (x / sums[*k].0).round() as i32);
+        Ok(order.iter().take(count).map(middle).collect())
+    }
+}
