@@ -49,6 +49,25 @@ def test_a_plane_seen_as_it_is_stays_as_it_is():
     np.testing.assert_allclose(together, np.broadcast_to(np.eye(2), together.shape), atol=2e-3)
 
 
+def test_what_is_seen_along_a_ramp_fits_together_and_stands_as_it_stood():
+    plane = Plane.fit(scale_maps.from_angles((40, 50), 50, 60))
+    turned = scale_maps.from_angles((40, 50), 50, 80)
+    other = Plane.fit(turned)
+    frames = plane.jacobians(turned, other)
+    # Derivatives of one map: along rows of what is along columns, and the other way round.
+    curl = np.gradient(frames[..., 1], axis=0) - np.gradient(frames[..., 0], axis=1)
+    assert np.abs(curl[2:-2, 2:-2]).max() < 0.02 * np.abs(frames).max()
+    np.testing.assert_allclose(frames[20, 25] @ plane.down, plane.jacobians(turned)[20, 25] @ plane.down, atol=0.15)
+    assert other.order(turned) < 1e-3 < other.order(np.asarray(turned[:, ::-1]))
+
+
+def test_round_things_are_no_plane_however_well_a_map_fits():
+    image, scale = checks.floor((160, 160))
+    fitted = Plane.fit(scale)
+    exact = np.asarray(fitted.scales(np.moveaxis(np.indices(scale.shape), 0, -1)), np.float32)
+    assert find_plane(texrs.Exemplar(image).guidance, exact) is None
+
+
 def test_a_map_that_hardly_varies_is_no_plane():
     assert Plane.fit(np.ones((20, 20), np.float32)) is None
     assert Plane.fit(scale_maps.from_angles((20, 20), 5, 90)) is None

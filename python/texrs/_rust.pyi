@@ -177,7 +177,7 @@ class Stitcher:
         seed: int,
         held: NDArray[bool_],
         given: NDArray[int32],
-        demand: tuple[NDArray[int16], NDArray[int16], NDArray[uint16], NDArray[uint32]] | None,
+        demand: tuple[NDArray[int16], NDArray[int16], NDArray[uint16], NDArray[uint32], int] | None,
         progress: Callable[[float], object] | None,
     ) -> tuple[NDArray[int32], NDArray[uint32], NDArray[int16], float, int]: ...
     def judge(
@@ -249,7 +249,7 @@ class Appearance:
         margin: int,
         held: NDArray[bool_],
         given: NDArray[int32],
-        guide: tuple[NDArray[int16], NDArray[int16], NDArray[uint16], NDArray[uint32]] | None,
+        guide: tuple[NDArray[int16], NDArray[int16], NDArray[uint16], NDArray[uint32], int] | None,
         progress: Callable[[float], object] | None,
     ) -> NDArray[int32]: ...
     def correct(
@@ -267,7 +267,7 @@ class Appearance:
         vote: int,
         settled: float,
         seed: int,
-        guide: tuple[NDArray[int16], NDArray[int16], NDArray[uint16], NDArray[uint32]] | None,
+        guide: tuple[NDArray[int16], NDArray[int16], NDArray[uint16], NDArray[uint32], int] | None,
         progress: Callable[[float], object] | None,
     ) -> tuple[int, float]: ...
 

@@ -36,6 +36,9 @@ class Demand(NamedTuple):
     order : (any) uint32
         Samples by their first value, the least first: what is drawn is drawn from those near what is asked. Empty: from
         anywhere.
+    excess : int
+        What it counts that a sample's first value is more than the wanted one, in 1/256 of what it counts that it is less.
+        Where it is not 256, first values alone are wanted.
 
     """
 
@@ -43,6 +46,7 @@ class Demand(NamedTuple):
     output: NDArray[np.int16]
     weight: NDArray[np.uint16]
     order: NDArray[np.uint32] = np.zeros(0, np.uint32)
+    excess: int = 256
 
 
 class Corrected(NamedTuple):

@@ -47,12 +47,20 @@ GOOD, FAIR = 0.03, 0.08
 """Residuals of a scale map that is a plane's beyond doubt, and of one that may be."""
 FORESHORTENED = 0.2
 """How much steeper edges must get with distance where there is doubt: less than 1, for few lie just across the slope."""
+FRONTAL = 0.05
+"""Where they get less steep than this it is no plane, however well the map fits: round things, each seen from the front."""
 AREAS, BETTER, SURE = 2 / 3, 0.5, 1e-3
 """Power of a map of areas that is one of widths, and how much better it must fit to be taken for one."""
 BANDS = 8
 """Bands of scales that edges are compared in."""
 PLANAR = 0.02
-"""Residual of a target that is a plane."""
+"""How far a target may be from one that grows along a line."""
+ALIGNED = 0.8
+"""Cosine of that line with the exemplar's slope: elements are foreshortened along that, and look odd along another."""
+HALF = 0.5
+"""Power of the foreshortening where sizes come and go: no surface shows that, and patches are sheared the less."""
+EXCESS = 38
+"""What showing what is larger, so shrunk, counts, in 1/256 of what showing what is smaller does: that is blurred."""
 FINE = 0.05
 """Share of a target that may be finer, or coarser, than what the resolution of a sheet is chosen for."""
 
@@ -84,6 +92,8 @@ class Sheet(ABC):
     to do with each other."""
     guide: ClassVar[float]
     """How much of it counts in cuts."""
+    excess: ClassVar[int]
+    """What a larger scale than the wanted one counts, in 1/256 of a smaller one."""
     heal: ClassVar[bool]
     """Whether torn elements are mended: of planes, mending takes longer than all the rest, and tears as much as it mends."""
 
@@ -131,7 +141,7 @@ class Sheet(ABC):
         """Return the places in the exemplar of places (N, 2) in fixed point, and the Jacobians there."""
 
     @abstractmethod
-    def measure_error(self, places: NDArray[np.int32], target: Floats) -> float:
+    def measure_error(self, places: NDArray[np.int32], target: Floats, frames: NDArray[np.int16]) -> float:
         """Return the median of how far the logarithms of the scales at places (rows, columns, 2) are from a target's."""
 
 
@@ -154,7 +164,7 @@ class Flattened(Sheet):
     origin: tuple[float, float]
     resolution: float
 
-    weight, guide, heal = 0.4, 0.1, False
+    weight, guide, excess, heal = 1.0, 0.1, EXCESS, False
 
     @classmethod
     def of(cls, colours: Floats, plane: Plane, target: Floats, known: Bools | None = None) -> Flattened:
@@ -201,9 +211,13 @@ class Flattened(Sheet):
 
     def frames(self, target: Floats, wrap: Sequence[bool]) -> NDArray[np.int16]:
         """Return the Jacobians of the plane, seen as large as a map says."""
-        other = None if any(wrap) else Plane.fit(target)
-        # A target that is a plane itself is seen as one.
-        frames = self.plane.jacobians(target, other if other is not None and other.residual < PLANAR else None)
+        other = None if any(wrap) or min(target.shape) < 2 else Plane.fit(target)
+        if other is None or other.order(target) > PLANAR:
+            frames = self.plane.jacobians(target, foreshortened=HALF)
+        else:
+            # A target that grows along a line is seen as the plane itself, if that is its own slope.
+            aligned = abs(float(np.dot(other.down, self.plane.down))) > ALIGNED
+            frames = self.plane.jacobians(target, other if aligned else None)
         fixed = np.clip(np.rint(frames * (self.resolution * ONE)), -STEEP * ONE, STEEP * ONE)
         return np.ascontiguousarray(fixed.astype(np.int16).reshape(-1, 2, 2))
 
@@ -214,13 +228,13 @@ class Flattened(Sheet):
         seen = self.plane.unfold(points) / self.resolution
         return at.astype(np.float32), seen.astype(np.float32)
 
-    def measure_error(self, places: NDArray[np.int32], target: Floats) -> float:
+    def measure_error(self, places: NDArray[np.int32], target: Floats, frames: NDArray[np.int16]) -> float:
         """Return the median, by the area of the plane that each pixel shows."""
         if min(target.shape) < 2:
             return 0.0
         steps = np.stack([np.diff(places, axis=0)[:, :-1], np.diff(places, axis=1)[:-1]], axis=-1) / ONE
         shown = np.maximum(np.abs(np.linalg.det(steps)), 1e-9)
-        asked = np.abs(np.linalg.det(self.plane.jacobians(target[:-1, :-1]) * self.resolution))
+        asked = np.abs(np.linalg.det(frames.reshape(*target.shape, 2, 2)[:-1, :-1] / ONE))
         return float(np.median(np.abs(np.log(shown / asked)))) / 2
 
     def place(self, coordinates: Floats) -> NDArray[np.int32]:
@@ -245,7 +259,7 @@ class Copies(Sheet):
     copies: tuple[Copy, ...]
     owner: NDArray[np.uint16]
 
-    weight, guide, heal = 6.0, 0.03, True
+    weight, guide, excess, heal = 12.0, 0.03, 256, True
 
     @classmethod
     def of(cls, colours: Floats, scale: Floats, sizes: Sequence[float], target: Floats) -> Copies:
@@ -296,7 +310,7 @@ class Copies(Sheet):
         found = np.clip(found, 0, np.array(self.shape, np.float32) - 1)
         return found, np.eye(2, dtype=np.float32) / factor[:, np.newaxis]
 
-    def measure_error(self, places: NDArray[np.int32], target: Floats) -> float:
+    def measure_error(self, places: NDArray[np.int32], target: Floats, frames: NDArray[np.int16]) -> float:
         """Return the median, by the scales of the samples."""
         return float(np.median(np.abs(self.logs[self._nearest(places)] - np.log(target))))
 
@@ -311,14 +325,16 @@ def find_plane(colours: Floats, scale: Floats) -> Plane | None:
 
     A map may hold the widths of elements, or the square roots of their areas, which are the 3/2 power of those; the plane is
     one of widths (see `Plane.power`). Maps that are measured are not quite those of a plane, and those of round things that get
-    smaller are not far from it. Where the fit is fair, edges decide: on a plane they get steeper along the slope with distance.
+    smaller are not far from it. So edges decide: on a plane they get steeper along the slope with distance. Where the fit is
+    good a little of that is enough; without any, a plane may have been fitted to what is none.
     """
     plane, other = Plane.fit(scale), Plane.fit(scale, AREAS)
     if plane is not None and other is not None and other.residual < BETTER * AREAS * plane.residual - SURE:
         plane = other
     if plane is None or plane.residual > FAIR:
         return None
-    return plane if plane.residual <= GOOD or _measure_foreshortening(colours, plane) >= FORESHORTENED else None
+    least = FRONTAL if plane.residual <= GOOD else FORESHORTENED
+    return plane if _measure_foreshortening(colours, plane) >= least else None
 
 
 def _measure_foreshortening(colours: Floats, plane: Plane) -> float:

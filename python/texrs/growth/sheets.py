@@ -105,7 +105,6 @@ def stitch_sheet(
     patch = float(max(min(wanted, FITS * min(sheet.free.shape), MOST), LEAST))
     frames = sheet.frames(target, region.wrap)
     weight = np.array([round(UNIT * sheet.weight)], np.uint16)
-    nowhere = np.zeros(0, np.uint32)
     made = stitcher.stitch(
         region,
         frames,
@@ -118,7 +117,7 @@ def stitch_sheet(
         seed=seed,
         held=held,
         given=None if given is None else given.reshape(-1),
-        demand=Demand(sheet.values(strength), code(np.log(target), strength).reshape(-1), weight, nowhere),
+        demand=Demand(sheet.values(strength), code(np.log(target), strength).reshape(-1), weight, excess=sheet.excess),
         progress=stage(progress, "patches"),
     )
     places = made.places.reshape(*region.shape, 2)
@@ -128,7 +127,7 @@ def stitch_sheet(
         coordinates.reshape(places.shape),
         np.minimum(made.patches, np.uint32(len(made.frames))).reshape(region.shape),
         jacobians.reshape(*region.shape, 2, 2),
-        sheet.measure_error(places, target),
+        sheet.measure_error(places, target, frames),
         patch,
         made,
     )

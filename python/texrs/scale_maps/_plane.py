@@ -115,7 +115,14 @@ class Plane:
         by_v = grown * (d / self.slope + points[..., 1:2] * e)
         return np.stack([by_v, scale[..., np.newaxis] * e], axis=-1)
 
-    def jacobians(self, scales: Floats, other: Plane | None = None) -> NDArray[np.float64]:
+    def order(self, scales: Floats) -> float:
+        """Return how far a map is from one that grows along the slope alone: root mean square, of logarithms."""
+        logs = np.log(scales)
+        along = self._along(np.moveaxis(np.indices(logs.shape), 0, -1), self.down)
+        found = logs.ravel()[np.argsort(along, axis=None, kind="stable")]
+        return float(np.sqrt(np.mean((found - np.sort(logs, axis=None)) ** 2)))
+
+    def jacobians(self, scales: Floats, other: Plane | None = None, foreshortened: float = 1.0) -> NDArray[np.float64]:
         """Return dS/dp of a picture whose elements are to be as large as a map (rows, columns) says: (..., 2, 2).
 
         Parameters
@@ -123,21 +130,27 @@ class Plane:
         scales : (rows, columns) float array
             How large.
         other : Plane, optional
-            The plane that the map is of: its lines run to its own vanishing point. For other maps each point is seen as if
-            straight ahead, along this plane's slope.
+            The plane along whose slope they grow: lines run to its own vanishing point, and what is upright here is so there.
+            For other maps each point is seen as if straight ahead, along this plane's slope.
+        foreshortened : float
+            How much of the foreshortening of this plane there is, as a power.
         """
         seen = self if other is None else other
         wide = np.asarray(scales, np.float64)
         # Elements are foreshortened as much as they are where this plane has the same scale.
-        long_ = wide * np.clip(wide, self.least, self.largest) / self.scale
+        long_ = wide * (np.clip(wide, self.least, self.largest) / self.scale) ** foreshortened
         frames = np.empty((*wide.shape, 2, 2))
         frames[..., 0, :] = seen.down / long_[..., np.newaxis]
         frames[..., 1, :] = seen.across / wide[..., np.newaxis]
-        if other is not None:
-            y, x = (np.arange(n) - (n - 1) / 2 for n in wide.shape)
-            across = y[:, np.newaxis] * seen.across[0] + x * seen.across[1]
-            frames[..., 1, :] -= (across / wide**2 * seen.slope)[..., np.newaxis] * seen.down
-        return frames
+        if other is None:
+            return frames
+        y, x = (np.arange(n) - (n - 1) / 2 for n in wide.shape)
+        across = y[:, np.newaxis] * seen.across[0] + x * seen.across[1]
+        rows, columns = np.gradient(wide)
+        slope = rows * seen.down[0] + columns * seen.down[1]
+        frames[..., 1, :] -= (across / wide**2 * slope)[..., np.newaxis] * seen.down
+        cos, sin = (float(np.dot(d, seen.down)) for d in (self.down, self.across))
+        return np.asarray(np.einsum("ij,...jk->...ik", np.array([[cos, -sin], [sin, cos]]), frames), np.float64)
 
     def _along(self, points: Array, direction: tuple[float, float]) -> NDArray[np.float64]:
         """Return how far points lie from the middle in a direction."""

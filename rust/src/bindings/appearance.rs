@@ -78,18 +78,25 @@ pub(super) fn frames<const D: usize>(values: &[i16]) -> Result<Frames<'_, D>> {
     })
 }
 
-/// Values of the exemplar's samples and of the output's points, weights, and samples by value.
+/// Values of the exemplar's samples and of the output's points, weights, samples by value, and what excess counts.
 pub(super) type GuideIn<'py> = (
     PyReadonlyArray1<'py, i16>,
     PyReadonlyArray1<'py, i16>,
     PyReadonlyArray1<'py, u16>,
     PyReadonlyArray1<'py, u32>,
+    u16,
 );
-pub(super) type GuideSlices<'a> = Option<(&'a [i16], &'a [i16], &'a [u16], &'a [u32])>;
+pub(super) type GuideSlices<'a> = Option<(&'a [i16], &'a [i16], &'a [u16], &'a [u32], u16)>;
 
 pub(super) fn slices<'a>(guide: &'a Option<GuideIn<'_>>) -> PyResult<GuideSlices<'a>> {
     Ok(match guide {
-        Some((a, b, c, d)) => Some((a.as_slice()?, b.as_slice()?, c.as_slice()?, d.as_slice()?)),
+        Some((a, b, c, d, excess)) => Some((
+            a.as_slice()?,
+            b.as_slice()?,
+            c.as_slice()?,
+            d.as_slice()?,
+            *excess,
+        )),
         None => None,
     })
 }
@@ -100,7 +107,10 @@ pub(super) fn guide<'a>(
     points: usize,
 ) -> Result<Option<Guide<'a>>> {
     arrays
-        .map(|(a, b, c, d)| Guide::new(grouped("guide", a)?, b, c, samples, points)?.ordered(d))
+        .map(|(a, b, c, d, excess)| {
+            let guide = Guide::new(grouped("guide", a)?, b, c, samples, points)?;
+            Ok(guide.ordered(d)?.lopsided(excess))
+        })
         .transpose()
 }
 

@@ -10,6 +10,8 @@ const SHARE: usize = 25;
 const ALIKE: i32 = 48;
 /// Cost of windows that have nothing to do with each other: what is asked counts in these units.
 pub(crate) const UNRELATED: f32 = 2.0 * 512.0 * 512.0;
+/// Weight of samples whose first value is more than what is asked where that counts as much as less.
+const EVEN: i64 = 256;
 /// Values that 12 bits hold.
 const VALUES: i32 = 4096;
 
@@ -24,6 +26,8 @@ pub struct Guide<'a> {
     order: &'a [u32],
     /// For each first value, how many of the order have a lesser one.
     before: Vec<u32>,
+    /// What it counts that a sample's first value is more than what is asked, in 1 / 256 of what it counts that it is less.
+    excess: i64,
 }
 
 /// Values at the points of the output. Outputs are large, and a scale is one number.
@@ -74,6 +78,7 @@ impl<'a> Guide<'a> {
             weight,
             order: &[],
             before: Vec::new(),
+            excess: EVEN,
         })
     }
 
@@ -98,6 +103,12 @@ impl<'a> Guide<'a> {
         }
         self.order = order;
         Ok(self)
+    }
+
+    /// Lets samples whose first value is more than what is asked count so many 256th of those where it is less.
+    pub fn lopsided(mut self, excess: u16) -> Self {
+        self.excess = i64::from(excess);
+        self
     }
 
     /// A sample drawn near what is asked at a point, by a random word; none where samples are drawn from anywhere.
@@ -150,12 +161,37 @@ impl<'a> Guide<'a> {
         if weight == 0 {
             return 0;
         }
-        let (a, b) = (&self.exemplar[sample], self.wanted(point));
+        (self.difference(sample, &self.wanted(point)) * i64::from(weight)) >> 8
+    }
+
+    /// Squared difference of the values of a sample and of wanted ones.
+    #[inline(always)]
+    pub(crate) fn difference(&self, sample: usize, wanted: &Colour) -> i64 {
         let mut sum = 0;
-        for c in 0..CHANNELS {
-            let d = i64::from(a[c]) - i64::from(b[c]);
-            sum += d * d;
+        for (c, (&a, &b)) in self.exemplar[sample].iter().zip(wanted).enumerate() {
+            let d = i64::from(a) - i64::from(b);
+            let lopsided = c == 0 && d > 0;
+            sum += if lopsided {
+                (d * d * self.excess) >> 8
+            } else {
+                d * d
+            };
         }
-        (sum * i64::from(weight)) >> 8
+        sum
+    }
+
+    /// Whether more than what is asked counts otherwise than less.
+    pub(crate) fn is_lopsided(&self) -> bool {
+        self.excess != EVEN
+    }
+
+    /// The least and the largest first value that is wanted.
+    pub(crate) fn span(&self) -> (i16, i16) {
+        let firsts: &mut dyn Iterator<Item = i16> = match self.output {
+            Wanted::All(values) => &mut values.iter().map(|v| v[0]),
+            Wanted::First(values) => &mut values.iter().copied(),
+        };
+        let first = firsts.next().unwrap_or(0);
+        firsts.fold((first, first), |(low, high), x| (low.min(x), high.max(x)))
     }
 }

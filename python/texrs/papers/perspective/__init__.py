@@ -16,7 +16,8 @@ Departures, with their reasons:
   larger than a window: by four fifths fewer cells of the pictures look torn.
 - An exemplar that is a plane is flattened. Its elements are the same everywhere then, and any of them can be seen at any
   depth; without that a ramp finds only a strip of the exemplar for each of its rows, and repeats it. Whether it is a plane is
-  told by the fit of S, or of its power 2/3 where the map is one of areas, to a linear function, and said in the report.
+  told by the fit of S, or of its power 2/3 where the map is one of areas, to a linear function and by edges,
+  which get steeper with distance there, and said in the report.
 - What is no plane is offered in several sizes, which add to what there is of a scale. The scale is a cost of showing a patch
   at a place, (log S_e - log S_o)^2, not a channel of windows: ratios of scales are what is seen. The output's map stays as
   asked.

@@ -27,6 +27,9 @@ const CHANCE: f32 = 0.1;
 /// How often a place may have been shown beyond the mean, at most, as it counts.
 const OFTEN: f32 = 6.0;
 
+/// Distance of levels of what is asked, at most: between them costs are interpolated.
+const LEVEL: f32 = 160.0;
+
 type Spectrum = Vec<Complex<f32>>;
 
 /// What it costs to choose places that others have chosen.
@@ -45,7 +48,7 @@ pub(super) struct Index<const D: usize> {
     size: [usize; D],
     plan: Arc<Volumes>,
     colours: Arc<Squares>,
-    guide: Option<Squares>,
+    guide: Option<Asked>,
     charges: Charges,
     /// How often what lies around each sample has been shown.
     shown: Vec<f32>,
@@ -57,6 +60,20 @@ pub(super) struct Index<const D: usize> {
 struct Squares {
     values: Vec<Spectrum>,
     squares: Spectrum,
+}
+
+/// What is asked, as it is compared.
+enum Asked {
+    /// By squared differences.
+    Squares(Squares),
+    /// By any cost: what samples cost where the first value of a level is wanted.
+    Levels {
+        /// The first level.
+        low: f32,
+        /// From one to the next.
+        step: f32,
+        costs: Vec<Spectrum>,
+    },
 }
 
 /// A template: values with weights, in the exemplar's frame.
@@ -97,6 +114,9 @@ impl<const D: usize> Index<D> {
             .collect();
         this.colours = Arc::new(this.squares(&colours));
         this.guide = guide.map(|guide| {
+            if guide.is_lopsided() {
+                return this.levels(guide);
+            }
             let values: Vec<Vec<f32>> = (0..CHANNELS)
                 .map(|c| {
                     (0..grid.len())
@@ -105,9 +125,29 @@ impl<const D: usize> Index<D> {
                 })
                 .filter(|plane| plane.iter().any(|&x| x != 0.0))
                 .collect();
-            this.squares(&values)
+            Asked::Squares(this.squares(&values))
         });
         this
+    }
+
+    /// What samples cost, by what is wanted.
+    fn levels(&self, guide: &Guide<'_>) -> Asked {
+        let (low, high) = guide.span();
+        let count = (f32::from(high - low) / LEVEL).ceil() as usize + 1;
+        let step = f32::from(high - low) / (count - 1).max(1) as f32;
+        let spectra = (0..count).map(|k| {
+            let wanted = [low + (k as f32 * step).round() as i16, 0, 0, 0];
+            let mut padded = vec![0.0; self.points()];
+            for i in 0..self.grid.len() {
+                padded[self.position(self.grid.point(i))] = guide.difference(i, &wanted) as f32;
+            }
+            self.plan.forward(&padded)
+        });
+        Asked::Levels {
+            low: f32::from(low),
+            step: step.max(1.0),
+            costs: spectra.collect(),
+        }
     }
 
     /// The same source, of which nothing has been shown, with other charges and no guide.
@@ -229,13 +269,19 @@ impl<const D: usize> Index<D> {
                 &mut spectrum,
             );
         }
-        if let (Some((template, points)), Some(squares)) = (&asked, &self.guide) {
-            self.correlate(
-                squares,
-                template,
-                2.0 / (*points as f32 * UNRELATED),
-                &mut spectrum,
-            );
+        if let Some((template, points)) = &asked {
+            let scale = 2.0 / (*points as f32 * UNRELATED);
+            match &self.guide {
+                Some(Asked::Squares(squares)) => {
+                    self.correlate(squares, template, scale, &mut spectrum)
+                }
+                Some(Asked::Levels { costs, .. }) => {
+                    for (cost, weight) in costs.iter().zip(&template.values) {
+                        self.correlate_cost(cost, weight, scale, &mut spectrum);
+                    }
+                }
+                None => {}
+            }
         }
         let mut scores = self.plan.inverse(spectrum);
         if points == 0 {
@@ -284,7 +330,12 @@ impl<const D: usize> Index<D> {
         chart: &Chart<D>,
         first: [i32; D],
     ) -> Option<(Template, usize)> {
-        let mut template = Template::new(self.points(), self.guide.as_ref()?.values.len());
+        let asked = self.guide.as_ref()?;
+        let channels = match asked {
+            Asked::Squares(squares) => squares.values.len(),
+            Asked::Levels { costs, .. } => costs.len(),
+        };
+        let mut template = Template::new(self.points(), channels);
         let mut points = 0;
         for (i, &p) in chart.window.points.iter().enumerate() {
             let p = p as usize;
@@ -292,8 +343,19 @@ impl<const D: usize> Index<D> {
                 continue;
             }
             if let Some(at) = self.splat(chart.steps[i], first) {
-                let value = guide.wanted(p).map(f32::from);
-                template.add(at, f32::from(guide.weight(p)) / 256.0, &value);
+                let (value, weight) = (
+                    guide.wanted(p).map(f32::from),
+                    f32::from(guide.weight(p)) / 256.0,
+                );
+                match asked {
+                    Asked::Squares(_) => template.add(at, weight, &value),
+                    Asked::Levels { low, step, costs } => {
+                        let level = (value[0] - low) / step;
+                        let (k, part) = (level as usize, level.fract());
+                        template.values[k][at] += weight * (1.0 - part);
+                        template.values[(k + 1).min(costs.len() - 1)][at] += weight * part;
+                    }
+                }
                 points += 1;
             }
         }
@@ -339,6 +401,24 @@ impl<const D: usize> Index<D> {
             for ((out, e), t) in out.iter_mut().zip(values).zip(&wanted) {
                 *out -= *e * t.conj() * (2.0 * scale);
             }
+        }
+    }
+
+    /// Adds the spectrum of the sums of costs of samples, by the weights of a template.
+    fn correlate_cost(
+        &self,
+        cost: &Spectrum,
+        weight: &[f32],
+        scale: f32,
+        out: &mut [Complex<f32>],
+    ) {
+        if weight.iter().all(|&w| w == 0.0) {
+            return;
+        }
+        let scale = scale / self.points() as f32;
+        let weight = self.plan.forward(weight);
+        for ((out, c), w) in out.iter_mut().zip(cost).zip(&weight) {
+            *out += *c * w.conj() * scale;
         }
     }
 
