@@ -8,6 +8,7 @@ mod patch_search;
 mod poisson;
 mod seam;
 mod sparse;
+mod stitcher;
 mod warp;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
@@ -67,6 +68,7 @@ criterion_group!(
     poisson::bench,
     seam::bench,
     sparse::bench,
+    stitcher::bench,
     warp::bench
 );
 criterion_main!(benches);

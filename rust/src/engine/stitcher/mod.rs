@@ -3,7 +3,8 @@
 //! 1. *chart*: a patch is a box of the exemplar, mapped from the output by the frames around its centre;
 //! 2. *search*: the places at which it fits what is there already, exactly, for all places at once;
 //! 3. *cut*: the best few are cut in by minimum cuts that judge the pairs which result, and the cheapest stays;
-//! 4. *heal*: elements that are torn are grown whole, or given up.
+//! 4. *recover*: where seams show most, other patches may take them;
+//! 5. *heal*: elements that are torn are grown whole, or given up.
 //!
 //! Kwatra, Schödl, Essa, Turk, Bobick, *Graphcut textures*, SIGGRAPH 2003. Departures: patches follow a field; a cut
 //! judges the pair that results, not how far the two pictures differ; elements are known to it.

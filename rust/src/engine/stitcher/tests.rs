@@ -363,3 +363,136 @@ fn bad_arrays_and_options_are_refused() {
         .is_err()
     );
 }
+
+/// What a seam costs, pair by pair.
+fn slow_pair(w: &Weights, source: &Source<2>, l: usize, r: usize, apart: f32) -> f32 {
+    let look = |i: usize| source.look(source.grid().point(i).map(|x| x as i32 * ONE));
+    let (l, r) = (look(l), look(r));
+    let unlike: f32 = (0..CHANNELS)
+        .map(|c| (l.colour[c] - r.colour[c]).abs())
+        .sum();
+    let mut cost = 2e-3 + w.colour * apart / 8.0;
+    cost += w.surprise * source.surprise(l.class, r.class);
+    let inside = (l.depth > 0.0, r.depth > 0.0);
+    if inside.0 && inside.1 {
+        cost += w.contact * unlike.min(1.5);
+    }
+    if l.beside && inside.1 || inside.0 && r.beside {
+        cost += w.joint;
+    }
+    cost += w.depth * (l.depth.min(6.0) + r.depth.min(6.0)) / 6.0;
+    cost + w.jump * ((l.depth - r.depth).abs() - 1.0).clamp(0.0, 4.0) / 2.0
+}
+
+#[test]
+fn seams_are_those_of_a_slow_judge() {
+    let grid = Grid::new([9, 21], [false; 2]).unwrap();
+    let colours = noise(3, grid.len());
+    let depth: Vec<f32> = noise(4, grid.len())
+        .iter()
+        .map(|x| (x * 12.0 - 4.0).max(0.0))
+        .collect();
+    let labels: Vec<u32> = depth.iter().map(|&d| u32::from(d > 0.0)).collect();
+    let classes: Vec<u8> = noise(5, grid.len())
+        .iter()
+        .map(|x| (x * 3.0) as u8)
+        .collect();
+    let elements = Elements {
+        labels: &labels,
+        depth: &depth,
+    };
+    let adjacency = Adjacency {
+        classes: &classes,
+        costs: &noise(6, 9),
+    };
+    let source = Source::new(&colours, grid, 1, elements, adjacency).unwrap();
+    let weights = Weights {
+        surprise: 0.7,
+        ..OPTIONS.weights
+    };
+    let order: Vec<usize> = (0..grid.len()).map(|p| p * 5 % grid.len()).collect();
+    let places: Vec<Place<2>> = order
+        .iter()
+        .map(|&i| grid.point(i).map(|x| x as i32 * ONE))
+        .collect();
+    let patches: Vec<u32> = (0..grid.len() as u32).map(|p| p % 3).collect();
+    let seams = judge(&source, &grid, &places, &patches, weights).unwrap();
+    for axis in 0..2 {
+        crate::kernels::seam::links(&grid, axis, |p, q| {
+            let colour = |i: usize| source.look(places[i]).colour[0];
+            let apart = (colour(p) - colour(q)).powi(2);
+            let slow = if patches[p] == patches[q] {
+                0.0
+            } else {
+                slow_pair(&weights, &source, order[p], order[q], 2.0 * apart)
+            };
+            assert!(
+                (seams[p][axis] - slow).abs() < 1e-4,
+                "{} {slow}",
+                seams[p][axis]
+            );
+        });
+    }
+    assert!(judge(&source, &grid, &places[1..], &patches, weights).is_err());
+}
+
+#[test]
+fn a_part_that_is_covered_stays_as_it_is_at_its_ends() {
+    let source = source([24, 24], [false; 2]);
+    let prepared = Prepared::new(&source);
+    let region = region([14, 17], [false; 2]);
+    let n = region.grid.len();
+    let first = Patch {
+        centre: [0, 0],
+        place: [2 * ONE, 3 * ONE],
+        frame: identity(),
+        rigid: true,
+        side: 24.0,
+    };
+    let shown = Shown {
+        places: region
+            .grid
+            .points()
+            .map(|p| [(p[0] as i32 + 2) * ONE, (p[1] as i32 + 3) * ONE])
+            .collect(),
+        patches: vec![0; n],
+        seams: vec![[0.0; 2]; n],
+        distortion: Vec::new(),
+        table: vec![first],
+    };
+    let cover_with = |shown: Shown<2>| {
+        let frames = Frames::Constant(identity());
+        cover(
+            &source,
+            &prepared,
+            &region,
+            frames,
+            shown,
+            &OPTIONS,
+            &Monitor::default(),
+        )
+    };
+    let made = cover_with(shown.clone()).unwrap();
+    for (p, point) in region.grid.points().enumerate() {
+        if point[0] == 0 || point[1] == 0 || point[0] == 13 || point[1] == 16 {
+            assert_eq!(made.places[p], shown.places[p]);
+        }
+        let patch = &made.table[made.patches[p] as usize];
+        let looks =
+            std::array::from_fn(|a| patch.place[a] + (point[a] as i32 - patch.centre[a]) * ONE);
+        assert_eq!(made.places[p], looks);
+    }
+    assert_eq!(cover_with(shown.clone()).unwrap().places, made.places);
+    let short = Shown {
+        patches: vec![0; n - 1],
+        ..shown.clone()
+    };
+    assert!(cover_with(short).is_err());
+    assert!(
+        cover_with(Shown {
+            patches: vec![1; n],
+            ..shown
+        })
+        .is_err()
+    );
+}
