@@ -23,8 +23,8 @@ use crate::kernels::seam::maxflow::Solver;
 
 /// Windows of more points are cut between blocks of such a side first, to be laid.
 pub(super) const LARGE: &[(usize, usize)] = &[(4096, 2)];
-/// To be compared with others, pictures and volumes.
-const JUDGED: [&[(usize, usize)]; 2] = [&[(4096, 4)], &[(1 << 15, 4), (4096, 2)]];
+/// To be compared with others. Pictures under a field lose more by larger blocks than those take less time.
+const JUDGED: &[(usize, usize)] = &[(1 << 15, 4), (4096, 2)];
 
 /// A patch at a place.
 pub(super) struct Proposal<'a, const D: usize> {
@@ -154,7 +154,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         patch: &Proposal<'_, D>,
         monitor: &Monitor,
     ) -> Result<Cutting<D>> {
-        let block = block(patch.window, self.blocks).max(block(patch.window, JUDGED[D - 2]));
+        let block = block(patch.window, self.blocks).max(block(patch.window, JUDGED));
         self.cut_between(view, patch, block, monitor)
     }
 
@@ -293,6 +293,8 @@ impl<'a, const D: usize> Cutter<'a, D> {
                     let apart = view.looks.distance(i, &look);
                     out.apart[i] = apart * apart;
                 }
+            } else {
+                out.looks.copy(i, &view.looks);
             }
         }
     }

@@ -108,12 +108,12 @@ impl<const D: usize> Energy<D> {
         for k in 0..run.n {
             let p = p_row + self.columns[p_column + k] as usize;
             let q = q_row + self.columns[q_column + k] as usize;
-            let (old_new, new_old, kept) = (costs.old_new[k], costs.new_old[k], costs.kept[k]);
+            let (old_new, new_old) = (costs.old_new[k], costs.new_old[k]);
+            // A seam that was worse than this one on both sides will go; it counts as much as keeps the energy submodular.
+            let kept = costs.kept[k].min(old_new + new_old);
             match (ties[run.p + k], ties[run.q + k]) {
                 (Tie::Either, Tie::Either) => {
-                    // A seam inside of a block goes with it: see `add_seams`. One that is worse than the new one on both
-                    // sides will go, and counts as much as keeps the energy submodular.
-                    let kept = kept.min(old_new + new_old);
+                    // A seam inside of a block goes with it: see `add_seams`.
                     if p != q {
                         add(&mut terminal[p], new_old - kept);
                         add(&mut terminal[q], -new_old);

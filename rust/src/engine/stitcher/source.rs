@@ -262,12 +262,12 @@ impl<const D: usize> Source<D> {
         })
     }
 
-    /// What a place shows: its colour between samples, all else of the nearest one. In volumes that colour is the nearest
-    /// one's too: measured, cuts are no worse by it, and it takes an eighth of the time.
+    /// What a place shows: its colour between samples, all else of the nearest one. Of volumes with elements that is
+    /// the nearest one's too: measured, cuts are no worse by it, and it takes an eighth of the time.
     #[inline]
     pub(super) fn look(&self, place: Place<D>) -> Look {
         let mut look = self.looks[self.sample(place)];
-        if D == 2 && place.iter().any(|x| x & (ONE - 1) != 0) {
+        if (D == 2 || !self.has_elements()) && place.iter().any(|x| x & (ONE - 1) != 0) {
             look.colour = self.interpolate(place);
         }
         look

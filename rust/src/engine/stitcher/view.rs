@@ -117,6 +117,17 @@ impl Looks {
         self.class[i] = look.class;
     }
 
+    /// Takes over what a point shows.
+    #[inline(always)]
+    pub(super) fn copy(&mut self, i: usize, from: &Self) {
+        for c in 0..CHANNELS {
+            self.colour[c][i] = from.colour[c][i];
+        }
+        self.depth[i] = from.depth[i];
+        self.beside[i] = from.beside[i];
+        self.class[i] = from.class[i];
+    }
+
     /// How far the colour of a point is from that of a look.
     #[inline(always)]
     pub(super) fn distance(&self, i: usize, look: &Look) -> f32 {
