@@ -17,10 +17,11 @@ Departures, with their reasons:
 - An exemplar that is a plane is flattened. Its elements are the same everywhere then, and any of them can be seen at any
   depth; without that a ramp finds only a strip of the exemplar for each of its rows, and repeats it. Whether it is a plane is
   told by the fit of S, or of its power 2/3 where the map is one of areas, to a linear function and by edges,
-  which get steeper with distance there, and said in the report.
+  which get steeper with distance there, and said in the report. A target that grows along the plane's slope shows that
+  plane; along another line elements are seen straight ahead; where sizes come and go they are half as foreshortened.
 - What is no plane is offered in several sizes, which add to what there is of a scale. The scale is a cost of showing a patch
-  at a place, (log S_e - log S_o)^2, not a channel of windows: ratios of scales are what is seen. The output's map stays as
-  asked.
+  at a place, (log S_e - log S_o)^2, not a channel of windows: ratios of scales are what is seen. Of planes it counts a
+  seventh where elements are shrunk: what is magnified is blurred. The output's map stays as asked.
 - What is found are coordinates, so that the last word is a copy, not a weighted mean: nothing blurs.
 - In place of the histograms of Eq. 8, places are charged for what has been shown often, and for classes of colour in excess.
 

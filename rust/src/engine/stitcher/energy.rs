@@ -112,13 +112,11 @@ impl<const D: usize> Energy<D> {
             // A seam that was worse than this one on both sides will go; it counts as much as keeps the energy submodular.
             let kept = costs.kept[k].min(old_new + new_old);
             match (ties[run.p + k], ties[run.q + k]) {
-                (Tie::Either, Tie::Either) => {
-                    // A seam inside of a block goes with it: see `add_seams`.
-                    if p != q {
-                        add(&mut terminal[p], new_old - kept);
-                        add(&mut terminal[q], -new_old);
-                        add(&mut forward[p], old_new + new_old - kept);
-                    }
+                // A seam inside of a block goes with it: see `add_seams`.
+                (Tie::Either, Tie::Either) if p != q => {
+                    add(&mut terminal[p], new_old - kept);
+                    add(&mut terminal[q], -new_old);
+                    add(&mut forward[p], old_new + new_old - kept);
                 }
                 (Tie::Old, Tie::Either) => add(&mut terminal[q], old_new - kept),
                 (Tie::New, Tie::Either) => add(&mut terminal[q], -new_old),
