@@ -137,7 +137,8 @@ def s5(made: Synthesis, least: float = 0.65) -> Found:
         {
             "coherent": (reuse.coherent, least, 1),
             "largest": (reuse.largest, 0, max(0.06, four)),
-            "most used": (reuse.most_used, 0, 15),
+            # Patches that cover seams are chosen for those, however often they have been shown.
+            "most used": (reuse.most_used, 0, 16),
         }
     )
 
