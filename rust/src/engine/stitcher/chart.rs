@@ -40,8 +40,7 @@ impl<const D: usize> Chart<D> {
         side: f32,
         bend: bool,
     ) -> Option<Self> {
-        let here: [usize; D] = std::array::from_fn(|a| canvas.grid.resolve(a, centre[a] as isize));
-        let frame = frames.at(canvas.grid.index(here));
+        let frame = frame_at(canvas, frames, centre);
         let mut side = side;
         let varies = matches!(frames, Frames::Dense(_));
         if bend && varies {
@@ -90,8 +89,7 @@ impl<const D: usize> Chart<D> {
         side: f32,
         bend: bool,
     ) -> ([i32; D], [i32; D]) {
-        let here: [usize; D] = std::array::from_fn(|a| canvas.grid.resolve(a, centre[a] as isize));
-        let frame = frames.at(canvas.grid.index(here));
+        let frame = frame_at(canvas, frames, centre);
         let bend = bend && matches!(frames, Frames::Dense(_));
         Self::bounds(canvas, &frame, centre, side, if bend { BENT } else { 1.0 })
     }
@@ -312,6 +310,16 @@ impl<const D: usize> Chart<D> {
         let connected = flood(&self.window.grid, &self.mask, &[start]);
         self.mask = connected;
     }
+}
+
+/// The Jacobian at a point of the canvas.
+fn frame_at<const D: usize>(
+    canvas: &Canvas<D>,
+    frames: Frames<'_, D>,
+    centre: [i32; D],
+) -> Frame<D> {
+    let here = std::array::from_fn(|a| canvas.grid.resolve(a, centre[a] as isize));
+    frames.at(canvas.grid.index(here))
 }
 
 /// The points of a mask that hang together with some of it.

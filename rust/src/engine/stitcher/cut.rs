@@ -91,7 +91,7 @@ struct Costs {
 
 /// What cuts are made with.
 pub(super) struct Cutter<'a, const D: usize> {
-    pairs: Judge<'a, D>,
+    judge: Judge<'a, D>,
     pub guide: Option<&'a Guide<'a>>,
     /// Windows of more points are cut between blocks of such a side first, the largest ones before the others.
     pub blocks: &'static [(usize, usize)],
@@ -107,7 +107,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         blocks: &'static [(usize, usize)],
     ) -> Self {
         Self {
-            pairs: Judge { source, weights },
+            judge: Judge { source, weights },
             guide,
             blocks,
             workspaces: Mutex::default(),
@@ -115,7 +115,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
     }
 
     pub(super) fn source(&self) -> &'a Source<D> {
-        self.pairs.source
+        self.judge.source
     }
 
     fn workspaces(&self) -> MutexGuard<'_, Vec<Workspace<D>>> {
@@ -132,19 +132,9 @@ impl<'a, const D: usize> Cutter<'a, D> {
         patch: &Proposal<'_, D>,
         monitor: &Monitor,
     ) -> Result<Cutting<D>> {
-        let coarse = self.cut_coarsely(view, patch, monitor)?;
-        self.refine(view, patch, coarse, monitor)
-    }
-
-    /// Cuts a patch in between blocks of points, if it is large: enough to compare it with others.
-    pub(super) fn cut_coarsely(
-        &self,
-        view: &View<D>,
-        patch: &Proposal<'_, D>,
-        monitor: &Monitor,
-    ) -> Result<Cutting<D>> {
         let block = block(patch.window, self.blocks);
-        self.cut_between(view, patch, block, monitor)
+        let coarse = self.cut_between(view, patch, block, monitor)?;
+        self.refine(view, patch, coarse, monitor)
     }
 
     /// Cuts a patch in between blocks of points that may be larger: enough to compare it with others.
@@ -307,14 +297,14 @@ impl<'a, const D: usize> Cutter<'a, D> {
         let apart = [&patch.apart[p..p + n], &patch.apart[q..q + n]];
         let (old, new) = (&view.looks, &patch.looks);
         let unlike = &mut costs.unlike;
-        self.pairs.pairs(
+        self.judge.pairs(
             old.row(p, n),
             new.row(q, n),
             apart,
             unlike,
             &mut costs.old_new,
         );
-        self.pairs.pairs(
+        self.judge.pairs(
             new.row(p, n),
             old.row(q, n),
             apart,
@@ -423,7 +413,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
 
     /// What a point costs that keeps what it shows, or takes the patch.
     fn points(&self, view: &View<D>, patch: &Proposal<'_, D>, i: usize) -> [f32; 2] {
-        let weights = &self.pairs.weights;
+        let weights = &self.judge.weights;
         let own = |all: &[f32]| weights.distortion * all.get(i).copied().unwrap_or(0.0);
         let mut costs = [own(&view.distortion), own(patch.distortion)];
         if let Some(guide) = self.guide {
