@@ -245,6 +245,12 @@ impl<const D: usize> Source<D> {
         self.looks.iter().map(|look| &look.colour)
     }
 
+    /// The colour of a sample.
+    #[inline(always)]
+    pub(super) fn colour_at(&self, sample: usize) -> &Colour {
+        &self.looks[sample].colour
+    }
+
     /// Cost of seeing two classes side by side; 0 where that is not judged.
     #[inline(always)]
     pub(super) fn surprise(&self, a: u8, b: u8) -> f32 {

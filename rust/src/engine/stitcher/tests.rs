@@ -122,6 +122,46 @@ fn the_best_place_is_that_of_a_slow_search() {
     }
 }
 
+#[test]
+fn a_large_exemplar_is_searched_as_exactly() {
+    for wrap in [[false, false], [false, true], [true, true]] {
+        let grid = Grid::new([1024, 640], wrap).unwrap();
+        // Noise that is smooth over some samples, as pictures are.
+        let [rows, columns] = grid.shape().map(|n| n / 4);
+        let coarse = noise(3, rows * columns);
+        let colours: Vec<f32> = (grid.points())
+            .map(|[row, column]| {
+                let at = |r: usize, c: usize| coarse[r % rows * columns + c % columns];
+                let (r, y) = (row / 4, (row % 4) as f32 / 4.0);
+                let (c, x) = (column / 4, (column % 4) as f32 / 4.0);
+                let line = |r: usize| at(r, c) * (1.0 - x) + at(r, c + 1) * x;
+                line(r) * (1.0 - y) + line(r + 1) * y
+            })
+            .collect();
+        let source = Source::new(&colours, grid, 1, NO_ELEMENTS, NO_CLASSES).unwrap();
+        let mut canvas = Canvas::<2>::new(Grid::new([40; 2], [false; 2]).unwrap(), false).unwrap();
+        for p in 0..canvas.grid.len() {
+            let [row, column] = canvas.grid.point(p);
+            if row < 20 {
+                canvas.patches[p] = 0;
+                canvas.places[p] = [(701 + row as i32) * ONE, (333 + column as i32) * ONE];
+            }
+        }
+        let free = Charges {
+            repetition: 0.0,
+            continuation: 0.0,
+        };
+        let index = Index::new(&source, None, free);
+        let frames = Frames::Constant(identity());
+        let chart = Chart::new(&canvas, frames, [20, 20], 31.0, false).unwrap();
+        let covered = |&p: &u32| canvas.covered(p);
+        let known: Vec<bool> = chart.window.points.iter().map(covered).collect();
+        let found = index.best(&source, &canvas, &chart, &known, None, 3, &Noise::new(0));
+        assert_eq!(found[0], [721 * ONE, 353 * ONE]);
+        assert_eq!(found.len(), 3);
+    }
+}
+
 proptest! {
     #[test]
     fn the_least_cut_is_that_of_all_labellings(seed in 0u64..500) {

@@ -1,0 +1,401 @@
+//! The best places for a patch: those where what is known of it fits best, for all places at once.
+//!
+//! Whatever the chart does to a patch, another place is another shift of the exemplar. So the points that are known
+//! already are written where the chart takes them, into a template of the exemplar's size, and the sum of squared
+//! differences of every shift is a correlation: SSD(s) = corr(E^2, W) - 2 corr(E, W T) + const.
+//!
+//! A large exemplar is searched by blocks of samples first; the best places are then found exactly around the best blocks.
+
+mod exact;
+mod lattice;
+mod spectra;
+
+use std::sync::Arc;
+
+use super::canvas::{Canvas, FREE};
+use super::chart::Chart;
+use super::source::Source;
+use crate::engine::guide::{Guide, UNRELATED};
+use crate::foundation::fixed::{BITS, ONE, Place, nearest};
+use crate::foundation::grid::Grid;
+use crate::foundation::hash::Noise;
+
+use exact::Fit;
+use spectra::{Spectra, Template};
+
+/// Places that are tried lie at least so many samples apart.
+const APART: i32 = 3;
+/// A neighbour goes on within so many samples of the place where it ends.
+const NEAR: i32 = 6;
+/// Points of a neighbour that count as going on.
+const FEW: u32 = 12;
+/// What places may fall short of the best by where nothing is there to fit; windows that have nothing to do with each other
+/// differ by 2.
+const CHANCE: f32 = 0.1;
+/// How often a place may have been shown beyond the mean, at most, as it counts.
+const OFTEN: f32 = 6.0;
+/// Blocks around which places are looked for, as a multiple of those that are wanted.
+const BLOCKS: usize = 4;
+
+/// What it costs to choose places that others have chosen.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Charges {
+    /// For places that have been shown more often than others.
+    pub repetition: f32,
+    /// For going on exactly where a neighbour ends.
+    pub continuation: f32,
+}
+
+/// An exemplar in which places are looked for.
+pub(super) struct Index<const D: usize> {
+    grid: Grid<D>,
+    spectra: Arc<Spectra<D>>,
+    charges: Charges,
+    /// How often what lies around each sample has been shown.
+    shown: Vec<f32>,
+    total: f64,
+}
+
+/// What the centre of a patch may look at: the first sample along each axis, and the last.
+struct Range<const D: usize> {
+    low: [i32; D],
+    high: [i32; D],
+}
+
+impl<const D: usize> Index<D> {
+    /// Transforms a source, and the values of a guide.
+    pub(super) fn new(source: &Source<D>, guide: Option<&Guide<'_>>, charges: Charges) -> Self {
+        Self::over(
+            *source.grid(),
+            Arc::new(Spectra::new(source, guide)),
+            charges,
+        )
+    }
+
+    fn over(grid: Grid<D>, spectra: Arc<Spectra<D>>, charges: Charges) -> Self {
+        Self {
+            grid,
+            spectra,
+            charges,
+            shown: vec![0.0; grid.len()],
+            total: 0.0,
+        }
+    }
+
+    /// The same source, of which nothing has been shown, with other charges.
+    pub(super) fn afresh(&self, charges: Charges) -> Self {
+        Self::over(self.grid, Arc::clone(&self.spectra), charges)
+    }
+
+    /// Notes that a patch of a side has been shown around a sample.
+    pub(super) fn note(&mut self, place: Place<D>, side: f32) {
+        let (centre, reach) = (nearest(place), side.ceil() as i32);
+        let mut axes: Vec<Vec<(usize, f32)>> = Vec::with_capacity(D);
+        for a in 0..D {
+            let reach = reach.min(if self.grid.wrap()[a] {
+                (self.grid.shape()[a] as i32 - 1) / 2
+            } else {
+                reach
+            });
+            let near = (-reach..=reach).filter_map(|d| {
+                let at = self.grid.inside(a, (centre[a] + d) as isize)?;
+                Some((at, (1.0 - d.abs() as f32 / side).max(0.0)))
+            });
+            axes.push(near.collect());
+        }
+        let shape = self.grid.shape();
+        let count: usize = axes.iter().map(Vec::len).product();
+        for k in 0..count {
+            let (mut rest, mut at, mut weight, mut step) = (k, 0, 1.0, 1);
+            for a in (0..D).rev() {
+                let (i, w) = axes[a][rest % axes[a].len()];
+                rest /= axes[a].len();
+                at += i * step;
+                step *= shape[a];
+                weight *= w;
+            }
+            self.shown[at] += weight;
+            self.total += f64::from(weight);
+        }
+    }
+
+    /// The places of the centre of a chart that fit known points of it best, the best one first; at most `count`.
+    #[allow(clippy::too_many_arguments)] // what is searched for, and where
+    pub(super) fn best(
+        &self,
+        source: &Source<D>,
+        canvas: &Canvas<D>,
+        chart: &Chart<D>,
+        known: &[bool],
+        guide: Option<&Guide<'_>>,
+        count: usize,
+        noise: &Noise,
+    ) -> Vec<Place<D>> {
+        let Some(range) = self.range(chart) else {
+            return Vec::new();
+        };
+        let lattice = &self.spectra.lattice;
+        // Block i of the template is the place i - first of the centre.
+        let first = range.low.map(|low| (-low) >> lattice.level);
+        let Ok(blocks) = Grid::new(
+            std::array::from_fn(|a| ((range.high[a] >> lattice.level) + first[a]) as usize + 1),
+            [false; D],
+        ) else {
+            return Vec::new();
+        };
+        let (template, points) = self.splat_known(source, canvas, chart, known, first);
+        let asked = guide.and_then(|guide| self.splat_asked(guide, chart, first));
+        if points == 0 && asked.is_none() {
+            let draw = noise.below(blocks.len() as u64, [0x70, 0, 0, 0]);
+            let at = lattice.centre(blocks.point(draw as usize), first);
+            return vec![at.map(|x| x * ONE)];
+        }
+        let mut scores = self.spectra.scores(
+            (points > 0).then(|| (&template, 1.0 / (points as f32 * source.channels() as f32))),
+            (asked.as_ref()).map(|(asked, n)| (asked, 2.0 / (*n as f32 * UNRELATED))),
+        );
+        if points == 0 {
+            // Nothing is there to fit, and many places show what is asked about as well.
+            for (k, score) in scores.iter_mut().enumerate() {
+                *score += CHANCE * noise.uniform([0x71, k as u32, 0, 0]) as f32;
+            }
+        }
+        let continued = self.continuations(canvas, chart);
+        if lattice.level == 0 {
+            let found = self.pick(&scores, &blocks, first, &continued, count);
+            return found.into_iter().map(|c| c.map(|x| x * ONE)).collect();
+        }
+        let near = self.pick(&scores, &blocks, first, &continued, BLOCKS * count);
+        let fit = Fit::new(source, canvas, chart, known, guide);
+        let mut found: Vec<([i32; D], f32)> = near
+            .into_iter()
+            .map(|centre| fit.settle(centre, lattice.level, |at| range.bring(at, &self.grid)))
+            .map(|(centre, cost)| (centre, cost + self.charge(centre, &continued)))
+            .collect();
+        found.sort_by(|a, b| a.1.total_cmp(&b.1));
+        self.part(found, count)
+    }
+
+    /// What the centre of a patch may look at.
+    fn range(&self, chart: &Chart<D>) -> Option<Range<D>> {
+        let (least, most) = extent(chart)?;
+        let low = least.map(|x| -(x >> BITS));
+        let high = std::array::from_fn(|a| {
+            let n = self.grid.shape()[a] as i32;
+            if self.grid.wrap()[a] {
+                low[a] + n - 1
+            } else {
+                (((n - 1) * ONE - most[a]) >> BITS).max(low[a])
+            }
+        });
+        Some(Range { low, high })
+    }
+
+    /// The points of a chart that are known.
+    fn splat_known(
+        &self,
+        source: &Source<D>,
+        canvas: &Canvas<D>,
+        chart: &Chart<D>,
+        known: &[bool],
+        first: [i32; D],
+    ) -> (Template, usize) {
+        let mut template = self.spectra.template();
+        let mut points = 0;
+        for (i, &p) in chart.window.points.iter().enumerate() {
+            if !known[i] {
+                continue;
+            }
+            if let Some(at) = self.spectra.lattice.splat(chart.steps[i], first) {
+                let colour = source.look(canvas.places[p as usize]).colour;
+                template.add(at, 1.0, &colour);
+                points += 1;
+            }
+        }
+        (template, points)
+    }
+
+    /// What is asked of the points of a chart; none where nothing is.
+    fn splat_asked(
+        &self,
+        guide: &Guide<'_>,
+        chart: &Chart<D>,
+        first: [i32; D],
+    ) -> Option<(Template, usize)> {
+        let mut template = self.spectra.template_asked()?;
+        let mut points = 0;
+        for (i, &p) in chart.window.points.iter().enumerate() {
+            let p = p as usize;
+            if !chart.mask[i] || !guide.asks(p) {
+                continue;
+            }
+            if let Some(at) = self.spectra.lattice.splat(chart.steps[i], first) {
+                let (value, weight) = (
+                    guide.wanted(p).map(f32::from),
+                    f32::from(guide.weight(p)) / 256.0,
+                );
+                self.spectra.ask(&mut template, at, weight, &value);
+                points += 1;
+            }
+        }
+        (points > 0).then_some((template, points))
+    }
+
+    /// The places at which the patches around a chart would go on.
+    fn continuations(&self, canvas: &Canvas<D>, chart: &Chart<D>) -> Vec<[i32; D]> {
+        let mut seen: Vec<(u32, u32, [i32; D])> = Vec::new();
+        for (i, &p) in chart.window.points.iter().enumerate() {
+            let patch = canvas.patches[p as usize];
+            if patch == FREE {
+                continue;
+            }
+            let slot = match seen.iter().rposition(|s| s.0 == patch) {
+                Some(slot) => slot,
+                None => {
+                    let (place, step) = (canvas.places[p as usize], chart.steps[i]);
+                    let centre = nearest(std::array::from_fn(|a| place[a].wrapping_sub(step[a])));
+                    seen.push((patch, 0, centre));
+                    seen.len() - 1
+                }
+            };
+            seen[slot].1 += 1;
+        }
+        seen.iter().filter(|s| s.1 >= FEW).map(|s| s.2).collect()
+    }
+
+    /// What it costs that a place has been shown more often than others.
+    fn repetition(&self, centre: [i32; D]) -> f32 {
+        let mean = (self.total / self.grid.len() as f64) as f32;
+        if self.charges.repetition == 0.0 || mean == 0.0 {
+            return 0.0;
+        }
+        let at = std::array::from_fn(|a| self.grid.resolve(a, centre[a] as isize));
+        self.charges.repetition * (self.shown[self.grid.index(at)] / mean).min(OFTEN)
+    }
+
+    /// All that it costs to choose a place, however well it fits.
+    fn charge(&self, centre: [i32; D], continued: &[[i32; D]]) -> f32 {
+        let goes_on = continued
+            .iter()
+            .filter(|c| self.within(centre, **c, NEAR))
+            .count();
+        self.repetition(centre) + self.charges.continuation * goes_on as f32
+    }
+
+    /// Whether two samples lie within so many of each other along each axis.
+    fn within(&self, a: [i32; D], b: [i32; D], reach: i32) -> bool {
+        (0..D).all(|axis| {
+            let (n, apart) = (self.grid.shape()[axis] as i32, (a[axis] - b[axis]).abs());
+            let apart = if self.grid.wrap()[axis] {
+                (apart % n).min(n - apart % n)
+            } else {
+                apart
+            };
+            apart <= reach
+        })
+    }
+
+    /// The centres with the least scores and their charges, apart from each other.
+    fn pick(
+        &self,
+        scores: &[f32],
+        blocks: &Grid<D>,
+        first: [i32; D],
+        continued: &[[i32; D]],
+        count: usize,
+    ) -> Vec<[i32; D]> {
+        let lattice = &self.spectra.lattice;
+        let wide = |reach: i32| (reach >> lattice.level).max(1);
+        let mut values: Vec<f32> = blocks
+            .points()
+            .map(|block| {
+                scores[lattice.position(block)] + self.repetition(lattice.centre(block, first))
+            })
+            .collect();
+        if self.charges.continuation > 0.0 {
+            for centre in continued {
+                let at = std::array::from_fn(|a| (centre[a] >> lattice.level) + first[a]);
+                self.around(blocks, at, wide(NEAR), |k| {
+                    values[k] += self.charges.continuation
+                });
+            }
+        }
+        let mut found = Vec::with_capacity(count);
+        while found.len() < count {
+            let mut best = (f32::INFINITY, 0);
+            for (k, &v) in values.iter().enumerate() {
+                if v < best.0 {
+                    best = (v, k);
+                }
+            }
+            if best.0 == f32::INFINITY {
+                break;
+            }
+            let block = blocks.point(best.1);
+            found.push(lattice.centre(block, first));
+            self.around(blocks, block.map(|x| x as i32), wide(APART), |k| {
+                values[k] = f32::INFINITY
+            });
+        }
+        found
+    }
+
+    /// The first of some places that lie apart from each other.
+    fn part(&self, sorted: Vec<([i32; D], f32)>, count: usize) -> Vec<Place<D>> {
+        let mut found: Vec<[i32; D]> = Vec::with_capacity(count);
+        for (centre, _) in sorted {
+            if found.len() < count && !found.iter().any(|f| self.within(centre, *f, APART)) {
+                found.push(centre);
+            }
+        }
+        found.into_iter().map(|c| c.map(|x| x * ONE)).collect()
+    }
+
+    /// Calls `f` with each position of a box around a block, around the exemplar's cyclic axes.
+    fn around(&self, blocks: &Grid<D>, at: [i32; D], reach: i32, mut f: impl FnMut(usize)) {
+        let (width, all) = (2 * reach + 1, &self.spectra.lattice.grid);
+        for k in 0..(width as usize).pow(D as u32) {
+            let (mut rest, mut point) = (k as i32, [0; D]);
+            let mut inside = true;
+            for a in 0..D {
+                let mut i = at[a] + rest % width - reach;
+                rest /= width;
+                if all.wrap()[a] {
+                    i = i.rem_euclid(all.shape()[a] as i32);
+                }
+                inside &= i >= 0 && (i as usize) < blocks.shape()[a];
+                point[a] = i.max(0) as usize;
+            }
+            if inside {
+                f(blocks.index(point));
+            }
+        }
+    }
+}
+
+impl<const D: usize> Range<D> {
+    /// The nearest sample that the centre may look at.
+    fn bring(&self, at: [i32; D], grid: &Grid<D>) -> [i32; D] {
+        std::array::from_fn(|a| {
+            let n = grid.shape()[a] as i32;
+            if grid.wrap()[a] {
+                self.low[a] + (at[a] - self.low[a]).rem_euclid(n)
+            } else {
+                at[a].clamp(self.low[a], self.high[a])
+            }
+        })
+    }
+}
+
+/// The least and the largest step of a chart along each axis.
+fn extent<const D: usize>(chart: &Chart<D>) -> Option<(Place<D>, Place<D>)> {
+    let mut ends: Option<(Place<D>, Place<D>)> = None;
+    for (step, _) in chart.steps.iter().zip(&chart.mask).filter(|(_, m)| **m) {
+        let (low, high) = ends.get_or_insert((*step, *step));
+        for a in 0..D {
+            low[a] = low[a].min(step[a]);
+            high[a] = high[a].max(step[a]);
+        }
+    }
+    ends
+}
