@@ -285,6 +285,7 @@ class Stitcher:
         patch: float,
         candidates: int = 3,
         bend: bool = False,
+        recover: float = 0.5,
         heal: bool = True,
         weights: Weights = Weights(),
         repetition: float = 0.15,
@@ -306,7 +307,7 @@ class Stitcher:
             What it shows before.
         patch : float
             Side of a patch in samples of the exemplar, at most; where it does not fill the part there are several.
-        candidates, bend, heal, weights, repetition, continuation, progress
+        candidates, bend, recover, heal, weights, repetition, continuation, progress
             As for `stitch`; what is charged are the patches that the part shows already.
         balance : float
             Cost of points of classes in excess, as many as a side of a patch has.
@@ -327,7 +328,14 @@ class Stitcher:
             region.place,
             frames,
             (*shown[:4], np.ascontiguousarray(shown.table.reshape(-1))),
-            (as_float(patch, "patch", 4, 4096), 0.0, as_int(candidates, "candidates", 1, 64), 0.0, bend, heal),
+            (
+                as_float(patch, "patch", 4, 4096),
+                0.0,
+                as_int(candidates, "candidates", 1, 64),
+                as_float(recover, "recover", 0, 4),
+                bend,
+                heal,
+            ),
             list(astuple(weights)),
             [
                 as_float(repetition, "repetition", 0, 100),

@@ -2,9 +2,10 @@
 
 The lowest layer are boxes of the exemplar from hashed places (`texrs.papers.solid.ground`). Each layer above is the same
 tiling, shifted. A box of it is a patch, of the best of several places, cut into what the layer before shows there
-(`Stitcher.cover`); where the last layer leaves an element torn inside a box, it is healed. The ends of a box stay as they
-are, so that boxes of a layer do not know of each other: what a box becomes hangs on the boxes of the layer before that it
-meets, 2^A of them, and on the field inside. So any part can be made by itself, and is the same however it is asked for.
+(`Stitcher.cover`); in the last layer the worst seams inside a box are covered again, and elements that are torn there are
+healed. The ends of a box stay as they are, so that boxes of a layer do not know of each other: what a box becomes hangs on
+the boxes of the layer before that it meets, 2^A of them, and on the field inside. So any part can be made by itself, and is
+the same however it is asked for.
 
 In rows and columns, or in classes of centres as corners, edges and interiors, a patch would hang on many more: in three
 dimensions a window of 32^3 on some 900 instead of 75. Cuts into what is covered already are no worse for it: a patch is
@@ -44,6 +45,8 @@ SHIFTS = {
 doubles what a window hangs on."""
 LARGER = 1.2
 """How much larger boxes are than patches in rows: less of each is left."""
+RECOVER = {2: 2.0, 3: 0.5}
+"""Share of as many patches as fill a box that cover its worst seams again: in three dimensions more gain nothing."""
 LARGEST = {2: 512, 3: 80}
 """Side of a box at most, where a field enlarges."""
 FITS = 0.9
@@ -183,7 +186,7 @@ class Layers:
     def _make(self, key: Key, below: Sequence[Box], advance: Callable[[float], object] | None) -> Box:
         """Cut a patch into what the layer below shows in a box."""
         region = self._region(key)
-        frames = to_fixed(self.field, region)
+        frames, last = to_fixed(self.field, region), key[0] == len(self.shifts) - 1
         shown = self.exemplar.stitcher.cover(
             region,
             frames,
@@ -191,8 +194,9 @@ class Layers:
             patch=max(6.0, FITS * min(self.exemplar.shape)),
             candidates=self.candidates,
             bend=self.bent,
-            # What lies below is cut again: elements are healed in the end.
-            heal=key[0] == len(self.shifts) - 1,
+            # What lies below is cut again: seams are covered, and elements healed, in the end.
+            recover=RECOVER[self.axes] if last else 0.0,
+            heal=last,
             weights=weights_of(self.exemplar),
             progress=advance,
         )

@@ -24,6 +24,9 @@ use crate::{Error, Result};
 const FILLED: f64 = 0.5;
 /// One is divided too where a patch would be so far from the field, on average, while it shows more than half of a patch.
 const STRAY: f32 = 0.2;
+/// Patches that cover seams again are measured by ones of this share of the part, so many of their sides apart.
+const OF_PART: f32 = 0.8;
+const STEP: f32 = 0.6;
 /// Windows that are covered have more points with a choice: those of more points are cut between larger blocks first.
 const COVERED: &[(usize, usize)] = &[(1 << 15, 4), (4096, 2)];
 /// Side of the smallest box that is divided.
@@ -142,6 +145,7 @@ pub fn cover<const D: usize>(
     };
     this.know_patches();
     this.cover(region.grid.shape().map(|_| 0), region.grid.shape())?;
+    this.recover_part()?;
     if options.heal {
         this.heal()?;
     }
@@ -198,6 +202,17 @@ impl<const D: usize> Stitching<'_, D> {
             self.cover(first, last)?;
         }
         Ok(())
+    }
+
+    /// Covers the worst seams again, as often as if patches lay side by side.
+    fn recover_part(&mut self) -> Result<()> {
+        let shape = self.canvas.grid.shape();
+        let scale = self.scale(shape.map(|n| n as i32 / 2));
+        let longest = shape.into_iter().max().unwrap_or(1) as f32;
+        let patch = (OF_PART * longest / scale).min(self.options.patch);
+        let step = STEP * patch * scale;
+        let patches = self.canvas.grid.len() as f32 / step.powi(D as i32);
+        self.recover(patches.round() as usize, patch)
     }
 
     fn window(&self, low: [usize; D], high: [usize; D]) -> Option<Window<D>> {

@@ -179,7 +179,7 @@ pub fn stitch<const D: usize>(
         monitor,
     };
     this.fill()?;
-    this.recover()?;
+    this.recover(this.patches.len(), options.patch)?;
     let healed = if options.heal { this.heal()? } else { 0 };
     let mut canvas = this.canvas;
     for place in &mut canvas.places {

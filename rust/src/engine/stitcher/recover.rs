@@ -13,20 +13,20 @@ const HOLE: f32 = 0.15;
 const SIDE: f32 = 0.6;
 
 impl<const D: usize> Stitching<'_, D> {
-    /// Covers the worst seams again, a share of the patches that there are.
-    pub(super) fn recover(&mut self) -> Result<()> {
-        let count = (self.options.recover * self.patches.len() as f32).round() as usize;
+    /// Covers the worst seams again: as a share of so many patches, which have a side.
+    pub(super) fn recover(&mut self, patches: usize, patch: f32) -> Result<()> {
+        let count = (self.options.recover * patches as f32).round() as usize;
         if count == 0 {
             return Ok(());
         }
-        let side = (self.options.patch * SIDE).max(4.0);
-        for centre in self.worst(count)? {
+        let side = (patch * SIDE).max(4.0);
+        for centre in self.worst(count, patch)? {
             let Some(chart) =
                 Chart::new(&self.canvas, self.frames, centre, side, self.options.bend)
             else {
                 continue;
             };
-            let hole = HOLE * self.options.patch * self.scale(centre);
+            let hole = HOLE * patch * self.scale(centre);
             let known: Vec<bool> = (chart.window.grid.points().zip(&chart.mask))
                 .map(|(point, &mask)| {
                     let at = chart.window.at(point);
@@ -44,9 +44,9 @@ impl<const D: usize> Stitching<'_, D> {
     }
 
     /// The middles of the seams in those cells of a lattice that have most of them, the worst first.
-    fn worst(&self, count: usize) -> Result<Vec<[i32; D]>> {
+    fn worst(&self, count: usize, patch: f32) -> Result<Vec<[i32; D]>> {
         let grid = &self.canvas.grid;
-        let side = ((2.0 * HOLE * self.options.patch) as usize).max(2);
+        let side = ((2.0 * HOLE * patch) as usize).max(2);
         let cells = Grid::new(grid.shape().map(|n| n.div_ceil(side)), [false; D])?;
         let mut sums = vec![(0.0f64, [0.0f64; D]); cells.len()];
         for (point, seams) in grid.points().zip(&self.canvas.seams) {

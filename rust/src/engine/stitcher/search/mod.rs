@@ -103,19 +103,20 @@ impl<const D: usize> Index<D> {
             });
             axes.push(near.collect());
         }
-        let shape = self.grid.shape();
-        let count: usize = axes.iter().map(Vec::len).product();
-        for k in 0..count {
-            let (mut rest, mut at, mut weight, mut step) = (k, 0, 1.0, 1);
-            for a in (0..D).rev() {
-                let (i, w) = axes[a][rest % axes[a].len()];
-                rest /= axes[a].len();
-                at += i * step;
-                step *= shape[a];
-                weight *= w;
+        let (rows, last) = axes.split_at(D - 1);
+        let strides = self.grid.strides();
+        for k in 0..rows.iter().map(Vec::len).product() {
+            let (mut rest, mut at, mut row) = (k, 0, 1.0);
+            for a in (0..D - 1).rev() {
+                let (i, w) = rows[a][rest % rows[a].len()];
+                rest /= rows[a].len();
+                at += i * strides[a];
+                row *= w;
             }
-            self.shown[at] += weight;
-            self.total += f64::from(weight);
+            for &(i, w) in &last[0] {
+                self.shown[at + i] += w * row;
+                self.total += f64::from(w * row);
+            }
         }
     }
 
