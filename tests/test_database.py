@@ -208,6 +208,31 @@ def test_splices_and_their_matrix(textures: TextureDatabase, monkeypatch: pytest
     assert (failing.sheet[40:60, 76:96] != 128).any()
 
 
+def test_results_that_are_passed_on_are_not_kept(textures: TextureDatabase) -> None:
+    textures.add(DOTS.image[:, ::-1].copy(), "other", mask=DOTS.mask[:, ::-1], layout="disjoint")
+    seen: dict[tuple[str, str], tuple[int, ...]] = {}
+
+    def each(a: str, b: str, result: texrs.Synthesis) -> None:
+        seen[a, b] = result.image.shape
+
+    made = textures.matrix(["dots", "other"], ["other"], cell=32, size=(40, 48), each=each)
+    assert seen == {("dots", "other"): (40, 48, 3), ("other", "other"): (40, 48, 3)}
+    assert not made.results
+    np.testing.assert_array_equal(
+        made.sheet, textures.matrix(["dots", "other"], ["other"], cell=32, size=(40, 48)).sheet
+    )
+
+
+def test_a_texture_is_removed_with_the_copy_of_its_pixels(textures: TextureDatabase, tmp_path: Path) -> None:
+    texrs.io.write(tmp_path / "file.png", DOTS.image)
+    textures.add(tmp_path / "file.png", mask=DOTS.mask, layout="disjoint")
+    textures.remove("dots")
+    textures.remove("file")
+    assert list(textures) == []
+    assert sorted(p.name for p in textures.path.iterdir()) == [".lock", "manifest.json"]
+    assert (tmp_path / "file.png").exists()
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -220,7 +245,10 @@ def test_splices_and_their_matrix(textures: TextureDatabase, monkeypatch: pytest
         (lambda db: db.add(DOTS.image, "x", boxes=3), "boxes: is no option"),
         (lambda db: db["nobody"], "name: there is no texture 'nobody'"),
         (lambda db: db.matrix(cell=3), "cell: needs an integer"),
-        (lambda db: db.matrix([], []), "rows, columns: no textures"),
+        (lambda db: db.matrix([], []), "rows: no textures"),
+        (lambda db: db.matrix(["dots"], ["nobody"]), "name: there is no texture 'nobody'"),
+        (lambda db: db.matrix("dots"), "rows: needs several names"),
+        (lambda db: db.remove("nobody"), "name: there is no texture 'nobody'"),
     ],
 )
 def test_bad_input(textures: TextureDatabase, call, message: str) -> None:

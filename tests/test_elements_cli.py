@@ -79,6 +79,28 @@ def test_database(here: Path, capsys: Capture) -> None:
     assert main(["database", "db", "matrix", "dots", "-o", "one.png", "--cell", "32", "-q"]) == 0
     assert "dots: made anew" in capsys.readouterr().err
     assert iio.imread("one.png").shape == (72, 72, 3)
+    assert main(["database", "db", "splice", "dots", "leaves_and_flowers", "-o", "s.png", "--size", "40x44", "-q"]) == 0
+    assert iio.imread("s.png").shape == (40, 44, 3)
+    rows = (
+        "matrix -q -o two.png --cell 32 --size 40x44 --seed 0 --each all --rows dots --columns leaves_and_flowers,dots"
+    )
+    assert main(["database", "db", *rows.split()]) == 0
+    assert iio.imread("two.png").shape == (72, 108, 3)
+    assert sorted(p.name for p in (here / "all").iterdir()) == ["dots-on-dots.png", "dots-on-leaves_and_flowers.png"]
+    np.testing.assert_array_equal(iio.imread("all/dots-on-leaves_and_flowers.png"), iio.imread("s.png"))
+    assert main(["database", "db", "remove", "leaves_and_flowers"]) == 0
+    capsys.readouterr()
+    assert main(["database", "db", "list"]) == 0
+    assert capsys.readouterr().out.startswith("dots\t")
+    for command, message in (
+        ("splice dots -o s.png", "NAME: splice needs two names"),
+        ("splice dots nobody -o s.png", "NAME: there is no texture 'nobody'"),
+        ("remove", "NAME: remove needs names"),
+        ("list --cell 32", "--cell: needs matrix, got list"),
+        ("splice dots dots -o s.png --each all", "--each: needs matrix, got splice"),
+    ):
+        assert main(["database", "db", *command.split(), "-q"]) == 2
+        assert message in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -104,7 +126,7 @@ def test_database(here: Path, capsys: Capture) -> None:
         ("analyse in.png -o before.npz --rotations 0", "--rotations: needs an integer from 1 to 72"),
         ("analyse in.png -o before.png", "--out: needs a name that ends in .npz"),
         ("analyse none.png -o before.npz", "none.png: there is no such file"),
-        ("database db remove", "add\\|list\\|matrix: allowed are"),
+        ("database db rename", "add\\|list\\|remove\\|splice\\|matrix: allowed are"),
         ("database db list", "db: there is no such folder"),
         ("database db add", "IMAGE: add needs images"),
         ("database in.png add in.png", "in.png: no folder"),

@@ -13,18 +13,30 @@ from texrs import io
 from texrs._threads import threads
 from texrs.cli import _outputs
 from texrs.cli._console import complain, note, say, show_progress
-from texrs.cli._kinds import PICTURE, PLACE, read_picture
-from texrs.cli._options import Options, take_options
-from texrs.cli._outputs import SAMPLE, Quiet, Threads, make_argument, name_arguments, to_write
+from texrs.cli._kinds import PICTURE, PLACE, Kind, read_picture
+from texrs.cli._options import Option, Options, check_needed, take_options
+from texrs.cli._outputs import SAMPLE, Quiet, Threads, make_argument, make_option, name_arguments, to_write
 from texrs.database import TextureDatabase
 from texrs.elements import analyse, pictures
 from texrs.errors import FileError, InvalidInput
+from texrs.papers.splice import splice
+from texrs.synthesis import Synthesis
 
 PICTURED = Options(analyse, arguments={"image": PICTURE})
 ANALYSED = Options(analyse, leave={"image": "there may be several"})
 KEPT = Options(TextureDatabase.add, only=("name", "similarity", "replace"))
 SIMILAR = Options(TextureDatabase.add, only=("similarity",))
-MATRIX = Options(TextureDatabase.matrix, only=("size", "cell"))
+NAMES = Kind("NAME,NAME,...", lambda text, about: [name.strip() for name in text.split(",")])
+MATRIX = Options(TextureDatabase.matrix, only=("rows", "columns", "cell"), kinds={"rows": NAMES, "columns": NAMES})
+SPLICED = Options(splice, only=("size", "seed", "method", "align", "snap_rows", "refine"))
+ACTIONS: dict[str, tuple[Option, ...]] = {
+    "add": (*ANALYSED, *KEPT),
+    "list": (),
+    "remove": (),
+    "splice": tuple(SPLICED),
+    "matrix": (*MATRIX, *SPLICED),
+}
+"""What can be done with a database, and the options of each."""
 
 
 @take_options(PICTURED, SIMILAR)
@@ -59,43 +71,94 @@ def analyse_command(
     note(f"wrote {out}: {len(entry.points)} elements, {entry.layout}, in {time.monotonic() - start:.1f} s", quiet=quiet)
 
 
-@take_options(ANALYSED, KEPT, MATRIX)
+@take_options(SPLICED, ANALYSED, KEPT, MATRIX)
 def database_command(
     folder: Annotated[str, make_argument("DIR", "Folder of the database; made if it is not there.")],
-    action: Annotated[str, make_argument("add|list|matrix", "Add images, list what is there, or splice all with all.")],
+    action: Annotated[
+        str,
+        make_argument("|".join(ACTIONS), "Add images, list or remove what is there, splice two, or all with all."),
+    ],
     given: dict[str, Any],
-    items: Annotated[list[str] | None, make_argument("IMAGE|NAME", "Images to add; names for matrix.")] = None,
-    out: Annotated[str | None, to_write("out", text="Image file for matrix.")] = None,
+    items: Annotated[list[str] | None, make_argument("IMAGE|NAME", "Images to add; names for all else.")] = None,
+    out: Annotated[str | None, to_write("out", text="Image file for splice and matrix.")] = None,
+    each: Annotated[
+        str | None, make_option("DIR", "Folder for every result of matrix, at full size: A-on-B.png.")
+    ] = None,
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
-    """Keep analysed textures in a folder: add, list, or splice all with all."""
-    if action not in ("add", "list", "matrix"):
-        raise InvalidInput(f"add|list|matrix: allowed are add, list and matrix; got {action!r}")
+    """Keep analysed textures in a folder: add, list, remove, or splice them."""
+    names = list(items or ())
+    if action not in ACTIONS:
+        raise InvalidInput(f"{'|'.join(ACTIONS)}: allowed are {', '.join(ACTIONS)}; got {action!r}")
+    check_needed(given, ACTIONS, action)
+    for flag, value, users in (("--out", out, ("splice", "matrix")), ("--each", each, ("matrix",))):
+        if value is not None and action not in users:
+            raise InvalidInput(f"{flag}: needs {' or '.join(users)}, got {action}")
     if action == "add":
-        add(folder, list(items or ()), given, count, quiet=quiet)
+        add(folder, names, given, count, quiet=quiet)
         return
     if not os.path.isdir(folder):
         raise FileError(f"{folder}: there is no such folder")
     textures = TextureDatabase(folder, say=complain)
-    if action == "list":
-        for record in textures.list():
-            box = ",".join(map(str, record.box))
-            say(f"{record.name}\t{record.layout}\t{record.elements} elements\tbox {box}\t{record.image}")
-        return
+    match action:
+        case "list":
+            for record in textures.list():
+                box = ",".join(map(str, record.box))
+                say(f"{record.name}\t{record.layout}\t{record.elements} elements\tbox {box}\t{record.image}")
+        case "remove":
+            if not names:
+                raise InvalidInput("NAME: remove needs names")
+            for name in names:
+                textures.remove(name)
+                note(f"removed {name}", quiet=quiet)
+        case _:
+            write_splices(textures, action, names, given, out, each, count, quiet=quiet)
+
+
+def write_splices(
+    textures: TextureDatabase,
+    action: str,
+    names: Sequence[str],
+    given: dict[str, Any],
+    out: str | None,
+    each: str | None,
+    count: int | None,
+    *,
+    quiet: bool,
+) -> None:
+    """Splice two textures of a database, or all with all: results are written as they are made."""
     if out is None:
-        raise InvalidInput("--out: matrix needs the name of an image file")
-    kept = [os.path.join(folder, file) for record in textures.list() for file in (record.file, record.image)]
+        raise InvalidInput(f"--out: {action} needs the name of an image file")
+    if action == "splice" and len(names) != 2:
+        raise InvalidInput(f"NAME: splice needs two names, of elements and of a layout; got {len(names)}")
+    kept = [os.path.join(textures.path, file) for record in textures.list() for file in (record.file, record.image)]
     _outputs.check_apart(kept, {"out": out})
     _outputs.check_output(out)
-    options = MATRIX.call(MATRIX.read(given))
-    with name_arguments(count="--threads"), threads(count), show_progress(quiet=quiet) as progress:
-        made = textures.matrix(items or None, items or None, **options, progress=progress, seed=given["seed"])
+    if each is not None:
+        _outputs.check_folder(each)
+        os.makedirs(each, exist_ok=True)
+    options = SPLICED.call(SPLICED.read(given))
+    with name_arguments(name="NAME", count="--threads"), threads(count), show_progress(quiet=quiet) as progress:
+        if action == "splice":
+            _outputs.deliver(textures.splice(names[0], names[1], **options, progress=progress), {"out": out})
+            note(f"wrote {out}: {names[0]} on {names[1]}", quiet=quiet)
+            return
+        chosen = {"rows": names or None, "columns": names or None} | MATRIX.call(MATRIX.read(given))
+
+        def write(a: str, b: str, result: Synthesis) -> None:
+            if each is not None:
+                place = os.path.join(each, f"{a}-on-{b}.png")
+                _outputs.check_apart(kept, {"each": place})
+                _outputs.deliver(result, {"out": place})
+
+        made = textures.matrix(**chosen, **options, each=write, progress=progress)
     for (a, b), reason in made.failed.items():
         complain(f"{a} on {b}: {reason}")
     with _outputs.write_output(out) as temporary:
         io.write(temporary, made.sheet)
-    note(f"wrote {out}: {len(made.results)} splices", quiet=quiet)
+    done = len(made.rows) * len(made.columns) - len(made.failed)
+    note(f"wrote {out}: {done} splices{f', each in {each}' if each else ''}", quiet=quiet)
 
 
 def add(folder: str, items: Sequence[str], given: dict[str, Any], count: int | None, *, quiet: bool) -> None:

@@ -83,6 +83,23 @@ class Folder:
             self._write(found)
         return entry
 
+    def drop(self, name: str) -> bool:
+        """Forget a texture, with the copy of its pixels where there is one; return whether it was there."""
+        if not self.path.is_dir():
+            return False
+        with self._lock_manifest():
+            found = self._parse()
+            found = self._scan() if found is None else found
+            record = found.pop(name, None)
+            if record is None:
+                return False
+            # A file that is left over is no entry, but an entry without its file would be damaged.
+            self._write(found)
+            for file in (record.file, f"{name}.npy" if record.image == f"{name}.npy" else None):
+                if file is not None:
+                    (self.path / file).unlink(missing_ok=True)
+        return True
+
     def read(self) -> dict[str, Record]:
         """Read the manifest; remake it from the entries where it is damaged."""
         found = self._parse()

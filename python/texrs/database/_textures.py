@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path as FilePath
 from typing import Literal, TypedDict, Unpack
 
@@ -12,16 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs import io
-from texrs._arrays import as_image, as_int, as_rgb, guidance
+from texrs._arrays import as_image, as_int
+from texrs._cache import Cache
 from texrs._typing import Array, Path, Progress
 from texrs.database._folder import NAME, Folder, Record, check_free, restore_option
+from texrs.database._sheet import Sheet
 from texrs.elements import FORMAT, Elements, ElementSearch, Layout, LayoutName, analyse, digest, load
 from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.papers.splice import splice
 from texrs.synthesis import Synthesis
 
-GAP = 4
-"""Pixels between the pictures of a sheet."""
+KEPT = 256 << 20
+"""Bytes of entries that are kept while all are spliced with all, about."""
 
 
 class AnalyseOptions(TypedDict, total=False):
@@ -57,6 +60,7 @@ class Matrix:
     columns: tuple[str, ...]
     """Those that give their arrangement."""
     results: Mapping[tuple[str, str], Synthesis]
+    """All of them, but for those that were passed on as they were made."""
     sheet: NDArray[np.uint8]
     """All of them in a picture, the textures themselves along its left and its upper edge."""
     failed: Mapping[tuple[str, str], str]
@@ -192,6 +196,42 @@ class TextureDatabase:
             replace_other=replace,
         )
 
+    def remove(self, name: str) -> None:
+        """Forget a texture: its entry, and the copy of pixels that were given as an array; image files stay.
+
+        Parameters
+        ----------
+        name : str
+            What it is called.
+
+        Raises
+        ------
+        InvalidInput
+            There is no such texture.
+        FileError
+            The folder cannot be written to.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from texrs import TextureDatabase, samples
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     textures = TextureDatabase(folder)
+        ...     dots = samples.load("dots", size=(96, 96))
+        ...     _ = textures.add(dots.image, "dots", mask=dots.mask, layout="disjoint")
+        ...     textures.remove("dots")
+        ...     len(textures)
+        0
+
+        """
+        try:
+            gone = self._folder.drop(self._find_record(name).name)
+        except OSError as error:
+            raise FileError(f"{self.path}: {name} cannot be removed ({error.strerror})") from None
+        if not gone:
+            # Another process was quicker.
+            self._find_record(name)
+
     def analyse(self, name: str, *, progress: Progress | None = None) -> Elements:
         """Return an entry, made anew if its image or the version is another one, or if it is damaged.
 
@@ -226,7 +266,15 @@ class TextureDatabase:
         entry = analyse(image, progress=progress, **options)
         return self._folder.keep(name, entry.with_similarity() if similar else entry, record.image, record.options)
 
-    def splice(self, a: str, b: str, size: Sequence[int] | None = None, **options: Unpack[SpliceOptions]) -> Synthesis:
+    def splice(
+        self,
+        a: str,
+        b: str,
+        size: Sequence[int] | None = None,
+        *,
+        progress: Progress | None = None,
+        **options: Unpack[SpliceOptions],
+    ) -> Synthesis:
         """Return the elements of one texture in the arrangement of another.
 
         Parameters
@@ -235,6 +283,8 @@ class TextureDatabase:
             Names of the texture whose elements are shown, and of that whose layout they take.
         size : (rows, columns), optional
             Of the result, in pixels; that of ``a`` by default.
+        progress : callable, optional
+            Called as ``progress(stage, share)``; raising stops the work.
         **options
             What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``align``, ``snap_rows``, ``refine``.
 
@@ -248,7 +298,7 @@ class TextureDatabase:
             There is no such texture, or what `texrs.splice` refuses.
 
         """
-        return splice(self.analyse(a), self.analyse(b), size, **options)
+        return splice(self.analyse(a), self.analyse(b), size, progress=progress, **options)
 
     def matrix(
         self,
@@ -257,6 +307,7 @@ class TextureDatabase:
         *,
         size: Sequence[int] | None = None,
         cell: int = 160,
+        each: Callable[[str, str, Synthesis], object] | None = None,
         progress: Progress | None = None,
         **options: Unpack[SpliceOptions],
     ) -> Matrix:
@@ -270,6 +321,9 @@ class TextureDatabase:
             Of each result.
         cell : int
             Side of a picture on the sheet, 16 to 1024.
+        each : callable, optional
+            Called as ``each(a, b, result)`` with each splice when it is made, to write it, say: then none is kept, and memory
+            is that of one and of about 256 MB of entries, however many there are.
         progress : callable, optional
             Called as ``progress("matrix", share)``; raising stops the work.
         **options
@@ -282,35 +336,31 @@ class TextureDatabase:
 
         """
         side = as_int(cell, "cell", 16, 1024)
-        down, across = (tuple(self) if names is None else tuple(names) for names in (rows, columns))
-        if not down or not across:
-            raise InvalidInput("rows, columns: no textures to splice")
-        entries = {name: self.analyse(name) for name in dict.fromkeys(down + across)}
+        down, across = (self._choose(names, which) for names, which in ((rows, "rows"), (columns, "columns")))
+        kept: Cache[str, Elements] = Cache(KEPT, count_bytes)
+        read = partial(self._read_entry, kept)
         results: dict[tuple[str, str], Synthesis] = {}
         failed: dict[tuple[str, str], str] = {}
-        for i, a in enumerate(down):
-            for j, b in enumerate(across):
+        sheet = Sheet(len(down), len(across), side)
+        for j, b in enumerate(across, start=1):
+            sheet.put(0, j, read(b).image)
+        for i, a in enumerate(down, start=1):
+            sheet.put(i, 0, read(a).image)
+            for j, b in enumerate(across, start=1):
                 if progress is not None:
-                    progress("matrix", (i * len(across) + j) / (len(down) * len(across)))
+                    progress("matrix", ((i - 1) * len(across) + j - 1) / (len(down) * len(across)))
                 try:
-                    results[a, b] = splice(entries[a], entries[b], size, **options)
+                    made = splice(read(a), read(b), size, **options)
                 except InvalidInput as error:
                     failed[a, b] = str(error)
-        step = side + GAP
-        sheet = np.full(((len(down) + 1) * step, (len(across) + 1) * step, 3), 255, np.uint8)
-
-        def put(row: int, column: int, image: Array | None) -> None:
-            small = np.full((side, side, 3), 128, np.uint8) if image is None else make_thumbnail(image, side)
-            top, left = row * step, column * step
-            sheet[top : top + small.shape[0], left : left + small.shape[1]] = small
-
-        for j, b in enumerate(across, start=1):
-            put(0, j, entries[b].image)
-        for i, a in enumerate(down, start=1):
-            put(i, 0, entries[a].image)
-            for j, b in enumerate(across, start=1):
-                put(i, j, results[a, b].image if (a, b) in results else None)
-        return Matrix(down, across, results, sheet, failed)
+                    sheet.put(i, j, None)
+                    continue
+                sheet.put(i, j, made.image)
+                if each is None:
+                    results[a, b] = made
+                else:
+                    each(a, b, made)
+        return Matrix(down, across, results, sheet.picture, failed)
 
     # --- the folder ----------------------------------------------------------------------------------------------
 
@@ -321,6 +371,20 @@ class TextureDatabase:
             raise InvalidInput(f"name: there is no texture {name!r} in {self.path}; there are {there}")
         return found[name]
 
+    def _choose(self, names: Sequence[str] | None, which: str) -> tuple[str, ...]:
+        """Return names that are there; all by default."""
+        chosen = tuple(self) if names is None else tuple(names)
+        if not chosen or isinstance(names, str):
+            raise InvalidInput(
+                f"{which}: no textures to splice" if not chosen else f"{which}: needs several names, got {names!r}"
+            )
+        for name in chosen:
+            self._find_record(name)
+        return chosen
+
+    def _read_entry(self, kept: Cache[str, Elements], name: str) -> Elements:
+        return kept.get_or_make(name, partial(self.analyse, name))
+
     def _read_image(self, record: Record) -> Array | None:
         try:
             return as_image(io.read(self.path / record.image))
@@ -328,12 +392,7 @@ class TextureDatabase:
             return None
 
 
-def make_thumbnail(image: Array, side: int) -> NDArray[np.uint8]:
-    """Return a small picture of an image, for people."""
-    from skimage.transform import resize
-
-    guide = as_rgb(guidance(as_image(image)))
-    share = side / max(guide.shape[:2])
-    size = [max(1, round(n * share)) for n in guide.shape[:2]]
-    small = resize(guide, size, anti_aliasing=share < 1)
-    return np.asarray(np.rint(np.clip(small, 0, 1) * 255), np.uint8)
+def count_bytes(entry: Elements) -> int:
+    """Return the bytes of the arrays of an entry."""
+    arrays = (entry.image, entry.points, entry.mask, entry.scores, entry.angles, entry.scales, entry.sets)
+    return sum(array.nbytes for array in arrays if array is not None)
