@@ -12,7 +12,7 @@ from element_checks import passes, score
 from texrs import elements, samples
 from texrs.elements import Elements, ElementSearch, Layout, analyse
 from texrs.elements._mixture import Mixture
-from texrs.elements._search import threshold_otsu
+from texrs.elements._search import Detections, Template, threshold_otsu
 from texrs.elements._separation import reconcile
 from texrs.errors import FileError, InvalidInput
 from texrs.layouts import directions
@@ -375,6 +375,28 @@ def test_pictures(entry: Elements) -> None:
     np.testing.assert_array_equal(made["mask"][entry.mask], IMAGE[entry.mask])
 
 
+def test_copies_are_as_large_and_turned_as_they_were_found() -> None:
+    points = np.array([[20.0, 20], [20, 60], [60, 20], [60, 60]])
+    bank = [Template((3, 3), (3, 3)), Template((3, 3), (3, 3), 0.0, 0.5), Template((3, 3), (3, 3), 90.0, 1.0)]
+    near = Detections(
+        points.astype(np.intp),
+        points,
+        np.ones(4),
+        np.array([0, 1, 2, 0]),
+        np.ones((80, 80), np.float32),
+        0.5,
+        None,
+        bank,
+    )
+    # A mask that is everything is at fault, and copies of the element take its place.
+    found = reconcile(np.ones((80, 80), bool), near, np.ones((9, 21), bool), (False, False))
+    assert found.made_by == "elements"
+    rows = [int(found.mask[r - 15 : r + 16, c].sum()) for r, c in points.astype(int)]
+    columns = [int(found.mask[r, c - 15 : c + 16].sum()) for r, c in points.astype(int)]
+    np.testing.assert_allclose(rows, [9, 5, 21, 9], atol=1)
+    np.testing.assert_allclose(columns, [21, 11, 9, 21], atol=1)
+
+
 def test_what_the_border_cuts_is_no_ground() -> None:
     mask = np.zeros((80, 80), bool)
     points = np.array([[20.0, 20], [20, 50], [50, 20], [50, 50]])
@@ -385,8 +407,9 @@ def test_what_the_border_cuts_is_no_ground() -> None:
     ragged[70:, 30:34] = ragged[70:74, 30:50] = True
     inner = np.zeros_like(mask)
     inner[32:42, 66:69] = inner[32:35, 66:78] = True
-    found = reconcile(
-        mask | ragged | inner, points, np.ones(4), np.ones((80, 80), np.float32), mask[12:29, 12:29], (False, False)
+    near = Detections(
+        points.astype(np.intp), points, np.ones(4), np.zeros(4, np.intp), np.ones((80, 80), np.float32), 0.5, None
     )
+    found = reconcile(mask | ragged | inner, near, mask[12:29, 12:29], (False, False))
     assert len(found.points) == 4
     assert (found.mask == mask | ragged).all()

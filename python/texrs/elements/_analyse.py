@@ -176,7 +176,7 @@ def _separate(guide: Floats, given: Arguments, start: Start, found: Detections, 
     if start.layout == Layout.DISJOINT:
         own = given.shape if given.shape is not None else _mask.ellipse(start.box.size)
         certain = given.whole is not None
-        agreed = reconcile(mask, found.points, found.scores, found.similarity, own, how.wrap, certain=certain)
+        agreed = reconcile(mask, found, own, how.wrap, certain=certain)
         # What a user lists stays as it is; the mask alone follows.
         return replace(plain, mask=agreed.mask, made_by=agreed.made_by) if listed else agreed
     jointed = start.layout == Layout.JOINTED
@@ -249,7 +249,7 @@ def _make_entry(
         "foreground": float(parted.mask.mean()),
         "spacing": spacing(parted.points),
     }
-    templates = [found.templates[found.template[i] if i >= 0 else 0] for i in parted.detection]
+    poses = np.concatenate([found.poses, [[0.0, 1.0]]])[parted.detection]
     return Elements(
         pixels,
         parted.points,
@@ -260,8 +260,8 @@ def _make_entry(
         directions(parted.points),
         how.wrap,
         report,
-        np.array([t.angle for t in templates]),
-        np.array([t.scale for t in templates]),
+        poses[:, 0],
+        poses[:, 1],
     )
 
 

@@ -57,6 +57,27 @@ def disc(shape: tuple[int, int], points: NDArray[np.float64], radius: int = RADI
     return marked
 
 
+def pose(shape: Bools, angle: float, scale: float) -> Bools:
+    """Return a shape turned by an angle in degrees and scaled about its middle, as a search turns and scales the element."""
+    from scipy.ndimage import affine_transform
+
+    turn = np.deg2rad(angle)
+    back = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]) / scale
+    reach = np.abs(np.linalg.inv(back)) @ np.array(shape.shape)
+    size = np.array([round_to_odd(n) for n in reach])
+    offset = (np.array(shape.shape) - 1) / 2 - back @ ((size - 1) / 2)
+    posed = affine_transform(shape.astype(np.float32), back, offset, output_shape=tuple(size), order=1)
+    return np.asarray(posed >= 0.5)
+
+
+def stamp_posed(mask: Bools, points: NDArray[Any], poses: NDArray[np.float64], shape: Bools, wrap: Wrap) -> None:
+    """Mark copies of a shape around points, each turned by its angle and scaled, the two columns of ``poses``."""
+    for angle, scale in np.unique(poses, axis=0).tolist():
+        here = ((poses == (angle, scale)).all(axis=1)).nonzero()[0]
+        plain = angle == 0.0 and scale == 1.0
+        stamp(mask, points[here], shape if plain else pose(shape, angle, scale), wrap)
+
+
 def stamp(mask: Bools, points: NDArray[Any], shape: Bools, wrap: Wrap) -> None:
     """Mark copies of a shape around points, as far as they lie inside."""
     rows, columns = np.nonzero(shape)

@@ -78,6 +78,12 @@ class Detections:
     channel: int | None
     templates: Sequence[Template] = (Template((3, 3), (3, 3)),)
 
+    @property
+    def poses(self) -> NDArray[np.float64]:
+        """Degrees by which each is turned against the element, and how many times larger it is: (n, 2)."""
+        found = [(t.angle, t.scale) for t in (self.templates[k] for k in self.template)]
+        return np.array(found, np.float64).reshape(-1, 2)
+
 
 def pad(array: NDArray[Any], margin: tuple[int, int], wrap: Wrap) -> NDArray[Any]:
     """Continue an image beyond its border: around where it repeats, mirrored elsewhere."""

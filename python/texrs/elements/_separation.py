@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Bools, Floats, Labels
-from texrs.elements._mask import Wrap, ellipse, stamp
+from texrs.elements._mask import Wrap, ellipse, stamp_posed
+from texrs.elements._search import Detections
 
 ADDED = 0.25
 """Least area of a component that is taken for an element that was not found, as a share of the usual one's."""
@@ -88,9 +89,7 @@ def find_nearest_pixels(points: NDArray[np.float64], shape: tuple[int, ...]) -> 
 
 def reconcile(
     mask: Bools,
-    points: NDArray[np.float64],
-    scores: NDArray[np.float64],
-    similarity: Floats,
+    found: Detections,
     shape: Bools,
     wrap: Wrap,
     *,
@@ -102,6 +101,7 @@ def reconcile(
     """
     from skimage.measure import regionprops
 
+    points, scores, similarity = found.points, found.scores, found.similarity
     pieces, count = label_components(mask, wrap)
     owner = pieces[find_nearest_pixels(points, mask.shape)]
     regions = {r.label: r for r in regionprops(pieces)}
@@ -121,7 +121,8 @@ def reconcile(
     share = float((good | several)[owner].mean()) if len(points) else 0.0
     if share < TRUSTED and not certain:
         copies = np.zeros(mask.shape, bool)
-        stamp(copies, points, shape if shape.any() else ellipse((shape.shape[0], shape.shape[1])), wrap)
+        own = shape if shape.any() else ellipse((shape.shape[0], shape.shape[1]))
+        stamp_posed(copies, points, found.poses, own, wrap)
         return Separation(points, scores, np.arange(len(points)), copies, "elements")
     kept: list[tuple[float, float, float, int]] = []
     for number, region in regions.items():
