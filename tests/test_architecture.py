@@ -12,7 +12,7 @@ PACKAGE = ROOT / "python" / "texrs"
 
 LAYERS = (
     ("_rust", "errors", "_typing"),
-    ("_arrays", "_cache", "_progress", "_version"),
+    ("_arrays", "_cache", "_digits", "_progress", "_version"),
     ("_threads", "kernels"),
     ("_engine",),
     ("io",),

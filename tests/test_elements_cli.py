@@ -37,7 +37,7 @@ def test_analyse_writes_what_the_function_finds(here: Path, capsys: Capture) -> 
     found = elements.load("e.npz")
     wanted = elements.analyse(DOTS.image, mask=DOTS.mask, layout="disjoint")
     np.testing.assert_array_equal(found.points, wanted.points)
-    assert sorted(p.name for p in Path("st").iterdir()) == ["mask.png", "points.png"]
+    assert sorted(p.name for p in Path("st").iterdir()) == ["mask.png", "numbers.png", "points.png"]
     assert "wrote e.npz" in capsys.readouterr().err
 
 

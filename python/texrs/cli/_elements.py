@@ -18,6 +18,7 @@ from texrs.cli._options import Option, Options, check_needed, take_options
 from texrs.cli._outputs import SAMPLE, Quiet, Threads, make_argument, make_option, name_arguments, to_write
 from texrs.database import TextureDatabase
 from texrs.elements import analyse, pictures
+from texrs.elements import page as draw_page
 from texrs.errors import FileError, InvalidInput
 from texrs.papers.splice import splice
 from texrs.synthesis import Synthesis
@@ -45,6 +46,7 @@ def analyse_command(
     given: dict[str, Any],
     more: Annotated[list[str] | None, make_argument("ROW,COL", "More places of --background.")] = None,
     stages: Annotated[str | None, to_write("stages", text="Folder for pictures of the points and the mask.")] = None,
+    page: Annotated[str | None, to_write("page")] = None,
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
@@ -56,6 +58,9 @@ def analyse_command(
     _outputs.check_output(out)
     if stages is not None:
         _outputs.check_folder(stages)
+    if page is not None:
+        _outputs.check_outputs({"out": out, "page": page})
+        _outputs.check_output(page)
     options |= PICTURED.read(given, which=lambda o: o.file)
     names = {o.path[-1]: o.flag for o in PICTURED} | {"image": given["image"], "count": "--threads"}
     with name_arguments(**names), threads(count), show_progress(quiet=quiet) as progress:
@@ -67,6 +72,9 @@ def analyse_command(
         os.makedirs(stages, exist_ok=True)
         for name, picture in pictures(entry).items():
             io.write(os.path.join(stages, f"{name}.png"), picture)
+    if page is not None:
+        with _outputs.write_output(page) as temporary:
+            temporary.write_text(draw_page(entry, Path(given["image"]).name), encoding="utf-8")
     explain(entry, quiet=quiet)
     note(f"wrote {out}: {len(entry.points)} elements, {entry.layout}, in {time.monotonic() - start:.1f} s", quiet=quiet)
 

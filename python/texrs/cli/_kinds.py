@@ -164,6 +164,13 @@ def read_steps(text: str, about: About) -> Any:
     return found["edit"] if isinstance(found, dict) and "edit" in found else found
 
 
+def read_corrections(text: str, about: About) -> Any:
+    """Return a list of corrections: JSON, or a file of it."""
+    if not (text.lower().endswith(".json") or text.lstrip().startswith("[")):
+        raise InvalidInput(f"{about.option}: needs a file of JSON, or a list of steps as JSON; got {text!r}")
+    return read_steps(text, about)
+
+
 # --- values that stand in files --------------------------------------------------------------------------------------
 
 
@@ -335,6 +342,7 @@ KINDS = {
     "background": Kind("ROW,COL", parse_places, "The option may be repeated.", many=True),
     "box": Kind("ROW,COL,HEIGHT,WIDTH", parse_box),
     "points": Kind("POINTS.csv", read_points, "A file of row,column a line.", file=True),
+    "corrections": Kind("JSON|FILE.json", read_corrections, "As the page of texrs analyse --page lists them."),
     "edit": Kind("WORDS|JSON|FILE.json", read_steps, "Names, JSON, or a file of it: a report is done again."),
     "steps": Kind("WORDS|JSON|FILE.json", read_steps, "Names, JSON, or a file of it: a report is done again."),
 }

@@ -24,13 +24,14 @@ SAMPLE = "sample:"
 """What the name of a built-in exemplar starts with."""
 LONGEST_PROBE = 2**17
 """Longer than a side may be in any format that limits it."""
-STAGE = re.compile(r"[0-9]{2,}-.*\.png|(points|mask)\.png|report\.json")
+STAGE = re.compile(r"[0-9]{2,}-.*\.png|(points|mask|numbers)\.png|report\.json")
 """Names of what is written to a folder of stages."""
 
 OUTPUTS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "out": (("--out", "-o"), "OUT", "File to write; its name says the format."),
     "map": (("--map",), "OUT.npz", "File for the source map, for texrs apply."),
     "stages": (("--stages",), "DIR", "Folder for pictures of the stages and report.json."),
+    "page": (("--page",), "OUT.html", "Page that shows what was found, to be corrected by clicking."),
 }
 """All options that say what is written: what the shell calls them, what they are, and what they are for."""
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no progress.")]

@@ -56,7 +56,7 @@ class Verb:
     def run(self, *, count: int | None, quiet: bool, variants: int | None = None, **given: Any) -> None:
         """Do the command: what can be checked is checked before any file is read, and before the work."""
         start, options = time.monotonic(), self.options
-        paths: dict[str, str | None] = {name: given.pop(name) for name in _outputs.OUTPUTS}
+        paths: dict[str, str | None] = {name: given.pop(name, None) for name in _outputs.OUTPUTS}
         out = paths["out"] or ""
         values = options.read(given, which=lambda o: not o.file)
         _outputs.check_outputs(paths)

@@ -39,6 +39,7 @@ class AnalyseOptions(TypedDict, total=False):
     method: Literal["paper"] | None
     wrap: bool | Sequence[bool]
     seed: int
+    corrections: Sequence[Mapping[str, object]]
 
 
 class SpliceOptions(TypedDict, total=False):
@@ -155,7 +156,8 @@ class TextureDatabase:
             What `texrs.elements.analyse` takes: ``box`` (row, column, height, width) around one element; ``mask`` (H, W) bool,
             the foreground; ``background``, points or (H, W) bool between the elements; ``layout`` ("disjoint", "connected"
             or "jointed"); ``points`` (n, 2), the elements; ``search``, an `ElementSearch`; ``method`` (None or "paper");
-            ``wrap``, whether the texture repeats; ``seed``. They are kept, and an entry is made anew with them.
+            ``wrap``, whether the texture repeats; ``seed``; ``corrections``, as `texrs.elements.correct` takes them. They are
+            kept, and an entry is made anew with them.
 
         Returns
         -------

@@ -1,19 +1,33 @@
 """Elements: where the repeated elements of a texture are, and what belongs to them (Liu et al. 2009, section 3).
 
-`analyse` finds them, from a box around one and a few places between them, or by itself; `load` reads what
-`Elements.save` wrote. `Elements.of_sample` takes over what is known of a generated texture. `Layout` says how they hang
-together, and `ElementSearch` how they are looked for.
+`analyse` finds them, from a box around one and a few places between them, or by itself; `correct` puts right what it got
+wrong, and `page` shows it; `load` reads what `Elements.save` wrote. `Elements.of_sample` takes over what is known of a
+generated texture. `Layout` says how they hang together, and `ElementSearch` how they are looked for.
 """
 
 from __future__ import annotations
 
 from texrs.elements._analyse import analyse
+from texrs.elements._corrections import correct
 from texrs.elements._elements import FORMAT, Elements, digest, load
 from texrs.elements._layout import Layout, LayoutName
 from texrs.elements._options import ElementSearch
+from texrs.elements._page import page
 from texrs.elements._pictures import pictures
 
-__all__ = ["FORMAT", "ElementSearch", "Elements", "Layout", "LayoutName", "analyse", "digest", "load", "pictures"]
+__all__ = [
+    "FORMAT",
+    "ElementSearch",
+    "Elements",
+    "Layout",
+    "LayoutName",
+    "analyse",
+    "correct",
+    "digest",
+    "load",
+    "page",
+    "pictures",
+]
 
 
 def __dir__() -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, Literal
@@ -14,6 +14,7 @@ from texrs._arrays import as_image, check_memory, guidance
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.elements import _mask
 from texrs.elements._arguments import Arguments, check_consistency, choose_usual_box, find_contradiction
+from texrs.elements._corrections import correct, read_steps
 from texrs.elements._elements import Elements
 from texrs.elements._layout import Layout, LayoutName
 from texrs.elements._options import ElementSearch, Settings
@@ -47,6 +48,7 @@ def analyse(
     method: Literal["paper"] | None = None,
     wrap: bool | Sequence[bool] = False,
     seed: int = 0,
+    corrections: Sequence[Mapping[str, object]] = (),
     progress: Progress | None = None,
 ) -> Elements:
     """Find the elements of a texture, what belongs to them and how they are connected [1]_.
@@ -77,6 +79,8 @@ def analyse(
         Whether the texture repeats without a seam.
     seed : int
         Chooses the samples of the mixtures.
+    corrections : sequence of dict
+        What is put right in the end, as `texrs.elements.correct` does.
     progress : callable, optional
         Called as ``progress(stage, share)``; raising stops the work.
 
@@ -89,7 +93,7 @@ def analyse(
     ------
     InvalidInput
         An argument of another shape, type or range; a box outside of the image; a background that contradicts box or
-        mask; a layout that contradicts the mask; or fewer than three elements.
+        mask; a layout that contradicts the mask; corrections that cannot be made; or fewer than three elements.
 
     References
     ----------
@@ -105,7 +109,7 @@ def analyse(
     True
 
     """
-    pixels = as_image(image, "image", minimum=SHORTEST)
+    pixels, steps = as_image(image, "image", minimum=SHORTEST), read_steps(corrections)
     size = (pixels.shape[0], pixels.shape[1])
     check_memory(BYTES * size[0] * size[1], "image")
     how = Settings.of(search, method, wrap, seed)
@@ -130,7 +134,7 @@ def analyse(
         )
     entry = _reanalyse(pixels, given, start, parted, how) or _make_entry(pixels, given, start, found, parted, how)
     watch("separate", 1.0)
-    return entry
+    return correct(entry, steps)
 
 
 def _repeat_channel(guide: Floats) -> Floats:

@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_image, as_rgb, guidance
+from texrs._digits import write_number
 from texrs.elements._elements import Elements
 
 Picture = NDArray[np.uint8]
 
-CROSS, BOX, GROUND = (255, 40, 40), (0, 230, 255), np.array((30, 30, 190), np.float64)
-"""Colours of points, of the chosen box, and of what is not foreground."""
+CROSS, BOX, GROUND, NUMBER = (255, 40, 40), (0, 230, 255), np.array((30, 30, 190), np.float64), (255, 235, 90)
+"""Colours of points, of the chosen box, of what is not foreground, and of numbers."""
 DIM = 0.65
 """How much of the ground's colour is that."""
 
@@ -23,18 +24,19 @@ def pictures(entry: Elements) -> dict[str, Picture]:
     -------
     dict of (H, W, 3) uint8
         "points": a cross on each element, and the box of the chosen one. "mask": what is not foreground under blue.
+        "numbers": twice as large, the number of each element, from 0, as `correct` names it.
 
     Examples
     --------
     >>> from texrs import elements, samples
     >>> sample = samples.load("dots", size=(64, 64))
     >>> sorted(elements.pictures(elements.analyse(sample.image, mask=sample.mask, layout="disjoint")))
-    ['mask', 'points']
+    ['mask', 'numbers', 'points']
 
     """
-    plain = np.rint(np.clip(as_rgb(guidance(as_image(entry.image))), 0, 1) * 255)
+    plain = draw_plain(entry)
     dimmed = np.where(entry.mask[..., np.newaxis], plain, (1 - DIM) * plain + DIM * GROUND)
-    drawn = plain.astype(np.uint8)
+    drawn = plain.copy()
     arm = max(2, min(entry.box) // 10)
     for row, column in np.floor(entry.points + 0.5).astype(int).tolist():
         for step in range(-arm, arm + 1):
@@ -49,7 +51,27 @@ def pictures(entry: Elements) -> dict[str, Picture]:
         for c in (column - width // 2, column + width // 2):
             for r in range(row - height // 2, row + height // 2 + 1):
                 _draw_dot(drawn, r, c, BOX)
-    return {"points": drawn, "mask": dimmed.astype(np.uint8)}
+    return {"points": drawn, "mask": dimmed.astype(np.uint8), "numbers": _draw_numbers(plain, entry)}
+
+
+def draw_plain(entry: Elements) -> Picture:
+    """Draw the texture alone."""
+    return np.rint(np.clip(as_rgb(guidance(as_image(entry.image))), 0, 1) * 255).astype(np.uint8)
+
+
+def _draw_numbers(plain: Picture, entry: Elements) -> Picture:
+    """Draw the number of each element in its middle, on a black plate."""
+    large = plain.repeat(2, axis=0).repeat(2, axis=1)
+    dot = 1 if min(entry.box) < 24 else 2
+    for number, (row, column) in enumerate(np.floor(2 * entry.points).astype(int).tolist()):
+        text = str(number)
+        top, left = row - 5 * dot // 2, column - (4 * len(text) - 1) * dot // 2
+        plate = large[
+            max(0, top - dot) : max(0, top + 6 * dot), max(0, left - dot) : max(0, left + 4 * len(text) * dot)
+        ]
+        plate[:] = 0
+        write_number(large, text, top, left, np.array(NUMBER, np.uint8), dot)
+    return large
 
 
 def _draw_dot(picture: Picture, row: int, column: int, colour: tuple[int, int, int]) -> None:

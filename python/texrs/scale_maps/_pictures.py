@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_choice, as_float, as_image
+from texrs._digits import write_number
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.scale_maps._maps import as_map
@@ -19,11 +20,6 @@ _ENCODINGS = ("log2", "paper")
 _COLOURS = ("12306b", "2a6fb0", "6fb7d6", "c9e4e8", "f7f4ea", "f6d9a4", "ee9f5a", "cf4d33", "6e0f22")
 """Small, normal and large: dark to light to dark, so that the normal size is the lightest."""
 _INK, _PAPER = 0.15, 1.0
-_GLYPHS = {
-    "0": 0o75557, "1": 0o26227, "2": 0o71747, "3": 0o71717, "4": 0o55711, "5": 0o74717,
-    "6": 0o74757, "7": 0o71122, "8": 0o75757, "9": 0o75717, ".": 0o00002,
-}  # fmt: skip
-"""Three by five dots each, the rows from the top as octal digits."""
 
 
 def encode(scale: object, encoding: Encoding = "log2") -> NDArray[np.uint8]:
@@ -183,11 +179,5 @@ def _draw_bar(height: int, reach: float, ticks: list[float], dot: int) -> Floats
         free[label] = False
         bar[row : row + max(1, dot // 2), left + width - 2 * dot : left + width + dot] = _INK
         text = f"{2.0**tick:.2g}"
-        first = row - 2 * dot
-        for k, glyph in enumerate(text):
-            rows = [_GLYPHS[glyph] >> 3 * (4 - r) & 7 for r in range(5)]
-            drawn = np.array([[bool(r & 4), bool(r & 2), bool(r & 1)] for r in rows]).repeat(dot, 0).repeat(dot, 1)
-            column = left + width + 2 * dot + 4 * dot * k
-            part = bar[max(0, first) : first + 5 * dot, column : column + 3 * dot]
-            part[drawn[max(0, -first) :][: len(part), : part.shape[1]]] = _INK
+        write_number(bar, text, row - 2 * dot, left + width + 2 * dot, _INK, dot)
     return bar

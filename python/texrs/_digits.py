@@ -1,0 +1,42 @@
+"""Numbers written into pictures."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["write_number"]
+
+GLYPHS = {
+    "0": 0o75557, "1": 0o26227, "2": 0o71747, "3": 0o71717, "4": 0o55711, "5": 0o74717,
+    "6": 0o74757, "7": 0o71122, "8": 0o75757, "9": 0o75717, ".": 0o00002,
+}  # fmt: skip
+"""Three by five dots each, the rows from the top as octal digits."""
+
+
+def write_number(picture: NDArray[Any], text: str, row: int, column: int, ink: Any, dot: int = 1) -> None:
+    """Write digits and points into a picture, as far as they lie inside.
+
+    Parameters
+    ----------
+    picture : (H, W, ...) array
+        Written into.
+    text : str
+        Digits and points.
+    row, column : int
+        Of the upper left corner.
+    ink : number or (C,) array
+        What is written.
+    dot : int
+        Pixels of a dot: a digit is three wide and five high, and the next one starts a dot further on.
+
+    """
+    for k, glyph in enumerate(text):
+        dots = [[bool(GLYPHS[glyph] >> 3 * (4 - r) & bit) for bit in (4, 2, 1)] for r in range(5)]
+        drawn = np.array(dots).repeat(dot, 0).repeat(dot, 1)
+        top, left = max(0, row), column + 4 * dot * k
+        part = picture[top : max(0, row + 5 * dot), max(0, left) : max(0, left + 3 * dot)]
+        seen = drawn[top - row :, max(0, left) - left :][: part.shape[0], : part.shape[1]]
+        part[seen] = ink

@@ -1,0 +1,192 @@
+"""Corrections of an analysis: a list of steps that can be done again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_float, as_int
+from texrs._typing import Bools
+from texrs.elements._arguments import as_points, find_contradiction
+from texrs.elements._elements import Elements
+from texrs.elements._layout import Layout
+from texrs.elements._mask import ellipse, round_to_odd, stamp
+from texrs.elements._separation import find_nearest_pixels, label_components
+from texrs.errors import InvalidInput
+from texrs.layouts import directions, spacing
+
+__all__ = ["correct"]
+
+FEWEST = 3
+"""Elements that must be left."""
+STEPS = {
+    "drop": ("elements",),
+    "add": ("points",),
+    "move": ("element", "to"),
+    "layout": ("layout",),
+    "foreground": ("points", "radius"),
+    "background": ("points", "radius"),
+}
+"""What a step may do, and what it needs."""
+RADIUS = 4.0
+"""Of a dab of foreground or background, in pixels, if none is given."""
+
+
+def correct(entry: Elements, steps: object) -> Elements:
+    """Return an entry with what an analysis got wrong put right.
+
+    Parameters
+    ----------
+    entry : Elements
+        As it was found.
+    steps : sequence of dict
+        Done one after the other; elements have the numbers of `pictures`, from 0, as they are before the step:
+
+        - ``{"op": "drop", "elements": [3, 7]}``: these are no elements. Separate ones are no foreground then either;
+        - ``{"op": "add", "points": [[row, column], ...]}``: elements that were not found;
+        - ``{"op": "move", "element": 4, "to": [row, column]}``: the middle of one;
+        - ``{"op": "layout", "layout": "connected"}``: how they hang together;
+        - ``{"op": "foreground", "points": [[row, column], ...], "radius": 4}``, and ``"background"``: dabs on the mask.
+
+    Returns
+    -------
+    Elements
+        Its report holds all steps under ``"corrections"``, those of earlier corrections first.
+
+    Raises
+    ------
+    InvalidInput
+        A step that is none, names no element or a place outside of the image, or leaves fewer than three elements or no
+        foreground.
+
+    Examples
+    --------
+    >>> from texrs import elements, samples
+    >>> sample = samples.load("dots", size=(96, 96))
+    >>> found = elements.analyse(sample.image, mask=sample.mask, layout="disjoint")
+    >>> fewer = elements.correct(found, [{"op": "drop", "elements": [0]}])
+    >>> len(found.points) - len(fewer.points)
+    1
+
+    """
+    known = read_steps(steps)
+    for number, step in enumerate(known):
+        try:
+            entry = _DO[step["op"]](entry, step)
+        except InvalidInput as error:
+            raise InvalidInput(f"corrections: step {number}, {step['op']}: {error}") from None
+    if len(entry.points) < FEWEST:
+        raise InvalidInput(f"corrections: leave {len(entry.points)} elements, at least {FEWEST} are needed")
+    trouble = find_contradiction(entry.mask, entry.layout, entry.wrap) if known else ""
+    report = {
+        **entry.report,
+        "corrections": [*entry.report.get("corrections", []), *known],
+        "foreground": float(entry.mask.mean()),
+        "spacing": spacing(entry.points),
+        "doubts": [trouble] if trouble else [],
+    }
+    return replace(entry, report=report, directions=directions(entry.points)) if known else entry
+
+
+def read_steps(steps: object) -> list[dict[str, Any]]:
+    """Check a list of corrections, and return it as text, numbers and lists."""
+    several = [steps] if isinstance(steps, Mapping) else steps
+    if not isinstance(several, Sequence) or isinstance(several, str):
+        raise InvalidInput(f"corrections: needs a list of steps, got {type(steps).__name__}")
+    found = []
+    for number, step in enumerate(several):
+        if not isinstance(step, Mapping) or step.get("op") not in STEPS:
+            raise InvalidInput(f"corrections: step {number} needs an 'op' among {', '.join(STEPS)}; got {step!r}")
+        allowed = STEPS[step["op"]]
+        unknown = sorted(map(str, set(step) - {"op", *allowed}))
+        missing = [name for name in allowed if name not in step and name != "radius"]
+        if unknown or missing:
+            said = f"knows no {', '.join(unknown)}" if unknown else f"needs {', '.join(missing)}"
+            raise InvalidInput(f"corrections: step {number}, {step['op']}, {said}; allowed are {', '.join(allowed)}")
+        found.append({str(name): _to_plain(value, number) for name, value in step.items()})
+    return found
+
+
+def _to_plain(value: object, number: int) -> Any:
+    """Return words, numbers and lists of them as they are kept."""
+    try:
+        return json.loads(json.dumps(value, allow_nan=False, default=lambda array: np.asarray(array).tolist()))
+    except (TypeError, ValueError, RecursionError):
+        raise InvalidInput(f"corrections: step {number} holds {value!r}; text, numbers and lists are allowed") from None
+
+
+def _drop(entry: Elements, step: Mapping[str, Any]) -> Elements:
+    listed = step["elements"] if isinstance(step["elements"], list) else [step["elements"]]
+    gone = [as_int(n, "elements", 0, len(entry.points) - 1) for n in listed]
+    kept = np.setdiff1d(np.arange(len(entry.points)), gone)
+    mask = entry.mask
+    if entry.layout == Layout.DISJOINT:
+        pieces = label_components(mask, entry.wrap)[0]
+        owner = pieces[find_nearest_pixels(entry.points, mask.shape)]
+        # A piece that holds another element too stays.
+        alone = np.setdiff1d(owner[gone], owner[kept])
+        mask = mask & ~np.isin(pieces, alone[alone > 0])
+    return _take(entry, kept, mask)
+
+
+def _add(entry: Elements, step: Mapping[str, Any]) -> Elements:
+    size = (entry.image.shape[0], entry.image.shape[1])
+    new = as_points(step["points"], size, "points")
+    points = as_points(np.concatenate([entry.points, new]), size, "points")
+    mask = entry.mask.copy()
+    if entry.layout == Layout.DISJOINT:
+        bare = new[~mask[find_nearest_pixels(new, mask.shape)]]
+        stamp(mask, bare, ellipse(entry.box), entry.wrap)
+    # What a user says is an element is one.
+    ones = np.ones(len(new))
+    angles = None if entry.angles is None else np.concatenate([entry.angles, 0 * ones])
+    scales = None if entry.scales is None else np.concatenate([entry.scales, ones])
+    scores = np.concatenate([entry.scores, ones])
+    return replace(entry, points=points, mask=mask, scores=scores, angles=angles, scales=scales)
+
+
+def _move(entry: Elements, step: Mapping[str, Any]) -> Elements:
+    number = as_int(step["element"], "element", 0, len(entry.points) - 1)
+    size = (entry.image.shape[0], entry.image.shape[1])
+    place, points = as_points(step["to"], size, "to"), entry.points.copy()
+    if len(place) != 1:
+        raise InvalidInput(f"to: needs one place (row, column), got {step['to']!r}")
+    points[number] = place[0]
+    return replace(entry, points=as_points(points, size, "to"))
+
+
+def _name_layout(entry: Elements, step: Mapping[str, Any]) -> Elements:
+    return replace(entry, layout=Layout(step["layout"]))
+
+
+def _dab(entry: Elements, step: Mapping[str, Any]) -> Elements:
+    size = (entry.image.shape[0], entry.image.shape[1])
+    radius = as_float(step.get("radius", RADIUS), "radius", 0.5, 1e4)
+    marked: Bools = np.zeros(size, bool)
+    side = round_to_odd(2 * radius + 1)
+    stamp(marked, as_points(step["points"], size, "points"), ellipse((side, side)), entry.wrap)
+    mask = entry.mask | marked if step["op"] == "foreground" else entry.mask & ~marked
+    if mask.all() or not mask.any():
+        raise InvalidInput(f"leaves {'nothing but' if mask.all() else 'no'} foreground")
+    return replace(entry, mask=mask)
+
+
+def _take(entry: Elements, kept: NDArray[np.intp], mask: Bools) -> Elements:
+    """Return an entry with some of its elements."""
+    angles, scales = (None if a is None else a[kept] for a in (entry.angles, entry.scales))
+    return replace(entry, points=entry.points[kept], mask=mask, scores=entry.scores[kept], angles=angles, scales=scales)
+
+
+_DO = {
+    "drop": _drop,
+    "add": _add,
+    "move": _move,
+    "layout": _name_layout,
+    "foreground": _dab,
+    "background": _dab,
+}

@@ -1,0 +1,139 @@
+"""A page that shows an analysis, and on which it can be corrected."""
+
+from __future__ import annotations
+
+import base64
+import json
+from html import escape
+
+import imageio.v3 as iio
+
+from texrs._version import __version__
+from texrs.elements._elements import Elements
+from texrs.elements._layout import Layout
+from texrs.elements._pictures import Picture, draw_plain, pictures
+
+__all__ = ["page"]
+
+DOUBTFUL = 0.6
+"""Below this a proposal is marked, and what to give instead is said."""
+ADVICE = {
+    "box": "draw a box around one element: <code>--box ROW,COL,HEIGHT,WIDTH</code>",
+    "background": "name a few places between the elements: <code>--background ROW,COL</code>",
+    "layout": "say how they hang together: <code>--layout disjoint</code>, <code>connected</code> or <code>jointed</code>",
+}
+
+
+def page(entry: Elements, title: str = "elements") -> str:
+    """Return a page of HTML that shows what was found, and on which corrections can be made by clicking.
+
+    Parameters
+    ----------
+    entry : Elements
+        As it was found.
+    title : str
+        What it is called.
+
+    Returns
+    -------
+    str
+        One page that needs no other file. It ends with the list of corrections that `correct` takes.
+
+    Examples
+    --------
+    >>> from texrs import elements, samples
+    >>> sample = samples.load("dots", size=(64, 64))
+    >>> elements.page(elements.analyse(sample.image, mask=sample.mask, layout="disjoint"))[:15]
+    '<!doctype html>'
+
+    """
+    drawn, report = pictures(entry), entry.report
+    height, width = entry.image.shape[:2]
+    rows = []
+    for name in ("box", "layout", "background"):
+        sure = report.get("confidence", {}).get(name)
+        said = "given" if sure is None else f"proposed, {sure:.0%} sure"
+        advice = f"; {ADVICE[name]}" if sure is not None and sure < DOUBTFUL else ""
+        value = {"layout": str(entry.layout), "box": f"{entry.box[0]} x {entry.box[1]}"}.get(name, "")
+        rows.append(f"<tr{' class=doubt' if advice else ''}><th>{name}<td>{escape(value)}<td>{said}{advice}")
+    doubts = "".join(f"<li>{escape(doubt)}" for doubt in report.get("doubts", []))
+    known = {
+        "points": entry.points.round(2).tolist(),
+        "box": list(entry.box),
+        "angles": [0.0] * len(entry.points) if entry.angles is None else entry.angles.tolist(),
+        "scales": [1.0] * len(entry.points) if entry.scales is None else entry.scales.tolist(),
+        "layout": str(entry.layout),
+        "earlier": report.get("corrections", []),
+    }
+    options = "".join(f"<option{' selected' if one == entry.layout else ''}>{one}" for one in Layout)
+    # No name may end the script that it stands in.
+    data = json.dumps(known).replace("<", "\\u003c")
+    return f"""<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark"><title>{escape(title)}</title><style>{STYLE}</style></head><body>
+<h1>{escape(title)}</h1>
+<p>{len(entry.points)} elements in {height} x {width} pixels; foreground {entry.mask.mean():.0%}.</p>
+<table>{"".join(rows)}</table>{f"<ul>{doubts}</ul>" if doubts else ""}
+<p>Click an element to drop it, and any other place to add one. Elements: <label>layout <select id="layout">{options}</select>
+</label></p>
+<svg id="view" viewBox="-0.5 -0.5 {width} {height}" role="img" aria-label="Elements, each with its number">
+<image href="{_to_uri(draw_plain(entry))}" x="-0.5" y="-0.5" width="{width}" height="{height}"/><g id="marks"></g></svg>
+<figure><img src="{_to_uri(drawn["mask"])}" alt="Mask" width="{width}"><figcaption>What is not foreground lies under blue.
+</figcaption></figure>
+<label for="list">Corrections, for <code>--corrections FILE.json</code>:</label>
+<textarea id="list" rows="6" readonly></textarea>
+<script>const known = {data};
+{SCRIPT}</script>
+<footer>Made by <code>texrs analyse</code>, version {escape(__version__)}.</footer></body></html>
+"""
+
+
+def _to_uri(picture: Picture) -> str:
+    file = iio.imwrite("<bytes>", picture, extension=".png", plugin="pillow") or b""
+    return f"data:image/png;base64,{base64.b64encode(file).decode('ascii')}"
+
+
+STYLE = """
+body { max-width: 1080px; margin: 0 auto; padding: 1rem; font: 16px/1.5 system-ui, sans-serif; }
+svg, img { width: 100%; height: auto; image-rendering: pixelated; border: 1px solid #8884; }
+th { text-align: left; padding-right: 1rem; } .doubt { color: #c43c0c; }
+ellipse { fill: #0000; stroke: #ffeb5a; stroke-width: 1; cursor: pointer; vector-effect: non-scaling-stroke; }
+.gone ellipse { stroke: #f33; stroke-dasharray: 3 3; } .new ellipse { stroke: #3e3; }
+text { fill: #ffeb5a; paint-order: stroke; stroke: #000; text-anchor: middle; dominant-baseline: central;
+  pointer-events: none; }
+.gone text { fill: #f77; text-decoration: line-through; } textarea { width: 100%; font: 13px monospace; }
+figure { margin: 1rem 0; } footer { color: #888; font-size: .875rem; padding: 1rem 0; }
+"""
+SCRIPT = """
+const view = document.getElementById('view'), marks = document.getElementById('marks');
+const list = document.getElementById('list'), layout = document.getElementById('layout');
+const gone = new Set(), added = [], svg = 'http://www.w3.org/2000/svg';
+const size = Math.max(4, Math.min(...known.box) / 3);
+function mark(point, name, scale, angle, kind, act) {
+  const group = marks.appendChild(document.createElementNS(svg, 'g')), [row, column] = point;
+  const ring = group.appendChild(document.createElementNS(svg, 'ellipse'));
+  ring.setAttribute('rx', known.box[1] * scale / 2); ring.setAttribute('ry', known.box[0] * scale / 2);
+  ring.setAttribute('transform', `translate(${column} ${row}) rotate(${-angle})`);
+  ring.addEventListener('click', event => { event.stopPropagation(); act(); draw(); });
+  const text = group.appendChild(document.createElementNS(svg, 'text'));
+  text.textContent = name; text.setAttribute('x', column); text.setAttribute('y', row);
+  text.setAttribute('font-size', size); group.setAttribute('class', kind);
+}
+function draw() {
+  marks.replaceChildren();
+  known.points.forEach((point, k) => mark(point, k, known.scales[k], known.angles[k], gone.has(k) ? 'gone' : '',
+    () => gone.has(k) ? gone.delete(k) : gone.add(k)));
+  added.forEach((point, k) => mark(point, '+', 1, 0, 'new', () => added.splice(k, 1)));
+  const steps = [...known.earlier];
+  if (gone.size) steps.push({op: 'drop', elements: [...gone].sort((a, b) => a - b)});
+  if (added.length) steps.push({op: 'add', points: added});
+  if (layout.value !== known.layout) steps.push({op: 'layout', layout: layout.value});
+  list.value = JSON.stringify(steps);
+}
+view.addEventListener('click', event => {
+  const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(view.getScreenCTM().inverse());
+  added.push([Math.round(10 * at.y) / 10, Math.round(10 * at.x) / 10]); draw();
+});
+layout.addEventListener('change', draw);
+draw();
+"""
