@@ -18,7 +18,7 @@ from texrs.elements._corrections import correct, read_steps
 from texrs.elements._elements import Elements
 from texrs.elements._layout import Layout, LayoutName
 from texrs.elements._options import ElementSearch, Settings
-from texrs.elements._proposal import Start, propose
+from texrs.elements._proposal import ADVICE, DOUBTFUL, Start, propose
 from texrs.elements._search import Detections, search_similar
 from texrs.elements._separation import Separation, add_missing, find_nearest_pixels, reconcile
 from texrs.errors import InvalidInput
@@ -134,6 +134,12 @@ def analyse(
         )
     entry = _reanalyse(pixels, given, start, parted, how) or _make_entry(pixels, given, start, found, parted, how)
     watch("separate", 1.0)
+    unsure = [
+        f"{name} is proposed, {sure:.0%} sure: {ADVICE[name]}"
+        for name, sure in start.confidence.items()
+        if sure < DOUBTFUL
+    ]
+    entry = replace(entry, report={**entry.report, "doubts": [*entry.report["doubts"], *unsure]})
     return correct(entry, steps)
 
 

@@ -12,16 +12,9 @@ from texrs._version import __version__
 from texrs.elements._elements import Elements
 from texrs.elements._layout import Layout
 from texrs.elements._pictures import Picture, draw_plain, pictures
+from texrs.elements._proposal import ADVICE, DOUBTFUL
 
 __all__ = ["page"]
-
-DOUBTFUL = 0.6
-"""Below this a proposal is marked, and what to give instead is said."""
-ADVICE = {
-    "box": "draw a box around one element: <code>--box ROW,COL,HEIGHT,WIDTH</code>",
-    "background": "name a few places between the elements: <code>--background ROW,COL</code>",
-    "layout": "say how they hang together: <code>--layout disjoint</code>, <code>connected</code> or <code>jointed</code>",
-}
 
 
 def page(entry: Elements, title: str = "elements") -> str:
@@ -53,7 +46,7 @@ def page(entry: Elements, title: str = "elements") -> str:
     for name in ("box", "layout", "background"):
         sure = report.get("confidence", {}).get(name)
         said = "given" if sure is None else f"proposed, {sure:.0%} sure"
-        advice = f"; {ADVICE[name]}" if sure is not None and sure < DOUBTFUL else ""
+        advice = f"; {escape(ADVICE[name])}" if sure is not None and sure < DOUBTFUL else ""
         value = {"layout": str(entry.layout), "box": f"{entry.box[0]} x {entry.box[1]}"}.get(name, "")
         rows.append(f"<tr{' class=doubt' if advice else ''}><th>{name}<td>{escape(value)}<td>{said}{advice}")
     doubts = "".join(f"<li>{escape(doubt)}" for doubt in report.get("doubts", []))
