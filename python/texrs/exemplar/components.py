@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from texrs._typing import Bools, Floats, Labels
 from texrs.exemplar.shapes import Shapes, renumber
 
-__all__ = ["fill_crescents", "find_elements"]
+__all__ = ["fill_crescents", "find_elements", "list_borders", "split_touching"]
 
 NECK = 1.25
 """How many times wider than the neck between them two parts must be to be split there."""
@@ -114,7 +114,7 @@ def _measure_maxima(values: Floats, labels: Labels, count: int) -> Floats:
     return result
 
 
-def _list_borders(labels: Labels) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def list_borders(labels: Labels) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the flat places of all neighbours along rows and columns whose labels differ."""
     place = np.arange(labels.size).reshape(labels.shape)
     first = [place[:-1].ravel(), place[:, :-1].ravel()]
@@ -127,7 +127,7 @@ def _list_borders(labels: Labels) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 def _join_parts(parts: Labels, relief: Floats) -> Labels:
     """Join parts, those with the least between them first, until all that are left are parted by evidence."""
-    a, b = _list_borders(parts)
+    a, b = list_borders(parts)
     flat, height = parts.ravel(), np.minimum(relief.ravel(), DEEP)
     both = (flat[a] > 0) & (flat[b] > 0)
     a, b = a[both], b[both]
@@ -140,7 +140,7 @@ def _join_parts(parts: Labels, relief: Floats) -> Labels:
         borders.setdefault(key >> 32, {})[key & 0xFFFFFFFF] = (total, length)
         borders.setdefault(key & 0xFFFFFFFF, {})[key >> 32] = (total, length)
     shapes = Shapes.of(parts)
-    perimeter = np.bincount(np.concatenate([flat[side] for side in _list_borders(parts)]), minlength=len(shapes.area))
+    perimeter = np.bincount(np.concatenate([flat[side] for side in list_borders(parts)]), minlength=len(shapes.area))
     into = np.arange(len(shapes.area), dtype=np.int32)
 
     def weigh(one: Any, other: Any, mean: Any, share: Any) -> Any:
@@ -185,7 +185,7 @@ def _fill_holes(elements: Labels) -> Labels:
     from scipy import ndimage
 
     holes, count = ndimage.label(elements == 0)
-    a, b = _list_borders(np.where(elements > 0, elements, -holes))
+    a, b = list_borders(np.where(elements > 0, elements, -holes))
     flat, hole = elements.ravel(), holes.ravel()
     least, most = np.full(count + 1, 2**31 - 1), np.zeros(count + 1, np.int64)
     for inner, outer in ((a, b), (b, a)):

@@ -46,10 +46,12 @@ from typing import Any, Literal, TypeAlias
 
 from texrs._arrays import as_method, as_seed, as_size
 from texrs._typing import Array, Progress
-from texrs.elements import Elements
+from texrs.elements import Elements, Layout
+from texrs.errors import InvalidInput
 from texrs.layouts import spacing
 from texrs.papers.splice.adjustment import adjust_targets, crop_extension, straighten_rows
 from texrs.papers.splice.backward_warp import warp_backwards
+from texrs.papers.splice.cells import find_entry_cells, splice_cells
 from texrs.papers.splice.draft import draft_pixels
 from texrs.papers.splice.edit import as_steps
 from texrs.papers.splice.entry import as_elements
@@ -62,6 +64,9 @@ from texrs.synthesis import Synthesis
 __all__ = ["self_splice", "splice"]
 
 Method: TypeAlias = Literal["paper", "preview"] | None
+NO_CELLS = (
+    "none were found in a that are sure enough; give texrs.elements.analyse a box around one, or a mask of the joints"
+)
 Edit: TypeAlias = str | Mapping[str, Any] | Sequence[Mapping[str, Any]]
 
 
@@ -74,6 +79,8 @@ def splice(
     method: Method = None,
     align: bool = True,
     snap_rows: bool = False,
+    cells: bool | None = None,
+    turns: bool | None = None,
     refine: bool = True,
     progress: Progress | None = None,
 ) -> Synthesis:
@@ -93,9 +100,13 @@ def splice(
         "paper": the algorithm as printed, with only its misprints repaired. "preview": triangles between the elements,
         drawn where these go; nothing is kept rigid or filled.
     align : bool
-        Whether to turn the layout so that lines of its points agree with those of ``a``.
+        Whether to turn the layout so that lines of its points agree with those of ``a``. Cells take it as it lies.
     snap_rows : bool
-        Whether to bring targets of about one row to one row: for walls, whose long joints then stay straight.
+        Whether to bring targets of about one row to one row: for walls that are bent, whose long joints then stay straight.
+    cells : bool, optional
+        Whether a connected texture is put together from its cells; False bends its figure. By default where cells are found.
+    turns : bool, optional
+        Whether cells may be turned; by default where nothing tells ``a`` from itself upside down, as light and letters do.
     refine : bool
         Whether to refine what is not rigid.
     progress : callable, optional
@@ -133,6 +144,13 @@ def splice(
     mine, theirs = as_elements(a, "a", watch), as_elements(b, "b", watch)
     rows, columns = as_size(size if size is not None else mine.mask.shape, minimum=16)
     number = as_seed(seed)
+    found = find_entry_cells(mine) if method is None and cells is not False else None
+    if cells and found is None:
+        raise InvalidInput(f"cells: {'separate elements have none' if mine.layout == Layout.DISJOINT else NO_CELLS}")
+    if found is not None:
+        return splice_cells(
+            mine, theirs, found, (rows, columns), turns=turns, refine=bool(refine), seed=number, watch=watch
+        )
     watch("match", 0.0)
     if method == "paper":
         match = match_literally(mine, theirs, (rows, columns), align=bool(align))

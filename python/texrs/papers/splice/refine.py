@@ -25,7 +25,7 @@ from texrs.growth.constraints import Asked
 from texrs.kernels.complete import complete
 from texrs.kernels.patch_search import PatchIndex
 
-__all__ = ["Draft", "fill", "refine_places"]
+__all__ = ["Draft", "Refinement", "correct_draft", "fill", "refine_places"]
 
 Places = NDArray[np.int32]
 Kinds = NDArray[np.uint8]
@@ -145,7 +145,12 @@ def refine_places(
         Pixels of the texture.
 
     """
-    refinement = Refinement.of(image, wrap, draft, seed)
+    return correct_draft(Refinement.of(image, wrap, draft, seed), wrap, progress)
+
+
+def correct_draft(refinement: Refinement, wrap: tuple[bool, bool], progress: Progress | None) -> Places:
+    """Return corrected places of what a refinement may change."""
+    draft, image = refinement.draft, refinement.exemplar.image
     grown = grow(
         Region.whole(draft.fixed.shape),
         refinement.levels,

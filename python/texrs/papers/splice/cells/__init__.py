@@ -1,0 +1,218 @@
+"""Connected textures by cells: each target cell shows a whole cell of A, and cells are joined by cuts.
+
+Bending a figure as printed (Liu et al. 2009, Eq. 5) realises about half of what a layout asks of a connected texture, and
+mirrors what is asked of it beyond its picture. Here nothing is bent but cells, each for itself. The flow, and where each stage
+is:
+
+1. the cells of A, and those of B, or the Voronoi cells of B's points where these are not connected (`texrs.exemplar.cells`,
+   `tessellation`, `continuation`);
+2. for each target cell the cell of A that is most like it and was shown least (`choice`);
+3. its outline brought to the target's, its inside with it, its joints as wide as they were (`outlines`, `charts`);
+4. cells joined by cuts in a band around their outlines (`joining`);
+5. what is stretched corrected from what is not (`refinement`).
+
+All five make a source map; the picture is looked up through it once.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_image, guidance
+from texrs._cache import Cache, content_hash
+from texrs._typing import Progress
+from texrs.elements import Elements, Layout
+from texrs.exemplar.cells import Cells, find_cells
+from texrs.exemplar.symmetry import find_mirrors
+from texrs.papers.splice.cells.charts import Charts, draw_charts
+from texrs.papers.splice.cells.choice import list_usable, shortlist
+from texrs.papers.splice.cells.joining import Joined, join
+from texrs.papers.splice.cells.pictures import CellStages
+from texrs.papers.splice.cells.refinement import refine_charts
+from texrs.papers.splice.cells.tessellation import Tessellation, take_cells, take_points
+from texrs.papers.splice.extension import lay_out
+from texrs.source_map import SourceMap
+from texrs.synthesis import Synthesis
+
+__all__ = ["find_entry_cells", "splice_cells"]
+
+SURE = 0.5
+"""Confidence from which on cells are believed."""
+FEWEST = 3
+"""Cells that can be shown, at least."""
+HERE = 0.25
+"""Sizes from a cell's centre within which a pixel of the output must show it, for the cell to be there."""
+
+_CELLS: Cache[bytes, Cells] = Cache(16)
+_TARGETS: Cache[bytes, Tessellation] = Cache(16)
+
+
+def find_entry_cells(entry: Elements) -> Cells | None:
+    """Return the cells of a connected texture; none where it has none that are sure enough, as nets."""
+    if entry.layout == Layout.DISJOINT:
+        return None
+    joints = ~entry.mask if entry.layout == Layout.JOINTED else entry.mask
+    size = float(min(entry.box))
+    key = content_hash(np.asarray(entry.image), np.packbits(entry.mask), size, entry.layout)
+    found = _CELLS.get_or_make(key, lambda: find_cells(entry.image, size=size, joints=joints))
+    return found if found.confidence >= SURE and len(list_usable(found)) >= FEWEST else None
+
+
+def splice_cells(
+    a: Elements,
+    b: Elements,
+    cells: Cells,
+    size: tuple[int, int],
+    *,
+    turns: bool | None,
+    refine: bool,
+    seed: int,
+    watch: Progress,
+) -> Synthesis:
+    """Show the cells of A in the tessellation of B.
+
+    Parameters
+    ----------
+    a, b : Elements
+        The textures.
+    cells : Cells
+        Those of A.
+    size : (rows, columns)
+        Of the result.
+    turns : bool, optional
+        Whether cells may be turned; by default where nothing tells A from itself upside down.
+    refine : bool
+        Whether what is stretched is corrected.
+    seed : int
+        Of what is chosen by chance, and of the correction.
+    watch : callable
+        Called as ``watch(stage, share)``.
+
+    Returns
+    -------
+    Synthesis
+        Whose labels are targets, counted from 1, as in the report's "matches".
+
+    Raises
+    ------
+    InvalidInput
+        B has no cell or point that could be taken.
+
+    """
+    watch("cells", 0.0)
+    may_turn = (True, True) in find_mirrors(guidance(as_image(a.image))) if turns is None else turns
+    # The size of those that can be shown: these come as large as they are.
+    unit = float(np.sqrt(np.median(cells.area[list_usable(cells)])))
+    wanted = _take_targets(b, size, unit, seed)
+    chosen = _list_shown(wanted)
+    watch("cells", 0.2)
+    choices = shortlist(cells, wanted, chosen, turns=may_turn, seed=seed)
+    charts = draw_charts(cells, wanted, chosen, choices)
+    watch("cells", 0.6)
+    joined = join(a.image, cells, charts, size)
+    watch("cells", 1.0)
+    places, frames = charts.places[joined.pixel], charts.frames[joined.pixel]
+    if refine:
+        places, frames = refine_charts(a, cells, charts, joined, places, frames, seed, watch)
+    source = SourceMap.from_coordinates(
+        places, (a.mask.shape[0], a.mask.shape[1]), label=(joined.chart + 1).astype(np.uint32), frame=frames
+    )
+    image = source.render(a.image)
+    report = _report(cells, wanted, charts, joined, layout=a.layout, turns=may_turn, seed=seed)
+    watch("done", 1.0)
+    return Synthesis(image, source, CellStages(a, b, cells, wanted, charts, joined, image), report)
+
+
+def _take_targets(b: Elements, size: tuple[int, int], unit: float, seed: int) -> Tessellation:
+    """Return the target cells: kept, for one layout often serves several textures of one size."""
+    key = content_hash(np.asarray(b.image), np.packbits(b.mask), b.points, b.layout, b.wrap, size, unit, seed)
+
+    def make() -> Tessellation:
+        theirs = find_entry_cells(b)
+        if theirs is not None:
+            return take_cells(theirs, b.wrap, size, unit, seed=seed)
+        return take_points(lay_out(b, beyond=True), size, unit)
+
+    return _TARGETS.get_or_make(key, make)
+
+
+def _list_shown(wanted: Tessellation) -> NDArray[np.intp]:
+    """Return the rows of the targets that reach into the output, from top to bottom."""
+    m = wanted.margin
+    rows = np.unique(wanted.labels[m:-m, m:-m]) - 1
+    return np.asarray(rows[np.lexsort((wanted.centre[rows, 1], wanted.centre[rows, 0]))], np.intp)
+
+
+def _find_places(cells: Cells, charts: Charts, joined: Joined) -> NDArray[np.float64]:
+    """Return where in the output the centre of each shown cell is, from the source map; NaN where it is not shown."""
+    shape = joined.chart.shape
+    chart = joined.chart.ravel()
+    pixel = joined.pixel.ravel()
+    off = charts.places[pixel] - cells.centre[charts.source[chart]]
+    far = np.hypot(off[:, 0], off[:, 1]) / charts.scale[chart] ** -1
+    order = np.lexsort((far, chart))
+    names, first = np.unique(chart[order], return_index=True)
+    best = order[first]
+    inverse = np.linalg.pinv(charts.frames[pixel[best]].astype(np.float64))
+    at = np.stack(np.divmod(best, shape[1]), axis=-1) - np.einsum("nij,nj->ni", inverse, off[best])
+    out = np.full((len(charts.target), 2), np.nan)
+    out[names] = np.where((far[best] <= HERE * cells.size)[:, None], at, np.nan)
+    return out
+
+
+def _report(
+    cells: Cells,
+    wanted: Tessellation,
+    charts: Charts,
+    joined: Joined,
+    *,
+    layout: Layout,
+    turns: bool,
+    seed: int,
+) -> dict[str, Any]:
+    """Say what was found, what was wanted and what has become of it, in JSON types."""
+    from scipy.spatial import cKDTree
+
+    size = joined.chart.shape
+    goal, found = wanted.centre[charts.target], _find_places(cells, charts, joined)
+    inside = ((goal >= 0) & (goal <= np.array(size) - 1)).all(axis=1)
+    there = np.isfinite(found[:, 0])
+    # How far the nearest cell of A's own layout would have to go.
+    offset = (np.array(size) - np.array(cells.labels.shape)) / 2
+    asked = cKDTree(cells.centre + offset).query(goal)[0]
+    compared = inside & there
+    missed = np.hypot(*(found - goal)[compared].T).sum()
+    realised = 1 - float(missed / max(asked[compared].sum(), 1e-9)) if compared.any() else 0.0
+    return {
+        "method": "cells",
+        "seed": seed,
+        "size": list(size),
+        "layout": layout.value,
+        "scale": round(wanted.scale, 6),
+        "continued": wanted.continued,
+        "turns": turns,
+        "targets": len(charts.target),
+        "cells": {
+            "count": cells.count,
+            "usable": len(list_usable(cells)),
+            "size": round(cells.size, 3),
+            "polarity": cells.polarity,
+            "confidence": round(cells.confidence, 4),
+        },
+        "present": round(float(there[inside].mean()) if inside.any() else 0.0, 4),
+        "realised": round(max(0.0, realised), 4),
+        "matches": [
+            {
+                "target": [round(float(v), 3) for v in goal[k]],
+                "found": [round(float(v), 3) for v in found[k]] if there[k] else None,
+                "element": int(charts.source[k]),
+                "point": [round(float(v), 3) for v in cells.centre[charts.source[k]]],
+                "turn": float(charts.turn[k]),
+                "scale": round(float(charts.scale[k]), 4),
+            }
+            for k in range(len(charts.target))
+        ],
+    }

@@ -1,0 +1,224 @@
+"""Charts: for each pixel of a target cell and a band around it, where in A it looks.
+
+A cell is turned and scaled, its outline brought to the target's, and what lies inside goes along (`outlines`). Joints would
+be stretched with it; so beside the outline, on both sides, source points slide along the gradient of the distance to the
+source's own outline until they are as far from it as the pixel is from the target's: joints keep their width.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Floats
+from texrs.exemplar.cells import Cells
+from texrs.kernels.gather import gather
+from texrs.papers.splice.cells.choice import Shortlist
+from texrs.papers.splice.cells.outlines import interpolate, match_outlines
+from texrs.papers.splice.cells.tessellation import Tessellation
+
+__all__ = ["Charts", "draw_charts"]
+
+BAND = 0.12
+"""Sizes of a cell beyond its outline that it is drawn for, so that it can be cut against those beside it."""
+JOINT = 0.25
+"""Sizes from the outline within which distances to it are those of the target."""
+SLIDES, SLIDE = 3, 0.8
+"""Steps in which source points slide, and the share of what is missing that they go in each."""
+CORE, EDGE, STEEP = 0.8, 1.5, 0.4
+"""What is deeper in the target than half of a joint, and so many pixels, is at least as deep as that in the source, and so much
+deeper for each pixel; but no deeper than a share of the source's greatest depth."""
+GRID, KNOT = (6, 20), 3.0
+"""Places along each side of the box of a cell at which displacements are interpolated, linearly between them: fewest and most,
+and pixels from one to the next."""
+MISFIT = 2.0
+"""Weight of the root of an outline's matching cost against the cost of the shortlist."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Charts:
+    """The pixels of all target cells, box by box in one row.
+
+    Attributes
+    ----------
+    target : (cells,) int
+        Row of the target of each box.
+    source : (cells,) int
+        Row of the cell of A that is shown.
+    turn, scale : (cells,) float64
+        Degrees that it is turned by, and what it is scaled by before it is bent.
+    first : (cells + 1,) int
+        Where the pixels of each box begin.
+    corner, sides : (cells, 2) int
+        First row and column of each box in the output, and how many it has.
+    depth : (n,) float32
+        How far inside the target each pixel lies; less than 0 outside.
+    places : (n, 2) float32
+        Where in A each pixel looks.
+    frames : (n, 2, 2) float32
+        The Jacobian there.
+
+    """
+
+    target: NDArray[np.intp]
+    source: NDArray[np.intp]
+    turn: NDArray[np.float64]
+    scale: NDArray[np.float64]
+    first: NDArray[np.intp]
+    corner: NDArray[np.intp]
+    sides: NDArray[np.intp]
+    depth: Floats
+    places: Floats
+    frames: Floats
+
+    def box(self, k: int) -> tuple[slice, slice]:
+        """Return where a box lies in the output."""
+        (top, left), (rows, columns) = self.corner[k], self.sides[k]
+        return slice(int(top), int(top + rows)), slice(int(left), int(left + columns))
+
+
+def draw_charts(cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], choices: Shortlist) -> Charts:
+    """Draw the chart of each chosen target: the best of its shortlist, once outlines are matched."""
+    unit, band = cells.size, max(2.0, BAND * cells.size)
+    source, turn, scale, found = _choose(cells, wanted, chosen, choices, unit)
+    first, corner, sides, depth = _measure_depths(wanted, chosen, band)
+    which = np.repeat(np.arange(len(chosen)), np.diff(first))
+    pixels = _list_pixels(first, corner, sides, which)
+
+    # Displacement of the outline, carried to a grid over each box, and from there to its pixels.
+    goal, middle = wanted.outlines[chosen], wanted.centre[chosen]
+    count = int(np.clip(np.ceil(np.median(sides) / KNOT), *GRID))
+    step = np.maximum(sides - 1, 1) / (count - 1)
+    knots = np.stack(np.meshgrid(np.arange(count), np.arange(count), indexing="ij"), -1).reshape(1, -1, 2)
+    grid = interpolate(corner[:, None] + knots * step[:, None], goal, found - (goal - middle[:, None]))
+    at = np.asarray((pixels - corner[which]) / step[which], np.float32)
+    tall = np.ascontiguousarray(grid.reshape(-1, count, 2))
+    at[:, 0] += which * count
+    moved = pixels - middle[which] + gather(tall, at[None], interpolation="linear")[0]
+
+    # Back through the turn and the scale.
+    angle = np.radians(turn)
+    cos, sin = np.cos(angle)[which], np.sin(angle)[which]
+    row, column = moved[:, 0] / scale[which], moved[:, 1] / scale[which]
+    places = np.stack([cos * row - sin * column, sin * row + cos * column], axis=-1) + cells.centre[source[which]]
+    places = _slide(cells, source, which, depth, places, unit, band)
+    limits = np.array(cells.labels.shape, np.float32) - 1
+    looked = np.clip(places, 0, limits).astype(np.float32)
+    frames = np.empty((len(looked), 2, 2), np.float32)
+    for k, (rows, columns) in enumerate(sides.tolist()):
+        here = slice(first[k], first[k + 1])
+        block = looked[here].reshape(rows, columns, 2)
+        for axis, n in enumerate((rows, columns)):
+            slope = np.asarray(np.gradient(block, axis=axis)) if n > 1 else np.zeros_like(block)
+            frames[here, :, axis] = slope.reshape(-1, 2)
+    return Charts(chosen, source, turn, scale, first, corner, sides, depth, looked, frames)
+
+
+def _choose(
+    cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], choices: Shortlist, unit: float
+) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Match the outlines of all that are on the shortlists; return source, turn, scale, and outline of the best."""
+    count, k = choices.source.shape
+    source, turn, scale = (x.reshape(-1) for x in (choices.source, choices.turn, choices.scale))
+    angle = np.radians(turn)
+    away = cells.outlines[source] - cells.centre[source][:, None]
+    cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    turned = np.stack([cos * away[..., 0] + sin * away[..., 1], cos * away[..., 1] - sin * away[..., 0]], axis=-1)
+    goal = np.repeat(wanted.outlines[chosen] - wanted.centre[chosen][:, None], k, axis=0)
+    found, misfit = match_outlines(goal, turned * scale[:, None, None], unit)
+    cost = choices.cost + MISFIT * np.sqrt(np.maximum(misfit, 0)).reshape(count, k)
+    best = np.arange(count) * k + cost.argmin(axis=1)
+    return source[best], turn[best], scale[best], found[best]
+
+
+def _measure_depths(
+    wanted: Tessellation, chosen: NDArray[np.intp], band: float
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], Floats]:
+    """Return the box of each target in the output, and how deep inside the target each of its pixels lies."""
+    from scipy.ndimage import distance_transform_edt, find_objects, gaussian_filter
+
+    boxes, pad = find_objects(wanted.labels), int(np.ceil(band)) + 2
+    size, margin = wanted.size, wanted.margin
+    corners, sides, depths = [], [], []
+    for target in chosen.tolist():
+        box = boxes[target]
+        inside = np.pad(wanted.labels[box] == target + 1, pad)
+        signed = distance_transform_edt(inside) - distance_transform_edt(~inside)
+        signed = gaussian_filter(signed - 0.5 * np.sign(signed), 1.0)
+        first = np.array([s.start - pad - margin for s in box])
+        low, high = np.maximum(first, 0), np.minimum(first + signed.shape, size)
+        cut = tuple(slice(a - f, b - f) for a, b, f in zip(low, high, first, strict=True))
+        corners.append(low)
+        sides.append(high - low)
+        depths.append(signed[cut].astype(np.float32).ravel())
+    first_pixel = np.concatenate([[0], np.cumsum([len(d) for d in depths])])
+    return first_pixel, np.array(corners), np.array(sides), np.concatenate(depths)
+
+
+def _list_pixels(
+    first: NDArray[np.intp], corner: NDArray[np.intp], sides: NDArray[np.intp], which: NDArray[np.intp]
+) -> NDArray[np.float64]:
+    """Return the place in the output of each pixel of the row."""
+    number = np.arange(len(which)) - first[which]
+    width = sides[which, 1]
+    return np.stack([number // width, number % width], axis=-1) + corner[which].astype(np.float64)
+
+
+def _slide(
+    cells: Cells,
+    source: NDArray[np.intp],
+    which: NDArray[np.intp],
+    depth: Floats,
+    places: NDArray[np.float64],
+    unit: float,
+    band: float,
+) -> NDArray[np.float64]:
+    """Slide source points beside outlines until they are as deep inside the source as the pixels are inside the target."""
+    shown, number = np.unique(source, return_inverse=True)
+    fields, corner = _measure_fields(cells, shown, int(np.ceil(2 * band)) + 2)
+    reach = JOINT * unit
+    joint = min(reach, 0.5 * cells.joint_width + EDGE)
+    deepest = CORE * np.array([float(f[..., 0].max()) for f in fields], np.float32)
+    kept = np.flatnonzero(depth > -band - 2)
+    kind = number[which[kept]]
+    at = np.asarray(places[kept] - corner[kind], np.float32)
+
+    def measure(at: Floats, kind: NDArray[np.intp]) -> Floats:
+        return np.asarray(gather(fields, at[None], kind[None].astype(np.uint16))[0], np.float32)
+
+    # Beside the outline as deep as the target is, farther inside as deep as they are, but never in the joint again.
+    inside, before = depth[kept], measure(at, kind)[:, 0]
+    weight = np.clip(1.3 - np.abs(inside) / reach, 0, 1)
+    weight = weight * weight * (3 - 2 * weight)
+    least = np.minimum(np.minimum(inside, joint + STEEP * (inside - joint)), deepest[kind])
+    wanted = np.maximum(before + weight * (inside - before), least)
+    near = np.flatnonzero(np.abs(wanted - before) > 0.01)
+    kind, wanted = kind[near], wanted[near]
+    moved = at[near]
+    for _ in range(SLIDES):
+        field = measure(moved, kind)
+        missing = np.clip(wanted - field[:, 0], -reach, reach)
+        moved = moved + SLIDE * missing[:, None] * field[:, 1:]
+    out = places.copy()
+    out[kept[near]] = moved + corner[kind]
+    return out
+
+
+def _measure_fields(cells: Cells, shown: NDArray[np.intp], pad: int) -> tuple[list[Floats], NDArray[np.float64]]:
+    """Return of each cell the signed distance to its outline and its slopes, (h, w, 3), and the place of the first pixel."""
+    from scipy.ndimage import distance_transform_edt, find_objects, gaussian_filter
+
+    boxes = find_objects(cells.labels)
+    fields, corners = [], []
+    for row in shown.tolist():
+        box = boxes[row]
+        # As if a cell at the border went on there: nothing is known of its joint.
+        inside = np.pad(cells.labels[box] == row + 1, pad)
+        signed = distance_transform_edt(inside) - distance_transform_edt(~inside)
+        signed = gaussian_filter(signed - 0.5 * np.sign(signed), 1.0)
+        slopes = np.gradient(signed)
+        fields.append(np.ascontiguousarray(np.stack([signed, *slopes], axis=-1), np.float32))
+        corners.append([s.start - pad for s in box])
+    return fields, np.array(corners, np.float64)

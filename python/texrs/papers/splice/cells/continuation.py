@@ -1,0 +1,186 @@
+"""Cells of a texture beyond its picture.
+
+On the lattice that they lie on, if there is one; around, where the texture wraps. Others are drawn as their joints alone, and
+the drawing is grown by quilting: reflected cells would be seen as a kaleidoscope. No picture is continued.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Bools, Floats, Labels
+from texrs.errors import InvalidInput
+from texrs.exemplar.cells import Cells
+from texrs.exemplar.components import split_touching
+from texrs.exemplar.contours import trace
+from texrs.exemplar.shapes import Shapes, mark_outlines
+from texrs.layouts import PointLayout
+from texrs.papers.splice.edit import fit_lattice
+from texrs.quilting import Picture, quilt
+from texrs.source_map import SourceMap
+
+__all__ = ["continue_cells"]
+
+Points = NDArray[np.float64]
+
+NEARLY = 0.75
+"""Share of the median area from which on a cell that the border cuts is taken for whole."""
+REGULAR = 0.12
+"""Root mean square distance of cells from their places on a lattice, in sizes, up to which they are continued on it."""
+DENSE = (0.6, 1.6)
+"""Least and greatest area of a lattice's cell, in squared sizes, for it to be of the cells."""
+DRAWN = 20.0
+"""Pixels that a cell is wide in the drawing of the joints."""
+LINE = 0.17
+"""How far from an outline the drawing of the joints reaches, in sizes."""
+TRIALS, FINE = 3, 0.03
+"""Quilts that are tried at the most, and the share of torn cells with which one is taken at once."""
+SOLID, HUGE = 0.8, 3.0
+"""Solidity below which, and squared sizes beyond which, a cell of a quilt is taken for torn."""
+CLOSED, LEAST = 0.8, 0.08
+"""Height in the drawing above which a pixel lies inside of a cell, and the least area of what does so together, in squared
+sizes."""
+PATCH, OVERLAP = 4.0, 1.2
+"""Side of a patch of the drawing, and overlap of two, in sizes."""
+
+
+def continue_cells(
+    cells: Cells, wrap: tuple[bool, bool], far: tuple[float, float], *, seed: int
+) -> tuple[NDArray[np.float64], float, str]:
+    """Return the outlines of the cells around the middle of a texture.
+
+    Parameters
+    ----------
+    cells : Cells
+        What is there.
+    wrap : (bool, bool)
+        Whether the texture repeats without a seam.
+    far : (float, float)
+        How far from the middle cells are wanted, along rows and columns, in sizes of a cell.
+    seed : int
+        Chooses what cannot be continued by rule.
+
+    Returns
+    -------
+    outlines : (n, P, 2) float64
+        About the middle, in sizes of a cell.
+    scale : float
+        What a pixel of the texture is there.
+    continued : str
+        "" where the texture is large enough, else "lattice", "wrap" or "quilted".
+
+    Raises
+    ------
+    InvalidInput
+        Too few cells are whole.
+
+    """
+    usable = np.flatnonzero(cells.whole | (cells.area >= NEARLY * cells.size**2))
+    if len(usable) < 3:
+        raise InvalidInput(f"b: {len(usable)} of its cells are whole, three or more are needed; take a larger picture")
+    scale = 1 / cells.size
+    centre = (np.array(cells.labels.shape) - 1) / 2
+    reach = np.array(far) / scale
+    if (reach <= centre).all():
+        near = (np.abs(cells.centre - centre) <= reach).all(axis=1)
+        return (cells.outlines[near] - centre) * scale, scale, ""
+    points = cells.centre[usable]
+    if any(wrap):
+        layout = PointLayout.of(points, cells.labels.shape, wrap, beyond=True)
+        places, of, mirrored = layout.within(centre - reach, centre + reach)
+        return _copy(cells, usable[of], places, mirrored, centre) * scale, scale, "wrap"
+    sites = _continue_on_lattice(points, cells.size, centre - reach, centre + reach) if len(points) >= 6 else None
+    if sites is not None:
+        places, of = sites
+        return _copy(cells, usable[of], places, np.zeros((len(of), 2), bool), centre) * scale, scale, "lattice"
+    return _grow(cells, far, seed), scale, "quilted"
+
+
+def _copy(cells: Cells, of: NDArray[np.intp], places: Points, mirrored: Bools, centre: Points) -> NDArray[np.float64]:
+    """Return outlines of cells at other places, about a centre."""
+    signs = np.where(mirrored, -1.0, 1.0)[:, None]
+    return (cells.outlines[of] - cells.centre[of][:, None]) * signs + places[:, None] - centre
+
+
+def _continue_on_lattice(
+    points: Points, unit: float, low: Points, high: Points
+) -> tuple[Points, NDArray[np.intp]] | None:
+    """Return places and cells on the lattice that points lie on; None where they lie on none."""
+    origin, basis = fit_lattice(points)
+    span = np.linalg.inv(basis)
+    index = np.rint((points - origin) @ span).astype(np.intp)
+    away = np.hypot(*(points - origin - index @ basis).T)
+    # One cell a site.
+    alone = DENSE[0] < np.abs(np.linalg.det(basis)) / unit**2 < DENSE[1] and len(np.unique(index, axis=0)) == len(index)
+    if not alone or np.sqrt((away**2).mean()) > REGULAR * unit:
+        return None
+    corners = np.array([[y, x] for y in (low[0], high[0]) for x in (low[1], high[1])])
+    ends = (corners - origin) @ span
+    first, last = np.floor(ends.min(axis=0)).astype(int), np.ceil(ends.max(axis=0)).astype(int)
+    sites = np.stack(np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(first, last, strict=True)), indexing="ij"), -1)
+    sites = sites.reshape(-1, 2)
+    own = {tuple(k): n for n, k in enumerate(index.tolist())}
+    # A site without a cell of its own takes one by its place, so that the same site always takes the same one.
+    of = np.array([own.get((i, j), (7919 * i + 104729 * j) % len(points)) for i, j in sites.tolist()])
+    mine = np.array([(i, j) in own for i, j in sites.tolist()])
+    places = np.where(mine[:, None], points[of], sites @ basis + origin)
+    inside = ((places >= low) & (places <= high)).all(axis=1)
+    return places[inside], of[inside].astype(np.intp)
+
+
+def _grow(cells: Cells, far: tuple[float, float], seed: int) -> NDArray[np.float64]:
+    """Quilt a drawing of the joints, and take what lies between them for cells: of a few quilts the one least torn."""
+    size = (round(2 * far[0] * DRAWN), round(2 * far[1] * DRAWN))
+    drawing = _draw(cells)
+    best, least = np.zeros((0, 0, 2)), np.inf
+    for attempt in range(TRIALS):
+        labels = _quilt(drawing, size, seed + attempt)
+        torn = _measure_torn(labels)
+        if torn < least:
+            best, least = trace(labels, np.arange(1, int(labels.max()) + 1)), torn
+        if torn <= FINE:
+            break
+    return (best - (np.array(size) - 1) / 2) / DRAWN
+
+
+def _quilt(drawing: Floats, size: tuple[int, int], seed: int) -> Labels:
+    """Return the cells of a quilt of the drawing."""
+    from skimage.segmentation import watershed
+
+    picture = Picture(drawing[..., None], SourceMap.identity(drawing.shape), np.maximum(drawing - 0.5, 0))
+    grown = quilt(
+        [picture],
+        size,
+        patch=round(PATCH * DRAWN),
+        overlap=round(OVERLAP * DRAWN),
+        wrap=(False, False),
+        shares=np.ones(1),
+        seed=seed,
+        progress=lambda share: None,
+    )
+    drawn = grown.render(drawing, interpolation="nearest")
+    # Lines that a seam has cut end somewhere, and part nothing; narrow gaps in others are closed, and cells parted at necks.
+    pieces = split_touching(drawn > CLOSED, np.zeros_like(drawn))
+    area = np.bincount(pieces.ravel())
+    pieces[area[pieces] < LEAST * DRAWN**2] = 0
+    _, seeds = np.unique(pieces, return_inverse=True)
+    return np.asarray(watershed(1 - drawn, seeds.reshape(drawn.shape)), np.int32)
+
+
+def _measure_torn(labels: Labels) -> float:
+    """Return the share of the area in cells that seams have run together, or left with dents."""
+    shapes = Shapes.of(labels)
+    area, solid = shapes.area[1:], shapes.measure_solidity()[1:]
+    odd = (solid < SOLID) | (area > HUGE * DRAWN**2)
+    return float(area[odd].sum() / area.sum())
+
+
+def _draw(cells: Cells) -> Floats:
+    """Draw the distance to outlines, 0 on them and 1 from a little inside on, at a fixed size of cells."""
+    from scipy.ndimage import distance_transform_edt
+    from skimage.transform import resize
+
+    depth = distance_transform_edt(~mark_outlines(cells.labels)) / (LINE * cells.size)
+    shape = tuple(max(16, round(n * DRAWN / cells.size)) for n in cells.labels.shape)
+    return np.asarray(resize(np.clip(depth, 0, 1), shape, order=1, anti_aliasing=True), np.float32).clip(0, 1)

@@ -1,0 +1,87 @@
+"""Cells joined: each is cut into what is there, in a band around its outline, where it shows least."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_image, guidance
+from texrs._engine.stitcher import FREE, Pasting, Samples
+from texrs._typing import Array, Bools
+from texrs.exemplar.cells import Cells
+from texrs.exemplar.shapes import mark_outlines
+from texrs.kernels.gather import gather
+from texrs.papers.splice.cells.charts import BAND, Charts
+
+__all__ = ["Joined", "join"]
+
+COLOUR, DEPTH = 1.0, 1.0
+"""What a seam costs by the colours on both sides, in standard deviations, and by how deep inside of a cell it lies."""
+CORE = 0.5
+"""Bands inside of its outline from which on a cell keeps its pixels."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Joined:
+    """Which pixel of which chart each pixel of the output shows.
+
+    Attributes
+    ----------
+    pixel : (H, W) uint32
+        Number in the row of all charts.
+    chart : (H, W) int32
+        Which chart that is of.
+
+    """
+
+    pixel: NDArray[np.uint32]
+    chart: NDArray[np.int32]
+
+
+def join(image: Array, cells: Cells, charts: Charts, size: tuple[int, int]) -> Joined:
+    """Cut the charts into the output, one after the other."""
+    from scipy.ndimage import distance_transform_edt
+
+    colours = guidance(as_image(image))
+    colours = colours / max(float(colours.std()), 1e-6)
+    far = distance_transform_edt(~mark_outlines(cells.labels)).astype(np.float32)
+    looked = gather(np.dstack([colours, far]), charts.places[None], interpolation="linear")[0]
+    band = max(2.0, BAND * cells.size)
+    # The cheapest place is the joint, as wide as the band; deeper inside all is equally bad.
+    inside = np.clip(looked[:, -1] / band - 0.5, 0, 2)
+    samples = Samples(np.ascontiguousarray(looked[:, :-1]), np.ascontiguousarray(inside), (COLOUR, DEPTH))
+    pixel = np.full(size, FREE, np.uint32)
+    seams = np.zeros((*size, 2), np.float32)
+    for k in range(len(charts.target)):
+        box = charts.box(k)
+        shape = tuple(charts.sides[k])
+        row = slice(charts.first[k], charts.first[k + 1])
+        depth = charts.depth[row].reshape(shape)
+        mask: Bools = depth >= -band
+        if not mask.any():
+            continue
+        patch = np.arange(row.start, row.stop, dtype=np.uint32).reshape(shape)
+        take, after = samples.cut(Pasting(pixel[box], seams[box], mask, depth >= CORE * band), patch)
+        pixel[box] = np.where(take, patch, pixel[box])
+        seams[box] = after
+    _fill(pixel, charts)
+    chart = (np.searchsorted(charts.first, pixel, side="right") - 1).astype(np.int32)
+    return Joined(pixel, chart)
+
+
+def _fill(pixel: NDArray[np.uint32], charts: Charts) -> None:
+    """Give what no chart covers to the one that it lies least far outside of."""
+    if not (pixel == FREE).any():
+        return
+    best = np.full(pixel.shape, -np.inf, np.float32)
+    for k in range(len(charts.target)):
+        box, shape = charts.box(k), tuple(charts.sides[k])
+        row = slice(charts.first[k], charts.first[k + 1])
+        depth = charts.depth[row].reshape(shape)
+        number = np.arange(row.start, row.stop, dtype=np.uint32).reshape(shape)
+        free = (best[box] > -np.inf) | (pixel[box] == FREE)
+        better = free & (depth > best[box])
+        pixel[box] = np.where(better, number, pixel[box])
+        best[box] = np.where(better, depth, best[box])

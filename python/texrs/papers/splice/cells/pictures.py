@@ -1,0 +1,83 @@
+"""Pictures of the stages of `texrs.papers.splice.cells`, drawn when they are looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Array, Labels
+from texrs.elements import Elements
+from texrs.exemplar.cells import Cells
+from texrs.exemplar.shapes import mark_outlines
+from texrs.papers.splice.cells.charts import Charts
+from texrs.papers.splice.cells.joining import Joined
+from texrs.papers.splice.cells.tessellation import Tessellation
+from texrs.papers.splice.pictures import BLUE, GREEN, RED, mark_points, to_picture
+
+__all__ = ["CellStages"]
+
+Picture = NDArray[np.uint8]
+
+
+class CellStages(Mapping[str, Array]):
+    """Pictures by name, in the order of the stages; each is drawn when first asked for."""
+
+    def __init__(
+        self,
+        a: Elements,
+        b: Elements,
+        cells: Cells,
+        wanted: Tessellation,
+        charts: Charts,
+        joined: Joined,
+        image: Array,
+    ) -> None:
+        m = wanted.margin
+        targets = wanted.labels[m:-m, m:-m]
+        self._draw: dict[str, Callable[[], Array]] = {
+            "cells of a": lambda: _draw_cells(to_picture(a.image), cells),
+            "layout of b": lambda: mark_points(to_picture(b.image), b.points, BLUE),
+            "target cells": lambda: _draw_outlines(np.full((*targets.shape, 3), 255, np.uint8), targets, BLUE),
+            "assignment": lambda: _shade(joined.chart, charts.source, cells.count),
+            "cuts": lambda: _draw_outlines(to_picture(image), joined.chart + 1, GREEN),
+            "composite": lambda: image,
+        }
+        self._drawn: dict[str, Array] = {}
+
+    def __getitem__(self, name: str) -> Array:
+        """Draw a stage."""
+        if name not in self._drawn:
+            self._drawn[name] = self._draw[name]()
+        return self._drawn[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Go through the names."""
+        return iter(self._draw)
+
+    def __len__(self) -> int:
+        """Return the number of stages."""
+        return len(self._draw)
+
+
+def _draw_outlines(picture: Picture, labels: Labels, colour: tuple[int, int, int]) -> Picture:
+    out = picture.copy()
+    out[mark_outlines(labels)] = colour
+    return out
+
+
+def _draw_cells(picture: Picture, cells: Cells) -> Picture:
+    """Draw the outlines of all cells, and a ring in those that are whole: green where they are sure, red where they are not."""
+    out = _draw_outlines(picture, cells.labels, BLUE)
+    for sure, colour in ((True, GREEN), (False, RED)):
+        out = mark_points(out, cells.centre[cells.whole & ((cells.certain >= 0.5) == sure)], colour)
+    return out
+
+
+def _shade(chart: Labels, source: NDArray[np.intp], count: int) -> Picture:
+    """Give each cell of A a colour of its own, and show who is where."""
+    turn = np.arange(count) * 0.618034 % 1 * 2 * np.pi
+    colours = 150 + 90 * np.stack([np.cos(turn), np.cos(turn - 2.1), np.cos(turn + 2.1)], axis=-1)
+    picture = colours.astype(np.uint8)[source[chart]]
+    return _draw_outlines(picture, chart + 1, (255, 255, 255))

@@ -1,0 +1,74 @@
+"""What a chart stretches, corrected: pixels take what fits their neighbours from what A shows at its own size.
+
+The corrector is that of the ground between separate elements (`texrs.papers.splice.refine`). Joints, and what is not stretched,
+stay as they are, and no joint comes into a cell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._engine.pyramid import ONE, Region
+from texrs._typing import Floats, Progress
+from texrs.elements import Elements
+from texrs.exemplar.cells import Cells
+from texrs.papers.splice.cells.charts import Charts
+from texrs.papers.splice.cells.joining import Joined
+from texrs.papers.splice.refine import Draft, Refinement, correct_draft
+
+__all__ = ["refine_charts"]
+
+STRETCH = 1.35
+"""Pixels of the output for one of A beyond which it is corrected."""
+EDGE = 2.0
+"""Pixels beside a joint that stay as they are, as joints do: these are lines, which the corrector would fray."""
+SMALLEST = 24.0
+"""Size of a cell, in pixels, below which its windows hold more joint than cell."""
+LEAST = 0.01
+"""Share of the output below which nothing is."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TurnedRefinement(Refinement):
+    """A refinement whose pixels look at A turned, as their charts are."""
+
+    turned: Floats
+
+    def frames(self, region: Region, spacing: int) -> NDArray[np.int16]:
+        """Return the Jacobian of each pixel: the turn of its chart."""
+        turned = np.rint(self.turned[::spacing, ::spacing] * ONE)
+        return np.ascontiguousarray(turned.reshape(region.points, 2, 2), np.int16)
+
+
+def refine_charts(
+    a: Elements,
+    cells: Cells,
+    charts: Charts,
+    joined: Joined,
+    places: Floats,
+    frames: Floats,
+    seed: int,
+    progress: Progress,
+) -> tuple[Floats, Floats]:
+    """Return places and frames, corrected where charts stretch A."""
+    if cells.size < SMALLEST:
+        return places, frames
+    stretch = 1 / np.maximum(np.linalg.svd(frames, compute_uv=False)[..., -1], 1e-3)
+    loose = (stretch > STRETCH) & (charts.depth[joined.pixel] > 0.5 * cells.joint_width + EDGE)
+    if loose.mean() < LEAST:
+        return places, frames
+    pixels = np.rint(places).astype(np.int32)
+    kinds = (cells.joints > 0.5).astype(np.uint8)
+    wanted = kinds[pixels[..., 0], pixels[..., 1]]
+    known = np.ones(loose.shape, bool)
+    draft = Draft(pixels, known, ~loose, kinds, wanted, np.zeros((*loose.shape, 2), bool))
+    angle = np.radians(charts.turn)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]], np.float32)
+    turned = np.ascontiguousarray(turn.transpose(2, 0, 1)[joined.chart])
+    base = Refinement.of(a.image, a.wrap, draft, seed)
+    refinement = TurnedRefinement(base.exemplar, draft, seed, base.coarsest, base.levels, turned)
+    found = correct_draft(refinement, a.wrap, progress).astype(np.float32)
+    return np.where(loose[..., None], found, places), np.where(loose[..., None, None], turned, frames)

@@ -1,0 +1,141 @@
+"""Target cells: the tessellation that the cells of one texture are to take from another.
+
+A connected texture gives its own cells, any other the Voronoi cells of its points. Both are brought to the size of the cells
+that come, and go on beyond their picture (`continuation`); no picture is continued.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Labels
+from texrs.errors import InvalidInput
+from texrs.exemplar.cells import Cells
+from texrs.exemplar.contours import measure_moments, trace
+from texrs.layouts import PointLayout
+from texrs.papers.splice.cells.continuation import continue_cells
+
+__all__ = ["Tessellation", "take_cells", "take_points"]
+
+Points = NDArray[np.float64]
+
+MARGIN = 1.0
+"""Target cells are drawn up to so many of their sizes beyond the output, so that those at its border are whole."""
+SLIVER = 0.2
+"""Share of the median area below which a target cell is given to those beside it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tessellation:
+    """Where cells are wanted.
+
+    Attributes
+    ----------
+    labels : (H, W) int32
+        The target cell of each pixel, from 1, of the output and a margin around it.
+    margin : int
+        Pixels of the margin on each side.
+    outlines : (n, P, 2) float64
+        Outlines of the target cells, in the output.
+    centre : (n, 2) float64
+        Their centroids, in the output.
+    area : (n,) float64
+        In squared pixels.
+    scale : float
+        What the layout was scaled by.
+    continued : str
+        How it goes on beyond its picture: "lattice", "wrap", "quilted", "reflected", or "" where it covers the output.
+
+    """
+
+    labels: Labels
+    margin: int
+    outlines: NDArray[np.float64]
+    centre: Points
+    area: NDArray[np.float64]
+    scale: float
+    continued: str
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Rows and columns of the output."""
+        return self.labels.shape[0] - 2 * self.margin, self.labels.shape[1] - 2 * self.margin
+
+
+def take_cells(cells: Cells, wrap: tuple[bool, bool], size: tuple[int, int], unit: float, *, seed: int) -> Tessellation:
+    """Take the cells of a connected texture, at a median size of ``unit`` pixels.
+
+    Raises
+    ------
+    InvalidInput
+        Too few of its cells are whole.
+
+    """
+    margin = int(np.ceil(MARGIN * unit))
+    far = [n / 2 + margin + unit for n in size]
+    shapes, scale, continued = continue_cells(cells, wrap, (far[0] / unit, far[1] / unit), seed=seed)
+    outlines = shapes * unit + (np.array(size) - 1) / 2
+    labels = _paint(outlines + margin, (size[0] + 2 * margin, size[1] + 2 * margin))
+    return _finish(labels, margin, scale * unit, continued)
+
+
+def take_points(layout: PointLayout, size: tuple[int, int], unit: float) -> Tessellation:
+    """Take the Voronoi cells of a texture's points, at a median size of ``unit`` pixels."""
+    from scipy.spatial import cKDTree
+
+    # Of the layout as it goes on, so that the cells at its border are like the others.
+    low, high = layout.points.min(axis=0), layout.points.max(axis=0)
+    around = layout.within(low - 2 * layout.scale, high + 2 * layout.scale)[0]
+    grid = np.stack(
+        np.meshgrid(*(np.arange(a, b, layout.scale / 16) for a, b in zip(low, high, strict=True)), indexing="ij"), -1
+    )
+    owner = cKDTree(around).query(grid.reshape(-1, 2))[1]
+    inner = ((around >= low) & (around <= high)).all(axis=1)
+    counts = np.bincount(owner, minlength=len(around))[inner] * (layout.scale / 16) ** 2
+    scale = unit / float(np.sqrt(np.median(counts[counts > 0])))
+    margin = int(np.ceil(MARGIN * unit))
+    middle, centre = (np.array(size) - 1) / 2, (low + high) / 2
+    box = [(side * (middle + margin + 2 * unit)) / scale + centre for side in (-1, 1)]
+    wanted, _, mirrored = layout.within(*box)
+    if not len(wanted):
+        raise InvalidInput("b: its layout has no point within the output")
+    points = (wanted - centre) * scale + middle + margin
+    shape = (size[0] + 2 * margin, size[1] + 2 * margin)
+    pixels = np.stack(np.meshgrid(*(np.arange(n) for n in shape), indexing="ij"), -1).reshape(-1, 2)
+    labels = (cKDTree(points).query(pixels)[1] + 1).reshape(shape)
+    continued = "reflected" if mirrored.any() else ""
+    return _finish(labels.astype(np.int32), margin, scale, continued)
+
+
+def _paint(outlines: NDArray[np.float64], shape: tuple[int, int]) -> Labels:
+    """Return for each pixel the outline that it lies inside of; 0 where that is none, or several."""
+    from skimage.draw import polygon
+
+    labels, times = np.zeros(shape, np.int32), np.zeros(shape, np.uint8)
+    for number, outline in enumerate(outlines, start=1):
+        rows, columns = polygon(outline[:, 0], outline[:, 1], shape)
+        labels[rows, columns] = number
+        times[rows, columns] += 1
+    labels[times > 1] = 0
+    return labels
+
+
+def _finish(labels: Labels, margin: int, scale: float, continued: str) -> Tessellation:
+    """Keep one connected piece of each cell that is no sliver, give the rest to those beside it, and trace what is left."""
+    from scipy.ndimage import distance_transform_edt
+    from skimage.measure import label
+
+    pieces = label(labels, connectivity=1, background=0)
+    area = np.bincount(pieces.ravel())
+    area[0] = 0
+    keep = area >= SLIVER * np.median(area[area >= 0.1 * area.max()])
+    kept = np.where(keep, np.cumsum(keep), 0)[pieces]
+    nearest = distance_transform_edt(kept == 0, return_distances=False, return_indices=True)
+    labels = kept[tuple(nearest)].astype(np.int32)
+    labels = label(labels, connectivity=1, background=0).astype(np.int32)
+    outlines = trace(labels, np.arange(1, int(labels.max()) + 1)) - margin
+    moments = measure_moments(outlines)
+    return Tessellation(labels, margin, outlines, moments.centre, moments.area, scale, continued)
