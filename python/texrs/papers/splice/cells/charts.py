@@ -25,7 +25,7 @@ BAND = 0.12
 """Sizes of a cell beyond its outline that it is drawn for, so that it can be cut against those beside it."""
 JOINT = 0.25
 """Sizes from the outline within which distances to it are those of the target."""
-SLIDES, SLIDE = 3, 0.8
+SLIDES, SLIDE = 4, 0.9
 """Steps in which source points slide, and the share of what is missing that they go in each."""
 CORE, EDGE, STEEP = 0.8, 1.5, 0.4
 """What is deeper in the target than half of a joint, and so many pixels, is at least as deep as that in the source, and so much

@@ -125,8 +125,8 @@ def interpolate(at: Polygons, outline: Polygons, values: Polygons) -> NDArray[np
     after, length_after = np.roll(away, -1, axis=2), np.roll(length, -1, axis=2)
     cross = away[..., 0] * after[..., 1] - away[..., 1] * after[..., 0]
     dot = away[..., 0] * after[..., 0] + away[..., 1] * after[..., 1]
-    # tan of half the angle that an edge is seen under: (1 - cos) / sin.
-    seen = (length * length_after - dot) / np.where(np.abs(cross) > 1e-6, cross, np.inf)
+    # tan of half the angle that an edge is seen under: sin / (1 + cos). On an edge that is half a turn.
+    seen = cross / np.maximum(length * length_after + dot, np.float32(1e-6))
     weight = (np.roll(seen, 1, axis=2) + seen) / length
     total = weight.sum(axis=2, keepdims=True)
     weight /= np.where(np.abs(total) > 1e-12, total, 1)

@@ -11,10 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import as_image, guidance
 from texrs._engine.pyramid import ONE, Region
 from texrs._typing import Floats, Progress
 from texrs.elements import Elements
 from texrs.exemplar.cells import Cells
+from texrs.exemplar.shapes import mark_outlines
 from texrs.papers.splice.cells.charts import Charts
 from texrs.papers.splice.cells.joining import Joined
 from texrs.papers.splice.refine import Draft, Refinement, correct_draft
@@ -27,6 +29,9 @@ EDGE = 2.0
 """Pixels beside a joint that stay as they are, as joints do: these are lines, which the corrector would fray."""
 SMALLEST = 24.0
 """Size of a cell, in pixels, below which its windows hold more joint than cell."""
+GRAIN, FINE = 0.2, 2.0
+"""Least share of the variance inside of cells that must be finer than so many pixels: what is smooth, or one figure, as the
+bottom of a comb's cell, is stretched better than it is corrected."""
 LEAST = 0.01
 """Share of the output below which nothing is."""
 
@@ -54,7 +59,7 @@ def refine_charts(
     progress: Progress,
 ) -> tuple[Floats, Floats]:
     """Return places and frames, corrected where charts stretch A."""
-    if cells.size < SMALLEST:
+    if cells.size < SMALLEST or _measure_grain(a, cells) < GRAIN:
         return places, frames
     stretch = 1 / np.maximum(np.linalg.svd(frames, compute_uv=False)[..., -1], 1e-3)
     loose = (stretch > STRETCH) & (charts.depth[joined.pixel] > 0.5 * cells.joint_width + EDGE)
@@ -72,3 +77,15 @@ def refine_charts(
     refinement = TurnedRefinement(base.exemplar, draft, seed, base.coarsest, base.levels, turned)
     found = correct_draft(refinement, a.wrap, progress).astype(np.float32)
     return np.where(loose[..., None], found, places), np.where(loose[..., None, None], turned, frames)
+
+
+def _measure_grain(a: Elements, cells: Cells) -> float:
+    """Return the share of the variance of lightness inside of cells that is of fine grain."""
+    from scipy.ndimage import distance_transform_edt, gaussian_filter
+
+    light = guidance(as_image(a.image)).mean(axis=-1)
+    inside = distance_transform_edt(~mark_outlines(cells.labels)) > 0.5 * cells.joint_width + FINE
+    if not inside.any():
+        return 0.0
+    fine, slow = ((light - gaussian_filter(light, s))[inside] for s in (FINE, 0.5 * cells.size))
+    return float(fine.var() / max(float(slow.var()), 1e-12))

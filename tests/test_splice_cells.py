@@ -1,0 +1,207 @@
+"""Connected textures spliced by cells: where cells come to lie, what they show, and what a user may do wrong."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.ndimage import maximum_filter
+from scipy.spatial import cKDTree
+
+import texrs
+from test_cells import draw_voronoi
+from texrs import samples
+from texrs.elements import Elements, Layout
+from texrs.errors import InvalidInput
+from texrs.exemplar.cells import find_cells
+from texrs.exemplar.shapes import mark_outlines
+from texrs.papers.splice.cells import find_entry_cells
+from texrs.papers.splice.cells.outlines import interpolate, match_outlines
+from texrs.papers.splice.cells.tessellation import take_cells
+
+SIZE = (160, 160)
+
+
+def stones(seed: int = 0, *, apart: float = 30.0, light: bool = True) -> Elements:
+    image, truth = draw_voronoi(SIZE, apart, light=light, seed=seed)
+    mask = image < 200 if light else image > 40
+    pixels = np.argwhere(np.ones(SIZE))
+    points = np.stack([pixels[truth.ravel() == k].mean(axis=0) for k in np.unique(truth)])
+    width = int(apart) | 1
+    return Elements(image, points, mask, (width, width), Layout.JOINTED, np.ones(len(points)))
+
+
+STONES = stones()
+WALL = Elements.of_sample(samples.bricks((192, 192)))
+NET = Elements.of_sample(samples.net((192, 192)))
+DOTS = Elements.of_sample(samples.dots((160, 160)))
+
+
+@pytest.fixture(scope="module")
+def spliced() -> Any:
+    made: dict[tuple[str, str], texrs.Synthesis] = {}
+    entries = {"stones": STONES, "wall": WALL, "net": NET, "dots": DOTS}
+
+    def get(a: str, b: str) -> texrs.Synthesis:
+        if (a, b) not in made:
+            made[a, b] = texrs.splice(entries[a], entries[b], (176, 176), seed=1)
+        return made[a, b]
+
+    return get
+
+
+PAIRS = [("stones", "wall"), ("stones", "dots"), ("wall", "stones"), ("net", "stones")]
+
+
+@pytest.mark.parametrize(("a", "b"), PAIRS)
+def test_cells_are_where_they_are_wanted(a: str, b: str, spliced: Any) -> None:
+    report = spliced(a, b).report
+    assert report["method"] == "cells"
+    assert report["present"] >= 0.95
+    assert report["realised"] >= 0.85
+    away = [np.hypot(*np.subtract(m["found"], m["target"])) for m in report["matches"] if m["found"]]
+    assert np.median(away) <= 0.15 * report["cells"]["size"]
+
+
+@pytest.mark.parametrize(("a", "b"), [("stones", "wall"), ("stones", "dots")])
+def test_cells_are_found_again_in_the_picture(a: str, b: str, spliced: Any) -> None:
+    result = spliced(a, b)
+    unit = result.report["cells"]["size"]
+    goals = np.array([m["target"] for m in result.report["matches"]])
+    inside = ((goals > unit / 2) & (goals < 176 - unit / 2)).all(axis=1)
+    found = find_cells(result.image, size=0.8 * unit)
+    assert (cKDTree(found.centre).query(goals[inside])[0] <= 0.2 * unit).mean() >= 0.85
+
+
+@pytest.mark.parametrize(("a", "b"), PAIRS)
+def test_joints_are_unbroken_and_as_wide(a: str, b: str, spliced: Any) -> None:
+    entry = {"stones": STONES, "wall": WALL, "net": NET}[a]
+    cells, result = find_entry_cells(entry), spliced(a, b)
+    assert cells is not None
+    shown = result.source.render(cells.joints, interpolation="linear")
+    seams = mark_outlines(result.source.label.astype(np.int32))
+    assert (maximum_filter(shown, 5)[seams] < 0.5).mean() <= 0.08
+    share = [
+        (j > 0.5).sum() / mark_outlines(x).sum()
+        for j, x in ((cells.joints, cells.labels), (shown, result.source.label))
+    ]
+    # Cuts are more jagged than outlines, and so longer.
+    assert 0.65 <= share[1] / share[0] <= 1.33
+
+
+def test_the_result_is_a_source_map(spliced: Any) -> None:
+    result = spliced("stones", "wall")
+    assert (result.source.render(STONES.image) == result.image).all()
+    deep = STONES.image.astype(np.uint16) * 257
+    assert texrs.splice(replace(STONES, image=deep), WALL, (176, 176), seed=1).image.dtype == np.uint16
+    height = np.linspace(0, 1, STONES.image.size, dtype=np.float32).reshape(SIZE)
+    assert result.source.render(height).shape == (176, 176)
+    frames = result.source.frames()
+    # A map that is continuous inside of its cells, and whose frames are its slopes.
+    slope = np.diff(result.source.coordinates, axis=1)
+    same = np.diff(result.source.label.astype(int), axis=1) == 0
+    off = np.abs(slope - frames[:, :-1, :, 1]).max(axis=-1)[same]
+    assert np.median(off) < 0.2
+    assert (np.linalg.det(frames) > 0).mean() > 0.98, "nothing is mirrored"
+
+
+def test_labels_are_targets(spliced: Any) -> None:
+    result = spliced("stones", "dots")
+    assert result.source.label.min() >= 1
+    assert result.source.label.max() <= len(result.report["matches"])
+    m = result.report["matches"][int(result.source.label[88, 88]) - 1]
+    assert np.hypot(*np.subtract(m["target"], 88)) < 40
+
+
+def test_stages_and_report(spliced: Any) -> None:
+    result = spliced("stones", "wall")
+    names = ["cells of a", "layout of b", "target cells", "assignment", "cuts", "composite"]
+    assert list(result.stages) == names
+    assert all(stage.ndim >= 2 for stage in result.stages.values())
+    json.dumps(dict(result.report))
+
+
+def test_same_bytes_for_any_pool_and_seed_decides() -> None:
+    found = []
+    for count in (1, 2, 7):
+        with texrs.threads(count):
+            found.append(texrs.splice(STONES, DOTS, 96, seed=3).image.tobytes())
+    assert found[0] == found[1] == found[2]
+    assert texrs.splice(STONES, DOTS, 96, seed=4).image.tobytes() != found[0]
+
+
+def test_turns_only_where_allowed() -> None:
+    turned = texrs.splice(STONES, DOTS, 128, turns=True).report
+    assert any(m["turn"] for m in turned["matches"])
+    upright = texrs.splice(STONES, DOTS, 128, turns=False).report
+    assert not any(m["turn"] for m in upright["matches"])
+    lit = np.clip(STONES.image.astype(float) + 60 * np.gradient(STONES.image.astype(float), axis=0) / 40, 0, 255)
+    assert texrs.splice(replace(STONES, image=lit.astype(np.uint8)), DOTS, 96).report["turns"] in (True, False)
+
+
+def test_figures_are_bent_when_asked_for_and_where_no_cells_are() -> None:
+    assert texrs.splice(STONES, DOTS, 96, cells=False).report["method"] == "default"
+    noise = np.random.default_rng(0).integers(0, 255, SIZE).astype(np.uint8)
+    assert texrs.splice(replace(STONES, image=noise), DOTS, 96).report["method"] == "default"
+    assert texrs.splice(STONES, DOTS, 96, method="paper").report["method"] == "paper"
+    with pytest.raises(InvalidInput, match="cells"):
+        texrs.splice(replace(STONES, image=noise), DOTS, 96, cells=True)
+    with pytest.raises(InvalidInput, match="separate"):
+        texrs.splice(DOTS, STONES, 96, cells=True)
+
+
+def test_layouts_go_on_without_mirrors() -> None:
+    wall, few = find_entry_cells(WALL), find_entry_cells(STONES)
+    assert wall is not None
+    assert few is not None
+    far = take_cells(few, (False, False), (400, 400), 30.0, seed=0)
+    assert far.continued == "quilted"
+    assert 120 <= len(far.area) <= 420
+    assert abs(np.sqrt(np.median(far.area)) / 30 - 1) < 0.25
+    assert take_cells(few, (False, False), (30, 30), 30.0, seed=0).continued == ""
+    assert take_cells(few, (True, True), (400, 400), 30.0, seed=0).continued == "wrap"
+
+
+def test_work_can_be_watched_and_stopped() -> None:
+    seen: list[tuple[str, float]] = []
+    texrs.splice(STONES, DOTS, 96, progress=lambda stage, share: seen.append((stage, share)))
+    assert ("cells", 1.0) in seen
+
+    def stop(stage: str, share: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        texrs.splice(STONES, DOTS, 96, progress=stop)
+
+
+# --- outlines --------------------------------------------------------------------------------------------------------
+
+
+def ring(radius: Any, count: int = 48) -> Any:
+    turn = 2 * np.pi * np.arange(count) / count
+    return np.stack([radius * np.sin(turn), radius * np.cos(turn)], axis=-1)
+
+
+def test_an_outline_is_matched_with_itself() -> None:
+    turn = 2 * np.pi * np.arange(48) / 48
+    star = ring(10 + 3 * np.cos(3 * turn))[None]
+    found, cost = match_outlines(star, star, 20.0)
+    assert np.abs(found - star).max() < 1e-4
+    assert cost[0] < 1e-6
+
+
+def test_where_an_outline_begins_does_not_matter() -> None:
+    turn = 2 * np.pi * np.arange(48) / 48
+    star = ring(10 + 3 * np.cos(3 * turn))
+    found, _ = match_outlines(star[None], np.roll(star, 17, axis=0)[None], 20.0)
+    assert np.abs(found[0] - star).max() < 1e-4
+
+
+def test_mean_values_carry_linear_maps() -> None:
+    outline = ring(10.0)[None]
+    inside = np.random.default_rng(0).uniform(-6, 6, (1, 50, 2))
+    matrix = np.array([[1.2, 0.3], [-0.1, 0.8]])
+    assert np.abs(interpolate(inside, outline, outline @ matrix) - inside @ matrix).max() < 1e-3
