@@ -106,7 +106,7 @@ def test_any_dtype_gives_the_same_cells() -> None:
 
 def test_wrong_arguments_are_told() -> None:
     image = np.zeros((40, 40), np.uint8)
-    for wrong in ({"size": 1}, {"size": "big"}, {"joints": image}, {"polarity": 2}, {"joints": np.zeros((3, 3), bool)}):
+    for wrong in ({"size": 1}, {"size": "big"}, {"joints": image}, {"joints": np.zeros((3, 3), bool)}):
         with pytest.raises(InvalidInput):
             find_cells(image, **wrong)  # type: ignore[arg-type]
     with pytest.raises(InvalidInput):

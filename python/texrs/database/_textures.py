@@ -49,6 +49,8 @@ class SpliceOptions(TypedDict, total=False):
     method: Literal["paper", "preview"] | None
     align: bool
     snap_rows: bool
+    cells: bool | None
+    turns: bool | None
     refine: bool
 
 
@@ -288,7 +290,8 @@ class TextureDatabase:
         progress : callable, optional
             Called as ``progress(stage, share)``; raising stops the work.
         **options
-            What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``align``, ``snap_rows``, ``refine``.
+            What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``align``, ``snap_rows``,
+            ``cells``, ``turns``, ``refine``.
 
         Returns
         -------
@@ -329,7 +332,8 @@ class TextureDatabase:
         progress : callable, optional
             Called as ``progress("matrix", share)``; raising stops the work.
         **options
-            What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``align``, ``snap_rows``, ``refine``.
+            What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``align``, ``snap_rows``,
+            ``cells``, ``turns``, ``refine``.
 
         Returns
         -------

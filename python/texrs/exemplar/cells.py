@@ -1,4 +1,4 @@
-"""Cells of a connected texture: bricks between mortar, stones between gaps, meshes of wax, scales.
+"""Cells of a connected texture: bricks between mortar, stones between gaps, the cells of a comb, scales.
 
 The joints are lines that are darker than what they part, or lighter; which, and how far apart they are, is found: each
 polarity is tried at several sizes, and the tessellation is taken whose joints are closed, whose cells are free of joints,
@@ -9,7 +9,7 @@ that they have together, nor the size that others agree on speaks for two.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,10 +132,8 @@ class _Tessellation(NamedTuple):
     width: float
 
 
-def find_cells(
-    image: object, *, size: float | None = None, joints: object = None, polarity: Literal[-1, 1] | None = None
-) -> Cells:
-    """Find the cells of a connected texture (section 5 of the design of splicing by cells).
+def find_cells(image: object, *, size: float | None = None, joints: object = None) -> Cells:
+    """Find the cells of a connected texture.
 
     Parameters
     ----------
@@ -145,8 +143,6 @@ def find_cells(
         About how wide a cell is across its shorter axis, in pixels; found by default.
     joints : (H, W) array of bool, optional
         What is known of the joints: one more tessellation that is tried.
-    polarity : {None, -1, 1}
-        Whether joints are dark (-1) or light (1); found by default. With a size nothing is left to be tried.
 
     Returns
     -------
@@ -175,13 +171,11 @@ def find_cells(
         joints = np.asarray(joints)
         if joints.shape != light.shape or joints.dtype != np.bool_:
             raise InvalidInput(f"joints: needs bool of shape {light.shape}, got {joints.dtype} {joints.shape}")
-    if polarity not in (None, -1, 1):
-        raise InvalidInput(f"polarity: allowed are None, -1 and 1; got {polarity!r}")
     sizes = _list_sizes(light.shape)
     if size is not None:
         about = as_float(size, "size", 3, max(light.shape))
-        sizes = [about * STEP**k for k in (NEAR if polarity is None else (0.0,))]
-    tried = [_tessellate(light, s, p) for s in sizes for p in ((-1, 1) if polarity is None else (polarity,))]
+        sizes = [about * STEP**k for k in NEAR]
+    tried = [_tessellate(light, s, p) for s in sizes for p in (-1, 1)]
     if joints is not None and joints.any() and not joints.all():
         seen = _project(lab, joints)
         tried += [_tessellate_mask(joints, seen), *(_tessellate(seen, s, 1) for s in sizes)]
@@ -212,7 +206,7 @@ def _tessellate(light: Floats, size: float, polarity: int) -> _Tessellation:
     from skimage.segmentation import watershed
 
     shrink = min(1.0, WORKING / size)
-    small = light if shrink == 1 else _shrink(light, shrink)
+    small = _shrink(light, shrink)
     width = size * shrink
     relief = _measure_relief(-polarity * small, width)
     joint = relief > np.percentile(relief, JOINT)
@@ -241,8 +235,9 @@ def _tessellate_mask(joints: Bools, seen: Floats) -> _Tessellation:
     labels = watershed(away, pieces.reshape(joints.shape)).astype(np.int32)
     # What is said to be joint must look like it too: masks are often made by colours alone.
     width = float(np.sqrt(usual))
-    relief = _measure_relief(-seen, width)
-    return _judge(labels, relief / _find_threshold(relief), width, 1)
+    shrink = min(1.0, WORKING / width)
+    relief = _measure_relief(-_shrink(seen, shrink), width * shrink)
+    return _judge(labels, _resize(relief / _find_threshold(relief), joints.shape), width, 1)
 
 
 def _find_threshold(relief: Floats) -> float:
@@ -252,10 +247,16 @@ def _find_threshold(relief: Floats) -> float:
 
 
 def _shrink(light: Floats, factor: float) -> Floats:
+    return _resize(light, tuple(max(8, round(n * factor)) for n in light.shape)) if factor < 1 else light
+
+
+def _resize(values: Floats, shape: tuple[int, ...]) -> Floats:
     from skimage.transform import resize
 
-    shape = tuple(max(8, round(n * factor)) for n in light.shape)
-    return np.asarray(resize(light, shape, order=1, anti_aliasing=True, preserve_range=True), np.float32)
+    if values.shape == shape:
+        return values
+    smaller = shape[0] < values.shape[0]
+    return np.asarray(resize(values, shape, order=1, anti_aliasing=smaller, preserve_range=True), np.float32)
 
 
 def _measure_relief(light: Floats, width: float) -> Floats:
@@ -347,7 +348,6 @@ def _enlarge(found: _Tessellation, light: Floats) -> tuple[Labels, Floats]:
     """Return the labels at full resolution, their borders on the ridges of the joints there, and the joints' strength."""
     from scipy.ndimage import distance_transform_edt, gaussian_filter
     from skimage.segmentation import watershed
-    from skimage.transform import resize
 
     depth = distance_transform_edt(~mark_outlines(found.labels))
     seeds = np.where(depth > SURE * found.width, found.labels, 0)
@@ -360,7 +360,7 @@ def _enlarge(found: _Tessellation, light: Floats) -> tuple[Labels, Floats]:
         np.minimum(((np.arange(n) + 0.5) / f).astype(np.intp), m - 1)
         for n, m, f in zip(light.shape, seeds.shape, factor, strict=True)
     ]
-    relief = np.asarray(resize(found.relief, light.shape, order=1, preserve_range=True), np.float32)
+    relief = _resize(found.relief, light.shape)
     dark = gaussian_filter(found.polarity * light, 0.5 * max(factor))
     relief_here = relief + dark / max(float(dark.std()), 1e-6) * FINE
     labels = watershed(relief_here, seeds[at[0][:, None], at[1][None]]).astype(np.int32)

@@ -23,6 +23,8 @@ Departures, with their reasons:
   than a share of an element: else courses are torn where a layout has none.
 - Layouts grow until disjoint elements have room, and those that still collide are pushed apart: spacing alone makes chains.
 - Distances are squared in Eq. 4: the best matching then has no crossings.
+- Connected textures whose cells are found are put together from these, each in a cell of B's layout (`cells`): bending a
+  figure goes half of the way. What follows of connected figures is for those without, as nets of knots, and for `cells=False`.
 - Disjoint elements move whole, by whole pixels: Eq. 5 in the limit of its weights. The soft energy stretches components that
   hold two pins by dozens of pixels. The ground between them is harmonic, so nothing of it moves further than its elements, and
   so smooth that it is solved for at every other pixel.
@@ -108,7 +110,7 @@ def splice(
     turns : bool, optional
         Whether cells may be turned; by default where nothing tells ``a`` from itself upside down, as light and letters do.
     refine : bool
-        Whether to refine what is not rigid.
+        Whether to refine what is not rigid; by cells, what is stretched.
     progress : callable, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
 
@@ -116,7 +118,8 @@ def splice(
     -------
     Synthesis
         The picture; a source map of whole pixels of ``a``, whose label is the target (counted from 1, as in the report)
-        that a rigid pixel belongs to, or 0; pictures of the stages, drawn when they are looked at; and a report.
+        that a rigid pixel belongs to, or 0; pictures of the stages, drawn when they are looked at; and a report. By cells
+        (``report["method"]`` is "cells") the map lies between pixels, and each has its target.
 
     Raises
     ------
