@@ -25,6 +25,9 @@ BAND = 0.12
 """Sizes of a cell beyond its outline that it is drawn for, so that it can be cut against those beside it."""
 JOINT = 0.25
 """Sizes from the outline within which distances to it are those of the target."""
+SMOOTH = 0.06
+"""Standard deviation, in sizes, of the Gaussian that distances to outlines are smoothed by: within a joint outlines waver, and
+what follows them would. Both sides alike, so that corners meet corners."""
 SLIDES, SLIDE = 4, 0.9
 """Steps in which source points slide, and the share of what is missing that they go in each."""
 CORE, EDGE, STEEP = 0.8, 1.5, 0.4
@@ -83,7 +86,7 @@ def draw_charts(cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], ch
     """Draw the chart of each chosen target: the best of its shortlist, once outlines are matched."""
     unit, band = cells.size, max(2.0, BAND * cells.size)
     source, turn, scale, found = _choose(cells, wanted, chosen, choices, unit)
-    first, corner, sides, depth = _measure_depths(wanted, chosen, band)
+    first, corner, sides, depth = _measure_depths(wanted, chosen, band, max(1.0, SMOOTH * unit))
     which = np.repeat(np.arange(len(chosen)), np.diff(first))
     pixels = _list_pixels(first, corner, sides, which)
 
@@ -134,7 +137,7 @@ def _choose(
 
 
 def _measure_depths(
-    wanted: Tessellation, chosen: NDArray[np.intp], band: float
+    wanted: Tessellation, chosen: NDArray[np.intp], band: float, smooth: float
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], Floats]:
     """Return the box of each target in the output, and how deep inside the target each of its pixels lies."""
     from scipy.ndimage import distance_transform_edt, find_objects, gaussian_filter
@@ -146,7 +149,7 @@ def _measure_depths(
         box = boxes[target]
         inside = np.pad(wanted.labels[box] == target + 1, pad)
         signed = distance_transform_edt(inside) - distance_transform_edt(~inside)
-        signed = gaussian_filter(signed - 0.5 * np.sign(signed), 1.0)
+        signed = gaussian_filter(signed - 0.5 * np.sign(signed), smooth)
         first = np.array([s.start - pad - margin for s in box])
         low, high = np.maximum(first, 0), np.minimum(first + signed.shape, size)
         cut = tuple(slice(a - f, b - f) for a, b, f in zip(low, high, first, strict=True))
@@ -177,7 +180,7 @@ def _slide(
 ) -> NDArray[np.float64]:
     """Slide source points beside outlines until they are as deep inside the source as the pixels are inside the target."""
     shown, number = np.unique(source, return_inverse=True)
-    fields, corner = _measure_fields(cells, shown, int(np.ceil(2 * band)) + 2)
+    fields, corner = _measure_fields(cells, shown, int(np.ceil(2 * band)) + 2, max(1.0, SMOOTH * unit))
     reach = JOINT * unit
     joint = min(reach, 0.5 * cells.joint_width + EDGE)
     deepest = CORE * np.array([float(f[..., 0].max()) for f in fields], np.float32)
@@ -206,7 +209,9 @@ def _slide(
     return out
 
 
-def _measure_fields(cells: Cells, shown: NDArray[np.intp], pad: int) -> tuple[list[Floats], NDArray[np.float64]]:
+def _measure_fields(
+    cells: Cells, shown: NDArray[np.intp], pad: int, smooth: float
+) -> tuple[list[Floats], NDArray[np.float64]]:
     """Return of each cell the signed distance to its outline and its slopes, (h, w, 3), and the place of the first pixel."""
     from scipy.ndimage import distance_transform_edt, find_objects, gaussian_filter
 
@@ -217,7 +222,7 @@ def _measure_fields(cells: Cells, shown: NDArray[np.intp], pad: int) -> tuple[li
         # As if a cell at the border went on there: nothing is known of its joint.
         inside = np.pad(cells.labels[box] == row + 1, pad)
         signed = distance_transform_edt(inside) - distance_transform_edt(~inside)
-        signed = gaussian_filter(signed - 0.5 * np.sign(signed), 1.0)
+        signed = gaussian_filter(signed - 0.5 * np.sign(signed), smooth)
         slopes = np.gradient(signed)
         fields.append(np.ascontiguousarray(np.stack([signed, *slopes], axis=-1), np.float32))
         corners.append([s.start - pad for s in box])

@@ -30,8 +30,9 @@ REGULAR = 0.12
 """Root mean square distance of cells from their places on a lattice, in sizes, up to which they are continued on it."""
 DENSE = (0.6, 1.6)
 """Least and greatest area of a lattice's cell, in squared sizes, for it to be of the cells."""
-DRAWN = 20.0
-"""Pixels that a cell is wide in the drawing of the joints."""
+DRAWN, LARGE = (16.0, 32.0), 400.0
+"""Pixels that a cell is wide in the drawing of the joints, at least and at most, and the side of the drawing beyond which they
+are fewer."""
 LINE = 0.17
 """How far from an outline the drawing of the joints reaches, in sizes."""
 TRIALS, FINE = 3, 0.03
@@ -131,20 +132,21 @@ def _continue_on_lattice(
 
 def _grow(cells: Cells, far: tuple[float, float], seed: int) -> NDArray[np.float64]:
     """Quilt a drawing of the joints, and take what lies between them for cells: of a few quilts the one least torn."""
-    size = (round(2 * far[0] * DRAWN), round(2 * far[1] * DRAWN))
-    drawing = _draw(cells)
+    unit = float(np.clip(LARGE / (2 * max(far)), *DRAWN))
+    size = (round(2 * far[0] * unit), round(2 * far[1] * unit))
+    drawing = _draw(cells, unit)
     best, least = np.zeros((0, 0, 2)), np.inf
     for attempt in range(TRIALS):
-        labels = _quilt(drawing, size, seed + attempt)
-        torn = _measure_torn(labels)
+        labels = _quilt(drawing, size, unit, seed + attempt)
+        torn = _measure_torn(labels, unit)
         if torn < least:
             best, least = trace(labels, np.arange(1, int(labels.max()) + 1)), torn
         if torn <= FINE:
             break
-    return (best - (np.array(size) - 1) / 2) / DRAWN
+    return (best - (np.array(size) - 1) / 2) / unit
 
 
-def _quilt(drawing: Floats, size: tuple[int, int], seed: int) -> Labels:
+def _quilt(drawing: Floats, size: tuple[int, int], unit: float, seed: int) -> Labels:
     """Return the cells of a quilt of the drawing."""
     from skimage.segmentation import watershed
 
@@ -152,8 +154,8 @@ def _quilt(drawing: Floats, size: tuple[int, int], seed: int) -> Labels:
     grown = quilt(
         [picture],
         size,
-        patch=round(PATCH * DRAWN),
-        overlap=round(OVERLAP * DRAWN),
+        patch=round(PATCH * unit),
+        overlap=round(OVERLAP * unit),
         wrap=(False, False),
         shares=np.ones(1),
         seed=seed,
@@ -163,24 +165,24 @@ def _quilt(drawing: Floats, size: tuple[int, int], seed: int) -> Labels:
     # Lines that a seam has cut end somewhere, and part nothing; narrow gaps in others are closed, and cells parted at necks.
     pieces = split_touching(drawn > CLOSED, np.zeros_like(drawn))
     area = np.bincount(pieces.ravel())
-    pieces[area[pieces] < LEAST * DRAWN**2] = 0
+    pieces[area[pieces] < LEAST * unit**2] = 0
     _, seeds = np.unique(pieces, return_inverse=True)
     return np.asarray(watershed(1 - drawn, seeds.reshape(drawn.shape)), np.int32)
 
 
-def _measure_torn(labels: Labels) -> float:
+def _measure_torn(labels: Labels, unit: float) -> float:
     """Return the share of the area in cells that seams have run together, or left with dents."""
     shapes = Shapes.of(labels)
     area, solid = shapes.area[1:], shapes.measure_solidity()[1:]
-    odd = (solid < SOLID) | (area > HUGE * DRAWN**2)
+    odd = (solid < SOLID) | (area > HUGE * unit**2)
     return float(area[odd].sum() / area.sum())
 
 
-def _draw(cells: Cells) -> Floats:
+def _draw(cells: Cells, unit: float) -> Floats:
     """Draw the distance to outlines, 0 on them and 1 from a little inside on, at a fixed size of cells."""
     from scipy.ndimage import distance_transform_edt
     from skimage.transform import resize
 
     depth = distance_transform_edt(~mark_outlines(cells.labels)) / (LINE * cells.size)
-    shape = tuple(max(16, round(n * DRAWN / cells.size)) for n in cells.labels.shape)
+    shape = tuple(max(16, round(n * unit / cells.size)) for n in cells.labels.shape)
     return np.asarray(resize(np.clip(depth, 0, 1), shape, order=1, anti_aliasing=True), np.float32).clip(0, 1)

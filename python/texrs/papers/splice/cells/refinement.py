@@ -29,7 +29,7 @@ EDGE = 2.0
 """Pixels beside a joint that stay as they are, as joints do: these are lines, which the corrector would fray."""
 SMALLEST = 24.0
 """Size of a cell, in pixels, below which its windows hold more joint than cell."""
-GRAIN, FINE = 0.2, 2.0
+GRAIN, FINE = 0.24, 2.0
 """Least share of the variance inside of cells that must be finer than so many pixels: what is smooth, or one figure, as the
 bottom of a comb's cell, is stretched better than it is corrected."""
 LEAST = 0.01
