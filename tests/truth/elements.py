@@ -94,13 +94,15 @@ def splice_separate_elements() -> Parts:
 
 @case
 def splice_a_connected_figure() -> Parts:
-    result = texrs.splice(entry("net", 128, 128), entry("pebbles", 128, 128, seed=1), (112, 128), seed=1)
+    result = texrs.splice(entry("net", 128, 128), entry("pebbles", 128, 128, seed=1), (112, 128), cells=False, seed=1)
     return parts_of(result, report=SPLICED, stages=("filled",))
 
 
 @case
 def splice_jointed_elements() -> Parts:
-    result = texrs.splice(entry("bricks", 128, 112), entry("dots", 128, 128, seed=1), snap_rows=True, seed=1)
+    result = texrs.splice(
+        entry("bricks", 128, 112), entry("dots", 128, 128, seed=1), snap_rows=True, cells=False, seed=1
+    )
     return parts_of(result, report=SPLICED, stages=("filled",))
 
 

@@ -30,12 +30,12 @@ REGULAR = 0.12
 """Root mean square distance of cells from their places on a lattice, in sizes, up to which they are continued on it."""
 DENSE = (0.6, 1.6)
 """Least and greatest area of a lattice's cell, in squared sizes, for it to be of the cells."""
-DRAWN, LARGE = (16.0, 32.0), 400.0
+DRAWN, LARGE = (16.0, 28.0), 320.0
 """Pixels that a cell is wide in the drawing of the joints, at least and at most, and the side of the drawing beyond which they
 are fewer."""
 LINE = 0.17
 """How far from an outline the drawing of the joints reaches, in sizes."""
-TRIALS, FINE = 3, 0.03
+TRIALS, FINE = 2, 0.03
 """Quilts that are tried at the most, and the share of torn cells with which one is taken at once."""
 SOLID, HUGE = 0.8, 3.0
 """Solidity below which, and squared sizes beyond which, a cell of a quilt is taken for torn."""
