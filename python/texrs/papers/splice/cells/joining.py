@@ -17,8 +17,10 @@ from texrs.papers.splice.cells.charts import BAND, Charts
 
 __all__ = ["Joined", "join"]
 
-COLOUR, DEPTH = 1.0, 12.0
+COLOUR, DEPTH = 1.0, 30.0
 """What a seam costs by the colours on both sides, in standard deviations, and by how deep inside of a cell it lies."""
+STEEP, DEEP = 4.0, 6.0
+"""Depth at a whole joint's width from the middle of a joint, and the one from which on all is equally deep."""
 CORE = 0.5
 """Bands inside of its outline from which on a cell keeps its pixels."""
 
@@ -49,8 +51,8 @@ def join(image: Array, cells: Cells, charts: Charts, size: tuple[int, int]) -> J
     far = distance_transform_edt(~mark_outlines(cells.labels)).astype(np.float32)
     looked = gather(np.dstack([colours, far]), charts.places[None], interpolation="linear")[0]
     band = max(2.0, BAND * cells.size)
-    # The cheapest place is the joint, as wide as the band; deeper inside all is equally bad.
-    inside = np.clip(looked[:, -1] / (0.5 * cells.joint_width + 0.5) - 1, 0, 3)
+    # The cheapest place is a joint.
+    inside = np.clip(STEEP * (looked[:, -1] / (0.5 * cells.joint_width + 0.5) - 1), 0, DEEP)
     samples = Samples(np.ascontiguousarray(looked[:, :-1]), np.ascontiguousarray(inside), (COLOUR, DEPTH))
     pixel = np.full(size, FREE, np.uint32)
     seams = np.zeros((*size, 2), np.float32)
