@@ -83,13 +83,13 @@ def test_joints_are_unbroken_and_as_wide(a: str, b: str, spliced: Any) -> None:
     assert cells is not None
     shown = result.source.render(cells.joints, interpolation="linear")
     seams = mark_outlines(result.source.label.astype(np.int32))
-    assert (maximum_filter(shown, 5)[seams] < 0.5).mean() <= 0.08
+    assert (maximum_filter(shown, 5)[seams] < 0.5).mean() <= 0.06
     share = [
         (j > 0.5).sum() / mark_outlines(x).sum()
         for j, x in ((cells.joints, cells.labels), (shown, result.source.label))
     ]
     # Cuts are more jagged than outlines, and so longer.
-    assert 0.65 <= share[1] / share[0] <= 1.33
+    assert 0.7 <= share[1] / share[0] <= 1.33
 
 
 def test_the_result_is_a_source_map(spliced: Any) -> None:
@@ -138,8 +138,6 @@ def test_turns_only_where_allowed() -> None:
     assert any(m["turn"] for m in turned["matches"])
     upright = texrs.splice(STONES, DOTS, 128, turns=False).report
     assert not any(m["turn"] for m in upright["matches"])
-    lit = np.clip(STONES.image.astype(float) + 60 * np.gradient(STONES.image.astype(float), axis=0) / 40, 0, 255)
-    assert texrs.splice(replace(STONES, image=lit.astype(np.uint8)), DOTS, 96).report["turns"] in (True, False)
 
 
 def test_figures_are_bent_when_asked_for_and_where_no_cells_are() -> None:
@@ -154,8 +152,7 @@ def test_figures_are_bent_when_asked_for_and_where_no_cells_are() -> None:
 
 
 def test_layouts_go_on_without_mirrors() -> None:
-    wall, few = find_entry_cells(WALL), find_entry_cells(STONES)
-    assert wall is not None
+    few = find_entry_cells(STONES)
     assert few is not None
     far = take_cells(few, (False, False), (400, 400), 30.0, seed=0)
     assert far.continued == "quilted"

@@ -47,7 +47,7 @@ CLEAR, SPREAD = 0.2, 0.2
 below which cells are alike."""
 EVEN, WIDTH = 0.38, 0.04
 """Score at which a texture is as likely to have cells as not, and what it differs by at odds of 2.7 to 1: of 19 textures with
-cells 17 lie above, of 15 without none."""
+cells 17 lie above, of 12 without none. Chosen on these very textures."""
 SURE, FINE = 0.15, 0.3
 """Widths from an outline from which on a pixel belongs to its cell also at full resolution, and how much the light of the
 full resolution says there against the strength of the joints."""
