@@ -7,16 +7,15 @@ together speaks for two things.
 
 from __future__ import annotations
 
-from heapq import heapify, heappop, heappush
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from texrs._typing import Bools, Floats, Labels
-from texrs.exemplar.shapes import Shapes, renumber
+from texrs.exemplar.merging import join_least_parted
+from texrs.exemplar.shapes import Shapes, list_borders, renumber
 
-__all__ = ["fill_crescents", "find_elements", "list_borders", "split_touching"]
+__all__ = ["fill_crescents", "find_elements", "split_touching"]
 
 NECK = 1.25
 """How many times wider than the neck between them two parts must be to be split there."""
@@ -114,70 +113,21 @@ def _measure_maxima(values: Floats, labels: Labels, count: int) -> Floats:
     return result
 
 
-def list_borders(labels: Labels) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the flat places of all neighbours along rows and columns whose labels differ."""
-    place = np.arange(labels.size).reshape(labels.shape)
-    first = [place[:-1].ravel(), place[:, :-1].ravel()]
-    second = [place[1:].ravel(), place[:, 1:].ravel()]
-    a, b = np.concatenate(first), np.concatenate(second)
-    flat = labels.ravel()
-    differ = flat[a] != flat[b]
-    return a[differ], b[differ]
-
-
 def _join_parts(parts: Labels, relief: Floats) -> Labels:
     """Join parts, those with the least between them first, until all that are left are parted by evidence."""
-    a, b = list_borders(parts)
-    flat, height = parts.ravel(), np.minimum(relief.ravel(), DEEP)
-    both = (flat[a] > 0) & (flat[b] > 0)
-    a, b = a[both], b[both]
-    low, high = np.minimum(flat[a], flat[b]), np.maximum(flat[a], flat[b])
-    strength = np.maximum(height[a], height[b])
-    borders: dict[int, dict[int, tuple[float, int]]] = {}
-    keys, where = np.unique(low.astype(np.int64) << 32 | high, return_inverse=True)
-    sums, lengths = np.bincount(where, strength), np.bincount(where)
-    for key, total, length in zip(keys.tolist(), sums.tolist(), lengths.tolist(), strict=True):
-        borders.setdefault(key >> 32, {})[key & 0xFFFFFFFF] = (total, length)
-        borders.setdefault(key & 0xFFFFFFFF, {})[key >> 32] = (total, length)
     shapes = Shapes.of(parts)
-    perimeter = np.bincount(np.concatenate([flat[side] for side in list_borders(parts)]), minlength=len(shapes.area))
-    into = np.arange(len(shapes.area), dtype=np.int32)
+    perimeter = np.bincount(np.concatenate([parts.ravel()[s] for s in list_borders(parts)]), minlength=len(shapes.area))
 
-    def weigh(one: Any, other: Any, mean: Any, share: Any) -> Any:
+    def weigh(one: Any, other: Any, total: Any, length: Any) -> Any:
         apart, together = shapes.compare_solidity(one, other)
-        return mean + CONVEXITY * (apart - together) - share
+        share = length / np.minimum(perimeter[one], perimeter[other])
+        return total / length + CONVEXITY * (apart - together) - share
 
-    one, other = (keys >> 32).astype(np.intp), (keys & 0xFFFFFFFF).astype(np.intp)
-    least = np.minimum(perimeter[one], perimeter[other])
-    first = weigh(one, other, sums / lengths, lengths / least).tolist()
-    scores = dict(zip(zip(one.tolist(), other.tolist(), strict=True), first, strict=True))
-    # Entries of pairs that were weighed anew, or are no more, stay behind and are passed over.
-    queue = [(score, pair) for pair, score in scores.items()]
-    heapify(queue)
-    while queue:
-        score, (p, q) = heappop(queue)
-        if scores.get((p, q)) != score:
-            continue
-        if score >= PARTED:
-            break
-        shapes.join(p, q)
-        perimeter[p] += perimeter[q] - 2 * borders[p][q][1]
-        into[into == q] = p
-        for r, (total, length) in borders.pop(q).items():
-            del borders[r][q]
-            scores.pop((min(q, r), max(q, r)))
-            if r != p:
-                before = borders[p].get(r, (0.0, 0))
-                borders[p][r] = borders[r][p] = (before[0] + total, before[1] + length)
-        near = sorted(borders[p])
-        if near:
-            totals, borderings = np.array([borders[p][r] for r in near]).T
-            least = np.minimum(perimeter[p], perimeter[near])
-            again = weigh(p, np.array(near), totals / borderings, borderings / least).tolist()
-            for r, value in zip(near, again, strict=True):
-                scores[min(p, r), max(p, r)] = value
-                heappush(queue, (value, (min(p, r), max(p, r))))
-    return into[parts]
+    def join(one: int, other: int, length: int) -> None:
+        shapes.join(one, other)
+        perimeter[one] += perimeter[other] - 2 * length
+
+    return join_least_parted(parts, np.minimum(relief, DEEP), weigh, join, below=PARTED)[parts]
 
 
 def _fill_holes(elements: Labels) -> Labels:
