@@ -19,7 +19,7 @@ from texrs.errors import InvalidInput
 from texrs.exemplar.cells import find_cells
 from texrs.exemplar.shapes import mark_outlines
 from texrs.papers.splice.cells import find_entry_cells
-from texrs.papers.splice.cells.outlines import interpolate, match_outlines
+from texrs.papers.splice.cells.outlines import interpolate, match_outlines, rematch_outlines
 from texrs.papers.splice.cells.tessellation import take_cells
 
 SIZE = (160, 160)
@@ -185,16 +185,20 @@ def ring(radius: Any, count: int = 48) -> Any:
 def test_an_outline_is_matched_with_itself() -> None:
     turn = 2 * np.pi * np.arange(48) / 48
     star = ring(10 + 3 * np.cos(3 * turn))[None]
-    found, cost = match_outlines(star, star, 20.0)
-    assert np.abs(found - star).max() < 1e-4
-    assert cost[0] < 1e-6
+    found = match_outlines(star, star, 20.0)
+    assert np.abs(found.locate(star) - star).max() < 1e-4
+    assert found.cost[0] < 1e-6
 
 
 def test_where_an_outline_begins_does_not_matter() -> None:
     turn = 2 * np.pi * np.arange(48) / 48
-    star = ring(10 + 3 * np.cos(3 * turn))
-    found, _ = match_outlines(star[None], np.roll(star, 17, axis=0)[None], 20.0)
-    assert np.abs(found[0] - star).max() < 1e-4
+    star = ring(10 + 3 * np.cos(3 * turn))[None]
+    other = np.roll(star, 17, axis=1)
+    for found in (
+        match_outlines(star, other, 20.0),
+        rematch_outlines(star, other, 20.0, match_outlines(star, other, 20.0)),
+    ):
+        assert np.abs(found.locate(other) - star).max() < 1e-4
 
 
 def test_mean_values_carry_linear_maps() -> None:

@@ -114,7 +114,7 @@ def splice_cells(
     watch("cells", 0.6)
     joined = join(a.image, cells, charts, size)
     watch("cells", 1.0)
-    places, frames = charts.places[joined.pixel], charts.frames[joined.pixel]
+    places, frames = charts.places[joined.pixel], charts.measure_frames(joined.pixel, joined.chart)
     if refine:
         places, frames = refine_charts(a, cells, charts, joined, places, frames, seed, watch)
     source = SourceMap.from_coordinates(
@@ -156,7 +156,7 @@ def _find_places(cells: Cells, charts: Charts, joined: Joined) -> NDArray[np.flo
     order = np.lexsort((far, chart))
     names, first = np.unique(chart[order], return_index=True)
     best = order[first]
-    inverse = np.linalg.pinv(charts.frames[pixel[best]].astype(np.float64))
+    inverse = np.linalg.pinv(charts.measure_frames(pixel[best], names).astype(np.float64))
     at = np.stack(np.divmod(best, shape[1]), axis=-1) - np.einsum("nij,nj->ni", inverse, off[best])
     out = np.full((len(charts.target), 2), np.nan)
     out[names] = np.where((far[best] <= HERE * cells.size)[:, None], at, np.nan)

@@ -8,15 +8,16 @@ source's own outline until they are as far from it as the pixel is from the targ
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._typing import Floats
+from texrs._typing import Floats, Labels
 from texrs.exemplar.cells import Cells
 from texrs.kernels.gather import gather
 from texrs.papers.splice.cells.choice import Shortlist
-from texrs.papers.splice.cells.outlines import interpolate, match_outlines
+from texrs.papers.splice.cells.outlines import Matched, interpolate, match_outlines, rematch_outlines
 from texrs.papers.splice.cells.tessellation import Tessellation
 
 __all__ = ["Charts", "draw_charts"]
@@ -36,6 +37,8 @@ deeper for each pixel; but no deeper than a share of the source's greatest depth
 GRID, KNOT = (6, 20), 3.0
 """Places along each side of the box of a cell at which displacements are interpolated, linearly between them: fewest and most,
 and pixels from one to the next."""
+GROUP = 128
+"""Targets that are drawn at once: of more, what is looked at on the way would take as much memory as hundreds of pictures."""
 MISFIT = 2.0
 """Weight of the root of an outline's matching cost against the cost of the shortlist."""
 
@@ -60,8 +63,6 @@ class Charts:
         How far inside the target each pixel lies; less than 0 outside.
     places : (n, 2) float32
         Where in A each pixel looks.
-    frames : (n, 2, 2) float32
-        The Jacobian there.
 
     """
 
@@ -74,49 +75,73 @@ class Charts:
     sides: NDArray[np.intp]
     depth: Floats
     places: Floats
-    frames: Floats
 
     def box(self, k: int) -> tuple[slice, slice]:
         """Return where a box lies in the output."""
         (top, left), (rows, columns) = self.corner[k], self.sides[k]
         return slice(int(top), int(top + rows)), slice(int(left), int(left + columns))
 
+    def measure_frames(self, pixel: NDArray[np.integer], chart: NDArray[np.integer]) -> Floats:
+        """Return the Jacobians, (..., 2, 2), at some pixels of the row, each of a given box: central differences."""
+        number, sides = pixel - self.first[chart], self.sides[chart]
+        at = np.divmod(number, sides[..., 1])
+        frames = np.zeros((*number.shape, 2, 2), np.float32)
+        for axis, step in enumerate((sides[..., 1], 1)):
+            ahead, behind = at[axis] < sides[..., axis] - 1, at[axis] > 0
+            far = np.maximum(ahead.astype(np.float32) + behind, 1)
+            slope = self.places[pixel + ahead * step] - self.places[pixel - behind * step]
+            frames[..., axis] = slope / far[..., None]
+        return frames
+
 
 def draw_charts(cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], choices: Shortlist) -> Charts:
     """Draw the chart of each chosen target: the best of its shortlist, once outlines are matched."""
     unit, band = cells.size, max(2.0, BAND * cells.size)
-    source, turn, scale, found = _choose(cells, wanted, chosen, choices, unit)
+    groups = [slice(k, k + GROUP) for k in range(0, len(chosen), GROUP)]
+    parts = [_choose(cells, wanted, chosen[g], choices.part(g), unit) for g in groups]
+    source, turn, scale, found = (np.concatenate(p) for p in zip(*parts, strict=True))
     first, corner, sides, depth = _measure_depths(wanted, chosen, band, max(1.0, SMOOTH * unit))
-    which = np.repeat(np.arange(len(chosen)), np.diff(first))
-    pixels = _list_pixels(first, corner, sides, which)
+    charts = Charts(chosen, source, turn, scale, first, corner, sides, depth, np.empty((len(depth), 2), np.float32))
+    count = int(np.clip(np.ceil(np.median(sides) / KNOT), *GRID))
+    shown, number = np.unique(source, return_inverse=True)
+    fields = _measure_fields(cells, shown, int(np.ceil(2 * band)) + 2, max(1.0, SMOOTH * unit))
+    for group in groups:
+        _draw(cells, wanted, charts, group, found[group], fields, number, count)
+    return charts
+
+
+def _draw(
+    cells: Cells,
+    wanted: Tessellation,
+    charts: Charts,
+    group: slice,
+    found: NDArray[np.float64],
+    fields: Fields,
+    number: NDArray[np.intp],
+    count: int,
+) -> None:
+    """Find where the pixels of some boxes look."""
+    sides, corner, source = charts.sides[group], charts.corner[group], charts.source[group]
+    pixels = slice(charts.first[group][0], charts.first[group.start + len(sides)])
+    which = np.repeat(np.arange(len(sides)), sides.prod(axis=1))
+    at = _list_pixels(sides, which)
 
     # Displacement of the outline, carried to a grid over each box, and from there to its pixels.
-    goal, middle = wanted.outlines[chosen], wanted.centre[chosen]
-    count = int(np.clip(np.ceil(np.median(sides) / KNOT), *GRID))
+    goal, middle = wanted.outlines[charts.target[group]], wanted.centre[charts.target[group]]
     step = np.maximum(sides - 1, 1) / (count - 1)
     knots = np.stack(np.meshgrid(np.arange(count), np.arange(count), indexing="ij"), -1).reshape(1, -1, 2)
     grid = interpolate(corner[:, None] + knots * step[:, None], goal, found - (goal - middle[:, None]))
-    at = np.asarray((pixels - corner[which]) / step[which], np.float32)
+    knot = np.asarray(at / step[which], np.float32)
+    knot[:, 0] += which * count
     tall = np.ascontiguousarray(grid.reshape(-1, count, 2))
-    at[:, 0] += which * count
-    moved = pixels - middle[which] + gather(tall, at[None], interpolation="linear")[0]
+    moved = at + (corner - middle)[which] + gather(tall, knot[None], interpolation="linear")[0]
 
     # Back through the turn and the scale.
-    angle = np.radians(turn)
-    cos, sin = np.cos(angle)[which], np.sin(angle)[which]
-    row, column = moved[:, 0] / scale[which], moved[:, 1] / scale[which]
-    places = np.stack([cos * row - sin * column, sin * row + cos * column], axis=-1) + cells.centre[source[which]]
-    places = _slide(cells, source, which, depth, places, unit, band)
-    limits = np.array(cells.labels.shape, np.float32) - 1
-    looked = np.clip(places, 0, limits).astype(np.float32)
-    frames = np.empty((len(looked), 2, 2), np.float32)
-    for k, (rows, columns) in enumerate(sides.tolist()):
-        here = slice(first[k], first[k + 1])
-        block = looked[here].reshape(rows, columns, 2)
-        for axis, n in enumerate((rows, columns)):
-            slope = np.asarray(np.gradient(block, axis=axis)) if n > 1 else np.zeros_like(block)
-            frames[here, :, axis] = slope.reshape(-1, 2)
-    return Charts(chosen, source, turn, scale, first, corner, sides, depth, looked, frames)
+    angle = np.radians(charts.turn[group])
+    inverse = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]) / charts.scale[group]
+    places = np.einsum("na,abn->nb", moved, inverse[:, :, which]) + cells.centre[source][which]
+    places = _slide(cells, fields, number[group][which], charts.depth[pixels], places)
+    charts.places[pixels] = np.clip(places, 0, np.array(cells.labels.shape, np.float32) - 1)
 
 
 def _choose(
@@ -129,27 +154,27 @@ def _choose(
     away = cells.outlines[source] - cells.centre[source][:, None]
     cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
     turned = np.stack([cos * away[..., 0] + sin * away[..., 1], cos * away[..., 1] - sin * away[..., 0]], axis=-1)
-    goal = np.repeat(wanted.outlines[chosen] - wanted.centre[chosen][:, None], k, axis=0)
-    found, misfit = match_outlines(goal, turned * scale[:, None, None], unit)
-    cost = choices.cost + MISFIT * np.sqrt(np.maximum(misfit, 0)).reshape(count, k)
+    turned *= scale[:, None, None]
+    goal = wanted.outlines[chosen] - wanted.centre[chosen][:, None]
+    found = match_outlines(np.repeat(goal, k, axis=0), turned, unit)
+    cost = choices.cost + MISFIT * np.sqrt(np.maximum(found.cost, 0)).reshape(count, k)
     best = np.arange(count) * k + cost.argmin(axis=1)
-    return source[best], turn[best], scale[best], found[best]
+    final = rematch_outlines(goal, turned[best], unit, Matched(found.places[best], found.cost[best]))
+    return source[best], turn[best], scale[best], final.locate(turned[best])
 
 
 def _measure_depths(
     wanted: Tessellation, chosen: NDArray[np.intp], band: float, smooth: float
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], Floats]:
     """Return the box of each target in the output, and how deep inside the target each of its pixels lies."""
-    from scipy.ndimage import distance_transform_edt, find_objects, gaussian_filter
+    from scipy.ndimage import find_objects
 
     boxes, pad = find_objects(wanted.labels), int(np.ceil(band)) + 2
     size, margin = wanted.size, wanted.margin
     corners, sides, depths = [], [], []
     for target in chosen.tolist():
         box = boxes[target]
-        inside = np.pad(wanted.labels[box] == target + 1, pad)
-        signed = distance_transform_edt(inside) - distance_transform_edt(~inside)
-        signed = gaussian_filter(signed - 0.5 * np.sign(signed), smooth)
+        signed = _measure_depth(wanted.labels, target + 1, box, pad, smooth)
         first = np.array([s.start - pad - margin for s in box])
         low, high = np.maximum(first, 0), np.minimum(first + signed.shape, size)
         cut = tuple(slice(a - f, b - f) for a, b, f in zip(low, high, first, strict=True))
@@ -160,42 +185,32 @@ def _measure_depths(
     return first_pixel, np.array(corners), np.array(sides), np.concatenate(depths)
 
 
-def _list_pixels(
-    first: NDArray[np.intp], corner: NDArray[np.intp], sides: NDArray[np.intp], which: NDArray[np.intp]
-) -> NDArray[np.float64]:
-    """Return the place in the output of each pixel of the row."""
+def _list_pixels(sides: NDArray[np.intp], which: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Return the place of each pixel in its box, of boxes that lie in one row."""
+    first = np.concatenate([[0], np.cumsum(sides.prod(axis=1))])
     number = np.arange(len(which)) - first[which]
-    width = sides[which, 1]
-    return np.stack([number // width, number % width], axis=-1) + corner[which].astype(np.float64)
+    return np.stack(np.divmod(number, sides[which, 1]), axis=-1).astype(np.float64)
 
 
 def _slide(
-    cells: Cells,
-    source: NDArray[np.intp],
-    which: NDArray[np.intp],
-    depth: Floats,
-    places: NDArray[np.float64],
-    unit: float,
-    band: float,
+    cells: Cells, fields: Fields, kind: NDArray[np.intp], depth: Floats, places: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Slide source points beside outlines until they are as deep inside the source as the pixels are inside the target."""
-    shown, number = np.unique(source, return_inverse=True)
-    fields, corner = _measure_fields(cells, shown, int(np.ceil(2 * band)) + 2, max(1.0, SMOOTH * unit))
+    unit = cells.size
     reach = JOINT * unit
     joint = min(reach, 0.5 * cells.joint_width + EDGE)
-    deepest = CORE * np.array([float(f[..., 0].max()) for f in fields], np.float32)
-    kept = np.flatnonzero(depth > -band - 2)
-    kind = number[which[kept]]
-    at = np.asarray(places[kept] - corner[kind], np.float32)
+    kept = np.flatnonzero(depth > -max(2.0, BAND * unit) - 2)
+    kind = kind[kept]
+    at = np.asarray(places[kept] - fields.corner[kind], np.float32)
 
     def measure(at: Floats, kind: NDArray[np.intp]) -> Floats:
-        return np.asarray(gather(fields, at[None], kind[None].astype(np.uint16))[0], np.float32)
+        return np.asarray(gather(fields.values, at[None], kind[None].astype(np.uint16))[0], np.float32)
 
     # Beside the outline as deep as the target is, farther inside as deep as they are, but never in the joint again.
     inside, before = depth[kept], measure(at, kind)[:, 0]
     weight = np.clip(1.3 - np.abs(inside) / reach, 0, 1)
     weight = weight * weight * (3 - 2 * weight)
-    least = np.minimum(np.minimum(inside, joint + STEEP * (inside - joint)), deepest[kind])
+    least = np.minimum(np.minimum(inside, joint + STEEP * (inside - joint)), CORE * fields.deepest[kind])
     wanted = np.maximum(before + weight * (inside - before), least)
     near = np.flatnonzero(np.abs(wanted - before) > 0.01)
     kind, wanted = kind[near], wanted[near]
@@ -205,25 +220,48 @@ def _slide(
         missing = np.clip(wanted - field[:, 0], -reach, reach)
         moved = moved + SLIDE * missing[:, None] * field[:, 1:]
     out = places.copy()
-    out[kept[near]] = moved + corner[kind]
+    out[kept[near]] = moved + fields.corner[kind]
     return out
 
 
-def _measure_fields(
-    cells: Cells, shown: NDArray[np.intp], pad: int, smooth: float
-) -> tuple[list[Floats], NDArray[np.float64]]:
-    """Return of each cell the signed distance to its outline and its slopes, (h, w, 3), and the place of the first pixel."""
-    from scipy.ndimage import distance_transform_edt, find_objects, gaussian_filter
+class Fields(NamedTuple):
+    """How deep places lie inside of cells of A.
+
+    Attributes
+    ----------
+    values : list of (h, w, 3) float32
+        Of each cell the signed distance to its outline, and its slopes.
+    corner : (n, 2) float64
+        Place of the first pixel of each.
+    deepest : (n,) float32
+        The greatest distance in each.
+
+    """
+
+    values: list[Floats]
+    corner: NDArray[np.float64]
+    deepest: Floats
+
+
+def _measure_fields(cells: Cells, shown: NDArray[np.intp], pad: int, smooth: float) -> Fields:
+    """Measure signed distances to the outlines of some cells."""
+    from scipy.ndimage import find_objects
 
     boxes = find_objects(cells.labels)
     fields, corners = [], []
     for row in shown.tolist():
-        box = boxes[row]
         # As if a cell at the border went on there: nothing is known of its joint.
-        inside = np.pad(cells.labels[box] == row + 1, pad)
-        signed = distance_transform_edt(inside) - distance_transform_edt(~inside)
-        signed = gaussian_filter(signed - 0.5 * np.sign(signed), smooth)
-        slopes = np.gradient(signed)
-        fields.append(np.ascontiguousarray(np.stack([signed, *slopes], axis=-1), np.float32))
-        corners.append([s.start - pad for s in box])
-    return fields, np.array(corners, np.float64)
+        signed = _measure_depth(cells.labels, row + 1, boxes[row], pad, smooth)
+        fields.append(np.ascontiguousarray(np.stack([signed, *np.gradient(signed)], axis=-1), np.float32))
+        corners.append([s.start - pad for s in boxes[row]])
+    deepest = np.array([float(f[..., 0].max()) for f in fields], np.float32)
+    return Fields(fields, np.array(corners, np.float64), deepest)
+
+
+def _measure_depth(labels: Labels, number: int, box: tuple[slice, ...], pad: int, smooth: float) -> NDArray[np.float64]:
+    """Return the smoothed signed distance to the outline of one label, over its box and so many pixels around."""
+    from scipy.ndimage import distance_transform_edt, gaussian_filter
+
+    inside = np.pad(labels[box] == number, pad)
+    signed = distance_transform_edt(inside) - distance_transform_edt(~inside)
+    return np.asarray(gaussian_filter(signed - 0.5 * np.sign(signed), smooth), np.float64)

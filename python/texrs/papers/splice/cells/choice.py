@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from texrs.exemplar.cells import Cells
 from texrs.exemplar.contours import measure_profiles
+from texrs.exemplar.shapes import list_borders
 from texrs.papers.splice.cells.tessellation import Tessellation
 
 __all__ = ["TURNS", "Shortlist", "shortlist"]
@@ -29,6 +30,8 @@ SMALL = 0.25
 """Share of the usual area below which a cell is not shown."""
 TRUSTED = 0.5
 """Certainty below which a cell is not shown, where enough are surer."""
+GROUP = 256
+"""Targets that are compared at once."""
 ENOUGH = 6
 """Cells to choose from that are wanted before less certain ones are left out."""
 
@@ -53,6 +56,10 @@ class Shortlist:
     turn: NDArray[np.float64]
     scale: NDArray[np.float64]
     cost: NDArray[np.float64]
+
+    def part(self, rows: slice) -> Shortlist:
+        """Return those of some of the targets."""
+        return Shortlist(self.source[rows], self.turn[rows], self.scale[rows], self.cost[rows])
 
 
 def shortlist(cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], *, turns: bool, seed: int) -> Shortlist:
@@ -79,20 +86,16 @@ def shortlist(cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], *, t
     goal = np.sqrt(wanted.area[chosen])
     theirs = measure_profiles(wanted.outlines[chosen], wanted.centre[chosen], RAYS) / goal[:, None]
     turned = np.stack([np.roll(mine, a * RAYS // 360, axis=1) for a in angles], axis=1)
-    flat = turned.reshape(-1, RAYS)
-    square = (theirs**2).mean(axis=1)[:, None] + (flat**2).mean(axis=1) - 2 * theirs @ flat.T / RAYS
-    base = np.sqrt(np.maximum(square, 0) / (theirs**2).mean(axis=1)[:, None])
-    base = base.reshape(len(chosen), len(usable), len(angles)) + TURN * np.abs(angles) / 90
-    base += SIZE * np.abs(np.log(goal[:, None] / size))[..., None]
-    base += NOISE * np.random.default_rng(seed).random(base.shape[:2])[..., None]
+    parts = [_compare(theirs[k : k + GROUP], turned, angles) for k in range(0, len(chosen), GROUP)]
+    least, which = (np.concatenate(p) for p in zip(*parts, strict=True))
+    least += SIZE * np.abs(np.log(goal[:, None] / size))
+    least += NOISE * np.random.default_rng(seed).random(least.shape)
     used = np.zeros(len(usable))
     taken = np.full(len(wanted.area), -1)
     beside = list_neighbours(wanted)
     k = min(BEST, len(usable))
     source = np.zeros((len(chosen), k), np.intp)
     turn, cost = np.zeros((2, len(chosen), k))
-    which = base.argmin(axis=2)
-    least = np.take_along_axis(base, which[..., None], axis=2)[..., 0]
     for row, target in enumerate(chosen.tolist()):
         here = least[row] + USE * used
         shown = taken[beside[target]]
@@ -104,6 +107,18 @@ def shortlist(cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], *, t
         taken[target] = order[0]
     scale = np.clip(goal[:, None] / np.sqrt(cells.area[source]), SMALLEST, LARGEST)
     return Shortlist(source, turn, scale, cost)
+
+
+def _compare(
+    theirs: NDArray[np.float64], turned: NDArray[np.float64], angles: NDArray[np.intp]
+) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Return how much each target's profile differs from each cell's, at the best turn, and which turn that is."""
+    flat = turned.reshape(-1, RAYS)
+    own = (theirs**2).mean(axis=1)[:, None]
+    square = own + (flat**2).mean(axis=1) - 2 * theirs @ flat.T / RAYS
+    cost = np.sqrt(np.maximum(square, 0) / own).reshape(len(theirs), *turned.shape[:2]) + TURN * np.abs(angles) / 90
+    which = cost.argmin(axis=2)
+    return np.take_along_axis(cost, which[..., None], axis=2)[..., 0], which
 
 
 def list_usable(cells: Cells) -> NDArray[np.intp]:
@@ -119,10 +134,8 @@ def list_usable(cells: Cells) -> NDArray[np.intp]:
 
 def list_neighbours(wanted: Tessellation) -> list[NDArray[np.intp]]:
     """Return the rows of the targets beside each target."""
-    labels, pairs = wanted.labels, []
-    for a, b in ((labels[1:], labels[:-1]), (labels[:, 1:], labels[:, :-1])):
-        differ = a != b
-        pairs.append(np.stack([a[differ], b[differ]], axis=-1))
-    both = np.unique(np.concatenate([*pairs, *(p[:, ::-1] for p in pairs)]), axis=0) - 1
-    ends = np.searchsorted(both[:, 0], np.arange(len(wanted.area) + 1))
-    return [both[a:b, 1] for a, b in pairwise(ends.tolist())]
+    flat = wanted.labels.ravel().astype(np.int64) - 1
+    one, other = (flat[side] for side in list_borders(wanted.labels))
+    both = np.unique(np.concatenate([one << 32 | other, other << 32 | one]))
+    ends = np.searchsorted(both >> 32, np.arange(len(wanted.area) + 1))
+    return [both[a:b] & 0xFFFFFFFF for a, b in pairwise(ends.tolist())]

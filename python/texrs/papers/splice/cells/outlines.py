@@ -7,10 +7,12 @@ for arbitrary planar polygons", ACM Transactions on Graphics 25(4), 2006).
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["interpolate", "match_outlines"]
+__all__ = ["Matched", "interpolate", "match_outlines", "rematch_outlines"]
 
 Polygons = NDArray[np.float64]
 
@@ -18,12 +20,34 @@ FINE = 2
 """Points of the source's outline for each one of the target's."""
 STRIDES = np.arange(0, 6)
 """Of these, how many may lie between the matches of neighbouring points."""
+APART = 16
+"""Of these, how far a match may lie from where even strides would lead: a sixth of the way around."""
 BEND, STRETCH = 0.05, 0.02
 """Weights of the difference in bending, in squared radians, and of strides that are longer or shorter than even ones; that of
 the squared distance, in squared sizes, is 1."""
 
 
-def match_outlines(target: Polygons, source: Polygons, unit: float) -> tuple[Polygons, NDArray[np.float64]]:
+class Matched(NamedTuple):
+    """Points of outlines matched with places on others.
+
+    Attributes
+    ----------
+    places : (n, points) int
+        Of `FINE` times as many places on the source's outline, in order.
+    cost : (n,) float64
+        Mean cost of a point.
+
+    """
+
+    places: NDArray[np.intp]
+    cost: NDArray[np.float64]
+
+    def locate(self, source: Polygons) -> Polygons:
+        """Return where the places are, (n, points, 2)."""
+        return np.take_along_axis(_refine(source), self.places[..., None], axis=1)
+
+
+def match_outlines(target: Polygons, source: Polygons, unit: float) -> Matched:
     """Match the points of outlines with places on others that lie over them.
 
     Parameters
@@ -33,22 +57,18 @@ def match_outlines(target: Polygons, source: Polygons, unit: float) -> tuple[Pol
     unit : float
         Size of a cell.
 
-    Returns
-    -------
-    found : (n, points, 2) float64
-        Places on the outlines of the sources, in order.
-    cost : (n,) float64
-        Mean cost of a point.
-
     """
-    places, cost = _match_from(target, source, unit, 0)
-    # Where it began is the only match that was not weighed against others: begin again where it is surest to be right.
+    goal, fine = _describe(target, unit), _describe_places(source, unit)
+    first = ((fine - goal[:, :1]) ** 2).sum(axis=-1).argmin(axis=1)
+    return _match_from(goal, fine, 0, first)
+
+
+def rematch_outlines(target: Polygons, source: Polygons, unit: float, found: Matched) -> Matched:
+    """Match again, from where the match that was found is surest to be right: where it began nothing was weighed."""
     half = target.shape[1] // 2
-    again, cost_again = _match_from(target, source, unit, half, places[:, half])
-    better = (cost_again < cost)[:, None, None]
-    fine = _refine(source)
-    n = np.arange(len(source))[:, None]
-    return fine[n, np.where(better[..., 0], again, places)], np.minimum(cost, cost_again)
+    again = _match_from(_describe(target, unit), _describe_places(source, unit), half, found.places[:, half])
+    better = again.cost < found.cost
+    return Matched(np.where(better[:, None], again.places, found.places), np.minimum(found.cost, again.cost))
 
 
 def _refine(source: Polygons) -> Polygons:
@@ -66,43 +86,51 @@ def measure_bending(polygons: Polygons) -> NDArray[np.float64]:
     return np.asarray(np.arctan2(cross, (behind * ahead).sum(axis=-1)))
 
 
-def _match_from(
-    target: Polygons, source: Polygons, unit: float, start: int, fixed: NDArray[np.intp] | None = None
-) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Match outlines, beginning at one point of the targets, which takes the nearest place, or one that is given."""
-    count, points = target.shape[:2]
-    fine = _refine(source)
-    bends = np.repeat(measure_bending(source), FINE, axis=1)
-    goal, bend = np.roll(target, -start, axis=1), np.roll(measure_bending(target), -start, axis=1)
-    goal, fine = np.asarray(goal / unit, np.float32), np.asarray(fine / unit, np.float32)
-    cost = BEND * np.square(np.asarray(bend, np.float32)[:, :, None] - np.asarray(bends, np.float32)[:, None])
-    for axis in range(2):
-        cost += np.square(goal[:, :, None, axis] - fine[:, None, :, axis])
-    first = cost[:, 0].argmin(axis=1) if fixed is None else fixed
-    places = fine.shape[1]
-    around = (first[:, None] + np.arange(places + 1)) % places
-    cost = np.take_along_axis(cost, around[:, None], axis=2)
+def _describe(outline: Polygons, unit: float) -> NDArray[np.float32]:
+    """Return of each point what it is compared by, (n, points, 3): its place, and how the outline bends there."""
+    bends = np.sqrt(BEND) * measure_bending(outline)
+    return np.concatenate([outline / unit, bends[..., None]], axis=-1, dtype=np.float32)
+
+
+def _describe_places(outline: Polygons, unit: float) -> NDArray[np.float32]:
+    """Return the same of `FINE` times as many places."""
+    bends = np.repeat(np.sqrt(BEND) * measure_bending(outline), FINE, axis=1)
+    return np.concatenate([_refine(outline) / unit, bends[..., None]], axis=-1, dtype=np.float32)
+
+
+def _match_from(goal: NDArray[np.float32], fine: NDArray[np.float32], start: int, first: NDArray[np.intp]) -> Matched:
+    """Match what is described, beginning at one point of the targets, whose place is given."""
+    count, points = goal.shape[:2]
+    places, wide = fine.shape[1], 2 * APART + 1
+    around = (first[:, None] + np.arange(-APART, places + APART + 1)) % places
+    fine = np.ascontiguousarray(np.take_along_axis(fine, around[..., None], axis=1).T)
+    goal = np.ascontiguousarray(np.roll(goal, -start, axis=1).T)
     stride = np.asarray(STRETCH * ((STRIDES - FINE) / FINE) ** 2, np.float32)
-    total = np.full((count, places + 1), np.inf, np.float32)
-    total[:, 0] = cost[:, 0, 0]
-    back = np.zeros((points, count, places + 1), np.int8)
-    for i in range(1, points + 1):
-        # The least over strides, kept as it is found: a stack of all would take longer to write than to search.
-        least = total + stride[0]
-        which = back[i - 1]
-        for k, step in enumerate(STRIDES[1:].tolist(), start=1):
-            tried = total[:, :-step] + stride[k]
-            shorter = tried < least[:, step:]
-            np.copyto(least[:, step:], tried, where=shorter)
-            which[:, step:][shorter] = k
-        total = least + cost[:, i] if i < points else least
-    at = np.full(count, places)
+    total = np.full((wide, count), np.inf, np.float32)
+    back = np.zeros((points, wide, count), np.int8)
+    for i in range(points + 1):
+        if i == 0:
+            least = np.where(np.arange(wide)[:, None] == APART, np.float32(0), total)
+        else:
+            least = np.full_like(total, np.inf)
+            # An even stride keeps the distance from where even strides lead; others change it.
+            for k, step in enumerate((STRIDES - FINE).tolist()):
+                to = slice(max(step, 0), wide + min(step, 0))
+                tried = total[max(-step, 0) : wide - max(step, 0)] + stride[k]
+                shorter = tried < least[to]
+                np.copyto(least[to], tried, where=shorter)
+                np.copyto(back[i - 1, to], np.int8(k), where=shorter)
+        if i < points:
+            away = fine[:, FINE * i : FINE * i + wide] - goal[:, i, None]
+            least += np.einsum("cwn,cwn->wn", away, away)
+        total = least
+    at = np.full(count, APART)
     rows = np.arange(count)
     out = np.zeros((count, points), np.intp)
     for i in range(points, 0, -1):
-        at = at - STRIDES[back[i - 1, rows, at]]
-        out[:, i - 1] = (at + first) % places
-    return np.roll(out, start, axis=1), total[:, places].astype(np.float64) / points
+        at = at - (STRIDES[back[i - 1, at, rows]] - FINE)
+        out[:, i - 1] = (first + FINE * (i - 1) + at - APART) % places
+    return Matched(np.roll(out, start, axis=1), total[APART].astype(np.float64) / points)
 
 
 def interpolate(at: Polygons, outline: Polygons, values: Polygons) -> NDArray[np.float32]:

@@ -61,7 +61,7 @@ def refine_charts(
     """Return places and frames, corrected where charts stretch A."""
     if cells.size < SMALLEST or _measure_grain(a, cells) < GRAIN:
         return places, frames
-    stretch = 1 / np.maximum(np.linalg.svd(frames, compute_uv=False)[..., -1], 1e-3)
+    stretch = 1 / np.maximum(_measure_least(frames), 1e-3)
     loose = (stretch > STRETCH) & (charts.depth[joined.pixel] > 0.5 * cells.joint_width + EDGE)
     if loose.mean() < LEAST:
         return places, frames
@@ -77,6 +77,12 @@ def refine_charts(
     refinement = TurnedRefinement(base.exemplar, draft, seed, base.coarsest, base.levels, turned)
     found = correct_draft(refinement, a.wrap, progress).astype(np.float32)
     return np.where(loose[..., None], found, places), np.where(loose[..., None, None], turned, frames)
+
+
+def _measure_least(frames: Floats) -> Floats:
+    """Return the lesser singular value of matrices (..., 2, 2)."""
+    (a, b), (c, d) = np.moveaxis(frames, (-2, -1), (0, 1))
+    return np.asarray(np.abs(np.hypot(a + d, b - c) - np.hypot(a - d, b + c)) / 2, np.float32)
 
 
 def _measure_grain(a: Elements, cells: Cells) -> float:
