@@ -13,7 +13,7 @@ from texrs import samples
 from texrs.errors import InvalidInput
 from texrs.exemplar.cells import Cells, find_cells
 from texrs.exemplar.contours import POINTS, measure_moments, measure_profiles, resample, trace
-from texrs.exemplar.merging import join_parts, measure_usual_area
+from texrs.exemplar.merging import join_least_parted, join_parts, measure_usual_area
 
 Picture = NDArray[np.uint8]
 
@@ -96,6 +96,21 @@ def test_measures_belong_to_the_cells() -> None:
     assert 3 < cells.joint_width < 10
 
 
+def test_masks_of_joints_may_be_nearly_empty_or_full() -> None:
+    image, _ = draw_voronoi((96, 96), 30.0, light=True)
+    one = np.zeros(image.shape, bool)
+    one[4, 4] = True
+    for joints in (one, ~one):
+        assert find_cells(image, size=28, joints=joints).confidence > 0.5
+
+
+def test_work_can_be_watched() -> None:
+    shares: list[float] = []
+    find_cells(np.zeros((40, 40)), size=12, progress=lambda stage, share: shares.append(share))
+    assert shares == sorted(shares)
+    assert len(shares) == 6
+
+
 def test_any_dtype_gives_the_same_cells() -> None:
     image, _ = draw_voronoi((120, 120), 30.0, light=False)
     plain = find_cells(image, size=28)
@@ -163,6 +178,22 @@ def test_fragments_go_to_the_neighbour_with_the_least_joint() -> None:
     relief[:, 19:21] = 1
     relief[9:15, 20:25] = 0.8
     assert join_parts(parts, relief, least=40)[12, 22] == join_parts(parts, relief, least=40)[0, -1]
+
+
+def test_background_is_joined_with_none() -> None:
+    parts = np.zeros((10, 30), np.int32)
+    parts[:, 5:12], parts[:, 12:20], parts[:, 20:] = 3, 1, 4
+    parts[:, 18:20] = 0
+    joined: list[tuple[int, int, int]] = []
+    into = join_least_parted(
+        parts,
+        np.zeros(parts.shape, np.float32),
+        lambda one, other, total, length: total / length,
+        lambda one, other, length: joined.append((one, other, length)),
+        below=0.5,
+    )
+    assert into.tolist() == [0, 1, 2, 1, 4]
+    assert joined == [(1, 3, 10)]
 
 
 def test_crumbs_hardly_count_in_the_usual_area() -> None:

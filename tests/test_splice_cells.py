@@ -151,6 +151,43 @@ def test_figures_are_bent_when_asked_for_and_where_no_cells_are() -> None:
         texrs.splice(DOTS, STONES, 96, cells=True)
 
 
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"cells": 1}, "cells: needs True or False"),
+        ({"turns": "no"}, "turns: needs True or False"),
+        ({"cells": True, "method": "paper"}, "bends"),
+        ({"cells": True, "method": "preview"}, "bends"),
+    ],
+)
+def test_wrong_options_are_told(options: Any, words: str) -> None:
+    with pytest.raises(InvalidInput, match=words):
+        texrs.splice(STONES, DOTS, 96, **options)
+    assert texrs.splice(STONES, DOTS, 96, cells=np.False_).report["method"] == "default"
+
+
+def test_boxes_of_any_size_are_taken() -> None:
+    for box in ((1, 1), (9999, 9999)):
+        assert texrs.splice(replace(STONES, box=box), DOTS, 96).report["method"] in ("cells", "default")
+
+
+def test_layouts_are_told_apart_by_all_that_they_are_made_from() -> None:
+    stripes = np.zeros(SIZE, bool)
+    stripes[::7] = True
+    unknown = replace(STONES, mask=stripes, points=STONES.points[::2])
+    given = replace(unknown, box=(3, 3)), unknown
+    assert [find_entry_cells(entry) is None for entry in given] == [True, False]
+    there = [texrs.splice(WALL, entry, 128).report["matches"] for entry in given]
+    assert there[0] != there[1]
+
+
+@pytest.mark.parametrize("points", [[[80.0, 20], [80, 60], [80, 100], [80, 150]], [[80.0, 20], [80.1, 20], [80, 20.2]]])
+def test_layouts_without_area_are_taken(points: list[list[float]]) -> None:
+    result = texrs.splice(STONES, replace(DOTS, points=np.array(points)), 96)
+    assert result.report["method"] == "cells"
+    assert result.report["targets"] >= 1
+
+
 def test_layouts_go_on_without_mirrors() -> None:
     few = find_entry_cells(STONES)
     assert few is not None

@@ -9,13 +9,14 @@ that they have together, nor the size that others agree on speaks for two.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_image, as_rgb, guidance
-from texrs._typing import Array, Bools, Floats, Labels
+from texrs._typing import Array, Bools, Floats, Labels, Progress
 from texrs.errors import InvalidInput
 from texrs.exemplar.contours import measure_moments, trace
 from texrs.exemplar.evidence import to_lab
@@ -132,7 +133,9 @@ class _Tessellation(NamedTuple):
     width: float
 
 
-def find_cells(image: object, *, size: float | None = None, joints: object = None) -> Cells:
+def find_cells(
+    image: object, *, size: float | None = None, joints: object = None, progress: Progress | None = None
+) -> Cells:
     """Find the cells of a connected texture.
 
     Parameters
@@ -143,6 +146,8 @@ def find_cells(image: object, *, size: float | None = None, joints: object = Non
         About how wide a cell is across its shorter axis, in pixels; found by default.
     joints : (H, W) array of bool, optional
         What is known of the joints: one more tessellation that is tried.
+    progress : callable, optional
+        Called as ``progress("cells", share)``; raising stops the work.
 
     Returns
     -------
@@ -175,17 +180,25 @@ def find_cells(image: object, *, size: float | None = None, joints: object = Non
     if size is not None:
         about = as_float(size, "size", 3, max(light.shape))
         sizes = [about * STEP**k for k in NEAR]
-    tried = [_tessellate(light, s, p) for s in sizes for p in (-1, 1)]
+    trials = [partial(_tessellate, light, s, p) for s in sizes for p in (-1, 1)]
     if joints is not None and joints.any() and not joints.all():
         seen = _project(lab, joints)
-        tried += [_tessellate_mask(joints, seen), *(_tessellate(seen, s, 1) for s in sizes)]
-    return _measure(max(tried, key=lambda t: t.score), light)
+        trials += [partial(_tessellate_mask, joints, seen), *(partial(_tessellate, seen, s, 1) for s in sizes)]
+    watch, best = progress or (lambda stage, share: None), None
+    for done, trial in enumerate(trials):
+        watch("cells", done / len(trials))
+        found = trial()
+        best = found if best is None or found.score > best.score else best
+    assert best is not None  # a size is always tried
+    return _measure(best, light)
 
 
 def _project(lab: Floats, joints: Bools) -> Floats:
     """Return the combination of the colours that tells joints best from the rest (Fisher), higher in joints."""
     inside, outside = lab[joints].astype(np.float64), lab[~joints].astype(np.float64)
-    within = (np.cov(inside.T) * len(inside) + np.cov(outside.T) * len(outside)) / lab[..., 0].size
+    within = (np.cov(inside.T, bias=True) * len(inside) + np.cov(outside.T, bias=True) * len(outside)) / lab[
+        ..., 0
+    ].size
     weight = np.linalg.solve(within + 1e-4 * np.eye(3), inside.mean(axis=0) - outside.mean(axis=0))
     return np.asarray(lab @ (weight / max(float(np.linalg.norm(weight)), 1e-9)), np.float32)
 

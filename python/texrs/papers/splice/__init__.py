@@ -46,7 +46,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal, TypeAlias
 
-from texrs._arrays import as_method, as_seed, as_size
+from texrs._arrays import as_bool, as_method, as_seed, as_size
 from texrs._typing import Array, Progress
 from texrs.elements import Elements, Layout
 from texrs.errors import InvalidInput
@@ -147,12 +147,15 @@ def splice(
     mine, theirs = as_elements(a, "a", watch), as_elements(b, "b", watch)
     rows, columns = as_size(size if size is not None else mine.mask.shape, minimum=16)
     number = as_seed(seed)
-    found = find_entry_cells(mine) if method is None and cells is not False else None
-    if cells and found is None:
+    wanted, may_turn = (None if v is None else as_bool(v, n) for v, n in ((cells, "cells"), (turns, "turns")))
+    if wanted and method is not None:
+        raise InvalidInput(f'cells: method="{method}" bends figures')
+    found = find_entry_cells(mine, watch) if method is None and wanted is not False else None
+    if wanted and found is None:
         raise InvalidInput(f"cells: {'separate elements have none' if mine.layout == Layout.DISJOINT else NO_CELLS}")
     if found is not None:
         return splice_cells(
-            mine, theirs, found, (rows, columns), turns=turns, refine=bool(refine), seed=number, watch=watch
+            mine, theirs, found, (rows, columns), turns=may_turn, refine=bool(refine), seed=number, watch=watch
         )
     watch("match", 0.0)
     if method == "paper":

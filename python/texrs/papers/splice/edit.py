@@ -20,6 +20,8 @@ Step = Mapping[str, Any]
 
 DRAWS = 24
 """Places that an element may try when it is moved at random."""
+VOTERS = 400
+"""Points in the middle of a layout that say which lattice it lies on."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,7 +166,9 @@ def fit_lattice(points: Points) -> tuple[Points, Points]:
     lattice of the same density.
     """
     scale = spacing(points)
-    difference = points[:, None] - points[None]
+    near = np.argsort(np.hypot(*(points - points.mean(axis=0)).T), kind="stable")[:VOTERS]
+    voters = points[np.sort(near)]
+    difference = voters[:, None] - voters[None]
     length = np.hypot(*difference.reshape(-1, 2).T)
     near = difference.reshape(-1, 2)[(length > 0) & (length < 2.2 * scale)]
     # Votes within a sixth of a spacing, of one half of the plane.
@@ -179,7 +183,7 @@ def fit_lattice(points: Points) -> tuple[Points, Points]:
             mean = votes[k] @ half / count[k]
             lean = abs(float(np.cross(np.append(first, 0), np.append(mean, 0))[2]))
             if lean > 0.5 * np.hypot(*first) * np.hypot(*mean):
-                if count[order[0]] >= 0.4 * len(points) and count[k] >= 0.4 * len(points):
+                if min(count[order[0]], count[k]) >= 0.4 * len(voters):
                     basis = np.array([first, mean])
                 break
     if not len(basis):

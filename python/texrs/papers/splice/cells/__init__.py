@@ -43,6 +43,8 @@ SURE = 0.5
 """Confidence from which on cells are believed."""
 FEWEST = 3
 """Cells that can be shown, at least."""
+LEAST = 3.0
+"""Width of a cell, in pixels, below which none is looked for."""
 HERE = 0.25
 """Sizes from a cell's centre within which a pixel of the output must show it, for the cell to be there."""
 
@@ -50,14 +52,15 @@ _CELLS: Cache[bytes, Cells] = Cache(16)
 _TARGETS: Cache[bytes, Tessellation] = Cache(16)
 
 
-def find_entry_cells(entry: Elements) -> Cells | None:
+def find_entry_cells(entry: Elements, watch: Progress | None = None) -> Cells | None:
     """Return the cells of a connected texture; none where it has none that are sure enough, as nets."""
     if entry.layout == Layout.DISJOINT:
         return None
     joints = ~entry.mask if entry.layout == Layout.JOINTED else entry.mask
-    size = float(min(entry.box))
+    # An entry that was not analysed here may say anything.
+    size = float(np.clip(min(entry.box), LEAST, min(entry.mask.shape)))
     key = content_hash(np.asarray(entry.image), np.packbits(entry.mask), size, entry.layout)
-    found = _CELLS.get_or_make(key, lambda: find_cells(entry.image, size=size, joints=joints))
+    found = _CELLS.get_or_make(key, lambda: find_cells(entry.image, size=size, joints=joints, progress=watch))
     return found if found.confidence >= SURE and len(list_usable(found)) >= FEWEST else None
 
 
@@ -128,7 +131,7 @@ def splice_cells(
 
 def _take_targets(b: Elements, size: tuple[int, int], unit: float, seed: int) -> Tessellation:
     """Return the target cells: kept, for one layout often serves several textures of one size."""
-    key = content_hash(np.asarray(b.image), np.packbits(b.mask), b.points, b.layout, b.wrap, size, unit, seed)
+    key = content_hash(np.asarray(b.image), np.packbits(b.mask), b.points, b.layout, b.box, b.wrap, size, unit, seed)
 
     def make() -> Tessellation:
         theirs = find_entry_cells(b)
@@ -152,7 +155,7 @@ def _find_places(cells: Cells, charts: Charts, joined: Joined) -> NDArray[np.flo
     chart = joined.chart.ravel()
     pixel = joined.pixel.ravel()
     off = charts.places[pixel] - cells.centre[charts.source[chart]]
-    far = np.hypot(off[:, 0], off[:, 1]) / charts.scale[chart] ** -1
+    far = np.hypot(off[:, 0], off[:, 1]) * charts.scale[chart]
     order = np.lexsort((far, chart))
     names, first = np.unique(chart[order], return_index=True)
     best = order[first]

@@ -143,6 +143,8 @@ def _grow(cells: Cells, far: tuple[float, float], seed: int) -> NDArray[np.float
             best, least = trace(labels, np.arange(1, int(labels.max()) + 1)), torn
         if torn <= FINE:
             break
+    if not len(best):
+        raise InvalidInput("b: its cells cannot be continued as far as that; take a smaller size or a larger picture")
     return (best - (np.array(size) - 1) / 2) / unit
 
 
@@ -174,6 +176,8 @@ def _measure_torn(labels: Labels, unit: float) -> float:
     """Return the share of the area in cells that seams have run together, or left with dents."""
     shapes = Shapes.of(labels)
     area, solid = shapes.area[1:], shapes.measure_solidity()[1:]
+    if not len(area):
+        return float(np.inf)
     odd = (solid < SOLID) | (area > HUGE * unit**2)
     return float(area[odd].sum() / area.sum())
 

@@ -24,6 +24,8 @@ Points = NDArray[np.float64]
 
 MARGIN = 1.0
 """Target cells are drawn up to so many of their sizes beyond the output, so that those at its border are whole."""
+SAMPLES = 640
+"""Along each axis, at the most, by which the areas of Voronoi cells are measured."""
 SLIVER = 0.2
 """Share of the median area below which a target cell is given to those beside it."""
 
@@ -89,13 +91,14 @@ def take_points(layout: PointLayout, size: tuple[int, int], unit: float) -> Tess
     # Of the layout as it goes on, so that the cells at its border are like the others.
     low, high = layout.points.min(axis=0), layout.points.max(axis=0)
     around = layout.within(low - 2 * layout.scale, high + 2 * layout.scale)[0]
-    grid = np.stack(
-        np.meshgrid(*(np.arange(a, b, layout.scale / 16) for a, b in zip(low, high, strict=True)), indexing="ij"), -1
-    )
+    step = max(layout.scale / 16, float((high - low).max()) / SAMPLES)
+    grid = np.stack(np.meshgrid(*(np.arange(a, b, step) for a, b in zip(low, high, strict=True)), indexing="ij"), -1)
     owner = cKDTree(around).query(grid.reshape(-1, 2))[1]
     inner = ((around >= low) & (around <= high)).all(axis=1)
-    counts = np.bincount(owner, minlength=len(around))[inner] * (layout.scale / 16) ** 2
-    scale = unit / float(np.sqrt(np.median(counts[counts > 0])))
+    counts = np.bincount(owner, minlength=len(around))[inner]
+    # Points on one line have no cells between them.
+    area = float(np.median(counts[counts > 0])) * step**2 if counts.any() else layout.scale**2
+    scale = unit / np.sqrt(area)
     margin = int(np.ceil(MARGIN * unit))
     middle, centre = (np.array(size) - 1) / 2, (low + high) / 2
     box = [(side * (middle + margin + 2 * unit)) / scale + centre for side in (-1, 1)]
