@@ -33,8 +33,8 @@ def windows(
     half = tuple(max(2, int(share * n / 2)) for n in a.box)
     found = []
     for m in result.report["matches"]:
-        target, source = np.rint(m["target"]), np.rint(m["point"])
-        rest = (m["point"] - source) - (m["target"] - target)
+        target, source = np.rint(m["found"]), np.rint(m["point"])
+        rest = (m["point"] - source) - (m["found"] - target)
         inside = True
         for at, shape in ((target, result.image.shape), (source, a.mask.shape)):
             inside &= all(h + 3 <= x < n - h - 3 for x, h, n in zip(at, half, shape, strict=False))
@@ -106,7 +106,7 @@ def copied(a: Elements, result: Synthesis) -> tuple[float, float | None]:
     rigid = np.argwhere(number > 0)
     if not len(rigid):
         return share, None
-    goals = np.array([m["target"] for m in result.report["matches"]])
+    goals = np.array([m["found"] for m in result.report["matches"]])
     starts = np.array([m["point"] for m in result.report["matches"]])
     which = number[tuple(rigid.T)] - 1
     away = (result.source.coordinates[tuple(rigid.T)] - starts[which]) - (rigid - goals[which])
@@ -150,7 +150,7 @@ def layout(result: Synthesis, a: Elements, b: Elements) -> dict[str, float]:
 
     Colours in standard deviations of B's.
     """
-    goals = np.array([m["target"] for m in result.report["matches"]])
+    goals = np.array([m["found"] for m in result.report["matches"]])
     number = result.source.label.astype(int)
     size = np.array(number.shape)
     inside = ((goals >= a.box[0] / 2) & (goals < size - a.box[1] / 2)).all(axis=1)
@@ -203,7 +203,7 @@ def share(a: Elements, result: Synthesis) -> float:
     areas = np.bincount(number.ravel())[1:]
     border = np.unique(np.concatenate([number[0], number[-1], number[:, 0], number[:, -1]]))
     whole = np.delete(areas, border[border > 0] - 1) if count else areas
-    goals = np.array([m["target"] for m in result.report["matches"]])
+    goals = np.array([m["found"] for m in result.report["matches"]])
     size = np.array(result.source.shape)
     inside = ((goals >= 0) & (goals <= size - 1)).all(axis=1).sum()
     return shown / (inside * float(whole.mean()) / float(size.prod()))

@@ -205,7 +205,7 @@ def test_a_listed_edit_stirs_its_neighbourhood_alone() -> None:
     assert (again.image == listed.image).all()
     meshed = texrs.self_splice(mine, [{"op": "move", "element": 12, "by": [6, 4]}, {"op": "shift", "by": 0}])
     for result in (listed, meshed):
-        moved = [m["target"] for m in result.report["matches"] if m["element"] == 12]
+        moved = [m["found"] for m in result.report["matches"] if m["element"] == 12]
         assert np.allclose(moved[0], points[12], atol=1e-3)
         rigid = np.argwhere(result.source.label == 1 + [m["element"] for m in result.report["matches"]].index(12))
         assert len(rigid) > 100
@@ -370,3 +370,23 @@ def test_bad_options() -> None:
         texrs.splice(a, b, seed=-1)
     with pytest.raises(InvalidInput, match="wrap"):
         texrs.splice(replace(a, wrap=(1, 2, 3)), b)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["dots", "bricks"])
+def test_no_strength_leaves_the_layout_as_it_is(name: str) -> None:
+    mine = ENTRIES[name]
+    result = texrs.splice(mine, ENTRIES["pebbles"], cells=False, strength=0.0, seed=1)
+    matches = result.report["matches"]
+    assert {m["realised"] for m in matches} == {None}
+    assert result.report["realised"] == 1
+    inside = tuple(slice(2 * n // 5, 3 * n // 5) for n in mine.mask.shape)
+    assert (result.image[inside] == mine.image[inside]).mean() > 0.98
+
+
+def test_part_of_the_way_is_part_of_the_way() -> None:
+    half, full = (
+        texrs.splice(ENTRIES["dots"], ENTRIES["pebbles"], strength=s, refine=False, seed=1) for s in (0.5, 1.0)
+    )
+    assert len(half.report["matches"]) > len(full.report["matches"]), "elements stay that would be erased"
+    for one, all_ in zip(half.report["matches"], full.report["matches"], strict=False):
+        assert one["element"] == all_["element"]

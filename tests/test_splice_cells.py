@@ -156,6 +156,8 @@ def test_figures_are_bent_when_asked_for_and_where_no_cells_are() -> None:
     [
         ({"cells": 1}, "cells: needs True or False"),
         ({"turns": "no"}, "turns: needs True or False"),
+        ({"strength": 1.5}, "strength"),
+        ({"strength": "half"}, "strength"),
         ({"cells": True, "method": "paper"}, "bends"),
         ({"cells": True, "method": "preview"}, "bends"),
     ],
@@ -186,6 +188,40 @@ def test_layouts_without_area_are_taken(points: list[list[float]]) -> None:
     result = texrs.splice(STONES, replace(DOTS, points=np.array(points)), 96)
     assert result.report["method"] == "cells"
     assert result.report["targets"] >= 1
+
+
+def test_strength_leads_from_one_layout_to_the_other() -> None:
+    cells = find_entry_cells(STONES)
+    assert cells is not None
+    own = cKDTree(cells.centre[cells.whole])
+    results = {s: texrs.splice(STONES, WALL, SIZE, strength=s, seed=1) for s in (0.0, 0.5, 1.0)}
+    away = []
+    for strength, result in results.items():
+        assert result.report["strength"] == strength
+        assert result.report["present"] >= 0.95
+        found = np.array([m["found"] for m in result.report["matches"] if m["found"]])
+        inside = ((found > 20) & (found < 140)).all(axis=1)
+        away.append(float(np.median(own.query(found[inside])[0])))
+    assert away[0] < 1.0 < away[1] < away[2]
+    assert (results[1.0].image == texrs.splice(STONES, WALL, SIZE, seed=1).image).all()
+    near = [m for m in results[0.0].report["matches"] if all(20 < x < 140 for x in m["target"])]
+    assert np.mean([np.hypot(*np.subtract(m["target"], m["point"])) < 1 for m in near]) > 0.8, "cells show themselves"
+
+
+@pytest.mark.parametrize("size", [(96, 128), (128, 224), (240, 240)])
+def test_own_layouts_have_any_size(size: tuple[int, int]) -> None:
+    for wrap in ((False, False), (True, False)):
+        report = texrs.splice(replace(STONES, wrap=wrap), DOTS, size, strength=0.3).report
+        assert report["present"] >= 0.9
+
+
+def test_the_report_says_how_much_of_each_way_was_gone(spliced: Any) -> None:
+    for result in (spliced("stones", "dots"), texrs.splice(STONES, DOTS, cells=False), texrs.splice(DOTS, STONES)):
+        parts = [m["realised"] for m in result.report["matches"]]
+        assert all(part is None or 0 <= part <= 1 for part in parts)
+        assert sum(part is not None for part in parts) > len(parts) / 2
+        assert 0 <= result.report["realised"] <= 1
+    assert spliced("stones", "dots").report["realised"] > texrs.splice(STONES, DOTS, cells=False).report["realised"]
 
 
 def test_layouts_go_on_without_mirrors() -> None:

@@ -33,6 +33,18 @@ def test_splice(tmp_path: Path) -> None:
     assert len(list(stages.glob("*.png"))) >= 7
 
 
+def test_splice_by_cells(tmp_path: Path) -> None:
+    made = []
+    for number, options in enumerate((["--cells"], ["--no-cells"], ["--cells", "--turns", "--strength", "0.5"])):
+        stages = tmp_path / str(number)
+        line = ["splice", "sample:bricks", "pebbles.png", "-o", str(tmp_path / "out.png"), "--size", "96", "-q"]
+        assert main([*line, *options, "--stages", str(stages)]) == 0
+        made.append(json.loads((stages / "report.json").read_text()))
+    assert [report["method"] for report in made] == ["cells", "default", "cells"]
+    assert [made[0]["strength"], made[2]["strength"]] == [1.0, 0.5]
+    assert made[2]["turns"] is True
+
+
 def test_self_splice_and_its_replay(tmp_path: Path) -> None:
     first, again, stages = tmp_path / "a.png", tmp_path / "b.png", tmp_path / "stages"
     line = ["self-splice", "dots.png", "-q", "--seed", "3"]
@@ -58,6 +70,8 @@ def test_entries_are_taken(tmp_path: Path) -> None:
         (["splice", "dots.png", "nothing.png"], "nothing.png"),
         (["splice", "dots.png", "pebbles.png", "--method", "fast"], "--method"),
         (["splice", "dots.png", "pebbles.png", "--size", "4"], "--size"),
+        (["splice", "dots.png", "pebbles.png", "--strength", "2"], "--strength"),
+        (["splice", "sample:dots", "pebbles.png", "--cells"], "--cells"),
         (["self-splice", "dots.png", "--edit", "melt"], "--edit"),
         (["self-splice", "dots.png", "--edit", "[3"], "not JSON"),
         (["self-splice", "dots.png", "--edit", "gone.json"], "gone.json"),

@@ -47,6 +47,7 @@ class SpliceOptions(TypedDict, total=False):
 
     seed: int
     method: Literal["paper", "preview"] | None
+    strength: float
     align: bool
     snap_rows: bool
     cells: bool | None
@@ -290,8 +291,8 @@ class TextureDatabase:
         progress : callable, optional
             Called as ``progress(stage, share)``; raising stops the work.
         **options
-            What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``align``, ``snap_rows``,
-            ``cells``, ``turns``, ``refine``.
+            What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``strength``,
+            ``align``, ``snap_rows``, ``cells``, ``turns``, ``refine``.
 
         Returns
         -------
@@ -332,8 +333,8 @@ class TextureDatabase:
         progress : callable, optional
             Called as ``progress("matrix", share)``; raising stops the work.
         **options
-            What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``align``, ``snap_rows``,
-            ``cells``, ``turns``, ``refine``.
+            What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``strength``,
+            ``align``, ``snap_rows``, ``cells``, ``turns``, ``refine``.
 
         Returns
         -------

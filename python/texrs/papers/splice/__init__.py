@@ -46,7 +46,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal, TypeAlias
 
-from texrs._arrays import as_bool, as_method, as_seed, as_size
+from texrs._arrays import as_bool, as_float, as_method, as_seed, as_size
 from texrs._typing import Array, Progress
 from texrs.elements import Elements, Layout
 from texrs.errors import InvalidInput
@@ -58,7 +58,7 @@ from texrs.papers.splice.draft import draft_pixels
 from texrs.papers.splice.edit import as_steps
 from texrs.papers.splice.entry import as_elements
 from texrs.papers.splice.literal import fill_literally, match_literally
-from texrs.papers.splice.matching import Match, match_edit, match_layouts
+from texrs.papers.splice.matching import Match, go_part_of_the_way, match_edit, match_layouts
 from texrs.papers.splice.refine import fill, refine_places
 from texrs.papers.splice.result import compose
 from texrs.synthesis import Synthesis
@@ -79,6 +79,7 @@ def splice(
     *,
     seed: int = 0,
     method: Method = None,
+    strength: float = 1.0,
     align: bool = True,
     snap_rows: bool = False,
     cells: bool | None = None,
@@ -101,6 +102,8 @@ def splice(
     method : {None, "paper", "preview"}
         "paper": the algorithm as printed, with only its misprints repaired. "preview": triangles between the elements,
         drawn where these go; nothing is kept rigid or filled.
+    strength : float
+        How much of the way elements go, from the texture's own layout, 0, to the other's, 1.
     align : bool
         Whether to turn the layout so that lines of its points agree with those of ``a``. Cells take it as it lies.
     snap_rows : bool
@@ -118,7 +121,8 @@ def splice(
     -------
     Synthesis
         The picture; a source map of whole pixels of ``a``, whose label is the target (counted from 1, as in the report)
-        that a rigid pixel belongs to, or 0; pictures of the stages, drawn when they are looked at; and a report. By cells
+        that a rigid pixel belongs to, or 0; pictures of the stages, drawn when they are looked at; and a report, whose
+        "matches" say of each element where it was wanted, where it is, and how much of its way was realised. By cells
         (``report["method"]`` is "cells") the map lies between pixels, and each has its target.
 
     Raises
@@ -150,20 +154,32 @@ def splice(
     wanted, may_turn = (None if v is None else as_bool(v, n) for v, n in ((cells, "cells"), (turns, "turns")))
     if wanted and method is not None:
         raise InvalidInput(f'cells: method="{method}" bends figures')
+    part = as_float(strength, "strength", 0, 1)
     found = find_entry_cells(mine, watch) if method is None and wanted is not False else None
     if wanted and found is None:
         raise InvalidInput(f"cells: {'separate elements have none' if mine.layout == Layout.DISJOINT else NO_CELLS}")
     if found is not None:
         return splice_cells(
-            mine, theirs, found, (rows, columns), turns=may_turn, refine=bool(refine), seed=number, watch=watch
+            mine,
+            theirs,
+            found,
+            (rows, columns),
+            strength=part,
+            turns=may_turn,
+            refine=bool(refine),
+            seed=number,
+            watch=watch,
         )
     watch("match", 0.0)
-    if method == "paper":
-        match = match_literally(mine, theirs, (rows, columns), align=bool(align))
-        match = straighten_rows(match) if snap_rows else match
-    else:
-        match = match_layouts(mine, theirs, (rows, columns), align=bool(align))
+    matching = match_literally if method == "paper" else match_layouts
+    match = matching(mine, theirs, (rows, columns), align=bool(align))
+    if part < 1:
+        match = go_part_of_the_way(mine, match, part)
+    match = replace(match, wanted=match.targets)
+    if method != "paper":
         match = adjust_targets(mine, match, snap=bool(snap_rows))
+    elif snap_rows:
+        match = straighten_rows(match)
     match = crop_extension(mine, match, (rows, columns))
     watch("match", 1.0)
     return _synthesize(mine, theirs, match, (rows, columns), number, method=method, refine=bool(refine), watch=watch)

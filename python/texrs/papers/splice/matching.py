@@ -22,7 +22,7 @@ from texrs.papers.splice.entry import remember
 from texrs.papers.splice.extension import Extension, count_elements, extend, lay_out
 from texrs.papers.splice.foreground import split_foreground
 
-__all__ = ["Match", "find_turns", "list_element_points", "match_edit", "match_layouts"]
+__all__ = ["Match", "find_turns", "go_part_of_the_way", "list_element_points", "match_edit", "match_layouts"]
 
 Points = NDArray[np.float64]
 
@@ -58,6 +58,8 @@ class Match:
         What B's layout was scaled and turned (degrees) by; the part of the scale that gives elements room.
     cost : float
         Mean squared distance of an element from its target.
+    wanted : (n, 2) float64, optional
+        Where elements were to be before the targets were adjusted to them; the targets themselves by default.
 
     """
 
@@ -68,6 +70,7 @@ class Match:
     angle: float
     gain: float
     cost: float
+    wanted: Points | None = None
 
     @property
     def starts(self) -> Points:
@@ -131,6 +134,20 @@ def match_layouts(a: Elements, b: Elements, size: tuple[int, int], *, align: boo
             if cost < NEARER * best.cost:
                 best = replace(best, targets=wanted, assigned=assigned, cost=cost)
     return best
+
+
+def go_part_of_the_way(a: Elements, match: Match, strength: float) -> Match:
+    """Let elements go so much of their way only: 0 leaves the texture's own layout, 1 takes the other's."""
+    targets, assigned = match.starts + strength * match.shift, match.assigned
+    if a.layout == Layout.DISJOINT:
+        # Those that go nowhere stay, while there is room: the others would be erased where the layout hardly changes.
+        points = match.extension.points
+        rest = np.setdiff1d(np.arange(len(points)), assigned)
+        if len(rest):
+            room = nearest_distances(points[rest], 1, targets)[:, 0]
+            stays = rest[np.sort(np.argsort(-room, kind="stable")[: round((1 - strength) * len(rest))])]
+            targets, assigned = np.concatenate([targets, points[stays]]), np.concatenate([assigned, stays])
+    return replace(match, targets=targets, assigned=assigned)
 
 
 def find_turns(a: Elements, b: Elements) -> list[float]:

@@ -18,7 +18,10 @@ from texrs.papers.splice.refine import Draft
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
-__all__ = ["compose"]
+__all__ = ["compose", "list_place", "measure_realised"]
+
+STAYS = 0.5
+"""Pixels: what is to go less far than that stays."""
 
 
 def compose(
@@ -41,18 +44,20 @@ def compose(
     source = SourceMap.from_coordinates(places.astype(np.float32), shape, label=label, frame=frames)
     image = source.render(a.image, interpolation="nearest")
     step = STEP if a.layout == Layout.DISJOINT else choose_coarseness(match.extension.mask.shape)
+    matches, realised = _list_matches(a, match)
     report: dict[str, Any] = {
         "method": method or "default",
         "seed": seed,
         "size": list(size),
         "layout": a.layout.value,
         **match.report(),
+        "realised": realised,
         "holes": float(1 - warp.known.mean()),
         "triangles": warp.triangles,
         "flipped": warp.flipped / max(warp.triangles, 1),
         "flipped_rigid": warp.flipped_rigid / max(warp.triangles, 1),
         "system": [-(-n // step) for n in match.extension.mask.shape],
-        "matches": _list_matches(a, match),
+        "matches": matches,
     }
     return Synthesis(image, source, Stages(a, b, match, warp.target, draft, filled, image), report)
 
@@ -67,14 +72,40 @@ def _make_frames(mirrored: Bools) -> NDArray[np.float32] | None:
     return frames
 
 
-def _list_matches(a: Elements, match: Match) -> list[dict[str, Any]]:
-    """Return which element goes where, in JSON types."""
+def _list_matches(a: Elements, match: Match) -> tuple[list[dict[str, Any]], float]:
+    """Return which element goes where, in JSON types, and how much of all their ways they go."""
     points = list_element_points(a)
+    wanted = match.targets if match.wanted is None else match.wanted
+    parts, whole = measure_realised(match.starts, wanted, match.targets)
     return [
         {
-            "target": [round(float(v), 3) for v in goal],
+            "target": list_place(goal),
+            "found": list_place(there),
+            "realised": part,
             "element": int(element),
-            "point": [round(float(v), 3) for v in points[element]],
+            "point": list_place(points[element]),
         }
-        for goal, element in zip(match.targets, match.extension.element[match.assigned], strict=True)
+        for goal, there, part, element in zip(
+            wanted, match.targets, parts, match.extension.element[match.assigned], strict=True
+        )
+    ], whole
+
+
+def measure_realised(
+    start: NDArray[np.float64], wanted: NDArray[np.float64], found: NDArray[np.float64]
+) -> tuple[list[float | None], float]:
+    """Return how much of its way each element goes, 0 to 1, None for those that are to stay, or were not found; and of all."""
+    asked, missed = (np.hypot(*(x - wanted).T) for x in (start, found))
+    there = np.isfinite(missed)
+    part = 1 - np.where(there, missed, 0) / np.maximum(asked, STAYS)
+    listed = [
+        round(max(0.0, float(p)), 4) if known and far >= STAYS else None
+        for p, known, far in zip(part, there, asked, strict=True)
     ]
+    total = float(asked[there].sum())
+    return listed, round(max(0.0, 1 - float(missed[there].sum()) / total), 4) if total >= STAYS else 1.0
+
+
+def list_place(place: NDArray[np.float64]) -> list[float]:
+    """Return a place in JSON types."""
+    return [round(float(v), 3) for v in place]

@@ -6,6 +6,7 @@ is:
 
 1. the cells of A, and those of B, or the Voronoi cells of B's points where these are not connected (`texrs.exemplar.cells`,
    `tessellation`, `continuation`);
+   for a part of the way only, tessellations between A's own and that one (`strength`);
 2. for each target cell the cell of A that is most like it and was shown least (`choice`);
 3. its outline brought to the target's, its inside with it, its joints as wide as they were (`outlines`, `charts`);
 4. cells joined by cuts in a band around their outlines (`joining`);
@@ -32,8 +33,10 @@ from texrs.papers.splice.cells.choice import list_usable, shortlist
 from texrs.papers.splice.cells.joining import Joined, join
 from texrs.papers.splice.cells.pictures import CellStages
 from texrs.papers.splice.cells.refinement import refine_charts
+from texrs.papers.splice.cells.strength import go_part_of_the_way, take_own_cells
 from texrs.papers.splice.cells.tessellation import Tessellation, take_cells, take_points
 from texrs.papers.splice.extension import lay_out
+from texrs.papers.splice.result import list_place, measure_realised
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
@@ -70,6 +73,7 @@ def splice_cells(
     cells: Cells,
     size: tuple[int, int],
     *,
+    strength: float,
     turns: bool | None,
     refine: bool,
     seed: int,
@@ -85,6 +89,8 @@ def splice_cells(
         Those of A.
     size : (rows, columns)
         Of the result.
+    strength : float
+        How much of the way cells go, from A's own tessellation, 0, to B's, 1.
     turns : bool, optional
         Whether cells may be turned; by default where nothing tells A from itself upside down.
     refine : bool
@@ -110,6 +116,8 @@ def splice_cells(
     # The size of those that can be shown: these come as large as they are.
     unit = float(np.sqrt(np.median(cells.area[list_usable(cells)])))
     wanted = _take_targets(b, size, unit, seed)
+    if strength < 1:
+        wanted = go_part_of_the_way(take_own_cells(cells, a.wrap, size, wanted.margin, seed=seed), wanted, strength)
     chosen = _list_shown(wanted)
     watch("cells", 0.2)
     choices = shortlist(cells, wanted, chosen, turns=may_turn, seed=seed)
@@ -124,7 +132,15 @@ def splice_cells(
         places, (a.mask.shape[0], a.mask.shape[1]), label=(joined.chart + 1).astype(np.uint32), frame=frames
     )
     image = source.render(a.image)
-    report = _report(cells, wanted, charts, joined, layout=a.layout, turns=may_turn, seed=seed)
+    report = {
+        "method": "cells",
+        "seed": seed,
+        "size": list(size),
+        "layout": a.layout.value,
+        "strength": strength,
+        "turns": may_turn,
+        **_report(cells, wanted, charts, joined),
+    }
     watch("done", 1.0)
     return Synthesis(image, source, CellStages(a, b, cells, wanted, charts, joined, image), report)
 
@@ -166,37 +182,25 @@ def _find_places(cells: Cells, charts: Charts, joined: Joined) -> NDArray[np.flo
     return out
 
 
-def _report(
-    cells: Cells,
-    wanted: Tessellation,
-    charts: Charts,
-    joined: Joined,
-    *,
-    layout: Layout,
-    turns: bool,
-    seed: int,
-) -> dict[str, Any]:
+def _report(cells: Cells, wanted: Tessellation, charts: Charts, joined: Joined) -> dict[str, Any]:
     """Say what was found, what was wanted and what has become of it, in JSON types."""
     from scipy.spatial import cKDTree
 
-    size = joined.chart.shape
+    size = np.array(joined.chart.shape)
     goal, found = wanted.centre[charts.target], _find_places(cells, charts, joined)
-    inside = ((goal >= 0) & (goal <= np.array(size) - 1)).all(axis=1)
+    inside = ((goal >= 0) & (goal <= size - 1)).all(axis=1)
     there = np.isfinite(found[:, 0])
-    # How far the nearest cell of A's own layout would have to go.
-    offset = (np.array(size) - np.array(cells.labels.shape)) / 2
-    asked = cKDTree(cells.centre + offset).query(goal)[0]
-    compared = inside & there
-    missed = np.hypot(*(found - goal)[compared].T).sum()
-    realised = 1 - float(missed / max(asked[compared].sum(), 1e-9)) if compared.any() else 0.0
+    if wanted.start is None:
+        # Cells come from anywhere: the way is that of the nearest cell of A's own layout.
+        own = cells.centre + (size - cells.labels.shape) / 2
+        start = own[cKDTree(own).query(goal)[1]]
+    else:
+        start = wanted.start[charts.target]
+    parts, _ = measure_realised(start, goal, found)
+    _, realised = measure_realised(start[inside], goal[inside], found[inside])
     return {
-        "method": "cells",
-        "seed": seed,
-        "size": list(size),
-        "layout": layout.value,
         "scale": round(wanted.scale, 6),
         "continued": wanted.continued,
-        "turns": turns,
         "targets": len(charts.target),
         "cells": {
             "count": cells.count,
@@ -206,13 +210,14 @@ def _report(
             "confidence": round(cells.confidence, 4),
         },
         "present": round(float(there[inside].mean()) if inside.any() else 0.0, 4),
-        "realised": round(max(0.0, realised), 4),
+        "realised": realised,
         "matches": [
             {
-                "target": [round(float(v), 3) for v in goal[k]],
-                "found": [round(float(v), 3) for v in found[k]] if there[k] else None,
+                "target": list_place(goal[k]),
+                "found": list_place(found[k]) if there[k] else None,
+                "realised": parts[k],
                 "element": int(charts.source[k]),
-                "point": [round(float(v), 3) for v in cells.centre[charts.source[k]]],
+                "point": list_place(cells.centre[charts.source[k]]),
                 "turn": float(charts.turn[k]),
                 "scale": round(float(charts.scale[k]), 4),
             }

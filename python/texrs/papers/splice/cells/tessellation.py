@@ -18,7 +18,7 @@ from texrs.exemplar.contours import measure_moments, trace
 from texrs.layouts import PointLayout
 from texrs.papers.splice.cells.continuation import continue_cells
 
-__all__ = ["Tessellation", "take_cells", "take_points"]
+__all__ = ["Tessellation", "finish_cells", "paint_cells", "take_cells", "take_points"]
 
 Points = NDArray[np.float64]
 
@@ -50,6 +50,8 @@ class Tessellation:
         What the layout was scaled by.
     continued : str
         How it goes on beyond its picture: "lattice", "wrap", "quilted", "reflected", or "" where it covers the output.
+    start : (n, 2) float64, optional
+        Where each cell comes from, of A's own, where it goes part of the way only.
 
     """
 
@@ -60,6 +62,7 @@ class Tessellation:
     area: NDArray[np.float64]
     scale: float
     continued: str
+    start: Points | None = None
 
     @property
     def size(self) -> tuple[int, int]:
@@ -67,8 +70,12 @@ class Tessellation:
         return self.labels.shape[0] - 2 * self.margin, self.labels.shape[1] - 2 * self.margin
 
 
-def take_cells(cells: Cells, wrap: tuple[bool, bool], size: tuple[int, int], unit: float, *, seed: int) -> Tessellation:
+def take_cells(
+    cells: Cells, wrap: tuple[bool, bool], size: tuple[int, int], unit: float, *, seed: int, margin: int | None = None
+) -> Tessellation:
     """Take the cells of a connected texture, at a median size of ``unit`` pixels.
+
+    The margin has so many pixels; by default as many as `MARGIN` says.
 
     Raises
     ------
@@ -76,12 +83,12 @@ def take_cells(cells: Cells, wrap: tuple[bool, bool], size: tuple[int, int], uni
         Too few of its cells are whole.
 
     """
-    margin = int(np.ceil(MARGIN * unit))
+    margin = int(np.ceil(MARGIN * unit)) if margin is None else margin
     far = [n / 2 + margin + unit for n in size]
     shapes, scale, continued = continue_cells(cells, wrap, (far[0] / unit, far[1] / unit), seed=seed)
     outlines = shapes * unit + (np.array(size) - 1) / 2
-    labels = _paint(outlines + margin, (size[0] + 2 * margin, size[1] + 2 * margin))
-    return _finish(labels, margin, scale * unit, continued)
+    labels = paint_cells(outlines + margin, (size[0] + 2 * margin, size[1] + 2 * margin))
+    return finish_cells(labels, margin, scale * unit, continued)
 
 
 def take_points(layout: PointLayout, size: tuple[int, int], unit: float) -> Tessellation:
@@ -110,10 +117,10 @@ def take_points(layout: PointLayout, size: tuple[int, int], unit: float) -> Tess
     pixels = np.stack(np.meshgrid(*(np.arange(n) for n in shape), indexing="ij"), -1).reshape(-1, 2)
     labels = (cKDTree(points).query(pixels)[1] + 1).reshape(shape)
     continued = "reflected" if mirrored.any() else ""
-    return _finish(labels.astype(np.int32), margin, scale, continued)
+    return finish_cells(labels.astype(np.int32), margin, scale, continued)
 
 
-def _paint(outlines: NDArray[np.float64], shape: tuple[int, int]) -> Labels:
+def paint_cells(outlines: NDArray[np.float64], shape: tuple[int, int]) -> Labels:
     """Return for each pixel the outline that it lies inside of; 0 where that is none, or several."""
     from skimage.draw import polygon
 
@@ -126,7 +133,7 @@ def _paint(outlines: NDArray[np.float64], shape: tuple[int, int]) -> Labels:
     return labels
 
 
-def _finish(labels: Labels, margin: int, scale: float, continued: str) -> Tessellation:
+def finish_cells(labels: Labels, margin: int, scale: float, continued: str) -> Tessellation:
     """Keep one connected piece of each cell that is no sliver, give the rest to those beside it, and trace what is left."""
     from scipy.ndimage import distance_transform_edt
     from skimage.measure import label

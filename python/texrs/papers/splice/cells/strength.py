@@ -1,0 +1,82 @@
+"""Tessellations between A's own and the one that is wanted.
+
+Cells of the two are matched one to one at the least total squared distance, as elements are (Eq. 4), and each outline goes a
+part of its way. Those that find no partner shrink away, or grow.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs.exemplar.cells import Cells
+from texrs.layouts import match_points
+from texrs.papers.splice.cells.outlines import match_outlines, rematch_outlines
+from texrs.papers.splice.cells.tessellation import Tessellation, finish_cells, paint_cells, take_cells
+
+__all__ = ["go_part_of_the_way", "take_own_cells"]
+
+
+def take_own_cells(
+    cells: Cells, wrap: tuple[bool, bool], size: tuple[int, int], margin: int, *, seed: int
+) -> Tessellation:
+    """Take A's own cells as they lie, around the middle of the output; beyond its picture, the labels reflected.
+
+    Where the output is larger than the picture, they go on as those of any layout (`take_cells`).
+    """
+    shape = cells.labels.shape
+    if any(n > m for n, m in zip(size, shape, strict=True)):
+        found = take_cells(cells, wrap, size, cells.size, seed=seed, margin=margin)
+    else:
+        modes = ["wrap" if w else "symmetric" for w in wrap]
+        labels = cells.labels
+        for axis, (n, m) in enumerate(zip(size, shape, strict=True)):
+            first = (m - n) // 2 - margin
+            around = [(0, 0), (0, 0)]
+            around[axis] = (max(0, -first), max(0, first + n + 2 * margin - m))
+            labels = np.pad(labels, around, mode=modes[axis])  # type: ignore[call-overload]
+            start = max(0, first)
+            labels = labels[(slice(None),) * axis + (slice(start, start + n + 2 * margin),)]
+        found = finish_cells(labels, margin, 1.0, "reflected")
+    return replace(found, start=found.centre)
+
+
+def go_part_of_the_way(own: Tessellation, wanted: Tessellation, strength: float) -> Tessellation:
+    """Let the cells of one tessellation go so much of their way to those of another.
+
+    Parameters
+    ----------
+    own, wanted : Tessellation
+        Of one size, with one margin.
+    strength : float
+        0 to 1.
+
+    """
+    if strength <= 0:
+        return own
+    few, many = (wanted, own) if len(own.area) >= len(wanted.area) else (own, wanted)
+    of, _ = match_points(many.centre, few.centre)
+    rest = np.setdiff1d(np.arange(len(many.area)), of)
+    every = np.arange(len(few.area))
+    mine, theirs = (of, every) if few is wanted else (every, of)
+    start, goal = own.centre[mine], wanted.centre[theirs]
+    shape, other = own.outlines[mine] - start[:, None], wanted.outlines[theirs] - goal[:, None]
+    unit = float(np.sqrt(np.median(wanted.area)))
+    found = rematch_outlines(other, shape, unit, match_outlines(other, shape, unit)).locate(shape)
+    outlines = (1 - strength) * (found + start[:, None]) + strength * (other + goal[:, None])
+    left = (1 - strength) if many is own else strength
+    alone = many.centre[rest]
+    fading = alone[:, None] + left * (many.outlines[rest] - alone[:, None])
+    outlines = np.concatenate([outlines, fading])
+    middles = np.concatenate([(1 - strength) * start + strength * goal, alone])
+    labels = paint_cells(outlines + wanted.margin, wanted.labels.shape)
+    made = finish_cells(labels, wanted.margin, wanted.scale, wanted.continued)
+    return replace(made, start=np.concatenate([start, alone])[_find_nearest(middles, made.centre)])
+
+
+def _find_nearest(points: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.intp]:
+    from scipy.spatial import cKDTree
+
+    return np.asarray(cKDTree(points).query(places)[1], np.intp)
