@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from texrs._typing import Labels
 
-__all__ = ["POINTS", "Moments", "measure_moments", "measure_profiles", "resample", "trace"]
+__all__ = ["POINTS", "Moments", "measure_moments", "measure_profiles", "paint", "resample", "trace"]
 
 Polygons = NDArray[np.float64]
 
@@ -88,6 +88,19 @@ def trace(labels: Labels, numbers: NDArray[np.integer], *, smooth: float = SMOOT
     turned = _measure_signed_area(out) < 0
     out[turned] = out[turned, ::-1]
     return out
+
+
+def paint(polygons: Polygons, shape: tuple[int, ...]) -> Labels:
+    """Return for each pixel the polygon that it lies inside of, from 1; 0 where that is none, or several."""
+    from skimage.draw import polygon
+
+    labels, times = np.zeros(shape, np.int32), np.zeros(shape, np.uint8)
+    for number, outline in enumerate(polygons, start=1):
+        rows, columns = polygon(outline[:, 0], outline[:, 1], shape)
+        labels[rows, columns] = number
+        times[rows, columns] = np.minimum(times[rows, columns], 1) + 1
+    labels[times > 1] = 0
+    return labels
 
 
 def resample(polygon: Polygons, count: int = POINTS) -> Polygons:

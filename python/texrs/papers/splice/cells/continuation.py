@@ -13,8 +13,8 @@ from texrs._typing import Bools, Floats, Labels
 from texrs.errors import InvalidInput
 from texrs.exemplar.cells import Cells
 from texrs.exemplar.components import split_touching
-from texrs.exemplar.contours import trace
-from texrs.exemplar.shapes import Shapes, mark_outlines
+from texrs.exemplar.contours import paint, trace
+from texrs.exemplar.shapes import Shapes, mark_outlines, renumber
 from texrs.layouts import PointLayout
 from texrs.papers.splice.edit import fit_lattice
 from texrs.quilting import Picture, quilt
@@ -35,13 +35,16 @@ DRAWN, LARGE = (16.0, 28.0), 320.0
 are fewer."""
 LINE = 0.17
 """How far from an outline the drawing of the joints reaches, in sizes."""
-TRIALS, FINE = 2, 0.03
+SEEN, HINTED, COVERED = 0.3, 0.05, 0.35
+"""Share of a cell that a patch of a quilt shows for the cell to be taken first, and for it to be taken at all; the share that
+others may cover."""
+TRIALS, FINE = 2, 0.05
 """Quilts that are tried at the most, and the share of torn cells with which one is taken at once."""
 SOLID, HUGE = 0.8, 3.0
 """Solidity below which, and squared sizes beyond which, a cell of a quilt is taken for torn."""
-CLOSED, LEAST = 0.8, 0.08
-"""Height in the drawing above which a pixel lies inside of a cell, and the least area of what does so together, in squared
-sizes."""
+CLOSED, LEAST, ROOM = 0.8, 0.08, 0.25
+"""Height in the drawing above which a pixel lies inside of a cell, the least area of what does so together, and what must be
+left between cells for one more, in squared sizes."""
 PATCH, OVERLAP = 4.0, 1.2
 """Side of a patch of the drawing, and overlap of two, in sizes."""
 
@@ -131,45 +134,96 @@ def _continue_on_lattice(
 
 
 def _grow(cells: Cells, far: tuple[float, float], seed: int) -> NDArray[np.float64]:
-    """Quilt a drawing of the joints, and take what lies between them for cells: of a few quilts the one least torn."""
+    """Quilt a drawing of the joints, and take the cells that it shows.
+
+    Seams cut cells, and run others together. So there are two readings, of which the one that is less torn is taken: what
+    the lines of the quilt enclose, and cells that it shows the most of, whole.
+    """
     unit = float(np.clip(LARGE / (2 * max(far)), *DRAWN))
     size = (round(2 * far[0] * unit), round(2 * far[1] * unit))
     drawing = _draw(cells, unit)
-    best, least = np.zeros((0, 0, 2)), np.inf
+    picture = Picture(drawing[..., None], SourceMap.identity(drawing.shape), np.maximum(drawing - 0.5, 0))
+    best, least = np.zeros(size, np.int32), np.inf
     for attempt in range(TRIALS):
-        labels = _quilt(drawing, size, unit, seed + attempt)
-        torn = _measure_torn(labels, unit)
-        if torn < least:
-            best, least = trace(labels, np.arange(1, int(labels.max()) + 1)), torn
-        if torn <= FINE:
+        grown = quilt(
+            [picture],
+            size,
+            patch=round(PATCH * unit),
+            overlap=round(OVERLAP * unit),
+            wrap=(False, False),
+            shares=np.ones(1),
+            seed=seed + attempt,
+            progress=lambda share: None,
+        )
+        drawn = grown.render(drawing, interpolation="nearest")
+        whole = _stamp(cells, grown.coordinates, np.array(drawing.shape) / cells.labels.shape, drawn)
+        for labels in (_enclose(drawn, unit), whole):
+            torn = _measure_torn(labels, unit)
+            if torn < least:
+                best, least = labels, torn
+        if least <= FINE:
             break
-    if not len(best):
+    if not best.any():
         raise InvalidInput("b: its cells cannot be continued as far as that; take a smaller size or a larger picture")
-    return (best - (np.array(size) - 1) / 2) / unit
+    outlines = trace(best, np.arange(1, int(best.max()) + 1))
+    return (outlines - (np.array(size) - 1) / 2) / unit
 
 
-def _quilt(drawing: Floats, size: tuple[int, int], unit: float, seed: int) -> Labels:
-    """Return the cells of a quilt of the drawing."""
+def _enclose(drawn: Floats, unit: float) -> Labels:
+    """Label what the lines of a quilt enclose: narrow gaps in them are closed, and those that end somewhere part nothing."""
     from skimage.segmentation import watershed
 
-    picture = Picture(drawing[..., None], SourceMap.identity(drawing.shape), np.maximum(drawing - 0.5, 0))
-    grown = quilt(
-        [picture],
-        size,
-        patch=round(PATCH * unit),
-        overlap=round(OVERLAP * unit),
-        wrap=(False, False),
-        shares=np.ones(1),
-        seed=seed,
-        progress=lambda share: None,
-    )
-    drawn = grown.render(drawing, interpolation="nearest")
-    # Lines that a seam has cut end somewhere, and part nothing; narrow gaps in others are closed, and cells parted at necks.
     pieces = split_touching(drawn > CLOSED, np.zeros_like(drawn))
-    area = np.bincount(pieces.ravel())
-    pieces[area[pieces] < LEAST * unit**2] = 0
-    _, seeds = np.unique(pieces, return_inverse=True)
-    return np.asarray(watershed(1 - drawn, seeds.reshape(drawn.shape)), np.int32)
+    seeds = renumber(pieces, np.bincount(pieces.ravel()) >= LEAST * unit**2)
+    return np.asarray(watershed(1 - drawn, seeds), np.int32)
+
+
+def _stamp(cells: Cells, coordinates: Floats, factor: Points, drawn: Floats) -> Labels:
+    """Label the cells that a quilt shows the most of, each whole, and what room is left between them.
+
+    Parameters
+    ----------
+    cells : Cells
+        Those that are drawn.
+    coordinates : (H, W, 2) float32
+        Where the quilt looks in the drawing.
+    factor : (2,) float64
+        Pixels of the drawing for one of the texture.
+    drawn : (H, W) float32
+        What the quilt shows there.
+
+    """
+    from scipy.ndimage import distance_transform_edt, label
+    from skimage.draw import polygon
+
+    shape, limits = coordinates.shape[:2], np.array(cells.labels.shape)
+    at = np.clip(np.rint((coordinates + 0.5) / factor - 0.5), 0, limits - 1).astype(np.intp)
+    shown = cells.labels[at[..., 0], at[..., 1]] - 1
+    pixels = np.stack(np.meshgrid(*(np.arange(n) for n in shape), indexing="ij"), -1)
+    # All that one patch shows of one cell says the same of where it would lie.
+    moved = np.rint(pixels - coordinates).astype(np.int64)
+    votes, count = np.unique(np.dstack([shown, moved]).reshape(-1, 3), axis=0, return_counts=True)
+    of = votes[:, 0]
+    share = count / (cells.area[of] * factor.prod())
+    found, covered = [], np.zeros(shape, bool)
+    turn = np.where(cells.whole[of], np.where(share >= SEEN, 0, 1), 2)
+    for k in np.lexsort((of, -share, turn)).tolist():
+        if share[k] < (SEEN, HINTED, SEEN)[turn[k]]:
+            continue
+        outline = (cells.outlines[of[k]] + 0.5) * factor - 0.5 + votes[k, 1:]
+        inside = polygon(outline[:, 0], outline[:, 1], shape)
+        if len(inside[0]) and covered[inside].mean() <= COVERED:
+            covered[inside] = True
+            found.append(outline)
+    stamped = paint(np.array(found).reshape(-1, cells.outlines.shape[1], 2), shape)
+    usual = cells.size**2 * factor.prod()
+    pieces, _ = label((drawn > CLOSED) & ~covered)
+    room = renumber(pieces.astype(np.int32), np.bincount(pieces.ravel()) >= ROOM * usual)
+    labels = np.where((room > 0) & (stamped == 0), room + len(found), stamped)
+    if not labels.any():
+        return labels
+    labels = labels[tuple(distance_transform_edt(labels == 0, return_distances=False, return_indices=True))]
+    return renumber(labels, np.bincount(labels.ravel()) > 0)
 
 
 def _measure_torn(labels: Labels, unit: float) -> float:

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs.exemplar.cells import Cells
+from texrs.exemplar.contours import paint
 from texrs.layouts import match_points
 from texrs.papers.splice.cells.outlines import match_outlines, rematch_outlines
-from texrs.papers.splice.cells.tessellation import Tessellation, finish_cells, paint_cells, take_cells
+from texrs.papers.splice.cells.tessellation import Tessellation, finish_cells, take_cells
 
 __all__ = ["go_part_of_the_way", "take_own_cells"]
 
@@ -71,7 +72,7 @@ def go_part_of_the_way(own: Tessellation, wanted: Tessellation, strength: float)
     fading = alone[:, None] + left * (many.outlines[rest] - alone[:, None])
     outlines = np.concatenate([outlines, fading])
     middles = np.concatenate([(1 - strength) * start + strength * goal, alone])
-    labels = paint_cells(outlines + wanted.margin, wanted.labels.shape)
+    labels = paint(outlines + wanted.margin, wanted.labels.shape)
     made = finish_cells(labels, wanted.margin, wanted.scale, wanted.continued)
     return replace(made, start=np.concatenate([start, alone])[_find_nearest(middles, made.centre)])
 

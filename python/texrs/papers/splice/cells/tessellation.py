@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from texrs._typing import Labels
 from texrs.errors import InvalidInput
 from texrs.exemplar.cells import Cells
-from texrs.exemplar.contours import measure_moments, trace
+from texrs.exemplar.contours import measure_moments, paint, trace
 from texrs.layouts import PointLayout
 from texrs.papers.splice.cells.continuation import continue_cells
 
-__all__ = ["Tessellation", "finish_cells", "paint_cells", "take_cells", "take_points"]
+__all__ = ["Tessellation", "finish_cells", "take_cells", "take_points"]
 
 Points = NDArray[np.float64]
 
@@ -87,7 +87,7 @@ def take_cells(
     far = [n / 2 + margin + unit for n in size]
     shapes, scale, continued = continue_cells(cells, wrap, (far[0] / unit, far[1] / unit), seed=seed)
     outlines = shapes * unit + (np.array(size) - 1) / 2
-    labels = paint_cells(outlines + margin, (size[0] + 2 * margin, size[1] + 2 * margin))
+    labels = paint(outlines + margin, (size[0] + 2 * margin, size[1] + 2 * margin))
     return finish_cells(labels, margin, scale * unit, continued)
 
 
@@ -118,19 +118,6 @@ def take_points(layout: PointLayout, size: tuple[int, int], unit: float) -> Tess
     labels = (cKDTree(points).query(pixels)[1] + 1).reshape(shape)
     continued = "reflected" if mirrored.any() else ""
     return finish_cells(labels.astype(np.int32), margin, scale, continued)
-
-
-def paint_cells(outlines: NDArray[np.float64], shape: tuple[int, int]) -> Labels:
-    """Return for each pixel the outline that it lies inside of; 0 where that is none, or several."""
-    from skimage.draw import polygon
-
-    labels, times = np.zeros(shape, np.int32), np.zeros(shape, np.uint8)
-    for number, outline in enumerate(outlines, start=1):
-        rows, columns = polygon(outline[:, 0], outline[:, 1], shape)
-        labels[rows, columns] = number
-        times[rows, columns] += 1
-    labels[times > 1] = 0
-    return labels
 
 
 def finish_cells(labels: Labels, margin: int, scale: float, continued: str) -> Tessellation:
