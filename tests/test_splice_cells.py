@@ -17,6 +17,7 @@ from texrs import samples
 from texrs.elements import Elements, Layout
 from texrs.errors import InvalidInput
 from texrs.exemplar.cells import find_cells
+from texrs.exemplar.contours import resample
 from texrs.exemplar.shapes import mark_outlines
 from texrs.papers.splice.cells import find_entry_cells
 from texrs.papers.splice.cells.outlines import interpolate, match_outlines, rematch_outlines
@@ -272,6 +273,15 @@ def test_where_an_outline_begins_does_not_matter() -> None:
         rematch_outlines(star, other, 20.0, match_outlines(star, other, 20.0)),
     ):
         assert np.abs(found.locate(other) - star).max() < 1e-4
+
+
+def test_outlines_are_nowhere_pulled_into_a_point() -> None:
+    box = resample(np.array([[-30.0, -10], [-30, 10], [30, 10], [30, -10]]))[None]
+    wedge = resample(np.array([[-34.0, 0], [26, 22], [26, -22]]))[None]
+    places = match_outlines(box, wedge, 40.0).places[0]
+    strides = np.diff(places, append=places[:1]) % (2 * len(places))
+    assert strides.sum() == 2 * len(places)
+    assert strides.min() > 0
 
 
 def test_mean_values_carry_linear_maps() -> None:

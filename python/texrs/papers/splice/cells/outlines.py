@@ -22,7 +22,7 @@ STRIDES = np.arange(0, 6)
 """Of these, how many may lie between the matches of neighbouring points."""
 APART = 16
 """Of these, how far a match may lie from where even strides would lead: a sixth of the way around."""
-BEND, STRETCH = 0.05, 0.02
+BEND, STRETCH = 0.05, 0.12
 """Weights of the difference in bending, in squared radians, and of strides that are longer or shorter than even ones; that of
 the squared distance, in squared sizes, is 1."""
 
