@@ -390,3 +390,29 @@ def test_part_of_the_way_is_part_of_the_way() -> None:
     assert len(half.report["matches"]) > len(full.report["matches"]), "elements stay that would be erased"
     for one, all_ in zip(half.report["matches"], full.report["matches"], strict=False):
         assert one["element"] == all_["element"]
+
+
+@pytest.mark.parametrize("name", ["dots", "pebbles"])
+@pytest.mark.parametrize("factor", [0.9, 0.8])
+def test_layouts_that_shrink_leave_no_bare_margin(name: str, factor: float) -> None:
+    mine = entry(name)
+    result = texrs.self_splice(mine, {"op": "scale", "factor": factor}, seed=1)
+    rows, columns = np.moveaxis(result.source.coordinates.astype(int), -1, 0)
+    shown, wide = mine.mask[rows, columns], max(mine.box) // 2
+    sides = (shown[:wide], shown[-wide:], shown[:, :wide], shown[:, -wide:])
+    assert min(side.mean() for side in sides) > 0.4 * mine.mask.mean()
+
+
+@pytest.mark.parametrize("name", ["net", "bricks"])
+def test_what_is_connected_cannot_be_removed(name: str) -> None:
+    with pytest.raises(InvalidInput, match="remove needs separate elements"):
+        texrs.self_splice(ENTRIES[name], [{"op": "shift", "by": 2}, {"op": "remove", "element": 3}])
+
+
+@pytest.mark.parametrize("off", [(11, 11), (0, 12)])
+def test_elements_are_moved_whose_centre_is_not_their_own(off: tuple[int, int]) -> None:
+    mine = ENTRIES["dots"]
+    points = mine.points.copy()
+    points[5] = np.clip(points[5] + off, 0, min(mine.mask.shape) - 1)
+    result = texrs.self_splice(replace(mine, points=points), {"op": "move", "element": 5, "by": [6, -9]})
+    assert result.image.shape == mine.image.shape

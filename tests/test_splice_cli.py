@@ -12,6 +12,7 @@ import texrs
 from reference.look_up import view
 from texrs import io
 from texrs.cli import main
+from texrs.papers.splice.edit import STEPS
 
 
 @pytest.fixture(autouse=True)
@@ -53,6 +54,12 @@ def test_self_splice_and_its_replay(tmp_path: Path) -> None:
     assert first.read_bytes() == again.read_bytes()
     moved = '[{"op": "move", "element": 1, "by": [3, 4]}]'
     assert main([*line, "-o", str(again), "--edit", moved]) == 0
+
+
+def test_the_help_names_every_step(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["self-splice", "--help"]) == 0
+    words = capsys.readouterr().out
+    assert not [step for step in STEPS if step not in words]
 
 
 def test_entries_are_taken(tmp_path: Path) -> None:

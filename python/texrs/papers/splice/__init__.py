@@ -31,7 +31,8 @@ Departures, with their reasons:
 - Eq. 5 sums over rigid pixels only, so the others have no equation and the system is singular, or, for brick walls,
   moves nothing but its pins: here they count a hundredth. Long joints, which the decoupling of Table 1 leaves free to slide,
   are tied to their neighbours by a weak spring.
-- Elements that reflection mirrors are turned back, and those that the border cuts are left out.
+- Elements that reflection mirrors are turned back, and those that the border cuts are left out. Where an edited layout
+  shrinks, whole ones from beyond take their places.
 - Wide holes are filled with patches of the ground; random pixels come out as noise there.
 - Refinement leaves what is rigid as it is, and so whatever the warp copied whole: there is nothing to mend. In its
   place nothing comes that is not ground itself.
@@ -201,7 +202,8 @@ def self_splice(
     a : Elements, or (H, W) or (H, W, C) array
         The texture; a picture is analysed by `texrs.elements.analyse`.
     edit : str, mapping, or sequence of mappings
-        What is done, step by step, in plain JSON types: ``{"op": "scale", "factor": 1.2}`` or ``[1.2, 1]`` (the layout, not
+        What is done, step by step: scale, shift, rows, randomise, regularise, move, remove or points. In plain JSON
+        types: ``{"op": "scale", "factor": 1.2}`` or ``[1.2, 1]`` (the layout, not
         the elements), ``{"op": "shift", "by": [4, 0]}``, ``{"op": "rows", "by": 6}`` (every other row to the right, those
         between to the left), ``{"op": "randomise", "amount": 0.25, "least": 0.7}`` (Gaussian, in spacings; the share of the
         least usual distance that is kept), ``{"op": "regularise", "amount": 1}`` (to the lattice that fits best),
@@ -227,7 +229,8 @@ def self_splice(
     Raises
     ------
     InvalidInput
-        A step that is not known, lacks something, or names an element that is not there.
+        A step that is not known, lacks something, or names an element that is not there, or one to be removed from a
+        connected figure, which has no ground to close over it.
 
     Examples
     --------

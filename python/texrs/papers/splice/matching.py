@@ -38,6 +38,8 @@ TURN = 0.75
 """A turn must cost so much less than a smaller one: lattices have several that cost nearly the same."""
 OFFSETS, NEARER = 6, 0.9
 """Offsets of a connected figure's layout that are tried along each axis, and how much less one must cost."""
+ALONE = 0.5
+"""Spacings that a site must be away from all elements for one to be sent there."""
 CLEARANCE = 1.08
 """Least distance of elements in their diameters."""
 
@@ -217,6 +219,10 @@ def _extend_until(a: Elements, size: tuple[int, int], unit: float, needed: float
 
 def match_edit(a: Elements, steps: Sequence[Step]) -> tuple[Match, bool]:
     """Match a texture with its own layout, edited; also tell whether the edit only lists moved points."""
+    if a.layout != Layout.DISJOINT and any(step["op"] == "remove" for step in steps):
+        raise InvalidInput(
+            f"edit: remove needs separate elements; those of a are {a.layout.value}, and what joins them stays"
+        )
     points = list_element_points(a)
     trial = apply_steps(points, len(points), steps, len(a.points))
     shrink = math.prod(min(1.0, float(np.min(s.get("factor", 1.0)))) for s in steps if s["op"] == "scale")
@@ -224,7 +230,9 @@ def match_edit(a: Elements, steps: Sequence[Step]) -> tuple[Match, bool]:
     size = (a.mask.shape[0], a.mask.shape[1])
     if far > 4 * max(size):
         raise InvalidInput(f"edit: moves elements by up to {far:.0f} pixels, four times the picture's size is allowed")
-    extension = extend(a, size, math.ceil(MARGIN * spacing(points) + far), whole=False, exact=shrink == 1)
+    # Where a layout shrinks, borders come in: there must be elements to send there.
+    margin = (MARGIN if shrink == 1 else 2 * MARGIN) * spacing(points) + far
+    extension = extend(a, size, math.ceil(margin), whole=False, exact=shrink == 1)
     edited = apply_steps(extension.points, extension.originals, steps, len(a.points))
     kept = edited.kept.copy()
     if a.layout == Layout.DISJOINT:
@@ -239,5 +247,27 @@ def match_edit(a: Elements, steps: Sequence[Step]) -> tuple[Match, bool]:
     if not len(assigned):
         raise InvalidInput("edit: leaves no element")
     moved = edited.points[assigned]
+    if shrink < 1 and a.layout == Layout.DISJOINT:
+        left = edited.points[np.flatnonzero(edited.kept & ~kept)]
+        moved = _fill_sites(left, moved, size, shrink * spacing(points), 0.5 * max(a.box) + 2)
     cost = float(((moved - extension.points[assigned]) ** 2).sum(axis=1).mean())
     return Match(moved, extension, assigned, 1.0, 0.0, 1.0, cost), edited.listed
+
+
+def _fill_sites(sites: Points, moved: Points, size: tuple[int, int], unit: float, radius: float) -> Points:
+    """Send elements that go far beyond the output to sites in it that have none: where a layout shrinks, borders come in.
+
+    Those are the sites of elements that the border cuts, which cannot be shown.
+    """
+    away = np.maximum(-moved, moved - (np.array(size) - 1)).max(axis=1)
+    spare = np.flatnonzero(away > radius)
+    wanted = sites[((sites > -radius) & (sites < np.array(size) - 1 + radius)).all(axis=1)]
+    # Not where another is already, as beside a site that comes in from both sides of a border.
+    wanted = wanted[nearest_distances(wanted, 1, moved)[:, 0] > ALONE * unit] if len(wanted) else wanted
+    wanted = wanted[: len(spare)]
+    if not len(wanted):
+        return moved
+    of, _ = match_points(moved[spare], wanted)
+    filled = moved.copy()
+    filled[spare[of]] = wanted
+    return filled
