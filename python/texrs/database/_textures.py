@@ -53,6 +53,7 @@ class SpliceOptions(TypedDict, total=False):
     cells: bool | None
     turns: bool | None
     refine: bool
+    blend: float | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -292,7 +293,7 @@ class TextureDatabase:
             Called as ``progress(stage, share)``; raising stops the work.
         **options
             What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``strength``,
-            ``align``, ``snap_rows``, ``cells``, ``turns``, ``refine``.
+            ``align``, ``snap_rows``, ``cells``, ``turns``, ``refine``, ``blend``.
 
         Returns
         -------
@@ -334,7 +335,7 @@ class TextureDatabase:
             Called as ``progress("matrix", share)``; raising stops the work.
         **options
             What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``strength``,
-            ``align``, ``snap_rows``, ``cells``, ``turns``, ``refine``.
+            ``align``, ``snap_rows``, ``cells``, ``turns``, ``refine``, ``blend``.
 
         Returns
         -------

@@ -33,6 +33,9 @@ Departures, with their reasons:
   are tied to their neighbours by a weak spring.
 - Elements that reflection mirrors are turned back, and those that the border cuts are left out. Where an edited layout
   shrinks, whole ones from beyond take their places.
+- In splices the ground between separate elements is neither warped nor refined, which averages it: it is completed where the
+  elements were, grown by patches, and each element is cut into it with what lies around all of them alike, its shadow say;
+  colours are corrected where they meet (`ground`). What follows of it is for edits, and for textures that show too little.
 - Wide holes are filled with patches of the ground; random pixels come out as noise there.
 - Refinement leaves what is rigid as it is, and so whatever the warp copied whole: there is nothing to mend. In its
   place nothing comes that is not ground itself.
@@ -58,6 +61,7 @@ from texrs.papers.splice.cells import find_entry_cells, splice_cells
 from texrs.papers.splice.draft import draft_pixels
 from texrs.papers.splice.edit import as_steps
 from texrs.papers.splice.entry import as_elements
+from texrs.papers.splice.ground import lay_ground
 from texrs.papers.splice.literal import fill_literally, match_literally
 from texrs.papers.splice.matching import Match, go_part_of_the_way, match_edit, match_layouts
 from texrs.papers.splice.refine import fill, refine_places
@@ -70,6 +74,8 @@ Method: TypeAlias = Literal["paper", "preview"] | None
 NO_CELLS = (
     "none were found in a that are sure enough; give texrs.elements.analyse a box around one, or a mask of the joints"
 )
+SCREENING = 0.01
+"""Weight of the values when colours are corrected, by default: light that changes slowly is evened out."""
 Edit: TypeAlias = str | Mapping[str, Any] | Sequence[Mapping[str, Any]]
 
 
@@ -86,6 +92,7 @@ def splice(
     cells: bool | None = None,
     turns: bool | None = None,
     refine: bool = True,
+    blend: float | None = SCREENING,
     progress: Progress | None = None,
 ) -> Synthesis:
     """Arrange the elements of one texture as those of another are.
@@ -114,7 +121,11 @@ def splice(
     turns : bool, optional
         Whether cells may be turned; by default where nothing tells ``a`` from itself upside down, as light and letters do.
     refine : bool
-        Whether to refine what is not rigid; by cells, what is stretched.
+        Whether to refine what is not rigid; by cells, what is stretched. Ground between separate elements needs none.
+    blend : float, optional
+        Of separate elements on their ground: weight of the values, 0 to 1e6, when colours are corrected so that the light
+        does not change where they meet, see `texrs.blend`. None or 0: no correction, and the picture is the texture looked
+        up through the source map. All else is not corrected.
     progress : callable, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
 
@@ -141,7 +152,7 @@ def splice(
     >>> from texrs.elements import Elements, Layout
     >>> buttons = Elements.of_sample(texrs.samples.dots((128, 128)))
     >>> stones = Elements.of_sample(texrs.samples.pebbles((128, 128)))
-    >>> result = texrs.splice(buttons, stones, seed=1)
+    >>> result = texrs.splice(buttons, stones, seed=1, blend=None)
     >>> row, column = result.source.coordinates[30, 40].astype(int)
     >>> result.image.shape, bool((result.image[30, 40] == buttons.image[row, column]).all())
     ((128, 128, 3), True)
@@ -156,6 +167,7 @@ def splice(
     if wanted and method is not None:
         raise InvalidInput(f'cells: method="{method}" bends figures')
     part = as_float(strength, "strength", 0, 1)
+    screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
     found = find_entry_cells(mine, watch) if method is None and wanted is not False else None
     if wanted and found is None:
         raise InvalidInput(f"cells: {'separate elements have none' if mine.layout == Layout.DISJOINT else NO_CELLS}")
@@ -183,7 +195,17 @@ def splice(
         match = straighten_rows(match)
     match = crop_extension(mine, match, (rows, columns))
     watch("match", 1.0)
-    return _synthesize(mine, theirs, match, (rows, columns), number, method=method, refine=bool(refine), watch=watch)
+    return _synthesize(
+        mine,
+        theirs,
+        match,
+        (rows, columns),
+        number,
+        method=method,
+        refine=bool(refine),
+        screening=screening,
+        watch=watch,
+    )
 
 
 def self_splice(
@@ -266,20 +288,29 @@ def _synthesize(
     method: Method,
     refine: bool,
     watch: Progress,
+    screening: float = 0.0,
     listed: bool = False,
 ) -> Synthesis:
     """Deform the texture, draw it backwards, fill and refine: sections 4.2 and 4.3, which splices and edits share."""
     warp = warp_backwards(a, match, size, method=method, listed=listed, progress=watch)
     draft, label = draft_pixels(a, match, warp, whole=method is None)
-    if method == "paper":
+    laid = (
+        lay_ground(a, match, draft, label, seed, watch)
+        if b and method is None and a.layout == Layout.DISJOINT
+        else None
+    )
+    if laid is not None:
+        filled = laid
+    elif method == "paper":
         filled = fill_literally(draft, seed)
     elif method == "preview":
         filled = draft
     else:
         filled = fill(a.image, draft, spacing(a.points), seed, watch)
     places = filled.places
-    if refine and method != "preview":
+    if refine and method != "preview" and laid is None:
         places = refine_places(a.image, a.wrap, filled, seed, watch)
-    result = compose(a, b, match, warp, draft, filled, places, label, method=method, seed=seed)
+    weight = screening if laid is not None else 0.0
+    result = compose(a, b, match, warp, draft, filled, places, label, method=method, seed=seed, screening=weight)
     watch("done", 1.0)
     return result

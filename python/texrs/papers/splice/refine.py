@@ -25,7 +25,7 @@ from texrs.growth.constraints import Asked
 from texrs.kernels.complete import complete
 from texrs.kernels.patch_search import PatchIndex
 
-__all__ = ["Draft", "Refinement", "correct_draft", "fill", "refine_places"]
+__all__ = ["Draft", "Refinement", "correct_draft", "fill", "fill_with_patches", "refine_places"]
 
 Places = NDArray[np.int32]
 Kinds = NDArray[np.uint8]
@@ -85,7 +85,7 @@ def fill(image: NDArray[np.generic], draft: Draft, scale: float, seed: int, prog
     depth, near = distance_transform_edt(holes, return_indices=True)
     ground = draft.kinds == 0
     if float(depth.max()) > 0.5 * WIDE * scale:
-        filled = _fill_with_patches(image, draft, ground, scale, seed, progress)
+        filled = fill_with_patches(image, draft, ground, scale, seed, progress)
         if filled is not None:
             return filled
     # From the nearest pixel that is known, as if the ground went on: where that is no ground, some ground at random.
@@ -104,7 +104,7 @@ def fill(image: NDArray[np.generic], draft: Draft, scale: float, seed: int, prog
     return replace(draft, places=places, known=np.ones_like(holes), mirrored=draft.mirrored & ~holes[..., None])
 
 
-def _fill_with_patches(
+def fill_with_patches(
     image: NDArray[np.generic], draft: Draft, ground: Bools, scale: float, seed: int, progress: Progress | None
 ) -> Draft | None:
     """Return the draft with its holes filled by patches of the ground alone; none where it has no place for a patch."""

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Bools
+from texrs.blending import blend
 from texrs.elements import Elements, Layout
 from texrs.papers.splice.backward_warp import BackwardWarp
 from texrs.papers.splice.energy import choose_coarseness
@@ -36,13 +37,19 @@ def compose(
     *,
     method: str | None,
     seed: int,
+    screening: float = 0.0,
 ) -> Synthesis:
     """Return the result of a splice from what its stages made."""
     shape = (a.mask.shape[0], a.mask.shape[1])
     size = label.shape
     frames = _make_frames(filled.mirrored)
     source = SourceMap.from_coordinates(places.astype(np.float32), shape, label=label, frame=frames)
-    image = source.render(a.image, interpolation="nearest")
+    # Between whole pixels nothing is looked up: "linear" is "nearest" that may be corrected.
+    image = (
+        blend(source, a.image, wrap=False, screening=screening, interpolation="linear")
+        if screening
+        else source.render(a.image, interpolation="nearest")
+    )
     step = STEP if a.layout == Layout.DISJOINT else choose_coarseness(match.extension.mask.shape)
     matches, realised = _list_matches(a, match)
     report: dict[str, Any] = {
@@ -52,6 +59,7 @@ def compose(
         "layout": a.layout.value,
         **match.report(),
         "realised": realised,
+        "blend": screening,
         "holes": float(1 - warp.known.mean()),
         "triangles": warp.triangles,
         "flipped": warp.flipped / max(warp.triangles, 1),
