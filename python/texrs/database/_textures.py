@@ -39,7 +39,7 @@ class AnalyseOptions(TypedDict, total=False):
     method: Literal["paper"] | None
     wrap: bool | Sequence[bool]
     seed: int
-    corrections: Sequence[Mapping[str, object]]
+    corrections: Sequence[Mapping[str, object]] | None
 
 
 class SpliceOptions(TypedDict, total=False):

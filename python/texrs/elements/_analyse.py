@@ -48,7 +48,7 @@ def analyse(
     method: Literal["paper"] | None = None,
     wrap: bool | Sequence[bool] = False,
     seed: int = 0,
-    corrections: Sequence[Mapping[str, object]] = (),
+    corrections: Sequence[Mapping[str, object]] | None = None,
     progress: Progress | None = None,
 ) -> Elements:
     """Find the elements of a texture, what belongs to them and how they are connected [1]_.
@@ -79,7 +79,7 @@ def analyse(
         Whether the texture repeats without a seam.
     seed : int
         Chooses the samples of the mixtures.
-    corrections : sequence of dict
+    corrections : sequence of dict, optional
         What is put right in the end, as `texrs.elements.correct` does.
     progress : callable, optional
         Called as ``progress(stage, share)``; raising stops the work.
@@ -109,7 +109,7 @@ def analyse(
     True
 
     """
-    pixels, steps = as_image(image, "image", minimum=SHORTEST), read_steps(corrections)
+    pixels, steps = as_image(image, "image", minimum=SHORTEST), read_steps(() if corrections is None else corrections)
     size = (pixels.shape[0], pixels.shape[1])
     check_memory(BYTES * size[0] * size[1], "image")
     how = Settings.of(search, method, wrap, seed)

@@ -38,7 +38,10 @@ GROWN = 3
 ROOM = 0.35
 """Of the spacing: how far from an element's box its matte is looked for."""
 LEAST = 0.02
-"""Share of the texture that must be ground for sure."""
+"""Share of the texture that must be ground, for what is unlike it to be known."""
+ENOUGH = 0.15
+"""Share of the texture that is neither element nor matte from which on ground can be made of it: of less, it shows what lies
+in it again and again."""
 CANDIDATES = 4
 """Places that are tried for each patch of the ground."""
 
@@ -74,7 +77,7 @@ def lay_ground(
     parts = split_foreground(a)
     guide = guidance(as_image(a.image))
     own, certain = find_owners(guide, a, parts)
-    bare = complete_ground(a, parts, own, seed, watch)
+    bare = complete_ground(a, own, seed, watch)
     if bare is None:
         return None
     ground = grow_ground(a, bare, label.shape, seed, watch)
@@ -141,20 +144,16 @@ def measure_matte(guide: Floats, a: Elements, parts: Foreground, away: Floats) -
     return np.asarray(pieces == middle) if middle else none
 
 
-def complete_ground(
-    a: Elements, parts: Foreground, own: NDArray[np.int32], seed: int, watch: Progress
-) -> NDArray[np.int32] | None:
+def complete_ground(a: Elements, own: NDArray[np.int32], seed: int, watch: Progress) -> NDArray[np.int32] | None:
     """Return where each pixel of the texture's ground comes from, elements and mattes filled with what is neither."""
-    for hole in (own > 0, parts.region > 0):
-        if (~hole).mean() <= LEAST:
-            continue
-        places = np.moveaxis(np.indices(hole.shape, np.int32), 0, -1)
-        nothing = np.zeros((*hole.shape, 2), bool)
-        draft = Draft(places, ~hole, ~hole, hole.astype(np.uint8), np.zeros(hole.shape, np.uint8), nothing)
-        found = fill_with_patches(a.image, draft, ~hole, spacing(a.points), seed, watch)
-        if found is not None:
-            return found.places
-    return None
+    hole = own > 0
+    if (~hole).mean() < ENOUGH:
+        return None
+    places = np.moveaxis(np.indices(hole.shape, np.int32), 0, -1)
+    nothing = np.zeros((*hole.shape, 2), bool)
+    draft = Draft(places, ~hole, ~hole, hole.astype(np.uint8), np.zeros(hole.shape, np.uint8), nothing)
+    found = fill_with_patches(a.image, draft, ~hole, spacing(a.points), seed, watch)
+    return None if found is None else found.places
 
 
 def grow_ground(
