@@ -25,7 +25,20 @@ def pictures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_splice(tmp_path: Path) -> None:
     out, source, stages = tmp_path / "out.png", tmp_path / "map.npz", tmp_path / "stages"
-    line = ["splice", "sample:dots", "pebbles.png", "-o", str(out), "--size", "96x112", "--seed", "2", "-q"]
+    line = [
+        "splice",
+        "sample:dots",
+        "pebbles.png",
+        "-o",
+        str(out),
+        "--size",
+        "96x112",
+        "--seed",
+        "2",
+        "--blend",
+        "0",
+        "-q",
+    ]
     assert main([*line, "--map", str(source), "--stages", str(stages)]) == 0
     image = io.read(out)
     assert image.shape == (96, 112, 3)
