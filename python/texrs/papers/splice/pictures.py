@@ -13,7 +13,7 @@ from texrs.elements import Elements
 from texrs.papers.splice.matching import Match
 from texrs.papers.splice.refine import Draft
 
-__all__ = ["Stages"]
+__all__ = ["Stages", "draw_stages"]
 
 Points = NDArray[np.float64]
 Picture = NDArray[np.uint8]
@@ -25,25 +25,8 @@ HOLE = (255, 0, 255)
 class Stages(Mapping[str, Array]):
     """Pictures by name, in the order of the stages; each is drawn when first asked for."""
 
-    def __init__(
-        self, a: Elements, b: Elements | None, match: Match, target: Points, draft: Draft, filled: Draft, image: Array
-    ) -> None:
-        extension = match.extension
-        origin = np.array(extension.origin)
-        shown = to_picture(a.image)
-        self._draw: dict[str, Callable[[], Array]] = {"points of a": lambda: mark_points(shown, a.points, RED)}
-        if b is not None:
-            self._draw["points of b"] = lambda: mark_points(to_picture(b.image), b.points, BLUE)
-        self._draw |= {
-            "mask": lambda: dim_ground(shown, a.mask),
-            "matching": lambda: draw_lines(
-                shown[extension.pixel[..., 0], extension.pixel[..., 1]], match.starts - origin, match.targets - origin
-            ),
-            "warped mesh": lambda: draw_mesh(target, extension.mask, draft.known.shape),
-            "before refinement": lambda: show_draft(shown, draft),
-            "filled": lambda: shown[filled.places[..., 0], filled.places[..., 1]],
-            "composite": lambda: image,
-        }
+    def __init__(self, draw: Mapping[str, Callable[[], Array]]) -> None:
+        self._draw = draw
         self._drawn: dict[str, Array] = {}
 
     def __getitem__(self, name: str) -> Array:
@@ -59,6 +42,29 @@ class Stages(Mapping[str, Array]):
     def __len__(self) -> int:
         """Return the number of stages."""
         return len(self._draw)
+
+
+def draw_stages(
+    a: Elements, b: Elements | None, match: Match, target: Points, draft: Draft, filled: Draft, image: Array
+) -> Stages:
+    """Return the stages of a splice, or of an edit, which has no ``b``."""
+    extension = match.extension
+    origin = np.array(extension.origin)
+    shown = to_picture(a.image)
+    draw: dict[str, Callable[[], Array]] = {"points of a": lambda: mark_points(shown, a.points, RED)}
+    if b is not None:
+        draw["points of b"] = lambda: mark_points(to_picture(b.image), b.points, BLUE)
+    draw |= {
+        "mask": lambda: dim_ground(shown, a.mask),
+        "matching": lambda: draw_lines(
+            shown[extension.pixel[..., 0], extension.pixel[..., 1]], match.starts - origin, match.targets - origin
+        ),
+        "warped mesh": lambda: draw_mesh(target, extension.mask, draft.known.shape),
+        "before refinement": lambda: show_draft(shown, draft),
+        "filled": lambda: shown[filled.places[..., 0], filled.places[..., 1]],
+        "composite": lambda: image,
+    }
+    return Stages(draw)
 
 
 def to_picture(image: Array) -> Picture:

@@ -14,7 +14,7 @@ from texrs.papers.splice.backward_warp import BackwardWarp
 from texrs.papers.splice.energy import choose_coarseness
 from texrs.papers.splice.interpolation import STEP
 from texrs.papers.splice.matching import Match, list_element_points
-from texrs.papers.splice.pictures import Stages
+from texrs.papers.splice.pictures import draw_stages
 from texrs.papers.splice.refine import Draft
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
@@ -67,7 +67,7 @@ def compose(
         "system": [-(-n // step) for n in match.extension.mask.shape],
         "matches": matches,
     }
-    return Synthesis(image, source, Stages(a, b, match, warp.target, draft, filled, image), report)
+    return Synthesis(image, source, draw_stages(a, b, match, warp.target, draft, filled, image), report)
 
 
 def _make_frames(mirrored: Bools) -> NDArray[np.float32] | None:

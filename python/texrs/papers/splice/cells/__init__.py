@@ -31,7 +31,7 @@ from texrs.exemplar.symmetry import find_mirrors
 from texrs.papers.splice.cells.charts import Charts, draw_charts
 from texrs.papers.splice.cells.choice import list_usable, shortlist
 from texrs.papers.splice.cells.joining import Joined, join
-from texrs.papers.splice.cells.pictures import CellStages
+from texrs.papers.splice.cells.pictures import draw_cell_stages
 from texrs.papers.splice.cells.refinement import refine_charts
 from texrs.papers.splice.cells.strength import go_part_of_the_way, take_own_cells
 from texrs.papers.splice.cells.tessellation import Tessellation, take_cells, take_points
@@ -142,7 +142,7 @@ def splice_cells(
         **_report(cells, wanted, charts, joined),
     }
     watch("done", 1.0)
-    return Synthesis(image, source, CellStages(a, b, cells, wanted, charts, joined, image), report)
+    return Synthesis(image, source, draw_cell_stages(a, b, cells, wanted, charts, joined, image), report)
 
 
 def _take_targets(b: Elements, size: tuple[int, int], unit: float, seed: int) -> Tessellation:

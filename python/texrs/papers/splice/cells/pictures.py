@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,29 +12,21 @@ from texrs.exemplar.shapes import mark_outlines
 from texrs.papers.splice.cells.charts import Charts
 from texrs.papers.splice.cells.joining import Joined
 from texrs.papers.splice.cells.tessellation import Tessellation
-from texrs.papers.splice.pictures import BLUE, GREEN, RED, mark_points, to_picture
+from texrs.papers.splice.pictures import BLUE, GREEN, RED, Stages, mark_points, to_picture
 
-__all__ = ["CellStages"]
+__all__ = ["draw_cell_stages"]
 
 Picture = NDArray[np.uint8]
 
 
-class CellStages(Mapping[str, Array]):
-    """Pictures by name, in the order of the stages; each is drawn when first asked for."""
-
-    def __init__(
-        self,
-        a: Elements,
-        b: Elements,
-        cells: Cells,
-        wanted: Tessellation,
-        charts: Charts,
-        joined: Joined,
-        image: Array,
-    ) -> None:
-        m = wanted.margin
-        targets = wanted.labels[m:-m, m:-m]
-        self._draw: dict[str, Callable[[], Array]] = {
+def draw_cell_stages(
+    a: Elements, b: Elements, cells: Cells, wanted: Tessellation, charts: Charts, joined: Joined, image: Array
+) -> Stages:
+    """Return the stages of a splice by cells."""
+    m = wanted.margin
+    targets = wanted.labels[m:-m, m:-m]
+    return Stages(
+        {
             "cells of a": lambda: _draw_cells(to_picture(a.image), cells),
             "layout of b": lambda: mark_points(to_picture(b.image), b.points, BLUE),
             "target cells": lambda: _draw_outlines(np.full((*targets.shape, 3), 255, np.uint8), targets, BLUE),
@@ -44,21 +34,7 @@ class CellStages(Mapping[str, Array]):
             "cuts": lambda: _draw_outlines(to_picture(image), joined.chart + 1, GREEN),
             "composite": lambda: image,
         }
-        self._drawn: dict[str, Array] = {}
-
-    def __getitem__(self, name: str) -> Array:
-        """Draw a stage."""
-        if name not in self._drawn:
-            self._drawn[name] = self._draw[name]()
-        return self._drawn[name]
-
-    def __iter__(self) -> Iterator[str]:
-        """Go through the names."""
-        return iter(self._draw)
-
-    def __len__(self) -> int:
-        """Return the number of stages."""
-        return len(self._draw)
+    )
 
 
 def _draw_outlines(picture: Picture, labels: Labels, colour: tuple[int, int, int]) -> Picture:
