@@ -51,6 +51,7 @@ class SpliceOptions(TypedDict, total=False):
     align: bool
     snap_rows: bool
     cells: bool | None
+    nets: bool | None
     turns: bool | None
     refine: bool
     blend: float | None
@@ -293,7 +294,7 @@ class TextureDatabase:
             Called as ``progress(stage, share)``; raising stops the work.
         **options
             What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``strength``,
-            ``align``, ``snap_rows``, ``cells``, ``turns``, ``refine``, ``blend``.
+            ``align``, ``snap_rows``, ``cells``, ``nets``, ``turns``, ``refine``, ``blend``.
 
         Returns
         -------
@@ -335,7 +336,7 @@ class TextureDatabase:
             Called as ``progress("matrix", share)``; raising stops the work.
         **options
             What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``strength``,
-            ``align``, ``snap_rows``, ``cells``, ``turns``, ``refine``, ``blend``.
+            ``align``, ``snap_rows``, ``cells``, ``nets``, ``turns``, ``refine``, ``blend``.
 
         Returns
         -------

@@ -24,7 +24,8 @@ Departures, with their reasons:
 - Layouts grow until disjoint elements have room, and those that still collide are pushed apart: spacing alone makes chains.
 - Distances are squared in Eq. 4: the best matching then has no crossings.
 - Connected textures whose cells are found are put together from these, each in a cell of B's layout (`cells`): bending a
-  figure goes half of the way. What follows of connected figures is for those without, as nets of knots, and for `cells=False`.
+  figure goes half of the way. Those without, as chainmail, are put together from their knots and what hangs on these (`nets`).
+  What follows of connected figures is for those that show too few knots, for `cells=False` and for `nets=False`.
 - Disjoint elements move whole, by whole pixels: Eq. 5 in the limit of its weights. The soft energy stretches components that
   hold two pins by dozens of pixels. The ground between them is harmonic, so nothing of it moves further than its elements, and
   so smooth that it is solved for at every other pixel.
@@ -64,6 +65,7 @@ from texrs.papers.splice.entry import as_elements
 from texrs.papers.splice.ground import lay_ground
 from texrs.papers.splice.literal import fill_literally, match_literally
 from texrs.papers.splice.matching import Match, go_part_of_the_way, match_edit, match_layouts
+from texrs.papers.splice.nets import has_knots, is_net, splice_nets
 from texrs.papers.splice.refine import fill, refine_places
 from texrs.papers.splice.result import compose
 from texrs.synthesis import Synthesis
@@ -71,6 +73,7 @@ from texrs.synthesis import Synthesis
 __all__ = ["self_splice", "splice"]
 
 Method: TypeAlias = Literal["paper", "preview"] | None
+NO_NET = "a has fewer than six knots, or they lie closer than 8 pixels; take a larger picture, or another box"
 NO_CELLS = (
     "none were found in a that are sure enough; give texrs.elements.analyse a box around one, or a mask of the joints"
 )
@@ -90,6 +93,7 @@ def splice(
     align: bool = True,
     snap_rows: bool = False,
     cells: bool | None = None,
+    nets: bool | None = None,
     turns: bool | None = None,
     refine: bool = True,
     blend: float | None = SCREENING,
@@ -113,15 +117,19 @@ def splice(
     strength : float
         How much of the way elements go, from the texture's own layout, 0, to the other's, 1.
     align : bool
-        Whether to turn the layout so that lines of its points agree with those of ``a``. Cells take it as it lies.
+        Whether to turn the layout so that lines of its points agree with those of ``a``. Cells and nets take it as it lies.
     snap_rows : bool
         Whether to bring targets of about one row to one row: for walls that are bent, whose long joints then stay straight.
     cells : bool, optional
         Whether a connected texture is put together from its cells; False bends its figure. By default where cells are found.
+    nets : bool, optional
+        Whether a connected texture is put together from its knots and the lines that hang on them; False bends its figure.
+        By default where no cells are found, unless ``cells`` is given, and there are six knots or more in a layout that is
+        sure enough. True goes before cells.
     turns : bool, optional
         Whether cells may be turned; by default where nothing tells ``a`` from itself upside down, as light and letters do.
     refine : bool
-        Whether to refine what is not rigid; by cells, what is stretched. Ground between separate elements needs none.
+        Whether to refine what is not rigid; by cells, what is stretched. Nets, and ground between separate elements, need none.
     blend : float, optional
         Of separate elements on their ground: weight of the values, 0 to 1e6, when colours are corrected so that the light
         does not change where they meet, see `texrs.blend`. None or 0: no correction, and the picture is the texture looked
@@ -135,7 +143,8 @@ def splice(
         The picture; a source map of whole pixels of ``a``, whose label is the target (counted from 1, as in the report)
         that a rigid pixel belongs to, or 0; pictures of the stages, drawn when they are looked at; and a report, whose
         "matches" say of each element where it was wanted, where it is, and how much of its way was realised. By cells
-        (``report["method"]`` is "cells") the map lies between pixels, and each has its target.
+        (``report["method"]`` is "cells") the map lies between pixels, and each has its target; by knots ("nets") each has
+        that whose knot it hangs on.
 
     Raises
     ------
@@ -163,12 +172,18 @@ def splice(
     mine, theirs = as_elements(a, "a", watch), as_elements(b, "b", watch)
     rows, columns = as_size(size if size is not None else mine.mask.shape, minimum=16)
     number = as_seed(seed)
-    wanted, may_turn = (None if v is None else as_bool(v, n) for v, n in ((cells, "cells"), (turns, "turns")))
-    if wanted and method is not None:
-        raise InvalidInput(f'cells: method="{method}" bends figures')
+    given = {"cells": cells, "nets": nets, "turns": turns}
+    wanted, net, may_turn = (None if v is None else as_bool(v, n) for n, v in given.items())
+    for name, asked in (("cells", wanted), ("nets", net)):
+        if asked and method is not None:
+            raise InvalidInput(f'{name}: method="{method}" bends figures')
+    if wanted and net:
+        raise InvalidInput("nets: a texture is put together either from its cells or from its knots; give one of the two")
+    if net and not has_knots(mine):
+        raise InvalidInput(f"nets: {'separate elements are no net' if mine.layout == Layout.DISJOINT else NO_NET}")
     part = as_float(strength, "strength", 0, 1)
     screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
-    found = find_entry_cells(mine, watch) if method is None and wanted is not False else None
+    found = find_entry_cells(mine, watch) if method is None and wanted is not False and not net else None
     if wanted and found is None:
         raise InvalidInput(f"cells: {'separate elements have none' if mine.layout == Layout.DISJOINT else NO_CELLS}")
     if found is not None:
@@ -183,6 +198,9 @@ def splice(
             seed=number,
             watch=watch,
         )
+    if net or (net is None and wanted is None and method is None and is_net(mine)):
+        theirs_cells = find_entry_cells(theirs, watch)
+        return splice_nets(mine, theirs, theirs_cells, (rows, columns), strength=part, seed=number, watch=watch)
     watch("match", 0.0)
     matching = match_literally if method == "paper" else match_layouts
     match = matching(mine, theirs, (rows, columns), align=bool(align))

@@ -20,7 +20,7 @@ from texrs.papers.splice.edit import fit_lattice
 from texrs.quilting import Picture, quilt
 from texrs.source_map import SourceMap
 
-__all__ = ["continue_cells"]
+__all__ = ["continue_cells", "continue_on_lattice"]
 
 Points = NDArray[np.float64]
 
@@ -94,7 +94,7 @@ def continue_cells(
         layout = PointLayout.of(points, cells.labels.shape, wrap, beyond=True)
         places, of, mirrored = layout.within(centre - reach, centre + reach)
         return _copy(cells, usable[of], places, mirrored, centre) * scale, scale, "wrap"
-    sites = _continue_on_lattice(points, cells.size, centre - reach, centre + reach) if len(points) >= 6 else None
+    sites = continue_on_lattice(points, cells.size, centre - reach, centre + reach) if len(points) >= 6 else None
     if sites is not None:
         places, of = sites
         return _copy(cells, usable[of], places, np.zeros((len(of), 2), bool), centre) * scale, scale, "lattice"
@@ -107,7 +107,7 @@ def _copy(cells: Cells, of: NDArray[np.intp], places: Points, mirrored: Bools, c
     return (cells.outlines[of] - cells.centre[of][:, None]) * signs + places[:, None] - centre
 
 
-def _continue_on_lattice(
+def continue_on_lattice(
     points: Points, unit: float, low: Points, high: Points
 ) -> tuple[Points, NDArray[np.intp]] | None:
     """Return places and cells on the lattice that points lie on; None where they lie on none."""

@@ -1,0 +1,42 @@
+"""Pictures of the stages of `texrs.papers.splice.nets`, drawn when they are looked at."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Array
+from texrs.elements import Elements
+from texrs.exemplar.shapes import mark_outlines
+from texrs.papers.splice.nets.graph import join_knots
+from texrs.papers.splice.pictures import BLUE, GREEN, RED, Stages, draw_lines, mark_points, to_picture
+
+__all__ = ["draw_net_stages"]
+
+Picture = NDArray[np.uint8]
+Points = NDArray[np.float64]
+
+
+def draw_net_stages(a: Elements, b: Elements, targets: Points, label: NDArray[np.uint32], image: Array) -> Stages:
+    """Return the stages of a splice by nets."""
+    return Stages(
+        {
+            "net of a": lambda: _draw_net(to_picture(a.image), a.points),
+            "layout of b": lambda: mark_points(to_picture(b.image), b.points, BLUE),
+            "target net": lambda: _draw_net(np.full((*label.shape, 3), 255, np.uint8), targets),
+            "cuts": lambda: _draw_cuts(to_picture(image), label),
+            "composite": lambda: image,
+        }
+    )
+
+
+def _draw_net(picture: Picture, points: Points) -> Picture:
+    """Draw a ring around each knot, and a line between neighbours."""
+    pairs = join_knots(points)
+    return mark_points(draw_lines(picture, points[pairs[:, 0]], points[pairs[:, 1]]), points, RED)
+
+
+def _draw_cuts(picture: Picture, label: NDArray[np.uint32]) -> Picture:
+    out = picture.copy()
+    out[mark_outlines(label.astype(np.int32) + 1)] = GREEN
+    return out
