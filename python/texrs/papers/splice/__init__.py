@@ -178,7 +178,9 @@ def splice(
         if asked and method is not None:
             raise InvalidInput(f'{name}: method="{method}" bends figures')
     if wanted and net:
-        raise InvalidInput("nets: a texture is put together either from its cells or from its knots; give one of the two")
+        raise InvalidInput(
+            "nets: a texture is put together either from its cells or from its knots; give one of the two"
+        )
     if net and not has_knots(mine):
         raise InvalidInput(f"nets: {'separate elements are no net' if mine.layout == Layout.DISJOINT else NO_NET}")
     part = as_float(strength, "strength", 0, 1)

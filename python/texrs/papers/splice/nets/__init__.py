@@ -25,7 +25,7 @@ from texrs._engine.appearance import Demand
 from texrs._engine.pyramid import ONE, Region, to_fixed
 from texrs._engine.stitcher import FREE
 from texrs._progress import stage
-from texrs._typing import Floats, Progress
+from texrs._typing import Bools, Floats, Progress
 from texrs.elements import Elements, Layout
 from texrs.exemplar import Exemplar
 from texrs.exemplar.cells import Cells
@@ -200,10 +200,11 @@ def _report(
 
 def _check_found(a: Elements, laid: Laid, places: NDArray[np.int32], shown: NDArray[np.intp]) -> Points:
     """Return where each knot is in the output, as the source map has it; NaN where it is not shown."""
-    found = laid.found[shown]
+    found: Points = laid.found[shown]
     size = np.array(places.shape[:2])
     pixel = np.rint(found)
-    inside = ((pixel >= 0) & (pixel <= size - 1)).all(axis=1)
+    inside: Bools = np.asarray(((pixel >= 0) & (pixel <= size - 1)).all(axis=1))
     rows, columns = np.where(inside[:, None], pixel, 0).astype(np.intp).T
     off = np.hypot(*(places[rows, columns] - a.points[laid.source[shown]]).T)
-    return np.where((inside & (off <= NEAR))[:, None], found, np.nan)
+    found[~(inside & (off <= NEAR))] = np.nan
+    return found

@@ -17,8 +17,8 @@ FAR = 1.0
 """Spacings from a knot beyond which all is equally far."""
 ASIDE = 0.5
 """Spacings from a line beyond which all is equally far, and no direction counts."""
-CHUNK = 1 << 21
-"""Pairs of a pixel and a line that are looked at together."""
+DENSE = 1.0
+"""Pixels from one point of a line to the next by which the line nearest to a pixel is found."""
 
 
 def join_knots(points: Points) -> NDArray[np.intp]:
@@ -51,19 +51,18 @@ def describe_places(points: Points, shape: tuple[int, int], unit: float) -> Floa
     from scipy.spatial import cKDTree
 
     pairs = join_knots(points)
-    pixels = np.stack(np.indices(shape), axis=-1).reshape(-1, 2).astype(np.float64)
+    pixels = np.argwhere(np.ones(shape, bool)).astype(np.float64)
     knot = cKDTree(points).query(pixels)[0] / unit
     start, along = points[pairs[:, 0]], points[pairs[:, 1]] - points[pairs[:, 0]]
-    square = np.maximum((along**2).sum(axis=1), 1e-12)
-    line, which = np.empty(len(pixels)), np.empty(len(pixels), np.intp)
-    for first in range(0, len(pixels), rows := max(1, CHUNK // len(pairs))):
-        part = slice(first, first + rows)
-        off = pixels[part, None] - start
-        share = np.clip((off * along).sum(axis=-1) / square, 0, 1)
-        far = np.hypot(*np.moveaxis(off - share[..., None] * along, -1, 0))
-        which[part] = far.argmin(axis=1)
-        line[part] = far.min(axis=1) / unit
-    turn = 2 * np.arctan2(along[:, 0], along[:, 1])[which]
-    counts = 0.5 * np.clip(1 - line / ASIDE, 0, 1)
-    said = [2 * np.minimum(knot, FAR), 2 * np.minimum(line, ASIDE), counts * np.cos(turn), counts * np.sin(turn)]
-    return np.stack(said, axis=-1).astype(np.float32).reshape(*shape, 4)
+    # The nearest line is that of the nearest of many points on lines.
+    count = np.ceil(np.hypot(*along.T) / DENSE).astype(np.intp) + 1
+    owner = np.repeat(np.arange(len(pairs)), count)
+    share = (np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)) / np.maximum(count[owner] - 1, 1)
+    which = owner[cKDTree(start[owner] + share[:, None] * along[owner]).query(pixels)[1]]
+    off, line = pixels - start[which], along[which]
+    share = np.clip((off * line).sum(axis=-1) / np.maximum((line**2).sum(axis=-1), 1e-12), 0, 1)
+    aside = np.hypot(*(off - share[:, None] * line).T) / unit
+    turn = 2 * np.arctan2(line[:, 0], line[:, 1])
+    counts = 0.5 * np.clip(1 - aside / ASIDE, 0, 1)
+    said = (2 * np.minimum(knot, FAR), 2 * np.minimum(aside, ASIDE), counts * np.cos(turn), counts * np.sin(turn))
+    return np.column_stack(said).astype(np.float32).reshape(*shape, 4)

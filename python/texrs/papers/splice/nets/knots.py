@@ -30,6 +30,8 @@ TRIED, CUT = 6, 6
 GRAPH, BEYOND, USES, AWAY, CHANCE = 1.0, 2.0, 0.1, 0.3, 0.02
 """What places cost beside their colours: by the graph, by what lies beyond the picture, by the uses of the knot, by what it
 misses its target by, and by chance; places that have nothing to do with each other differ by one in colour."""
+SEEN = 16
+"""Pixels of a spacing that are looked at, one in so many, where places are judged."""
 LOST = 0.35
 """Share of a window that may lie beyond the picture."""
 
@@ -109,6 +111,8 @@ def lay_knots(
     colours = guidance(as_image(image)).astype(np.float32)
     colours = colours / max(float(colours.std()), 1e-6)
     flat = np.ascontiguousarray(colours.reshape(-1, colours.shape[-1]))
+    described = np.dstack([mine, colours])
+    step = max(2, int(unit / SEEN))
     samples = Samples(flat, np.zeros(len(flat), np.float32), (1.0, 0.0))
     shown, seams = np.full(size, FREE, np.uint32), np.zeros((*size, 2), np.float32)
     owner = np.full(size, FREE, np.uint32)
@@ -127,17 +131,17 @@ def lay_knots(
         known = (shown[box] != FREE) & window.cell
         there = flat[np.where(known, shown[box], 0)]
 
-        judge = partial(judge_places, window, shape, colours, mine, there, known, theirs[box])
+        judge = partial(judge_places, window, described, there, known, theirs[box], step)
         first = judge(middles) + USES * used + chance[t]
         best = np.argsort(first, kind="stable")[:TRIED]
         best = best[np.isfinite(first[best])]
         if not len(best):
             continue
-        of, step = np.repeat(best, len(shifts)), np.tile(shifts, (len(best), 1))
-        cost = judge(middles[of] + step) + USES * used[of] + chance[t, of] + AWAY * np.hypot(*step.T) / unit
+        of, away = np.repeat(best, len(shifts)), np.tile(shifts, (len(best), 1))
+        cost = judge(middles[of] + away) + USES * used[of] + chance[t, of] + AWAY * np.hypot(*away.T) / unit
         tried = np.argsort(cost, kind="stable")[:CUT]
         tried = tried[np.isfinite(cost[tried])]
-        offers = [make_patch(window, middles[of[k]] + step[k], shape) for k in tried.tolist()]
+        offers = [make_patch(window, middles[of[k]] + away[k], shape) for k in tried.tolist()]
         pastings = [Pasting(shown[box], seams[box], window.cell & ok, window.core & ok) for _, ok in offers]
         price = [samples.judge(p, patch[None])[0] for p, (patch, _) in zip(pastings, offers, strict=True)]
         k = int(np.argmin(price))
@@ -146,7 +150,7 @@ def lay_knots(
         owner[box] = np.where(take, np.uint32(t), owner[box])
         seams[box] = after
         source[t] = of[tried[k]]
-        found[t] = np.rint(targets[t]) - middles[source[t]] - step[tried[k]] + points[source[t]]
+        found[t] = np.rint(targets[t]) - middles[source[t]] - away[tried[k]] + points[source[t]]
         used[source[t]] += 1
     places = np.stack(np.divmod(np.where(shown == FREE, 0, shown).astype(np.int32), np.int32(shape[1])), axis=-1)
     return Laid(places, owner, source, found)
@@ -184,37 +188,38 @@ def open_window(targets: Points, t: int, tree: object, size: tuple[int, ...], un
 
 def judge_places(
     window: Window,
-    shape: NDArray[np.intp],
-    colours: Floats,
-    mine: Floats,
+    described: Floats,
     there: Floats,
     known: Bools,
     theirs: Floats,
+    step: int,
     corners: NDArray[np.intp],
 ) -> Floats:
     """Return how badly A fits a window when so many of its pixels (n, 2) lie on the target; infinitely if it cannot.
 
-    Every other pixel is looked at.
+    A is ``described``, (h, w, 4 + C), by its net and its colours. Every so manieth pixel is looked at.
     """
-    cell, known = window.cell[::2, ::2], known[::2, ::2]
-    off, there, theirs = window.off[::2, ::2][cell], there[::2, ::2][cell], theirs[::2, ::2][cell]
-    known = known[cell]
+    thin = (slice(None, None, step),) * 2
+    cell, shape = window.cell[thin], np.array(described.shape[:2])
     cost = np.full(len(corners), np.inf)
-    if not len(off):
+    if not cell.any():
         return cost
+    off, known = window.off[thin][cell], known[thin][cell]
+    asked = np.concatenate([theirs[thin][cell], there[thin][cell]], axis=-1)
+    rows = described.reshape(-1, described.shape[-1])
+    low, high = off.min(axis=0), off.max(axis=0)
     for k, corner in enumerate(corners):
-        at = off + corner
-        ok = ((at >= 0) & (at < shape)).all(axis=-1)
-        lost = 1 - ok.mean()
+        at, wanted, both = off + corner, asked, known
+        if (low + corner < 0).any() or (high + corner >= shape).any():
+            ok = ((at >= 0) & (at < shape)).all(axis=-1)
+            at, wanted, both = at[ok], asked[ok], known[ok]
+        lost = 1 - len(at) / len(off)
         if lost > LOST:
             continue
-        rows, columns = at[ok].T
-        unlike = ((mine[rows, columns] - theirs[ok]) ** 2).sum(axis=-1).mean()
-        cost[k] = GRAPH * unlike + BEYOND * lost
-        both = known[ok]
+        apart = (rows.take(at[:, 0] * shape[1] + at[:, 1], axis=0) - wanted) ** 2
+        cost[k] = GRAPH * apart[:, :4].sum(axis=-1).mean() + BEYOND * lost
         if both.any():
-            apart = (colours[rows[both], columns[both]] - there[ok][both]) ** 2
-            cost[k] += apart.mean() / 2
+            cost[k] += apart[both, 4:].mean() / 2
     return cost
 
 
@@ -223,4 +228,4 @@ def make_patch(window: Window, corner: NDArray[np.intp], shape: NDArray[np.intp]
     at = window.off + corner
     ok = ((at >= 0) & (at < shape)).all(axis=-1)
     rows, columns = np.moveaxis(np.clip(at, 0, shape - 1), -1, 0)
-    return np.asarray(rows * shape[1] + columns, np.uint32), ok
+    return np.asarray(rows * shape[1] + columns, np.uint32), np.asarray(ok)
