@@ -105,7 +105,7 @@ def splice_nets(
     if strength < 1:
         wanted = go_part_of_the_way(take_own_points(a, size, unit), wanted, strength)
     mine, theirs = describe_places(a.points, shape, unit), describe_places(wanted.points, size, unit)
-    laid = lay_knots(a.image, a.points, mine, wanted.points, theirs, unit, seed, watch)
+    laid = lay_knots(a, mine, wanted.points, theirs, unit, seed, watch)
     places = grow_rest(a, laid, mine, theirs, unit, seed, watch)
     shown = np.unique(laid.target[laid.target != FREE]).astype(np.intp)
     shown = shown[np.lexsort((wanted.points[shown, 1], wanted.points[shown, 0]))]

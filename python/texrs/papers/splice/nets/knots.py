@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_image, guidance
 from texrs._engine.stitcher import FREE, Pasting, Samples
-from texrs._typing import Array, Bools, Floats, Progress
+from texrs._typing import Bools, Floats, Progress
+from texrs.elements import Elements
 
 __all__ = ["Laid", "lay_knots"]
 
@@ -27,9 +28,12 @@ LOOSE = 0.05
 """Spacings by which a knot may miss its target, so that its lines meet those that are there."""
 TRIED, CUT = 6, 6
 """Knots that are shifted, and places that are cut in, of which the cheapest stays."""
-GRAPH, BEYOND, USES, AWAY, CHANCE = 1.0, 2.0, 0.1, 0.3, 0.02
+GRAPH, BEYOND, USES, AWAY, CHANCE = 1.0, 6.0, 0.1, 0.3, 0.02
 """What places cost beside their colours: by the graph, by what lies beyond the picture, by the uses of the knot, by what it
 misses its target by, and by chance; places that have nothing to do with each other differ by one in colour."""
+COLOUR, DEPTH, DEEP = 1.0, 0.3, 6.0
+"""What a seam costs by the colours on both sides, in standard deviations, and by how many pixels deep in the foreground it is,
+which beyond so many is all the same: keys stay whole."""
 SEEN = 16
 """Pixels of a spacing that are looked at, one in so many, where places are judged."""
 LOST = 0.35
@@ -81,16 +85,14 @@ class Window:
 
 
 def lay_knots(
-    image: Array, points: Points, mine: Floats, targets: Points, theirs: Floats, unit: float, seed: int, watch: Progress
+    a: Elements, mine: Floats, targets: Points, theirs: Floats, unit: float, seed: int, watch: Progress
 ) -> Laid:
     """Lay a knot at each target.
 
     Parameters
     ----------
-    image : (h, w[, C]) array
-        A.
-    points : (m, 2) float64
-        Its knots.
+    a : Elements
+        The texture.
     mine : (h, w, 4) float32
         Where in its net each of its pixels lies (`describe_places`).
     targets : (n, 2) float64
@@ -105,15 +107,17 @@ def lay_knots(
         Called as ``watch("nets", share)``.
 
     """
+    from scipy.ndimage import distance_transform_edt
     from scipy.spatial import cKDTree
 
-    shape, size = np.array(mine.shape[:2]), theirs.shape[:2]
-    colours = guidance(as_image(image)).astype(np.float32)
+    points, shape, size = a.points, np.array(mine.shape[:2]), theirs.shape[:2]
+    colours = guidance(as_image(a.image)).astype(np.float32)
     colours = colours / max(float(colours.std()), 1e-6)
     flat = np.ascontiguousarray(colours.reshape(-1, colours.shape[-1]))
     described = np.dstack([mine, colours])
     step = max(2, int(unit / SEEN))
-    samples = Samples(flat, np.zeros(len(flat), np.float32), (1.0, 0.0))
+    depth = np.minimum(distance_transform_edt(a.mask), DEEP).astype(np.float32).ravel()
+    samples = Samples(flat, depth, (COLOUR, DEPTH))
     shown, seams = np.full(size, FREE, np.uint32), np.zeros((*size, 2), np.float32)
     owner = np.full(size, FREE, np.uint32)
     source, found = np.full(len(targets), -1, np.intp), np.full((len(targets), 2), np.nan)
