@@ -10,7 +10,7 @@ import pytest
 import texrs
 from element_checks import passes, score
 from texrs import elements, samples
-from texrs.elements import Elements, ElementSearch, Layout, analyse
+from texrs.elements import Elements, ElementSearch, Layout, _proposal, analyse
 from texrs.elements._mixture import Mixture
 from texrs.elements._search import Detections, Template, threshold_otsu
 from texrs.elements._separation import reconcile
@@ -414,3 +414,33 @@ def test_what_the_border_cuts_is_no_ground() -> None:
     found = reconcile(mask | ragged | inner, near, mask[12:29, 12:29], (False, False))
     assert len(found.points) == 4
     assert (found.mask == mask | ragged).all()
+
+
+def lay_tiles(shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Return tiles of many colours between grey joints, and their middles: grainy there, each looks like a thing."""
+    random = np.random.default_rng(0)
+    image = np.full((*shape, 3), 0.5, np.float32)
+    middles = np.array([(r, c) for r in range(24, shape[0], 48) for c in range(24, shape[1], 48)], float)
+    away = np.hypot(*np.mgrid[-20.5:21, -20.5:21])[..., None]
+    for row, column in middles.astype(int):
+        grain = random.normal(0, 0.04, (42, 42, 1)) * (away < 14)
+        image[row - 21 : row + 21, column - 21 : column + 21] = random.uniform(0.2, 0.3, 3) + grain
+    return image, middles
+
+
+def test_a_proposed_layout_is_jointed_where_the_picture_falls_into_cells() -> None:
+    image, middles = lay_tiles((192, 192))
+    away = _proposal._measure_distance((192, 192), middles, (41, 41), (False, False))
+    thing, _ = _proposal._compare_things(_proposal.to_lab(image), away, middles)
+    assert thing >= _proposal.THING
+    layout, sure = _proposal._choose_layout(image, away, middles, None)
+    assert layout != Layout.DISJOINT
+    assert sure <= 1
+
+
+def test_a_layout_is_proposed_for_a_long_narrow_picture() -> None:
+    places = np.array([(10.0, 15.0 + 30 * k) for k in range(23)])
+    away = _proposal._measure_distance((20, 700), places, (15, 15), (False, False))
+    grain = np.random.default_rng(0).random((20, 700, 1)).astype(np.float32)
+    image = np.where((away < 1)[..., None], grain, 0.5).repeat(3, axis=-1).astype(np.float32)
+    assert _proposal._choose_layout(image, away, places, None)[0] == Layout.DISJOINT

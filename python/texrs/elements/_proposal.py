@@ -3,8 +3,8 @@
 1. sizes: blobs of every scale, pieces of a colour segmentation, and the periods of the autocorrelation propose boxes;
 2. the element: each box is searched for in a small picture, and the one that the texture repeats best is taken;
 3. the background: what lies farthest from all that was found, of the colours that most of it has;
-4. the layout: elements that are busier and more varied than what lies between them are things on a ground; else what lies
-   between is a net where it stands out, and joints where it does not.
+4. the layout: elements that are busier and more varied than what lies between them are things on a ground, unless the whole
+   picture falls into cells beyond doubt; else what lies between is a net where it stands out, and joints where it does not.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from texrs.elements._mask import disc, round_to_odd, to_lab
 from texrs.elements._search import Detections, describe_appearance, search_similar
 from texrs.elements._separation import find_nearest_pixels, label_components
 from texrs.errors import InvalidInput
+from texrs.exemplar.cells import find_cells
 from texrs.layouts import spacing
 
 SMALL = 224
@@ -45,9 +46,14 @@ NET = 0.2
 """Contrast from which on what lies between evenly spread openings is a net; half of it where they are unevenly spread."""
 EVEN = 0.15
 """Spread of the distances to the nearest element, over their mean, up to which they are evenly spread."""
+CELLS, LARGE = 0.99, 256
+"""Confidence in the cells of a picture from which on they outweigh what single elements look like, and the longest side of the
+picture in which they are looked for. Chosen on photographs: walls and tiles lie above it, heaps of fruit or stones below."""
+SMALLEST = 16
+"""Shorter side of that picture, at least."""
 DOUBTFUL = 0.65
-"""Below this a proposal is doubtful: of layouts proposed for fifteen photographs two of six were wrong below it, one of nine
-above."""
+"""Below this a proposal is doubtful: of layouts proposed for 23 photographs, their parts and four generated textures of each of
+eight kinds, 28 % were right that were less than 50 % sure, 49 % of those up to 65 %, 78 % up to 80 %, and all above."""
 ADVICE = {
     "box": "draw a box around one element",
     "background": "name a few places between the elements",
@@ -310,7 +316,12 @@ def _choose_layout(
     thing, contrast = _compare_things(to_lab(guide), away, points)
     sure = _measure_odds(thing / THING)
     if thing >= THING:
-        return Layout.DISJOINT, sure
+        sides = guide.shape[:2]
+        step = max(1, min(-(-max(sides) // LARGE), min(sides) // SMALLEST))
+        cells = find_cells(_downscale(guide, step)).confidence
+        if cells < CELLS:
+            return Layout.DISJOINT, sure
+        sure = cells
     near = cKDTree(points).query(points, k=2)[0][:, 1]
     spread = float(near.std() / max(float(near.mean()), 1e-9))
     # A net stands out from what is seen through it, and joints less; the less if all between them is of one size.
