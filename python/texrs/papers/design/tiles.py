@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._typing import Array, Floats
+from texrs._typing import Array, Bools, Floats
 from texrs.exemplar.patches import place_patches
-from texrs.exemplar.symmetry import flip_coordinates, flip_frame
+from texrs.exemplar.symmetry import flip, flip_coordinates, flip_frame
 from texrs.kernels.complete import complete
 from texrs.kernels.gather import gather
 from texrs.papers.design.canvas import Draft
@@ -21,6 +21,8 @@ __all__ = ["Tile", "fill_holes"]
 
 CANDIDATES = 5
 """Matches of a hole that are cut in; the cheapest is kept."""
+KEPT = 2.0
+"""Depth in pixels from which on elements are not cut when holes are filled: seams may follow their outlines."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,6 +71,7 @@ def fill_holes(draft: Draft, plan: Plan, shapes: tuple[tuple[int, ...], ...], wh
             draft.covered,
             plan.index,
             patch=plan.side,
+            keep=None if plan.literal else mark_elements(draft, plan),
             seed=seed,
             count=1 if plan.literal else CANDIDATES,
             paper=plan.literal,
@@ -82,3 +85,12 @@ def fill_holes(draft: Draft, plan: Plan, shapes: tuple[tuple[int, ...], ...], wh
     deformed = np.where(holes[..., np.newaxis], np.float32(0), draft.colours)
     stages = {"deformed": deformed, "holes": holes, "completed": colours}
     return Tile(source, colours, float(holes.mean()), draft.log, stages)
+
+
+def mark_elements(draft: Draft, plan: Plan) -> Bools:
+    """Mark what a draft shows of the inside of elements: patches that fill holes would tear them."""
+    if plan.parts.kind not in ("components", "labels"):
+        return np.zeros(draft.covered.shape, bool)
+    inside = flip((plan.parts.measure_depth(KEPT) >= 1).astype(np.float32), draft.mirror)
+    shown = gather(inside[..., np.newaxis], draft.coordinates, interpolation="nearest")[..., 0]
+    return np.asarray(draft.covered & (shown > 0), bool)
