@@ -15,9 +15,12 @@ from reference.look_up import view
 from texrs import DeformationOptions, ElementOptions, samples
 from texrs.errors import Cancelled, InvalidInput, LimitExceeded
 from texrs.exemplar import segment
+from texrs.papers.design.deformation import deform_elements
 from texrs.papers.design.elements import measure_elements, place
 from texrs.papers.design.logistic_map import iterate
 from texrs.papers.design.operations import Moves, Operation
+from texrs.papers.design.plan import make_plan
+from texrs.papers.design.tiles import fill_holes, mark_elements
 
 
 @pytest.fixture(scope="module")
@@ -433,3 +436,18 @@ def test_what_needs_more_memory_than_there_is_is_refused_before_anything_is_made
 
     with pytest.raises(LimitExceeded, match=r"^size: needs .* GB of memory"):
         texrs.design(np.zeros((32, 32, 64)), (16384, 16384), progress=progress)
+
+
+def test_holes_are_not_filled_over_the_inside_of_elements(pebbles):
+    exemplar = texrs.Exemplar(pebbles)
+    parts = exemplar.segment(ElementOptions(labels=samples.pebbles((128, 128)).labels))
+    plan = make_plan(exemplar, parts, DeformationOptions(), side=None)
+    draft = deform_elements(plan, 5, 0)
+    kept = mark_elements(draft, plan)
+    assert kept.mean() > 0.2
+    assert not kept[~draft.covered].any()
+    draft.covered[kept.argmax() // 128 :][:9] = False
+    kept &= draft.covered
+    filled = fill_holes(draft, plan, ((128, 128),), 0, 5)
+    assert filled.holes > 0
+    np.testing.assert_array_equal(filled.source.label[kept], draft.label[kept])
