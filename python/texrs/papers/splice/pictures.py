@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_image, as_rgb, to_unit
-from texrs._typing import Array, Bools
+from texrs._typing import Array, Bools, Labels
 from texrs.elements import Elements
+from texrs.exemplar.shapes import mark_outlines
 from texrs.papers.splice.matching import Match
 from texrs.papers.splice.refine import Draft
 
@@ -79,6 +80,13 @@ def mark_points(image: Picture, points: Points, colour: tuple[int, int, int]) ->
     for radius, shade in ((4, WHITE), (3, colour), (2, colour)):
         at = np.rint(points[:, None] + radius * np.stack([np.sin(angles), np.cos(angles)], axis=-1)).astype(np.intp)
         _put(out, at.reshape(-1, 2), shade)
+    return out
+
+
+def draw_outlines(image: Picture, labels: Labels, colour: tuple[int, int, int]) -> Picture:
+    """Return a picture with the outlines of labelled regions, 0 for none, drawn over it."""
+    out = image.copy()
+    out[mark_outlines(labels)] = colour
     return out
 
 

@@ -19,7 +19,7 @@ from texrs.papers.splice.refine import Draft
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
-__all__ = ["compose", "list_place", "measure_realised"]
+__all__ = ["compose", "list_place", "measure_realised", "report_ways"]
 
 STAYS = 0.5
 """Pixels: what is to go less far than that stays."""
@@ -112,6 +112,49 @@ def measure_realised(
     ]
     total = float(asked[there].sum())
     return listed, round(max(0.0, 1 - float(missed[there].sum()) / total), 4) if total >= STAYS else 1.0
+
+
+def report_ways(
+    own: NDArray[np.float64],
+    start: NDArray[np.float64] | None,
+    goal: NDArray[np.float64],
+    found: NDArray[np.float64],
+    size: tuple[int, ...],
+) -> tuple[dict[str, float], list[dict[str, Any]]]:
+    """Report what became of the ways of elements that are put where targets are, in JSON types.
+
+    Parameters
+    ----------
+    own : (n, 2) float64
+        Elements of A where they lie around the middle of the output: where those come from that have no ``start``.
+    start : (m, 2) float64, optional
+        Where each target's element comes from.
+    goal, found : (m, 2) float64
+        Where it is wanted and where it is, NaN where it is not shown.
+    size : tuple of int
+        Of the output, whose inner targets alone are counted in the summary.
+
+    Returns
+    -------
+    summary : dict
+        "present", the share that is shown, and "realised", how much of their ways they go.
+    matches : list of dict
+        A target each: "target", "found" and "realised".
+
+    """
+    from scipy.spatial import cKDTree
+
+    if start is None:
+        start = own[cKDTree(own).query(goal)[1]]
+    there = np.isfinite(found[:, 0])
+    inside = ((goal >= 0) & (goal <= np.array(size) - 1)).all(axis=1)
+    parts, _ = measure_realised(start, goal, found)
+    _, realised = measure_realised(start[inside], goal[inside], found[inside])
+    present = round(float(there[inside].mean()) if inside.any() else 0.0, 4)
+    return {"present": present, "realised": realised}, [
+        {"target": list_place(g), "found": list_place(f) if shown else None, "realised": part}
+        for g, f, shown, part in zip(goal, found, there, parts, strict=True)
+    ]
 
 
 def list_place(place: NDArray[np.float64]) -> list[float]:

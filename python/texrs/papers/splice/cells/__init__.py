@@ -36,7 +36,7 @@ from texrs.papers.splice.cells.refinement import refine_charts
 from texrs.papers.splice.cells.strength import go_part_of_the_way, take_own_cells
 from texrs.papers.splice.cells.tessellation import Tessellation, take_cells, take_points
 from texrs.papers.splice.extension import lay_out
-from texrs.papers.splice.result import list_place, measure_realised
+from texrs.papers.splice.result import list_place, report_ways
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
@@ -184,20 +184,11 @@ def _find_places(cells: Cells, charts: Charts, joined: Joined) -> NDArray[np.flo
 
 def _report(cells: Cells, wanted: Tessellation, charts: Charts, joined: Joined) -> dict[str, Any]:
     """Say what was found, what was wanted and what has become of it, in JSON types."""
-    from scipy.spatial import cKDTree
-
-    size = np.array(joined.chart.shape)
+    size = joined.chart.shape
+    own = cells.centre + (np.array(size) - cells.labels.shape) / 2
+    start = None if wanted.start is None else wanted.start[charts.target]
     goal, found = wanted.centre[charts.target], _find_places(cells, charts, joined)
-    inside = ((goal >= 0) & (goal <= size - 1)).all(axis=1)
-    there = np.isfinite(found[:, 0])
-    if wanted.start is None:
-        # Cells come from anywhere: the way is that of the nearest cell of A's own layout.
-        own = cells.centre + (size - cells.labels.shape) / 2
-        start = own[cKDTree(own).query(goal)[1]]
-    else:
-        start = wanted.start[charts.target]
-    parts, _ = measure_realised(start, goal, found)
-    _, realised = measure_realised(start[inside], goal[inside], found[inside])
+    summary, matches = report_ways(own, start, goal, found, size)
     return {
         "scale": round(wanted.scale, 6),
         "continued": wanted.continued,
@@ -209,18 +200,15 @@ def _report(cells: Cells, wanted: Tessellation, charts: Charts, joined: Joined) 
             "polarity": cells.polarity,
             "confidence": round(cells.confidence, 4),
         },
-        "present": round(float(there[inside].mean()) if inside.any() else 0.0, 4),
-        "realised": realised,
+        **summary,
         "matches": [
-            {
-                "target": list_place(goal[k]),
-                "found": list_place(found[k]) if there[k] else None,
-                "realised": parts[k],
+            match
+            | {
                 "element": int(charts.source[k]),
                 "point": list_place(cells.centre[charts.source[k]]),
                 "turn": float(charts.turn[k]),
                 "scale": round(float(charts.scale[k]), 4),
             }
-            for k in range(len(charts.target))
+            for k, match in enumerate(matches)
         ],
     }

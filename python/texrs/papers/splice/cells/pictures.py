@@ -8,11 +8,10 @@ from numpy.typing import NDArray
 from texrs._typing import Array, Labels
 from texrs.elements import Elements
 from texrs.exemplar.cells import Cells
-from texrs.exemplar.shapes import mark_outlines
 from texrs.papers.splice.cells.charts import Charts
 from texrs.papers.splice.cells.joining import Joined
 from texrs.papers.splice.cells.tessellation import Tessellation
-from texrs.papers.splice.pictures import BLUE, GREEN, RED, Stages, mark_points, to_picture
+from texrs.papers.splice.pictures import BLUE, GREEN, RED, Stages, draw_outlines, mark_points, to_picture
 
 __all__ = ["draw_cell_stages"]
 
@@ -29,23 +28,17 @@ def draw_cell_stages(
         {
             "cells of a": lambda: _draw_cells(to_picture(a.image), cells),
             "layout of b": lambda: mark_points(to_picture(b.image), b.points, BLUE),
-            "target cells": lambda: _draw_outlines(np.full((*targets.shape, 3), 255, np.uint8), targets, BLUE),
+            "target cells": lambda: draw_outlines(np.full((*targets.shape, 3), 255, np.uint8), targets, BLUE),
             "assignment": lambda: _shade(joined.chart, charts.source, cells.count),
-            "cuts": lambda: _draw_outlines(to_picture(image), joined.chart + 1, GREEN),
+            "cuts": lambda: draw_outlines(to_picture(image), joined.chart + 1, GREEN),
             "composite": lambda: image,
         }
     )
 
 
-def _draw_outlines(picture: Picture, labels: Labels, colour: tuple[int, int, int]) -> Picture:
-    out = picture.copy()
-    out[mark_outlines(labels)] = colour
-    return out
-
-
 def _draw_cells(picture: Picture, cells: Cells) -> Picture:
     """Draw the outlines of all cells, and a ring in those that are whole: green where they are sure, red where they are not."""
-    out = _draw_outlines(picture, cells.labels, BLUE)
+    out = draw_outlines(picture, cells.labels, BLUE)
     for sure, colour in ((True, GREEN), (False, RED)):
         out = mark_points(out, cells.centre[cells.whole & ((cells.certain >= 0.5) == sure)], colour)
     return out
@@ -56,4 +49,4 @@ def _shade(chart: Labels, source: NDArray[np.intp], count: int) -> Picture:
     turn = np.arange(count) * 0.618034 % 1 * 2 * np.pi
     colours = 150 + 90 * np.stack([np.cos(turn), np.cos(turn - 2.1), np.cos(turn + 2.1)], axis=-1)
     picture = colours.astype(np.uint8)[source[chart]]
-    return _draw_outlines(picture, chart + 1, (255, 255, 255))
+    return draw_outlines(picture, chart + 1, (255, 255, 255))

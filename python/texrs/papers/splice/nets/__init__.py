@@ -35,11 +35,11 @@ from texrs.papers.splice.nets.graph import describe_places, join_knots
 from texrs.papers.splice.nets.knots import Laid, lay_knots
 from texrs.papers.splice.nets.pictures import draw_net_stages
 from texrs.papers.splice.nets.targets import Targets, go_part_of_the_way, take_own_points, take_points
-from texrs.papers.splice.result import list_place, measure_realised
+from texrs.papers.splice.result import list_place, report_ways
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
-__all__ = ["is_net", "splice_nets"]
+__all__ = ["has_knots", "is_net", "splice_nets"]
 
 Points = NDArray[np.float64]
 
@@ -162,43 +162,25 @@ def _report(
     a: Elements, wanted: Targets, laid: Laid, places: NDArray[np.int32], shown: NDArray[np.intp], unit: float
 ) -> dict[str, Any]:
     """Say what was wanted and what has become of it, in JSON types."""
-    from scipy.spatial import cKDTree
-
-    size = np.array(places.shape[:2])
-    goal, source = wanted.points[shown], laid.source[shown]
-    found = _check_found(a, laid, places, shown)
-    if wanted.start is None:
-        # Knots come from anywhere: the way is that of the nearest of A's own.
-        own = a.points + (size - a.mask.shape) / 2
-        start = own[cKDTree(own).query(goal)[1]]
-    else:
-        start = wanted.start[shown]
-    inside = ((goal >= 0) & (goal <= size - 1)).all(axis=1)
-    there = np.isfinite(found[:, 0])
-    parts, _ = measure_realised(start, goal, found)
-    _, realised = measure_realised(start[inside], goal[inside], found[inside])
+    size, source = places.shape[:2], laid.source[shown]
+    own = a.points + (np.array(size) - a.mask.shape) / 2
+    start = None if wanted.start is None else wanted.start[shown]
+    summary, matches = report_ways(own, start, wanted.points[shown], _find_places(a, laid, places, shown), size)
     return {
         "scale": round(wanted.scale, 6),
         "continued": wanted.continued,
         "targets": len(shown),
         "knots": {"count": len(a.points), "spacing": round(unit, 3), "lines": len(join_knots(a.points))},
         "grown": round(float((laid.target == FREE).mean()), 4),
-        "present": round(float(there[inside].mean()) if inside.any() else 0.0, 4),
-        "realised": realised,
+        **summary,
         "matches": [
-            {
-                "target": list_place(goal[k]),
-                "found": list_place(found[k]) if there[k] else None,
-                "realised": parts[k],
-                "element": int(source[k]),
-                "point": list_place(a.points[source[k]]),
-            }
-            for k in range(len(shown))
+            match | {"element": int(knot), "point": list_place(a.points[knot])}
+            for match, knot in zip(matches, source, strict=True)
         ],
     }
 
 
-def _check_found(a: Elements, laid: Laid, places: NDArray[np.int32], shown: NDArray[np.intp]) -> Points:
+def _find_places(a: Elements, laid: Laid, places: NDArray[np.int32], shown: NDArray[np.intp]) -> Points:
     """Return where each knot is in the output, as the source map has it; NaN where it is not shown."""
     found: Points = laid.found[shown]
     size = np.array(places.shape[:2])

@@ -7,9 +7,8 @@ from numpy.typing import NDArray
 
 from texrs._typing import Array
 from texrs.elements import Elements
-from texrs.exemplar.shapes import mark_outlines
 from texrs.papers.splice.nets.graph import join_knots
-from texrs.papers.splice.pictures import BLUE, GREEN, RED, Stages, draw_lines, mark_points, to_picture
+from texrs.papers.splice.pictures import BLUE, GREEN, RED, Stages, draw_lines, draw_outlines, mark_points, to_picture
 
 __all__ = ["draw_net_stages"]
 
@@ -24,7 +23,7 @@ def draw_net_stages(a: Elements, b: Elements, targets: Points, label: NDArray[np
             "net of a": lambda: _draw_net(to_picture(a.image), a.points),
             "layout of b": lambda: mark_points(to_picture(b.image), b.points, BLUE),
             "target net": lambda: _draw_net(np.full((*label.shape, 3), 255, np.uint8), targets),
-            "cuts": lambda: _draw_cuts(to_picture(image), label),
+            "cuts": lambda: draw_outlines(to_picture(image), label.astype(np.int32) + 1, GREEN),
             "composite": lambda: image,
         }
     )
@@ -34,9 +33,3 @@ def _draw_net(picture: Picture, points: Points) -> Picture:
     """Draw a ring around each knot, and a line between neighbours."""
     pairs = join_knots(points)
     return mark_points(draw_lines(picture, points[pairs[:, 0]], points[pairs[:, 1]]), points, RED)
-
-
-def _draw_cuts(picture: Picture, label: NDArray[np.uint32]) -> Picture:
-    out = picture.copy()
-    out[mark_outlines(label.astype(np.int32) + 1)] = GREEN
-    return out
