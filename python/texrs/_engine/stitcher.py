@@ -31,7 +31,7 @@ class Weights:
     colour : float
         Squared differences of the colours on both sides, in the exemplar's standard deviations.
     contact, jump, depth, joint : float
-        Two elements in contact; an element that is cut off; a seam inside of one; elements nearer than two samples.
+        Two elements in contact, of whatever colours; an element that is cut off; a seam inside of one; elements nearer than two samples.
     surprise : float
         Colours that are seldom seen side by side.
     distortion : float
@@ -42,7 +42,7 @@ class Weights:
     """
 
     colour: float = 0.1
-    contact: float = 1.0
+    contact: float = 3.0
     jump: float = 1.0
     depth: float = 0.15
     joint: float = 0.5

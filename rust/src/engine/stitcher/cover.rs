@@ -83,14 +83,14 @@ pub fn judge<const D: usize>(
     }
     let judge = Judge { source, weights };
     let mut seams = vec![[0.0; D]; grid.len()];
-    let (mut apart, mut costs, mut unlike) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut apart, mut costs) = (Vec::new(), Vec::new());
     runs(grid, |Run { axis, p, q, n }| {
         let (l, r) = (looks.row(p, n), looks.row(q, n));
         apart.resize(n, 0.0);
         costs.resize(n, 0.0);
         distances(l, r, &mut apart);
         apart.iter_mut().for_each(|d| *d *= *d);
-        judge.pairs(l, r, [&apart, &apart], &mut unlike, &mut costs);
+        judge.pairs(l, r, [&apart, &apart], &mut costs);
         for k in 0..n {
             if patches[p + k] != patches[q + k] {
                 seams[p + k][axis] = costs[k];

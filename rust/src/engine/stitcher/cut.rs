@@ -85,7 +85,6 @@ struct Patch {
 struct Costs {
     old_new: Vec<f32>,
     new_old: Vec<f32>,
-    unlike: Vec<f32>,
     capacities: Capacities,
 }
 
@@ -296,21 +295,10 @@ impl<'a, const D: usize> Cutter<'a, D> {
         costs.new_old.resize(n, 0.0);
         let apart = [&patch.apart[p..p + n], &patch.apart[q..q + n]];
         let (old, new) = (&view.looks, &patch.looks);
-        let unlike = &mut costs.unlike;
-        self.judge.pairs(
-            old.row(p, n),
-            new.row(q, n),
-            apart,
-            unlike,
-            &mut costs.old_new,
-        );
-        self.judge.pairs(
-            new.row(p, n),
-            old.row(q, n),
-            apart,
-            unlike,
-            &mut costs.new_old,
-        );
+        self.judge
+            .pairs(old.row(p, n), new.row(q, n), apart, &mut costs.old_new);
+        self.judge
+            .pairs(new.row(p, n), old.row(q, n), apart, &mut costs.new_old);
         if patch.meets {
             let kept = &view.seams[run.axis][p..p + n];
             let (l, r) = (&patch.same[p..p + n], &patch.same[q..q + n]);

@@ -12,8 +12,6 @@ use crate::foundation::wide::wide_fn;
 const SHORTEST: f32 = 2e-3;
 /// Costs of one pair are at most this, so that sums stay within 32 bits.
 pub(super) const MOST: f32 = 1000.0;
-/// Beyond this, colours of two elements are as different as can be.
-const UNLIKE: f32 = 1.5;
 /// As deep as counts.
 const DEEP: f32 = 6.0;
 
@@ -26,14 +24,7 @@ pub(super) struct Judge<'a, const D: usize> {
 impl<const D: usize> Judge<'_, D> {
     /// Costs of pairs: what each point of a row is beside, and how far the pictures are apart at both, squared.
     #[inline]
-    pub(super) fn pairs(
-        &self,
-        l: Row<'_>,
-        r: Row<'_>,
-        apart: [&[f32]; 2],
-        unlike: &mut Vec<f32>,
-        out: &mut [f32],
-    ) {
+    pub(super) fn pairs(&self, l: Row<'_>, r: Row<'_>, apart: [&[f32]; 2], out: &mut [f32]) {
         let w = &self.weights;
         add_colours(w.colour, apart[0], apart[1], out);
         if w.surprise > 0.0 {
@@ -42,10 +33,8 @@ impl<const D: usize> Judge<'_, D> {
             }
         }
         if self.source.has_elements() {
-            unlike.resize(out.len(), 0.0);
-            distances(l, r, unlike);
             let weights = [w.contact, w.joint, w.depth, w.jump];
-            add_elements(weights, unlike, l.depth, r.depth, l.beside, r.beside, out);
+            add_elements(weights, l.depth, r.depth, l.beside, r.beside, out);
         }
         out.iter_mut().for_each(|cost| *cost = cost.min(MOST));
     }
@@ -76,10 +65,8 @@ wide_fn! {
 }
 
 wide_fn! {
-    #[allow(clippy::too_many_arguments)] // arguments are known not to overlap
     fn add_elements(
         weights: [f32; 4],
-        unlike: &[f32],
         l_depth: &[f32],
         r_depth: &[f32],
         l_beside: &[f32],
@@ -88,13 +75,14 @@ wide_fn! {
     ) {
         let [contact, joint, depth, jump] = weights;
         let n = out.len();
-        let (unlike, l_depth, r_depth) = (&unlike[..n], &l_depth[..n], &r_depth[..n]);
+        let (l_depth, r_depth) = (&l_depth[..n], &r_depth[..n]);
         let (l_beside, r_beside) = (&l_beside[..n], &r_beside[..n]);
         for k in 0..n {
             let (dl, dr) = (l_depth[k], r_depth[k]);
             let inside = (if dl > 0.0 { 1.0f32 } else { 0.0 }, if dr > 0.0 { 1.0f32 } else { 0.0 });
             let mut cost = out[k];
-            cost += contact * (inside.0 * inside.1) * unlike[k].min(UNLIKE);
+            // Whatever their colours: two of one colour that meet are one thing of a shape that the exemplar has not.
+            cost += contact * (inside.0 * inside.1);
             cost += joint * (l_beside[k] * inside.1).max(inside.0 * r_beside[k]);
             cost += depth * (dl.min(DEEP) + dr.min(DEEP)) / DEEP;
             cost += jump * ((dl - dr).abs() - 1.0).clamp(0.0, 4.0) / 2.0;

@@ -408,14 +408,11 @@ fn bad_arrays_and_options_are_refused() {
 fn slow_pair(w: &Weights, source: &Source<2>, l: usize, r: usize, apart: f32) -> f32 {
     let look = |i: usize| source.look(source.grid().point(i).map(|x| x as i32 * ONE));
     let (l, r) = (look(l), look(r));
-    let unlike: f32 = (0..CHANNELS)
-        .map(|c| (l.colour[c] - r.colour[c]).abs())
-        .sum();
     let mut cost = 2e-3 + w.colour * apart / 8.0;
     cost += w.surprise * source.surprise(l.class, r.class);
     let inside = (l.depth > 0.0, r.depth > 0.0);
     if inside.0 && inside.1 {
-        cost += w.contact * unlike.min(1.5);
+        cost += w.contact;
     }
     if l.beside && inside.1 || inside.0 && r.beside {
         cost += w.joint;

@@ -7,7 +7,7 @@ use crate::{Error, Result};
 pub struct Weights {
     /// Squared differences of the colours on both sides.
     pub colour: f32,
-    /// Two elements in contact.
+    /// Two elements in contact, of whatever colours.
     pub contact: f32,
     /// A jump of the depth: an element that is cut off.
     pub jump: f32,
