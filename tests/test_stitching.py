@@ -141,6 +141,17 @@ def test_elements_stay_whole(kind):
     assert abs(stitched.density[1] / stitched.density[0] - 1) < 0.2
 
 
+def test_elements_keep_their_share():
+    """Cuts around elements are shorter than cuts between them, and would leave fewer than there are."""
+    exemplar = texrs.Exemplar(PARTICLES.image, axes=3)
+    depth = exemplar.instances.depth
+    shares = []
+    for seed in (1, 2, 3):
+        at = np.rint(texrs.solid(exemplar, 64, seed=seed).source.coordinates).astype(int) % 64
+        shares.append((depth[tuple(np.moveaxis(at, -1, 0))] > 0).mean())
+    assert abs(np.mean(shares) / (depth > 0).mean() - 1) < 0.05
+
+
 def test_elements_are_counted_without_bias():
     """A part of what repeats has as many elements for its size as the whole has, though its ends cut many."""
     exemplar = texrs.Exemplar(PARTICLES.image, axes=3, repeat=True)

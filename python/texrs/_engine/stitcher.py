@@ -31,7 +31,10 @@ class Weights:
     colour : float
         Squared differences of the colours on both sides, in the exemplar's standard deviations.
     contact, jump, depth, joint : float
-        Two elements in contact, of whatever colours; an element that is cut off; a seam inside of one; elements nearer than two samples.
+        Two elements in contact, of whatever colours; an element that is cut off; a seam inside of one; elements nearer
+        than two samples.
+    presence : float
+        A point that shows no element: cuts around elements are shorter, and would leave too few of them.
     surprise : float
         Colours that are seldom seen side by side.
     distortion : float
@@ -44,8 +47,9 @@ class Weights:
     colour: float = 0.1
     contact: float = 3.0
     jump: float = 1.0
-    depth: float = 0.15
+    depth: float = 0.3
     joint: float = 0.5
+    presence: float = 0.02
     surprise: float = 1.0
     distortion: float = 0.03
     guide: float = 0.5

@@ -89,7 +89,7 @@ impl Stitcher {
         .map(Self)
     }
 
-    /// Weights: colour, contact, jump, depth, joint, surprise, distortion, guide.
+    /// Weights: colour, contact, jump, depth, joint, presence, surprise, distortion, guide.
     #[allow(clippy::too_many_arguments)] // the arguments of the Python method
     fn stitch<'py>(
         &self,
@@ -97,7 +97,7 @@ impl Stitcher {
         place: Where,
         jacobians: PyReadonlyArray3In<'py>,
         patch: PatchIn,
-        weights: [f32; 8],
+        weights: [f32; 9],
         charges: [f32; 3],
         seed: u64,
         held: PyReadonlyArray1<'py, bool>,
@@ -159,7 +159,7 @@ impl Stitcher {
         place: Where,
         places: PyReadonlyArray1<'py, i32>,
         patches: PyReadonlyArray1<'py, u32>,
-        weights: [f32; 8],
+        weights: [f32; 9],
     ) -> PyResult<Bound<'py, PyArray1<f32>>> {
         let (places, patches) = (places.as_slice()?, patches.as_slice()?);
         macro_rules! judged {
@@ -188,7 +188,7 @@ impl Stitcher {
         jacobians: PyReadonlyArray3In<'py>,
         shown: ShownIn<'py>,
         patch: PatchIn,
-        weights: [f32; 8],
+        weights: [f32; 9],
         charges: [f32; 3],
         progress: Option<Py<PyAny>>,
     ) -> PyResult<ShownOut<'py>> {
@@ -288,13 +288,14 @@ fn write<const D: usize>(patch: &Patch<D>) -> Vec<i32> {
     row
 }
 
-fn seam(weights: [f32; 8]) -> Weights {
+fn seam(weights: [f32; 9]) -> Weights {
     let [
         colour,
         contact,
         jump,
         depth,
         joint,
+        presence,
         surprise,
         distortion,
         guide,
@@ -305,13 +306,14 @@ fn seam(weights: [f32; 8]) -> Weights {
         jump,
         depth,
         joint,
+        presence,
         surprise,
         distortion,
         guide,
     }
 }
 
-fn options(patch: PatchIn, weights: [f32; 8], charges: [f32; 3], seed: u64) -> Options {
+fn options(patch: PatchIn, weights: [f32; 9], charges: [f32; 3], seed: u64) -> Options {
     let (side, overlap, candidates, recover, bend, heal) = patch;
     Options {
         patch: side,

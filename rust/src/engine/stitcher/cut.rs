@@ -241,7 +241,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         };
         self.look(view, patch, ties, &mut work.patch);
         work.energy.clear(grid, block)?;
-        if self.guide.is_some() || !patch.distortion.is_empty() {
+        if self.has_points(patch) {
             for (i, _) in ties.iter().enumerate().filter(|(_, t)| **t == Tie::Either) {
                 let [keep, take] = self.points(view, patch, i);
                 work.energy.add_point(i, capacity(take - keep));
@@ -389,7 +389,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         take: impl Fn(usize) -> bool,
     ) -> f64 {
         let mut value = view.total;
-        if self.guide.is_some() || !patch.distortion.is_empty() {
+        if self.has_points(patch) {
             for (i, tie) in view.ties.iter().enumerate() {
                 if *tie == Tie::New || *tie == Tie::Either {
                     value += f64::from(self.points(view, patch, i)[usize::from(take(i))]);
@@ -397,6 +397,12 @@ impl<'a, const D: usize> Cutter<'a, D> {
             }
         }
         value
+    }
+
+    /// Whether points cost anything by themselves.
+    fn has_points(&self, patch: &Proposal<'_, D>) -> bool {
+        let elements = self.judge.weights.presence > 0.0 && self.source().has_elements();
+        elements || self.guide.is_some() || !patch.distortion.is_empty()
     }
 
     /// What a point costs that keeps what it shows, or takes the patch.
@@ -409,6 +415,11 @@ impl<'a, const D: usize> Cutter<'a, D> {
             for (cost, place) in costs.iter_mut().zip([view.places[i], patch.places[i]]) {
                 let asked = guide.cost(p, self.source().sample(place)) as f32;
                 *cost += weights.guide * asked / UNRELATED;
+            }
+        }
+        if weights.presence > 0.0 && self.source().has_elements() {
+            for (cost, place) in costs.iter_mut().zip([view.places[i], patch.places[i]]) {
+                *cost += weights.presence * f32::from(u8::from(self.source().bare(place)));
             }
         }
         if view.patches[i] == FREE {

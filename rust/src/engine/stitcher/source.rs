@@ -279,6 +279,12 @@ impl<const D: usize> Source<D> {
         look
     }
 
+    /// Whether a place lies between elements.
+    #[inline]
+    pub(super) fn bare(&self, place: Place<D>) -> bool {
+        self.looks[self.sample(place)].depth <= 0.0
+    }
+
     #[inline]
     fn interpolate(&self, place: Place<D>) -> Colour {
         let shape = self.grid.shape();

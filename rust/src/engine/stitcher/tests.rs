@@ -37,6 +37,7 @@ const OPTIONS: Options = Options {
         jump: 1.0,
         depth: 0.15,
         joint: 0.5,
+        presence: 0.0,
         surprise: 0.0,
         distortion: 0.03,
         guide: 0.5,

@@ -15,6 +15,8 @@ pub struct Weights {
     pub depth: f32,
     /// An element beside another one's border: joints stay as wide as two samples.
     pub joint: f32,
+    /// A point that shows none: cuts around elements are shorter, and would leave fewer of them than there are.
+    pub presence: f32,
     /// Classes that are seldom side by side.
     pub surprise: f32,
     /// A point whose patch is bent against the field.
@@ -31,6 +33,7 @@ impl Weights {
         jump: 0.0,
         depth: 0.0,
         joint: 0.0,
+        presence: 0.0,
         surprise: 0.0,
         distortion: 0.0,
         guide: 0.0,
@@ -43,6 +46,7 @@ impl Weights {
             self.jump,
             self.depth,
             self.joint,
+            self.presence,
             self.surprise,
             self.distortion,
             self.guide,
