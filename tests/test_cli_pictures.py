@@ -47,6 +47,7 @@ def files(folder: Path) -> dict[str, bytes]:
         ("--wrap x --overlap 12", {"wrap": (False, True), "overlap": 12}),
         ("--wrap y --overlap 10x30 --threads 1", {"wrap": (True, False), "overlap": (10, 30)}),
         ("--wrap none", {"wrap": False}),
+        ("--size 48x60", {"size": (48, 60)}),
     ],
 )
 def test_tile_writes_what_the_function_makes(here: Path, capsys: Capture, arguments: str, options: dict) -> None:

@@ -10,9 +10,13 @@ import pytest
 
 import texrs
 from texrs import samples
-from texrs import tiling as cyclic
 from texrs._arrays import as_image, guidance
 from texrs.errors import Cancelled, InvalidInput
+from texrs.kernels import seam
+from texrs.tiling import _closed
+from texrs.tiling._joints import Choice, find_joint, make_levels
+from texrs.tiling._maps import find_calm_line, lay_out
+from texrs.tiling._things import find_things
 
 GENERATED = ("bark", "beans", "bricks", "dots", "leaves_and_flowers", "net", "pebbles", "scales", "weave", "grit")
 PHOTOGRAPHS = ("brick", "grass", "gravel", "coffee")
@@ -58,13 +62,60 @@ def test_no_jump_across_the_wrap(name):
 
 
 @pytest.mark.parametrize("name", ["bricks", "weave", "net", "scales", "pebbles", "beans", "brick"])
-def test_searched_overlap_costs_less_than_the_usual_one(name):
+def test_searched_joints_cost_less_than_the_usual_one(name):
     image = picture(name)
-    cost = [
-        sum(j["cost"] for j in texrs.tile(image, overlap=overlap).report["joints"].values())
-        for overlap in (None, cyclic.OVERLAP)
-    ]
+    cost = []
+    for overlap in (None, 50):
+        joints = texrs.tile(image, overlap=overlap).report["joints"].values()
+        cost.append(sum(j["cost"] / (2 if j["cover"] else 1) for j in joints))
     assert cost[0] < cost[1]
+
+
+@pytest.mark.parametrize("name", ["weave", "pebbles", "beans", "grass"])
+def test_a_joint_followed_from_a_small_picture_is_about_as_cheap_as_the_cheapest(name):
+    image = picture(name)
+    most = image.shape[1] // 2
+    cost = {
+        overlap: texrs.tile(image, wrap=(False, True), overlap=overlap).report["joints"]["columns"]["cost"]
+        for overlap in range(25, most + 1)
+    }
+    found = find_joint(
+        make_levels(guidance(as_image(image)), find_things(guidance(as_image(image))).depth),
+        1,
+        Choice(25, most),
+        closed=False,
+        progress=lambda share: None,
+    )
+    assert cost[found.joint.width] == pytest.approx(found.cuts[0].value, rel=1e-3)
+    # The cheapest of all may lose more of the picture, or not fit.
+    assert found.cuts[0].value <= 1.3 * min(cost.values())
+
+
+def test_few_cuts_are_made_at_the_full_size(monkeypatch):
+    full = []
+    real = _closed.cut_strips
+    monkeypatch.setattr(
+        _closed,
+        "cut_strips",
+        lambda strips, **more: full.extend(s for s in strips if np.shape(s.a)[1] >= 512) or real(strips, **more),
+    )
+    texrs.tile(np.tile(picture("grit"), (2, 2, 1)))
+    assert 1 <= len(full) <= 4
+
+
+@pytest.mark.parametrize("name", ["beans", "pebbles"])
+def test_cuts_spare_the_inside_of_things(name):
+    guide = guidance(as_image(picture(name)))
+    # Light things on dark ground.
+    depth = np.clip((guide.mean(axis=-1) - 0.35) / 0.1, 0, 1).astype(np.float32)
+    deep = []
+    for given in (0 * depth, depth):
+        levels = make_levels(guide, given)
+        found = find_joint(levels, 0, Choice(80, 80), closed=False, progress=lambda share: None)
+        line, piece = lay_out(256, found, 100)
+        shown = depth[line, np.indices(line.shape)[1]]
+        deep.append(sum(float(shown[piece != np.roll(piece, 1, axis)].sum()) for axis in range(2)))
+    assert deep[1] < 0.9 * deep[0]
 
 
 def test_regular_patterns_close_exactly():
@@ -74,6 +125,28 @@ def test_regular_patterns_close_exactly():
     rows, columns = made.image.shape[:2]
     assert (rows % 20, columns % 28) == (0, 0)
     np.testing.assert_array_equal(made.image, np.roll(made.image, (20, 28), (0, 1)))
+
+
+def test_regular_patterns_close_exactly_at_any_size():
+    unit = np.random.default_rng(3).integers(0, 256, (37, 53, 3), dtype=np.uint8)
+    image = np.tile(unit, (14, 11, 1))[:500, :571]
+    made = texrs.tile(image)
+    rows, columns = made.image.shape[:2]
+    assert (rows % 37, columns % 53) == (0, 0)
+    np.testing.assert_array_equal(made.image, np.roll(made.image, (37, 53), (0, 1)))
+
+
+def test_a_seam_that_closes_costs_no_more_than_the_least_one_but_for_little():
+    guide = guidance(as_image(picture("pebbles")))
+    strip = seam.Strip(guide[-60:], guide[:60], 0, np.full((60, 256), 0.5, np.float32))
+    [found] = _closed.cut_overlaps([strip], closed=True)
+    [least] = seam.cut_strips([strip], cyclic=True)
+    assert least.value * (1 - 1e-3) <= found.value <= 1.05 * least.value
+    assert found.mask.shape == (60, 256)
+    assert not found.mask[0].any()
+    assert found.mask[-1].all()
+    again = _closed.measure_cut(strip, least.mask)
+    assert (again.value, again.edges) == (pytest.approx(least.value, rel=1e-3), least.edges)
 
 
 def sheared() -> np.ndarray:
@@ -87,10 +160,19 @@ def sheared() -> np.ndarray:
     return image[..., np.newaxis]
 
 
+def join_rows(guide: np.ndarray, closed: bool) -> texrs.SourceMap:
+    """Return the map of a picture whose rows are joined with an overlap of 16."""
+    levels = make_levels(guide, np.zeros(guide.shape[:2], np.float32))
+    found = find_joint(levels, 0, Choice(16, 16), closed=closed, progress=lambda share: None)
+    line, piece = lay_out(guide.shape[1], found, find_calm_line(guide, 0, found))
+    coordinates = np.stack([line, np.indices(line.shape)[1]], axis=-1).astype(np.float32)
+    return texrs.SourceMap.from_coordinates(coordinates, guide.shape[:2], label=piece)
+
+
 def test_an_open_second_cut_reopens_the_first_wrap():
     guide, run, torn = sheared(), {}, {}
     for closed in (False, True):
-        source = cyclic.join(guide, 0, range(16, 17), closed=closed).source
+        source = join_rows(guide, closed)
         # Rows in which the two sides of the wrap come from different ends of the picture.
         torn[closed] = int((source.label[:, 0] != source.label[:, -1]).sum())
         inner, across = jumps(source.render(guide), 1)
@@ -99,6 +181,60 @@ def test_an_open_second_cut_reopens_the_first_wrap():
     assert run[True] <= 2
     assert torn[False] >= 6
     assert run[False] > 2
+
+
+# --- the size --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["grit", "pebbles", "leaves_and_flowers"])
+def test_the_size_is_kept_where_a_cover_shows_no_more(name):
+    image = picture(name)
+    made = texrs.tile(image)
+    assert made.image.shape == image.shape
+    assert all(j["cover"] > 0 and j["overlap"] == 0 for j in made.report["joints"].values())
+    # What covers the ends is from elsewhere in the picture, and nothing but the ends is covered.
+    assert 0.6 < (made.source.reuse().verbatim) <= 1
+
+
+@pytest.mark.parametrize(
+    "size", [(256, 256), (250, 255), (129, 200), (100, 90), (60, 256), (300, 256), (400, 330), 192]
+)
+def test_any_size_is_exact(size):
+    image = picture("beans")
+    made = texrs.tile(image, size=size)
+    rows, columns = (size, size) if isinstance(size, int) else size
+    assert made.image.shape == (rows, columns, 3)
+    at = made.source.coordinates.astype(int)
+    np.testing.assert_array_equal(made.image, image[at[..., 0], at[..., 1]])
+    for axis in (0, 1):
+        inner, across = jumps(made.image, axis)
+        assert across.mean() / inner.mean() <= 1.5
+    assert made.report["method"] == ("quilt" if max(rows, columns) > 256 else "tile")
+
+
+@pytest.mark.parametrize(
+    ("size", "wrap"), [((100, 70), (True, False)), ((60, 96), (False, True)), (50, (False, False))]
+)
+def test_an_axis_that_does_not_wrap_keeps_its_middle(size, wrap):
+    image = picture("pebbles", 96)
+    made = texrs.tile(image, size=size, wrap=wrap)
+    sides = (size, size) if isinstance(size, int) else size
+    assert made.image.shape == (*sides, 3)
+    if sides[0] > 96:
+        return
+    for axis in (0, 1):
+        if not wrap[axis]:
+            first = (96 - sides[axis]) // 2
+            assert (made.source.coordinates[..., axis] == np.indices(sides)[axis] + first).all()
+
+
+@pytest.mark.parametrize("shape", [(2, 2), (2, 9), (3, 3), (5, 64), (8, 8)])
+def test_smallest_pictures_of_any_size(shape):
+    image = np.random.default_rng(0).integers(0, 256, shape, dtype=np.uint8)
+    for size in (shape, (2, 2), tuple(max(2, n - 1) for n in shape)):
+        assert texrs.tile(image, size=size).image.shape == size
+    if min(shape) >= 8:
+        assert texrs.tile(image, size=33).image.shape == (33, 33)
 
 
 @pytest.mark.parametrize("wrap", [(True, False), (False, True), (False, False)])
@@ -149,7 +285,7 @@ def test_any_number_of_channels(channels):
 def test_constant_stays_constant():
     made = texrs.tile(np.full((40, 50, 3), 7, np.uint8))
     assert (made.image == 7).all()
-    assert made.report["overlap"] == [5, 6]  # All cuts cost the same, so the least is lost.
+    assert made.image.shape == (40, 50, 3)  # All cuts cost the same, so nothing is lost.
 
 
 @pytest.mark.parametrize("shape", [(2, 2), (2, 9), (3, 3), (5, 64), (64, 5)])
@@ -175,6 +311,10 @@ def test_smallest_pictures(shape):
         ({"overlap": (3, 4, 5)}, "overlap: needs one number or"),
         ({"overlap": "8"}, "overlap: needs an integer"),
         ({"overlap": True}, "overlap: needs an integer"),
+        ({"size": 30, "overlap": 4}, "overlap: the size says it already"),
+        ({"size": (1, 30)}, "size: needs at least 2 rows to wrap them, got 1"),
+        ({"size": (30, 40, 3)}, "size: needs (rows, columns)"),
+        ({"size": 0}, "size: each side must be at least 1"),
         ({"wrap": "xy"}, "wrap: needs"),
         ({"wrap": (True,)}, "wrap: needs"),
     ],
@@ -200,6 +340,11 @@ def test_images_are_checked(image, words):
         texrs.tile(image)
 
 
+def test_a_few_pixels_are_not_extended():
+    with pytest.raises(InvalidInput, match="needs 8 pixels a side of it, got 40"):
+        texrs.tile(np.zeros((7, 60), np.uint8), size=40)
+
+
 def test_an_axis_that_does_not_wrap_has_no_limit():
     assert texrs.tile(np.zeros((1, 40), np.uint8), wrap=(False, True), overlap=20).image.shape == (1, 20)
 
@@ -208,7 +353,7 @@ def test_progress_and_cancel():
     seen = []
     texrs.tile(np.zeros((40, 40), np.uint8), progress=lambda stage, share: seen.append((stage, share)))
     stages = list(dict.fromkeys(stage for stage, _ in seen))
-    assert stages == ["join columns", "join rows", "done"]
+    assert stages == ["segment", "join columns", "join rows", "done"]
     assert all(0 <= share <= 1 for _, share in seen)
 
     def stop(stage: str, share: float) -> None:
