@@ -14,28 +14,17 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_bool, as_float, as_image, as_int, as_mask, as_method, as_seed, as_wrap, guidance
+from texrs._arrays import as_bool, as_float, as_image, as_int, as_mask, as_method, as_seed, as_wrap
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.blending import blend as correct_colours
 from texrs.completion._depth import fill_in_depth
 from texrs.completion._optimise import optimise, recover_scale
+from texrs.completion._patches import LEAST, fill_with_patches, map_untouched
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
-from texrs.exemplar.patches import choose_usual_side, index_patches, mark_corners, place_patches
-from texrs.exemplar.symmetry import ALL, NONE
-from texrs.kernels.complete import complete as fill
-from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
 __all__ = ["complete"]
-
-SCALED = np.float32(2.0)
-"""Weight of scales as colours that patches are compared by: elements larger by a half are as far off as black from white."""
-
-LEAST = 4
-"""Side of the smallest patch that still says anything of a texture."""
-PLACES = 64
-"""Places to copy from that a patch should have; where it has fewer, smaller patches are taken."""
 
 
 def complete(
@@ -77,9 +66,9 @@ def complete(
         like one of the picture, or of ``exemplar``, resized where there is a scale map [2]_: for large holes, where patches
         would repeat what is around.
     patch : int, optional
-        Side of a patch in pixels, at least 4: about the size of what repeats. By default a sixth of the shorter side,
-        12 to 32, of a plane up to a quarter; less where no place, or few, would be free of holes. "optimise" has no
-        patches, and refuses one.
+        Side of a patch in pixels, at least 4: about the size of what repeats. By default several are tried, from three
+        quarters to four times a sixth of the shorter side (12 to 32), and the one is kept whose seams show least; large
+        holes are filled with few. Of a plane up to a quarter. "optimise" has no patches, and refuses one.
     boundary : int
         Width in pixels of the hole's boundary, which may be replaced too, 0 to 1024, so that the seam can run where it shows
         least. 0 leaves all that is known as it is.
@@ -151,6 +140,7 @@ def complete(
     between = method == "optimise"
     scales = recover_scales(pictures, open_, scale_map, exemplar_scale_map) if open_.any() else None
     levels: list[dict[str, object]] = []
+    tried: list[tuple[int, float]] = []
     wide = widen(open_, width, cyclic)
     if open_.any() and method == "optimise":
         places, levels = optimise(
@@ -170,9 +160,21 @@ def complete(
                 seed=seed,
                 progress=progress,
             )
-        places, side, count = deep or fill_with_patches(
-            pictures, open_, scales, chosen, ~wide, mirror=mirror, wrap=cyclic, seed=seed, watch=watch
-        )
+        if deep is None:
+            places, side, tried = fill_with_patches(
+                pictures,
+                open_,
+                scales,
+                chosen,
+                ~wide,
+                mirror=mirror,
+                wrap=(cyclic[0], cyclic[1]),
+                seed=seed,
+                watch=watch,
+            )
+            count = int(places.label.max())
+        else:
+            places, side, count = deep
         between = deep is not None
     new = find_places(places.label)
     # What is kept maps to itself; of patches every coordinate is whole, but where they are seen in depth.
@@ -203,6 +205,7 @@ def complete(
         "scaled": scale_map is not None,
         "replaced_outside": int(np.count_nonzero(~open_[new])),
         "patch": round(side, 3),
+        "tried": [[s, round(shown, 3)] for s, shown in tried],
         "patches": count,
         "mirror": mirror,
         "blend": screening,
@@ -262,84 +265,6 @@ def check_pictures(image: object, hole: object, exemplar: object | None) -> tupl
     if mask.all():
         pixels[...] = other[0, 0]
     return [pixels.reshape(array.shape), other.reshape(other.shape[: array.ndim])], mask
-
-
-def map_untouched(shapes: tuple[tuple[int, ...], ...]) -> SourceMap:
-    """Return the source map of a picture of which nothing is replaced yet."""
-    identity = SourceMap.identity(shapes[0])
-    return SourceMap(identity.coordinates, identity.exemplar, identity.label, None, shapes)
-
-
-def fill_with_patches(
-    pictures: Sequence[Array],
-    open_: Bools,
-    scales: Sequence[Floats] | None,
-    chosen: int | None,
-    keep: Bools,
-    *,
-    mirror: bool,
-    wrap: Sequence[bool],
-    seed: int,
-    watch: Progress,
-) -> tuple[SourceMap, float, int]:
-    """Fill a hole with patches, and return the source map, the side of the patches and how many there are."""
-    guides = guide_together(pictures)
-    if scales is not None:
-        pairs = zip(guides, scales, strict=True)
-        guides = [np.concatenate([g, SCALED * np.log(s)[..., np.newaxis]], axis=-1) for g, s in pairs]
-    shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
-    mirrors = ALL if mirror else (NONE,)
-    itself = len(pictures) == 1
-    free = ~open_ if itself else np.ones(shapes[-1], bool)
-    side = choose_side(free, chosen, min(n for shape in shapes for n in shape))
-    filled = fill(
-        guides[0],
-        ~open_,
-        index_patches(guides[-1], side, mirrors, free),
-        patch=side,
-        keep=keep,
-        wrap=wrap,
-        seed=seed,
-        shown=0 if itself else None,
-        progress=lambda share: watch("complete", share),
-    )
-    new, coordinates, jacobians = place_patches(filled, mirrors, (shapes[-1][0], shapes[-1][1]))
-    places = map_untouched(shapes)
-    places.coordinates[new] = coordinates
-    places.exemplar[new] = len(shapes) - 1
-    frames = np.stack([np.eye(2, dtype=np.float32), *jacobians])
-    label = (filled.label + 1).astype(np.uint32)
-    return SourceMap(places.coordinates, places.exemplar, label, frames, shapes), side, len(filled.source)
-
-
-def guide_together(pictures: Sequence[Array]) -> list[Floats]:
-    """Return the colours that patches are compared by, brought to [0, 1] together."""
-    pixels = [as_image(p) for p in pictures]
-    if len(pixels) == 1:
-        return [guidance(pixels[0])]
-    lines = guidance(np.concatenate([p.reshape(1, -1, p.shape[-1]) for p in pixels], axis=1))
-    found, start = [], 0
-    for p in pixels:
-        count = p.shape[0] * p.shape[1]
-        found.append(np.ascontiguousarray(lines[0, start : start + count].reshape(*p.shape[:2], -1)))
-        start += count
-    return found
-
-
-def choose_side(free: Bools, chosen: int | None, largest: int) -> int:
-    """Return the side of the patches: the one asked for, or the usual one, smaller where few places are free for it."""
-    if chosen is not None:
-        if not mark_corners(free, chosen).any():
-            fits = next((s for s in range(chosen - 1, LEAST - 1, -1) if mark_corners(free, s).any()), None)
-            hint = f"at most {fits} has one" if fits else "nor has any other; give an exemplar"
-            raise InvalidInput(f"patch: {chosen} has no place in the image that is free of holes; {hint}")
-        return chosen
-    for side in range(min(largest, choose_usual_side(min(free.shape))), LEAST - 1, -1):
-        if np.count_nonzero(mark_corners(free, side)) >= PLACES:
-            return side
-    if not mark_corners(free, LEAST).any():
-        raise InvalidInput(f"hole: leaves no {LEAST} x {LEAST} pixels in one piece to copy from; give an exemplar")
-    return LEAST
 
 
 def widen(mask: Bools, width: int, wrap: Sequence[bool]) -> Bools:

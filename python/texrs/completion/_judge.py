@@ -1,0 +1,75 @@
+"""What a completion shows of its seams: how far patches are from going on in what lies beside them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Bools, Floats
+
+Places = tuple[NDArray[np.intp], NDArray[np.intp]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Filled:
+    """A picture that was filled, and where its pixels come from."""
+
+    colours: Floats
+    """(H, W, C)"""
+    label: NDArray[np.integer[Any]]
+    """(H, W): the patch of each pixel, 0 where the picture was kept."""
+    coordinates: Floats
+    """(H, W, 2): place in what is copied from, of pixels of patches."""
+    frames: Floats
+    """(patches + 1, 2, 2): Jacobian of each patch."""
+
+
+def judge_seams(filled: Filled, source: Floats, free: Bools, wrap: tuple[bool, bool]) -> float:
+    """Return how far what patches would show beyond their seams is from what is shown there, over all seams.
+
+    Parameters
+    ----------
+    filled : Filled
+        The picture.
+    source : (h, w, C) float32
+        What was copied from.
+    free : (h, w) bool
+        What is known of it.
+    wrap : (bool, bool)
+        Axes along which the picture is cyclic.
+
+    """
+    cost = 0.0
+    for axis, closed in enumerate(wrap):
+        torn = filled.label != np.roll(filled.label, -1, axis)
+        if not closed:
+            np.moveaxis(torn, axis, 0)[-1] = False
+        row, column = np.nonzero(torn)
+        here: Places = (row, column)
+        step = np.zeros(2, np.intp)
+        step[axis] = 1
+        there = ((row + step[0]) % torn.shape[0], (column + step[1]) % torn.shape[1])
+        sums = [np.zeros(len(row)), np.zeros(len(row))]
+        for place, beside, way in ((here, there, step), (there, here, -step)):
+            found, known = _look_beyond(filled, source, free, place, way)
+            apart = np.abs(found - filled.colours[beside]).sum(axis=-1, dtype=np.float64)
+            sums[0] += apart * known
+            sums[1] += known
+        cost += float((sums[0] / np.maximum(sums[1], 1)).sum())
+    return cost
+
+
+def _look_beyond(
+    filled: Filled, source: Floats, free: Bools, place: Places, way: NDArray[np.intp]
+) -> tuple[Floats, Bools]:
+    """Return what the patch of each place shows a step on, and whether that is known."""
+    label = filled.label[place]
+    at = filled.coordinates[place] + filled.frames[label] @ way.astype(np.float32)
+    row, column = np.rint(at).astype(np.intp).T
+    height, width = free.shape
+    inside = (label > 0) & (row >= 0) & (row < height) & (column >= 0) & (column < width)
+    row, column = np.where(inside, row, 0), np.where(inside, column, 0)
+    return source[row, column], inside & free[row, column]
