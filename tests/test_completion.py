@@ -12,6 +12,7 @@ from reference.look_up import view
 from texrs import samples
 from texrs.completion._judge import Filled, judge_seams
 from texrs.completion._patches import MARGIN, PLACES, choose_part
+from texrs.completion._scene import Scene
 from texrs.errors import Cancelled, InvalidInput
 from texrs.exemplar.patches import mark_corners
 
@@ -209,11 +210,12 @@ def test_any_number_of_channels(channels):
 def test_the_patches_are_kept_whose_seams_show_least():
     report = texrs.complete(PEBBLES, HOLE).report
     tried = dict(report["tried"])
-    assert len(tried) >= 4
-    assert tried[report["patch"]] == min(tried.values())
+    assert len(tried) >= 3
+    assert list(tried) == sorted(tried, reverse=True)
+    assert 0.97 * tried[report["patch"]] <= min(tried.values())
     again = texrs.complete(PEBBLES, HOLE, patch=report["patch"])
     np.testing.assert_array_equal(texrs.complete(PEBBLES, HOLE).image, again.image)
-    assert again.report["tried"] == [[report["patch"], 0.0]]
+    assert again.report["tried"] == []
 
 
 @pytest.mark.parametrize("side", [64, 40])
@@ -224,6 +226,21 @@ def test_large_things_are_made_whole(side):
     hole = np.hypot(row - 170, column - 150) < 48
     made = texrs.complete(np.where(hole, 0, wall).astype(np.uint8), hole)
     assert (made.image == wall).mean() > 0.995
+
+
+def test_sizes_for_large_holes_are_tried_in_a_small_copy(monkeypatch):
+    seen = []
+    real = Scene.fill
+    monkeypatch.setattr(
+        Scene, "fill", lambda self, side, *more: seen.append((self.known.shape, side)) or real(self, side, *more)
+    )
+    picture = texrs.samples.pebbles((640, 640)).image
+    hole = np.zeros((640, 640), bool)
+    hole[200:430, 210:440] = True
+    report = texrs.complete(np.where(hole[..., np.newaxis], 0, picture).astype(np.uint8), hole).report
+    assert [shape for shape, _ in seen] == [(320, 320)] * (len(seen) - 1) + [(640, 640)]
+    assert seen[-1][1] == report["patch"]
+    assert [2 * side for _, side in seen[:-1]] == [side for side, _ in report["tried"]]
 
 
 def test_seams_are_judged_by_what_patches_show_beyond_them():

@@ -67,8 +67,9 @@ def complete(
         would repeat what is around.
     patch : int, optional
         Side of a patch in pixels, at least 4: about the size of what repeats. By default several are tried, from three
-        quarters to four times a sixth of the shorter side (12 to 32), and the one is kept whose seams show least; large
-        holes are filled with few. Of a plane up to a quarter. "optimise" has no patches, and refuses one.
+        quarters to four times a sixth of the shorter side (12 to 32), of large holes in a small copy, and those are kept
+        whose seams show least; with a scale map a sixth, of a plane up to a quarter. "optimise" has no patches, and
+        refuses one.
     boundary : int
         Width in pixels of the hole's boundary, which may be replaced too, 0 to 1024, so that the seam can run where it shows
         least. 0 leaves all that is known as it is.

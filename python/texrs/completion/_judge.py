@@ -10,6 +10,12 @@ from numpy.typing import NDArray
 
 from texrs._typing import Bools, Floats
 
+STRONG = 1.4
+"""Power of a difference: a few large ones show more than many small ones of the same sum."""
+
+STRONG = 1.4
+"""Power of a difference: a few large ones show more than many small ones of the same sum."""
+
 Places = tuple[NDArray[np.intp], NDArray[np.intp]]
 
 
@@ -58,7 +64,7 @@ def judge_seams(filled: Filled, source: Floats, free: Bools, wrap: tuple[bool, b
             apart = np.abs(found - filled.colours[beside]).sum(axis=-1, dtype=np.float64)
             sums[0] += apart * known
             sums[1] += known
-        cost += float((sums[0] / np.maximum(sums[1], 1)).sum())
+        cost += float(((sums[0] / np.maximum(sums[1], 1)) ** STRONG).sum())
     return cost
 
 

@@ -6,17 +6,17 @@ fill, so it is filled with patches of several sizes; kept is the one whose seams
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from texrs._arrays import as_image, guidance
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.completion._judge import Filled, judge_seams
+from texrs.completion._scene import Scene
 from texrs.errors import InvalidInput
-from texrs.exemplar.patches import choose_usual_side, index_patches, mark_corners, place_patches
-from texrs.exemplar.symmetry import ALL, NONE
-from texrs.kernels.complete import complete as fill
+from texrs.exemplar.patches import choose_usual_side, mark_corners
+from texrs.exemplar.symmetry import ALL, NONE, Flip
 from texrs.source_map import SourceMap
 
 SCALED = np.float32(2.0)
@@ -27,16 +27,26 @@ PLACES = 64
 """Places to copy from that a patch should have; where it has fewer, smaller patches are taken."""
 SIZES = (0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.25, 3.0, 4.0)
 """Sides of patches that are tried, in usual ones."""
+FINE = (0.75, 1.0, 1.5)
+"""The same in usual ones of the full size, where a copy is filled."""
 WIDEST = 0.3
 """The largest of them is at most this share of the shorter side."""
-MANY = 64
+CLEARLY = 0.97
+"""Smaller patches are taken where their seams show less than this share of what those of larger ones show."""
+WITHIN = 0.75
+"""And at most this share of the side of a square of all holes: one that covers a hole shows its outline."""
+MANY = 256
 """Only patches are tried of which about so many fill the holes."""
 COVERS = 0.4
 """Share of a patch that fills a hole."""
 MARGIN = 256
 """Pixels around the holes that patches are copied from."""
-PLENTY = 4
+PLENTY = 2
 """Known pixels there, in pixels of the holes; where they are fewer, all of the picture is copied from."""
+LARGE = 160**2
+"""For holes of more pixels, sizes are tried in a copy of half the size, or less."""
+SMALLEST = 64
+"""A side of the smallest picture that is halved."""
 
 
 def fill_with_patches(
@@ -64,47 +74,27 @@ def fill_with_patches(
 
     """
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
-    itself = len(pictures) == 1
     part, cyclic = choose_part(open_, keep, wrap)
-    near = [pictures[0][part], *pictures[1:]]
-    known, kept = ~open_[part], keep[part]
-    guides = guide_together(near)
+    guides = guide_together([pictures[0][part], *pictures[1:]])
     if scales is not None:
         pairs = zip(guides, (scales[0][part], *scales[1:]), strict=True)
         guides = [np.concatenate([g, SCALED * np.log(s)[..., np.newaxis]], axis=-1) for g, s in pairs]
-    mirrors = ALL if mirror else (NONE,)
+    known, itself = ~open_[part], len(pictures) == 1
     free = known if itself else np.ones(shapes[-1], bool)
-    # Where scales differ, those within a large patch do too.
-    sizes = SIZES if scales is None else (1.0,)
-    sides = list_sides(free, int(np.count_nonzero(~known)), chosen, min(*known.shape, *free.shape), sizes)
+    scene = Scene(guides[0], known, keep[part], guides[-1], free, cyclic)
+    mirrors = ALL if mirror else (NONE,)
     tried: list[tuple[int, float]] = []
-    best: tuple[Filled, int] | None = None
-    for number, side in enumerate(sides):
-        filled = fill(
-            guides[0],
-            known,
-            index_patches(guides[-1], side, mirrors, free),
-            patch=side,
-            keep=kept,
-            wrap=cyclic,
-            seed=seed,
-            shown=0 if itself else None,
-            progress=lambda share, number=number: watch("complete", (number + share) / len(sides)),  # type: ignore[misc]
-        )
-        new, coordinates, jacobians = place_patches(filled, mirrors, (free.shape[0], free.shape[1]))
-        places = np.zeros((*known.shape, 2), np.float32)
-        places[new] = coordinates
-        frames = np.stack([np.eye(2, dtype=np.float32), *jacobians])
-        made = Filled(filled.colours, filled.label + 1, places, frames)
-        shown = judge_seams(made, guides[-1], free, cyclic) if len(sides) > 1 else 0.0
-        if best is None or shown < min(cost for _, cost in tried):
-            best = (made, side)
-        tried.append((side, shown))
-        if shown == 0:
-            break
-    if best is None:
-        raise AssertionError("one side at least is tried")
-    made, side = best
+    made: Filled | None = None
+    if chosen is not None:
+        check_places(free, chosen)
+        side = chosen
+    elif scales is not None:
+        # Where scales differ, those within a large patch do too.
+        side = list_sides(scene, choose_usual_side(min(free.shape)), (1.0,))[0]
+    else:
+        side, tried, made = try_sides(scene, mirrors, seed, lambda share: watch("complete", 0.5 * share))
+    if made is None:
+        made = scene.fill(side, mirrors, seed, lambda share: watch("complete", 0.5 + 0.5 * share))
     new = np.nonzero(made.label)
     corner = np.array([p.start for p in part], np.float32)
     source = map_untouched(shapes)
@@ -112,6 +102,37 @@ def fill_with_patches(
     source.exemplar[part][new] = len(shapes) - 1
     source.label[part] = made.label
     return SourceMap(source.coordinates, source.exemplar, source.label, made.frames, shapes), side, tried
+
+
+def try_sides(
+    scene: Scene, mirrors: Sequence[Flip], seed: int, watch: Callable[[float], object]
+) -> tuple[int, list[tuple[int, float]], Filled | None]:
+    """Return the best side, all that were tried with what their seams show, and the filling if it was made at full size."""
+    small, times = scene, 1
+    while small.holes > LARGE and min(*small.known.shape, *small.free.shape) >= SMALLEST:
+        half = small.halve()
+        if np.count_nonzero(mark_corners(half.free, 2 * LEAST)) < PLACES:
+            break
+        small, times = half, 2 * times
+    usual = choose_usual_side(min(scene.free.shape))
+    sides = list_sides(small, choose_usual_side(min(small.free.shape)), SIZES)
+    if times > 1:
+        sides += [side for side in list_sides(small, usual / times, FINE) if side < sides[-1]]
+    tried: list[tuple[int, float]] = []
+    best, least, chosen = None, np.inf, 0
+    for number, side in enumerate(sides):
+        made = small.fill(side, mirrors, seed, lambda share, number=number: watch((number + share) / len(sides)))  # type: ignore[misc]
+        shown = judge_seams(made, small.source, small.free, small.wrap) if len(sides) > 1 else 0.0
+        if shown < CLEARLY * least:
+            best, least, chosen = made, shown, times * side
+        tried.append((times * side, shown))
+        if shown == 0:
+            break
+    if times == 1:
+        return chosen, tried, best
+    while not mark_corners(scene.free, chosen).any():
+        chosen -= 1
+    return chosen, tried, None
 
 
 def choose_part(open_: Bools, keep: Bools, wrap: tuple[bool, bool]) -> tuple[tuple[slice, slice], tuple[bool, bool]]:
@@ -153,22 +174,25 @@ def guide_together(pictures: Sequence[Array]) -> list[Floats]:
     return found
 
 
-def list_sides(free: Bools, holes: int, chosen: int | None, largest: int, sizes: Sequence[float]) -> list[int]:
-    """Return the sides of patches to try: the one asked for, or those about the usual one that have places enough."""
-    if chosen is not None:
-        if not mark_corners(free, chosen).any():
-            fits = next((s for s in range(chosen - 1, LEAST - 1, -1) if mark_corners(free, s).any()), None)
-            hint = f"at most {fits} has one" if fits else "nor has any other; give an exemplar"
-            raise InvalidInput(f"patch: {chosen} has no place in the image that is free of holes; {hint}")
-        return [chosen]
-    usual = choose_usual_side(min(free.shape))
-    sides = [round(usual * size) for size in sizes]
-    most = max(usual, round(WIDEST * min(free.shape)))
-    sides = [s for s in sides if s <= min(most, largest) and np.count_nonzero(mark_corners(free, s)) >= PLACES]
-    few = [s for s in sides if holes <= MANY * COVERS * s * s] or sides[-1:]
+def check_places(free: Bools, side: int) -> None:
+    """Refuse patches of a size that has no place."""
+    if not mark_corners(free, side).any():
+        fits = next((s for s in range(side - 1, LEAST - 1, -1) if mark_corners(free, s).any()), None)
+        hint = f"at most {fits} has one" if fits else "nor has any other; give an exemplar"
+        raise InvalidInput(f"patch: {side} has no place in the image that is free of holes; {hint}")
+
+
+def list_sides(scene: Scene, usual: float, sizes: Sequence[float]) -> list[int]:
+    """Return the sides of patches about the usual one that have places enough, the largest first."""
+    free = scene.free
+    largest = min(*scene.known.shape, *free.shape)
+    most = min(largest, max(round(usual), round(min(WIDEST * min(free.shape), WITHIN * scene.holes**0.5))))
+    sides = sorted({round(usual * size) for size in sizes}, reverse=True)
+    found = [s for s in sides if LEAST <= s <= most and np.count_nonzero(mark_corners(free, s)) >= PLACES]
+    few = [s for s in found if scene.holes <= MANY * COVERS * s * s] or found[:1]
     if few:
         return few
-    for side in range(min(largest, usual), LEAST - 1, -1):
+    for side in range(min(largest, round(usual)), LEAST - 1, -1):
         if np.count_nonzero(mark_corners(free, side)) >= PLACES:
             return [side]
     if not mark_corners(free, LEAST).any():

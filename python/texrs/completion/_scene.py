@@ -1,0 +1,86 @@
+"""A picture with holes, and what they may be filled from; the same at half the size."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from texrs._typing import Bools, Floats
+from texrs.completion._judge import Filled
+from texrs.exemplar.patches import index_patches, place_patches
+from texrs.exemplar.symmetry import Flip
+from texrs.kernels.complete import complete as fill
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """What a hole is filled in, and from."""
+
+    colours: Floats
+    """(H, W, C)"""
+    known: Bools
+    """(H, W): False in the holes."""
+    keep: Bools
+    """(H, W): what nothing may be pasted over."""
+    source: Floats
+    """(h, w, C): what is copied from; the colours themselves, or another picture's."""
+    free: Bools
+    """(h, w): what of it may be copied."""
+    wrap: tuple[bool, bool]
+    """Axes along which the picture is cyclic."""
+
+    @property
+    def itself(self) -> bool:
+        """Whether holes are filled from what is around them."""
+        return self.source is self.colours
+
+    @property
+    def holes(self) -> int:
+        """Pixels to be filled."""
+        return int(np.count_nonzero(~self.known))
+
+    def halve(self) -> Scene:
+        """Return the scene at half the size; what is not wholly known is a hole, and an odd last line is left out."""
+        colours = _average(self.colours)
+        return Scene(
+            colours,
+            _all_four(self.known),
+            _all_four(self.keep),
+            colours if self.itself else _average(self.source),
+            _all_four(self.free),
+            self.wrap,
+        )
+
+    def fill(self, side: int, mirrors: Sequence[Flip], seed: int, progress: Callable[[float], object]) -> Filled:
+        """Fill the holes with patches of a size."""
+        filled = fill(
+            self.colours,
+            self.known,
+            index_patches(self.source, side, mirrors, self.free),
+            patch=side,
+            keep=self.keep,
+            wrap=self.wrap,
+            seed=seed,
+            shown=0 if self.itself else None,
+            progress=progress,
+        )
+        new, coordinates, jacobians = place_patches(filled, mirrors, (self.free.shape[0], self.free.shape[1]))
+        places = np.zeros((*self.known.shape, 2), np.float32)
+        places[new] = coordinates
+        frames = np.stack([np.eye(2, dtype=np.float32), *jacobians])
+        return Filled(filled.colours, (filled.label + 1).astype(np.uint32), places, frames)
+
+
+def _average(image: Floats) -> Floats:
+    rows, columns = (n // 2 * 2 for n in image.shape[:2])
+    lines = image[0:rows:2, :columns] + image[1:rows:2, :columns]
+    return np.asarray((lines[:, 0::2] + lines[:, 1::2]) * np.float32(0.25), np.float32)
+
+
+def _all_four(mask: Bools) -> Bools:
+    rows, columns = (n // 2 * 2 for n in mask.shape)
+    lines = mask[0:rows:2, :columns] & mask[1:rows:2, :columns]
+    found: Bools = lines[:, 0::2] & lines[:, 1::2]
+    return found
