@@ -21,7 +21,7 @@ LAYERS = (
     ("exemplar",),
     ("elements",),
     ("volume",),
-    ("synthesis",),
+    ("synthesis", "judging"),
     ("quilting",),
     ("growth",),
     ("blending", "tiling"),

@@ -98,7 +98,7 @@ def gather(
     elif dtype != out.dtype:
         out = out.astype(dtype)
     had_channels = np.asarray(several[0]).ndim > axes
-    return out.reshape((*shape, -1) if had_channels else shape)
+    return out.reshape((*shape, images[0].shape[-1]) if had_channels else shape)
 
 
 def _to_kernel(array: Array) -> Array:

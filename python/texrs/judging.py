@@ -1,0 +1,346 @@
+"""How good a texture is, judged by where it comes from.
+
+Looked for are things that seams tear, lines that break off there, fog along seams, places that are shown again and again, and
+what of the exemplar is never shown.
+
+A source map says where seams are, so only these are looked at, and an exemplar says what is usual: each figure counts what
+the exemplar does not have itself, so a piece of it scores 0. Two figures are of tears. One goes by the elements of a
+segmentation. The other one, lines that break off, knows nothing of elements, so that a cut which keeps out of what was taken
+for elements is not praised for that alone: an edge of the exemplar that runs into a seam must go on beyond it.
+
+How near the windows at seams are to windows of the exemplar is no judge: the nearest are those of things that were fused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_image, as_wrap, guidance
+from texrs._typing import Array, Bools, Floats
+from texrs.errors import InvalidInput
+from texrs.exemplar import Exemplar
+from texrs.exemplar.shapes import mark_outlines
+from texrs.kernels.gather import gather
+from texrs.source_map import SourceMap
+
+__all__ = ["Judgement", "judge"]
+
+REACH, INSIDE = 8.0, 1 / 8
+"""Depth in pixels from which on a pixel is as deep inside an element as any, and the share of that which counts as inside."""
+VISIBLE, UNSEEN = 90, 0.25
+"""Percentile of the exemplar's own differences beyond which one is seen, and what a tear counts that is not."""
+EDGE, TURNED = 85, 0.6
+"""Percentile of the exemplar's gradients beyond which one is of a line, and the share of it that must be missing for a line to
+break off."""
+BAND = 3
+"""Pixels on both sides of a seam in which fog is looked for."""
+CELL = 8
+"""Use is counted in cells of so many pixels a side."""
+TORN, BROKEN, FOG, REPETITION, UNUSED = 1.0, 1.0, 0.5, 0.3, 0.1
+"""What the figures count for in the score."""
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """What is wrong with a texture: 0 is the best of each figure but ``share``.
+
+    Attributes
+    ----------
+    torn : float
+        Length of the seams inside of elements, as a share of the outlines that so much texture should have. Where no step
+        is seen that the exemplar does not have, a quarter counts.
+    broken : float
+        Lines that break off at seams, as a share of the same lines, beyond what is usual in the exemplar.
+    fog : float
+        Detail that is missing beside seams, as a share of what the exemplar has there; 0 to 1.
+    repetition : float
+        How much more often than others places are shown, those that stand out counting for more: 0 where all are shown
+        alike.
+    share : float
+        Share of the exemplar that is shown, 0 to 1, as far as there is room for it.
+
+    """
+
+    torn: float
+    broken: float
+    fog: float
+    repetition: float
+    share: float
+
+    @property
+    def score(self) -> float:
+        """All in one figure: the less, the better."""
+        flaws = TORN * self.torn + BROKEN * self.broken + FOG * self.fog
+        return flaws + REPETITION * self.repetition + UNUSED * (1 - self.share)
+
+    def report(self) -> dict[str, float]:
+        """Return the figures and the score as JSON types."""
+        return {name: round(value, 4) for name, value in {"score": self.score, **asdict(self)}.items()}
+
+
+def judge(
+    exemplar: Array | Exemplar,
+    source: SourceMap,
+    image: Array | None = None,
+    *,
+    wrap: bool | tuple[bool, bool] = False,
+) -> Judgement:
+    """Judge a texture that was made from one exemplar.
+
+    Parameters
+    ----------
+    exemplar : (H, W) or (H, W, C) array, or Exemplar
+        What it was made from.
+    source : SourceMap
+        Where each pixel comes from, shape (h, w).
+    image : (h, w) or (h, w, C) array, optional
+        The texture, if its colours were corrected; fog is looked for in it.
+    wrap : bool or (rows, columns)
+        Axes along which it is cyclic.
+
+    Returns
+    -------
+    Judgement
+
+    Raises
+    ------
+    InvalidInput
+        A source map into several exemplars or of another one's shape, or an image of another shape.
+
+    Examples
+    --------
+    >>> import texrs
+    >>> from texrs.judging import judge
+    >>> pebbles = texrs.samples.pebbles((96, 96)).image
+    >>> judge(pebbles, texrs.SourceMap.identity((96, 96))).score
+    0.0
+    >>> made = texrs.synthesize(pebbles, 96)
+    >>> judge(pebbles, made.source).score > 0
+    True
+
+    """
+    known = exemplar if isinstance(exemplar, Exemplar) else Exemplar(exemplar)
+    if known.axes != 2 or source.shapes != (known.shape,):
+        raise InvalidInput(f"source: needs one into a picture of {known.shape}, got one into {source.shapes}")
+    cyclic = as_wrap(wrap)
+    traits = known.remember("traits", lambda: measure_traits(known))
+    seams = [find_seam(source, axis, cyclic[axis]) for axis in range(2)]
+    fog = 0.0
+    if image is not None:
+        pixels = guidance(as_image(image, "image"))
+        if pixels.shape[:2] != source.shape:
+            raise InvalidInput(f"image: needs the size of the source map, {source.shape}, got {pixels.shape[:2]}")
+        fog = measure_fog(traits, source, seams, pixels)
+    repetition, share = measure_use(traits, source)
+    area = source.shape[0] * source.shape[1]
+    return Judgement(measure_tears(traits, seams, area), measure_breaks(traits, seams, area), fog, repetition, share)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Traits:
+    """What is usual in an exemplar.
+
+    Attributes
+    ----------
+    colours : (H, W, C) float32
+        What is compared.
+    depth : (H, W) float32
+        How deep inside an element each pixel is, 0 to 1.
+    outlines : float
+        Pairs of neighbours a pixel that an outline parts.
+    step : float
+        The difference of neighbours beyond which one is seen.
+    slopes : (H, W, 2 C) float32
+        Gradients: of all channels along rows, then along columns.
+    line : float
+        Size of a gradient from which on it is of a line.
+    broken : float
+        Share of the pairs of neighbours at which a line breaks off.
+    lines : float
+        Share of the pairs of neighbours at which there is a line.
+    salience : (h, w) float64
+        How much each cell stands out, 1 on the average.
+
+    """
+
+    colours: Floats
+    depth: Floats
+    outlines: float
+    step: float
+    slopes: Floats
+    line: float
+    broken: float
+    lines: float
+    salience: NDArray[np.float64]
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the arrays."""
+        return self.colours.nbytes + self.depth.nbytes + self.slopes.nbytes + self.salience.nbytes
+
+
+def measure_traits(exemplar: Exemplar) -> Traits:
+    """Measure what is usual in an exemplar."""
+    from scipy.ndimage import gaussian_filter
+
+    colours, parts = exemplar.guidance, exemplar.segment()
+    found = parts.kind in ("components", "labels")
+    depth = parts.measure_depth(REACH) if found else np.zeros(exemplar.shape, np.float32)
+    outline = mark_outlines(parts.elements).mean() if found else 1.0
+    steps = np.concatenate([np.abs(np.diff(colours, axis=axis)).mean(axis=-1).ravel() for axis in range(2)])
+    soft = gaussian_filter(colours, (1, 1, 0))
+    slopes = np.concatenate(np.gradient(soft, axis=(0, 1)), axis=-1).astype(np.float32)
+    sizes = np.abs(slopes).reshape(*exemplar.shape, 2, -1).mean(axis=-1)
+    own = SourceMap.identity(exemplar.shape)
+    pairs = [Seam(own, axis, *list_neighbours(exemplar.shape, axis)) for axis in range(2)]
+    line = max(float(np.percentile(sizes, EDGE)), 1e-6)
+    broken, lines = (float(marks.mean()) for marks in find_breaks(slopes, line, pairs))
+    step = float(np.percentile(steps, VISIBLE))
+    return Traits(colours, depth, float(outline), step, slopes, line, broken, lines, measure_salience(colours))
+
+
+def measure_salience(colours: Floats) -> NDArray[np.float64]:
+    """Return how much each cell stands out: how far its mean and its contrast are from the usual, in standard deviations."""
+    rows, columns = (-(-n // CELL) for n in colours.shape[:2])
+    fill = ((0, rows * CELL - colours.shape[0]), (0, columns * CELL - colours.shape[1]), (0, 0))
+    cells = np.pad(colours, fill, mode="edge").reshape(rows, CELL, columns, CELL, -1).astype(np.float64)
+    traits = np.concatenate([cells.mean(axis=(1, 3)), cells.std(axis=(1, 3))], axis=-1)
+    away = np.abs(traits - np.median(traits, axis=(0, 1))) / np.maximum(traits.std(axis=(0, 1)), 1e-9)
+    salience: NDArray[np.float64] = 0.25 + away.mean(axis=-1)
+    return np.asarray(salience / salience.mean(), np.float64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seam:
+    """Pairs of neighbours along an axis that do not come from neighbouring places."""
+
+    source: SourceMap
+    axis: int
+    at: tuple[NDArray[np.intp], ...]
+    after: tuple[NDArray[np.intp], ...]
+
+    def look_across(self, image: Floats) -> tuple[Floats, Floats]:
+        """Return what an image of the exemplar shows on both sides."""
+        first, second = (gather(image, self.source.coordinates[at], interpolation="nearest") for at in self.sides)
+        return first, second
+
+    @property
+    def sides(self) -> tuple[tuple[NDArray[np.intp], ...], tuple[NDArray[np.intp], ...]]:
+        """The pixels on both sides."""
+        return self.at, self.after
+
+
+def list_neighbours(shape: tuple[int, ...], axis: int) -> tuple[tuple[NDArray[np.intp], ...], ...]:
+    """Return the pixels of a picture that have a neighbour along an axis, and these neighbours."""
+    at = np.nonzero(np.ones([n - (a == axis) for a, n in enumerate(shape)], bool))
+    return at, tuple(index + (a == axis) for a, index in enumerate(at))
+
+
+def find_seam(source: SourceMap, axis: int, wrap: bool) -> Seam:
+    """Find the seams that cross an axis."""
+    parted = ~source.continues(axis, wrap=wrap)
+    if not wrap:
+        np.moveaxis(parted, axis, 0)[-1] = False
+    at = np.nonzero(parted)
+    after = tuple((index + (a == axis)) % n for a, (index, n) in enumerate(zip(at, source.shape, strict=True)))
+    return Seam(source, axis, at, after)
+
+
+def measure_tears(traits: Traits, seams: list[Seam], area: int) -> float:
+    """Return the length of seams inside elements as a share of the outlines in so much texture."""
+    length = 0.0
+    for seam in seams:
+        depth = np.minimum(*seam.look_across(traits.depth[..., np.newaxis]))[:, 0]
+        before, behind = seam.look_across(traits.colours)
+        seen = np.abs(before - behind).mean(axis=-1) > traits.step
+        length += float(((depth > INSIDE) * np.where(seen, 1.0, UNSEEN)).sum())
+    return length / max(traits.outlines * area, 1.0)
+
+
+def measure_breaks(traits: Traits, seams: list[Seam], area: int) -> float:
+    """Return the lines that break off at seams as a share of the lines in so much texture, beyond what is usual."""
+    found, _ = find_breaks(traits.slopes, traits.line, seams)
+    excess = float(found.sum()) - traits.broken * len(found)
+    return max(0.0, excess) / max(traits.lines * area, 1.0)
+
+
+def find_breaks(slopes: Floats, line: float, seams: list[Seam]) -> tuple[Bools, Bools]:
+    """Mark the pairs at which a line breaks off that crosses from one side to the other, and those at which there is one.
+
+    A line that crosses is a strong gradient along the seam. Beyond it there must be one like it, no more than a pixel aside,
+    but where one side has an edge of its own along the seam: there a thing ends, and what lies below it goes on unseen.
+    """
+    ends = np.zeros(seams[0].source.shape, bool)
+    for seam in seams:
+        for at in seam.sides:
+            # Of both axes: along a slanted outline a seam goes in steps.
+            ends[at] |= np.abs(list_slopes(slopes, seam, at, seam.axis)[1]).mean(axis=-1) > line
+    broken, lines = [], []
+    for seam in seams:
+        first, second = (list_slopes(slopes, seam, at, 1 - seam.axis) for at in seam.sides)
+        off, crossed = np.zeros(len(seam.at[0]), bool), np.zeros(len(seam.at[0]), bool)
+        for here, there in ((first, second), (second, first)):
+            size = np.abs(here[1]).mean(axis=-1)
+            lack = np.min([np.abs(here[1] - other).mean(axis=-1) for other in there], axis=0)
+            off |= (size > line) & (lack > TURNED * size)
+            crossed |= size > line
+        broken.append(off & ~ends[seam.at] & ~ends[seam.after])
+        lines.append(crossed)
+    return np.concatenate(broken), np.concatenate(lines)
+
+
+def list_slopes(slopes: Floats, seam: Seam, at: tuple[NDArray[np.intp], ...], along: int) -> list[Array]:
+    """Return the gradients along an axis of the output where pixels come from, and a pixel to each side."""
+    source = seam.source
+    frame = source.frame_array()
+    ways = np.zeros((len(at[0]), 2), np.float32)
+    if frame is None:
+        ways[:, along] = 1
+    else:
+        ways[:] = (frame[source.label[at]] if frame.ndim == 3 else frame[at])[..., along]
+    found = []
+    for step in (-1, 0, 1):
+        each = gather(slopes, source.coordinates[at] + np.float32(step) * ways, interpolation="nearest")
+        rows, columns = np.split(each, 2, axis=-1)
+        found.append(rows * ways[:, :1] + columns * ways[:, 1:])
+    return found
+
+
+def measure_fog(traits: Traits, source: SourceMap, seams: list[Seam], image: Floats) -> float:
+    """Return the share of the detail that is missing beside seams, where the image should show what its sources do."""
+    from scipy.ndimage import binary_dilation, laplace
+
+    at_seam = np.zeros(source.shape, bool)
+    for seam in seams:
+        for side in seam.sides:
+            at_seam[side] = True
+    # Not at the seams themselves, which may be sharp where nothing else is.
+    near = binary_dilation(at_seam, iterations=1)
+    band = binary_dilation(near, iterations=BAND - 1) & ~near
+    if not band.any():
+        return 0.0
+    sharp = np.stack([laplace(traits.colours[..., c]) for c in range(traits.colours.shape[-1])], axis=-1)
+    own = np.stack([laplace(image[..., c]) for c in range(image.shape[-1])], axis=-1)
+    wanted = np.abs(gather(sharp, source.coordinates[band], interpolation="nearest")).mean()
+    shown = np.abs(own[band]).mean()
+    return float(np.clip(1 - shown / wanted, 0, 1)) if wanted > 0 else 0.0
+
+
+def measure_use(traits: Traits, source: SourceMap) -> tuple[float, float]:
+    """Return how unevenly the cells of the exemplar are shown, and the share of them that is, as far as there is room."""
+    rows, columns = traits.salience.shape
+    last = np.array(traits.colours.shape[:2]) - 1
+    cell = np.clip(np.rint(source.coordinates), 0, last).astype(np.intp) // CELL
+    counts = np.bincount((cell[..., 0] * columns + cell[..., 1]).ravel(), minlength=rows * columns).reshape(
+        rows, columns
+    )
+    mean = max(source.coordinates.size / 2 / counts.size, CELL**2)
+    # What is shown no more often than a whole picture of it would, repeats nothing.
+    excess = np.maximum(counts / mean - 1, 0)
+    repetition = float((traits.salience * excess).sum() / counts.size)
+    room = min(1.0, counts.sum() / (traits.colours.shape[0] * traits.colours.shape[1]))
+    share = min(1.0, float((counts > CELL).mean()) / room)
+    return repetition, share

@@ -1,0 +1,159 @@
+"""The judge against pictures whose order is known: real over made, whole over torn, crisp over fogged, varied over repeated."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+import texrs
+from texrs import SourceMap, samples
+from texrs.errors import InvalidInput
+from texrs.judging import judge
+from texrs.kernels.gather import gather
+
+GENERATED = ("pebbles", "beans", "leaves_and_flowers", "dots")
+PHOTOGRAPHS = {
+    "gravel": (slice(0, 192), slice(0, 192)),
+    "brick": (slice(0, 192), slice(0, 192)),
+    # Coins in rows, each different.
+    "coins": (slice(20, 220), slice(20, 220)),
+}
+NAMES = (*GENERATED, *PHOTOGRAPHS)
+
+
+def picture(name):
+    if name in PHOTOGRAPHS:
+        return np.ascontiguousarray(samples.photograph(name).image[PHOTOGRAPHS[name]])
+    return samples.load(name, size=(160, 160)).image
+
+
+def paste(source, mask, shift):
+    """Show other places of the exemplar where a mask is set."""
+    there = source.coordinates + np.float32(shift)
+    inside = ((there >= 0) & (there <= np.array(source.shapes[0]) - 1)).all(axis=-1) & mask
+    coordinates = np.where(inside[..., np.newaxis], there, source.coordinates)
+    label = np.where(inside, source.label.max() + 1, source.label).astype(np.uint32)
+    return SourceMap(coordinates, source.exemplar, label, None, source.shapes)
+
+
+def scramble(shape, seed, side=32):
+    """Return blocks from anywhere, side by side."""
+    rng, made = np.random.default_rng(seed), SourceMap.identity(shape)
+    for row in range(0, shape[0], side):
+        for column in range(0, shape[1], side):
+            mask = np.zeros(shape, bool)
+            mask[row : row + side, column : column + side] = True
+            low = np.array([-row, -column])
+            high = np.array(shape) - side - (row, column)
+            made = paste(made, mask, rng.integers(low, np.maximum(high, low) + 1))
+    return made
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_real_pieces_are_ranked_over_results(name):
+    image = picture(name)
+    real = judge(image, SourceMap.identity(image.shape[:2]))
+    assert real.score == 0
+    assert real.share == 1
+    rows, columns = (np.arange(20, 140, dtype=np.float32) for _ in range(2))
+    crop = SourceMap.from_coordinates(np.stack(np.meshgrid(rows, columns, indexing="ij"), -1), image.shape[:2])
+    for made in (texrs.design(image, 160), texrs.synthesize(image, 160)):
+        result = judge(image, made.source, made.image)
+        assert result.score > judge(image, crop).score, result
+        assert result.torn + result.broken > 0, result
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_results_are_ranked_over_blocks_from_anywhere(name):
+    image = picture(name)
+    result = judge(image, texrs.synthesize(image, image.shape[:2]).source)
+    for seed in range(2):
+        blocks = judge(image, scramble(image.shape[:2], seed))
+        assert result.broken < blocks.broken, (result, blocks)
+        assert result.torn + result.broken < blocks.torn + blocks.broken, (result, blocks)
+
+
+@pytest.mark.parametrize("name", ["pebbles", "beans", "dots"])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_things_laid_whole_are_ranked_over_torn_ones(name, seed):
+    """The same holes are cut twice: along what is laid there, and across it."""
+    sample = samples.load(name, size=(160, 160))
+    rng = np.random.default_rng(seed)
+    boxes = ndimage.find_objects(sample.labels)
+    inner = [k for k, box in enumerate(boxes, 1) if box and all(s.start > 12 and s.stop < 148 for s in box)]
+    whole = torn = SourceMap.identity((160, 160))
+    for thing in rng.choice(inner, 6, replace=False):
+        shift, box = rng.integers(-30, 31, 2), boxes[thing - 1]
+        mask = np.roll(sample.labels == thing, shift, (0, 1))
+        half = (box[1].stop - box[1].start) // 2
+        whole, torn = paste(whole, mask, -shift), paste(torn, mask, -shift + (0, half))
+    a, b = judge(sample.image, whole), judge(sample.image, torn)
+    assert a.broken < b.broken, (a, b)
+    assert a.torn + a.broken < b.torn + b.broken, (a, b)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_crisp_seams_are_ranked_over_fogged_ones(name):
+    image = picture(name)
+    made = texrs.synthesize(image, 160)
+    crisp = made.image.astype(np.float64)
+    soft = ndimage.gaussian_filter(crisp, (2, 2) + (0,) * (crisp.ndim - 2))
+    at_seam = np.zeros((160, 160), bool)
+    for axis in range(2):
+        at_seam |= ~made.source.continues(axis)
+    near = ndimage.binary_dilation(at_seam, iterations=4)
+    near = near if crisp.ndim == 2 else near[..., np.newaxis]
+    fogged = np.rint(np.where(near, soft, crisp)).astype(np.uint8)
+    clear, dim = judge(image, made.source, made.image), judge(image, made.source, fogged)
+    assert clear.fog < 0.1, clear
+    assert dim.fog > clear.fog + 0.2, dim
+    assert replace(dim, fog=clear.fog) == clear
+
+
+def test_one_place_shown_again_and_again_is_told_from_a_whole_exemplar_shown_again():
+    image = picture("pebbles")
+    many = np.indices((320, 320)).transpose(1, 2, 0).astype(np.float32)
+    whole = judge(image, SourceMap.from_coordinates(many % 160, (160, 160)))
+    piece = judge(image, SourceMap.from_coordinates(many % 40, (160, 160)))
+    assert whole.repetition == 0
+    assert piece.repetition > 0.5
+    assert (whole.share, piece.share) == (1, 1 / 16)
+
+
+def test_what_stands_out_counts_for_more():
+    image = np.full((160, 160), 0.5, np.float32) + samples.grit((160, 160)).image.mean(axis=-1) / 2550
+    image[64:96, 64:96] = 1
+    seen = np.indices((160, 160)).transpose(1, 2, 0).astype(np.float32)
+    dull, bright = (
+        judge(image, paste(SourceMap.identity((160, 160)), (seen < 32).all(axis=-1), shift)) for shift in (96, 64)
+    )
+    assert bright.repetition > 2 * dull.repetition
+
+
+def test_frames_are_heeded_where_a_picture_is_mirrored():
+    """A mirrored copy of the whole has no seam at all, and its lines run on."""
+    image = picture("leaves_and_flowers")
+    grid = np.indices((160, 160)).transpose(1, 2, 0).astype(np.float32)
+    grid[..., 1] = 159 - grid[..., 1]
+    mirrored = SourceMap.from_coordinates(grid, (160, 160), frame=np.diag([1.0, -1.0]).astype(np.float32)[np.newaxis])
+    assert judge(image, mirrored).score == 0
+
+
+def test_cyclic_axes_are_looked_at_around_the_end():
+    image = picture("pebbles")
+    whole = SourceMap.identity((160, 160))
+    assert judge(image, whole, wrap=(False, False)).broken == 0
+    assert judge(image, whole, wrap=True).broken > 0
+
+
+def test_arguments_are_checked():
+    image = picture("dots")
+    with pytest.raises(InvalidInput, match="source"):
+        judge(image, SourceMap.identity((100, 100)))
+    with pytest.raises(InvalidInput, match="image"):
+        judge(image, SourceMap.identity((160, 160)), image[:80])
+
+
+def test_nothing_looked_up_keeps_its_channels():
+    assert gather(np.zeros((4, 4, 3)), np.zeros((0, 2))).shape == (0, 3)
