@@ -49,9 +49,10 @@ def test_size_dtype_and_content(pebbles, result):
 
 def test_stages_are_pictures_in_order(result):
     assert list(result.stages) == ["segmentation", "deformed", "holes", "completed", "composite"]
-    assert result.stages["holes"].any()
-    deformed, completed = result.stages["deformed"], result.stages["completed"]
-    assert (completed[result.stages["holes"]] != deformed[result.stages["holes"]]).any()
+    assert result.stages["holes"].dtype == bool
+    # What lies apart leaves a hole where it was.
+    apart = texrs.design(samples.dots((96, 96)).image, 96, tiles=1).stages
+    assert (apart["completed"][apart["holes"]] != apart["deformed"][apart["holes"]]).any()
 
 
 def test_the_composite_is_what_the_source_map_shows_in_every_dtype(pebbles):
@@ -451,3 +452,10 @@ def test_holes_are_not_filled_over_the_inside_of_elements(pebbles):
     filled = fill_holes(draft, plan, ((128, 128),), 0, 5)
     assert filled.holes > 0
     np.testing.assert_array_equal(filled.source.label[kept], draft.label[kept])
+
+
+def test_what_is_left_in_a_heap_without_ground_stays(pebbles, result):
+    plan = make_plan(texrs.Exemplar(pebbles), texrs.Exemplar(pebbles).segment(), DeformationOptions(), side=None)
+    assert not plan.pure
+    assert not any(result.report["holes"])
+    assert make_plan(texrs.Exemplar(pebbles), texrs.Exemplar(pebbles).segment(), DeformationOptions(), side=4).pure

@@ -23,8 +23,8 @@ Departures, with their reasons:
 - Where elements of one shape lie in a heap they take each other's places, turned and scaled to the shape that they fill; in a
   heap of leaves most rest. If all moved there would be nothing left to lie on. An element brings only background along, not
   pieces of its neighbours.
-- Holes are filled with background alone where the example has enough of it, and never over the inside of elements, which
-  patches would tear.
+- Holes are filled with background alone where the example has enough of it. Where it has not, what is left of an element in a
+  heap whose place another one took stays. The inside of elements is never filled over: patches would tear them.
 - Nothing is mirrored along an axis on which the example plainly differs from its mirror image (light from one side, leaves
   that hang), nor turned where the example has directions of its own (bark, brickwork); where it repeats on a lattice, elements
   move from place to place of the lattice and nowhere else.

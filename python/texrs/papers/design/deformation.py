@@ -98,7 +98,8 @@ def deform_elements(plan: Plan, seed: int, tile: int) -> Draft:
         canvas.log.append(describe(mover, operations, full=full))
         if operations or not full:
             canvas.stitch(picture, labels, placement, mover.label)
-        if heap is not None:
+        # Filled with pieces of other things, what is left would be torn once more.
+        if heap is not None and plan.pure:
             canvas.open_remains(labels, element, len(canvas.frames) - 1)
     return canvas
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from texrs._typing import Floats
+from texrs._typing import Bools, Floats
 from texrs.exemplar import Exemplar
 from texrs.exemplar.patches import choose_usual_side, index_patches, mark_corners
 from texrs.exemplar.segmentation import Segmentation
@@ -39,6 +39,8 @@ class Plan:
     """Of a patch that fills holes, in pixels."""
     literal: bool
     """Whether the paper is followed as printed."""
+    pure: bool
+    """Whether holes are filled with background alone."""
 
 
 def make_plan(
@@ -65,7 +67,9 @@ def make_plan(
     guide, extent = exemplar.guidance, side or choose_usual_side(min(exemplar.shape))
     mirrors = exemplar.mirrors if options.mirror else (NONE,)
     moves = settle_moves(exemplar, parts, options, mirrors)
-    return Plan(guide, parts, choose_patches(guide, parts, mirrors, extent), mirrors, moves, extent, literal)
+    free = mark_background(parts, extent)
+    index = index_patches(guide, extent, mirrors, free)
+    return Plan(guide, parts, index, mirrors, moves, extent, literal, free is not None)
 
 
 def settle_moves(
@@ -85,10 +89,8 @@ def settle_moves(
     return Moves(options, (), axes)
 
 
-def choose_patches(guide: Floats, parts: Segmentation, mirrors: Sequence[Flip], side: int) -> PatchIndex:
-    """Return the index of the patches that holes are filled from: of background alone, if there is enough of it."""
-    if parts.kind in ("components", "labels"):
-        free = parts.elements == 0
-        if np.count_nonzero(mark_corners(free, side)) >= BACKGROUND_PLACES:
-            return index_patches(guide, side, mirrors, free)
-    return index_patches(guide, side, mirrors)
+def mark_background(parts: Segmentation, side: int) -> Bools | None:
+    """Mark the background, if there is enough of it to fill holes with it alone."""
+    free = parts.elements == 0
+    found = parts.kind in ("components", "labels") and np.count_nonzero(mark_corners(free, side)) >= BACKGROUND_PLACES
+    return free if found else None
