@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_image, as_wrap, guidance
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
-from texrs.exemplar import Exemplar
+from texrs.exemplar import ElementOptions, Exemplar
 from texrs.exemplar.shapes import mark_outlines
 from texrs.kernels.gather import gather
 from texrs.source_map import SourceMap
@@ -39,7 +39,11 @@ BAND = 3
 """Pixels on both sides of a seam in which fog is looked for."""
 CELL = 8
 """Use is counted in cells of so many pixels a side."""
-TORN, BROKEN, FOG, REPETITION, UNUSED = 1.0, 1.0, 0.5, 0.3, 0.1
+GROUND = 0.1
+"""What ground counts for, where there are elements."""
+ALIKE = 4
+"""Frames are alike that are the same to so many steps a unit."""
+TORN, BROKEN, FOG, REPETITION, UNUSED = 1.0, 1.0, 0.5, 0.1, 0.1
 """What the figures count for in the score."""
 
 
@@ -57,8 +61,8 @@ class Judgement:
     fog : float
         Detail that is missing beside seams, as a share of what the exemplar has there; 0 to 1.
     repetition : float
-        How much more often than others places are shown, those that stand out counting for more: 0 where all are shown
-        alike.
+        How often what is shown is shown again exactly alike, those places that stand out counting for more, over what
+        pieces drawn blindly would give: 0 for nothing twice, 1 as if so drawn, a quarter if they were mirrored, too.
     share : float
         Share of the exemplar that is shown, 0 to 1, as far as there is room for it.
 
@@ -86,6 +90,7 @@ def judge(
     source: SourceMap,
     image: Array | None = None,
     *,
+    elements: ElementOptions = ElementOptions(),
     wrap: bool | tuple[bool, bool] = False,
 ) -> Judgement:
     """Judge a texture that was made from one exemplar.
@@ -98,6 +103,8 @@ def judge(
         Where each pixel comes from, shape (h, w).
     image : (h, w) or (h, w, C) array, optional
         The texture, if its colours were corrected; fog is looked for in it.
+    elements : ElementOptions
+        How the elements of the exemplar are found.
     wrap : bool or (rows, columns)
         Axes along which it is cyclic.
 
@@ -126,7 +133,7 @@ def judge(
     if known.axes != 2 or source.shapes != (known.shape,):
         raise InvalidInput(f"source: needs one into a picture of {known.shape}, got one into {source.shapes}")
     cyclic = as_wrap(wrap)
-    traits = known.remember("traits", lambda: measure_traits(known))
+    traits = known.remember(("traits", elements.key), lambda: measure_traits(known, elements))
     seams = [find_seam(source, axis, cyclic[axis]) for axis in range(2)]
     fog = 0.0
     if image is not None:
@@ -182,11 +189,11 @@ class Traits:
         return self.colours.nbytes + self.depth.nbytes + self.slopes.nbytes + self.salience.nbytes
 
 
-def measure_traits(exemplar: Exemplar) -> Traits:
+def measure_traits(exemplar: Exemplar, elements: ElementOptions) -> Traits:
     """Measure what is usual in an exemplar."""
     from scipy.ndimage import gaussian_filter
 
-    colours, parts = exemplar.guidance, exemplar.segment()
+    colours, parts = exemplar.guidance, exemplar.segment(elements)
     found = parts.kind in ("components", "labels")
     depth = parts.measure_depth(REACH) if found else np.zeros(exemplar.shape, np.float32)
     outline = mark_outlines(parts.elements).mean() if found else 1.0
@@ -199,17 +206,23 @@ def measure_traits(exemplar: Exemplar) -> Traits:
     line = max(float(np.percentile(sizes, EDGE)), 1e-6)
     broken, lines = (float(marks.mean()) for marks in find_breaks(slopes, line, pairs))
     step = float(np.percentile(steps, VISIBLE))
-    return Traits(colours, depth, float(outline), step, slopes, line, broken, lines, measure_salience(colours))
+    return Traits(colours, depth, float(outline), step, slopes, line, broken, lines, measure_salience(colours, depth))
 
 
-def measure_salience(colours: Floats) -> NDArray[np.float64]:
-    """Return how much each cell stands out: how far its mean and its contrast are from the usual, in standard deviations."""
+def measure_salience(colours: Floats, depth: Floats) -> NDArray[np.float64]:
+    """Return how much each cell stands out: how far its mean and its contrast are from the usual, in standard deviations.
+
+    Where there are elements, ground counts for little: nobody sees that it is shown twice.
+    """
     rows, columns = (-(-n // CELL) for n in colours.shape[:2])
     fill = ((0, rows * CELL - colours.shape[0]), (0, columns * CELL - colours.shape[1]), (0, 0))
     cells = np.pad(colours, fill, mode="edge").reshape(rows, CELL, columns, CELL, -1).astype(np.float64)
     traits = np.concatenate([cells.mean(axis=(1, 3)), cells.std(axis=(1, 3))], axis=-1)
     away = np.abs(traits - np.median(traits, axis=(0, 1))) / np.maximum(traits.std(axis=(0, 1)), 1e-9)
-    salience: NDArray[np.float64] = 0.25 + away.mean(axis=-1)
+    salience: NDArray[np.float64] = 0.5 + away.mean(axis=-1)
+    if depth.any():
+        inside = np.pad(depth > 0, fill[:2], mode="edge").reshape(rows, CELL, columns, CELL).mean(axis=(1, 3))
+        salience *= GROUND + (1 - GROUND) * inside
     return np.asarray(salience / salience.mean(), np.float64)
 
 
@@ -322,25 +335,40 @@ def measure_fog(traits: Traits, source: SourceMap, seams: list[Seam], image: Flo
     band = binary_dilation(near, iterations=BAND - 1) & ~near
     if not band.any():
         return 0.0
-    sharp = np.stack([laplace(traits.colours[..., c]) for c in range(traits.colours.shape[-1])], axis=-1)
-    own = np.stack([laplace(image[..., c]) for c in range(image.shape[-1])], axis=-1)
-    wanted = np.abs(gather(sharp, source.coordinates[band], interpolation="nearest")).mean()
-    shown = np.abs(own[band]).mean()
+    # What is scaled or turned is softer, but not in fog: the source itself says what there should be.
+    wanted, shown = (
+        np.abs(np.stack([laplace(seen[..., c]) for c in range(seen.shape[-1])], axis=-1)[band]).mean()
+        for seen in (gather(traits.colours, source.coordinates, interpolation="cubic"), image)
+    )
     return float(np.clip(1 - shown / wanted, 0, 1)) if wanted > 0 else 0.0
 
 
 def measure_use(traits: Traits, source: SourceMap) -> tuple[float, float]:
-    """Return how unevenly the cells of the exemplar are shown, and the share of them that is, as far as there is room."""
+    """Return how often what is shown is shown again exactly alike, and the share of the exemplar that is shown."""
     rows, columns = traits.salience.shape
     last = np.array(traits.colours.shape[:2]) - 1
-    cell = np.clip(np.rint(source.coordinates), 0, last).astype(np.intp) // CELL
-    counts = np.bincount((cell[..., 0] * columns + cell[..., 1]).ravel(), minlength=rows * columns).reshape(
-        rows, columns
-    )
-    mean = max(source.coordinates.size / 2 / counts.size, CELL**2)
-    # What is shown no more often than a whole picture of it would, repeats nothing.
-    excess = np.maximum(counts / mean - 1, 0)
-    repetition = float((traits.salience * excess).sum() / counts.size)
-    room = min(1.0, counts.sum() / (traits.colours.shape[0] * traits.colours.shape[1]))
-    share = min(1.0, float((counts > CELL).mean()) / room)
+    row, column = np.moveaxis(np.clip(np.rint(source.coordinates), 0, last).astype(np.intp) // CELL, -1, 0)
+    cell = (row * columns + column).ravel()
+    area = np.bincount(cell, minlength=rows * columns)
+    # What is turned, scaled or mirrored is not alike.
+    key, ways = cell, number_frames(source)
+    if ways is not None:
+        key = ways.ravel() * (rows * columns) + cell
+    shown, number = np.unique(key, return_inverse=True)
+    times = np.bincount(number) / CELL**2
+    again = traits.salience.ravel()[shown % (rows * columns)] * times * np.maximum(times - 1, 0)
+    shape = traits.colours.shape
+    drawn = cell.size / (shape[0] * shape[1])
+    repetition = float(again.sum() / (cell.size / CELL**2) / drawn)
+    share = min(1.0, float((area > CELL).mean()) / min(1.0, drawn))
     return repetition, share
+
+
+def number_frames(source: SourceMap) -> NDArray[np.intp] | None:
+    """Return a number for each pixel, the same for those that show the exemplar turned and scaled about alike."""
+    frame = source.frame_array()
+    if frame is None:
+        return None
+    rough = np.rint(ALIKE * frame.reshape(-1, 4)).astype(np.intp)
+    number = np.unique(rough, axis=0, return_inverse=True)[1].reshape(frame.shape[:-2])
+    return np.asarray(number[source.label] if frame.ndim == 3 else number, np.intp)

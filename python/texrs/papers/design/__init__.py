@@ -25,6 +25,9 @@ Departures, with their reasons:
   pieces of its neighbours.
 - Holes are filled with background alone where the example has enough of it. Where it has not, what is left of an element in a
   heap whose place another one took stays. The inside of elements is never filled over: patches would tear them.
+- Where moved elements are judged clearly worse than the example as it is, they stay where they are, and variety comes from
+  patches alone: both are tried at a small size (see `texrs.judging`). In heaps of fruit, where elements can only be cut out
+  roughly, torn outlines fall to a third.
 - Nothing is mirrored along an axis on which the example plainly differs from its mirror image (light from one side, leaves
   that hang), nor turned where the example has directions of its own (bark, brickwork); where it repeats on a lattice, elements
   move from place to place of the lattice and nowhere else.
@@ -45,14 +48,12 @@ from functools import partial
 from texrs._typing import Progress
 from texrs.blending import SCREENING
 from texrs.exemplar import ElementOptions
-from texrs.papers.design.arguments import Arguments, Exemplars, Method, Size, Weights, check_arguments
-from texrs.papers.design.deformation import deform_elements
-from texrs.papers.design.literal import move_layers
+from texrs.papers.design.arguments import Arguments, Choice, Exemplars, Method, Size, Weights, check_arguments
 from texrs.papers.design.options import DeformationOptions
 from texrs.papers.design.plan import Plan, make_plan
 from texrs.papers.design.report import describe, draw_stages
-from texrs.papers.design.texture import correct_colours, stitch_tiles
-from texrs.papers.design.tiles import fill_holes
+from texrs.papers.design.texture import correct_colours
+from texrs.papers.design.trials import choose_plan, make_composite
 from texrs.synthesis import Synthesis
 
 __all__ = ["DeformationOptions", "design", "design_variants"]
@@ -67,6 +68,7 @@ def design(
     weights: Weights = None,
     elements: ElementOptions = ElementOptions(),
     deformation: DeformationOptions = DeformationOptions(),
+    plan: Choice = "auto",
     tiles: int = 4,
     patch: int | None = None,
     blend: float | None = SCREENING,
@@ -92,6 +94,10 @@ def design(
         How the elements of the exemplar are found.
     deformation : DeformationOptions
         How elements are deformed.
+    plan : {"auto", "move", "still"}
+        What is done with elements. "move": they are deformed, as the paper has it. "still": they stay as they are, and
+        patches of the exemplar and its mirror images are joined between them. "auto": both are tried at a small size and
+        judged, and the better one is taken; where ``deformation`` is given, or the ``method``, elements move.
     tiles : int
         Deformed copies of the exemplar that the result is stitched from, 1 to 64.
     patch : int, optional
@@ -159,6 +165,7 @@ def design(
         weights=weights,
         elements=elements,
         deformation=deformation,
+        plan=plan,
         tiles=tiles,
         patch=patch,
         blend=blend,
@@ -178,6 +185,7 @@ def design_variants(
     weights: Weights = None,
     elements: ElementOptions = ElementOptions(),
     deformation: DeformationOptions = DeformationOptions(),
+    plan: Choice = "auto",
     tiles: int = 4,
     patch: int | None = None,
     blend: float | None = SCREENING,
@@ -208,6 +216,10 @@ def design_variants(
         How the elements of the exemplar are found.
     deformation : DeformationOptions
         How elements are deformed.
+    plan : {"auto", "move", "still"}
+        What is done with elements. "move": they are deformed, as the paper has it. "still": they stay as they are, and
+        patches of the exemplar and its mirror images are joined between them. "auto": both are tried at a small size and
+        judged, and the better one is taken; where ``deformation`` is given, or the ``method``, elements move.
     tiles : int
         Deformed copies of the exemplar that each texture is stitched from, 1 to 64.
     patch : int, optional
@@ -254,6 +266,7 @@ def design_variants(
         weights=weights,
         elements=elements,
         deformation=deformation,
+        plan=plan,
         tiles=tiles,
         patch=patch,
         blend=blend,
@@ -281,23 +294,17 @@ def segment(arguments: Arguments) -> list[Plan]:
     arguments.watch("segment", 0.0)
     for number, exemplar in enumerate(arguments.guides):
         progress = partial(report_share, arguments.watch, number, len(arguments.guides))
-        parts = exemplar.segment(elements.select(number), progress=progress)
-        plans.append(make_plan(exemplar, parts, arguments.deformation, side=arguments.side, literal=arguments.literal))
+        chosen = elements.select(number)
+        parts = exemplar.segment(chosen, progress=progress)
+        plan = make_plan(exemplar, parts, arguments.deformation, side=arguments.side, literal=arguments.literal)
+        plans.append(choose_plan(plan, exemplar, chosen, arguments))
         arguments.watch("segment", (number + 1) / len(arguments.guides))
     return plans
 
 
 def make_texture(plans: Sequence[Plan], arguments: Arguments, seed: int) -> Synthesis:
     """Make one texture of analysed exemplars: steps 2 to 6."""
-    tiles = []
-    count = arguments.tiles * len(plans)
-    for number in range(count):
-        arguments.watch("deform and complete", number / count)
-        tile, which = divmod(number, len(plans))
-        plan = plans[which]
-        draft = move_layers(plan, seed, which, tile) if plan.literal else deform_elements(plan, seed, tile)
-        tiles.append(fill_holes(draft, plan, arguments.shapes, which, (seed + tile) % 2**64))
-    composite = stitch_tiles(plans, tiles, arguments, seed)
+    tiles, composite = make_composite(plans, arguments, seed)
     picture = composite.render(arguments.images)
     image, seams = correct_colours(composite, picture, arguments)
     report = describe(plans, tiles, composite, seams, arguments, seed)

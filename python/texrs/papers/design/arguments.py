@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import (
+    as_choice,
     as_float,
     as_int,
     as_list,
@@ -27,12 +28,13 @@ from texrs.errors import InvalidInput
 from texrs.exemplar import ElementOptions, Exemplar, as_exemplar
 from texrs.papers.design.options import DeformationOptions
 
-__all__ = ["Arguments", "Exemplars", "Method", "Size", "Weights", "check_arguments"]
+__all__ = ["Arguments", "Choice", "Exemplars", "Method", "Size", "Weights", "check_arguments"]
 
 Exemplars: TypeAlias = Array | Exemplar | Sequence[Array | Exemplar]
 Size: TypeAlias = int | Sequence[int] | None
 Weights: TypeAlias = Sequence[float] | Array | None
 Method: TypeAlias = Literal["paper"] | None
+Choice: TypeAlias = Literal["auto", "move", "still"]
 
 MINIMUM_SIDE = 16
 """An exemplar with a shorter side holds no texture to speak of."""
@@ -54,6 +56,7 @@ class Arguments:
     """Of each exemplar: (n,) for the whole, or (rows, columns, n)."""
     elements: ElementOptions
     deformation: DeformationOptions
+    plan: Choice
     tiles: int
     side: int | None
     """Of the patches that fill holes."""
@@ -83,6 +86,7 @@ def check_arguments(
     weights: Weights,
     elements: ElementOptions,
     deformation: DeformationOptions,
+    plan: Choice,
     tiles: int,
     patch: int | None,
     blend: float | None,
@@ -99,6 +103,7 @@ def check_arguments(
     first, cyclic = as_seed(seed), as_wrap(wrap)
     shares = as_shares(weights, len(exemplars), (rows, columns))
     as_method(method, None, "paper")
+    as_choice(plan, "plan", ("auto", "move", "still"))
     arguments = Arguments(
         exemplars,
         scale_together(exemplars),
@@ -108,6 +113,7 @@ def check_arguments(
         shares,
         elements,
         deformation,
+        plan,
         as_int(tiles, "tiles", 1, 64),
         None if patch is None else as_int(patch, "patch", 4, min(min(e.shape) for e in exemplars)),
         as_float(0.0 if blend is None else blend, "blend", 0, 1e6),

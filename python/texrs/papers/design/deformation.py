@@ -67,6 +67,8 @@ def deform_elements(plan: Plan, seed: int, tile: int) -> Draft:
         With holes where nothing lies.
 
     """
+    if plan.still:
+        return rest(plan, tile)
     parts = plan.parts
     # The background takes one of the mirrors, and the elements are cut out of the mirrored picture.
     mirror = plan.mirrors[int(uniform(seed, tile, 0, 0, 1) * len(plan.mirrors))]
@@ -102,6 +104,12 @@ def deform_elements(plan: Plan, seed: int, tile: int) -> Draft:
         if heap is not None and plan.pure:
             canvas.open_remains(labels, element, len(canvas.frames) - 1)
     return canvas
+
+
+def rest(plan: Plan, tile: int) -> Draft:
+    """Return the exemplar as it is, in one of its mirror images after the other."""
+    mirror = plan.mirrors[tile % len(plan.mirrors)]
+    return Canvas.start_on_picture(flip(plan.guide, mirror), mirror)
 
 
 def describe(element: Element, operations: Sequence[Operation], *, full: bool) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,6 +41,10 @@ class Plan:
     """Whether the paper is followed as printed."""
     pure: bool
     """Whether holes are filled with background alone."""
+    still: bool = False
+    """Whether elements stay where they are, so that variety comes from the patches alone."""
+    tried: Mapping[str, Mapping[str, float]] | None = None
+    """How each plan was judged that was tried, if any."""
 
 
 def make_plan(

@@ -56,6 +56,8 @@ def describe(
         "elements": sum(p.parts.count for p in plans),
         "kind": first.parts.kind,
         "reason": first.parts.reason,
+        "plan": ["still" if p.still else "move" for p in plans],
+        "tried": [p.tried and {name: dict(figures) for name, figures in p.tried.items()} for p in plans],
         "rotate": first.moves.rotate,
         "shares": [int(np.count_nonzero(composite.exemplar == which)) for which in range(len(plans))],
         "holes": [t.holes for t in tiles],

@@ -1,0 +1,92 @@
+"""What is done with the elements of an exemplar, tried at a small size and judged.
+
+A departure from the paper, which always deforms: where elements lie close, or were not found as they are, to move them tears
+them, and patches of the exemplar that are joined between its elements give the better texture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from texrs.exemplar import ElementOptions, Exemplar
+from texrs.judging import judge
+from texrs.papers.design.arguments import Arguments
+from texrs.papers.design.deformation import deform_elements
+from texrs.papers.design.literal import move_layers
+from texrs.papers.design.options import DeformationOptions
+from texrs.papers.design.plan import Plan
+from texrs.papers.design.texture import correct_colours, stitch_tiles
+from texrs.papers.design.tiles import Tile, fill_holes
+from texrs.source_map import SourceMap
+
+__all__ = ["choose_plan", "make_composite"]
+
+CLEARLY = 0.85
+"""Share of the score of moved elements below which still ones are taken: deformation gives more different textures."""
+LEAST, SHARE = 192, 0.75
+"""Least side of a trial in pixels, and its side as a share of the exemplar's shorter one."""
+TILES = 2
+"""Deformed copies of the exemplar that a trial is stitched from, at most."""
+
+
+def make_composite(plans: Sequence[Plan], arguments: Arguments, seed: int) -> tuple[list[Tile], SourceMap]:
+    """Deform the elements of each tile, fill its holes, and stitch the tiles: steps 2 to 5."""
+    tiles = []
+    count = arguments.tiles * len(plans)
+    for number in range(count):
+        arguments.watch("deform and complete", number / count)
+        tile, which = divmod(number, len(plans))
+        plan = plans[which]
+        if plan.still and tile >= len(plan.mirrors):
+            continue
+        draft = move_layers(plan, seed, which, tile) if plan.literal else deform_elements(plan, seed, tile)
+        tiles.append(fill_holes(draft, plan, arguments.shapes, which, (seed + tile) % 2**64))
+    return tiles, stitch_tiles(plans, tiles, arguments, seed)
+
+
+def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, arguments: Arguments) -> Plan:
+    """Settle whether elements move: as was said, or as is judged the better.
+
+    Parameters
+    ----------
+    plan : Plan
+        By which they move.
+    exemplar : Exemplar
+        The example, on the scale that decisions are made on.
+    elements : ElementOptions
+        How its elements were found.
+    arguments : Arguments
+        What is asked for. Neither the seed nor the size plays a part, so that all textures of an exemplar are made alike.
+
+    """
+    still = replace(plan, still=True)
+    if plan.literal or arguments.plan != "auto" or arguments.deformation != DeformationOptions():
+        return still if arguments.plan == "still" and not plan.literal else plan
+    ways = {"move": plan, "still": still}
+    key = ("design trials", elements.key, arguments.side, min(TILES, arguments.tiles), arguments.screening)
+    tried = exemplar.remember(
+        key, lambda: {name: try_plan(p, exemplar, elements, arguments) for name, p in ways.items()}
+    )
+    better = tried["still"]["score"] < CLEARLY * tried["move"]["score"]
+    return replace(still if better else plan, tried=tried)
+
+
+def try_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, arguments: Arguments) -> Mapping[str, float]:
+    """Make a small texture by a plan, and judge it."""
+    side = max(LEAST, round(SHARE * min(exemplar.shape)))
+    small = replace(
+        arguments,
+        exemplars=[exemplar],
+        guides=[exemplar],
+        size=(side, side),
+        wrap=(True, True),
+        shares=np.ones(1),
+        tiles=min(TILES, arguments.tiles),
+        watch=lambda stage, share: arguments.watch("try", 0.5 * plan.still),
+    )
+    _, composite = make_composite([plan], small, 0)
+    image, _ = correct_colours(composite, composite.render(small.images), small)
+    return judge(exemplar, composite, image, elements=elements, wrap=True).report()
