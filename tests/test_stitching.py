@@ -8,8 +8,10 @@ import pytest
 import texrs
 from texrs import SourceMap, fields, samples, volume
 from texrs.errors import InvalidInput
+from texrs.exemplar import _exemplar
 from texrs.exemplar.adjacency import classify, measure_adjacency
 from texrs.exemplar.instances import label_components
+from texrs.judging import judge
 
 PARTICLES = samples.particles((64, 64, 64))
 FIELDS = {"none": None, "circular": fields.circular(), "zigzag": fields.zigzag(period=48)}
@@ -200,3 +202,19 @@ def test_rare_things_keep_their_share():
     images = [texrs.solid(PARTICLES.image, 64, seed=s, interpolation="nearest").image for s in (1, 2)]
     mean = np.mean([shares(image) for image in images], axis=0)
     np.testing.assert_allclose(mean / shares(PARTICLES.image), 1, atol=0.2)
+
+
+def test_cuts_keep_out_of_what_may_be_elements(monkeypatch):
+    """Things in a heap, which no background parts, are not found for sure."""
+    picture = texrs.samples.beans((160, 160)).image
+    exemplar = texrs.Exemplar(picture, repeat=False)
+    assert exemplar.instances is None
+    assert exemplar.stitcher.guessed
+    assert not exemplar.stitcher.separate
+    torn = [judge(exemplar, texrs.synthesize(exemplar, 160, seed=seed).source).torn for seed in range(3)]
+    monkeypatch.setattr(_exemplar, "guess_instances", lambda parts: None)
+    # Said in another way, so that it is another exemplar, of which nothing is kept.
+    unaware = texrs.Exemplar(picture, repeat=False, labels=False)
+    assert not unaware.stitcher.guessed
+    before = [judge(exemplar, texrs.synthesize(unaware, 160, seed=seed).source).torn for seed in range(3)]
+    assert sum(torn) < 0.6 * sum(before), (torn, before)

@@ -128,6 +128,8 @@ class Stitcher:
         Number of the element of each sample, from 1; 0 for none.
     depth : float32 array, optional
         Distance of each sample to the background.
+    sure : bool
+        Whether the elements were found for sure. Those that may be some are kept whole by what cuts cost, and not healed.
 
     Raises
     ------
@@ -145,6 +147,7 @@ class Stitcher:
         costs: Floats,
         labels: NDArray[np.uint32] | None = None,
         depth: Floats | None = None,
+        sure: bool = True,
     ) -> None:
         self.shape = colours.shape[:-1]
         self._inner = _rust.Stitcher(
@@ -156,7 +159,7 @@ class Stitcher:
             np.ascontiguousarray(classes.reshape(-1)),
             np.ascontiguousarray(costs.reshape(-1)),
         )
-        self.separate = labels is not None
+        self.separate, self.guessed = labels is not None and sure, labels is not None and not sure
         self.nbytes = 32 * int(np.prod(self.shape, dtype=np.int64))
 
     def stitch(
@@ -240,7 +243,7 @@ class Stitcher:
                 as_int(candidates, "candidates", 1, 64),
                 as_float(recover, "recover", 0, 4),
                 bend,
-                heal,
+                heal and not self.guessed,
             ),
             list(astuple(weights)),
             [
@@ -338,7 +341,7 @@ class Stitcher:
                 as_int(candidates, "candidates", 1, 64),
                 as_float(recover, "recover", 0, 4),
                 bend,
-                heal,
+                heal and not self.guessed,
             ),
             list(astuple(weights)),
             [

@@ -27,7 +27,7 @@ from texrs.exemplar.analysis import (
 from texrs.exemplar.instances import Instances, as_instances, find_instances
 from texrs.exemplar.regularity import measure_direction
 from texrs.exemplar.segmentation import ElementOptions, Segmentation, segment
-from texrs.exemplar.stitching import make_stitcher
+from texrs.exemplar.stitching import guess_instances, make_stitcher
 from texrs.exemplar.symmetry import Flip, find_mirrors
 
 T = TypeVar("T")
@@ -242,8 +242,11 @@ class Exemplar:
 
     @property
     def stitcher(self) -> Stitcher:
-        """The exemplar as patches are cut from it: with its elements, and which colours lie side by side."""
-        return self.remember("stitcher", lambda: make_stitcher(self.colours, self.repeat, self.instances))
+        """The exemplar as patches are cut from it: with its elements, and which colours lie side by side.
+
+        Where elements are not found for sure, those that `segment` finds in a picture are cut less.
+        """
+        return self.remember("stitcher", self._make_stitcher)
 
     @property
     def mirrors(self) -> tuple[Flip, ...]:
@@ -365,6 +368,11 @@ class Exemplar:
             raise FileError(f"{path}: is damaged ({error})") from None
         made._facts["analysis", (2,), COARSEST] = analysis
         return made
+
+    def _make_stitcher(self) -> Stitcher:
+        found = self.instances
+        sure = found is not None or self._axes == 3 or self.labels
+        return make_stitcher(self.colours, self.repeat, found if sure else guess_instances(self.segment()), sure=sure)
 
     def _measure(self, levels: int) -> tuple[bool, ...]:
         return measure_repeat(self.colours, axes=self._axes, levels=levels) if self._repeat is None else self._repeat

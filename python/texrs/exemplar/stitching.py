@@ -4,15 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from texrs._engine.stitcher import Stitcher
 from texrs._typing import Floats
 from texrs.exemplar.adjacency import measure_adjacency
 from texrs.exemplar.instances import Instances
+from texrs.exemplar.segmentation import Segmentation
 
-__all__ = ["make_stitcher"]
+__all__ = ["guess_instances", "make_stitcher"]
+
+REACH, DEEP = 3.0, 8.0
+"""Depth in pixels from which on cuts cost the same everywhere inside of what may be an element, and what it counts as."""
 
 
-def make_stitcher(colours: Floats, wrap: Sequence[bool], elements: Instances | None) -> Stitcher:
+def make_stitcher(colours: Floats, wrap: Sequence[bool], elements: Instances | None, *, sure: bool = True) -> Stitcher:
     """Return an exemplar as patches are cut from it: with its elements, and which colours lie side by side."""
     beside = measure_adjacency(colours, wrap)
     return Stitcher(
@@ -22,4 +28,13 @@ def make_stitcher(colours: Floats, wrap: Sequence[bool], elements: Instances | N
         costs=beside.costs,
         labels=None if elements is None else elements.labels,
         depth=None if elements is None else elements.depth,
+        sure=sure,
     )
+
+
+def guess_instances(parts: Segmentation) -> Instances | None:
+    """Return what may be the elements of a picture, as in a heap, whose things no background parts; None without any."""
+    if parts.kind != "components":
+        return None
+    depth = np.asarray(DEEP * parts.measure_depth(REACH), np.float32)
+    return Instances(np.where(depth > 0, parts.elements, 0).astype(np.uint32), depth)

@@ -32,6 +32,8 @@ DIRECTED = 0.3
 """Textures whose edges agree in direction so much go on along it: their patches bend with a field."""
 SEPARATE, ANY = Weights(surprise=0.5), Weights()
 """What seams cost where the elements are known, and where they are not."""
+GUESSED = Weights(surprise=0.5, contact=0.0, joint=0.0, jump=0.0, depth=0.15, presence=0.0)
+"""And where they are guessed: things in a heap touch and lie on each other, so seams are charged for running inside alone."""
 
 
 def from_patches(exemplar: Exemplar, level: int, seed: int, *, candidates: int = 4, bend: bool | None = None) -> Start:
@@ -89,7 +91,8 @@ def bends_with(exemplar: Exemplar, varies: bool, bend: bool | None = None) -> bo
 
 def weights_of(exemplar: Exemplar) -> Weights:
     """Return what seams cost in what is made from an exemplar."""
-    return SEPARATE if exemplar.stitcher.separate else ANY
+    stitcher = exemplar.stitcher
+    return SEPARATE if stitcher.separate else GUESSED if stitcher.guessed else ANY
 
 
 def patch_side(shape: tuple[int, ...]) -> float:

@@ -21,6 +21,8 @@ Departures, with their reasons:
   round an axis, and none are now (`texrs.volume.integrity`); cells in walls gain more.
 - A cut judges the pair that results, the old voxel at p beside the new one at q, not how far the two pictures differ at both.
 - Patches of separate elements are turned as a whole, and those of textures with a direction bend with the field.
+- Of a picture whose elements are not found for sure, as in a heap, those of `texrs.exemplar.segmentation` are kept from being
+  cut, if not healed: seams inside of them fall to a quarter.
 - Where seams show most, half as many patches again are tried, which need not fit what lies there: they may take it if less
   shows then.
 - Places are charged for what has been shown often, and for classes of colour in excess: cuts are cheapest where rare things
