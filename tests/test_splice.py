@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.ndimage import find_objects
+from scipy.ndimage import binary_dilation, find_objects, label
 
 import splice_checks as checks
 import texrs
@@ -100,7 +100,17 @@ def test_nothing_moved_nothing_changed(name: str) -> None:
 def test_moving_all_moves_the_picture(name: str) -> None:
     mine = ENTRIES[name]
     image = texrs.self_splice(mine, {"op": "shift", "by": [5, -3]}).image
-    assert (image[5:, :-3] == mine.image[:-5, 3:]).all(), "S9"
+    same = (image[5:, :-3] == mine.image[:-5, 3:]).all(axis=-1)
+    if name in ("net", "bricks"):
+        assert same.all(), "S9"
+        return
+    # Separate elements whose straight edges would come in from the top or the right give way to whole ones; scraps, to ground.
+    number, _ = label(mine.mask)
+    coming = np.isin(number, np.union1d(number[0], number[:, -1])[1:])
+    far = ~binary_dilation(coming, iterations=12)[:-5, 3:]
+    far[:16], far[:, -16:] = False, False
+    assert far.mean() > 0.5
+    assert same[far].mean() > 0.995, "S9"
 
 
 # --- brick walls: S11 ------------------------------------------------------------------------------------------------
@@ -180,7 +190,7 @@ def test_an_element_moves_whole_where_its_centre_lies_beside_it(shape: str, midd
     centre = np.argwhere(one).mean(axis=0) if middle == "of mass" else np.array([11.5, 11.5])
     points = centre + 24.0 * np.array([[i, j] for i in range(4) for j in range(4)])
     mine = Elements(image, points, mask, (25, 25), layout, np.ones(16))
-    result = texrs.self_splice(mine, {"op": "move", "element": 5, "by": [4, -3]})
+    result = texrs.self_splice(mine, {"op": "move", "element": 5, "by": [4, -3]}, blend=None)
     assert (result.image != image).any()
     if layout == Layout.DISJOINT:
         pixels = np.argwhere(one) + 24

@@ -32,11 +32,16 @@ Departures, with their reasons:
 - Eq. 5 sums over rigid pixels only, so the others have no equation and the system is singular, or, for brick walls,
   moves nothing but its pins: here they count a hundredth. Long joints, which the decoupling of Table 1 leaves free to slide,
   are tied to their neighbours by a weak spring.
-- Elements that reflection mirrors are turned back, and those that the border cuts are left out. Where an edited layout
-  shrinks, whole ones from beyond take their places.
+- Elements that reflection mirrors are turned back, and those that the border cuts are left out; with no or little strength they
+  stay where they are.
 - In splices the ground between separate elements is neither warped nor refined, which averages it: it is completed where the
-  elements were, grown by patches, and each element is cut into it with what lies around all of them alike, its shadow say;
-  colours are corrected where they meet (`ground`). What follows of it is for edits, and for textures that show too little.
+  elements were, grown by patches where more is needed, and each element is cut into it with what lies around all of them
+  alike, its shadow say; colours are corrected where they meet (`ground`).
+- Light that differs across a picture of separate elements is taken off before they are moved, and put back after, in the
+  measure in which it falls on elements (`light`): else each brings that of its old place.
+- Edits of separate elements put these into their new places on the texture's own ground, completed where one was
+  (`rearrangement`): what does not move keeps its bytes. Where an element that the border cuts would come in, a whole one takes
+  its place. What follows of separate elements is for textures that show too little of their ground.
 - Wide holes are filled with patches of the ground; random pixels come out as noise there.
 - Refinement leaves what is rigid as it is, and so whatever the warp copied whole: there is nothing to mend. In its
   place nothing comes that is not ground itself.
@@ -62,12 +67,13 @@ from texrs.papers.splice.cells import find_entry_cells, splice_cells
 from texrs.papers.splice.draft import draft_pixels
 from texrs.papers.splice.edit import as_steps
 from texrs.papers.splice.entry import as_elements
-from texrs.papers.splice.ground import lay_ground
+from texrs.papers.splice.ground import lay_ground, survey
 from texrs.papers.splice.literal import fill_literally, match_literally
-from texrs.papers.splice.matching import Match, go_part_of_the_way, match_edit, match_layouts
+from texrs.papers.splice.matching import Match, edit_layout, go_part_of_the_way, keep_cut, match_edit, match_layouts
 from texrs.papers.splice.nets import has_knots, is_net, splice_nets
+from texrs.papers.splice.rearrangement import rearrange
 from texrs.papers.splice.refine import fill, refine_places
-from texrs.papers.splice.result import compose
+from texrs.papers.splice.result import compose, compose_edit
 from texrs.synthesis import Synthesis
 
 __all__ = ["self_splice", "splice"]
@@ -115,7 +121,8 @@ def splice(
         "paper": the algorithm as printed, with only its misprints repaired. "preview": triangles between the elements,
         drawn where these go; nothing is kept rigid or filled.
     strength : float
-        How much of the way elements go, from the texture's own layout, 0, to the other's, 1.
+        How much of the way elements go, from the texture's own layout, 0, to the other's, 1. With 0, separate elements at the
+        texture's own size make the texture itself.
     align : bool
         Whether to turn the layout so that lines of its points agree with those of ``a``. Cells and nets take it as it lies.
     snap_rows : bool
@@ -132,8 +139,9 @@ def splice(
         Whether to refine what is not rigid; by cells, what is stretched. Nets, and ground between separate elements, need none.
     blend : float, optional
         Of separate elements on their ground: weight of the values, 0 to 1e6, when colours are corrected so that the light
-        does not change where they meet, see `texrs.blend`. None or 0: no correction, and the picture is the texture looked
-        up through the source map. All else is not corrected.
+        does not change where they meet, see `texrs.blend`; where the texture has a lit side the result has it too, and things
+        do not bring the light of their old places. None or 0: no correction, and the picture is the texture looked up through
+        the source map. All else is not corrected.
     progress : callable, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
 
@@ -184,7 +192,7 @@ def splice(
     if net and not has_knots(mine):
         raise InvalidInput(f"nets: {'separate elements are no net' if mine.layout == Layout.DISJOINT else NO_NET}")
     part = as_float(strength, "strength", 0, 1)
-    screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
+    screening = _as_screening(blend)
     found = find_entry_cells(mine, watch) if method is None and wanted is not False and not net else None
     if wanted and found is None:
         raise InvalidInput(f"cells: {'separate elements have none' if mine.layout == Layout.DISJOINT else NO_CELLS}")
@@ -210,9 +218,11 @@ def splice(
         match = go_part_of_the_way(mine, match, part)
     match = replace(match, wanted=match.targets)
     if method != "paper":
-        match = adjust_targets(mine, match, snap=bool(snap_rows))
+        match = adjust_targets(mine, match, snap=bool(snap_rows), part=part < 1)
     elif snap_rows:
         match = straighten_rows(match)
+    if part < 1 and method is None and mine.layout == Layout.DISJOINT and mine.mask.shape == (rows, columns):
+        match = keep_cut(mine, match, part)
     match = crop_extension(mine, match, (rows, columns))
     watch("match", 1.0)
     return _synthesize(
@@ -235,6 +245,7 @@ def self_splice(
     seed: int = 0,
     method: Literal["preview"] | None = None,
     refine: bool = True,
+    blend: float | None = SCREENING,
     progress: Progress | None = None,
 ) -> Synthesis:
     """Edit the layout of a texture's own elements (Figure 9).
@@ -253,11 +264,15 @@ def self_splice(
         ``{"op": "points", "points": [[row, column], ...]}``. A name alone is a step with its
         defaults. The report's "edit" replays.
     seed : int
-        Chooses random steps, what fills holes, and the noise of the refinement.
+        Chooses random steps, the elements that come in over a border, what fills holes, and the noise of the refinement.
     method : {None, "preview"}
         "preview": triangles between the elements, drawn where these go; nothing is kept rigid or filled.
     refine : bool
-        Whether to refine what is deformed.
+        Whether to refine what is deformed: connected figures, and separate elements that show too little of their ground.
+    blend : float, optional
+        Of separate elements on their ground: weight of the values, 0 to 1e6, when the colours of what changed are corrected
+        so that the light does not change where things meet, as in `splice`. All else keeps its values. None or 0: no
+        correction.
     progress : callable, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
 
@@ -266,7 +281,7 @@ def self_splice(
     Synthesis
         The picture; a source map of whole pixels of ``a``, whose label is the target (counted from 1, as in the report)
         that a rigid pixel belongs to, or 0; pictures of the stages; and a report. Where nothing is moved the picture is the
-        texture, exactly.
+        texture, exactly; of separate elements, all that does not move is.
 
     Raises
     ------
@@ -289,13 +304,29 @@ def self_splice(
     as_method(method, None, "preview")
     watch = progress or (lambda stage, share: None)
     mine, number = as_elements(a, "a", watch), as_seed(seed)
-    steps = as_steps(edit, number)
-    match, listed = match_edit(mine, steps)
-    size = (mine.mask.shape[0], mine.mask.shape[1])
-    result = _synthesize(
-        mine, None, match, size, number, method=method, refine=bool(refine), watch=watch, listed=listed
-    )
+    steps, screening = as_steps(edit, number), _as_screening(blend)
+    edited = edit_layout(mine, steps)
+    laid = rearrange(mine, edited, number, watch) if method is None and mine.layout == Layout.DISJOINT else None
+    if laid is not None:
+        result = compose_edit(mine, laid, seed=number, screening=screening)
+        watch("done", 1.0)
+    else:
+        result = _synthesize(
+            mine,
+            None,
+            match_edit(mine, edited),
+            (mine.mask.shape[0], mine.mask.shape[1]),
+            number,
+            method=method,
+            refine=bool(refine),
+            watch=watch,
+            listed=edited.listed,
+        )
     return replace(result, report={**result.report, "edit": steps})
+
+
+def _as_screening(blend: object) -> float:
+    return as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
 
 
 def _synthesize(
@@ -314,11 +345,8 @@ def _synthesize(
     """Deform the texture, draw it backwards, fill and refine: sections 4.2 and 4.3, which splices and edits share."""
     warp = warp_backwards(a, match, size, method=method, listed=listed, progress=watch)
     draft, label = draft_pixels(a, match, warp, whole=method is None)
-    laid = (
-        lay_ground(a, match, draft, label, seed, watch)
-        if b and method is None and a.layout == Layout.DISJOINT
-        else None
-    )
+    scene = survey(a) if b and method is None and a.layout == Layout.DISJOINT else None
+    laid = lay_ground(scene, match, draft, label, seed, watch) if scene is not None else None
     if laid is not None:
         filled = laid
     elif method == "paper":
@@ -331,6 +359,9 @@ def _synthesize(
     if refine and method != "preview" and laid is None:
         places = refine_places(a.image, a.wrap, filled, seed, watch)
     weight = screening if laid is not None else 0.0
-    result = compose(a, b, match, warp, draft, filled, places, label, method=method, seed=seed, screening=weight)
+    light = scene.light if scene is not None else None
+    result = compose(
+        a, b, match, warp, draft, filled, places, label, method=method, seed=seed, screening=weight, light=light
+    )
     watch("done", 1.0)
     return result

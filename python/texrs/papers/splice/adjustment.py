@@ -29,10 +29,13 @@ STRAIN = {Layout.CONNECTED: 0.45, Layout.JOINTED: 0.3}
 walls."""
 
 
-def adjust_targets(a: Elements, match: Match, *, snap: bool) -> Match:
-    """Give disjoint elements room; bring those of a connected figure to rows, if asked to, and limit how it is strained."""
+def adjust_targets(a: Elements, match: Match, *, snap: bool, part: bool = False) -> Match:
+    """Give disjoint elements room; bring those of a connected figure to rows, if asked to, and limit how it is strained.
+
+    Where they go but a ``part`` of their way, disjoint elements that touch may go on doing so.
+    """
     if a.layout == Layout.DISJOINT:
-        return separate_targets(a, match)
+        return separate_targets(a, match, starts=match.starts if part else None)
     return limit_strain(a, straighten_rows(match) if snap else match)
 
 
@@ -48,10 +51,13 @@ def straighten_rows(match: Match) -> Match:
     return replace(match, targets=snapped)
 
 
-def separate_targets(a: Elements, match: Match, *, rounds: int = 12, room: float = 1.0) -> Match:
+def separate_targets(
+    a: Elements, match: Match, *, rounds: int = 12, room: float = 1.0, starts: Points | None = None
+) -> Match:
     """Push targets apart where the disjoint elements that go there would lie over each other.
 
-    Elements are seen as convex: each pair is pushed along the line between its targets.
+    Elements are seen as convex: each pair is pushed along the line between its targets, but no farther than it was at its
+    ``starts``, where some are given; NaN for those that were nowhere.
     """
     from scipy.spatial import cKDTree
 
@@ -68,7 +74,10 @@ def separate_targets(a: Elements, match: Match, *, rounds: int = 12, room: float
         away = at[second] - at[first]
         length = np.maximum(np.hypot(*away.T), 1e-9)
         ray = np.rint(np.arctan2(away[:, 0], away[:, 1]) / (2 * math.pi) * 32).astype(np.intp) % 32
-        lack = mine[first, ray] + mine[second, (ray + 16) % 32] + room - length
+        apart = mine[first, ray] + mine[second, (ray + 16) % 32] + room
+        if starts is not None:
+            apart = np.fmin(apart, np.hypot(*(starts[second] - starts[first]).T))
+        lack = apart - length
         close = lack > 0.5
         if not close.any():
             break

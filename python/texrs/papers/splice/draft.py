@@ -9,7 +9,7 @@ from texrs._typing import Bools
 from texrs.elements import Elements, Layout
 from texrs.papers.splice.backward_warp import BackwardWarp
 from texrs.papers.splice.deformation import find_rigid_shifts
-from texrs.papers.splice.foreground import split_foreground
+from texrs.papers.splice.foreground import Foreground, split_foreground
 from texrs.papers.splice.matching import Match
 from texrs.papers.splice.refine import Draft
 
@@ -32,6 +32,8 @@ def draft_pixels(a: Elements, match: Match, warp: BackwardWarp, *, whole: bool) 
     if whole and a.layout == Layout.DISJOINT:
         label, drawn_out = _label_elements(match, warp, at)
         known = known & ~drawn_out
+        if not extension.originals:
+            _add_cut(match, split_foreground(a), places, label, known, mirrored)
         kinds = ((split_foreground(a).region > 0) | a.mask).astype(np.uint8)
         return Draft(places, known, stays | (label > 0), kinds, np.zeros(known.shape, np.uint8), mirrored), label
     kinds = np.asarray(~a.mask if a.layout == Layout.JOINTED else a.mask).astype(np.uint8)
@@ -58,6 +60,21 @@ def _label_elements(match: Match, warp: BackwardWarp, at: NDArray[np.intp]) -> t
     drawn_out = (number > 0) & ~here
     label[drawn_out] = 0
     return label, drawn_out
+
+
+def _add_cut(
+    match: Match, parts: Foreground, places: NDArray[np.int32], label: Labels, known: Bools, mirrored: Bools
+) -> None:
+    """Add elements that the border cuts, which stay where they are: the mesh knows none of them."""
+    element = match.extension.element[match.assigned]
+    number = np.zeros(len(parts.points) + 1, np.uint32)
+    for k in np.flatnonzero(~parts.whole[element]).tolist():
+        number[element[k] + 1] = k + 1
+    if number.any():
+        new = np.where(label == 0, number[parts.region], 0).astype(np.uint32)
+        at = new > 0
+        label[at], known[at], mirrored[at] = new[at], True, False
+        places[at] = np.argwhere(at)
 
 
 def _mark_copied(places: NDArray[np.int32], mirrored: Bools, known: Bools) -> Bools:

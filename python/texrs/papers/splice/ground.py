@@ -1,10 +1,13 @@
 """The ground between separate elements, made anew for a splice: neither warped nor averaged.
 
-The texture's ground is completed where its elements lie, and grown to the size of the result by the stitcher. Each element
-is then cut into it with its matte: what around an element looks as around the others, its shadow and its highlights.
+The texture's ground is completed where its elements lie, and grown by the stitcher where the result is larger. Each element
+is then cut into it with its matte: what around an element looks as around the others, its shadow and its highlights. All of
+it in even light (`light`).
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +23,11 @@ from texrs.growth.start import OVERLAP, weights_of
 from texrs.kernels.seam import cut
 from texrs.layouts import spacing
 from texrs.papers.splice.foreground import Foreground, split_foreground
+from texrs.papers.splice.light import Light, measure_light
 from texrs.papers.splice.matching import Match
 from texrs.papers.splice.refine import Draft, fill_with_patches
 
-__all__ = ["lay_ground"]
+__all__ = ["ENOUGH", "Scene", "cut_in", "lay_ground", "survey"]
 
 BESIDE = 3
 """Pixels around an element in which it is cut into the ground in any case."""
@@ -46,14 +50,46 @@ CANDIDATES = 4
 """Places that are tried for each patch of the ground."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """A texture of separate elements, and what of it is whose.
+
+    Attributes
+    ----------
+    a : Elements
+        The texture, in even light.
+    light : Light or None
+        What was taken off; None where its light was even.
+    own : (h, w) int32
+        The element that a pixel belongs to, counted from 1, as its own or in its matte or beside that; 0 for ground, -1 for
+        scraps of foreground that are of none.
+    certain : (h, w) bool
+        Where a matte is beyond doubt.
+
+    """
+
+    a: Elements
+    light: Light | None
+    own: NDArray[np.int32]
+    certain: Bools
+
+
+def survey(a: Elements) -> Scene:
+    """Tell elements with their mattes from ground, and take off what light there is on them."""
+    parts = split_foreground(a)
+    own, certain = find_owners(guidance(as_image(a.image)), a, parts)
+    light = measure_light(a, own == 0, parts.core)
+    return Scene(a if light is None else replace(a, image=light.even), light, own, certain)
+
+
 def lay_ground(
-    a: Elements, match: Match, draft: Draft, label: NDArray[np.uint32], seed: int, watch: Progress
+    scene: Scene, match: Match, draft: Draft, label: NDArray[np.uint32], seed: int, watch: Progress
 ) -> Draft | None:
     """Return the places of a splice whose elements lie where a draft has them, on a ground of its own.
 
     Parameters
     ----------
-    a : Elements
+    scene : Scene
         The texture: its elements are separate.
     match : Match
         Which element is where.
@@ -72,31 +108,82 @@ def lay_ground(
         None where the texture shows too little of its ground, and where it is moved as a whole.
 
     """
-    if (match.shift == match.shift[0]).all():
+    sized = label.shape == scene.own.shape
+    if (match.shift == match.shift[0]).all() and (match.shift.any() or not sized):
         return None
-    parts = split_foreground(a)
-    guide = guidance(as_image(a.image))
-    own, certain = find_owners(guide, a, parts)
-    bare = complete_ground(a, own, seed, watch)
+    bare = complete_ground(scene.a, scene.own, seed, watch)
     if bare is None:
         return None
-    ground = grow_ground(a, bare, label.shape, seed, watch)
-    carried, offered = carry_mattes(match, draft, label, own)
+    ground = grow_ground(scene.a, bare, label.shape, seed, watch)
+    element = np.concatenate([[-1], match.extension.element[match.assigned]])[label]
+    places = cut_in(scene, ground, draft.places, label, element, mirrored=draft.mirrored)
+    if sized:
+        keep_still(scene, places, label, element)
+    everywhere = np.ones(label.shape, bool)
+    mirrored = draft.mirrored & (label > 0)[..., np.newaxis]
+    return Draft(places, everywhere, everywhere, draft.kinds, draft.wanted, mirrored)
+
+
+def keep_still(scene: Scene, places: NDArray[np.int32], label: NDArray[np.uint32], element: NDArray[np.intp]) -> None:
+    """Leave elements that do not move as they are, with all around them; scraps, where none does."""
+    here = np.moveaxis(np.indices(label.shape, np.int32), 0, -1)
+    moved = np.zeros(int(label.max()) + 1, bool)
+    moved[label[(places != here).any(axis=-1) & (label > 0)]] = True
+    stays = np.zeros(int(scene.own.max()) + 2, bool)
+    stays[element[(label > 0) & ~moved[label]] + 1] = True
+    # The last stands for scraps.
+    stays[-1] = not moved.any()
+    still = stays[scene.own] & (scene.own != 0) & ~moved[label]
+    places[still] = here[still]
+
+
+def cut_in(
+    scene: Scene,
+    ground: NDArray[np.int32],
+    places: NDArray[np.int32],
+    label: NDArray[np.uint32],
+    element: NDArray[np.intp],
+    *,
+    mirrored: Bools | None = None,
+    room: Bools | None = None,
+) -> NDArray[np.int32]:
+    """Cut elements into a ground, each with its matte; a shadow stays whole.
+
+    Parameters
+    ----------
+    scene : Scene
+        The texture.
+    ground : (H, W, 2) int32
+        Where the pixels of the ground come from.
+    places : (H, W, 2) int32
+        Where those of elements do.
+    label : (H, W) uint32
+        Which pixels are of an element that is to be cut in: not 0.
+    element : (H, W) int
+        Which of the texture's elements that is.
+    mirrored : (H, W, 2) bool, optional
+        Along which axes it is mirrored.
+    room : (H, W) bool, optional
+        Where a matte may be; everywhere by default.
+
+    """
+    carried, offered = carry_mattes(places, label, element, scene.own, mirrored)
+    if room is not None:
+        offered &= room
+    guide = guidance(as_image(scene.a.image))
     here, there = (guide[p[..., 0], p[..., 1]] for p in (ground, carried))
     elements = label > 0
     everywhere = np.ones(label.shape, bool)
-    # A shadow stays whole: cuts run around it.
-    core = elements | (offered & certain[carried[..., 0], carried[..., 1]])
+    # Cuts run around a shadow.
+    core = elements | (offered & scene.certain[carried[..., 0], carried[..., 1]])
     taken = cut(here, there, everywhere, offered | elements, core_b=core, cost="paper").mask | elements
-    places = np.where(taken[..., np.newaxis], carried, ground).astype(np.int32)
-    mirrored = draft.mirrored & elements[..., np.newaxis]
-    return Draft(places, everywhere, everywhere, draft.kinds, draft.wanted, mirrored)
+    return np.where(taken[..., np.newaxis], carried, ground).astype(np.int32)
 
 
 def find_owners(guide: Floats, a: Elements, parts: Foreground) -> tuple[NDArray[np.int32], Bools]:
     """Return the element, counted from 1, that each pixel of the texture belongs to, and where that is certain.
 
-    A pixel may be the element's own, or in its matte or beside that; all else is ground, 0.
+    A pixel may be the element's own, or in its matte or beside that; all else is ground, 0, but for scraps, -1.
     """
     from scipy.ndimage import binary_dilation, distance_transform_edt
 
@@ -109,7 +196,8 @@ def find_owners(guide: Floats, a: Elements, parts: Foreground) -> tuple[NDArray[
     rows, columns = np.moveaxis(np.clip(offset, 0, len(matte) - 1), -1, 0)
     certain = within & matte[rows, columns]
     beside = within & binary_dilation(matte, iterations=GROWN)[rows, columns]
-    return np.where((away <= BESIDE) | beside, nearest, 0).astype(np.int32), certain
+    scraps = binary_dilation(a.mask & (parts.region == 0), iterations=BESIDE)
+    return np.where((away <= BESIDE) | beside, nearest, np.where(scraps, -1, 0)).astype(np.int32), certain
 
 
 def measure_matte(guide: Floats, a: Elements, parts: Foreground, away: Floats) -> Bools:
@@ -146,7 +234,7 @@ def measure_matte(guide: Floats, a: Elements, parts: Foreground, away: Floats) -
 
 def complete_ground(a: Elements, own: NDArray[np.int32], seed: int, watch: Progress) -> NDArray[np.int32] | None:
     """Return where each pixel of the texture's ground comes from, elements and mattes filled with what is neither."""
-    hole = own > 0
+    hole = own != 0
     if (~hole).mean() < ENOUGH:
         return None
     places = np.moveaxis(np.indices(hole.shape, np.int32), 0, -1)
@@ -159,7 +247,13 @@ def complete_ground(a: Elements, own: NDArray[np.int32], seed: int, watch: Progr
 def grow_ground(
     a: Elements, bare: NDArray[np.int32], size: tuple[int, ...], seed: int, watch: Progress
 ) -> NDArray[np.int32]:
-    """Return where each pixel of a ground of some size comes from: patches of the completed one, cut together."""
+    """Return where each pixel of a ground of some size comes from: the completed one, or patches of it, cut together.
+
+    Where the completed one is large enough it is taken as it lies: of several patches the smoothest fits best.
+    """
+    if all(n <= m for n, m in zip(size, bare.shape, strict=False)):
+        first = [(m - n) // 2 for n, m in zip(size, bare.shape, strict=False)]
+        return bare[first[0] : first[0] + size[0], first[1] : first[1] + size[1]]
     shown = np.asarray(a.image)[bare[..., 0], bare[..., 1]]
     exemplar = Exemplar(shown, labels=False, repeat=a.wrap)
     region = Region.whole((size[0], size[1]))
@@ -179,17 +273,22 @@ def grow_ground(
 
 
 def carry_mattes(
-    match: Match, draft: Draft, label: NDArray[np.uint32], own: NDArray[np.int32]
+    places: NDArray[np.int32],
+    label: NDArray[np.uint32],
+    element: NDArray[np.intp],
+    own: NDArray[np.int32],
+    mirrored: Bools | None,
 ) -> tuple[NDArray[np.int32], Bools]:
     """Return where pixels would come from that are of an element or beside one, and which of those are of its matte."""
     from scipy.ndimage import distance_transform_edt
 
     near = distance_transform_edt(label == 0, return_distances=False, return_indices=True)
-    step = np.stack(np.indices(label.shape) - near, axis=-1)
-    there = draft.places[tuple(near)] + step
+    there = places[tuple(near)] + np.stack(np.indices(label.shape) - near, axis=-1)
     limits = np.array(own.shape)
-    inside = ((there >= 0) & (there < limits)).all(axis=-1) & ~draft.mirrored[tuple(near)].any(axis=-1)
+    inside = ((there >= 0) & (there < limits)).all(axis=-1)
+    if mirrored is not None:
+        inside &= ~mirrored[tuple(near)].any(axis=-1)
     carried = np.clip(there, 0, limits - 1).astype(np.int32)
-    carried[label > 0] = draft.places[label > 0]
-    element = np.concatenate([[-1], match.extension.element[match.assigned]])[label[tuple(near)]] + 1
-    return carried, inside & (own[carried[..., 0], carried[..., 1]] == element) & (element > 0)
+    carried[label > 0] = places[label > 0]
+    whose = np.where(label > 0, element + 1, 0)[tuple(near)]
+    return carried, inside & (own[carried[..., 0], carried[..., 1]] == whose) & (whose > 0)

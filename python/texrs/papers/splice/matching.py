@@ -22,7 +22,17 @@ from texrs.papers.splice.entry import remember
 from texrs.papers.splice.extension import Extension, count_elements, extend, lay_out
 from texrs.papers.splice.foreground import split_foreground
 
-__all__ = ["Match", "find_turns", "go_part_of_the_way", "list_element_points", "match_edit", "match_layouts"]
+__all__ = [
+    "Edit",
+    "Match",
+    "edit_layout",
+    "find_turns",
+    "go_part_of_the_way",
+    "keep_cut",
+    "list_element_points",
+    "match_edit",
+    "match_layouts",
+]
 
 Points = NDArray[np.float64]
 
@@ -152,6 +162,44 @@ def go_part_of_the_way(a: Elements, match: Match, strength: float) -> Match:
     return replace(match, targets=targets, assigned=assigned)
 
 
+def keep_cut(a: Elements, match: Match, strength: float) -> Match:
+    """Let elements that the border cuts stay where there is room for them: at no strength all, at the full one none.
+
+    They cannot go anywhere else, and without them a texture's own layout would have a bare margin.
+    """
+    parts, extension = split_foreground(a), match.extension
+    if not strength:
+        # Copies beyond the border would reach into the picture.
+        own = ((match.targets >= 0) & (match.targets <= np.array(a.mask.shape) - 1)).all(axis=1)
+        kept = None if match.wanted is None else match.wanted[own]
+        match = replace(match, targets=match.targets[own], assigned=match.assigned[own], wanted=kept)
+    cut = np.flatnonzero(parts.present & ~parts.whole)
+    if not len(cut):
+        return match
+    area = np.bincount(parts.core.ravel(), minlength=len(parts.points) + 1)[1:]
+    radius = np.sqrt(area / math.pi)
+    points = parts.points[cut]
+    away = np.hypot(*np.moveaxis(points[:, None] - match.targets[None], -1, 0))
+    apart = np.hypot(*np.moveaxis(points[:, None] - match.starts[None], -1, 0))
+    wide = radius[cut][:, None] + radius[extension.element[match.assigned]][None]
+    room = (away - np.minimum(wide, apart)).min(axis=1)
+    order = np.argsort(-room, kind="stable")[: round((1 - strength) * len(cut))]
+    stays = np.sort(order[room[order] > -0.5])
+    count = len(extension.points)
+    extension = replace(
+        extension,
+        points=np.concatenate([extension.points, points[stays]]),
+        element=np.concatenate([extension.element, cut[stays]]),
+    )
+    return replace(
+        match,
+        extension=extension,
+        targets=np.concatenate([match.targets, points[stays]]),
+        assigned=np.concatenate([match.assigned, count + np.arange(len(stays))]),
+        wanted=None if match.wanted is None else np.concatenate([match.wanted, points[stays]]),
+    )
+
+
 def find_turns(a: Elements, b: Elements) -> list[float]:
     """Return the turns, in degrees, that bring a direction in which B's points line up to one of A's; none is the first."""
     mine, theirs = (t.directions or find_directions(t) for t in (a, b))
@@ -217,8 +265,46 @@ def _extend_until(a: Elements, size: tuple[int, int], unit: float, needed: float
 # --- edits -----------------------------------------------------------------------------------------------------------
 
 
-def match_edit(a: Elements, steps: Sequence[Step]) -> tuple[Match, bool]:
-    """Match a texture with its own layout, edited; also tell whether the edit only lists moved points."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Edit:
+    """A texture's own layout, edited, on the texture as it goes on beyond its borders.
+
+    Attributes
+    ----------
+    extension : Extension
+        The texture beyond its borders, with all elements of the picture itself.
+    points : (n, 2) float64
+        Where each of its elements is to be.
+    kept : (n) bool
+        False where it is taken away.
+    inwards : (n) bool
+        Which ones the border cuts whose straight edges would come into the picture.
+    together : bool
+        Whether the picture is moved as a whole.
+    listed : bool
+        Whether the edit only lists moved points.
+    ruled : bool
+        Whether it moves elements by a rule, which knows nothing of their sizes.
+    cyclic : (bool, bool)
+        Along which axes the edited layout goes around.
+    shrink : float
+        What the layout is scaled down by; 1 where it is not.
+
+    """
+
+    extension: Extension
+    points: Points
+    kept: NDArray[np.bool_]
+    inwards: NDArray[np.bool_]
+    together: bool
+    listed: bool
+    ruled: bool
+    cyclic: tuple[bool, bool]
+    shrink: float
+
+
+def edit_layout(a: Elements, steps: Sequence[Step]) -> Edit:
+    """Edit a texture's own layout, as far beyond its borders as anything may come in."""
     if a.layout != Layout.DISJOINT and any(step["op"] == "remove" for step in steps):
         raise InvalidInput(
             f"edit: remove needs separate elements; those of a are {a.layout.value}, and what joins them stays"
@@ -234,24 +320,32 @@ def match_edit(a: Elements, steps: Sequence[Step]) -> tuple[Match, bool]:
     margin = (MARGIN if shrink == 1 else 2 * MARGIN) * spacing(points) + far
     extension = extend(a, size, math.ceil(margin), whole=False, exact=shrink == 1)
     edited = apply_steps(extension.points, extension.originals, steps, len(a.points))
-    kept = edited.kept.copy()
+    shift = edited.points - extension.points
+    inwards = np.zeros(len(shift), bool)
     if a.layout == Layout.DISJOINT:
-        shift = edited.points - extension.points
-        cut = split_foreground(a).cut[extension.element]
-        # The straight edge of an element that the border cuts must not come into the picture.
-        # But where all goes one way the picture is moved as it is.
-        together = bool((np.ptp(shift, axis=0) < 1e-9).all())
-        inwards = (cut[:, :, 0] & (shift > 0.5)) | (cut[:, :, 1] & (shift < -0.5))
-        kept[: extension.originals] &= together | ~inwards[: extension.originals].any(axis=1)
+        own = slice(extension.originals)
+        cut = split_foreground(a).cut[extension.element[own]]
+        inwards[own] = ((cut[:, :, 0] & (shift[own] > 0.5)) | (cut[:, :, 1] & (shift[own] < -0.5))).any(axis=1)
+    together = bool((np.ptp(shift, axis=0) < 1e-9).all())
+    names = {step["op"] for step in steps}
+    ruled = bool(names & {"scale", "rows", "randomise", "regularise"})
+    cyclic = (False, False) if "scale" in names else a.wrap
+    return Edit(extension, edited.points, edited.kept, inwards, together, edited.listed, ruled, cyclic, shrink)
+
+
+def match_edit(a: Elements, edit: Edit) -> Match:
+    """Match a texture with its own layout, edited: what the border cuts does not come in, unless all goes one way."""
+    kept = edit.kept & (edit.together | ~edit.inwards)
     assigned = np.flatnonzero(kept)
     if not len(assigned):
         raise InvalidInput("edit: leaves no element")
-    moved = edited.points[assigned]
-    if shrink < 1 and a.layout == Layout.DISJOINT:
-        left = edited.points[np.flatnonzero(edited.kept & ~kept)]
-        moved = _fill_sites(left, moved, size, shrink * spacing(points), 0.5 * max(a.box) + 2)
-    cost = float(((moved - extension.points[assigned]) ** 2).sum(axis=1).mean())
-    return Match(moved, extension, assigned, 1.0, 0.0, 1.0, cost), edited.listed
+    moved = edit.points[assigned]
+    if edit.shrink < 1 and a.layout == Layout.DISJOINT:
+        left = edit.points[np.flatnonzero(edit.kept & ~kept)]
+        size = (a.mask.shape[0], a.mask.shape[1])
+        moved = _fill_sites(left, moved, size, edit.shrink * spacing(list_element_points(a)), 0.5 * max(a.box) + 2)
+    cost = float(((moved - edit.extension.points[assigned]) ** 2).sum(axis=1).mean())
+    return Match(moved, edit.extension, assigned, 1.0, 0.0, 1.0, cost)
 
 
 def _fill_sites(sites: Points, moved: Points, size: tuple[int, int], unit: float, radius: float) -> Points:

@@ -46,9 +46,9 @@ class Stages(Mapping[str, Array]):
 
 
 def draw_stages(
-    a: Elements, b: Elements | None, match: Match, target: Points, draft: Draft, filled: Draft, image: Array
+    a: Elements, b: Elements | None, match: Match, target: Points | None, draft: Draft, filled: Draft, image: Array
 ) -> Stages:
-    """Return the stages of a splice, or of an edit, which has no ``b``."""
+    """Return the stages of a splice, or of an edit, which has no ``b``; where nothing was warped there is no ``target``."""
     extension = match.extension
     origin = np.array(extension.origin)
     shown = to_picture(a.image)
@@ -60,7 +60,10 @@ def draw_stages(
         "matching": lambda: draw_lines(
             shown[extension.pixel[..., 0], extension.pixel[..., 1]], match.starts - origin, match.targets - origin
         ),
-        "warped mesh": lambda: draw_mesh(target, extension.mask, draft.known.shape),
+    }
+    if target is not None:
+        draw["warped mesh"] = lambda: draw_mesh(target, extension.mask, draft.known.shape)
+    draw |= {
         "before refinement": lambda: show_draft(shown, draft),
         "filled": lambda: shown[filled.places[..., 0], filled.places[..., 1]],
         "composite": lambda: image,

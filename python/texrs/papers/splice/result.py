@@ -7,14 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._typing import Bools
+from texrs._typing import Array, Bools
 from texrs.blending import blend
 from texrs.elements import Elements, Layout
 from texrs.papers.splice.backward_warp import BackwardWarp
 from texrs.papers.splice.energy import choose_coarseness
 from texrs.papers.splice.interpolation import STEP
+from texrs.papers.splice.light import Light
 from texrs.papers.splice.matching import Match, list_element_points
 from texrs.papers.splice.pictures import draw_stages
+from texrs.papers.splice.rearrangement import Rearrangement
 from texrs.papers.splice.refine import Draft
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
@@ -38,18 +40,16 @@ def compose(
     method: str | None,
     seed: int,
     screening: float = 0.0,
+    light: Light | None = None,
 ) -> Synthesis:
     """Return the result of a splice from what its stages made."""
     shape = (a.mask.shape[0], a.mask.shape[1])
     size = label.shape
     frames = _make_frames(filled.mirrored)
     source = SourceMap.from_coordinates(places.astype(np.float32), shape, label=label, frame=frames)
-    # Between whole pixels nothing is looked up: "linear" is "nearest" that may be corrected.
-    image = (
-        blend(source, a.image, wrap=False, screening=screening, interpolation="linear")
-        if screening
-        else source.render(a.image, interpolation="nearest")
-    )
+    image = source.render(a.image, interpolation="nearest")
+    if screening:
+        image = correct_colours(a, source, screening, light, None if light is None else light.spread(size))
     step = STEP if a.layout == Layout.DISJOINT else choose_coarseness(match.extension.mask.shape)
     matches, realised = _list_matches(a, match)
     report: dict[str, Any] = {
@@ -68,6 +68,50 @@ def compose(
         "matches": matches,
     }
     return Synthesis(image, source, draw_stages(a, b, match, warp.target, draft, filled, image), report)
+
+
+def compose_edit(a: Elements, laid: Rearrangement, *, seed: int, screening: float) -> Synthesis:
+    """Return the result of an edit whose elements were rearranged."""
+    shape = (a.mask.shape[0], a.mask.shape[1])
+    source = SourceMap.from_coordinates(laid.filled.places.astype(np.float32), shape, label=laid.label)
+    image = source.render(a.image, interpolation="nearest")
+    if screening and laid.changed.any():
+        lit = correct_colours(a, source, screening, laid.light, laid.field, laid.changed)
+        image[laid.changed] = lit[laid.changed]
+    matches, realised = _list_matches(a, laid.match)
+    report: dict[str, Any] = {
+        "method": "default",
+        "seed": seed,
+        "size": list(shape),
+        "layout": a.layout.value,
+        **laid.match.report(),
+        "realised": realised,
+        "blend": screening,
+        "holes": float(1 - laid.draft.known.mean()),
+        "triangles": 0,
+        "flipped": 0.0,
+        "flipped_rigid": 0.0,
+        "changed": float(laid.changed.mean()),
+        "matches": matches,
+    }
+    return Synthesis(image, source, draw_stages(a, None, laid.match, None, laid.draft, laid.filled, image), report)
+
+
+def correct_colours(
+    a: Elements,
+    source: SourceMap,
+    screening: float,
+    light: Light | None,
+    field: NDArray[np.float32] | None,
+    within: Bools | None = None,
+) -> Array:
+    """Return the picture of a source map in the light that is to fall on it, with its seams made to disappear."""
+    # Between whole pixels nothing is looked up: "linear" is "nearest" that may be corrected.
+    shown = a.image if light is None else light.even
+    image = blend(source, shown, wrap=False, screening=screening, within=within, interpolation="linear")
+    if light is None or field is None:
+        return image
+    return light.put_back(image, field, source.coordinates.astype(np.int32), a.image)
 
 
 def _make_frames(mirrored: Bools) -> NDArray[np.float32] | None:
