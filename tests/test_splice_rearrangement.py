@@ -59,6 +59,27 @@ def test_all_but_one_element_keeps_its_bytes(op: str) -> None:
     assert 0 < result.report["changed"] < 0.05
 
 
+def test_moved_elements_keep_their_colours_above_others() -> None:
+    one = find_middle(BUTTONS)
+    other = int(np.argsort(np.hypot(*(BUTTONS.points - BUTTONS.points[one]).T))[1])
+    step = {"op": "move", "element": one, "to": (BUTTONS.points[other] + [5, 3]).tolist()}
+    result = texrs.self_splice(BUTTONS, step, seed=1)
+    rows, columns = np.moveaxis(result.source.coordinates.astype(int), -1, 0)
+    core = split_foreground(BUTTONS).core[rows, columns] == one + 1
+    assert core.sum() > 100
+    np.testing.assert_array_equal(result.image[core], BUTTONS.image[rows, columns][core])
+
+
+@pytest.mark.parametrize("edit", [{"op": "rows", "by": 12}, {"op": "shift", "by": 14}, {"op": "scale", "factor": 0.85}])
+def test_margins_of_dense_textures_are_full(edit: dict[str, Any]) -> None:
+    """Of pebbles hardly any ground is seen; the layout goes on, and is not reflected at pixels."""
+    stones = Elements.of_sample(samples.load("pebbles", size=(192, 192)))
+    result = texrs.self_splice(stones, edit, seed=1)
+    shown = result.source.label > 0
+    sides = (shown[:16], shown[-16:], shown[:, :16], shown[:, -16:])
+    assert min(side.mean() for side in sides) > 0.6 * shown[32:-32, 32:-32].mean()
+
+
 def test_what_was_removed_leaves_ground_alone() -> None:
     mine = make_discs(light=0.5)
     one = find_middle(mine)

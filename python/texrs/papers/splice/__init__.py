@@ -305,12 +305,12 @@ def self_splice(
     watch = progress or (lambda stage, share: None)
     mine, number = as_elements(a, "a", watch), as_seed(seed)
     steps, screening = as_steps(edit, number), _as_screening(blend)
-    edited = edit_layout(mine, steps)
-    laid = rearrange(mine, edited, number, watch) if method is None and mine.layout == Layout.DISJOINT else None
+    laid = rearrange(mine, steps, number, watch) if method is None and mine.layout == Layout.DISJOINT else None
     if laid is not None:
         result = compose_edit(mine, laid, seed=number, screening=screening)
         watch("done", 1.0)
     else:
+        edited = edit_layout(mine, steps)
         result = _synthesize(
             mine,
             None,

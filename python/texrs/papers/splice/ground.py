@@ -74,10 +74,16 @@ class Scene:
     certain: Bools
 
 
-def survey(a: Elements) -> Scene:
-    """Tell elements with their mattes from ground, and take off what light there is on them."""
+def survey(a: Elements, *, narrow: bool = False) -> Scene:
+    """Tell elements with their mattes from ground, and take off what light there is on them.
+
+    With ``narrow`` they have no mattes where these would leave too little ground.
+    """
     parts = split_foreground(a)
     own, certain = find_owners(guidance(as_image(a.image)), a, parts)
+    if narrow and (own == 0).mean() < ENOUGH:
+        own = np.where(parts.region > 0, parts.region, np.where(a.mask, -1, 0)).astype(np.int32)
+        certain = np.zeros(own.shape, bool)
     light = measure_light(a, own == 0, parts.core)
     return Scene(a if light is None else replace(a, image=light.even), light, own, certain)
 

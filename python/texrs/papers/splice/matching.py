@@ -303,8 +303,11 @@ class Edit:
     shrink: float
 
 
-def edit_layout(a: Elements, steps: Sequence[Step]) -> Edit:
-    """Edit a texture's own layout, as far beyond its borders as anything may come in."""
+def edit_layout(a: Elements, steps: Sequence[Step], *, labels: bool = False) -> Edit:
+    """Edit a texture's own layout, as far beyond its borders as anything may come in.
+
+    With ``labels`` the layout alone goes on there, also where the border cuts elements, and not the picture.
+    """
     if a.layout != Layout.DISJOINT and any(step["op"] == "remove" for step in steps):
         raise InvalidInput(
             f"edit: remove needs separate elements; those of a are {a.layout.value}, and what joins them stays"
@@ -319,6 +322,15 @@ def edit_layout(a: Elements, steps: Sequence[Step]) -> Edit:
     # Where a layout shrinks, borders come in: there must be elements to send there.
     margin = (MARGIN if shrink == 1 else 2 * MARGIN) * spacing(points) + far
     extension = extend(a, size, math.ceil(margin), whole=False, exact=shrink == 1)
+    if labels:
+        layout = PointLayout.of(points, size, a.wrap, beyond=True)
+        places, of, _ = layout.within(np.full(2, -margin), np.array(size) + margin)
+        new = (places != points[of]).any(axis=1)
+        extension = replace(
+            extension,
+            points=np.concatenate([points, places[new]]),
+            element=np.concatenate([np.arange(len(points)), of[new]]),
+        )
     edited = apply_steps(extension.points, extension.originals, steps, len(a.points))
     shift = edited.points - extension.points
     inwards = np.zeros(len(shift), bool)

@@ -8,6 +8,7 @@ picture goes on beyond its border, others than those that lie there: a mirrored 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,10 +19,11 @@ from texrs._typing import Bools, Floats, Progress
 from texrs.elements import Elements
 from texrs.layouts import spacing
 from texrs.papers.splice.adjustment import separate_targets
+from texrs.papers.splice.edit import Step
 from texrs.papers.splice.foreground import Foreground, split_foreground
-from texrs.papers.splice.ground import ENOUGH, Scene, cut_in, survey
+from texrs.papers.splice.ground import Scene, cut_in, survey
 from texrs.papers.splice.light import Light
-from texrs.papers.splice.matching import Edit, Match
+from texrs.papers.splice.matching import Edit, Match, edit_layout
 from texrs.papers.splice.refine import Draft, fill_with_patches
 
 __all__ = ["Rearrangement", "rearrange"]
@@ -29,7 +31,9 @@ __all__ = ["Rearrangement", "rearrange"]
 Points = NDArray[np.float64]
 Places = NDArray[np.int32]
 
-CROWDED = 0.85
+SEEN = 0.1
+"""Share of the texture that is ground enough to complete all of it: what is completed lies among what was there."""
+CROWDED = 0.75
 """Share of their radii that elements which come in must be away from others."""
 ALIKE = 5
 """Elements of about one size of which one that comes in is drawn."""
@@ -49,6 +53,8 @@ class Rearrangement:
         The target of each pixel of an element, counted from 1; 0 elsewhere.
     changed : (H, W) bool
         What does not stay as it is.
+    pasted : (H, W) bool
+        Where elements were put, without what lies around them.
     light : Light or None
         What was taken off the texture.
     field : (H, W, c) float32 or None
@@ -61,19 +67,20 @@ class Rearrangement:
     filled: Draft
     label: NDArray[np.uint32]
     changed: Bools
+    pasted: Bools
     light: Light | None
     field: Floats | None
 
 
-def rearrange(a: Elements, edit: Edit, seed: int, watch: Progress) -> Rearrangement | None:
+def rearrange(a: Elements, steps: Sequence[Step], seed: int, watch: Progress) -> Rearrangement | None:
     """Put the elements of a texture where an edit has them; None where too little of its ground is seen.
 
     Parameters
     ----------
     a : Elements
         The texture: its elements are separate.
-    edit : Edit
-        Its layout, edited.
+    steps : sequence
+        The edit, as `as_steps` returns it.
     seed : int
         Chooses the elements that come in, and the patches that fill the ground.
     watch : callable
@@ -81,7 +88,8 @@ def rearrange(a: Elements, edit: Edit, seed: int, watch: Progress) -> Rearrangem
 
     """
     watch("match", 0.0)
-    parts, scene = split_foreground(a), survey(a)
+    edit = edit_layout(a, steps, labels=True)
+    parts, scene = split_foreground(a), survey(a, narrow=True)
     shift = (edit.points - edit.extension.points)[0] if edit.together else np.zeros(2)
     step = np.rint(shift).astype(np.intp)
     match, still = choose_elements(a, parts, edit, step, seed)
@@ -111,6 +119,7 @@ def rearrange(a: Elements, edit: Edit, seed: int, watch: Progress) -> Rearrangem
         replace(draft, places=whole, known=everywhere),
         np.where(pasted, label, rest),
         ~seen | (whole != base).any(axis=-1),
+        pasted & (parts.core[whole[..., 0], whole[..., 1]] > 0),
         light,
         None if light is None else light.field[base[..., 0], base[..., 1]],
     )
@@ -128,12 +137,12 @@ def move_picture(a: Elements, step: NDArray[np.intp]) -> tuple[Places, Bools]:
 def fill_holes(scene: Scene, base: Places, known: Bools, seed: int, watch: Progress) -> Places | None:
     """Return the places of a picture with its holes filled by ground; None where too little is seen of that.
 
-    As much of it as is to be filled is enough, as `lay_ground` has it for whole pictures.
+    As much of it as is to be filled is enough, and a share of the picture that is seen everywhere between elements.
     """
     ground, lack = scene.own == 0, float((~known).mean())
     if not lack:
         return base
-    if ground.mean() < min(ENOUGH, lack):
+    if ground.mean() < min(SEEN, lack):
         return None
     nothing = np.zeros(known.shape, np.uint8)
     draft = Draft(base, known, known, nothing, nothing, np.zeros((*known.shape, 2), bool))
@@ -155,7 +164,7 @@ def choose_elements(
     shown = ((edit.points > -wide) & (edit.points < size - 1 + wide)).all(axis=1) & (len(usable) > 0)
     # What did not move into the picture is not in it, and where it goes around, all of it is the picture's own.
     around = (np.abs(extension.points - parts.points[extension.element]) > 0.5) & edit.cyclic
-    shown &= (edit.points != extension.points).any(axis=1) & ~around.any(axis=1)
+    shown &= (np.rint(edit.points - extension.points) != 0).any(axis=1) & ~around.any(axis=1)
     chosen = np.flatnonzero(edit.kept & (shown | ~comes))
     # The last ones lie on top, and have the first choice of places.
     chosen = chosen[np.argsort(2 * ~comes[chosen] + edit.inwards[chosen], kind="stable")]

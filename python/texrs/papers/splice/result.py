@@ -76,7 +76,8 @@ def compose_edit(a: Elements, laid: Rearrangement, *, seed: int, screening: floa
     source = SourceMap.from_coordinates(laid.filled.places.astype(np.float32), shape, label=laid.label)
     image = source.render(a.image, interpolation="nearest")
     if screening and laid.changed.any():
-        lit = correct_colours(a, source, screening, laid.light, laid.field, laid.changed)
+        # Elements keep their colours, which another one that they cover would change.
+        lit = correct_colours(a, source, screening, laid.light, laid.field, laid.changed & ~laid.pasted)
         image[laid.changed] = lit[laid.changed]
     matches, realised = _list_matches(a, laid.match)
     report: dict[str, Any] = {
