@@ -33,6 +33,8 @@ Places = NDArray[np.int32]
 
 SEEN = 0.1
 """Share of the texture that is ground enough to complete all of it: what is completed lies among what was there."""
+BELOW = 3
+"""Pixels that ground reaches below elements, so that these are cut into it."""
 CROWDED = 0.75
 """Share of their radii that elements which come in must be away from others."""
 ALIKE = 5
@@ -103,10 +105,10 @@ def rearrange(a: Elements, steps: Sequence[Step], seed: int, watch: Progress) ->
     owner, region = (of[base[..., 0], base[..., 1]] for of in (scene.own, parts.region))
     known = seen & stays[owner]
     rest = np.where(known, number[region], 0).astype(np.uint32)
-    bare = fill_holes(scene, base, known, seed, watch)
+    label, places = paste_elements(parts, match, np.flatnonzero(~still), rest, edit.cyclic)
+    bare = fill_holes(scene, base, known, label > 0, seed, watch)
     if bare is None:
         return None
-    label, places = paste_elements(parts, match, np.flatnonzero(~still), rest, edit.cyclic)
     element = np.concatenate([[-1], match.assigned])[label]
     whole = cut_in(scene, bare, places, label, element, room=rest == 0) if label.any() else bare
     pasted, everywhere, light = label > 0, np.ones(known.shape, bool), scene.light
@@ -134,11 +136,16 @@ def move_picture(a: Elements, step: NDArray[np.intp]) -> tuple[Places, Bools]:
     return base.clip(0, limits - 1).astype(np.int32), np.asarray(inside, bool)
 
 
-def fill_holes(scene: Scene, base: Places, known: Bools, seed: int, watch: Progress) -> Places | None:
+def fill_holes(
+    scene: Scene, base: Places, known: Bools, pasted: Bools, seed: int, watch: Progress
+) -> Places | None:
     """Return the places of a picture with its holes filled by ground; None where too little is seen of that.
 
-    As much of it as is to be filled is enough, and a share of the picture that is seen everywhere between elements.
+    As much of it as is to be filled is enough, and a share of the picture that is seen everywhere between elements. Deep
+    below elements nothing is filled.
     """
+    from scipy.ndimage import binary_erosion
+
     ground, lack = scene.own == 0, float((~known).mean())
     if not lack:
         return base
@@ -146,7 +153,9 @@ def fill_holes(scene: Scene, base: Places, known: Bools, seed: int, watch: Progr
         return None
     nothing = np.zeros(known.shape, np.uint8)
     draft = Draft(base, known, known, nothing, nothing, np.zeros((*known.shape, 2), bool))
-    found = fill_with_patches(as_image(scene.a.image), draft, ground, spacing(scene.a.points), seed, watch)
+    hidden = binary_erosion(pasted, iterations=BELOW) & ~known
+    image = as_image(scene.a.image)
+    found = fill_with_patches(image, draft, ground, spacing(scene.a.points), seed, watch, hidden=hidden)
     return None if found is None else found.places
 
 

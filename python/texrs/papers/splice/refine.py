@@ -16,7 +16,7 @@ from texrs._engine.appearance import Corrected
 from texrs._engine.coherence import correct, jitter
 from texrs._engine.pyramid import ONE, Region, to_fixed
 from texrs._progress import stage
-from texrs._typing import Bools, Progress
+from texrs._typing import Bools, Floats, Progress
 from texrs.exemplar import Exemplar
 from texrs.exemplar.analysis import COARSEST
 from texrs.exemplar.patches import mark_corners
@@ -37,6 +37,13 @@ JITTER = 1.0
 PASSES = 2
 WIDE = 1.0
 """A hole wider than so many spacings is filled with patches; less is grown over from its boundary."""
+PATCH = 0.33
+"""Of the spacing: the side of those patches."""
+STROKE, ROUGH, MOST = 2.5, 1.05, 1.1
+"""How many times the usual gradient is an edge, and no roughness; how rough a patch must be, in that of the ground, as seams and
+the correction of colours smooth a twentieth away; and how much of roughness and edges together it may show."""
+CHOICE, FEWEST, PLENTY = 100, 32, 4000
+"""Patches to choose from, of those as rough as the ground; and of any; and how many are enough: of a plain ground all fit."""
 K, APART = 3, 0.05
 """Size of a similarity set, and how far apart its samples are, as a share of the shorter side."""
 
@@ -105,31 +112,83 @@ def fill(image: NDArray[np.generic], draft: Draft, scale: float, seed: int, prog
 
 
 def fill_with_patches(
-    image: NDArray[np.generic], draft: Draft, ground: Bools, scale: float, seed: int, progress: Progress | None
+    image: NDArray[np.generic],
+    draft: Draft,
+    ground: Bools,
+    scale: float,
+    seed: int,
+    progress: Progress | None,
+    *,
+    hidden: Bools | None = None,
 ) -> Draft | None:
-    """Return the draft with its holes filled by patches of the ground alone; none where it has no place for a patch."""
+    """Return the draft with its holes filled by patches of the ground alone; none where it has no place for a patch.
+
+    What is ``hidden`` will not be seen, and is not filled.
+    """
     guide = guidance(as_image(image))
-    for side in range(int(np.clip(scale / 2, 6, 24)), 3, -1):
-        allowed = mark_corners(ground, side)
-        if np.count_nonzero(allowed) >= 32:
-            break
-    else:
+    found = find_patches(guide, ground, scale)
+    if found is None:
         return None
-    colours = guide[draft.places[..., 0], draft.places[..., 1]]
-    index = PatchIndex([guide], allowed=[allowed], max_patch=side)
-    found = complete(
+    side, allowed = found
+    known, colours = draft.known, guide[draft.places[..., 0], draft.places[..., 1]]
+    if hidden is not None:
+        # As the ground is on the whole: no patch fits better or worse for it.
+        known, colours[hidden] = known | hidden, guide[ground].mean(axis=0)
+        if known.all():
+            return replace(draft, known=known)
+    filled = complete(
         colours,
-        draft.known,
-        index,
-        patch=min(side, *draft.known.shape),
-        keep=draft.known,
+        known,
+        PatchIndex([guide], allowed=[allowed], max_patch=side),
+        patch=min(side, *known.shape),
+        keep=known,
         seed=seed,
         progress=stage(progress, "fill"),
     )
-    places = draft.places.copy()
-    new = ~draft.known
-    places[new] = np.rint(found.coordinates[new]).astype(np.int32)
+    places, new = draft.places.copy(), ~known
+    places[new] = np.rint(filled.coordinates[new]).astype(np.int32)
     return replace(draft, places=places, known=np.ones_like(new), mirrored=draft.mirrored & draft.known[..., None])
+
+
+def find_patches(guide: Floats, ground: Bools, scale: float) -> tuple[int, Bools] | None:
+    """Return the side of patches of a ground, and the corners of those that may be copied.
+
+    Of noise the smoothest patches fit best, so that what is filled with any looks blurred. Taken are those that are as rough as
+    the ground is, and show no more of what lies about in it; any, where these are too few even of the smallest.
+    """
+    steep = np.sqrt(sum((np.gradient(guide, axis=axis) ** 2).sum(axis=-1) for axis in range(2)))
+    inner = mark_corners(ground, 3)
+    shown = steep[1:-1, 1:-1][inner[:-2, :-2]] if inner.any() else steep[ground]
+    rough = np.minimum(steep, STROKE * float(np.median(shown)) if shown.size else 0.0)
+    usual = (float(np.minimum(shown, rough.max()).mean()), float(shown.mean())) if shown.size else (0.0, 0.0)
+    first = int(np.clip(PATCH * scale, 6, 24))
+    for side in range(first, 3, -1):
+        noise, all_of_it = (average_windows(of, side) for of in (rough, steep))
+        fits = mark_corners(ground, side) & (noise >= ROUGH * usual[0] - 1e-5) & (all_of_it <= MOST * usual[1] + 1e-5)
+        if np.count_nonzero(fits) >= CHOICE:
+            return side, thin_out(fits)
+    for side in range(first, 3, -1):
+        allowed = mark_corners(ground, side)
+        if np.count_nonzero(allowed) >= FEWEST:
+            return side, thin_out(allowed)
+    return None
+
+
+def thin_out(places: Bools) -> Bools:
+    """Return so many of the places as are enough, evenly."""
+    at = np.flatnonzero(places)
+    out = np.zeros(places.shape, bool)
+    out.flat[at[:: -(-len(at) // PLENTY)]] = True
+    return out
+
+
+def average_windows(values: NDArray[np.floating], side: int) -> NDArray[np.float64]:
+    """Return the mean of each window by its first corner; 0 where it does not fit in."""
+    total = np.pad(np.asarray(values, np.float64).cumsum(0).cumsum(1), ((1, 0), (1, 0)))
+    out = np.zeros(values.shape)
+    means = (total[side:, side:] - total[:-side, side:] - total[side:, :-side] + total[:-side, :-side]) / side**2
+    out[: means.shape[0], : means.shape[1]] = means
+    return out
 
 
 def refine_places(
