@@ -35,12 +35,14 @@ def draw_overview() -> np.ndarray:
 def draw_decoupling() -> np.ndarray:
     """Figure 5: a wall in another layout. What its conditions decouple keeps joints upright; taken for a net, they lean.
 
-    The wall, and its figure bent as a wall; the same without the conditions, as a net whose lines are the joints; the default.
+    The wall, and its figure bent as a wall; the same without the conditions, as a net whose lines are the joints; the default,
+    and as printed.
     """
     wall, layout = entry("bricks"), entry("pebbles")
     net = Elements(wall.image, wall.points, ~wall.mask, wall.box, Layout.CONNECTED, wall.scores)
     bent = [texrs.splice(a, layout, seed=1, cells=False, nets=False).image for a in (wall, net)]
-    return beside([wall.image, *bent, texrs.splice(wall, layout, seed=1).image])
+    made = [texrs.splice(wall, layout, seed=1, method=method).image for method in (None, "paper")]
+    return beside([wall.image, *bent, *made])
 
 
 def draw_groups() -> np.ndarray:
@@ -68,7 +70,10 @@ def draw_matrix() -> np.ndarray:
 
 
 def draw_edits() -> np.ndarray:
-    """Figure 9: textures, and their own layouts edited: regular, wider, row by row, at random; one moved, one taken away."""
+    """Figure 9: textures, and their own layouts edited: regular, wider, row by row, at random; one moved, one taken away.
+
+    By default, and below it as printed.
+    """
     rows = []
     for name in ("dots", "leaves_and_flowers", "pebbles", "bricks"):
         mine = entry(name)
@@ -82,7 +87,9 @@ def draw_edits() -> np.ndarray:
         ]
         if mine.layout == Layout.DISJOINT:
             edits.append({"op": "remove", "element": middle})
-        rows.append(beside([mine.image, *(texrs.self_splice(mine, edit, seed=1).image for edit in edits)]))
+        for method in (None, "paper"):
+            made = [texrs.self_splice(mine, edit, seed=1, method=method).image for edit in edits]
+            rows.append(beside([mine.image, *made]))
     return below(rows)
 
 

@@ -243,7 +243,7 @@ def self_splice(
     edit: Edit,
     *,
     seed: int = 0,
-    method: Literal["preview"] | None = None,
+    method: Method = None,
     refine: bool = True,
     blend: float | None = SCREENING,
     progress: Progress | None = None,
@@ -265,8 +265,8 @@ def self_splice(
         defaults. The report's "edit" replays.
     seed : int
         Chooses random steps, the elements that come in over a border, what fills holes, and the noise of the refinement.
-    method : {None, "preview"}
-        "preview": triangles between the elements, drawn where these go; nothing is kept rigid or filled.
+    method : {None, "paper", "preview"}
+        "paper": figures deformed as printed, with holes where nothing comes in. "preview": triangles between the elements, drawn where these go; nothing is kept rigid or filled.
     refine : bool
         Whether to refine what is deformed: connected figures, and separate elements that show too little of their ground.
     blend : float, optional
@@ -301,7 +301,7 @@ def self_splice(
     [{'op': 'randomise', 'seed': 5}]
 
     """
-    as_method(method, None, "preview")
+    as_method(method, None, "paper", "preview")
     watch = progress or (lambda stage, share: None)
     mine, number = as_elements(a, "a", watch), as_seed(seed)
     steps, screening = as_steps(edit, number), _as_screening(blend)

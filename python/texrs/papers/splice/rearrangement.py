@@ -97,13 +97,12 @@ def rearrange(a: Elements, steps: Sequence[Step], seed: int, watch: Progress) ->
     match, still = choose_elements(a, parts, edit, step, seed)
     watch("match", 1.0)
     base, seen = move_picture(a, step)
-    # What stays is the ground, and elements that do not move; scraps, the last, where none comes in.
-    number = np.zeros(len(parts.points) + 2, np.uint32)
+    # What stays is the ground, and elements that do not move; and scraps whose straight edges do not come in.
+    number = np.zeros(len(parts.points) + 1, np.uint32)
     number[match.assigned[still] + 1] = np.flatnonzero(still) + 1
-    stays = number > 0
-    stays[0], stays[-1] = True, not step[~np.array(edit.cyclic)].any()
-    owner, region = (of[base[..., 0], base[..., 1]] for of in (scene.own, parts.region))
-    known = seen & stays[owner]
+    stays = (number[np.maximum(scene.own, 0)] > 0) | (scene.own == 0) | mark_scraps(scene.own, step, edit.cyclic)
+    known, region = (of[base[..., 0], base[..., 1]] for of in (stays, parts.region))
+    known &= seen
     rest = np.where(known, number[region], 0).astype(np.uint32)
     label, places = paste_elements(parts, match, np.flatnonzero(~still), rest, edit.cyclic)
     bare = fill_holes(scene, base, known, label > 0, seed, watch)
@@ -136,9 +135,20 @@ def move_picture(a: Elements, step: NDArray[np.intp]) -> tuple[Places, Bools]:
     return base.clip(0, limits - 1).astype(np.int32), np.asarray(inside, bool)
 
 
-def fill_holes(
-    scene: Scene, base: Places, known: Bools, pasted: Bools, seed: int, watch: Progress
-) -> Places | None:
+def mark_scraps(own: NDArray[np.int32], step: NDArray[np.intp], cyclic: tuple[bool, bool]) -> Bools:
+    """Mark the scraps of a texture that stay when it is moved: all but those at a border that comes in."""
+    from scipy.ndimage import label
+
+    pieces, count = label(own < 0)
+    stays = np.arange(count + 1) > 0
+    for axis in range(2):
+        if step[axis] and not cyclic[axis]:
+            side = np.arange(BELOW) if step[axis] > 0 else -1 - np.arange(BELOW)
+            stays[np.take(pieces, side, axis=axis)] = False
+    return np.asarray(stays[pieces], bool)
+
+
+def fill_holes(scene: Scene, base: Places, known: Bools, pasted: Bools, seed: int, watch: Progress) -> Places | None:
     """Return the places of a picture with its holes filled by ground; None where too little is seen of that.
 
     As much of it as is to be filled is enough, and a share of the picture that is seen everywhere between elements. Deep
@@ -173,7 +183,9 @@ def choose_elements(
     shown = ((edit.points > -wide) & (edit.points < size - 1 + wide)).all(axis=1) & (len(usable) > 0)
     # What did not move into the picture is not in it, and where it goes around, all of it is the picture's own.
     around = (np.abs(extension.points - parts.points[extension.element]) > 0.5) & edit.cyclic
-    shown &= (np.rint(edit.points - extension.points) != 0).any(axis=1) & ~around.any(axis=1)
+    shift = np.rint(edit.points - extension.points)
+    away = ((extension.points < 0) & (shift <= 0)) | ((extension.points > size - 1) & (shift >= 0))
+    shown &= (shift != 0).any(axis=1) & ~(around | (away & ~np.array(edit.cyclic))).any(axis=1)
     chosen = np.flatnonzero(edit.kept & (shown | ~comes))
     # The last ones lie on top, and have the first choice of places.
     chosen = chosen[np.argsort(2 * ~comes[chosen] + edit.inwards[chosen], kind="stable")]
