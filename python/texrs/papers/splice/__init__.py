@@ -42,7 +42,8 @@ Departures, with their reasons:
 - Edits of separate elements put these into their new places on the texture's own ground, completed where one was
   (`rearrangement`): what does not move keeps its bytes. Where an element that the border cuts would come in, a whole one takes
   its place. What follows of separate elements is for textures that show too little of their ground.
-- Wide holes are filled with patches of the ground; random pixels come out as noise there.
+- Wide holes are filled with patches of the ground, as rough as it is: random pixels come out as noise there, and of patches the
+  smoothest fit best, which looks blurred.
 - Refinement leaves what is rigid as it is, and so whatever the warp copied whole: there is nothing to mend. In its
   place nothing comes that is not ground itself.
 - Triangles between elements carry previews, and edits that list moved points: what moves then changes its neighbours alone.
@@ -266,7 +267,7 @@ def self_splice(
     seed : int
         Chooses random steps, the elements that come in over a border, what fills holes, and the noise of the refinement.
     method : {None, "paper", "preview"}
-        "paper": figures deformed as printed, with holes where nothing comes in. "preview": triangles between the elements, drawn where these go; nothing is kept rigid or filled.
+        "paper": as printed.
     refine : bool
         Whether to refine what is deformed: connected figures, and separate elements that show too little of their ground.
     blend : float, optional

@@ -101,9 +101,8 @@ def rearrange(a: Elements, steps: Sequence[Step], seed: int, watch: Progress) ->
     number = np.zeros(len(parts.points) + 1, np.uint32)
     number[match.assigned[still] + 1] = np.flatnonzero(still) + 1
     stays = (number[np.maximum(scene.own, 0)] > 0) | (scene.own == 0) | mark_scraps(scene.own, step, edit.cyclic)
-    known, region = (of[base[..., 0], base[..., 1]] for of in (stays, parts.region))
-    known &= seen
-    rest = np.where(known, number[region], 0).astype(np.uint32)
+    known = np.asarray(seen & stays[base[..., 0], base[..., 1]], bool)
+    rest = np.where(known, number[parts.region[base[..., 0], base[..., 1]]], 0).astype(np.uint32)
     label, places = paste_elements(parts, match, np.flatnonzero(~still), rest, edit.cyclic)
     bare = fill_holes(scene, base, known, label > 0, seed, watch)
     if bare is None:

@@ -40,8 +40,8 @@ WIDE = 1.0
 PATCH = 0.33
 """Of the spacing: the side of those patches."""
 STROKE, ROUGH, MOST = 2.5, 0.95, 1.1
-"""How many times the usual gradient is an edge, and no roughness; how rough a patch must be, in that of the ground; and how much
-of roughness and edges together it may show."""
+"""How many times the usual gradient is an edge, and no roughness; how rough a patch must be, in that of the ground; how much of
+roughness and edges together it may show."""
 CHOICE, FEWEST, PLENTY = 100, 32, 4000
 """Patches to choose from, of those as rough as the ground; and of any; and how many are enough: of a plain ground all fit."""
 K, APART = 3, 0.05
