@@ -237,3 +237,32 @@ def test_of_a_texture_without_elements_the_ground_is_left() -> None:
     rows, columns = np.moveaxis(result.source.coordinates.astype(int), -1, 0)
     assert not mine.mask[rows, columns].any()
     assert result.report["matches"] == []
+
+
+@pytest.mark.parametrize("step", ["move", "remove"])
+def test_edits_as_printed(step: str) -> None:
+    one = find_middle(BUTTONS)
+    edit = {"op": step, "element": one} | ({"by": [0, 12]} if step == "move" else {})
+    result = texrs.self_splice(BUTTONS, edit, seed=1, method="paper")
+    assert result.report["method"] == "paper"
+    found = {m["element"]: m["found"] for m in result.report["matches"]}
+    if step == "move":
+        np.testing.assert_allclose(found[one], BUTTONS.points[one] + [0, 12], atol=0.51)
+    else:
+        assert one not in found
+
+
+def test_ground_is_as_rough_as_it_was() -> None:
+    """Of patches the smoothest fit best: without a say in it, a fifth of the roughness of such a ground is lost."""
+    mine = make_discs(noise=0.08)
+    image = mine.image.copy()
+    smooth = (np.indices(mine.mask.shape)[1] // 40) % 2 == 1
+    image[smooth & ~mine.mask] = 102
+    mine = replace(mine, image=image)
+
+    def measure(image: Any, ground: Any) -> float:
+        steep = np.hypot(*np.gradient(image[..., 0].astype(float)))
+        return float(steep[~binary_dilation(~ground, iterations=4)].mean())
+
+    result = texrs.splice(mine, BUTTONS, (160, 160), seed=1)
+    assert measure(result.image, result.source.label == 0) > 0.93 * measure(mine.image, ~mine.mask)

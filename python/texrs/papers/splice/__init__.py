@@ -267,7 +267,8 @@ def self_splice(
     seed : int
         Chooses random steps, the elements that come in over a border, what fills holes, and the noise of the refinement.
     method : {None, "paper", "preview"}
-        "paper": as printed.
+        "paper": the algorithm as printed, with only its misprints repaired. "preview": triangles between the elements, drawn
+        where these go; nothing is kept rigid or filled.
     refine : bool
         Whether to refine what is deformed: connected figures, and separate elements that show too little of their ground.
     blend : float, optional
