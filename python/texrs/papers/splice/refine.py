@@ -37,8 +37,8 @@ JITTER = 1.0
 PASSES = 2
 WIDE = 1.0
 """A hole wider than so many spacings is filled with patches; less is grown over from its boundary."""
-PATCH = 0.33
-"""Of the spacing: the side of those patches."""
+PATCH, LEAST = 0.33, 6
+"""Of the spacing: the side of those patches; and the least side in pixels of one whose roughness says anything."""
 STROKE, ROUGH, MOST = 2.5, 0.95, 1.1
 """How many times the usual gradient is an edge, and no roughness; how rough a patch must be, in that of the ground; how much of
 roughness and edges together it may show."""
@@ -154,15 +154,15 @@ def find_patches(guide: Floats, ground: Bools, scale: float) -> tuple[int, Bools
     """Return the side of patches of a ground, and the corners of those that may be copied.
 
     Of noise the smoothest patches fit best, so that what is filled with any looks blurred. Taken are those that are as rough as
-    the ground is, and show no more of what lies about in it; any, where these are too few even of the smallest.
+    the ground is, and show no more of what lies about in it; any, where these are too few.
     """
     steep = np.sqrt(sum((np.gradient(guide, axis=axis) ** 2).sum(axis=-1) for axis in range(2)))
     inner = mark_corners(ground, 3)
     shown = steep[1:-1, 1:-1][inner[:-2, :-2]] if inner.any() else steep[ground]
     rough = np.minimum(steep, STROKE * float(np.median(shown)) if shown.size else 0.0)
     usual = (float(np.minimum(shown, rough.max()).mean()), float(shown.mean())) if shown.size else (0.0, 0.0)
-    first = int(np.clip(PATCH * scale, 6, 24))
-    for side in range(first, 3, -1):
+    first = int(np.clip(PATCH * scale, LEAST, 24))
+    for side in range(first, LEAST - 1, -1):
         noise, all_of_it = (average_windows(of, side) for of in (rough, steep))
         fits = mark_corners(ground, side) & (noise >= ROUGH * usual[0] - 1e-5) & (all_of_it <= MOST * usual[1] + 1e-5)
         if np.count_nonzero(fits) >= CHOICE:
