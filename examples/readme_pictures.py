@@ -34,7 +34,7 @@ def main() -> None:
     FOLDER.mkdir(parents=True, exist_ok=True)
     texrs.io.write(FOLDER / "four.jpg", four())
     pebbles = texrs.samples.pebbles((192, 192)).image
-    made = texrs.design(pebbles, (384, 768), seed=3)
+    made = texrs.design(pebbles, (384, 768), seed=3, plan="move")
     left = below(
         [beside([pebbles, made.stages["deformed"]], 188), beside([made.stages["holes"], made.stages["completed"]], 188)]
     )
