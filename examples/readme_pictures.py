@@ -33,10 +33,10 @@ def main() -> None:
     """Write all pictures."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     texrs.io.write(FOLDER / "four.jpg", four())
-    pebbles = texrs.samples.pebbles((192, 192)).image
-    made = texrs.design(pebbles, (384, 768), seed=3, plan="move")
+    flowers = texrs.samples.leaves_and_flowers((192, 192)).image
+    made = texrs.design(flowers, (384, 768), seed=3, plan="move")
     left = below(
-        [beside([pebbles, made.stages["deformed"]], 188), beside([made.stages["holes"], made.stages["completed"]], 188)]
+        [beside([flowers, made.stages["deformed"]], 188), beside([made.stages["holes"], made.stages["completed"]], 188)]
     )
     texrs.io.write(FOLDER / "design.jpg", beside([left, made.image], 384))
     names = ("pebbles", "leaves_and_flowers", "beans", "dots", "grit", "bark")
