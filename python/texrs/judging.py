@@ -28,6 +28,11 @@ from texrs.source_map import SourceMap
 
 __all__ = ["Judgement", "judge"]
 
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 REACH, INSIDE = 8.0, 1 / 8
 """Depth in pixels from which on a pixel is as deep inside an element as any, and the share of that which counts as inside."""
 VISIBLE, UNSEEN = 90, 0.25
