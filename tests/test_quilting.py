@@ -12,7 +12,7 @@ from texrs import SourceMap, samples
 from texrs.quilting import Picture, quilt
 from texrs.quilting._finder import halve
 from texrs.quilting._quilt import find_calm_lines
-from texrs.quilting._windows import Span, Window, deal_exemplars, divide_axis
+from texrs.quilting._windows import Span, Window, divide_axis
 
 
 def picture(image: np.ndarray, *, mirrored: bool = False) -> Picture:
@@ -32,7 +32,7 @@ def pebbles() -> np.ndarray:
 
 
 def made(pictures: list[Picture], size: tuple[int, int] = (200, 240), **options: object) -> SourceMap:
-    asked = {"patch": 64, "overlap": 24, "wrap": (True, True), "shares": np.ones(1), "seed": 4} | options
+    asked = {"patch": 64, "overlap": 24, "wrap": (True, True), "seed": 4} | options
     return quilt(pictures, size, progress=lambda share: None, **asked)  # type: ignore[arg-type]
 
 
@@ -152,29 +152,6 @@ def test_surroundings_are_the_pixels_beside(start: int, extent: int, wrap: bool)
     assert around.closed[0] == (wrap and extent + 2 > length)
     assert set(seen) == (set(own) if around.closed[0] else expected)
     assert len(seen) == len(set(seen))
-
-
-def test_a_map_of_shares_stays_where_it_is(pebbles: np.ndarray) -> None:
-    other = 255 - pebbles
-    shares = np.zeros((200, 240, 2))
-    shares[:, :120, 0] = shares[:, 120:, 1] = 1
-    first, second = picture(pebbles), picture(other)
-    size = (pebbles.shape[:2],) * 2
-    sources = [
-        SourceMap(p.source.coordinates, np.full_like(p.source.exemplar, k), p.source.label, None, size)
-        for k, p in enumerate((first, second))
-    ]
-    both = [Picture(p.colours, s, p.depth) for p, s in zip((first, second), sources, strict=True)]
-    source = made(both, shares=shares)
-    assert (source.exemplar[:, 40:80] == 0).mean() > 0.9
-    assert (source.exemplar[:, 160:200] == 1).mean() > 0.9
-
-
-def test_shares_are_dealt_evenly() -> None:
-    rows, columns = divide_axis(400, 128, 64, 16, True), divide_axis(400, 128, 64, 16, True)
-    windows = [Window(r, c) for r in rows for c in columns]
-    kinds = deal_exemplars(windows, (400, 400), np.array([0.75, 0.25]), 0)
-    assert np.bincount(kinds) / len(kinds) == pytest.approx([0.75, 0.25], abs=0.05)
 
 
 def test_a_calm_line_is_no_edge() -> None:

@@ -16,7 +16,7 @@ from typing import Literal
 
 import numpy as np
 
-from texrs._arrays import as_float, as_image, as_int, as_list, as_mask, as_wrap
+from texrs._arrays import as_bool, as_float, as_image, as_int, as_list, as_mask, as_wrap
 from texrs._typing import Array, Floats, Interpolation, Progress
 from texrs.blending._correction import divide_strips, solve_correction
 from texrs.blending._seams import Look, Seam, take_rows
@@ -41,6 +41,7 @@ def blend(
     band: int | None = None,
     within: Array | None = None,
     known: Array | Sequence[Array] | None = None,
+    across: bool = True,
     interpolation: Interpolation = "cubic",
     kind: Literal["colour", "normal"] = "colour",
     green: Literal["up", "down"] = "up",
@@ -73,6 +74,9 @@ def blend(
         hole.
     known : (h, w) bool or integers, or a sequence of one an exemplar, optional
         What of the exemplars may be looked at beyond a seam. By default all.
+    across : bool
+        Whether values are corrected also where two exemplars meet. `texrs.design` does not: flowers on moss end at an edge,
+        and one would stain the other.
     interpolation : {"cubic", "linear", "nearest"}
         As in `SourceMap.render`.
     kind, green
@@ -124,7 +128,7 @@ def blend(
     """
     if source.axes != 2:
         raise InvalidInput("source: a picture is needed, got the source map of a volume")
-    cyclic = as_wrap(wrap)
+    cyclic, across = as_wrap(wrap), as_bool(across, "across")
     weight = as_float(screening, "screening", 0, 1e6)
     width = None if band is None else as_int(band, "band", 1, 2**31)
     inside = None if within is None else as_mask(within, "within", source.shape)
@@ -143,7 +147,7 @@ def blend(
     for number, (part, channels) in enumerate(steps):
         closed = (part.cyclic, cyclic[1])
         if channels == groups[0]:
-            look = Look(samples, shown, take_rows(source, part.rows), interpolation, kind, green)
+            look = Look(samples, shown, take_rows(source, part.rows), across, interpolation, kind, green)
             seen = [look.find_seams(axis, closed[axis]) for axis in range(2)]
         if any(len(seam.lack) for seam in seen):
             report = None if progress is None else _scale_progress(progress, number, len(steps))

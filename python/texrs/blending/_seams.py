@@ -20,6 +20,8 @@ class Look:
     samples: Samples
     known: list[Floats] | None
     source: SourceMap
+    across: bool
+    """Whether there is a seam where two exemplars meet."""
     interpolation: Interpolation
     kind: Literal["colour", "normal"]
     green: Literal["up", "down"]
@@ -48,6 +50,9 @@ class Look:
     def find_seams(self, axis: int, wrap: bool) -> Seam:
         """Return the seams that cross an axis: the differences wanted less those of the picture."""
         at, after = list_seams(self.source, axis, wrap)
+        if not self.across:
+            same = self.source.exemplar[at] == self.source.exemplar[after]
+            at, after = (tuple(index[same] for index in ends) for ends in (at, after))
         if not len(at[0]):
             return Seam(at, after, np.zeros((0, self.samples.channels), np.float32))
         here, _ = self.look_beside(at, axis, 0)

@@ -24,14 +24,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
 from texrs._engine.noise import uniform
 from texrs.kernels.patch_search import Match
 from texrs.quilting._finder import Finder
 from texrs.quilting._quilt import Picture, Quilt
-from texrs.quilting._windows import Window, deal_exemplars, divide_axis
+from texrs.quilting._windows import Window, divide_axis
 from texrs.source_map import SourceMap
 
 __all__ = ["Picture", "quilt"]
@@ -44,7 +41,6 @@ def quilt(
     patch: int,
     overlap: int,
     wrap: tuple[bool, bool],
-    shares: NDArray[np.float64],
     seed: int,
     progress: Callable[[float], object],
 ) -> SourceMap:
@@ -53,7 +49,7 @@ def quilt(
     Parameters
     ----------
     pictures : sequence of Picture
-        What patches are taken from.
+        What patches are taken from: pictures that fit each other, made from one exemplar.
     size : (rows, columns)
         Size of the texture.
     patch, overlap : int
@@ -61,10 +57,8 @@ def quilt(
         patches divide the texture evenly.
     wrap : (bool, bool)
         Axes along which the texture is cyclic.
-    shares : (exemplars,) or (rows, columns, exemplars) float64
-        Share of the texture that each exemplar gets, on the whole or place by place.
     seed : int
-        Chooses the first patch, and the exemplars.
+        Chooses the first patch, and where a cyclic texture begins.
     progress : callable
         Called with the share that is done.
 
@@ -77,23 +71,19 @@ def quilt(
     sides = [min(p.colours.shape[axis] for p in pictures) for axis in range(2)]
     rows, columns = (divide_axis(size[a], sides[a], min(patch, sides[a]), overlap, wrap[a]) for a in range(2))
     shape = (rows[0].extent, columns[0].extent)
-    members = [[i for i, p in enumerate(pictures) if p.kind == kind] for kind in range(shares.shape[-1])]
-    colours = [p.colours for p in pictures]
-    finders = [Finder(colours, mine, shape) for mine in members]
+    finder = Finder([p.colours for p in pictures], shape)
     canvas = Quilt(pictures, size, wrap)
     windows = [Window(r, c) for r in rows for c in columns]
-    wanted = deal_exemplars(windows, size, shares, seed)
     for number, window in enumerate(windows):
         progress(number / len(windows))
         if number == 0:
-            mine = members[wanted[number]]
-            which = mine[int(uniform(seed, 0, 0, 0, 3) * len(mine))]
+            which = int(uniform(seed, 0, 0, 0, 3) * len(pictures))
             free = [n - m + 1 for n, m in zip(pictures[which].colours.shape, shape, strict=False)]
             row, column = (int(uniform(seed, 1 + axis, 0, 0, 3) * n) for axis, n in enumerate(free))
             canvas.lay(window, Match(0.0, which, row, column))
         else:
-            canvas.paste(window, finders[wanted[number]])
+            canvas.paste(window, finder)
     progress(1.0)
-    # A cyclic texture may begin anywhere. Beside a map of shares it stays where it is.
-    rolled = {axis: uniform(seed, axis, 0, 0, 6) for axis in range(2) if wrap[axis] and shares.ndim == 1}
+    # A cyclic texture may begin anywhere.
+    rolled = {axis: uniform(seed, axis, 0, 0, 6) for axis in range(2) if wrap[axis]}
     return canvas.finish(rolled)

@@ -14,11 +14,9 @@ POOL = 48
 
 
 class Finder:
-    """Finds matches in some of the pictures: everywhere at half their size, then exactly around the few that are taken."""
+    """Finds matches in pictures: everywhere at half their size, then exactly around the few that are taken."""
 
-    def __init__(self, pictures: Sequence[Floats], members: Sequence[int], patch: tuple[int, int]) -> None:
-        colours = [pictures[i] for i in members]
-        self.members = members
+    def __init__(self, colours: Sequence[Floats], patch: tuple[int, int]) -> None:
         self.shapes = [(c.shape[0] - patch[0], c.shape[1] - patch[1]) for c in colours]
         self.whole = PatchIndex(colours, max_patch=patch)
         self.half = PatchIndex([halve(c) for c in colours], max_patch=(patch[0] // 2, patch[1] // 2))
@@ -36,7 +34,7 @@ class Finder:
         return pool
 
     def refine(self, matches: Sequence[Match], colours: Floats, known: Bools) -> list[Match]:
-        """Return the best match within a pixel of each of some of the pool, in one of all pictures."""
+        """Return the best match within a pixel of each of some of the pool."""
         near = []
         for m in matches:
             rows, columns = (
@@ -47,8 +45,7 @@ class Finder:
         every = sorted({place for places in near for place in places})
         scored = self.whole.best_among(colours, known, candidates=every, count=len(every), separation=0)
         ranks = {(m.exemplar, m.row, m.column): rank for rank, m in enumerate(scored)}
-        best = (scored[min(ranks[place] for place in places)] for places in near)
-        return [Match(b.cost, self.members[b.exemplar], b.row, b.column) for b in best]
+        return [scored[min(ranks[place] for place in places)] for places in near]
 
 
 def halve(image: Floats) -> Floats:

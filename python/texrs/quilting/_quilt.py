@@ -46,11 +46,6 @@ class Picture:
     regular: bool = False
     """Whether it repeats on a lattice."""
 
-    @property
-    def kind(self) -> int:
-        """The exemplar it was made from."""
-        return int(self.source.exemplar[0, 0])
-
 
 class Quilt:
     """The texture in the making.
@@ -89,12 +84,10 @@ class Quilt:
         old, known = self.place[window.index(self.size)], window.mark_known()
         colours = self.all_colours.take(old, axis=0, mode="clip")
         pool = finder.find_pool(colours, known)
-        shown = self.list_places(
-            [Match(m.cost, finder.members[m.exemplar], m.row, m.column) for m in pool], window, CELL
-        )
+        shown = self.list_places(pool, window, CELL)
         good, usual = np.quantile([m.cost for m in pool], (GOOD, 0.5)).tolist()
         usual = usual or 1.0
-        regular = self.pictures[finder.members[0]].regular
+        regular = self.pictures[0].regular
         charges = (ON_LATTICE if regular else REPETITION * (good or usual) / usual) * self.measure_repetition(shown)
         continued, mirrored = self.measure_likeness(shown, known, old)
         charges += CONTINUATION * continued

@@ -1,4 +1,4 @@
-"""Where the patches of a quilt lie, and which exemplar each is taken from."""
+"""Where the patches of a quilt lie."""
 
 from __future__ import annotations
 
@@ -9,9 +9,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from texrs._engine.noise import uniform
 from texrs._typing import Bools
 
 
@@ -115,25 +113,3 @@ def index_box(ends: Sequence[tuple[int, int]], size: tuple[int, int]) -> Any:
     if all(low >= 0 and high <= n for (low, high), n in zip(ends, size, strict=True)):
         return tuple(slice(low, high) for low, high in ends)
     return np.ix_(*(np.arange(low, high) % n for (low, high), n in zip(ends, size, strict=True)))
-
-
-def deal_exemplars(
-    windows: Sequence[Window], size: tuple[int, int], shares: NDArray[np.float64], seed: int
-) -> list[int]:
-    """Return the exemplar of each patch, so that every one gets its share.
-
-    Always taking the best match would let one win everywhere: it matches itself best.
-    """
-    count = shares.shape[-1]
-    order = sorted(range(len(windows)), key=lambda i: uniform(seed, i, 0, 0, 5))
-    due, kinds = np.zeros(count), [0] * len(windows)
-    for i in order:
-        here = shares
-        if shares.ndim == 3:
-            # What the middle of the patch asks for: its borders are shared with its neighbours.
-            spans_of = (windows[i].rows, windows[i].columns)
-            here = shares[tuple((s.start + s.extent // 2) % n for s, n in zip(spans_of, size, strict=True))]
-        due += here
-        kinds[i] = int(np.argmax(np.where(here > 0, due, -np.inf)))
-        due[kinds[i]] -= 1
-    return kinds

@@ -25,7 +25,6 @@ def extend(colours: Floats, size: tuple[int, int], wrap: Sequence[bool], watch: 
         patch=max(2, round(PATCH * min(shape))),
         overlap=max(1, round(OVERLAP * min(shape))),
         wrap=(wrap[0], wrap[1]),
-        shares=np.ones(1),
         seed=0,
         progress=lambda share: watch("quilt", share),
     )

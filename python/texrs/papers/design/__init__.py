@@ -33,6 +33,9 @@ Departures, with their reasons:
   move from place to place of the lattice and nowhere else.
 - A cyclic texture (section 3.5) is stitched on the torus from the start: patches are chosen to fit both sides of the
   wrap, where the paper folds a finished picture that was never chosen to fit.
+- Several exemplars are each stitched into a texture of the full size. Which one shows is asked by a map, or drawn as
+  territories of smooth noise; a cut moves their borders to outlines, by an element at most (`texrs.papers.design.mixing`).
+  Dealing patches to exemplars gives rectangles, and no map is obeyed. Colours are not corrected where exemplars meet.
 - The differences that the colours are corrected to are those of the sources on both sides of a seam, where the paper
   takes those of the picture itself; some weight on the values keeps the colours from drifting.
 
@@ -89,7 +92,8 @@ def design(
     wrap : bool or (rows, columns)
         Axes along which the result repeats without a seam.
     weights : (n,), (rows, columns) of int, or (rows, columns, n) array, optional
-        Shares of n exemplars in the result, or which one is where, or their shares everywhere; equal by default.
+        Shares of n exemplars in the result, or which one is where, or their shares everywhere; equal by default. Borders
+        follow outlines, by an element at most from where a map has them; shares on the whole are kept within 3 %.
     elements : ElementOptions
         How the elements of the exemplar are found.
     deformation : DeformationOptions
@@ -105,7 +109,8 @@ def design(
         default.
     blend : float, optional
         Weight of the values, 0 to 1e6, when colours are corrected so that seams disappear (section 3.6): the smaller, the
-        wider the correction. None or 0: no correction. See `texrs.blend`, which corrects other maps in the same way.
+        wider the correction. None or 0: no correction. See `texrs.blend`, which corrects other maps in the same way,
+        of several exemplars with ``across=False``.
     method : {None, "paper"}
         "paper": the algorithm as printed, with only its misprints repaired, for comparison. Whole colour layers are moved,
         once each, by the printed generator, and stitched at the plain cost; holes take the best match; colours are
@@ -134,8 +139,8 @@ def design(
     Notes
     -----
     For each pixel of the result 18 bytes are needed, or 14 and twice those of a pixel of the image where that is more,
-    and 0.5 GB beside it: 5.9 GB for 16384 x 16384 pixels of 8-bit RGB. ``method="paper"`` takes 24 more, a map of
-    ``weights`` 8 for each exemplar.
+    and 0.5 GB beside it: 5.9 GB for 16384 x 16384 pixels of 8-bit RGB. ``method="paper"`` takes 24 more. Several
+    exemplars take 100 more and 75 for each, and a map of ``weights`` 8 for each.
 
     References
     ----------
@@ -211,7 +216,8 @@ def design_variants(
     wrap : bool or (rows, columns)
         Axes along which each texture repeats without a seam.
     weights : (n,), (rows, columns) of int, or (rows, columns, n) array, optional
-        Shares of n exemplars in each texture, or which one is where, or their shares everywhere; equal by default.
+        Shares of n exemplars in each texture, or which one is where, or their shares everywhere; equal by default. Borders
+        follow outlines, by an element at most from where a map has them; shares on the whole are kept within 3 %.
     elements : ElementOptions
         How the elements of the exemplar are found.
     deformation : DeformationOptions
@@ -227,7 +233,8 @@ def design_variants(
         default.
     blend : float, optional
         Weight of the values, 0 to 1e6, when colours are corrected so that seams disappear (section 3.6): the smaller, the
-        wider the correction. None or 0: no correction. See `texrs.blend`, which corrects other maps in the same way.
+        wider the correction. None or 0: no correction. See `texrs.blend`, which corrects other maps in the same way,
+        of several exemplars with ``across=False``.
     method : {None, "paper"}
         "paper": the algorithm as printed, with only its misprints repaired, for comparison. Whole colour layers are moved,
         once each, by the printed generator, and stitched at the plain cost; holes take the best match; colours are

@@ -125,10 +125,16 @@ def check_arguments(
 
 
 def count_bytes(arguments: Arguments) -> int:
-    """Return the bytes that a texture takes: the source map is 14 a pixel, 18 while it is made; the picture is kept twice."""
+    """Return the bytes that a texture takes: the source map is 14 a pixel, 18 while it is made; the picture is kept twice.
+
+    Several exemplars are each stitched to the full size, and mixed by a cut.
+    """
     pixels = arguments.exemplars[0].pixels
     kept = 14 + 2 * pixels.shape[-1] * pixels.itemsize
-    return int(math.prod(arguments.size) * (max(18, kept) + 24 * arguments.literal) + arguments.shares.nbytes + SPARE)
+    count = len(arguments.exemplars)
+    mixed = 100 + 75 * count if count > 1 else 0
+    each = max(18, kept) + 24 * arguments.literal + mixed
+    return int(math.prod(arguments.size) * each + arguments.shares.nbytes + SPARE)
 
 
 def check_together(exemplars: Sequence[Exemplar], labels: object) -> None:

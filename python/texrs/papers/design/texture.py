@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from texrs._typing import Array, Floats
+from texrs._typing import Array, Floats, Progress
 from texrs.blending import blend, measure_visibility
 from texrs.kernels.gather import gather
 from texrs.papers.design.arguments import Arguments
+from texrs.papers.design.mixing import Layer, mix
 from texrs.papers.design.plan import Plan
 from texrs.papers.design.tiles import Tile
 from texrs.quilting import Picture, quilt
@@ -24,29 +25,76 @@ PATCH, OVERLAP = 0.6, 0.25
 """Side of a patch and overlap of two, as shares of the exemplar's shorter side."""
 DEEP = 6.0
 """Depth in pixels from which on all of an element is as deep."""
+LEAST, TERRITORY = 6.0, 0.75
+"""Least distance in pixels that borders between exemplars may be moved by, and the size of territories as a share of the
+shorter side."""
 CLOSE = 0.5
 """Share of the exemplar that elements cover from which on they lie close."""
 
 
 def stitch_tiles(plans: Sequence[Plan], tiles: Sequence[Tile], arguments: Arguments, seed: int) -> SourceMap:
     """Stitch patches of the tiles into a texture of any size, on the torus where it wraps (section 3.1, step 4)."""
-    depths = [measure_depth(plan) for plan in plans]
-    pictures = []
-    for tile in tiles:
-        which = int(tile.source.exemplar[0, 0])
-        depth = gather(depths[which], tile.source.coordinates, interpolation="nearest")
-        pictures.append(Picture(tile.colours, tile.source, depth, plans[which].parts.lattice is not None))
-    side = min(min(d.shape) for d in depths)
+    each = [
+        stitch_alone(number, plans, [t for t in tiles if int(t.source.exemplar[0, 0]) == number], arguments, seed)
+        for number in range(len(plans))
+    ]
+    if len(each) == 1:
+        return each[0]
+    side = min(min(plan.guide.shape[:2]) for plan in plans)
+    return mix(
+        [measure_layer(source, plan) for source, plan in zip(each, plans, strict=True)],
+        arguments.shares,
+        extent=min(max(LEAST, float(np.mean([measure_extent(plan) for plan in plans]))), min(arguments.size) / 4),
+        # Smaller ones keep a map of shares place by place.
+        territory=min(TERRITORY * side / (2 if arguments.shares.ndim > 1 else 1), min(arguments.size) / 2),
+        wrap=arguments.wrap,
+        seed=seed,
+    )
+
+
+def stitch_alone(
+    number: int, plans: Sequence[Plan], tiles: Sequence[Tile], arguments: Arguments, seed: int
+) -> SourceMap:
+    """Stitch patches of the tiles of one exemplar."""
+    plan = plans[number]
+    depth, regular = measure_depth(plan), plan.parts.lattice is not None
+    side = min(depth.shape)
     return quilt(
-        pictures,
+        [
+            Picture(t.colours, t.source, gather(depth, t.source.coordinates, interpolation="nearest"), regular)
+            for t in tiles
+        ],
         arguments.size,
         patch=round(PATCH * side),
         overlap=round(OVERLAP * side),
         wrap=arguments.wrap,
-        shares=arguments.shares,
         seed=seed,
-        progress=partial(arguments.watch, "stitch"),
+        progress=partial(report_share, arguments.watch, number, len(plans)),
     )
+
+
+def report_share(watch: Progress, number: int, count: int, share: float) -> None:
+    """Report the share of one of several alike."""
+    watch("stitch", (number + share) / count)
+
+
+def measure_layer(source: SourceMap, plan: Plan) -> Layer:
+    """Return what a texture of one exemplar shows: its colours, and where things are."""
+    parts, where = plan.parts, source.coordinates
+    depth, things = np.zeros((2, *plan.guide.shape[:2]), np.float32)
+    if parts.kind in ("components", "labels"):
+        depth, things = parts.measure_depth(DEEP), (parts.elements > 0).astype(np.float32)
+    colours = gather(plan.guide, where, interpolation="nearest")
+    shown = gather(np.stack([depth, things], axis=-1), where, interpolation="nearest")
+    return Layer(source, colours, shown[..., 0], shown[..., 1] > 0)
+
+
+def measure_extent(plan: Plan) -> float:
+    """Return the usual size of an element, in pixels."""
+    if plan.parts.kind not in ("components", "labels"):
+        return float(plan.side)
+    areas = np.bincount(plan.parts.elements.ravel())[1:]
+    return float(np.sqrt(np.median(areas[areas > 0])))
 
 
 def measure_depth(plan: Plan) -> Floats:
@@ -73,6 +121,7 @@ def correct_colours(composite: SourceMap, picture: Array, arguments: Arguments) 
             images,
             wrap=False if literal else wrap,
             screening=0.0 if literal else arguments.screening,
+            across=literal,
             progress=arguments.watch,
         )
         after = measure_visibility(composite, images, image, wrap=wrap)

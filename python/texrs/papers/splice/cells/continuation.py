@@ -151,7 +151,6 @@ def _grow(cells: Cells, far: tuple[float, float], seed: int) -> NDArray[np.float
             patch=round(PATCH * unit),
             overlap=round(OVERLAP * unit),
             wrap=(False, False),
-            shares=np.ones(1),
             seed=seed + attempt,
             progress=lambda share: None,
         )

@@ -1,0 +1,220 @@
+"""Several exemplars in one texture: territories with organic borders, cut along outlines.
+
+Each exemplar is stitched into a texture of the full size by itself, so nothing is left at a border that was made to fit
+something else. Which one shows is asked by a map, or by smooth fields of noise that are bent until every one has its share. A
+cut then moves the borders, by no more than about an element, to where they show least: along the outline of a thing of
+either side, which then lies on what the other side shows; through things nowhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Bools, Floats
+from texrs.kernels.seam import binary_labels
+from texrs.source_map import SourceMap
+
+__all__ = ["Layer", "mix"]
+
+OUTLINE, DEEP = 0.03, 6.0
+"""What it costs to end a layer along the outline of a thing that stays whole, and in the midst of one; on plain ground, 1."""
+CREASE = 0.15
+"""What it costs along the strongest edges of the colours: where things lie in heaps nobody knows their outlines for sure."""
+PULL = 0.5
+"""Cost of a pixel that is as far from where its exemplar is asked as is allowed; the cost grows with the square."""
+FORBIDDEN = 1e3
+"""Cost of a pixel that is farther away."""
+ROUNDS, FREE, EXACT, STEP = 16, 8, 0.01, 0.05
+"""Times at most that costs of the exemplars are adapted until their shares are right, those after which borders are
+pulled twice as much each time (large pieces may change all at once, and shares with them), what shares may be off, of
+themselves, and by how much costs change at first for what they are off."""
+FINER, FAINTER = 2.5, 0.5
+"""How much finer than a territory the bends of its border are, and how much fainter."""
+KNOTS = 6
+"""Points of noise along a territory, of which a third are averaged: so its borders favour no axis."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Layer:
+    """A texture of the full size, made of one exemplar."""
+
+    source: SourceMap
+    colours: Floats
+    depth: Floats
+    """How deep inside a thing each pixel is, 0 to 1, and 0 on the ground."""
+    things: Bools
+    """What is no ground."""
+
+
+def mix(
+    layers: Sequence[Layer],
+    shares: NDArray[np.float64],
+    *,
+    extent: float,
+    territory: float,
+    wrap: tuple[bool, bool],
+    seed: int,
+) -> SourceMap:
+    """Put layers together.
+
+    Parameters
+    ----------
+    layers : sequence of Layer
+        One an exemplar, all of one size.
+    shares : (n,) or (rows, columns, n) float64
+        Share of each, on the whole or place by place; they sum to 1.
+    extent : float
+        Size of an element, in pixels: the farthest that a border may lie from where it is asked.
+    territory : float
+        Size of the territories, in pixels, where the map leaves it open.
+    wrap : (bool, bool)
+        Axes along which the texture is cyclic.
+    seed : int
+        Chooses the territories.
+
+    Returns
+    -------
+    SourceMap
+
+    """
+    size = layers[0].source.shape
+    wanted = draw_territories(shares, size, territory, seed)
+    chosen = cut_borders(layers, wanted, extent, wrap)
+    place = chosen.astype(np.uint32) * np.uint32(wanted.size) + np.arange(wanted.size, dtype=np.uint32).reshape(size)
+    return SourceMap.pick([layer.source for layer in layers], place, chosen.astype(np.uint32))
+
+
+def draw_territories(
+    shares: NDArray[np.float64], size: tuple[int, ...], territory: float, seed: int
+) -> NDArray[np.uint16]:
+    """Return the exemplar that is asked at each pixel.
+
+    The largest of the logarithms of the shares, each with noise of the distribution of Gumbel, is each with the probability
+    of its share; smooth noise makes territories of it.
+    """
+    count = shares.shape[-1]
+    if ((shares == 0) | (shares == 1)).all():
+        return np.asarray(np.broadcast_to(shares.argmax(axis=-1), size), np.uint16)
+    with np.errstate(divide="ignore"):
+        scores = np.log(np.broadcast_to(shares, (*size, count))).astype(np.float32)
+    for which in range(count):
+        scores[..., which] -= np.log(-np.log(draw_noise(size, territory, (seed, which))))
+    due = np.broadcast_to(shares, (*size, count)).mean(axis=(0, 1))
+    for _ in range(4 * ROUNDS):
+        wanted = scores.argmax(axis=-1)
+        got = np.bincount(wanted.ravel(), minlength=count) / wanted.size
+        if measure_error(got, due) <= EXACT / 4:
+            break
+        scores += np.log(np.maximum(due, 1e-6) / np.maximum(got, 1e-3 * due + 1e-6)).astype(np.float32)
+    return np.asarray(wanted, np.uint16)
+
+
+def draw_noise(size: tuple[int, ...], grain: float, seed: tuple[int, int]) -> Floats:
+    """Return smooth cyclic noise, evenly distributed between 0 and 1 without its ends."""
+    from scipy.ndimage import gaussian_filter, zoom
+    from scipy.special import ndtr
+
+    rng = np.random.default_rng(seed)
+    total = np.zeros(size, np.float32)
+    for fine, strength in ((1.0, 1.0), (FINER, FAINTER)):
+        cells = [min(n, max(2, round(KNOTS * n * fine / grain))) for n in size]
+        knots = gaussian_filter(rng.standard_normal(cells), KNOTS / 3, mode="wrap").astype(np.float32)
+        knots /= max(float(knots.std()), 1e-6)
+        factors = [n / c for n, c in zip(size, cells, strict=True)]
+        total += strength * zoom(knots, factors, order=3, mode="grid-wrap", grid_mode=True)
+    even = ndtr((total - total.mean()) / max(float(total.std()), 1e-6))
+    return np.asarray(np.clip(even, 1e-4, 1 - 1e-4), np.float32)
+
+
+def measure_error(got: NDArray[np.float64], due: NDArray[np.float64]) -> float:
+    """Return by how much of itself the share that is farthest off is off."""
+    asked = due > 0
+    return float((np.abs(got - due)[asked] / due[asked]).max())
+
+
+def cut_borders(
+    layers: Sequence[Layer], wanted: NDArray[np.uint16], extent: float, wrap: tuple[bool, bool]
+) -> NDArray[np.uint16]:
+    """Return the layer that shows at each pixel: as was asked, with borders where they show least, and in the shares asked.
+
+    A layer is cut into what shows, one after the other, each time by the minimum cut; what each costs is adapted
+    until the shares are right.
+    """
+    count, size = len(layers), wanted.size
+    ends = [measure_ends(layer) for layer in layers]
+    away = np.stack([measure_distance(wanted == which, extent, wrap) for which in range(count)])
+    far, squares = away > 1, away**2
+    due = np.bincount(wanted.ravel(), minlength=count) / size
+    best, price, found, off, step = wanted, np.zeros(count), np.zeros(count), np.inf, 0.0
+    for number in range(ROUNDS):
+        pull = PULL * 2.0 ** max(0, number - FREE)
+        asked = price + step * found
+        costs = np.where(far, FORBIDDEN, pull * squares + asked[:, np.newaxis, np.newaxis]).astype(np.float32)
+        chosen = np.zeros(wanted.shape, np.uint16)
+        # With two layers the first cut is the best there is; of more, each has to be tried against all others.
+        for which in range(1, count) if count == 2 else [*range(1, count), *range(count)]:
+            chosen = cut_in(which, chosen, ends, costs, wrap)
+        got = np.bincount(chosen.ravel(), minlength=count) / size
+        error = measure_error(got, due)
+        if error < off:
+            best, price, off = chosen, asked, error
+            found = np.where(due > 0, got - due, 0) / float(due[due > 0].min())
+            step = 1.5 * step or STEP
+        else:
+            step /= 3
+        if off <= EXACT:
+            break
+    return best
+
+
+def measure_ends(layer: Layer) -> NDArray[np.float32]:
+    """Return what it costs to end a layer between each pixel and the next, (axis, side that stays, rows, columns)."""
+    ends = np.empty((2, 2, *layer.depth.shape), np.float32)
+    for axis in range(2):
+        colours, depth = np.roll(layer.colours, -1, axis), np.roll(layer.depth, -1, axis)
+        things = np.roll(layer.things, -1, axis)
+        edge = np.abs(layer.colours - colours).sum(axis=-1)
+        ground = CREASE + (1 - CREASE) * np.exp(-edge / max(2 * float(edge.mean()), 1e-6))
+        plain = ground + DEEP * np.minimum(layer.depth, depth)
+        ends[axis, 0] = np.where(layer.things & ~things, OUTLINE, plain)
+        ends[axis, 1] = np.where(things & ~layer.things, OUTLINE, plain)
+    return ends
+
+
+def measure_distance(asked: Bools, extent: float, wrap: tuple[bool, bool]) -> Floats:
+    """Return how far each pixel is from where something is asked, in extents; anything above 1 is far."""
+    from scipy.ndimage import distance_transform_edt
+
+    if not asked.any():
+        return np.full(asked.shape, 2, np.float32)
+    margin = [min(int(extent) + 2, n) if cyclic else 0 for n, cyclic in zip(asked.shape, wrap, strict=True)]
+    around = np.pad(asked, [(m, m) for m in margin], mode="wrap")
+    inner = tuple(slice(m, m + n) for m, n in zip(margin, asked.shape, strict=True))
+    return np.asarray(distance_transform_edt(~around)[inner] / extent, np.float32)
+
+
+def cut_in(
+    which: int,
+    chosen: NDArray[np.uint16],
+    ends: Sequence[NDArray[np.float32]],
+    costs: NDArray[np.float32],
+    wrap: tuple[bool, bool],
+) -> NDArray[np.uint16]:
+    """Cut a layer into what shows. A border is as good as the better of its sides: that one lies on the other."""
+    kept = np.take_along_axis(costs, chosen[np.newaxis].astype(np.intp), axis=0)[0]
+    unary = np.stack([np.where(chosen == which, np.float32(np.inf), kept), costs[which]], axis=-1)
+    pairs = []
+    for axis in range(2):
+        shown = np.zeros((2, *chosen.shape), np.float32)
+        after = np.roll(chosen, -1, axis)
+        for layer, end in enumerate(ends):
+            shown[0][chosen == layer] = end[axis, 0][chosen == layer]
+            shown[1][after == layer] = end[axis, 1][after == layer]
+        new = ends[which][axis]
+        pairs.append((np.minimum(shown[0], new[1]), np.minimum(new[0], shown[1])))
+    taken = binary_labels(unary, pairs, wrap=wrap).mask
+    return np.where(taken, np.uint16(which), chosen)
