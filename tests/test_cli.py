@@ -92,6 +92,10 @@ def test_design_writes_what_the_function_makes(here: Path, capsys: Capture) -> N
     written = sorted(p.name for p in Path("stages").iterdir())
     assert written[0] == "01-segmentation.png"
     assert written[-1] == "report.json"
+    # Each layer has a colour of its own: numbers of layers would be black.
+    layers = iio.imread("stages/01-segmentation.png")
+    assert layers.max() > 100
+    assert len(np.unique(layers.reshape(-1, layers.shape[-1]), axis=0)) > 1
     assert not list(here.glob(".texrs*"))
     out, err = capsys.readouterr()
     assert out == ""
