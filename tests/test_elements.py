@@ -11,6 +11,7 @@ import texrs
 from element_checks import passes, score
 from texrs import elements, samples
 from texrs.elements import Elements, ElementSearch, Layout, _proposal, analyse
+from texrs.elements._mask import cut_foreground, to_lab
 from texrs.elements._mixture import Mixture
 from texrs.elements._search import Detections, Template, threshold_otsu
 from texrs.elements._separation import reconcile
@@ -444,3 +445,25 @@ def test_a_layout_is_proposed_for_a_long_narrow_picture() -> None:
     grain = np.random.default_rng(0).random((20, 700, 1)).astype(np.float32)
     image = np.where((away < 1)[..., None], grain, 0.5).repeat(3, axis=-1).astype(np.float32)
     assert _proposal._choose_layout(image, away, places, None)[0] == Layout.DISJOINT
+
+
+def test_what_is_found_small_is_cut_small() -> None:
+    """The middles of elements are taken for foreground as large as these were found."""
+    size, radius = (192, 192), 12
+    centres = (np.indices((4, 4)).reshape(2, -1).T + 0.5) * 48
+    radii = np.where(np.arange(16) % 3 == 1, radius / 2, radius)
+    away = np.linalg.norm(np.indices(size).transpose(1, 2, 0)[:, :, None] - centres, axis=-1) / radii
+    mask = (away <= 1).any(axis=-1)
+    random = np.random.default_rng(2)
+    image = np.where(mask, 0.62, 0.5)[..., None] + random.normal(0, 0.1, (*size, 3))
+    poses = np.stack([np.zeros(16), radii / radius], axis=-1)
+    given = {"background": np.zeros(size, bool), "layout": Layout.DISJOINT}
+    given["background"][::48] = True
+    lab = to_lab(np.clip(image, 0, 1).astype(np.float32))
+    box = (2 * radius + 1, 2 * radius + 1)
+    shares = []
+    for scales in (poses[:, 1], np.ones(16)):
+        each = np.stack([np.zeros(17), [1.0, *scales]], axis=-1)
+        made = cut_foreground(lab, np.concatenate([centres[:1], centres]), box, poses=each, **given)
+        shares.append((made & mask).sum() / (made | mask).sum())
+    assert shares[0] > 0.93 > shares[1]

@@ -203,6 +203,7 @@ def _cut(guide: Floats, given: Arguments, start: Start, found: Detections, how: 
         start.box.size,
         np.zeros(guide.shape[:2], bool) if start.background is None else start.background,
         layout=start.layout,
+        poses=np.concatenate([[[0.0, 1.0]], found.poses]),
         shape=given.shape,
         wrap=how.wrap,
         seed=how.seed,

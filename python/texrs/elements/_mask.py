@@ -100,6 +100,7 @@ def cut_foreground(
     background: Bools,
     *,
     layout: Layout,
+    poses: NDArray[np.float64] | None = None,
     shape: Bools | None = None,
     wrap: Wrap = (False, False),
     seed: int = 0,
@@ -119,6 +120,9 @@ def cut_foreground(
         Known background.
     layout : Layout
         Elements that are no net fill the middles of their boxes.
+    poses : (n, 2), optional
+        How far each is turned, in degrees, and how many times larger it is: what is taken for its middle is as large as
+        it was found. By default all are as the chosen one.
     shape : bool, optional
         What of the chosen one's box is foreground, where it is certain.
     """
@@ -127,9 +131,11 @@ def cut_foreground(
         colours = flatten_shading(colours, max(box), wrap)
     flat = colours.reshape(-1, 3).astype(np.float64)
 
-    def mark(places: NDArray[Any], part: Bools) -> Bools:
+    poses = np.tile((0.0, 1.0), (len(centres), 1)) if poses is None else poses
+
+    def mark(part: Bools, number: int | None = None) -> Bools:
         marked = np.zeros(size, bool)
-        stamp(marked, places, part, wrap)
+        stamp_posed(marked, centres[:number], poses[:number], part, wrap)
         return marked
 
     def cost(mine: Sequence[NDArray[np.float64]], number: int) -> NDArray[np.float64]:
@@ -138,31 +144,31 @@ def cut_foreground(
             return _measure_nearest_costs(flat, samples)
         return -Mixture.fit(samples, seed=seed + number).log(flat)
 
-    half = WHOLE * np.array(box)
+    half = WHOLE * poses[:, 1:] * np.array(box)
     whole = ((centres >= half) & (centres <= np.array(size) - 1 - half)) | np.array(wrap)
     whole[0] = True
     # Where the border cuts an element, it may as well be none.
-    centres = centres[whole.all(axis=1)]
+    centres, poses = centres[whole.all(axis=1)], poses[whole.all(axis=1)]
     known = flat[background.ravel()]
     core = shape if shape is not None else ellipse(box, CORE)
-    certain = mark(centres[:1], core) & ~background
-    fore, back = mark(centres, core) & ~background, np.zeros(size, bool)
+    certain = mark(core, 1) & ~background
+    fore, back = mark(core) & ~background, np.zeros(size, bool)
     unlikeness, mesh = cost([known], 0), False
     if layout == Layout.CONNECTED and shape is None:
         certain[:] = False
-        outer = mark(centres, ~ellipse(box, OUTER)) & ~background
+        outer = mark(~ellipse(box, OUTER)) & ~background
         mesh = bool(np.median(unlikeness[fore.ravel()]) < np.median(unlikeness[outer.ravel()]))
         if mesh:
             # The box holds a mesh of the net, whose middle is background.
-            fore, back = outer & ~fore, mark(centres, ellipse(box, MESH)) & ~outer
+            fore, back = outer & ~fore, mark(ellipse(box, MESH)) & ~outer
         unlike = unlikeness[fore.ravel()]
         fore.ravel()[np.flatnonzero(fore.ravel())[unlike < np.quantile(unlike, 1 - ALIKE)]] = False
     elif layout == Layout.DISJOINT and model == "mixture":
-        back = ~mark(centres, np.ones((round_to_odd(box[0] * FAR), round_to_odd(box[1] * FAR)), bool))
+        back = ~mark(np.ones((round_to_odd(box[0] * FAR), round_to_odd(box[1] * FAR)), bool))
     costs = [cost([known, flat[(back & ~background).ravel()]], 0), cost([flat[fore.ravel()]], 1)]
     difference = np.clip(costs[1] - costs[0], -NATS, NATS).reshape(size)
     if model == "mixture" and (layout != Layout.CONNECTED or mesh):
-        difference += np.where(mark(centres, ellipse(box, MESH)), PRIOR if mesh else -PRIOR, 0)
+        difference += np.where(mark(ellipse(box, MESH)), PRIOR if mesh else -PRIOR, 0)
     unary = np.stack([np.maximum(-difference, 0), np.maximum(difference, 0)], axis=-1).astype(np.float32)
     unary[certain, 0] = np.inf
     unary[background, 1] = np.inf
