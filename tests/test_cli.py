@@ -25,6 +25,7 @@ from texrs import SourceMap, samples
 from texrs.cli import COMMANDS, app, main
 from texrs.cli._console import Stopped
 from texrs.cli._outputs import OUTPUTS
+from texrs.elements import Elements
 from texrs.errors import InvalidInput
 
 Capture = pytest.CaptureFixture[str]
@@ -192,6 +193,22 @@ def test_labels_by_hand(here: Path, capsys: Capture) -> None:
     assert main(["design", "in.png", "--element-labels", "in.png", *TINY, "-o", "out.png"]) == 2
     assert "in.png: needs integers of shape" in capsys.readouterr().err
     assert files(here) == before
+
+
+def test_analysed_elements_as_example(here: Path, capsys: Capture) -> None:
+    entry = Elements.of_sample(samples.load("dots", size=(96, 96)))
+    entry.save("dots.npz")
+    iio.imwrite("dots.png", entry.image)
+    made = []
+    for given in (["dots.npz"], ["dots.png", "--element-labels", "dots.npz"]):
+        assert main(["design", *given, *TINY, "-o", "out.png", "--stages", "s"]) == 0
+        assert '"kind": "labels"' in Path("s/report.json").read_text()
+        made.append(Path("out.png").read_bytes())
+    assert made[0] == made[1]
+    Path("none.npz").write_bytes(b"nothing")
+    capsys.readouterr()
+    assert main(["design", "none.npz", *TINY, "-o", "out.png"]) != 0
+    assert "none.npz" in complaint(capsys)
 
 
 def test_sample_as_example(here: Path) -> None:

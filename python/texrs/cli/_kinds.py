@@ -259,6 +259,13 @@ def read_entry(text: str, about: About) -> Any:
     return elements.load(text) if text.lower().endswith(".npz") else read_picture(text)
 
 
+def read_labels(path: str, about: About) -> Array:
+    """Read the labels of elements: a picture of them, or those of an entry."""
+    from texrs import elements
+
+    return elements.load(path).labels if path.lower().endswith(".npz") else io.read(path)
+
+
 def read_points(path: str, about: About) -> list[list[float]]:
     """Read a list of points, row,column a line; a first line of words and empty lines are passed over."""
     try:
@@ -288,13 +295,16 @@ def read_points(path: str, about: About) -> list[list[float]]:
 # --- the kinds -------------------------------------------------------------------------------------------------------
 
 PICTURE = Kind("FILE", lambda text, about: read_picture(text), "A file, or sample:NAME.", file=True)
-PICTURES = Kind(
-    "FILE", lambda texts, about: [read_picture(text) for text in texts], "Files, or sample:NAME.", file=True, many=True
-)
 UNKNOWN = replace(PICTURE, read=lambda text, about: read_picture(text, finite=False))
 """A picture in which some is not known, and may be anything."""
 VOLUME = replace(PICTURE, read=lambda text, about: read_volume(text))
 ENTRY = Kind("FILE", read_entry, "An image file, sample:NAME, or an entry that texrs analyse wrote (.npz).", file=True)
+ENTRIES = replace(
+    ENTRY,
+    read=lambda texts, about: [read_entry(text, about) for text in texts],
+    note="Files, sample:NAME, or entries that texrs analyse wrote (.npz).",
+    many=True,
+)
 MASK = Kind("FILE", lambda path, about: read_mask(path, about.axes), "What is not black is marked.", file=True)
 HOLE = replace(MASK, words=("alpha",))
 MAP = Kind("FILE", lambda path, about: read_scale_map(path), "A file that texrs scale-map wrote.", file=True)
@@ -336,7 +346,7 @@ KINDS = {
     "target": MAP,
     "mask": MASK,
     "within": MASK,
-    "labels": Kind("FILE", lambda path, about: io.read(path), file=True),
+    "labels": Kind("FILE", read_labels, "Or an entry that texrs analyse wrote (.npz).", file=True),
     "values": Kind("FILE", read_values, file=True),
     "coordinates": Kind("FILE", lambda path, about: np.asarray(read_array(path, about.axes)), file=True),
     "background": Kind("ROW,COL", parse_places, "The option may be repeated.", many=True),

@@ -17,7 +17,7 @@ from texrs._threads import threads
 from texrs._typing import Array
 from texrs.cli import _outputs
 from texrs.cli._console import note, show_progress
-from texrs.cli._kinds import ENTRY, HOLE, MAP_OR_AUTO, NUMBERS, PICTURE, PICTURES, UNKNOWN, VOLUME, About, Kind
+from texrs.cli._kinds import ENTRIES, ENTRY, HOLE, MAP_OR_AUTO, NUMBERS, PICTURE, UNKNOWN, VOLUME, About, Kind
 from texrs.cli._options import Options, as_command, make_parameter
 from texrs.cli._outputs import Quiet, Threads, describe, name_arguments, to_write
 from texrs.synthesis import Synthesis
@@ -136,7 +136,7 @@ def make_verb(name: str) -> Verb:
         case "design":
             from texrs.papers.design import design, design_variants
 
-            options = Options(design, arguments={"exemplar": PICTURES}, names={"elements": "element"})
+            options = Options(design, arguments={"exemplar": ENTRIES}, names={"elements": "element"})
             return Verb(options, times=2, several=design_variants)
         case "perspective":
             from texrs.papers.perspective import perspective

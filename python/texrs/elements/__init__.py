@@ -2,7 +2,8 @@
 
 `analyse` finds them, from a box around one and a few places between them, or by itself; `correct` puts right what it got
 wrong, and `page` shows it; `load` reads what `Elements.save` wrote. `Elements.of_sample` takes over what is known of a
-generated texture. `Layout` says how they hang together, and `ElementSearch` how they are looked for.
+generated texture. `Elements.instances` are the elements one by one. `Layout` says how they hang together, and
+`ElementSearch` how they are looked for.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 from texrs.elements._analyse import analyse
 from texrs.elements._corrections import correct
 from texrs.elements._elements import FORMAT, Elements, digest, load
+from texrs.elements._instances import Instance
 from texrs.elements._layout import Layout, LayoutName
 from texrs.elements._options import ElementSearch
 from texrs.elements._page import page
@@ -19,6 +21,7 @@ __all__ = [
     "FORMAT",
     "ElementSearch",
     "Elements",
+    "Instance",
     "Layout",
     "LayoutName",
     "analyse",

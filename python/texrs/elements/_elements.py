@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,8 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_image
 from texrs._engine.coherence import Similarity
-from texrs._typing import Array, Path
+from texrs._typing import Array, Labels, Path
+from texrs.elements._instances import Instance, Labelled, cut_instances, label_elements
 from texrs.elements._layout import Layout
 from texrs.errors import FileError, InvalidInput
 from texrs.exemplar import Exemplar
@@ -110,6 +112,48 @@ class Elements:
         mask = sample.labels > 0 if sample.mask is None else sample.mask
         layout = Layout(sample.layout or "disjoint")
         return cls(sample.image, sample.centres, mask, (height, width), layout, np.ones(len(sample.centres)), wrap=wrap)
+
+    @cached_property
+    def labels(self) -> Labels:
+        """The element of each pixel, (H, W) int32, counted from 1; 0 is the ground. Made when first asked for, read-only.
+
+        Element ``k + 1`` belongs to point ``k``. After those of the points come pieces of the foreground, and cells, that no
+        point lies in. Separate elements are the pieces of the mask, parted where several points lie in one; elements of a
+        connected texture its cells without their joints, where it has any that are sure, else what lies nearest to each.
+        Specks of the foreground without a point are ground.
+
+        Examples
+        --------
+        >>> from texrs import samples
+        >>> from texrs.elements import Elements
+        >>> entry = Elements.of_sample(samples.load("dots", size=(96, 96)))
+        >>> entry.labels.shape, bool(entry.mask[entry.labels > 0].all())
+        ((96, 96), True)
+
+        """
+        return self._labelled.labels
+
+    @cached_property
+    def instances(self) -> tuple[Instance, ...]:
+        """Each element with a mask of its own, in the order of `labels`; made when first asked for.
+
+        Examples
+        --------
+        >>> from texrs import samples
+        >>> from texrs.elements import Elements
+        >>> entry = Elements.of_sample(samples.load("dots", size=(96, 96)))
+        >>> one = entry.instances[0]
+        >>> bool(one.mask.sum() == (entry.labels == 1).sum()), one.confidence
+        (True, 1.0)
+
+        """
+        return cut_instances(self._labelled, self.angles, self.scales, self.wrap)
+
+    @cached_property
+    def _labelled(self) -> Labelled:
+        found = label_elements(self.image, self.mask, self.points, self.scores, self.box, self.layout, self.wrap)
+        found.labels.flags.writeable = False
+        return found
 
     def similarity(self, *, k: int = 3, progress: Callable[[float], object] | None = None) -> Similarity:
         """Return what each pixel of the texture may be replaced by: itself and the ``k - 1`` that look most like it.

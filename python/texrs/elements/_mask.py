@@ -131,11 +131,11 @@ def cut_foreground(
         colours = flatten_shading(colours, max(box), wrap)
     flat = colours.reshape(-1, 3).astype(np.float64)
 
-    poses = np.tile((0.0, 1.0), (len(centres), 1)) if poses is None else poses
+    turned = np.tile((0.0, 1.0), (len(centres), 1)) if poses is None else poses
 
     def mark(part: Bools, number: int | None = None) -> Bools:
         marked = np.zeros(size, bool)
-        stamp_posed(marked, centres[:number], poses[:number], part, wrap)
+        stamp_posed(marked, centres[:number], turned[:number], part, wrap)
         return marked
 
     def cost(mine: Sequence[NDArray[np.float64]], number: int) -> NDArray[np.float64]:
@@ -144,11 +144,11 @@ def cut_foreground(
             return _measure_nearest_costs(flat, samples)
         return -Mixture.fit(samples, seed=seed + number).log(flat)
 
-    half = WHOLE * poses[:, 1:] * np.array(box)
+    half = WHOLE * turned[:, 1:] * np.array(box)
     whole = ((centres >= half) & (centres <= np.array(size) - 1 - half)) | np.array(wrap)
     whole[0] = True
     # Where the border cuts an element, it may as well be none.
-    centres, poses = centres[whole.all(axis=1)], poses[whole.all(axis=1)]
+    centres, turned = centres[whole.all(axis=1)], turned[whole.all(axis=1)]
     known = flat[background.ravel()]
     core = shape if shape is not None else ellipse(box, CORE)
     certain = mark(core, 1) & ~background

@@ -127,7 +127,7 @@ def reconcile(
     kept: list[tuple[float, float, float, int]] = []
     for number, region in regions.items():
         mine = np.flatnonzero(owner == number)
-        centre = _centre(region.coords, mask.shape, wrap)
+        centre = find_middle(region.coords, mask.shape, wrap)
         if not certain and not any(wrap) and _is_strip(region.bbox, region.area, shape.shape):
             continue
         whole = solid[number] >= ROUND and area[number] <= ONE * usual
@@ -182,7 +182,7 @@ def add_missing(found: Separation, similarity: Floats, wrap: Wrap, *, joints: bo
         fits = least * usual <= region.area <= SWOLLEN * usual
         if inside[region.label] or cut or not fits or region.solidity < SOLID:
             continue
-        centre = _centre(region.coords, size, wrap)
+        centre = find_middle(region.coords, size, wrap)
         new.append((*centre, float(similarity[find_nearest_pixels(centre, size)]), -1.0))
     if not new:
         return found
@@ -201,7 +201,7 @@ def _drop_fragments(found: Separation, pieces: Labels, areas: NDArray[np.intp], 
     return Separation(found.points[~bits], found.scores[~bits], found.detection[~bits], mask, found.made_by)
 
 
-def _centre(pixels: NDArray[np.intp], shape: tuple[int, ...], wrap: Wrap) -> NDArray[np.float64]:
+def find_middle(pixels: NDArray[np.intp], shape: tuple[int, ...], wrap: Wrap) -> NDArray[np.float64]:
     """Return the centroid of pixels, around cyclic axes that of their angles."""
     centre = pixels.mean(axis=0)
     for axis in range(2):

@@ -50,6 +50,7 @@ from functools import partial
 
 from texrs._typing import Progress
 from texrs.blending import SCREENING
+from texrs.elements import Elements
 from texrs.exemplar import ElementOptions
 from texrs.papers.design.arguments import Arguments, Choice, Exemplars, Method, Size, Weights, check_arguments
 from texrs.papers.design.options import DeformationOptions
@@ -69,7 +70,7 @@ def design(
     seed: int = 0,
     wrap: bool | Sequence[bool] = (True, True),
     weights: Weights = None,
-    elements: ElementOptions = ElementOptions(),
+    elements: ElementOptions | Elements = ElementOptions(),
     deformation: DeformationOptions = DeformationOptions(),
     plan: Choice = "auto",
     tiles: int = 4,
@@ -82,9 +83,9 @@ def design(
 
     Parameters
     ----------
-    exemplar : (H, W) or (H, W, C) array, Exemplar, or a sequence of them
+    exemplar : (H, W) or (H, W, C) array, Exemplar, Elements, or a sequence of them
         The example, any real dtype, at least 16 pixels a side. Several, of one dtype and one number of channels, are
-        mixed.
+        mixed. An entry of analysed elements, as `splice` takes them, brings its own elements along.
     size : int or (rows, columns), optional
         Size of the result, in pixels, at least 16 a side; twice the exemplar by default.
     seed : int
@@ -94,8 +95,8 @@ def design(
     weights : (n,), (rows, columns) of int, or (rows, columns, n) array, optional
         Shares of n exemplars in the result, or which one is where, or their shares everywhere; equal by default. Borders
         follow outlines, by an element at most from where a map has them; shares on the whole are kept within 3 %.
-    elements : ElementOptions
-        How the elements of the exemplar are found.
+    elements : ElementOptions or Elements
+        How the elements of the exemplar are found, or what `texrs.elements.analyse` found: its ``labels`` are used.
     deformation : DeformationOptions
         How elements are deformed.
     plan : {"auto", "move", "still"}
@@ -158,6 +159,9 @@ def design(
     >>> heights = np.linspace(0, 1, 96 * 96, dtype=np.float32).reshape(96, 96)
     >>> result.source.render(heights).shape
     (128, 160)
+    >>> stones = texrs.elements.Elements.of_sample(texrs.samples.pebbles((96, 96)))
+    >>> texrs.design(stones, 96, tiles=1, plan="move").report["kind"]
+    'labels'
     >>> still = texrs.design(pebbles, 128, deformation=texrs.DeformationOptions(rotate=0, mirror=False))
 
     """
@@ -188,7 +192,7 @@ def design_variants(
     seed: int = 0,
     wrap: bool | Sequence[bool] = (True, True),
     weights: Weights = None,
-    elements: ElementOptions = ElementOptions(),
+    elements: ElementOptions | Elements = ElementOptions(),
     deformation: DeformationOptions = DeformationOptions(),
     plan: Choice = "auto",
     tiles: int = 4,
@@ -204,9 +208,9 @@ def design_variants(
 
     Parameters
     ----------
-    exemplar : (H, W) or (H, W, C) array, Exemplar, or a sequence of them
+    exemplar : (H, W) or (H, W, C) array, Exemplar, Elements, or a sequence of them
         The example, any real dtype, at least 16 pixels a side. Several, of one dtype and one number of channels, are
-        mixed.
+        mixed. An entry of analysed elements, as `splice` takes them, brings its own elements along.
     count : int
         How many, 1 to 4096.
     size : int or (rows, columns), optional
@@ -218,8 +222,8 @@ def design_variants(
     weights : (n,), (rows, columns) of int, or (rows, columns, n) array, optional
         Shares of n exemplars in each texture, or which one is where, or their shares everywhere; equal by default. Borders
         follow outlines, by an element at most from where a map has them; shares on the whole are kept within 3 %.
-    elements : ElementOptions
-        How the elements of the exemplar are found.
+    elements : ElementOptions or Elements
+        How the elements of the exemplar are found, or what `texrs.elements.analyse` found: its ``labels`` are used.
     deformation : DeformationOptions
         How elements are deformed.
     plan : {"auto", "move", "still"}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,13 +24,14 @@ from texrs._arrays import (
     try_array,
 )
 from texrs._typing import Array, Progress
+from texrs.elements import Elements
 from texrs.errors import InvalidInput
 from texrs.exemplar import ElementOptions, Exemplar, as_exemplar
 from texrs.papers.design.options import DeformationOptions
 
 __all__ = ["Arguments", "Choice", "Exemplars", "Method", "Size", "Weights", "check_arguments"]
 
-Exemplars: TypeAlias = Array | Exemplar | Sequence[Array | Exemplar]
+Exemplars: TypeAlias = Array | Exemplar | Elements | Sequence[Array | Exemplar | Elements]
 Size: TypeAlias = int | Sequence[int] | None
 Weights: TypeAlias = Sequence[float] | Array | None
 Method: TypeAlias = Literal["paper"] | None
@@ -84,7 +85,7 @@ def check_arguments(
     seed: int,
     wrap: bool | Sequence[bool],
     weights: Weights,
-    elements: ElementOptions,
+    elements: ElementOptions | Elements,
     deformation: DeformationOptions,
     plan: Choice,
     tiles: int,
@@ -94,11 +95,13 @@ def check_arguments(
     progress: Progress | None,
 ) -> Arguments:
     """Check the arguments of `texrs.design_variants`."""
-    exemplars = [as_exemplar(e, minimum=MINIMUM_SIDE) for e in as_list(exemplar)]
-    for name, value, kind in (("elements", elements, ElementOptions), ("deformation", deformation, DeformationOptions)):
+    given = as_list(exemplar)
+    exemplars = [as_exemplar(e.image if isinstance(e, Elements) else e, minimum=MINIMUM_SIDE) for e in given]
+    chosen = take_entries(given, exemplars, elements)
+    for name, value, kind in (("elements", chosen, ElementOptions), ("deformation", deformation, DeformationOptions)):
         if not isinstance(value, kind):
             raise InvalidInput(f"{name}: needs {kind.__name__}(...), got {value!r}")
-    check_together(exemplars, elements.labels)
+    check_together(exemplars, chosen.labels)
     rows, columns = as_size(size if size is not None else [2 * n for n in exemplars[0].shape], minimum=MINIMUM_SIDE)
     first, cyclic = as_seed(seed), as_wrap(wrap)
     shares = as_shares(weights, len(exemplars), (rows, columns))
@@ -111,7 +114,7 @@ def check_arguments(
         [(first + k) % 2**64 for k in range(as_int(count, "count", 1, 4096))],
         (cyclic[0], cyclic[1]),
         shares,
-        elements,
+        chosen,
         deformation,
         plan,
         as_int(tiles, "tiles", 1, 64),
@@ -122,6 +125,36 @@ def check_arguments(
     )
     check_memory(count_bytes(arguments))
     return arguments
+
+
+def take_entries(given: Sequence[object], exemplars: Sequence[Exemplar], elements: Any) -> Any:
+    """Return how elements are found: where entries of analysed ones are given, by their labels.
+
+    What is said of the elements beside stands above an entry that the exemplar came in.
+    """
+    if isinstance(elements, Elements):
+        shapes = [e.shape for e in exemplars]
+        if shapes != [elements.mask.shape]:
+            raise InvalidInput(
+                f"elements: those of one texture of {elements.mask.shape} are for one exemplar of that shape, got {shapes}; "
+                "of several exemplars each can be an entry itself"
+            )
+        return ElementOptions(labels=part_at_borders(elements))
+    plain = isinstance(elements, ElementOptions) and (elements.layers, elements.kind) == (None, "auto")
+    if not plain or elements.labels is not None or not any(isinstance(e, Elements) for e in given):
+        return elements
+    labels: list[Any] = [part_at_borders(e) if isinstance(e, Elements) else None for e in given]
+    return ElementOptions(labels=labels if len(labels) > 1 else labels[0])
+
+
+def part_at_borders(entry: Elements) -> NDArray[np.integer[Any]]:
+    """Return the labels of an entry, elements that go on around a border of it in two: they are moved within the exemplar."""
+    from scipy.ndimage import label
+
+    if not any(entry.wrap):
+        return entry.labels
+    pieces, count = label(entry.labels > 0)
+    return np.asarray(entry.labels * (int(count) + 1) + pieces)
 
 
 def count_bytes(arguments: Arguments) -> int:

@@ -25,8 +25,9 @@ from numpy.typing import NDArray
 from texrs._arrays import as_image, guidance
 from texrs._cache import Cache, content_hash
 from texrs._typing import Progress
-from texrs.elements import Elements, Layout
-from texrs.exemplar.cells import Cells, find_cells
+from texrs.elements import Elements
+from texrs.elements._instances import find_sure_cells
+from texrs.exemplar.cells import Cells
 from texrs.exemplar.symmetry import find_mirrors
 from texrs.papers.splice.cells.charts import Charts, draw_charts
 from texrs.papers.splice.cells.choice import list_usable, shortlist
@@ -42,29 +43,18 @@ from texrs.synthesis import Synthesis
 
 __all__ = ["find_entry_cells", "splice_cells"]
 
-SURE = 0.5
-"""Confidence from which on cells are believed."""
 FEWEST = 3
 """Cells that can be shown, at least."""
-LEAST = 3.0
-"""Width of a cell, in pixels, below which none is looked for."""
 HERE = 0.25
 """Sizes from a cell's centre within which a pixel of the output must show it, for the cell to be there."""
 
-_CELLS: Cache[bytes, Cells] = Cache(16)
 _TARGETS: Cache[bytes, Tessellation] = Cache(16)
 
 
 def find_entry_cells(entry: Elements, watch: Progress | None = None) -> Cells | None:
     """Return the cells of a connected texture; none where it has none that are sure enough, as nets."""
-    if entry.layout == Layout.DISJOINT:
-        return None
-    joints = ~entry.mask if entry.layout == Layout.JOINTED else entry.mask
-    # An entry that was not analysed here may say anything.
-    size = float(np.clip(min(entry.box), LEAST, min(entry.mask.shape)))
-    key = content_hash(np.asarray(entry.image), np.packbits(entry.mask), size, entry.layout)
-    found = _CELLS.get_or_make(key, lambda: find_cells(entry.image, size=size, joints=joints, progress=watch))
-    return found if found.confidence >= SURE and len(list_usable(found)) >= FEWEST else None
+    found = find_sure_cells(entry.image, entry.mask, entry.box, entry.layout, watch)
+    return found if found is not None and len(list_usable(found)) >= FEWEST else None
 
 
 def splice_cells(
