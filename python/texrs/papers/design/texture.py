@@ -91,9 +91,9 @@ def measure_layer(source: SourceMap, plan: Plan) -> Layer:
 
 def measure_extent(plan: Plan) -> float:
     """Return the usual size of an element, in pixels."""
-    if plan.parts.kind not in ("components", "labels"):
-        return float(plan.side)
     areas = np.bincount(plan.parts.elements.ravel())[1:]
+    if plan.parts.kind not in ("components", "labels") or not areas.any():
+        return float(plan.side)
     return float(np.sqrt(np.median(areas[areas > 0])))
 
 
