@@ -7,7 +7,7 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::canvas::{FREE, Window};
+use super::canvas::{Canvas, FREE, Window};
 use super::chart::Chart;
 use super::energy::Energy;
 use super::pair::{Capacities, Judge, capacity, go_on};
@@ -32,7 +32,8 @@ pub(super) struct Proposal<'a, const D: usize> {
     pub mask: &'a [bool],
     /// Of all points of the window.
     pub places: Vec<Place<D>>,
-    pub distortion: &'a [f32],
+    /// What each costs that takes the patch, by itself; empty where that is nothing.
+    pub points: Vec<f32>,
 }
 
 /// What a cut comes to.
@@ -45,19 +46,6 @@ pub(super) struct Cutting<const D: usize> {
     pub seams: Vec<(u32, u8, f32)>,
     /// Side of the blocks of points that it runs between.
     block: usize,
-}
-
-impl<'a, const D: usize> Proposal<'a, D> {
-    /// A chart with its centre at a place.
-    pub(super) fn new(chart: &'a Chart<D>, place: Place<D>) -> Self {
-        let add = |s: &Place<D>| std::array::from_fn(|a| s[a].wrapping_add(place[a]));
-        Self {
-            window: &chart.window,
-            mask: &chart.mask,
-            places: chart.steps.iter().map(add).collect(),
-            distortion: &chart.distortion,
-        }
-    }
 }
 
 /// What cuts are made in, one at a time.
@@ -122,6 +110,62 @@ impl<'a, const D: usize> Cutter<'a, D> {
         self.workspaces
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What a window shows where a patch comes that covers a mask. Points of its core must take it; empty for none.
+    pub(super) fn view(
+        &self,
+        canvas: &Canvas<D>,
+        window: &Window<D>,
+        mask: &[bool],
+        core: &[bool],
+    ) -> View<D> {
+        let mut view = View::new(canvas, window, mask, core, self.source());
+        view.points = self.weigh(window, &view.places, &view.distortion);
+        for (cost, &patch) in view.points.iter_mut().zip(&view.patches) {
+            if patch == FREE {
+                *cost = 0.0;
+            }
+        }
+        view
+    }
+
+    /// A chart with its centre at a place.
+    pub(super) fn propose<'c>(&self, chart: &'c Chart<D>, place: Place<D>) -> Proposal<'c, D> {
+        let add = |s: &Place<D>| std::array::from_fn(|a| s[a].wrapping_add(place[a]));
+        let places: Vec<Place<D>> = chart.steps.iter().map(add).collect();
+        Proposal {
+            window: &chart.window,
+            mask: &chart.mask,
+            points: self.weigh(&chart.window, &places, &chart.distortion),
+            places,
+        }
+    }
+
+    /// What each point of a window costs by itself that shows a place; empty where that is nothing.
+    fn weigh(&self, window: &Window<D>, places: &[Place<D>], distortion: &[f32]) -> Vec<f32> {
+        let (weights, source) = (&self.judge.weights, self.source());
+        let presence = if source.has_elements() {
+            weights.presence
+        } else {
+            0.0
+        };
+        if presence <= 0.0 && self.guide.is_none() && distortion.is_empty() {
+            return Vec::new();
+        }
+        let cost = |(i, &place): (usize, &Place<D>)| {
+            let mut cost = weights.distortion * distortion.get(i).copied().unwrap_or(0.0);
+            let sample = source.sample(place);
+            if let Some(guide) = self.guide {
+                let asked = guide.cost(window.points[i] as usize, sample) as f32;
+                cost += weights.guide * asked / UNRELATED;
+            }
+            if presence > 0.0 {
+                cost += presence * f32::from(u8::from(source.is_bare(sample)));
+            }
+            cost
+        };
+        places.iter().enumerate().map(cost).collect()
     }
 
     /// Cuts a patch into the canvas.
@@ -241,10 +285,9 @@ impl<'a, const D: usize> Cutter<'a, D> {
         };
         self.look(view, patch, ties, &mut work.patch);
         work.energy.clear(grid, block)?;
-        if self.has_points(patch) {
-            for (i, _) in ties.iter().enumerate().filter(|(_, t)| **t == Tie::Either) {
-                let [keep, take] = self.points(view, patch, i);
-                work.energy.add_point(i, capacity(take - keep));
+        for (i, take) in patch.points.iter().enumerate() {
+            if ties[i] == Tie::Either {
+                work.energy.add_point(i, capacity(take - view.cost(i)));
             }
         }
         self.add_pairs(
@@ -342,7 +385,7 @@ impl<'a, const D: usize> Cutter<'a, D> {
         patch: &Patch,
         costs: &mut Costs,
     ) -> Cutting<D> {
-        let mut value = self.value_of(view, proposal, |i| take[i]);
+        let mut value = value_of(view, proposal, |i| take[i]);
         let mut seams = Vec::new();
         runs(&proposal.window.grid, |run| {
             let kept = &view.seams[run.axis];
@@ -378,56 +421,23 @@ impl<'a, const D: usize> Cutter<'a, D> {
 
     /// What the window of a patch costs as it is.
     pub(super) fn value(&self, view: &View<D>, patch: &Proposal<'_, D>) -> f64 {
-        self.value_of(view, patch, |_| false)
+        value_of(view, patch, |_| false)
     }
+}
 
-    /// What the points cost of which some take the patch, and all seams as they are.
-    fn value_of(
-        &self,
-        view: &View<D>,
-        patch: &Proposal<'_, D>,
-        take: impl Fn(usize) -> bool,
-    ) -> f64 {
-        let mut value = view.total;
-        if self.has_points(patch) {
-            for (i, tie) in view.ties.iter().enumerate() {
-                if *tie == Tie::New || *tie == Tie::Either {
-                    value += f64::from(self.points(view, patch, i)[usize::from(take(i))]);
-                }
-            }
-        }
-        value
-    }
-
-    /// Whether points cost anything by themselves.
-    fn has_points(&self, patch: &Proposal<'_, D>) -> bool {
-        let elements = self.judge.weights.presence > 0.0 && self.source().has_elements();
-        elements || self.guide.is_some() || !patch.distortion.is_empty()
-    }
-
-    /// What a point costs that keeps what it shows, or takes the patch.
-    fn points(&self, view: &View<D>, patch: &Proposal<'_, D>, i: usize) -> [f32; 2] {
-        let weights = &self.judge.weights;
-        let own = |all: &[f32]| weights.distortion * all.get(i).copied().unwrap_or(0.0);
-        let mut costs = [own(&view.distortion), own(patch.distortion)];
-        if let Some(guide) = self.guide {
-            let p = patch.window.points[i] as usize;
-            for (cost, place) in costs.iter_mut().zip([view.places[i], patch.places[i]]) {
-                let asked = guide.cost(p, self.source().sample(place)) as f32;
-                *cost += weights.guide * asked / UNRELATED;
-            }
-        }
-        if weights.presence > 0.0 && self.source().has_elements() {
-            for (cost, place) in costs.iter_mut().zip([view.places[i], patch.places[i]]) {
-                *cost += weights.presence * f32::from(u8::from(self.source().bare(place)));
-            }
-        }
-        if view.patches[i] == FREE {
-            [0.0, costs[1]]
-        } else {
-            costs
+/// What the points cost of which some take the patch, and all seams as they are.
+fn value_of<const D: usize>(
+    view: &View<D>,
+    patch: &Proposal<'_, D>,
+    take: impl Fn(usize) -> bool,
+) -> f64 {
+    let mut value = view.total;
+    for (i, &new) in patch.points.iter().enumerate() {
+        if view.ties[i] == Tie::New || view.ties[i] == Tie::Either {
+            value += f64::from(if take(i) { new } else { view.cost(i) });
         }
     }
+    value
 }
 
 /// The side of the blocks that a window is cut between.

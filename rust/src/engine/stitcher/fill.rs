@@ -7,7 +7,6 @@ use std::collections::VecDeque;
 
 use super::chart::Chart;
 use super::cut::{Cutting, Proposal};
-use super::view::View;
 use super::{Stitching, enlargement};
 use crate::Result;
 use crate::foundation::fixed::{Frames, Place};
@@ -210,7 +209,7 @@ impl<const D: usize> Stitching<'_, D> {
             o.candidates,
             &self.noise.part(number),
         );
-        let view = View::new(&self.canvas, &chart.window, &chart.mask, &[], source);
+        let view = (self.cutter).view(&self.canvas, &chart.window, &chart.mask, &[]);
         let worth = f64::from(o.balance / side);
         let excess = |patch: &Proposal<'_, D>, take: &[bool]| {
             let points = &chart.window.points;
@@ -220,7 +219,7 @@ impl<const D: usize> Stitching<'_, D> {
             worth * after.excess(source)
         };
         let cuts = par::map(places.len(), |k| {
-            let patch = Proposal::new(&chart, places[k]);
+            let patch = self.cutter.propose(&chart, places[k]);
             let cut = self.cutter.judge(&view, &patch, self.monitor)?;
             Ok((cut.value + excess(&patch, &cut.take), cut))
         });
@@ -234,7 +233,7 @@ impl<const D: usize> Stitching<'_, D> {
         let Some((_, k, judged)) = best else {
             return Ok(None);
         };
-        let patch = Proposal::new(&chart, places[k]);
+        let patch = self.cutter.propose(&chart, places[k]);
         let cutting = self
             .cutter
             .cut_judged(&view, &patch, judged, self.monitor)?;

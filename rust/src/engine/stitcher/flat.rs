@@ -183,7 +183,7 @@ impl Samples {
             window,
             mask: pasting.mask,
             places: samples.iter().map(|&k| place(k)).collect(),
-            distortion: &[],
+            points: Vec::new(),
         })
     }
 

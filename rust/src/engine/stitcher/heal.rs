@@ -8,8 +8,7 @@ use std::collections::{HashMap, HashSet, VecDeque};
 
 use super::canvas::{FREE, HELD, Window};
 use super::chart::{Chart, flood};
-use super::cut::{Cutting, Proposal, widen};
-use super::view::View;
+use super::cut::{Cutting, widen};
 use super::{Patch, Stitching};
 use crate::Result;
 use crate::foundation::fixed::{Frames, Place};
@@ -260,7 +259,7 @@ impl<const D: usize> Stitching<'_, D> {
         let Some(chart) = self.chart_of(to, window) else {
             return Ok(None);
         };
-        let proposal = Proposal::new(&chart, to.place);
+        let proposal = self.cutter.propose(&chart, to.place);
         let (canvas, n) = (&self.canvas, chart.window.grid.len());
         let own: Vec<bool> = (0..n)
             .map(|i| {
@@ -291,13 +290,7 @@ impl<const D: usize> Stitching<'_, D> {
         if !core.contains(&true) {
             return Ok(None);
         }
-        let view = View::new(
-            canvas,
-            &chart.window,
-            &chart.mask,
-            &core,
-            self.cutter.source(),
-        );
+        let view = (self.cutter).view(canvas, &chart.window, &chart.mask, &core);
         let cutting = self.cutter.cut(&view, &proposal, self.monitor)?;
         let mut changes: Vec<(Key, i64)> = Vec::new();
         let mut change = |key: Option<Key>, by: i64| {

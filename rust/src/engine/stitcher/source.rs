@@ -279,10 +279,10 @@ impl<const D: usize> Source<D> {
         look
     }
 
-    /// Whether a place lies between elements.
-    #[inline]
-    pub(super) fn bare(&self, place: Place<D>) -> bool {
-        self.looks[self.sample(place)].depth <= 0.0
+    /// Whether a sample lies between elements.
+    #[inline(always)]
+    pub(super) fn is_bare(&self, sample: usize) -> bool {
+        self.looks[sample].depth <= 0.0
     }
 
     #[inline]

@@ -25,6 +25,8 @@ pub(super) struct View<const D: usize> {
     pub total: f64,
     /// Empty where nothing is bent.
     pub distortion: Vec<f32>,
+    /// What points cost by themselves that stay as they are; empty where that is nothing.
+    pub points: Vec<f32>,
     /// Of points that show something.
     pub looks: Looks,
     /// What each point may do when a patch comes that covers some of them.
@@ -81,9 +83,16 @@ impl<const D: usize> View<D> {
             patches,
             seams,
             distortion: Vec::new(),
+            points: Vec::new(),
             looks,
             ties,
         }
+    }
+
+    /// What a point costs by itself that stays as it is.
+    #[inline(always)]
+    pub(super) fn cost(&self, i: usize) -> f32 {
+        self.points.get(i).copied().unwrap_or(0.0)
     }
 }
 
