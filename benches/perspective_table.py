@@ -55,9 +55,9 @@ steepen all: see `drawn` and `itself`); spread: deviation of the logarithms wher
 share of torn cells (<= 0.15);
 wavelength: rank correlation of the local wavelength; error: median of |log S_e(S(p)) - log S| (<= 0.08); sharp: mean gradient
 over the exemplar's at the same scales (0.9 to 1.1); colour: distance of quantiles from the exemplar's at the same scales (<=
-0.012); rows: autocorrelation along rows, less the exemplar's (<= 0). Figures are means over the seeds; **bold** fails, and
-the last line counts; seconds are those of processors. The first line of a texture is the exemplar's own; `drawn` are discs of the very sizes that are asked
-for.
+0.012); rows: autocorrelation along rows, less the exemplar's (<= 0); seconds: of processors. Figures are means over the seeds;
+**bold** fails, and the last line counts. The first line of a texture is the exemplar's own; `drawn` are discs of the very sizes
+that are asked for.
 """
 
 
