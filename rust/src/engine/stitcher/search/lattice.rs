@@ -5,7 +5,7 @@ use crate::foundation::fixed::{Place, nearest};
 use crate::foundation::grid::Grid;
 
 /// Exemplars of more samples are searched by blocks of them.
-const LARGE: usize = 1 << 19;
+const LARGE: usize = 1 << 18;
 
 /// Blocks of samples, in arrays that have room for transforms.
 #[derive(Debug, Clone, Copy)]
