@@ -344,6 +344,9 @@ def test_bad_input_names_the_argument(arguments, options, names):
         (DeformationOptions, {"start": 0.5}),
         (DeformationOptions, {"start": 1}),
         (DeformationOptions, {"growth_rate": 2.5}),
+        (DeformationOptions, {"u": 0}),
+        (DeformationOptions, {"v": 5}),
+        (DeformationOptions, {"xi": 0}),
     ],
 )
 def test_options_are_checked_when_they_are_made(kind, options):

@@ -116,6 +116,31 @@ def test_heaps_move_without_holes_to_speak_of():
     assert max(made.report["holes"]) < 0.1
 
 
+def test_operations_are_obeyed_in_heaps():
+    beans = samples.beans((128, 128)).image
+    made = {
+        n: texrs.design(beans, 96, tiles=1, seed=1, plan="move", deformation=DeformationOptions(operations=n))
+        for n in (None, 0, 1, 2, 6)
+    }
+    assert made[None].report["arrangement"] == ["heap"]
+    np.testing.assert_array_equal(made[None].image, made[1].image)
+    longest = {
+        n: max((len(e["operations"]) for e in result.report["operations"][0][1:] if "place" in e), default=0)
+        for n, result in made.items()
+    }
+    # Turned and scaled to the shape of the other one, and what comes on top of it.
+    assert longest[0] == 0
+    assert [longest[n] for n in (1, 2, 6)] == [2, 3, 7]
+    assert len({result.image.tobytes() for result in made.values()}) == 4
+
+
+def test_v_chooses_among_the_first_operations():
+    for v, kinds in ((1, {"T"}), (2, {"T", "R"}), (4, {"T", "R", "M", "S"})):
+        moves = Moves(DeformationOptions(v=v, rotate=60))
+        drawn = [o for e in range(60) for o in moves.draw_operations(moves.draw_values(0, 0, e), (False, False), 99)]
+        assert {o.kind for o in drawn} == kinds
+
+
 # --- lattices --------------------------------------------------------------------------------------------------------
 
 

@@ -74,6 +74,28 @@ def test_extents_and_directions():
     assert max(abs(choose_operation(h, 100).amount) for h in range(256) if choose_operation(h, 100).kind == "R") == 81
 
 
+def test_u_v_and_xi_choose_the_range():
+    kinds = {v: {choose_operation(h, 100, DeformationOptions(v=v)).kind for h in range(256)} for v in (1, 2, 3, 4)}
+    assert kinds == {1: {"T"}, 2: {"T", "R"}, 3: {"T", "R", "M"}, 4: {"T", "R", "M", "S"}}
+    fine = DeformationOptions(u=100, xi=0.012, scale=(0.5, 2))
+    sizes = {choose_operation(h, 100, fine).amount for h in range(256) if choose_operation(h, 100, fine).kind == "S"}
+    assert len(sizes) > 10
+    assert (min(sizes), max(sizes)) == (0.5, 1.19)
+    assert {choose_operation(h, 100, DeformationOptions(u=1)).amount for h in range(256)} == {0.0}
+
+
+def test_layers_are_moved_as_often_as_asked(pebbles, result):
+    def log(operations):
+        asked = DeformationOptions(operations=operations)
+        made = texrs.design(pebbles, (160, 192), seed=1, tiles=1, deformation=asked, method="paper")
+        return [entry["operations"] for entry in made.report["operations"][0]]
+
+    drawn = [choose_operation(h, min(pebbles.shape[:2])).describe() for h in iterate(START, count=6)]
+    assert log(3) == [drawn[:3], drawn[3:]]
+    assert log(None) == log(1)
+    assert log(0) == [[], []]
+
+
 def test_the_first_variant_starts_as_printed_and_others_elsewhere():
     assert choose_start(None, 2.0, 5, 0, 0) == START
     assert choose_start(0.3, 2.0, 5, 0, 0) == 0.3
@@ -88,11 +110,11 @@ def test_layers_are_moved_whole():
     picture = np.random.default_rng(0).random((40, 40, 3)).astype(np.float32)
     layers = np.zeros((40, 40), np.int32)
     layers[15:25, 15:25] = 1
-    whole = stitch_layers(picture, layers, WEAK, 2.0)
+    whole = stitch_layers(picture, layers, WEAK)
     assert whole.covered.all()
     np.testing.assert_array_equal(whole.colours, picture)
     np.testing.assert_array_equal(whole.label, layers)
-    moved = stitch_layers(picture, layers, START, 2.0)
+    moved = stitch_layers(picture, layers, START)
     # T4 moves the ground by 8 pixels to the right; R1 turns the square by 9 degrees, into what the ground left open.
     assert (~moved.covered[:, :8]).all()
     assert 0 < (moved.label == 1).sum() <= 100
@@ -107,7 +129,7 @@ def test_a_layer_over_others_altogether_is_lost():
     starts = np.random.default_rng(1).uniform(-1, 1, 4000)
     wanted = [("M", 1), ("M", 0)]
     found = [x for x in starts if [(o.kind, o.axis) for o in chosen(x)] == wanted]
-    assert (stitch_layers(picture, layers, float(found[0]), 2.0).label == 0).all()
+    assert (stitch_layers(picture, layers, float(found[0])).label == 0).all()
 
 
 def chosen(start):
@@ -141,7 +163,7 @@ def test_options_of_elements_play_no_part(pebbles, result):
         tiles=2,
         method="paper",
         elements=ElementOptions(kind="grid"),
-        deformation=DeformationOptions(operations=0, translate=0.0, rotate=10.0, scale=(1.0, 1.0), mirror=False),
+        deformation=DeformationOptions(translate=0.0, rotate=10.0, mirror=False),
         blend=0.5,
     )
     np.testing.assert_array_equal(other.image, result.image)

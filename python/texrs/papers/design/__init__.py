@@ -113,10 +113,10 @@ def design(
         wider the correction. None or 0: no correction. See `texrs.blend`, which corrects other maps in the same way,
         of several exemplars with ``across=False``.
     method : {None, "paper"}
-        "paper": the algorithm as printed, with only its misprints repaired, for comparison. Whole colour layers are moved,
-        once each, by the printed generator, and stitched at the plain cost; holes take the best match; colours are
-        corrected without weight on the values. The ``kind`` of elements, and of their deformation all but ``start`` and
-        ``growth_rate``, play no part, nor does the amount of ``blend``.
+        "paper": the algorithm as printed, with only its misprints repaired, for comparison. Whole colour layers are moved
+        by the printed generator, once each or as ``operations`` says, and stitched at the plain cost; holes take the best
+        match; colours are corrected without weight on the values. The ``kind`` of elements and ``translate``, ``rotate``
+        and ``mirror`` of their deformation play no part, nor does the amount of ``blend``.
     progress : callable, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
 
@@ -240,10 +240,10 @@ def design_variants(
         wider the correction. None or 0: no correction. See `texrs.blend`, which corrects other maps in the same way,
         of several exemplars with ``across=False``.
     method : {None, "paper"}
-        "paper": the algorithm as printed, with only its misprints repaired, for comparison. Whole colour layers are moved,
-        once each, by the printed generator, and stitched at the plain cost; holes take the best match; colours are
-        corrected without weight on the values. The ``kind`` of elements, and of their deformation all but ``start`` and
-        ``growth_rate``, play no part, nor does the amount of ``blend``.
+        "paper": the algorithm as printed, with only its misprints repaired, for comparison. Whole colour layers are moved
+        by the printed generator, once each or as ``operations`` says, and stitched at the plain cost; holes take the best
+        match; colours are corrected without weight on the values. The ``kind`` of elements and ``translate``, ``rotate``
+        and ``mirror`` of their deformation play no part, nor does the amount of ``blend``.
     progress : callable, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
 

@@ -23,7 +23,7 @@ from texrs.papers.design.heaps import Heap
 from texrs.papers.design.operations import Operation
 from texrs.papers.design.plan import Plan
 
-__all__ = ["deform_elements"]
+__all__ = ["classify", "deform_elements"]
 
 DENSE, RAGGED = 0.42, 0.825
 """Share of the image that elements cover from which on they lie in a heap, and the solidity below which few of them have the
@@ -35,7 +35,7 @@ Arrangement: TypeAlias = Literal["apart", "layers", "leaves", "heap", "full"]
 
 
 def classify(parts: Segmentation) -> Arrangement:
-    """Return how elements lie: apart, in a heap, of leaves or of things of one shape, or so that all is full."""
+    """Return how elements lie: apart, in a heap of things of one shape or of leaves, so that all is full, or as layers."""
     if parts.lattice is not None or parts.kind == "grid":
         return "full"
     if parts.kind == "none":

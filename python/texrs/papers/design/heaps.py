@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from texrs._typing import Labels
 from texrs.papers.design.elements import Element, Placement, place
-from texrs.papers.design.operations import Moves, Operation
+from texrs.papers.design.operations import TRIES, Moves, Operation
 
 __all__ = ["Heap"]
 
@@ -62,9 +62,10 @@ class Heap:
     ) -> tuple[Element, list[Operation], Placement] | None:
         """Find an element that can lie where another one does, turned and scaled to its shape; None if none can."""
         place_of = self.elements[site]
-        if any(place_of.touches) or not (moves.options.operations and moves.options.translate):
+        count = moves.count(1)
+        if any(place_of.touches) or not (count and moves.options.translate):
             return None
-        values = moves.draw_values(seed, tile, place_of.label)
+        values = moves.draw_values(seed, tile, place_of.label, TAKERS)
         likely = self.rank_takers(site, moves)
         while likely:
             h1, h2 = next(values), next(values)
@@ -75,11 +76,16 @@ class Heap:
             operations += [Operation("S", scale, 0)] if scale != 1 else []
             shift = np.round(place_of.centre - other.centre)
             operations += [Operation("T", float(n), axis) for axis, n in enumerate(shift) if n]
-            placement = place(other, operations, self.labels.shape)
-            if placement is None:
-                continue
-            shape, there = placement.distance > 0, self.labels[placement.window] == place_of.label
-            both = np.count_nonzero(shape & there)
-            if both >= ALIKE * (np.count_nonzero(shape) + place_of.area - both):
-                return other, operations, placement
+            for attempt in range(TRIES if count > 1 else 1):
+                # What comes first does not change where it is brought to.
+                changed = [*moves.draw_changes(values, count - 1, 1 - attempt / TRIES), *operations]
+                placement = place(other, changed, self.labels.shape)
+                if placement is not None and self.fills(placement, place_of):
+                    return other, changed, placement
         return None
+
+    def fills(self, placement: Placement, element: Element) -> bool:
+        """Whether what is placed has about the shape of an element, and covers it."""
+        shape, there = placement.distance > 0, self.labels[placement.window] == element.label
+        both = np.count_nonzero(shape & there)
+        return bool(both >= ALIKE * (np.count_nonzero(shape) + element.area - both))

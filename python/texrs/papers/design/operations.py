@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,7 +16,7 @@ from texrs.exemplar.symmetry import Flip
 from texrs.papers.design.logistic_map import iterate
 from texrs.papers.design.options import DeformationOptions
 
-__all__ = ["TRIES", "Moves", "Operation", "U", "V"]
+__all__ = ["TRIES", "Moves", "Operation"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +55,8 @@ TRIES = 12
 """Draws for an element."""
 BURN_IN = 64
 """Two starts that differ by 1e-8 give different sequences only after about 24 steps."""
-U, V = 10, 4
-"""Constants of the choice of an operation (section 3.3)."""
+USUAL = 2
+"""Operations on an element, unless it is said how many."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,10 +79,17 @@ class Moves:
         shifts = tuple((-r if axes[0] else r, -c if axes[1] else c) for r, c in self.shifts)
         return replace(self, shifts=shifts)
 
-    def draw_values(self, seed: int, tile: int, element: int) -> Iterator[float]:
-        """Return the values of the logistic map for one element of one tile; each has a start of its own."""
+    def count(self, usual: int = USUAL) -> int:
+        """Return how many operations an element takes."""
+        return usual if self.options.operations is None else self.options.operations
+
+    def draw_values(self, seed: int, tile: int, element: int, times: int = 1) -> Iterator[float]:
+        """Return the values of the logistic map for one element of one tile, enough to draw its operations so many times.
+
+        Each element has a start of its own.
+        """
         options = self.options
-        count = 3 * (TRIES + 1) * options.operations + 3
+        count = 3 * times * ((TRIES + 1) * self.count() + 1)
         attempt = 0
         while True:
             start = 2 * uniform(seed, tile, element, attempt, 2) - 1
@@ -105,23 +112,42 @@ class Moves:
         ``reach`` is the share of their extents that translations and rotations may have. ``touches`` says on which axes
         the exemplar's border cuts the element: it then only slides along that border.
         """
-        options = self.options
-        if self.shifts and options.operations:
+        if self.shifts and self.count():
             _, h2, h3 = next(values), next(values), next(values)
             shift = self.shifts[min(int((h2 + h3 / 256) % 16 / 16 * len(self.shifts)), len(self.shifts) - 1)]
             return [] if any(touches) else [Operation("T", float(n), axis) for axis, n in enumerate(shift) if n]
+        return self._draw(["T", *self.changes], self.count(), values, touches, side, reach)
+
+    def draw_changes(self, values: Iterator[float], count: int, reach: float) -> list[Operation]:
+        """Choose what else is done to an element that takes another one's place; ``reach`` is the share of its extents."""
+        drawn = self._draw(self.changes, count, values, (False, False), 0, reach) if self.changes else []
+        return [replace(o, amount=1 + reach * (o.amount - 1)) if o.kind == "S" else o for o in drawn]
+
+    @property
+    def changes(self) -> list[str]:
+        """The kinds of operations that are allowed, but translations."""
+        options = self.options
         allowed = {
-            "T": True,
             "R": self.rotate > 0,
             "M": options.mirror and any(self.axes),
             "S": options.scale != (1.0, 1.0),
         }
-        kinds = [kind for kind, may in allowed.items() if may]
-        chosen = []
-        for _ in range(options.operations):
+        return [kind for kind, may in allowed.items() if may]
+
+    def _draw(
+        self,
+        kinds: Sequence[str],
+        count: int,
+        values: Iterator[float],
+        touches: tuple[bool, bool],
+        side: int,
+        reach: float,
+    ) -> list[Operation]:
+        options, chosen = self.options, []
+        for _ in range(count):
             h1, h2, h3 = next(values), next(values), next(values)
-            kind, axis, extent = kinds[int(h1 % U) % V % len(kinds)], int(h2) // 2 % 2, h3 / 255
-            sense = 1 if int(h2) % 2 else -1
+            kind = kinds[int(h1 % options.u) % options.v % len(kinds)]
+            axis, extent, sense = int(h2) // 2 % 2, h3 / 255, 1 if int(h2) % 2 else -1
             if all(touches):
                 continue
             if any(touches):

@@ -18,8 +18,11 @@ class DeformationOptions:
 
     Attributes
     ----------
-    operations : int
-        Deformations that are combined on each element, 0 to 8.
+    operations : int, optional
+        Deformations that are combined on each element, one after the other, 0 to 8. By default 2, and 1 in heaps and as
+        printed. In a heap the first one takes another element's place, turned and scaled to its shape, and others turn,
+        mirror and scale it as far as it still fills that. On a lattice and where no separate elements are found there is one,
+        a move from place to place: all else shows. The report says which it is, ``report["arrangement"]``.
     translate : float
         Longest translation, as a share of the exemplar's shorter side, 0 to 0.5. In a heap and on a lattice elements go as
         far as the next place that fits, unless this is 0.
@@ -35,6 +38,13 @@ class DeformationOptions:
         Start of the logistic map (Eq. 2), within (-1, 1); the seed draws one for each element by default.
     growth_rate : float
         The lambda of the logistic map (Eq. 2), 0 to 2; below about 1.4 its sequence is periodic.
+    u, v : int
+        What a value h of the logistic map is divided by, 1 to 256, and how many operations there are to choose from, 1 to
+        4, of translation, rotation, mirror and scale in this order: the one chosen is mod(mod(h, u), v). As printed the
+        extent is n = mod(h, u) as well, so the larger u the finer are the extents; by default it is another value's.
+    xi : float
+        As printed, what n is multiplied by for the scaling extent e, 0.001 to 2; it is brought within ``scale``. By default
+        extents are drawn within ``scale`` evenly.
 
     Raises
     ------
@@ -48,13 +58,16 @@ class DeformationOptions:
 
     """
 
-    operations: int = 2
+    operations: int | None = None
     translate: float = 0.12
     rotate: float | None = None
     scale: tuple[float, float] = (0.8, 1.2)
     mirror: bool = True
     start: float | None = None
     growth_rate: float = 2.0
+    u: int = 10
+    v: int = 4
+    xi: float = 0.13
 
     def __post_init__(self) -> None:
         if not isinstance(self.scale, Sequence) or isinstance(self.scale, str) or len(self.scale) != 2:
@@ -63,12 +76,15 @@ class DeformationOptions:
         if low > high:
             raise InvalidInput(f"scale: the least comes first, got {self.scale!r}")
         values: dict[str, object] = {
-            "operations": as_int(self.operations, "operations", 0, 8),
+            "operations": None if self.operations is None else as_int(self.operations, "operations", 0, 8),
             "translate": as_float(self.translate, "translate", 0, 0.5),
             "rotate": None if self.rotate is None else as_float(self.rotate, "rotate", 0, 180),
             "scale": (low, high),
             "mirror": as_bool(self.mirror, "mirror"),
             "growth_rate": as_float(self.growth_rate, "growth_rate", 0, 2),
+            "u": as_int(self.u, "u", 1, 256),
+            "v": as_int(self.v, "v", 1, 4),
+            "xi": as_float(self.xi, "xi", 0.001, 2),
         }
         if self.start is not None:
             iterate(self.start, self.growth_rate)

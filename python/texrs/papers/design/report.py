@@ -10,6 +10,7 @@ import numpy as np
 from texrs._arrays import as_rgb
 from texrs._typing import Array
 from texrs.papers.design.arguments import Arguments
+from texrs.papers.design.deformation import classify
 from texrs.papers.design.plan import Plan
 from texrs.papers.design.tiles import Tile
 from texrs.source_map import SourceMap
@@ -56,6 +57,7 @@ def describe(
         "elements": sum(p.parts.count for p in plans),
         "kind": first.parts.kind,
         "reason": first.parts.reason,
+        "arrangement": [classify(p.parts) for p in plans],
         "plan": ["still" if p.still else "move" for p in plans],
         "tried": [p.tried and {name: dict(figures) for name, figures in p.tried.items()} for p in plans],
         "rotate": first.moves.rotate,
