@@ -346,3 +346,22 @@ def as_seed(value: object, name: str = "seed") -> int:
 def as_mask(value: object, name: str, shape: Sequence[int | str]) -> Bools:
     """Check a mask, bool or integers of which zero means False, and return a copy (see `as_array`)."""
     return np.array(as_array(value, name, np.bool_, shape))
+
+
+# Of single precision NumPy works out functions in other ways on other processors, which differ in the last bit; rounded from
+# double precision they do not.
+
+
+def log_single(values: Array) -> Floats:
+    """Return natural logarithms in single precision, of the same bits on any processor."""
+    return np.log(values, dtype=np.float64).astype(np.float32)
+
+
+def exp_single(values: Array) -> Floats:
+    """Return exponentials in single precision, of the same bits on any processor."""
+    return np.exp(values, dtype=np.float64).astype(np.float32)
+
+
+def power_single(values: Array, exponent: float) -> Floats:
+    """Return powers in single precision, of the same bits on any processor."""
+    return np.power(values, np.float64(exponent), dtype=np.float64).astype(np.float32)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from texrs._arrays import as_image, guidance
+from texrs._arrays import as_image, guidance, log_single
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.completion._judge import Filled, judge_seams
 from texrs.completion._scene import Scene
@@ -78,7 +78,7 @@ def fill_with_patches(
     guides = guide_together([pictures[0][part], *pictures[1:]])
     if scales is not None:
         pairs = zip(guides, (scales[0][part], *scales[1:]), strict=True)
-        guides = [np.concatenate([g, SCALED * np.log(s)[..., np.newaxis]], axis=-1) for g, s in pairs]
+        guides = [np.concatenate([g, SCALED * log_single(s)[..., np.newaxis]], axis=-1) for g, s in pairs]
     known, itself = ~open_[part], len(pictures) == 1
     free = known if itself else np.ones(shapes[-1], bool)
     scene = Scene(guides[0], known, keep[part], guides[-1], free, cyclic)

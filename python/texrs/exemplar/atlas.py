@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import log_single
 from texrs._engine.appearance import Appearance
 from texrs._engine.pyramid import ONE, halve
 from texrs._typing import Array, Bools, Floats
@@ -130,7 +131,7 @@ class Atlas:
             What may be copied; None is all.
         """
         shape, block = (colours.shape[0], colours.shape[1]), 1 << (levels - 1)
-        logs = np.zeros(shape, np.float32) if scale is None else np.log(scale).astype(np.float32)
+        logs = np.zeros(shape, np.float32) if scale is None else log_single(scale)
         parts = [(size, find_box(logs, size, wanted, block)) for size in sizes]
         copies = pack([p for p in parts if p[1] is not None], block)
         packed = np.zeros((*measure(copies, block), colours.shape[-1]), np.float32)

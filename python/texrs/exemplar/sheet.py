@@ -16,6 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import log_single
 from texrs._engine.pyramid import ONE
 from texrs._engine.stitcher import Stitcher
 from texrs._typing import Bools, Floats
@@ -185,9 +186,7 @@ class Flattened(Sheet):
             near = np.clip(np.rint(at), 0, np.array(shape) - 1).astype(np.intp)
             inside &= known[near[..., 0], near[..., 1]]
         shown = gather(colours, mirror(at, shape).astype(np.float32), interpolation="linear")
-        return cls(
-            shape, shown, np.log(scales).astype(np.float32), inside, plane, (float(low[0]), float(low[1])), resolution
-        )
+        return cls(shape, shown, log_single(scales), inside, plane, (float(low[0]), float(low[1])), resolution)
 
     def describe(self) -> dict[str, Any]:
         """Return how the plane lies: the tilt in degrees as `texrs.scale_maps`, the ratio of its scales, and the fit."""
@@ -264,7 +263,7 @@ class Copies(Sheet):
     @classmethod
     def of(cls, colours: Floats, scale: Floats, sizes: Sequence[float], target: Floats) -> Copies:
         """Resize an exemplar; of other copies than the first only what has scales of the target is kept."""
-        shape, logs = (colours.shape[0], colours.shape[1]), np.log(scale).astype(np.float32)
+        shape, logs = (colours.shape[0], colours.shape[1]), log_single(scale)
         wanted = float(target.min()), float(target.max())
         parts = [(size, find_box(logs, size, wanted, GAP)) for size in sizes]
         copies = pack([p for p in parts if p[1] is not None], 1, GAP)
@@ -289,7 +288,7 @@ class Copies(Sheet):
 
     def side(self, target: Floats) -> float:
         """Return a share of the exemplar; less where the map changes by much within that."""
-        logs = np.log(target)
+        logs = log_single(target)
         down, right = (np.gradient(logs, axis=k) if n > 1 else np.zeros_like(logs) for k, n in enumerate(logs.shape))
         steep = np.hypot(down, right)
         return min(COPIED * float(np.sqrt(np.prod(self.shape))), VARIES / max(float(np.quantile(steep, 0.75)), 1e-6))
@@ -312,7 +311,7 @@ class Copies(Sheet):
 
     def measure_error(self, places: NDArray[np.int32], target: Floats, frames: NDArray[np.int16]) -> float:
         """Return the median, by the scales of the samples."""
-        return float(np.median(np.abs(self.logs[self._nearest(places)] - np.log(target))))
+        return float(np.median(np.abs(self.logs[self._nearest(places)] - log_single(target))))
 
     def _nearest(self, places: NDArray[np.int32]) -> tuple[NDArray[np.intp], ...]:
         """Return the rows and columns of the samples nearest to places."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import log_single
 from texrs._engine.appearance import Demand
 from texrs._engine.pyramid import Region
 from texrs._typing import Floats, Progress
@@ -71,7 +72,7 @@ class Scales:
                 band = asked[first : first + thick]
                 # The last point of a closed axis stands for what is left.
                 last = (first + thick) * spacing if first + thick < len(asked) else len(self.target)
-                logs = np.log(self.target[min(first * spacing, len(self.target) - 1) : last])
+                logs = log_single(self.target[min(first * spacing, len(self.target) - 1) : last])
                 band[...] = code_logs(average_points(logs, band.shape, spacing))
         return asked.reshape(-1)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import log_single
 from texrs._engine.appearance import Demand
 from texrs._engine.pyramid import ONE, Region
 from texrs._engine.stitcher import Stitched, Weights
@@ -117,12 +118,15 @@ def stitch_sheet(
         seed=seed,
         held=held,
         given=None if given is None else given.reshape(-1),
-        demand=Demand(sheet.values(strength), code(np.log(target), strength).reshape(-1), weight, excess=sheet.excess),
+        demand=Demand(
+            sheet.values(strength), code(log_single(target), strength).reshape(-1), weight, excess=sheet.excess
+        ),
         progress=stage(progress, "patches"),
     )
     places = made.places.reshape(*region.shape, 2)
     coordinates, seen = sheet.locate(places.reshape(-1, 2))
-    jacobians = seen @ (frames.astype(np.float32) / np.float32(ONE))
+    # In double precision, for products of single precision differ in the last bit from processor to processor.
+    jacobians = (seen @ (frames / np.float64(ONE))).astype(np.float32)
     return FromSheet(
         coordinates.reshape(places.shape),
         np.minimum(made.patches, np.uint32(len(made.frames))).reshape(region.shape),

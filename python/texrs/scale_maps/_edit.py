@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from texrs._arrays import exp_single, log_single
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.scale_maps._blur import blur
@@ -81,7 +82,7 @@ def edit(scale: object, steps: Sequence[Mapping[str, Any] | str] | str) -> Float
 
     """
     given = as_map(scale)
-    before = np.log(given)
+    before = log_single(given)
     logs = before
     for number, (operation, options) in enumerate(_read_all(steps), start=1):
         try:
@@ -92,7 +93,7 @@ def edit(scale: object, steps: Sequence[Mapping[str, Any] | str] | str) -> Float
         low, high = np.minimum(logs, np.log(np.float32(_LEAST))), np.maximum(logs, np.log(np.float32(_LARGEST)))
         logs = np.clip(changed, low, high).astype(np.float32)
     # What no step reached is what it was, to the last bit.
-    return np.where(logs == before, given, np.exp(logs))
+    return np.where(logs == before, given, exp_single(logs))
 
 
 def _read_all(steps: object) -> list[tuple[str, dict[str, Any]]]:

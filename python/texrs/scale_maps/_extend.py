@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from texrs._arrays import as_image, as_mask
+from texrs._arrays import as_image, as_mask, exp_single, log_single
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.kernels import poisson
@@ -60,7 +60,7 @@ def extend(scale: object, known: object, *, trend: Trend = "plane") -> Floats:
     values = as_map(as_image(given, "scale"))
     if there.all():
         return values
-    logs = np.log(values)
+    logs = log_single(values)
     course = follow(logs, kind, there)
     logs -= course
     logs[~there] = 0
@@ -68,4 +68,4 @@ def extend(scale: object, known: object, *, trend: Trend = "plane") -> Floats:
     membrane = poisson.solve(logs, nothing, nothing, screening=0, boundary="free", mask=~there)
     # As the trend, no more than four times beyond what is known.
     low, high = max(LEAST, float(values[there].min()) / 4), min(LARGEST, float(values[there].max()) * 4)
-    return np.where(there, values, np.clip(np.exp(course + membrane), low, high).astype(np.float32))
+    return np.where(there, values, np.clip(exp_single(course + membrane), np.float32(low), np.float32(high)))

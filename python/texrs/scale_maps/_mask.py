@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from texrs._arrays import as_choice, as_image, as_int, as_mask
+from texrs._arrays import as_choice, as_image, as_int, as_mask, exp_single, log_single
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.scale_maps._extend import extend
@@ -143,14 +143,14 @@ def _measure(mask: Bools, known: Bools | None, what: str, window: int | None) ->
             "larger window, or a scale by angles is needed"
         )
     ratio = np.clip(density / typical, _WIDEST ** (-1 / power), _WIDEST ** (1 / power))
-    logs = (-power * np.log(ratio)).astype(np.float32)
+    logs = np.float32(-power) * log_single(ratio)
     # What a window says holds at the middle of what it sees.
     cells = np.indices(logs.shape) * float(lattice.cell)
     down, across = gradient(logs, cells[0] - rows, cells[1] - columns, enough)
     logs += (down * rows + across * columns).astype(np.float32)
     logs = smooth(logs, enough, _ROUNDS)
     if not enough.all():
-        logs = np.log(extend(np.exp(logs), enough))
+        logs = log_single(extend(exp_single(logs), enough))
     return lattice.spread(logs)
 
 
@@ -219,4 +219,4 @@ def _measure_as_printed(mask: Bools, known: Bools | None, window: int | None) ->
     scale = np.clip(count / middle, 1 / _WIDEST, _WIDEST)  # (1)
     mean = ndimage.uniform_filter(scale, _PAPER_SIZE, mode="nearest")
     scale = 0.8 * mean + 0.2 * ndimage.median_filter(scale, _PAPER_SIZE, mode="nearest")  # (2)
-    return np.asarray(np.log(scale), np.float32)
+    return log_single(scale)

@@ -8,6 +8,7 @@ from math import hypot
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import log_single
 from texrs._typing import Array, Floats
 from texrs.scale_maps._trend import follow
 
@@ -58,8 +59,8 @@ class Plane:
     @classmethod
     def fit(cls, scale: Floats, power: float = 1.0) -> Plane | None:
         """Return the plane that a power of a scale map, (rows, columns), says; none where it is seen from the front."""
-        logs = np.log(scale) * np.float32(power)
-        surface = np.exp(follow(logs, "plane")).astype(np.float64)
+        logs = log_single(scale) * np.float32(power)
+        surface = np.exp(follow(logs, "plane"), dtype=np.float64)
         least, largest = float(surface.min()), float(surface.max())
         if largest < LEVEL * least:
             return None
@@ -72,7 +73,8 @@ class Plane:
         # Sums in one order, whatever number of threads a matrix product would take.
         normal = np.einsum("ni,nj->ij", basis, basis)
         found = np.linalg.lstsq(normal, np.einsum("ni,n->i", basis, surface[open_]), rcond=1e-12)[0]
-        at, *rise = (float(f) for f in found)
+        # The last bits of a least squares fit hang on the processor.
+        at, *rise = (float(f"{f:.9g}") for f in found)
         slope = hypot(*rise)
         if not at > HORIZON * largest or slope <= 0:
             return None
@@ -117,7 +119,7 @@ class Plane:
 
     def order(self, scales: Floats) -> float:
         """Return how far a map is from one that grows along the slope alone: root mean square, of logarithms."""
-        logs = np.log(scales)
+        logs = log_single(scales)
         along = self._along(np.moveaxis(np.indices(logs.shape), 0, -1), self.down)
         found = logs.ravel()[np.argsort(along, axis=None, kind="stable")]
         return float(np.sqrt(np.mean((found - np.sort(logs, axis=None)) ** 2)))

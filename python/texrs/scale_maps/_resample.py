@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from texrs._arrays import as_choice, as_size
+from texrs._arrays import as_choice, as_size, exp_single, log_single
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.scale_maps._angles import from_angles
@@ -79,14 +79,14 @@ def resample(
 def _stretch(scale: Floats, size: tuple[int, ...]) -> Floats:
     if scale.shape == size:
         return scale.copy()
-    logs = np.log(scale)
+    logs = log_single(scale)
     for axis, sides in enumerate(size):
         at = np.clip((np.arange(sides) + 0.5) * (logs.shape[axis] / sides) - 0.5, 0, logs.shape[axis] - 1)
         first = np.floor(at).astype(np.intp)
         second = np.minimum(first + 1, logs.shape[axis] - 1)
         share = np.expand_dims((at - first).astype(np.float32), 1 - axis)
         logs = np.take(logs, first, axis) * (1 - share) + np.take(logs, second, axis) * share
-    return np.exp(logs)
+    return exp_single(logs)
 
 
 def _continue(scale: Floats, size: tuple[int, ...]) -> Floats:

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_image, as_list
+from texrs._arrays import as_image, as_list, power_single
 from texrs._typing import Array, Bools, Frames, Interpolation, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.kernels.gather import gather
@@ -295,7 +295,7 @@ class SourceMap:
         frame = self.frame_array()
         if frame is None:
             return np.ones(self.shape, np.float32)
-        shrunk = np.abs(np.linalg.det(frame)) ** np.float32(1 / self.axes)
+        shrunk = power_single(np.abs(np.linalg.det(frame.astype(np.float64))), 1 / self.axes)
         return np.asarray(shrunk[self.label] if frame.ndim == 3 else shrunk, np.float32)
 
     def _turn_normals(self, normals: Array, green: str, signed: bool) -> Array:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import log_single
 from texrs._typing import Array, Floats, Interpolation
 from texrs.kernels.gather import gather
 
@@ -51,7 +52,7 @@ def gather_smoothed(
     from scipy import ndimage
 
     axes = coordinates.shape[-1]
-    level = np.clip(np.log2(np.maximum(shrunk, 1)) * LEVELS, 0, OCTAVES * LEVELS).reshape(-1)
+    level = np.clip(log_single(np.maximum(shrunk, 1)) * (LEVELS / np.log(2)), 0, OCTAVES * LEVELS).reshape(-1)
     here = np.flatnonzero(level >= np.log2(STRAIGHT) * LEVELS)
     if not here.size:
         return out

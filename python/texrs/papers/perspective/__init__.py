@@ -37,6 +37,7 @@ from typing import Any
 
 import numpy as np
 
+from texrs._arrays import power_single
 from texrs._engine.pyramid import Region
 from texrs._typing import Array, Interpolation, Progress
 from texrs.exemplar import Exemplar
@@ -152,7 +153,7 @@ def perspective(
         warnings.warn(outside.describe(sizes), stacklevel=2)
     if plane is not None:
         # From here on scales are widths.
-        asked = replace(asked, scale=asked.scale**plane.power, target=wanted**plane.power)
+        asked = replace(asked, scale=power_single(asked.scale, plane.power), target=power_single(wanted, plane.power))
     else:
         asked = replace(asked, target=wanted)
     sheet: Sheet = (

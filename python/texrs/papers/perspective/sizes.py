@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from texrs._arrays import as_float
+from texrs._arrays import as_float, log_single
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.exemplar.atlas import LARGEST, SMALLEST, extend_sizes
@@ -50,7 +50,7 @@ def _check_sizes(asked: object) -> tuple[float, ...]:
 
 def count_samples(scale: Floats, target: Floats) -> float:
     """Return how many samples of about the wanted scale the exemplar has for each point, where it has the fewest."""
-    mine, theirs = np.sort(np.log(scale), axis=None), np.log(target).ravel()
+    mine, theirs = np.sort(log_single(scale), axis=None), log_single(target).ravel()
     bins = np.arange(theirs.min(), theirs.max() + ALIKE, ALIKE)
     asked = np.histogram(theirs, np.append(bins, bins[-1] + ALIKE))[0]
     middle = bins + ALIKE / 2

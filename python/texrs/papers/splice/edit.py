@@ -154,7 +154,8 @@ def _regularise(step: Step, at: Points, originals: int, kept: NDArray[np.bool_])
     index = np.rint((at - origin) @ span)
     low, high = index.min(axis=0).astype(int) - 1, index.max(axis=0).astype(int) + 1
     sites = np.stack(np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(low, high, strict=True)), indexing="ij"), -1)
-    places = sites.reshape(-1, 2) @ basis + origin
+    # A lattice is full of ties, and the last bits of its fit hang on the processor.
+    places = np.round(sites.reshape(-1, 2) @ basis + origin, 6)
     of, _ = match_points(places, at)
     return at + amount * (places[of] - at)
 
