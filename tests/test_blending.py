@@ -107,7 +107,7 @@ def test_against_the_written_out_problem(wrap, screening):
     label = np.repeat([0, 1], 6)[np.newaxis].repeat(10, 0)
     frame = np.stack([np.eye(2), np.diag([-1, 1])]).astype(np.float32)
     source = pasted(places, ((12, 14),), label=label, frame=frame)
-    healed = blend(source, image, wrap=wrap, screening=screening)
+    healed = blend(source, image, wrap=wrap, screening=screening, outlines=False)
     expected = np.clip(twin(source, image, wrap, screening), image.min(), image.max())
     np.testing.assert_allclose(healed, expected, atol=2e-5)
 
@@ -134,6 +134,50 @@ def test_a_picture_of_shifted_brightness_becomes_one():
     assert (healed[:, -1] == rendered[:, -1]).all()
 
 
+def laid_on(ground, light):
+    """A light disc cut out of its own ground along its outline, and laid on another ground."""
+    rows, columns = np.mgrid[:48, :48]
+    disc = np.hypot(rows - 23.5, columns - 23.5) < 14
+    random = np.random.default_rng(6)
+    noise = 0.02 * random.standard_normal((48, 48))
+    own = (np.where(disc, light, ground) + noise).astype(np.float32)
+    other = (0.2 + noise.T).astype(np.float32)
+    return pasted(SourceMap.identity((48, 48)).coordinates, ((48, 48),) * 2, ~disc, ~disc), [own, other]
+
+
+def test_an_outline_keeps_its_step():
+    source, exemplars = laid_on(0.3, 0.8)
+    shown = source.render(exemplars)
+    # What is left is the noise where the picture closes on itself.
+    assert np.abs(blend(source, exemplars, wrap=True) - shown).max() < 0.03
+    fog = blend(source, exemplars, wrap=True, outlines=False)
+    assert np.abs(fog - shown).max() > 0.1
+    # Where the disc is hardly lighter than its own ground nothing says that the step is an outline.
+    plain, alike = laid_on(0.78, 0.8)
+    assert np.abs(blend(plain, alike, wrap=True) - plain.render(alike)).max() > 0.1
+
+
+def test_seams_of_a_design_are_as_sharp_as_the_example():
+    """In a band of 3 pixels around seams differences are as large as what is looked up there has in the example."""
+    from scipy.ndimage import distance_transform_edt
+
+    image = samples.pebbles((128, 128)).image
+    result = texrs.design(image, 160, seed=1, tiles=2, plan="still")
+    parted = np.zeros((160, 160), bool)
+    for axis in range(2):
+        crosses = ~result.source.continues(axis, wrap=True)
+        parted |= crosses | np.roll(crosses, 1, axis)
+    band = distance_transform_edt(~parted) < 3
+
+    def measure(picture):
+        grey = picture.astype(np.float32).mean(axis=-1)
+        return sum(np.abs(np.roll(grey, -1, axis) - grey) for axis in range(2)).astype(np.float32)
+
+    own = result.source.render(measure(image), interpolation="nearest")
+    assert 0.9 < measure(result.image)[band].mean() / own[band].mean() < 1.1
+    assert np.abs(result.image.mean(axis=(0, 1)) - image.mean(axis=(0, 1))).max() < 12
+
+
 # --- every map -------------------------------------------------------------------------------------------------------
 
 
@@ -147,7 +191,9 @@ def test_depth_and_channels(patchwork, exemplar):
     grey = blend(patchwork, exemplar[..., 0], wrap=True)
     assert grey.shape == patchwork.shape
     np.testing.assert_array_equal(grey, blend(patchwork, exemplar[..., :1], wrap=True)[..., 0])
-    assert np.abs(grey.astype(int) - eight[..., 0]).max() <= 1
+    # Outlines are those of all channels together.
+    alone, together = (blend(patchwork, e, wrap=True, outlines=False) for e in (exemplar[..., :1], exemplar))
+    assert np.abs(alone[..., 0].astype(int) - together[..., 0]).max() <= 1
 
 
 def test_values_stay_in_the_range_of_each_channel(patchwork, exemplar):

@@ -171,7 +171,7 @@ def blends() -> Parts:
     heights, slopes = floats(*args, seed=7), normals(*args, seed=7)
     return {
         "floats": rounded(blend(source, heights, wrap=True)),
-        "paper": rounded(blend(source, heights, wrap=False, screening=0)),
+        "paper": rounded(blend(source, heights, wrap=False, screening=0, outlines=False)),
         "near seams": blend(source, grey(*args, seed=7), wrap=(True, False), band=6),
         "within": rounded(blend(source, heights, wrap=False, screening=0.01, within=within, known=known)),
         "normals": blend(source, slopes, wrap=True, kind="normal", green="down", interpolation="linear"),

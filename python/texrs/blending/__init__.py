@@ -2,7 +2,8 @@
 
 Section 3.6 (Eq. 5 and 6) of Shen, Jin, Mao and Feng, "Completion-based texture design using deformation", 2006, after
 Agarwala et al., "Interactive digital photomontage", SIGGRAPH 2004. As printed, the differences wanted are those of the
-composite itself, whose solution is the composite; here they come from the sources on both sides of a seam.
+composite itself, whose solution is the composite; here they come from the sources on both sides of a seam. Where a seam runs
+along the outline of a thing the step across it is right, and stays: evened out, it would leave a fog around the thing.
 
 The correction depends on the source map and on one map of the exemplar alone, so it can be made for each map of a
 material: colours, heights, normals, in any dtype.
@@ -42,6 +43,7 @@ def blend(
     within: Array | None = None,
     known: Array | Sequence[Array] | None = None,
     across: bool = True,
+    outlines: bool = True,
     interpolation: Interpolation = "cubic",
     kind: Literal["colour", "normal"] = "colour",
     green: Literal["up", "down"] = "up",
@@ -53,7 +55,8 @@ def blend(
     channel by itself, where I is ``source.render(exemplars)`` [1]_. Where the source continues from p to q the
     difference wanted, g, is that of I. Across a seam it is the mean of what the sources of p and of q would show there,
     of those that lie inside their exemplar: ``I(S(p) + J(p) e) - I(S(p))`` and ``I(S(q)) - I(S(q) - J(q) e)``; 0 where
-    neither does.
+    neither does. Where the seam runs along the outline of a thing, which one of the sources shows there itself, g goes over to
+    the step that there is; outlines are those of all channels together.
 
     Parameters
     ----------
@@ -77,6 +80,9 @@ def blend(
     across : bool
         Whether values are corrected also where two exemplars meet. `texrs.design` does not: flowers on moss end at an edge,
         and one would stain the other.
+    outlines : bool
+        Whether the step across a seam stays where it is the outline of a thing. False: all steps are evened out, as the
+        paper does.
     interpolation : {"cubic", "linear", "nearest"}
         As in `SourceMap.render`.
     kind, green
@@ -128,7 +134,7 @@ def blend(
     """
     if source.axes != 2:
         raise InvalidInput("source: a picture is needed, got the source map of a volume")
-    cyclic, across = as_wrap(wrap), as_bool(across, "across")
+    cyclic, across, outlines = as_wrap(wrap), as_bool(across, "across"), as_bool(outlines, "outlines")
     weight = as_float(screening, "screening", 0, 1e6)
     width = None if band is None else as_int(band, "band", 1, 2**31)
     inside = None if within is None else as_mask(within, "within", source.shape)
@@ -147,7 +153,7 @@ def blend(
     for number, (part, channels) in enumerate(steps):
         closed = (part.cyclic, cyclic[1])
         if channels == groups[0]:
-            look = Look(samples, shown, take_rows(source, part.rows), across, interpolation, kind, green)
+            look = Look(samples, shown, take_rows(source, part.rows), across, outlines, interpolation, kind, green)
             seen = [look.find_seams(axis, closed[axis]) for axis in range(2)]
         if any(len(seam.lack) for seam in seen):
             report = None if progress is None else _scale_progress(progress, number, len(steps))

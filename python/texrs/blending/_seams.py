@@ -12,6 +12,12 @@ from texrs._typing import Array, Bools, Floats, Interpolation
 from texrs.blending._values import Samples
 from texrs.source_map import SourceMap
 
+ALONG = 2.0
+"""Standard deviation, in pixels, of the window along a seam in which outlines are looked for."""
+OUTLINE = (0.35, 0.6)
+"""Share of the step across a seam that one of its sources shows itself, from which on it may be an outline of a thing, and
+from which on it surely is. Where noise is cut, it shows up to a quarter."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
@@ -22,6 +28,8 @@ class Look:
     source: SourceMap
     across: bool
     """Whether there is a seam where two exemplars meet."""
+    outlines: bool
+    """Whether outlines of things keep their step."""
     interpolation: Interpolation
     kind: Literal["colour", "normal"]
     green: Literal["up", "down"]
@@ -59,9 +67,14 @@ class Look:
         there, _ = self.look_beside(after, axis, 0)
         ahead, forward = self.look_beside(at, axis, 1)
         behind, backward = self.look_beside(after, axis, -1)
-        known = forward.astype(np.float32) + backward
-        total = (ahead - here) * forward[:, np.newaxis] + (there - behind) * backward[:, np.newaxis]
-        return Seam(at, after, total / np.maximum(known, 1)[:, np.newaxis] - (there - here))
+        own = ((ahead - here) * forward[:, np.newaxis], (there - behind) * backward[:, np.newaxis])
+        known = np.maximum(forward.astype(np.float32) + backward, 1)[:, np.newaxis]
+        step = there - here
+        lack = (own[0] + own[1]) / known - step
+        if self.outlines:
+            outline = measure_outlines(step, own, at, self.source.shape, "wrap" if wrap else "constant")
+            lack *= 1 - outline[:, np.newaxis]
+        return Seam(at, after, lack)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,6 +85,28 @@ class Seam:
     after: tuple[Array, ...]
     lack: Floats
     """What the differences from ``at`` to ``after`` lack, (n, C) in [0, 1]."""
+
+
+def measure_outlines(
+    step: Floats, own: tuple[Floats, Floats], at: tuple[Array, ...], shape: tuple[int, ...], ends: str
+) -> Floats:
+    """Return how surely each pair of neighbours lies on an outline of a thing that occludes what is beyond, 0 to 1.
+
+    There one of the sources shows most of the step itself. Both are summed up along the seam: in noise a single
+    pair may agree by chance.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    def sum_up(values: Floats) -> Floats:
+        spread = np.zeros(shape, np.float32)
+        spread[at] = values.sum(axis=-1)
+        found: Floats = gaussian_filter(spread, ALONG, mode=ends)[at]
+        return found
+
+    shown = np.maximum(*(sum_up(mine * step) for mine in own))
+    least, sure = OUTLINE
+    surely: Floats = np.clip((shown / np.maximum(sum_up(step**2), 1e-12) - least) / (sure - least), 0, 1)
+    return surely
 
 
 def list_seams(source: SourceMap, axis: int, wrap: bool) -> tuple[tuple[Array, ...], tuple[Array, ...]]:

@@ -37,7 +37,8 @@ Departures, with their reasons:
   territories of smooth noise; a cut moves their borders to outlines, by an element at most (`texrs.papers.design.mixing`).
   Dealing patches to exemplars gives rectangles, and no map is obeyed. Colours are not corrected where exemplars meet.
 - The differences that the colours are corrected to are those of the sources on both sides of a seam, where the paper
-  takes those of the picture itself; some weight on the values keeps the colours from drifting.
+  takes those of the picture itself; some weight on the values keeps the colours from drifting. Along the outline of a thing
+  the step stays.
 
 ``method="paper"`` leaves the departures out (`texrs.papers.design.literal`), but for the torus and the squares.
 """

@@ -122,6 +122,7 @@ def correct_colours(composite: SourceMap, picture: Array, arguments: Arguments) 
             wrap=False if literal else wrap,
             screening=0.0 if literal else arguments.screening,
             across=literal,
+            outlines=not literal,
             progress=arguments.watch,
         )
         after = measure_visibility(composite, images, image, wrap=wrap)
