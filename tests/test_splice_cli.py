@@ -69,6 +69,13 @@ def test_self_splice_and_its_replay(tmp_path: Path) -> None:
     assert main([*line, "-o", str(again), "--edit", moved]) == 0
 
 
+def test_self_splice_in_another_size(tmp_path: Path) -> None:
+    out = tmp_path / "a.png"
+    for options in ([], ["--edit", "randomise"]):
+        assert main(["self-splice", "dots.png", "-q", "-o", str(out), "--size", "144x160", *options]) == 0
+        assert io.read(out).shape[:2] == (144, 160)
+
+
 def test_the_help_names_every_step(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["self-splice", "--help"]) == 0
     words = capsys.readouterr().out
@@ -94,6 +101,7 @@ def test_entries_are_taken(tmp_path: Path) -> None:
         (["splice", "sample:dots", "pebbles.png", "--cells"], "--cells"),
         (["self-splice", "dots.png", "--edit", "melt"], "--edit"),
         (["self-splice", "dots.png", "--edit", "[3"], "not JSON"),
+        (["self-splice", "dots.png", "--size", "4"], "--size"),
         (["self-splice", "dots.png", "--edit", "gone.json"], "gone.json"),
     ],
 )

@@ -171,6 +171,15 @@ def self_splice_made_regular() -> Parts:
     return moved_parts_of(result)
 
 
+@case
+def self_splice_in_another_size() -> Parts:
+    made = [
+        texrs.self_splice(entry("dots", 96, 96, seed=4), {"op": "randomise", "amount": 0.1}, (128, 144), seed=3),
+        texrs.self_splice(entry("pebbles", 112, 128, seed=2), size=(96, 176), seed=3),
+    ]
+    return {f"{number} {name}": part for number, one in enumerate(made) for name, part in moved_parts_of(one).items()}
+
+
 # --- what they know of an exemplar -----------------------------------------------------------------------------------
 
 

@@ -11,7 +11,7 @@ is our element. The flow, in the paper's order, and where each stage is:
 4. fill the holes and refine what is not rigid by texture synthesis (section 4.3: `draft`, `refine`).
 
 Elements are analysed beforehand (section 3; `texrs.elements`). An edit of a texture's own layout takes the place of the first
-stage (Figure 9, `edit`).
+stage (Figure 9, `edit`); where it is asked for in another size the texture is brought to that first (`resizing`).
 
 Departures, with their reasons:
 
@@ -70,10 +70,19 @@ from texrs.papers.splice.edit import as_steps
 from texrs.papers.splice.entry import as_elements
 from texrs.papers.splice.ground import lay_ground, survey
 from texrs.papers.splice.literal import fill_literally, match_literally
-from texrs.papers.splice.matching import Match, edit_layout, go_part_of_the_way, keep_cut, match_edit, match_layouts
+from texrs.papers.splice.matching import (
+    Match,
+    edit_layout,
+    go_part_of_the_way,
+    is_own,
+    keep_cut,
+    match_edit,
+    match_layouts,
+)
 from texrs.papers.splice.nets import has_knots, is_net, splice_nets
 from texrs.papers.splice.rearrangement import rearrange
 from texrs.papers.splice.refine import fill, refine_places
+from texrs.papers.splice.resizing import check_resized, crop, read_elements, report_resized
 from texrs.papers.splice.result import compose, compose_edit
 from texrs.synthesis import Synthesis
 
@@ -219,7 +228,7 @@ def splice(
         match = go_part_of_the_way(mine, match, part)
     match = replace(match, wanted=match.targets)
     if method != "paper":
-        match = adjust_targets(mine, match, snap=bool(snap_rows), part=part < 1)
+        match = adjust_targets(mine, match, snap=bool(snap_rows), part=part < 1 or is_own(mine, theirs))
     elif snap_rows:
         match = straighten_rows(match)
     if part < 1 and method is None and mine.layout == Layout.DISJOINT and mine.mask.shape == (rows, columns):
@@ -241,7 +250,8 @@ def splice(
 
 def self_splice(
     a: Elements | Array,
-    edit: Edit,
+    edit: Edit | None = None,
+    size: int | Sequence[int] | None = None,
     *,
     seed: int = 0,
     method: Method = None,
@@ -255,7 +265,7 @@ def self_splice(
     ----------
     a : Elements, or (H, W) or (H, W, C) array
         The texture; a picture is analysed by `texrs.elements.analyse`.
-    edit : str, mapping, or sequence of mappings
+    edit : str, mapping, or sequence of mappings, optional
         What is done, step by step: scale, shift, rows, randomise, regularise, move, remove or points. In plain JSON
         types: ``{"op": "scale", "factor": 1.2}`` or ``[1.2, 1]`` (the layout, not
         the elements), ``{"op": "shift", "by": [4, 0]}``, ``{"op": "rows", "by": 6}`` (every other row to the right, those
@@ -263,7 +273,11 @@ def self_splice(
         least usual distance that is kept), ``{"op": "regularise", "amount": 1}`` (to the lattice that fits best),
         ``{"op": "move", "element": 3, "by": [0, 8]}`` or ``"to"``, ``{"op": "remove", "element": 3}``,
         ``{"op": "points", "points": [[row, column], ...]}``. A name alone is a step with its
-        defaults. The report's "edit" replays.
+        defaults; no step, the default, leaves the layout as it is. The report's "edit" replays.
+    size : int or (rows, columns), optional
+        Size of the result, in pixels, sides of at least 16; that of ``a`` by default. In a larger one the texture's own layout
+        goes on, as in a splice with itself, before the steps are done; a smaller one is the middle of the texture. Steps
+        then count the elements as the report's "elements" lists them, whose places they have before the steps.
     seed : int
         Chooses random steps, the elements that come in over a border, what fills holes, and the noise of the refinement.
     method : {None, "paper", "preview"}
@@ -289,7 +303,10 @@ def self_splice(
     ------
     InvalidInput
         A step that is not known, lacks something, or names an element that is not there, or one to be removed from a
-        connected figure, which has no ground to close over it.
+        connected figure, which has no ground to close over it; a size that is no size, or that shows fewer than three
+        elements, of which no step can make a layout.
+    LimitExceeded
+        A size that is too large.
 
     Examples
     --------
@@ -301,28 +318,38 @@ def self_splice(
     True
     >>> texrs.self_splice(entry, "randomise", seed=5).report["edit"]
     [{'op': 'randomise', 'seed': 5}]
+    >>> texrs.self_splice(entry, size=(128, 160), seed=5).image.shape
+    (128, 160, 3)
 
     """
     as_method(method, None, "paper", "preview")
     watch = progress or (lambda stage, share: None)
+    asked = None if size is None else as_size(size, minimum=16)
     mine, number = as_elements(a, "a", watch), as_seed(seed)
-    steps, screening = as_steps(edit, number), _as_screening(blend)
+    steps, screening = as_steps(() if edit is None else edit, number), _as_screening(blend)
+    if asked is not None and asked != mine.mask.shape:
+        rest: dict[str, Any] = {"seed": number, "method": method, "refine": refine, "blend": blend, "progress": watch}
+        inside = all(n <= m for n, m in zip(asked, mine.mask.shape, strict=True))
+        resized = crop(mine, asked) if inside else splice(mine, mine, asked, align=False, **rest)
+        entry = read_elements(mine, resized)
+        edited = self_splice(check_resized(entry), steps, **rest) if steps else resized
+        return report_resized(mine, entry, resized, edited, steps)
     laid = rearrange(mine, steps, number, watch) if method is None and mine.layout == Layout.DISJOINT else None
     if laid is not None:
         result = compose_edit(mine, laid, seed=number, screening=screening)
         watch("done", 1.0)
     else:
-        edited = edit_layout(mine, steps)
+        moved = edit_layout(mine, steps)
         result = _synthesize(
             mine,
             None,
-            match_edit(mine, edited),
+            match_edit(mine, moved),
             (mine.mask.shape[0], mine.mask.shape[1]),
             number,
             method=method,
             refine=bool(refine),
             watch=watch,
-            listed=edited.listed,
+            listed=moved.listed,
         )
     return replace(result, report={**result.report, "edit": steps})
 

@@ -32,7 +32,7 @@ walls."""
 def adjust_targets(a: Elements, match: Match, *, snap: bool, part: bool = False) -> Match:
     """Give disjoint elements room; bring those of a connected figure to rows, if asked to, and limit how it is strained.
 
-    Where they go but a ``part`` of their way, disjoint elements that touch may go on doing so.
+    Where they go but a ``part`` of their way, or to their own layout, disjoint elements that touch may go on doing so.
     """
     if a.layout == Layout.DISJOINT:
         return separate_targets(a, match, starts=match.starts if part else None)

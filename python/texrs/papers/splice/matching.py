@@ -28,6 +28,7 @@ __all__ = [
     "edit_layout",
     "find_turns",
     "go_part_of_the_way",
+    "is_own",
     "keep_cut",
     "list_element_points",
     "match_edit",
@@ -117,7 +118,7 @@ def match_layouts(a: Elements, b: Elements, size: tuple[int, int], *, align: boo
     unit = spacing(a.points)
     layout = lay_out(b, beyond=True)
     scale, gain, disjoint = unit / layout.scale, 1.0, a.layout == Layout.DISJOINT
-    if disjoint:
+    if disjoint and not is_own(a, b):
         gain = _measure_gain(a, scale * nearest_distances(layout.points, 1)[:, 0])
     beyond = BEYOND * unit
     turns = find_turns(a, b) if align else [0.0]
@@ -146,6 +147,11 @@ def match_layouts(a: Elements, b: Elements, size: tuple[int, int], *, align: boo
             if cost < NEARER * best.cost:
                 best = replace(best, targets=wanted, assigned=assigned, cost=cost)
     return best
+
+
+def is_own(a: Elements, b: Elements) -> bool:
+    """Return whether a layout is the texture's own, in which its elements have the room that they have."""
+    return np.array_equal(a.points, b.points) and np.array_equal(a.mask, b.mask)
 
 
 def go_part_of_the_way(a: Elements, match: Match, strength: float) -> Match:

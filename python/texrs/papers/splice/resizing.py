@@ -1,0 +1,87 @@
+"""A texture in another size, for edits of it: an entry like that of a picture, which looks into the texture.
+
+A larger one is the texture spliced with itself, whose layout goes on as layouts do; a smaller one is cut out of its middle.
+What is edited then is a picture like any other, and the source maps are composed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from texrs.elements import Elements
+from texrs.errors import InvalidInput
+from texrs.papers.splice.edit import Step
+from texrs.papers.splice.entry import FEWEST
+from texrs.papers.splice.matching import list_element_points
+from texrs.papers.splice.result import list_place
+from texrs.source_map import SourceMap
+from texrs.synthesis import Synthesis
+
+__all__ = ["check_resized", "crop", "read_elements", "report_resized"]
+
+
+def crop(a: Elements, size: Sequence[int]) -> Synthesis:
+    """Return the middle of a texture, as a splice would."""
+    shape = a.mask.shape
+    first = [(n - m) // 2 for n, m in zip(shape, size, strict=True)]
+    places = np.moveaxis(np.indices(tuple(size)), 0, -1) + first
+    source = SourceMap.from_coordinates(places.astype(np.float32), (shape[0], shape[1]))
+    image = source.render(a.image, interpolation="nearest")
+    matches = [
+        {"target": place, "found": place, "realised": None, "element": k, "point": list_place(point)}
+        for k, point in enumerate(list_element_points(a))
+        for place in [list_place(point - first)]
+    ]
+    report = {"method": "default", "size": list(size), "layout": a.layout.value, "matches": matches}
+    return Synthesis(image, source, {"composite": image}, report)
+
+
+def read_elements(a: Elements, made: Synthesis) -> Elements:
+    """Return the entry of a picture that shows elements of a texture: those whose centres lie in it.
+
+    Nothing is looked for: the splice says where its elements are, and the mask is looked up as the picture is.
+    """
+    size = np.array(made.source.shape)
+    found = [match["found"] for match in made.report["matches"] if match["found"] is not None]
+    points = np.array(found, np.float64).reshape(-1, 2)
+    points = points[((points >= 0) & (points <= size - 1)).all(axis=1)]
+    mask = made.source.render(a.mask, interpolation="nearest")
+    # A side that was left as it is goes around as it did.
+    wrap = [w and n == m for w, n, m in zip(a.wrap, size, a.mask.shape, strict=True)]
+    return replace(
+        a,
+        image=made.image,
+        points=points,
+        mask=mask,
+        scores=np.ones(len(points)),
+        wrap=(wrap[0], wrap[1]),
+        angles=None,
+        scales=None,
+        sets=None,
+    )
+
+
+def check_resized(entry: Elements) -> Elements:
+    """Check that a picture in another size shows enough elements for its layout to be edited."""
+    if len(entry.points) < FEWEST:
+        size = entry.mask.shape
+        raise InvalidInput(f"size: {size} shows {len(entry.points)} elements, steps need {FEWEST} or more")
+    return entry
+
+
+def report_resized(
+    a: Elements, entry: Elements, resized: Synthesis, edited: Synthesis, steps: Sequence[Step]
+) -> Synthesis:
+    """Return an edit of a texture in another size as one of the texture itself."""
+    whole = edited.source if edited is resized else edited.source.compose(resized.source)
+    report: dict[str, Any] = {
+        **edited.report,
+        "edit": list(steps),
+        "elements": [list_place(point) for point in entry.points],
+    }
+    stages = {"resized": resized.image, **edited.stages, "composite": whole.render(a.image)}
+    return Synthesis(edited.image, whole, stages, report)
