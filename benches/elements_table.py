@@ -4,7 +4,8 @@ TEXRS_TEXTURES=FOLDER python benches/elements_table.py [PICTURES]
 
 FOLDER holds b-disjoint, c-connected and d-background, each image with its annotation. With PICTURES, a folder, what
 was found is drawn there. Detections within half a box of the border do not count; of the keyboard, whose centres are
-not all listed, recall alone does.
+not all listed, recall alone does. After the table it says how reliable what the automatic start states is: in bins of stated
+confidence, how much was right, of layouts and of single elements.
 """
 
 from __future__ import annotations
@@ -14,17 +15,26 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
+
 from texrs import elements, io
 from texrs.errors import TexrsError
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
-from element_checks import annotated, passes, score
+from element_checks import Annotated, annotated, pair, passes, score
+
+BINS = (0.0, 0.5, 0.65, 0.8, 0.9, 1.0)
+"""Between which stated confidences are put together."""
+Stated = list[tuple[float, bool]]
+"""How sure something was said to be, and whether it was right."""
 
 
 def main(folder: Path, pictures: Path | None) -> None:
     print("| texture | layout | start | elements | of | recall | inner | precision | error | mask | s | S1 |")
     print("|---|---|---|---|---|---|---|---|---|---|---|---|")
     totals = {"box": [0, 0, 0], "auto": [0, 0, 0]}
+    layouts: Stated = []
+    single: Stated = []
     for texture in annotated(folder):
         image = io.read(texture.image)
         given = {"box": texture.box, "background": texture.background, "layout": texture.layout}
@@ -38,6 +48,9 @@ def main(folder: Path, pictures: Path | None) -> None:
             seconds = time.perf_counter() - began
             total = totals[start]
             total[2] += found.layout == texture.layout
+            if start == "auto":
+                layouts.append((found.report["confidence"]["layout"], found.layout == texture.layout))
+                single += judge_elements(found, texture)
             row = [texture.name, texture.layout if start == "box" else f"{found.layout}", start, len(found.points)]
             if texture.centres is None:
                 row += ["-", "-", "-", "-", "-"]
@@ -57,8 +70,39 @@ def main(folder: Path, pictures: Path | None) -> None:
             if pictures is not None:
                 for name, picture in elements.pictures(found).items():
                     io.write(pictures / f"{texture.name}-{start}-{name}.png", picture)
-    for start, (met, count, layouts) in totals.items():
-        print(f"{start}: S1 met on {met} of {count}; layout right on {layouts}")
+    for start, (met, count, right) in totals.items():
+        print(f"{start}: S1 met on {met} of {count}; layout right on {right}")
+    print_reliability("layouts", layouts)
+    print_reliability("single elements", single)
+
+
+def judge_elements(found: elements.Elements, texture: Annotated) -> Stated:
+    """Return how sure each element is said to be, and whether one is there; of those that are not all listed, none.
+
+    Those of a wrong layout count, those within half a box of the border do not.
+    """
+    if texture.centres is None or "keyboard" in texture.name:
+        return []
+    half = np.array(texture.box[2:]) / 2
+    inner = ((found.points >= half) & (found.points <= np.array(found.mask.shape) - 1 - half)).all(axis=1)
+    right = np.isin(np.arange(len(inner)), pair(found.points, texture.centres, texture.box[2:])[0])
+    return list(zip(found.scores[inner].clip(0, 1).tolist(), right[inner].tolist(), strict=True))
+
+
+def print_reliability(name: str, stated: Stated) -> None:
+    """Print how much was right of what was stated to be about as sure, and by how much the two differ on the average."""
+    if not stated:
+        return
+    print(f"\n| {name}: stated | number | mean stated | right |")
+    print("|---|---|---|---|")
+    sure, right = (np.array(column, float) for column in zip(*stated, strict=True))
+    which = np.searchsorted(BINS[1:-1], sure, side="right")
+    apart = 0.0
+    for k in np.unique(which):
+        mean, share = sure[which == k].mean(), right[which == k].mean()
+        apart += abs(mean - share) * np.mean(which == k)
+        print(f"| {BINS[k]:.2f} to {BINS[k + 1]:.2f} | {np.sum(which == k)} | {mean:.2f} | {share:.2f} |")
+    print(f"\n{name}: {len(sure)} stated, {right.mean():.0%} right, {apart:.2f} apart")
 
 
 if __name__ == "__main__":

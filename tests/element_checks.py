@@ -29,15 +29,20 @@ class Score:
     """Mean distance of the pairs, in pixels."""
 
 
-def score(points: Any, centres: Any, box: Any, shape: Any, tolerance: float = TOLERANCE) -> Score:
-    """Pair points with centres, each with one at most, so that most are paired, and the nearest ones."""
+def pair(points: Any, centres: Any, box: Any, tolerance: float = TOLERANCE) -> tuple[Any, Any]:
+    """Pair points with centres, each with one at most, so that most are paired, and the nearest ones: which of either."""
     from scipy.optimize import linear_sum_assignment
 
-    box = np.asarray(box, float)
-    away = np.sqrt((((points[:, None] - centres[None]) / box) ** 2).sum(axis=-1))
+    away = np.sqrt((((points[:, None] - centres[None]) / np.asarray(box, float)) ** 2).sum(axis=-1))
     i, j = linear_sum_assignment(np.where(away <= tolerance, away, 1e3))
     paired = away[i, j] <= tolerance
-    i, j = i[paired], j[paired]
+    return i[paired], j[paired]
+
+
+def score(points: Any, centres: Any, box: Any, shape: Any, tolerance: float = TOLERANCE) -> Score:
+    """Score points against true centres, each of which is of one point at most."""
+    box = np.asarray(box, float)
+    i, j = pair(points, centres, box, tolerance)
     hit, got = np.zeros(len(points), bool), np.zeros(len(centres), bool)
     hit[i], got[j] = True, True
 
@@ -74,7 +79,7 @@ class Annotated:
         """Read a JSON annotation, which has (x, y)."""
         given = json.loads(path.read_text(encoding="utf-8"))
         (x, y), (width, height) = given["foreground_box"]["center"], given["foreground_box"]["size"]
-        centres = given.get("element_centres")
+        centres = given.get("texel_centres")
         return cls(
             path.stem,
             path.parent / given["image"],
