@@ -207,7 +207,8 @@ def test_unscreened_poisson_acts_and_keeps_the_border(result):
     for axis in range(2):
         for line in (0, -1):
             np.testing.assert_array_equal(np.take(result.image, line, axis), np.take(composite, line, axis))
-    plain = texrs.blend(result.source, samples.pebbles((128, 128)).image, wrap=False, screening=0)
+    image = samples.pebbles((128, 128)).image
+    plain = texrs.blend(result.source, image, wrap=False, screening=0, outlines=False)
     np.testing.assert_array_equal(result.image, plain)
 
 
