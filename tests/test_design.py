@@ -355,14 +355,6 @@ def test_options_are_checked_when_they_are_made(kind, options):
         kind(**options)
 
 
-def test_large_textures_are_made_of_more_tiles():
-    dots = samples.dots((48, 48)).image
-    made = {n: texrs.design(dots, size, seed=1, tiles=n).report for n, size in ((None, 112), (4, 96))}
-    assert [len(report["holes"]) for report in made.values()] == [6, 4]
-    assert len(texrs.design(dots, 96, seed=1).report["holes"]) == 4
-    assert len(texrs.design(dots, 192, seed=1).report["holes"]) == 9
-
-
 def test_options_are_frozen_and_keyword_only():
     for kind, field in ((ElementOptions, "layers"), (DeformationOptions, "operations")):
         with pytest.raises(TypeError):

@@ -74,7 +74,7 @@ def design(
     elements: ElementOptions | Elements = ElementOptions(),
     deformation: DeformationOptions = DeformationOptions(),
     plan: Choice = "auto",
-    tiles: int | None = None,
+    tiles: int = 4,
     patch: int | None = None,
     blend: float | None = SCREENING,
     method: Method = None,
@@ -104,9 +104,8 @@ def design(
         What is done with elements. "move": they are deformed, as the paper has it. "still": they stay as they are, and
         patches of the exemplar and its mirror images are joined between them. "auto": both are tried at a small size and
         judged, and the better one is taken; where ``deformation`` is given, or the ``method``, elements move.
-    tiles : int, optional
-        Deformed copies of the exemplar that the result is stitched from, 1 to 64. By default as many as fill its area, 4 to 9,
-        so that what one shows is not seen again and again; of exemplars of more than half a megapixel 4.
+    tiles : int
+        Deformed copies of the exemplar that the result is stitched from, 1 to 64.
     patch : int, optional
         Side of the patches that fill holes, in pixels, 4 to the exemplar's shorter side; a sixth of that, 12 to 32, by
         default.
@@ -197,7 +196,7 @@ def design_variants(
     elements: ElementOptions | Elements = ElementOptions(),
     deformation: DeformationOptions = DeformationOptions(),
     plan: Choice = "auto",
-    tiles: int | None = None,
+    tiles: int = 4,
     patch: int | None = None,
     blend: float | None = SCREENING,
     method: Method = None,
@@ -232,9 +231,8 @@ def design_variants(
         What is done with elements. "move": they are deformed, as the paper has it. "still": they stay as they are, and
         patches of the exemplar and its mirror images are joined between them. "auto": both are tried at a small size and
         judged, and the better one is taken; where ``deformation`` is given, or the ``method``, elements move.
-    tiles : int, optional
-        Deformed copies of the exemplar that each texture is stitched from, 1 to 64. By default as many as fill its area, 4
-        to 9, so that what one shows is not seen again and again; of exemplars of more than half a megapixel 4.
+    tiles : int
+        Deformed copies of the exemplar that each texture is stitched from, 1 to 64.
     patch : int, optional
         Side of the patches that fill holes, in pixels, 4 to the exemplar's shorter side; a sixth of that, 12 to 32, by
         default.

@@ -39,8 +39,6 @@ Choice: TypeAlias = Literal["auto", "move", "still"]
 
 MINIMUM_SIDE = 16
 """An exemplar with a shorter side holds no texture to speak of."""
-FEWEST, MOST, LARGE = 4, 9, 1 << 19
-"""Tiles unless it is said how many, and the pixels of an exemplar from which on there are no more than the fewest."""
 SPARE = 500_000_000
 """Bytes that do not grow with the result."""
 
@@ -90,7 +88,7 @@ def check_arguments(
     elements: ElementOptions | Elements,
     deformation: DeformationOptions,
     plan: Choice,
-    tiles: int | None,
+    tiles: int,
     patch: int | None,
     blend: float | None,
     method: Method,
@@ -119,7 +117,7 @@ def check_arguments(
         chosen,
         deformation,
         plan,
-        count_tiles(exemplars[0].shape, (rows, columns)) if tiles is None else as_int(tiles, "tiles", 1, 64),
+        as_int(tiles, "tiles", 1, 64),
         None if patch is None else as_int(patch, "patch", 4, min(min(e.shape) for e in exemplars)),
         as_float(0.0 if blend is None else blend, "blend", 0, 1e6),
         method == "paper",
@@ -127,12 +125,6 @@ def check_arguments(
     )
     check_memory(count_bytes(arguments))
     return arguments
-
-
-def count_tiles(shape: Sequence[int], size: Sequence[int]) -> int:
-    """Return how many deformed exemplars fill a texture, within bounds: what is searched grows with them."""
-    most = FEWEST if math.prod(shape) > LARGE else MOST
-    return min(max(math.ceil(math.prod(size) / math.prod(shape)), FEWEST), most)
 
 
 def take_entries(given: Sequence[object], exemplars: Sequence[Exemplar], elements: Any) -> Any:
