@@ -16,7 +16,7 @@ from texrs.elements._mixture import Mixture
 from texrs.elements._search import Detections, Template, threshold_otsu
 from texrs.elements._separation import reconcile
 from texrs.errors import FileError, InvalidInput
-from texrs.layouts import directions
+from texrs.point_sets import directions
 
 DISC, SPACING = 9, 32
 

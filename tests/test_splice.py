@@ -313,7 +313,8 @@ def test_edits_replay() -> None:
 
 
 def test_regular_layouts() -> None:
-    from texrs.papers.splice.edit import apply_steps, fit_lattice
+    from texrs.papers.splice.edit import apply_steps
+    from texrs.point_sets import fit_lattice
 
     skew = np.array([[20.0, 4.0], [3.0, 25.0]])
     index = np.argwhere(np.ones((6, 6)))

@@ -10,11 +10,12 @@ from scipy.spatial import Delaunay
 
 import texrs
 from reference.look_up import view
-from texrs import layouts, samples
+from texrs import point_sets, samples
 from texrs.elements import Elements, Layout
 from texrs.papers.splice import energy
 from texrs.papers.splice.adjustment import STRAIN, limit_strain
 from texrs.papers.splice.matching import Match, match_layouts
+from texrs.point_sets import _matching
 
 
 def lattice(rows: int, columns: int, *, shifted: bool, noise: float = 0.0) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -27,9 +28,9 @@ def lattice(rows: int, columns: int, *, shifted: bool, noise: float = 0.0) -> np
 def test_many_elements_are_matched_as_few_are(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     random = np.random.default_rng(seed)
     source, target = random.random((500, 2)) * 400, random.random((400, 2)) * 400
-    dense = layouts.match_points(source, target)
-    monkeypatch.setattr(layouts, "DENSE", 0)
-    near = layouts.match_points(source, target)
+    dense = point_sets.match_points(source, target)
+    monkeypatch.setattr(_matching, "DENSE", 0)
+    near = point_sets.match_points(source, target)
     assert (near[0] == dense[0]).all()
     assert near[1] == pytest.approx(dense[1])
 
@@ -37,9 +38,9 @@ def test_many_elements_are_matched_as_few_are(seed: int, monkeypatch: pytest.Mon
 def test_crowded_targets_find_sources_farther_away(monkeypatch: pytest.MonkeyPatch) -> None:
     random = np.random.default_rng(0)
     source, target = random.random((600, 2)) * 400, random.random((400, 2)) * 40
-    dense = layouts.match_points(source, target)
-    monkeypatch.setattr(layouts, "DENSE", 0)
-    assert layouts.match_points(source, target)[1] == pytest.approx(dense[1])
+    dense = point_sets.match_points(source, target)
+    monkeypatch.setattr(_matching, "DENSE", 0)
+    assert point_sets.match_points(source, target)[1] == pytest.approx(dense[1])
 
 
 @pytest.mark.parametrize("upright", [True, False])
@@ -82,23 +83,23 @@ def test_layouts_go_on_as_they_are(shifted: bool) -> None:
     """Beyond the border each point has the neighbours that points inside have."""
     points = lattice(7, 7, shifted=shifted, noise=0.5)
     shape = (160, 160)
-    found = layouts.PointLayout.of(points, shape, (False, False), beyond=True)
+    found = point_sets.PointLayout.of(points, shape, (False, False), beyond=True)
     far = found.within(np.full(2, -60.0), np.full(2, 220.0))[0]
     inner = far[((far > -20) & (far < 180)).all(axis=1)]
-    nearest = layouts.nearest_distances(inner, 6, far)[:, 1:5]
+    nearest = point_sets.nearest_distances(inner, 6, far)[:, 1:5]
     assert np.median(np.abs(nearest - np.median(nearest, axis=0))) < 2.0
     assert np.percentile(nearest[:, 0], 5) > 14.0
 
 
 def test_outermost_points_do_not_make_a_layout_wider() -> None:
-    assert layouts.spacing(lattice(3, 3, shifted=False), count=4) == pytest.approx(20.0)
-    assert layouts.spacing(lattice(9, 9, shifted=False), count=4) == pytest.approx(20.0)
+    assert point_sets.spacing(lattice(3, 3, shifted=False), count=4) == pytest.approx(20.0)
+    assert point_sets.spacing(lattice(9, 9, shifted=False), count=4) == pytest.approx(20.0)
 
 
 def test_pictures_of_any_size_take_their_time_only(monkeypatch: pytest.MonkeyPatch) -> None:
     """Coarser systems and near matches go through the whole of a splice."""
     monkeypatch.setattr(energy, "MOST", 1 << 13)
-    monkeypatch.setattr(layouts, "DENSE", 0)
+    monkeypatch.setattr(_matching, "DENSE", 0)
     wall = Elements.of_sample(samples.load("bricks", size=(128, 128)))
     stones = Elements.of_sample(samples.load("pebbles", size=(128, 128)))
     result = texrs.splice(wall, stones, cells=False, seed=1)

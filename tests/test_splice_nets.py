@@ -14,9 +14,9 @@ import texrs
 from texrs import samples
 from texrs.elements import Elements, Layout
 from texrs.errors import InvalidInput
-from texrs.layouts import spacing
 from texrs.papers.splice.nets.graph import describe_places, join_knots
 from texrs.papers.splice.nets.targets import Targets, go_part_of_the_way, take_points
+from texrs.point_sets import spacing
 
 SIZE = (144, 144)
 UNIT = 30.0

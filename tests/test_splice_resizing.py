@@ -11,7 +11,7 @@ import texrs
 from texrs import samples
 from texrs.elements import Elements
 from texrs.errors import InvalidInput, LimitExceeded
-from texrs.layouts import nearest_distances, spacing
+from texrs.point_sets import nearest_distances, spacing
 
 
 def entry(name: str, size: tuple[int, int] = (128, 128)) -> Elements:

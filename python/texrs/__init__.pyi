@@ -1,5 +1,5 @@
 # The public names of texrs and where they live: read by type checkers, and by lazy_loader when texrs is imported.
-from . import elements, errors, exemplar, fields, io, judging, kernels, samples, scale_maps, volume
+from . import elements, errors, exemplar, fields, io, judging, kernels, layouts, samples, scale_maps, volume
 from ._threads import threads
 from ._version import __version__
 from .blending import blend
@@ -42,6 +42,7 @@ __all__ = [
     "io",
     "judging",
     "kernels",
+    "layouts",
     "perspective",
     "samples",
     "scale_maps",

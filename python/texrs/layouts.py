@@ -1,369 +1,302 @@
-"""Point sets brought into register: one texture's layout for the elements of another.
+"""Layouts that are drawn, not found: points, lattices, cells and courses that elements are brought into.
 
-Y. Liu et al., "Texture splicing", 2009, section 4.1: scales are normalised by the mean distance to the nearest points,
-orientations by the directions in which points line up, and points are matched one to one at the least total cost (Eq. 4).
-Here also: what the paper is silent about, namely how both point sets go on beyond the borders of their pictures.
+Each is an entry like that of a picture (`texrs.elements.Elements`), whose picture is a drawing of the layout, so that all that
+takes the arrangement of a texture takes it: the second argument of `texrs.splice`, and a `texrs.TextureDatabase`. `make` makes
+one of a description in plain JSON types, as the command line does.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import check_memory
+from texrs._arrays import as_float, as_seed, as_size, as_wrap, try_array
+from texrs._typing import Array, Labels
+from texrs.elements import Elements, Layout
 from texrs.errors import InvalidInput
+from texrs.point_sets import nearest_distances
 
-__all__ = ["Fold", "PointLayout", "directions", "find_fold", "match_points", "nearest_distances", "spacing"]
+__all__ = ["cells", "courses", "lattice", "make", "points"]
 
 Points = NDArray[np.float64]
 
-NEIGHBOURS = 5
-"""k of the scale normalisation: the paper says between 4 and 6."""
-AROUND = 6
-"""Neighbours that tell how a layout goes on: fewer do not tell rows that are shifted from rows that are not."""
-INSIDE = 0.5
-"""Points farther from the outermost one along every axis than so many distances to the nearest are inner ones."""
-MERGE = 0.6
-"""Points nearer than this, in spacings, that meet where a point set is folded are one."""
-PEAK, CLEAR = 1.3, 6.0
-"""How far a direction must stand out: from the median one, and in spreads of all directions."""
-FINE, COARSE = 0.15, 0.8
-"""Widths, in spacings, of the Gaussians that points are drawn as: lines show at the first, outlines at both."""
-WIDE_BINS = 64
-"""Room at the ends for the wider ones."""
-DENSE = 1 << 20
-"""Pairs of a source and a target of which all are looked at."""
-NEAR = 64
-"""Of more pairs, so many sources a target, those nearest to it."""
-TIE = 1e-9
-"""What a later source costs more than the one before: of equal ones the first is taken."""
+GROUND, THING = 208, 72
+"""Grey values of the drawing."""
+DISC = 0.35
+"""Radius that a point is drawn with, of the usual distance to the nearest."""
+SHORTEST = 16
+"""Pixels along a side, at least."""
+LARGEST = 1 << 24
+"""Pixels of a drawing, at the most."""
+MOST = 1 << 18
+"""Points or bricks, at the most."""
 
 
-def nearest_distances(points: Points, count: int, among: Points | None = None) -> Points:
-    """Return the distances to the ``count`` nearest points, (n, count); to others of ``points`` itself by default."""
-    from scipy.spatial import cKDTree
-
-    own = among is None
-    tree = cKDTree(points if among is None else among)
-    found = tree.query(points, k=[*range(1 + own, count + 1 + own)])[0]
-    return np.asarray(found, np.float64)
-
-
-def spacing(points: Points, count: int = NEIGHBOURS) -> float:
-    """Return the median over inner points of the mean distance to the nearest ones: borders bias it less than the mean.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> grid = np.argwhere(np.ones((9, 9))) * 10.0
-    >>> round(spacing(grid, count=4), 6)
-    10.0
-
-    """
-    if len(points) < 3:
-        raise InvalidInput(f"points: a layout needs three or more, got {len(points)}")
-    far = nearest_distances(points, min(count, len(points) - 1))
-    return float(np.median(far.mean(axis=1)[_mark_inner(points, far)]))
-
-
-def _mark_inner(points: Points, far: Points) -> NDArray[np.bool_]:
-    """Mark the points that are not the outermost, or all if there is no other: half of the neighbours of these are missing."""
-    edge = INSIDE * float(np.median(far[:, 0]))
-    found: NDArray[np.bool_] = ((points > points.min(axis=0) + edge) & (points < points.max(axis=0) - edge)).all(axis=1)
-    return found if found.any() else ~found
-
-
-def directions(points: Points, *, most: int = 3) -> tuple[float, ...]:
-    """Return the directions in which points line up: degrees in [0, 180) from the columns' axis to the rows', strongest first.
-
-    A Radon transform of the points, drawn as Gaussians of .15 spacings: where lines of points are seen end on, it varies
-    most [1]_. Empty where no direction stands out.
-
-    References
-    ----------
-    .. [1] K. Jafari-Khouzani and H. Soltanian-Zadeh, "Radon transform orientation estimation for rotation invariant
-       texture analysis", IEEE Trans. PAMI 27(6), 2005.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> grid = np.argwhere(np.ones((9, 9))) * [10.0, 10.0]
-    >>> sorted(directions(grid)[:2])
-    [0.0, 90.0]
-
-    """
-    from scipy.ndimage import gaussian_filter1d
-
-    scale = spacing(points)
-    away = points - points.mean(axis=0)
-    # Points within a disc: the outline of any other shape has directions of its own.
-    radius = np.hypot(*away.T)
-    disc = away[radius <= max(float(np.abs(away).max(axis=0).min()), 2.5 * scale)]
-    if len(disc) < 8:
-        return ()
-    step = 0.05 * scale
-    angles = np.radians(np.arange(180))
-    across = disc @ np.stack([np.cos(angles), -np.sin(angles)])
-    bins = np.rint((across - across.min()) / step).astype(np.intp) + WIDE_BINS
-    width = int(bins.max()) + 1 + WIDE_BINS
-    counts = np.bincount((bins + np.arange(180) * width).ravel(), minlength=180 * width).reshape(180, width)
-    fine, coarse = (
-        s * (gaussian_filter1d(counts.astype(np.float64), s / 0.05, axis=1, mode="constant") ** 2).sum(axis=1)
-        for s in (FINE, COARSE)
-    )
-    # Against the outline of the whole: a cloud without lines varies as much at both widths.
-    power = fine / coarse
-    usual = float(np.median(power))
-    spread = 1.4826 * float(np.median(np.abs(power - usual)))
-    found: list[tuple[float, float]] = []
-    for k in range(180):
-        around = power[np.arange(k - 6, k + 7) % 180]
-        if power[k] >= around.max() and power[k] > max(PEAK * usual, usual + CLEAR * spread):
-            found.append((-round(float(power[k]), 9), float(k)))
-    return tuple(angle for _, angle in sorted(found)[:most])
-
-
-@dataclass(frozen=True, slots=True)
-class Fold:
-    """How an axis goes on beyond its ends: around, or reflected at two lines.
-
-    Attributes
-    ----------
-    low, high : float
-        The lines: of what lies between them the rest is made. An axis that wraps has the period ``high - low``.
-    wrap : bool
-        Around, not reflected.
-
-    """
-
-    low: float
-    high: float
-    wrap: bool
-
-    def apply(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Return what coordinates stand for, between the lines, and whether they are mirrored.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> Fold(0.0, 10.0, False).apply(np.array([-3.0, 4.0, 12.0, 23.0]))
-        (array([3., 4., 8., 3.]), array([ True, False,  True, False]))
-
-        """
-        side = self.high - self.low
-        turn = np.floor((x - self.low) / side)
-        rest = x - self.low - turn * side
-        mirrored = np.zeros(np.shape(x), bool) if self.wrap else np.mod(turn, 2) == 1
-        return self.low + np.where(mirrored, side - rest, rest), mirrored
-
-    def copies(
-        self, x: NDArray[np.float64], low: float, high: float
-    ) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.bool_]]:
-        """Return the places that stand for each coordinate, (n, turns), the turns, and which places lie in [low, high].
-
-        An odd turn is mirrored, if any is.
-        """
-        side = self.high - self.low
-        turns = np.arange(math.floor((low - self.low) / side) - 1, math.floor((high - self.low) / side) + 2)
-        mirrored = np.zeros(len(turns), bool) if self.wrap else turns % 2 == 1
-        at = self.low + turns * side + np.where(mirrored, self.high - x[:, None], x[:, None] - self.low)
-        return np.asarray(at, np.float64), turns, (at >= low) & (at <= high)
-
-
-def find_fold(points: Points, axis: int, ends: tuple[float, float], *, wrap: bool, beyond: bool) -> Fold:
-    """Find the lines at which a layout is reflected along an axis, so that it goes on as it is.
-
-    Each line is tried at several places around the outermost points; the one is taken where those near it have neighbours
-    as far away as points inside have. In a row of a lattice that is on or midway between its points.
+def points(places: object, size: int | Sequence[int], *, wrap: bool | Sequence[bool] = False) -> Elements:
+    """Return a layout of points.
 
     Parameters
     ----------
-    points : (n, 2) array
-        The layout.
-    axis : int
-        Which axis.
-    ends : (float, float)
-        First and last coordinate of the picture.
-    wrap : bool
-        Whether the picture goes around: then its ends are the lines.
-    beyond : bool
-        Whether lines may lie beyond the picture's ends: so for points alone, for whose pixels nobody asks.
-
-    """
-    if wrap:
-        return Fold(ends[0] - 0.5, ends[1] + 0.5, True)
-    scale = spacing(points)
-    count = min(AROUND, len(points) - 1)
-    far = nearest_distances(points, count)
-    inner = np.median(far[_mark_inner(points, far)], axis=0)
-    lines = []
-    for sign in (-1, 1):
-        x = sign * points[:, axis]
-        outermost, end = float(x.max()), sign * (ends[0] if sign < 0 else ends[1])
-        steps = outermost + np.linspace(-0.2, 0.8, 21) * scale
-        if not beyond:
-            # The last pixel itself is a line too: reflected there, no pixel is lost.
-            steps = np.append(steps[steps <= end], end)
-        costs = [_measure_misfit(points, axis, sign, float(at), scale, inner) for at in steps]
-        lines.append(sign * float(steps[int(np.argmin(costs))]))
-    low, high = lines
-    if high - low < 0.5 * scale:
-        low, high = ends
-    if not beyond:
-        low, high = float(np.ceil(low * 2) / 2), float(np.floor(high * 2) / 2)
-    return Fold(low, high, False)
-
-
-def _measure_misfit(points: Points, axis: int, sign: int, line: float, scale: float, inner: Points) -> float:
-    """Return how far the neighbours of points near a line differ from those of points inside."""
-    x = sign * points[:, axis]
-    kept = points[x <= line + 0.25 * scale]
-    if len(kept) < 3:
-        return math.inf
-    mirrored = kept.copy()
-    mirrored[:, axis] = sign * (2 * line) - kept[:, axis]
-    x = sign * kept[:, axis]
-    apart = np.abs(2 * (line - x)) > MERGE * float(inner[0])
-    both = np.concatenate([kept, mirrored[apart]])
-    near = np.flatnonzero(x > line - scale)
-    if len(near) == 0:
-        return math.inf
-    # Those at the sides lack neighbours wherever the line is.
-    aside = kept[near, 1 - axis]
-    middle = (aside > aside.min() + 0.25 * scale) & (aside < aside.max() - 0.25 * scale)
-    near = near[middle] if middle.any() else near
-    found = nearest_distances(kept[near], len(inner) + 1, both)[:, 1:]
-    return float(np.abs(found - inner).mean() + 1e-3 * abs(line - float(x.max())))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PointLayout:
-    """A layout that goes on without end.
-
-    Attributes
-    ----------
-    points : (n, 2) float64
-        The points of the picture.
-    folds : (Fold, Fold)
-        How they go on along rows and columns.
-    scale : float
-        Their spacing.
-
-    """
-
-    points: Points
-    folds: tuple[Fold, Fold]
-    scale: float
-
-    @classmethod
-    def of(cls, points: Points, shape: Sequence[int], wrap: Sequence[bool], *, beyond: bool) -> PointLayout:
-        """Find how the layout of a picture goes on."""
-        folds = [find_fold(points, a, (0.0, shape[a] - 1.0), wrap=wrap[a], beyond=beyond) for a in range(2)]
-        return cls(points, (folds[0], folds[1]), spacing(points))
-
-    def within(self, low: Points, high: Points) -> tuple[Points, NDArray[np.intp], NDArray[np.bool_]]:
-        """Return the points in a box, which of ``points`` each stands for, and along which axes it is mirrored."""
-        along = [self.folds[a].copies(self.points[:, a], float(low[a]), float(high[a])) for a in range(2)]
-        which, up, aside = np.nonzero(along[0][2][:, :, None] & along[1][2][:, None])
-        if not len(which):
-            return np.zeros((0, 2)), np.zeros(0, np.intp), np.zeros((0, 2), bool)
-        found = np.stack([along[0][0][which, up], along[1][0][which, aside]], axis=-1)
-        turned = np.stack([along[0][1][up], along[1][1][aside]], axis=-1)
-        # Those of the picture itself come first, then by place: who is merged must not hang on the box.
-        order = np.lexsort((found[:, 1], found[:, 0], turned.any(axis=1)))
-        found, which, turned = found[order], which[order], turned[order]
-        kept = drop_duplicates(found, turned, MERGE * float(np.median(nearest_distances(self.points, 1))))
-        mirrored = (turned % 2 == 1) & [not f.wrap for f in self.folds]
-        return found[kept], which[kept], mirrored[kept]
-
-
-def drop_duplicates(points: Points, turn: NDArray[np.intp], apart: float) -> NDArray[np.intp]:
-    """Return which points no earlier one of another turn is nearer to than ``apart``."""
-    from scipy.spatial import cKDTree
-
-    dropped = np.zeros(len(points), bool)
-    pairs = cKDTree(points).query_pairs(apart, output_type="ndarray")
-    for first, second in sorted(map(tuple, np.sort(pairs, axis=1).tolist())):
-        # What lies so near within one picture is so in the layout itself.
-        if not dropped[first] and (turn[first] != turn[second]).any():
-            dropped[second] = True
-    return np.flatnonzero(~dropped)
-
-
-def match_points(source: Points, target: Points) -> tuple[NDArray[np.intp], float]:
-    """Match each target with a source of its own at the least total squared distance (Eq. 4).
-
-    Squared, for the best matching then has no crossings; of equal ones the first is taken.
-
-    Returns
-    -------
-    of : (targets) int
-        The source of each target.
-    cost : float
-        Mean squared distance.
+    places : (n, 2) array
+        Rows and columns, in pixels, three or more within ``size``, no two in one place.
+    size : int or (rows, columns)
+        Of the drawing, sides of at least 16. With ``texrs.splice(layout_scale=1)`` pixels of it are those of the result.
+    wrap : bool or (bool, bool)
+        Whether the layout repeats along rows and columns.
 
     Raises
     ------
     InvalidInput
-        Fewer sources than targets.
+        Points that are none, too few, or outside.
+
+    Examples
+    --------
+    >>> import texrs
+    >>> from texrs.elements import Elements
+    >>> ring = [[64 + 40 * s, 64 + 40 * c] for s, c in [(0, 1), (1, 0), (0, -1), (-1, 0), (0.7, 0.7), (-0.7, -0.7)]]
+    >>> layout = texrs.layouts.points(ring, 128)
+    >>> buttons = Elements.of_sample(texrs.samples.dots((128, 128)))
+    >>> made = texrs.splice(buttons, layout, 128, layout_scale=1)
+    >>> len(made.report["matches"])
+    6
+
+    """
+    shape, around = _as_shape(size), as_wrap(wrap, "wrap")
+    at = try_array(places, np.float64)
+    if at.ndim != 2 or at.shape[1] != 2 or not np.isfinite(at).all():
+        raise InvalidInput(f"places: needs finite (row, column), shape (n, 2), got {at.dtype} {at.shape}")
+    at = np.asarray(at, np.float64)
+    if not 3 <= len(at) <= MOST:
+        raise InvalidInput(f"places: needs 3 to {MOST} points, got {len(at)}")
+    outside = ((at < -0.5) | (at > np.array(shape) - 0.5)).any(axis=1)
+    if outside.any():
+        raise InvalidInput(f"places: {at[outside][0].tolist()} lies outside of {shape}")
+    if len(np.unique(at, axis=0)) < len(at):
+        raise InvalidInput("places: holds one place twice")
+    return _draw_points(at, shape, (around[0], around[1]))
+
+
+def lattice(
+    size: int | Sequence[int],
+    first: Sequence[float],
+    second: Sequence[float],
+    *,
+    origin: Sequence[float] | None = None,
+) -> Elements:
+    """Return the points of a lattice, which goes on beyond the drawing as a lattice does.
+
+    Parameters
+    ----------
+    size : int or (rows, columns)
+        Of the drawing, sides of at least 16.
+    first, second : (row, column)
+        From a point to two of its neighbours, in pixels: ``(0, 20)`` and ``(17.3, 10)`` for hexagons.
+    origin : (row, column), optional
+        One of the points; the middle of the drawing by default.
+
+    Raises
+    ------
+    InvalidInput
+        Vectors along one line, or so long that fewer than three points lie in the drawing, or so short that too many do.
+
+    Examples
+    --------
+    >>> import texrs
+    >>> len(texrs.layouts.lattice(100, (0, 20), (17.3, 10)).points)
+    23
+
+    """
+    shape = _as_shape(size)
+    basis = np.array([_as_pair(first, "first"), _as_pair(second, "second")])
+    area = abs(float(np.linalg.det(basis)))
+    if area < 0.05 * float(np.hypot(*basis[0]) * np.hypot(*basis[1])) or not area:
+        raise InvalidInput(f"second: {tuple(basis[1].tolist())} lies along first, {tuple(basis[0].tolist())}")
+    if np.prod(shape) / area > MOST:
+        raise InvalidInput(f"first, second: more than {MOST} points would lie in {shape}")
+    middle = (np.array(shape) - 1) / 2 if origin is None else np.array(_as_pair(origin, "origin"))
+    corners = np.array([[y, x] for y in (0, shape[0] - 1) for x in (0, shape[1] - 1)]) - middle
+    ends = corners @ np.linalg.inv(basis)
+    low, high = np.floor(ends.min(axis=0)).astype(int), np.ceil(ends.max(axis=0)).astype(int)
+    index = np.stack(np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(low, high, strict=True)), indexing="ij"), -1)
+    at = np.round(index.reshape(-1, 2) @ basis + middle, 6)
+    at = at[((at >= 0) & (at <= np.array(shape) - 1)).all(axis=1)]
+    if len(at) < 3:
+        raise InvalidInput(f"size: {shape} shows {len(at)} points of this lattice, three or more are needed")
+    return _draw_points(at, shape, (False, False))
+
+
+def cells(labels: Array, *, wrap: bool | Sequence[bool] = False) -> Elements:
+    """Return a layout of cells: a tessellation, as the panes of a window or the stones of a pavement.
+
+    Parameters
+    ----------
+    labels : (H, W) array of int
+        The cell of each pixel, any positive numbers; 0 is joint. Three cells or more, sides of at least 16.
+    wrap : bool or (bool, bool)
+        Whether it repeats along rows and columns.
+
+    Raises
+    ------
+    InvalidInput
+        No labels, or too few.
 
     Examples
     --------
     >>> import numpy as np
-    >>> match_points(np.array([[0.0, 0], [0, 10], [0, 20]]), np.array([[0.0, 19], [0, 1]]))[0].tolist()
-    [2, 0]
+    >>> import texrs
+    >>> from texrs.elements import Elements
+    >>> panes = np.add.outer(10 * (np.arange(96) // 24), np.arange(96) // 32) + 1
+    >>> wall = Elements.of_sample(texrs.samples.bricks((160, 160)))
+    >>> texrs.splice(wall, texrs.layouts.cells(panes), 96).report["method"]
+    'cells'
 
     """
-    if len(source) < len(target):
-        raise InvalidInput(f"source: needs a point for each of {len(target)} targets, got {len(source)}")
-    if len(source) * len(target) <= DENSE:
-        of = _assign(((target[:, None] - source[None]) ** 2).sum(axis=-1))
-    else:
-        of = _assign_near(source, target)
-    cost = ((target - source[of]) ** 2).sum(axis=-1)
-    return of, float(cost.mean()) if len(target) else 0.0
+    given: NDArray[Any] = try_array(labels, None)
+    if given.ndim != 2 or min(given.shape) < SHORTEST:
+        raise InvalidInput(f"labels: needs (H, W) with sides of at least {SHORTEST}, got shape {given.shape}")
+    image = np.full(given.shape, GROUND, np.uint8)
+    found = Elements.of_labels(image, given, layout=Layout.JOINTED, wrap=wrap)
+    image[~found.mask] = THING
+    return found
 
 
-def _assign(square: Points) -> NDArray[np.intp]:
-    """Match rows with columns, every pair of which has a cost."""
-    from scipy.optimize import linear_sum_assignment
+def courses(
+    size: int | Sequence[int],
+    height: float | Sequence[float],
+    length: float,
+    *,
+    shift: float = 0.5,
+    vary: float = 0.0,
+    joint: float = 2.0,
+    seed: int = 0,
+) -> Elements:
+    """Return courses of bricks or stones, each free along its own: a wall.
 
-    rows, columns = linear_sum_assignment(square + TIE * np.arange(square.shape[1]))
-    of = np.empty(len(square), np.intp)
-    of[rows] = columns
-    return of
+    Parameters
+    ----------
+    size : int or (rows, columns)
+        Of the drawing, sides of at least 16.
+    height : float, or sequence of float
+        Of a course, joint included, in pixels, 4 or more; several heights follow each other again and again.
+    length : float
+        Usual length of a brick, joint included, in pixels, 4 or more.
+    shift : float
+        How much each course is moved along against the one above, in lengths: 0.5 is a running bond, 0 a stack.
+    vary : float
+        How much lengths differ, 0 to 0.9: bricks are ``1 - vary`` to ``1 + vary`` times as long as is usual.
+    joint : float
+        Width of the joints, in pixels, 0 to half of the height.
+    seed : int
+        Chooses lengths that vary.
 
+    Raises
+    ------
+    InvalidInput
+        A number out of its range, or so large that fewer than three bricks are seen.
 
-def _assign_near(source: Points, target: Points) -> NDArray[np.intp]:
-    """Match many targets, each with one of the sources near it.
+    Examples
+    --------
+    >>> import texrs
+    >>> texrs.layouts.courses(128, height=[16, 24], length=40, shift=1 / 3, vary=0.3)
+    Elements(30 of box (15, 31) in 128 x 128, jointed)
 
-    A matching whose every pair is among the first half of the near ones is taken: a better one would have to send a target
-    beyond the other half, which pays only where many others gain by it. All pairs would take memory and time as the square
-    and the cube of their number.
     """
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import min_weight_full_bipartite_matching
+    shape, number = _as_shape(size), as_seed(seed)
+    listed = height if isinstance(height, Sequence | np.ndarray) else [height]
+    heights = [as_float(h, "height", 4, 1e6) for h in listed]
+    if not heights:
+        raise InvalidInput("height: needs one or more")
+    long, moved = as_float(length, "length", 4, 1e6), as_float(shift, "shift", -1e6, 1e6)
+    spread = as_float(vary, "vary", 0, 0.9)
+    wide = as_float(joint, "joint", 0, min(*heights, long * (1 - spread), 1e6) / 2)
+    if shape[0] / min(heights) * (shape[1] / long + 2) > MOST:
+        raise InvalidInput(f"height, length: more than {MOST} bricks would lie in {shape}")
+    noise, labels = np.random.default_rng(number), np.zeros(shape, np.int32)
+    rows, columns = np.arange(shape[0]) + 0.5, np.arange(shape[1]) + 0.5
+    top, course, count = 0.0, 0, 0
+    while top < shape[0]:
+        tall = heights[course % len(heights)]
+        sides = long * (1 + spread * noise.uniform(-1, 1, int(shape[1] / (long * (1 - spread))) + 3))
+        ends = np.concatenate([[0.0], np.cumsum(sides)]) + long * ((moved * course) % 1 - 1)
+        brick = np.searchsorted(ends, columns, side="right") - 1
+        beside = np.minimum(columns - ends[brick], ends[brick + 1] - columns)
+        inside = np.minimum(rows - top, top + tall - rows) >= wide / 2
+        within = (rows >= top) & (rows < top + tall) & inside
+        labels[within] = np.where(beside >= wide / 2, count + brick + 1, 0)
+        top, course, count = top + tall, course + 1, count + len(sides)
+    return cells(labels)
+
+
+def make(description: Mapping[str, Any]) -> Elements:
+    """Make a layout of a description in plain JSON types.
+
+    Parameters
+    ----------
+    description : mapping
+        ``{"layout": "points", "places": [[row, column], ...], "size": [128, 128]}``, or ``"lattice"``, ``"cells"`` or
+        ``"courses"`` with the arguments of the function of that name.
+
+    Raises
+    ------
+    InvalidInput
+        No such layout, or an argument that it does not have or that is out of range.
+
+    Examples
+    --------
+    >>> import texrs
+    >>> texrs.layouts.make({"layout": "lattice", "size": 96, "first": [0, 24], "second": [24, 0]})
+    Elements(9 of box (17, 17) in 96 x 96, disjoint)
+
+    """
+    import inspect
+
+    if not isinstance(description, Mapping) or description.get("layout") not in _MADE:
+        raise InvalidInput(f"layout: needs a mapping with a 'layout' among {', '.join(_MADE)}; got {description!r}")
+    function = _MADE[description["layout"]]
+    given = {str(name): value for name, value in description.items() if name != "layout"}
+    known = inspect.signature(function).parameters
+    for name in given:
+        if name not in known:
+            raise InvalidInput(f"layout: {description['layout']} has no {name!r}; it has {', '.join(known)}")
+    for name, parameter in known.items():
+        if parameter.default is parameter.empty and name not in given:
+            raise InvalidInput(f"layout: {description['layout']} needs {name!r}")
+    return function(**given)
+
+
+_MADE: dict[str, Callable[..., Elements]] = {"points": points, "lattice": lattice, "cells": cells, "courses": courses}
+
+
+def __dir__() -> list[str]:
+    return __all__
+
+
+def _as_shape(size: object) -> tuple[int, int]:
+    rows, columns = as_size(size, minimum=SHORTEST, limit=LARGEST)
+    return rows, columns
+
+
+def _as_pair(value: object, name: str) -> tuple[float, float]:
+    pair = try_array(value, np.float64)
+    if pair.shape != (2,) or not np.isfinite(pair).all():
+        raise InvalidInput(f"{name}: needs two finite numbers (row, column), got {value!r}")
+    return as_float(float(pair[0]), name, -1e6, 1e6), as_float(float(pair[1]), name, -1e6, 1e6)
+
+
+def _draw_points(at: Points, shape: tuple[int, int], wrap: tuple[bool, bool]) -> Elements:
+    """Draw points as discs of one size that do not touch."""
     from scipy.spatial import cKDTree
 
-    tree, count = cKDTree(source), NEAR
-    while count < len(source):
-        far, near = tree.query(target, k=count)
-        # A cost of nothing would be no pair.
-        cost = 1 + far**2 + TIE * near
-        pairs = csr_array(
-            (cost.ravel(), near.ravel(), np.arange(len(target) + 1) * count), shape=(len(target), len(source))
-        )
-        try:
-            of = min_weight_full_bipartite_matching(pairs)[1]
-        except ValueError:
-            count *= 4  # Too few sources near some of them.
-            continue
-        if not (near[:, count // 2 :] == of[:, None]).any():
-            return np.asarray(of, np.intp)
-        count *= 2
-    check_memory(3 * 8 * len(source) * len(target))
-    return _assign(((target[:, None] - source[None]) ** 2).sum(axis=-1))
+    radius = max(1.0, DISC * float(np.median(nearest_distances(at, 1))))
+    grid = np.stack(np.meshgrid(*(np.arange(n) for n in shape), indexing="ij"), -1).reshape(-1, 2)
+    far, nearest = cKDTree(at).query(grid, distance_upper_bound=radius)
+    owner: Labels = np.where(np.isfinite(far), nearest + 1, 0).reshape(shape).astype(np.int32)
+    # A point whose disc lies under others keeps its pixel.
+    pixel = np.clip(np.rint(at), 0, np.array(shape) - 1).astype(np.intp)
+    owner[pixel[:, 0], pixel[:, 1]] = np.arange(1, len(at) + 1)
+    image = np.where(owner > 0, THING, GROUND).astype(np.uint8)
+    side = 2 * round(radius) + 1
+    return Elements(image, at, owner > 0, (side, side), Layout.DISJOINT, np.ones(len(at)), wrap=wrap)

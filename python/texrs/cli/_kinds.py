@@ -147,21 +147,26 @@ def _parse_finite(text: str, count: int, option: str, wanted: str) -> list[float
 
 def read_steps(text: str, about: About) -> Any:
     """Return an edit: names with commas between them, JSON, or a file of JSON."""
-    where = about.option
+    if not text.lower().endswith(".json") and not text.lstrip().startswith(("[", "{")):
+        return [word.strip() for word in text.split(",")]
+    found = read_json(text, about.option)
+    # A report holds its edit beside other things.
+    return found["edit"] if isinstance(found, dict) and "edit" in found else found
+
+
+def read_json(text: str, option: str) -> Any:
+    """Return what JSON says, or a file of it."""
+    where = option
     if text.lower().endswith(".json"):
         where = text
         try:
             text = Path(text).read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             raise FileError(f"{where}: {error}") from None
-    elif not text.lstrip().startswith(("[", "{")):
-        return [word.strip() for word in text.split(",")]
     try:
-        found = json.loads(text)
+        return json.loads(text)
     except (json.JSONDecodeError, RecursionError) as error:
         raise InvalidInput(f"{where}: is not JSON ({error})") from None
-    # A report holds its edit beside other things.
-    return found["edit"] if isinstance(found, dict) and "edit" in found else found
 
 
 def read_corrections(text: str, about: About) -> Any:
@@ -259,6 +264,18 @@ def read_entry(text: str, about: About) -> Any:
     return elements.load(text) if text.lower().endswith(".npz") else read_picture(text)
 
 
+def read_layout(text: str, about: About) -> Any:
+    """Read analysed elements or a picture, as `read_entry` does, or make a layout of JSON; its labels may be a picture."""
+    if not text.lower().endswith(".json") and not text.lstrip().startswith("{"):
+        return read_entry(text, about)
+    from texrs import layouts
+
+    said = read_json(text, about.option)
+    if isinstance(said, dict) and isinstance(said.get("labels"), str):
+        said = {**said, "labels": io.read(said["labels"])}
+    return layouts.make(said)
+
+
 def read_labels(path: str, about: About) -> Array:
     """Read the labels of elements: a picture of them, or those of an entry."""
     from texrs import elements
@@ -299,6 +316,12 @@ UNKNOWN = replace(PICTURE, read=lambda text, about: read_picture(text, finite=Fa
 """A picture in which some is not known, and may be anything."""
 VOLUME = replace(PICTURE, read=lambda text, about: read_volume(text))
 ENTRY = Kind("FILE", read_entry, "An image file, sample:NAME, or an entry that texrs analyse wrote (.npz).", file=True)
+LAYOUT = Kind(
+    "FILE|JSON",
+    read_layout,
+    "As the first, or a layout: JSON, or a file of it (.json), as texrs.layouts.make takes it.",
+    file=True,
+)
 ENTRIES = replace(
     ENTRY,
     read=lambda texts, about: [read_entry(text, about) for text in texts],

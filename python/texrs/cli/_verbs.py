@@ -17,7 +17,7 @@ from texrs._threads import threads
 from texrs._typing import Array
 from texrs.cli import _outputs
 from texrs.cli._console import note, show_progress
-from texrs.cli._kinds import ENTRIES, ENTRY, HOLE, MAP_OR_AUTO, NUMBERS, PICTURE, UNKNOWN, VOLUME, About, Kind
+from texrs.cli._kinds import ENTRIES, ENTRY, HOLE, LAYOUT, MAP_OR_AUTO, NUMBERS, PICTURE, UNKNOWN, VOLUME, About, Kind
 from texrs.cli._options import Options, as_command, make_parameter
 from texrs.cli._outputs import Quiet, Threads, describe, name_arguments, to_write
 from texrs.synthesis import Synthesis
@@ -154,7 +154,7 @@ def make_verb(name: str) -> Verb:
         case "splice":
             from texrs.papers.splice import splice
 
-            return Verb(Options(splice, arguments={"a": ENTRY, "b": ENTRY}), says=count_moved)
+            return Verb(Options(splice, arguments={"a": ENTRY, "b": LAYOUT}), says=count_moved)
         case "self-splice":
             from texrs.papers.splice import self_splice
 

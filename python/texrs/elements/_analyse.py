@@ -22,7 +22,7 @@ from texrs.elements._proposal import ADVICE, DOUBTFUL, Start, propose
 from texrs.elements._search import Detections, search_similar
 from texrs.elements._separation import Separation, add_missing, find_nearest_pixels, reconcile
 from texrs.errors import InvalidInput
-from texrs.layouts import directions, spacing
+from texrs.point_sets import directions, spacing
 
 FEWEST = 3
 """Elements without which there is no layout."""

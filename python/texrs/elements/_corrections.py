@@ -18,7 +18,7 @@ from texrs.elements._layout import Layout
 from texrs.elements._mask import ellipse, round_to_odd, stamp
 from texrs.elements._separation import find_nearest_pixels, label_components
 from texrs.errors import InvalidInput
-from texrs.layouts import directions, spacing
+from texrs.point_sets import directions, spacing
 
 __all__ = ["correct"]
 
@@ -56,7 +56,8 @@ def correct(entry: Elements, steps: object) -> Elements:
     Returns
     -------
     Elements
-        Its report holds all steps under ``"corrections"``, those of earlier corrections first.
+        Its report holds all steps under ``"corrections"``, those of earlier corrections first. Labels that were given
+        (`Elements.of_labels`) hold until a step: then elements are told by the mask and the points.
 
     Raises
     ------
@@ -90,7 +91,7 @@ def correct(entry: Elements, steps: object) -> Elements:
         "spacing": spacing(entry.points),
         "doubts": [trouble] if trouble else [],
     }
-    return replace(entry, report=report, directions=directions(entry.points)) if known else entry
+    return replace(entry, report=report, directions=directions(entry.points), known=None) if known else entry
 
 
 def read_steps(steps: object) -> list[dict[str, Any]]:

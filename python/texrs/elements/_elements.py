@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -12,13 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_image
+from texrs._arrays import as_image, as_wrap
 from texrs._engine.coherence import Similarity
 from texrs._typing import Array, Labels, Path
 from texrs.elements._instances import Instance, Labelled, cut_instances, label_elements
-from texrs.elements._layout import Layout
+from texrs.elements._known import as_element_labels, measure_box, measure_centres
+from texrs.elements._layout import Layout, LayoutName
 from texrs.errors import FileError, InvalidInput
 from texrs.exemplar import Exemplar
+from texrs.exemplar.shapes import mark_outlines
 from texrs.io import atomic, read_arrays
 from texrs.samples import Sample
 
@@ -57,6 +59,8 @@ class Elements:
         How many times larger each element is, as far as was looked for.
     sets : Similarity, optional
         What `similarity` returns, where it was made to be kept.
+    known : ndarray of shape (height, width), int32, optional
+        The element of each pixel where that is given, not found, as `of_labels` has it.
     """
 
     image: NDArray[Any]
@@ -71,6 +75,7 @@ class Elements:
     angles: NDArray[np.float64] | None = None
     scales: NDArray[np.float64] | None = None
     sets: Similarity | None = None
+    known: Labels | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "layout", Layout(self.layout))
@@ -103,15 +108,62 @@ class Elements:
         Elements(3 of box (25, 47) in 96 x 96, jointed)
 
         """
-        from scipy.ndimage import find_objects
-
         if sample.centres is None or sample.labels is None or sample.image.ndim > 3 or len(sample.centres) < 3:
             raise InvalidInput(f"sample: needs a picture with three known elements or more, got {sample!r}")
-        found = [box for box in find_objects(sample.labels) if box is not None]
-        height, width = (int(np.median([box[axis].stop - box[axis].start for box in found])) | 1 for axis in (0, 1))
         mask = sample.labels > 0 if sample.mask is None else sample.mask
-        layout = Layout(sample.layout or "disjoint")
-        return cls(sample.image, sample.centres, mask, (height, width), layout, np.ones(len(sample.centres)), wrap=wrap)
+        layout, scores = Layout(sample.layout or "disjoint"), np.ones(len(sample.centres))
+        return cls(sample.image, sample.centres, mask, measure_box(sample.labels), layout, scores, wrap=wrap)
+
+    @classmethod
+    def of_labels(
+        cls,
+        image: Array,
+        labels: Array,
+        *,
+        layout: Layout | LayoutName = Layout.DISJOINT,
+        wrap: Sequence[bool] | bool = False,
+    ) -> Elements:
+        """Return the entry of a texture whose elements are known pixel by pixel: drawn by hand, or found by another program.
+
+        Parameters
+        ----------
+        image : (H, W) or (H, W, C) array
+            The texture.
+        labels : (H, W) array of int or bool
+            The element of each pixel, any positive numbers; 0 is ground, mortar or joint. Of bools each connected piece is
+            an element.
+        layout : {"disjoint", "jointed", "connected"}
+            How the elements hang together; cells, as bricks and stones, are jointed, and need no joint between them.
+        wrap : bool or (bool, bool)
+            Whether the texture repeats without a seam along rows and columns.
+
+        Raises
+        ------
+        InvalidInput
+            Labels of another shape, with fewer than three elements, or separate elements without ground.
+
+        Examples
+        --------
+        >>> from texrs import samples
+        >>> from texrs.elements import Elements
+        >>> wall = samples.bricks((96, 96))
+        >>> Elements.of_labels(wall.image, wall.labels, layout="jointed")
+        Elements(8 of box (25, 47) in 96 x 96, jointed)
+
+        """
+        pixels, around, kind = as_image(image, "image"), as_wrap(wrap, "wrap"), Layout(layout)
+        known = as_element_labels(labels, (pixels.shape[0], pixels.shape[1]), around)
+        mask, count = known > 0, int(known.max())
+        if count < 3:
+            raise InvalidInput(f"labels: three elements or more are needed, got {count}")
+        if mask.all() and kind == Layout.DISJOINT:
+            raise InvalidInput('labels: separate elements need ground (0) around them; cells are layout="jointed"')
+        if mask.all():
+            mask = ~mark_outlines(known)
+        points = measure_centres(known, around)
+        return cls(
+            image, points, mask, measure_box(known), kind, np.ones(count), wrap=(around[0], around[1]), known=known
+        )
 
     @cached_property
     def labels(self) -> Labels:
@@ -151,6 +203,8 @@ class Elements:
 
     @cached_property
     def _labelled(self) -> Labelled:
+        if self.known is not None:
+            return Labelled(self.known, self.points, np.ones(len(self.points)))
         found = label_elements(self.image, self.mask, self.points, self.scores, self.box, self.layout, self.wrap)
         found.labels.flags.writeable = False
         return found
@@ -202,6 +256,8 @@ class Elements:
         for name in ("angles", "scales"):
             if getattr(self, name) is not None:
                 parts[name] = getattr(self, name)
+        if self.known is not None:
+            parts["known"] = self.known
         if self.sets is not None:
             parts |= {"sets": self.sets.sets, "numbers": np.array(self.sets.numbers)}
         with atomic(path) as temporary, open(temporary, "wb") as file:
@@ -245,6 +301,7 @@ def load(path: Path) -> Elements:
         count, size = len(parts["points"]), image.shape[:2]
         shapes = {"points": (count, 2), "mask": size, "box": (2,), "scores": (count,), "wrap": (2,)}
         shapes |= {name: (count,) for name in ("angles", "scales") if name in parts}
+        shapes |= {"known": size} if "known" in parts else {}
         for name, shape in shapes.items():
             if parts[name].shape != shape:
                 raise InvalidInput(f"{name} of shape {parts[name].shape}")
@@ -255,6 +312,9 @@ def load(path: Path) -> Elements:
             sets = Similarity(parts["sets"].astype(np.uint32), int(parts["numbers"].ravel()[0]))
             if sets.sets.ndim != 2 or len(sets.sets) != size[0] * size[1] or int(sets.sets.max()) >= len(sets.sets):
                 raise InvalidInput("similarity sets")
+        known = parts["known"].astype(np.int32) if "known" in parts else None
+        if known is not None and not np.array_equal(np.unique(known[known != 0]), np.arange(1, count + 1)):
+            raise InvalidInput("known elements")
         rows, columns = (int(n) for n in parts["box"])
         return Elements(
             image,
@@ -269,6 +329,7 @@ def load(path: Path) -> Elements:
             parts.get("angles"),
             parts.get("scales"),
             sets,
+            known,
         )
     except (InvalidInput, KeyError, TypeError, ValueError, OverflowError) as error:
         raise FileError(f"{path}: is damaged ({' '.join(str(error).split())})") from None

@@ -16,7 +16,7 @@ from texrs.elements._foreground import divide_foreground
 from texrs.elements._layout import Layout
 from texrs.elements._separation import find_nearest_pixels
 from texrs.errors import InvalidInput
-from texrs.exemplar.cells import Cells, find_cells
+from texrs.exemplar.cells import Cells, find_cells, take_cells
 
 __all__ = ["Instance", "Labelled", "cut_instances", "find_sure_cells", "label_elements"]
 
@@ -73,11 +73,19 @@ class Labelled(NamedTuple):
 
 
 def find_sure_cells(
-    image: Array, mask: Bools, box: tuple[int, int], layout: Layout, progress: Progress | None = None
+    image: Array,
+    mask: Bools,
+    box: tuple[int, int],
+    layout: Layout,
+    progress: Progress | None = None,
+    *,
+    known: Labels | None = None,
 ) -> Cells | None:
-    """Return the cells of a connected texture; none where it has none that are sure enough, as nets."""
+    """Return the cells of a connected texture, those that are known if there are any; none where none are sure, as in nets."""
     if layout == Layout.DISJOINT:
         return None
+    if known is not None:
+        return _CELLS.get_or_make(content_hash(np.asarray(image), known), lambda: take_cells(known, image))
     joints = ~mask if layout == Layout.JOINTED else mask
     # An entry that was not analysed here may say anything.
     size = float(np.clip(min(box), LEAST, min(mask.shape)))

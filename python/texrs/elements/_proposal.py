@@ -24,7 +24,7 @@ from texrs.elements._search import Detections, describe_appearance, search_simil
 from texrs.elements._separation import find_nearest_pixels, label_components
 from texrs.errors import InvalidInput
 from texrs.exemplar.cells import find_cells
-from texrs.layouts import spacing
+from texrs.point_sets import spacing
 
 SMALL = 224
 """Longest side of the picture in which boxes are compared."""

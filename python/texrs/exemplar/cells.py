@@ -23,7 +23,7 @@ from texrs.exemplar.evidence import to_lab
 from texrs.exemplar.merging import join_parts, measure_usual_area
 from texrs.exemplar.shapes import Shapes, mark_outlines
 
-__all__ = ["Cells", "find_cells"]
+__all__ = ["Cells", "find_cells", "take_cells"]
 
 WORKING = 22.0
 """Width of a cell, in pixels, that images are shrunk to before they are looked at."""
@@ -191,6 +191,44 @@ def find_cells(
         best = found if best is None or found.score > best.score else best
     assert best is not None  # a size is always tried
     return _measure(best, light)
+
+
+def take_cells(labels: Labels, image: object) -> Cells:
+    """Take cells that are known, whatever a picture looks like.
+
+    Parameters
+    ----------
+    labels : (H, W) array of int
+        The cell of each pixel, from 1, without gaps in the numbers; 0 in joints, which the cells beside them share. Where
+        cells lie side by side their outlines are the joints.
+    image : (H, W) or (H, W, C) array
+        The texture, whose joints are darker or lighter.
+
+    Returns
+    -------
+    Cells
+        Of the confidence 1, each certain.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs.exemplar.cells import take_cells
+    >>> halves = np.repeat([[1, 1, 0, 2, 2]], 4, axis=0)
+    >>> take_cells(halves, np.zeros((4, 5))).labels[0].tolist()
+    [1, 1, 1, 2, 2]
+
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    nearest = distance_transform_edt(labels == 0, return_distances=False, return_indices=True)
+    full = np.ascontiguousarray(labels[tuple(nearest)], np.int32)
+    joint = (labels == 0) | mark_outlines(full)
+    outlines = trace(full, np.arange(1, int(full.max()) + 1))
+    moments = measure_moments(outlines)
+    relief, light = joint.astype(np.float32), to_lab(as_rgb(guidance(as_image(image))))[..., 0]
+    sure, polarity = np.ones(len(outlines)), _compare(light, relief)
+    whole = _mark_whole(full)
+    return Cells(full, outlines, moments.centre, moments.area, moments.angle, whole, sure, relief, 1.0, polarity)
 
 
 def _project(lab: Floats, joints: Bools) -> Floats:

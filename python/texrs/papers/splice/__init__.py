@@ -61,7 +61,6 @@ from texrs._arrays import as_bool, as_float, as_method, as_seed, as_size
 from texrs._typing import Array, Progress
 from texrs.elements import Elements, Layout
 from texrs.errors import InvalidInput
-from texrs.layouts import spacing
 from texrs.papers.splice.adjustment import adjust_targets, crop_extension, straighten_rows
 from texrs.papers.splice.backward_warp import warp_backwards
 from texrs.papers.splice.cells import find_entry_cells, splice_cells
@@ -84,6 +83,7 @@ from texrs.papers.splice.rearrangement import rearrange
 from texrs.papers.splice.refine import fill, refine_places
 from texrs.papers.splice.resizing import check_resized, crop, read_elements, report_resized
 from texrs.papers.splice.result import compose, compose_edit
+from texrs.point_sets import spacing
 from texrs.synthesis import Synthesis
 
 __all__ = ["self_splice", "splice"]
@@ -106,7 +106,8 @@ def splice(
     seed: int = 0,
     method: Method = None,
     strength: float = 1.0,
-    align: bool = True,
+    layout_scale: float | None = None,
+    align: bool | None = None,
     snap_rows: bool = False,
     cells: bool | None = None,
     nets: bool | None = None,
@@ -122,7 +123,7 @@ def splice(
     a : Elements, or (H, W) or (H, W, C) array
         The texture whose elements are shown; a picture is analysed by `texrs.elements.analyse`.
     b : Elements, or array
-        The texture whose layout they take.
+        The texture whose layout they take, or a layout that was drawn (`texrs.layouts`).
     size : int or (rows, columns), optional
         Size of the result, in pixels; that of ``a`` by default.
     seed : int
@@ -133,8 +134,13 @@ def splice(
     strength : float
         How much of the way elements go, from the texture's own layout, 0, to the other's, 1. With 0, separate elements at the
         texture's own size make the texture itself.
-    align : bool
-        Whether to turn the layout so that lines of its points agree with those of ``a``. Cells and nets take it as it lies.
+    layout_scale : float, optional
+        What the layout is enlarged by, 0.01 to 100: its pixels are those of the result at 1, the middle of the one on that of
+        the other. Twice as large, separate elements lie half as dense along each axis; where too dense they are pushed
+        apart. By default it is brought to the spacing, or the size, of the elements of ``a``.
+    align : bool, optional
+        Whether to turn the layout so that lines of its points agree with those of ``a``; by default where no ``layout_scale``
+        is given. Cells and nets take it as it lies.
     snap_rows : bool
         Whether to bring targets of about one row to one row: for walls that are bent, whose long joints then stay straight.
     cells : bool, optional
@@ -202,6 +208,10 @@ def splice(
     if net and not has_knots(mine):
         raise InvalidInput(f"nets: {'separate elements are no net' if mine.layout == Layout.DISJOINT else NO_NET}")
     part = as_float(strength, "strength", 0, 1)
+    enlarged = None if layout_scale is None else as_float(layout_scale, "layout_scale", 0.01, 100)
+    turned = enlarged is None if align is None else as_bool(align, "align")
+    if enlarged is not None and method == "paper":
+        raise InvalidInput('layout_scale: method="paper" brings the layout to the spacing of a')
     screening = _as_screening(blend)
     found = find_entry_cells(mine, watch) if method is None and wanted is not False and not net else None
     if wanted and found is None:
@@ -213,6 +223,7 @@ def splice(
             found,
             (rows, columns),
             strength=part,
+            scale=enlarged,
             turns=may_turn,
             refine=bool(refine),
             seed=number,
@@ -220,10 +231,14 @@ def splice(
         )
     if net or (net is None and wanted is None and method is None and is_net(mine)):
         theirs_cells = find_entry_cells(theirs, watch)
-        return splice_nets(mine, theirs, theirs_cells, (rows, columns), strength=part, seed=number, watch=watch)
+        return splice_nets(
+            mine, theirs, theirs_cells, (rows, columns), strength=part, scale=enlarged, seed=number, watch=watch
+        )
     watch("match", 0.0)
-    matching = match_literally if method == "paper" else match_layouts
-    match = matching(mine, theirs, (rows, columns), align=bool(align))
+    if method == "paper":
+        match = match_literally(mine, theirs, (rows, columns), align=turned)
+    else:
+        match = match_layouts(mine, theirs, (rows, columns), align=turned, scale=enlarged)
     if part < 1:
         match = go_part_of_the_way(mine, match, part)
     match = replace(match, wanted=match.targets)

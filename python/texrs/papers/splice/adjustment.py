@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs.elements import Elements, Layout
-from texrs.layouts import spacing
 from texrs.papers.splice.entry import remember
 from texrs.papers.splice.foreground import split_foreground
 from texrs.papers.splice.matching import Match
+from texrs.point_sets import spacing
 
 __all__ = ["adjust_targets", "crop_extension", "limit_strain", "separate_targets", "straighten_rows"]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_int, as_seed, try_array
 from texrs.errors import InvalidInput
-from texrs.layouts import match_points, nearest_distances, spacing
+from texrs.point_sets import fit_lattice, match_points, nearest_distances, spacing
 
 __all__ = ["EditedLayout", "Step", "apply_steps", "as_steps"]
 
@@ -20,8 +20,6 @@ Step = Mapping[str, Any]
 
 DRAWS = 24
 """Places that an element may try when it is moved at random."""
-VOTERS = 400
-"""Points in the middle of a layout that say which lattice it lies on."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,49 +156,6 @@ def _regularise(step: Step, at: Points, originals: int, kept: NDArray[np.bool_])
     places = np.round(sites.reshape(-1, 2) @ basis + origin, 6)
     of, _ = match_points(places, at)
     return at + amount * (places[of] - at)
-
-
-def fit_lattice(points: Points) -> tuple[Points, Points]:
-    """Fit a lattice by least squares: its origin, and two vectors as rows.
-
-    The vectors are those differences of near points that most pairs repeat; where none is repeated they make a square
-    lattice of the same density.
-    """
-    scale = spacing(points)
-    near = np.argsort(np.hypot(*(points - points.mean(axis=0)).T), kind="stable")[:VOTERS]
-    voters = points[np.sort(near)]
-    difference = voters[:, None] - voters[None]
-    length = np.hypot(*difference.reshape(-1, 2).T)
-    near = difference.reshape(-1, 2)[(length > 0) & (length < 2.2 * scale)]
-    # Votes within a sixth of a spacing, of one half of the plane.
-    half = near[(near[:, 0] > 1e-9) | ((np.abs(near[:, 0]) <= 1e-9) & (near[:, 1] > 0))]
-    basis = np.zeros((0, 2))
-    if len(half):
-        votes = (np.hypot(*(half[:, None] - half[None]).reshape(-1, 2).T) < scale / 6).reshape(len(half), -1)
-        count = votes.sum(axis=1)
-        order = np.lexsort((half[:, 1], half[:, 0], -count + 0.3 * count.max() * np.hypot(*half.T) / scale))
-        first = votes[order[0]] @ half / count[order[0]]
-        for k in order[1:]:
-            mean = votes[k] @ half / count[k]
-            lean = abs(float(np.cross(np.append(first, 0), np.append(mean, 0))[2]))
-            if lean > 0.5 * np.hypot(*first) * np.hypot(*mean):
-                if min(count[order[0]], count[k]) >= 0.4 * len(voters):
-                    basis = np.array([first, mean])
-                break
-    if not len(basis):
-        area = float(np.prod(np.ptp(points, axis=0) + scale))
-        basis = np.eye(2) * np.sqrt(area / len(points))
-    origin = points[int(np.hypot(*(points - points.mean(axis=0)).T).argmin())]
-    for _ in range(3):
-        index = np.rint((points - origin) @ np.linalg.inv(basis))
-        system = np.concatenate([index, np.ones((len(points), 1))], axis=1)
-        if np.linalg.matrix_rank(system) < 3:
-            break
-        fit = np.linalg.lstsq(system, points, rcond=None)[0]
-        if abs(np.linalg.det(fit[:2])) < 0.2 * abs(np.linalg.det(basis)):
-            break
-        basis, origin = fit[:2], fit[2]
-    return origin, basis
 
 
 def _move_element(step: Step, at: Points, originals: int, kept: NDArray[np.bool_]) -> Points:

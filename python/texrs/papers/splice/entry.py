@@ -59,11 +59,14 @@ def check_entry(entry: Elements, name: str) -> Elements:
             "give a larger picture, another box, or the points"
         )
     as_wrap(entry.wrap, f"{name}.wrap")
+    known = entry.known
+    if known is not None and (known.shape != shape or known.min() < 0 or int(known.max()) != len(points)):
+        raise InvalidInput(f"{name}.known: needs labels of shape {shape} from 1 to {len(points)}, one a point")
     return replace(entry, points=points)
 
 
 def remember(count: int) -> Callable[[Making[P, T]], Making[P, T]]:
-    """Let a function keep what it last made of the mask, points, layout and wrap of so many entries, and of the rest."""
+    """Let a function keep what it last made of the mask, points, layout, wrap and labels of so many entries, and the rest."""
 
     def decorate(make: Making[P, T]) -> Making[P, T]:
         cache: Cache[bytes, T] = Cache(count)
@@ -71,7 +74,7 @@ def remember(count: int) -> Callable[[Making[P, T]], Making[P, T]]:
 
         @wraps(make)
         def recall(entry: Elements, /, *rest: P.args, **options: P.kwargs) -> T:
-            content = (np.packbits(entry.mask), entry.points, entry.mask.shape, entry.layout, entry.wrap)
+            content = (np.packbits(entry.mask), entry.points, entry.mask.shape, entry.layout, entry.wrap, entry.known)
             key = content_hash(*content, rest, sorted(options.items()))
             return cache.get_or_make(key, lambda: make(entry, *rest, **options))
 

@@ -16,9 +16,9 @@ from texrs._arrays import check_memory
 from texrs._typing import Bools, Labels
 from texrs.elements import Elements, Layout
 from texrs.errors import InvalidInput
-from texrs.layouts import Fold, PointLayout
 from texrs.papers.splice.entry import remember
 from texrs.papers.splice.foreground import Foreground, split_foreground
+from texrs.point_sets import Fold, PointLayout
 
 __all__ = ["Extension", "count_elements", "extend"]
 

@@ -57,10 +57,13 @@ class Foreground:
 
 @remember(16)
 def split_foreground(entry: Elements) -> Foreground:
-    """Split a disjoint foreground into its elements: by component, and within one by the nearest element."""
+    """Split a disjoint foreground into its elements: by component, and within one by the nearest element; or as is known."""
     from skimage.segmentation import expand_labels
 
-    points, core = divide_foreground(np.asarray(entry.mask, bool), entry.points)
+    if entry.known is None:
+        points, core = divide_foreground(np.asarray(entry.mask, bool), entry.points)
+    else:
+        points, core = entry.points, entry.known
     core = _open_gaps(core)
     region = _open_gaps(expand_labels(core, FRINGE).astype(np.int32))
     cut = np.zeros((len(points), 2, 2), bool)

@@ -21,11 +21,11 @@ from texrs.exemplar import Exemplar
 from texrs.growth import patch_side
 from texrs.growth.start import OVERLAP, weights_of
 from texrs.kernels.seam import cut
-from texrs.layouts import spacing
 from texrs.papers.splice.foreground import Foreground, split_foreground
 from texrs.papers.splice.light import Light, measure_light
 from texrs.papers.splice.matching import Match
 from texrs.papers.splice.refine import Draft, fill_with_patches
+from texrs.point_sets import spacing
 
 __all__ = ["ENOUGH", "Scene", "cut_in", "lay_ground", "survey"]
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_image, to_unit
 from texrs._typing import Array, Bools, Floats, Labels
 from texrs.elements import Elements
-from texrs.layouts import spacing
+from texrs.point_sets import spacing
 
 __all__ = ["Light", "measure_light"]
 

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from texrs.elements import Elements
 from texrs.errors import InvalidInput
-from texrs.layouts import nearest_distances
 from texrs.papers.splice.extension import extend
 from texrs.papers.splice.matching import Match, find_turns
 from texrs.papers.splice.refine import Draft
+from texrs.point_sets import nearest_distances
 
 __all__ = ["fill_literally", "match_literally"]
 

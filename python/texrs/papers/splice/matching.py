@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from texrs.elements import Elements, Layout
 from texrs.errors import InvalidInput
-from texrs.layouts import PointLayout, directions, match_points, nearest_distances, spacing
 from texrs.papers.splice.edit import Step, apply_steps
 from texrs.papers.splice.entry import remember
 from texrs.papers.splice.extension import Extension, count_elements, extend, lay_out
 from texrs.papers.splice.foreground import split_foreground
+from texrs.point_sets import PointLayout, directions, match_points, nearest_distances, spacing
 
 __all__ = [
     "Edit",
@@ -113,16 +113,20 @@ def list_element_points(entry: Elements) -> Points:
     return split_foreground(entry).points if disjoint else entry.points
 
 
-def match_layouts(a: Elements, b: Elements, size: tuple[int, int], *, align: bool) -> Match:
-    """Match the elements of A with B's layout."""
+def match_layouts(a: Elements, b: Elements, size: tuple[int, int], *, align: bool, scale: float | None = None) -> Match:
+    """Match the elements of A with B's layout, brought to the spacing of A, or enlarged as asked, middle upon middle."""
     unit = spacing(a.points)
     layout = lay_out(b, beyond=True)
-    scale, gain, disjoint = unit / layout.scale, 1.0, a.layout == Layout.DISJOINT
-    if disjoint and not is_own(a, b):
-        gain = _measure_gain(a, scale * nearest_distances(layout.points, 1)[:, 0])
+    gain, disjoint, centre = 1.0, a.layout == Layout.DISJOINT, layout.points.mean(axis=0)
+    if scale is not None:
+        factor, centre = scale, (np.array(b.mask.shape) - 1) / 2
+    else:
+        factor = unit / layout.scale
+        if disjoint and not is_own(a, b):
+            gain = _measure_gain(a, factor * nearest_distances(layout.points, 1)[:, 0])
     beyond = BEYOND * unit
     turns = find_turns(a, b) if align else [0.0]
-    asked = [_place_targets(layout, scale * gain, angle, size, beyond) for angle in turns]
+    asked = [_place_targets(layout, centre, factor * gain, angle, size, beyond, lattice=disjoint) for angle in turns]
     if not all(len(wanted) for wanted in asked):
         raise InvalidInput("b: its layout has no point within the output")
     most = max(len(wanted) for wanted in asked)
@@ -136,12 +140,12 @@ def match_layouts(a: Elements, b: Elements, size: tuple[int, int], *, align: boo
     for angle, wanted in zip(turns, asked, strict=True):
         assigned, cost = match_points(extension.points, wanted)
         if best is None or cost < TURN * best.cost:
-            best = Match(wanted, extension, assigned, scale * gain, angle, gain, cost)
+            best = Match(wanted, extension, assigned, factor * gain, angle, gain, cost)
     assert best is not None  # no turn is always among them
-    if disjoint:
+    if disjoint or scale is not None:
         return best
     for offset in _find_offsets(extension.points, best.targets, unit):
-        wanted = _place_targets(layout, scale, best.angle, size, beyond, offset)
+        wanted = _place_targets(layout, centre, factor, best.angle, size, beyond, offset)
         if 0 < len(wanted) <= len(extension.points):
             assigned, cost = match_points(extension.points, wanted)
             if cost < NEARER * best.cost:
@@ -232,16 +236,28 @@ def _measure_gain(a: Elements, distances: Points) -> float:
 
 
 def _place_targets(
-    layout: PointLayout, scale: float, angle: float, size: tuple[int, int], beyond: float, offset: Points | float = 0.0
+    layout: PointLayout,
+    centre: Points,
+    scale: float,
+    angle: float,
+    size: tuple[int, int],
+    beyond: float,
+    offset: Points | float = 0.0,
+    *,
+    lattice: bool = False,
 ) -> Points:
-    """Scale and turn a layout about its centroid into the middle of an output, or beside it, and cover that and a margin."""
+    """Scale and turn a layout about a centre into the middle of an output, or beside it, and cover that and a margin.
+
+    With ``lattice`` what lies on one goes on on it; else all is reflected, as a connected figure goes on itself.
+    """
     turn = math.radians(angle)
     matrix = scale * np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
-    centre, middle = layout.points.mean(axis=0), (np.array(size) - 1) / 2 + offset
+    middle = (np.array(size) - 1) / 2 + offset
     low, high = np.full(2, -beyond), np.array(size) - 1 + beyond
     box = np.array([[y, x] for y in (low[0], high[0]) for x in (low[1], high[1])])
     back = (box - middle) @ np.linalg.inv(matrix).T + centre
-    found = layout.within(back.min(axis=0), back.max(axis=0))[0]
+    go_on = layout.cover if lattice else layout.within
+    found = go_on(back.min(axis=0), back.max(axis=0))[0]
     moved = (found - centre) @ matrix.T + middle
     return np.asarray(moved[((moved >= low) & (moved <= high)).all(axis=1)], np.float64)
 

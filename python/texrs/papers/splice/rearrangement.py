@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from texrs._arrays import as_image
 from texrs._typing import Bools, Floats, Progress
 from texrs.elements import Elements
-from texrs.layouts import spacing
 from texrs.papers.splice.adjustment import separate_targets
 from texrs.papers.splice.edit import Step
 from texrs.papers.splice.foreground import Foreground, split_foreground
@@ -25,6 +24,7 @@ from texrs.papers.splice.ground import Scene, cut_in, survey
 from texrs.papers.splice.light import Light
 from texrs.papers.splice.matching import Edit, Match, edit_layout
 from texrs.papers.splice.refine import Draft, fill_with_patches
+from texrs.point_sets import spacing
 
 __all__ = ["Rearrangement", "rearrange"]
 

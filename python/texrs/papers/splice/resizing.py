@@ -62,6 +62,7 @@ def read_elements(a: Elements, made: Synthesis) -> Elements:
         angles=None,
         scales=None,
         sets=None,
+        known=None,
     )
 
 

@@ -53,7 +53,7 @@ _TARGETS: Cache[bytes, Tessellation] = Cache(16)
 
 def find_entry_cells(entry: Elements, watch: Progress | None = None) -> Cells | None:
     """Return the cells of a connected texture; none where it has none that are sure enough, as nets."""
-    found = find_sure_cells(entry.image, entry.mask, entry.box, entry.layout, watch)
+    found = find_sure_cells(entry.image, entry.mask, entry.box, entry.layout, watch, known=entry.known)
     return found if found is not None and len(list_usable(found)) >= FEWEST else None
 
 
@@ -64,6 +64,7 @@ def splice_cells(
     size: tuple[int, int],
     *,
     strength: float,
+    scale: float | None = None,
     turns: bool | None,
     refine: bool,
     seed: int,
@@ -81,6 +82,8 @@ def splice_cells(
         Of the result.
     strength : float
         How much of the way cells go, from A's own tessellation, 0, to B's, 1.
+    scale : float, optional
+        What B's layout is enlarged by, not to the size of A's cells.
     turns : bool, optional
         Whether cells may be turned; by default where nothing tells A from itself upside down.
     refine : bool
@@ -105,7 +108,7 @@ def splice_cells(
     may_turn = (True, True) in find_mirrors(guidance(as_image(a.image))) if turns is None else turns
     # The size of those that can be shown: these come as large as they are.
     unit = float(np.sqrt(np.median(cells.area[list_usable(cells)])))
-    wanted = _take_targets(b, size, unit, seed)
+    wanted = _take_targets(b, size, unit, scale, seed)
     if strength < 1:
         wanted = go_part_of_the_way(take_own_cells(cells, a.wrap, size, wanted.margin, seed=seed), wanted, strength)
     chosen = _list_shown(wanted)
@@ -135,15 +138,18 @@ def splice_cells(
     return Synthesis(image, source, draw_cell_stages(a, b, cells, wanted, charts, joined, image), report)
 
 
-def _take_targets(b: Elements, size: tuple[int, int], unit: float, seed: int) -> Tessellation:
+def _take_targets(b: Elements, size: tuple[int, int], unit: float, scale: float | None, seed: int) -> Tessellation:
     """Return the target cells: kept, for one layout often serves several textures of one size."""
-    key = content_hash(np.asarray(b.image), np.packbits(b.mask), b.points, b.layout, b.box, b.wrap, size, unit, seed)
+    parts = np.asarray(b.image), np.packbits(b.mask), b.points, b.layout, b.box, b.wrap, b.known
+    key = content_hash(*parts, size, unit, scale, seed)
 
     def make() -> Tessellation:
         theirs = find_entry_cells(b)
         if theirs is not None:
-            return take_cells(theirs, b.wrap, size, unit, seed=seed)
-        return take_points(lay_out(b, beyond=True), size, unit)
+            wide, exact = unit if scale is None else scale * theirs.size, b.known is not None
+            return take_cells(theirs, b.wrap, size, wide, seed=seed, exact=exact)
+        centre = None if scale is None else (np.array(b.mask.shape) - 1) / 2
+        return take_points(lay_out(b, beyond=True), size, unit, scale=scale, centre=centre)
 
     return _TARGETS.get_or_make(key, make)
 

@@ -1,7 +1,8 @@
 """Cells of a texture beyond its picture.
 
 On the lattice that they lie on, if there is one; around, where the texture wraps. Others are drawn as their joints alone, and
-the drawing is grown by quilting: reflected cells would be seen as a kaleidoscope. No picture is continued.
+the drawing is grown by quilting: reflected cells would be seen as a kaleidoscope. Those that are known, not found, stay as they
+are where they cover the output, and the border's are made whole by reflection. No picture is continued.
 """
 
 from __future__ import annotations
@@ -15,21 +16,16 @@ from texrs.exemplar.cells import Cells
 from texrs.exemplar.components import split_touching
 from texrs.exemplar.contours import paint, trace
 from texrs.exemplar.shapes import Shapes, mark_outlines, renumber
-from texrs.layouts import PointLayout
-from texrs.papers.splice.edit import fit_lattice
+from texrs.point_sets import PointLayout, continue_on_lattice
 from texrs.quilting import Picture, quilt
 from texrs.source_map import SourceMap
 
-__all__ = ["continue_cells", "continue_on_lattice"]
+__all__ = ["continue_cells"]
 
 Points = NDArray[np.float64]
 
 NEARLY = 0.75
 """Share of the median area from which on a cell that the border cuts is taken for whole."""
-REGULAR = 0.12
-"""Root mean square distance of cells from their places on a lattice, in sizes, up to which they are continued on it."""
-DENSE = (0.6, 1.6)
-"""Least and greatest area of a lattice's cell, in squared sizes, for it to be of the cells."""
 DRAWN, LARGE = (16.0, 28.0), 320.0
 """Pixels that a cell is wide in the drawing of the joints, at least and at most, and the side of the drawing beyond which they
 are fewer."""
@@ -45,12 +41,19 @@ SOLID, HUGE = 0.8, 3.0
 CLOSED, LEAST, ROOM = 0.8, 0.08, 0.25
 """Height in the drawing above which a pixel lies inside of a cell, the least area of what does so together, and what must be
 left between cells for one more, in squared sizes."""
+BESIDE = 0.5
+"""Sizes beyond the picture up to which cells that the border cuts are made whole by reflection."""
 PATCH, OVERLAP = 4.0, 1.2
 """Side of a patch of the drawing, and overlap of two, in sizes."""
 
 
 def continue_cells(
-    cells: Cells, wrap: tuple[bool, bool], far: tuple[float, float], *, seed: int
+    cells: Cells,
+    wrap: tuple[bool, bool],
+    far: tuple[float, float],
+    *,
+    seed: int,
+    seen: tuple[float, float] | None = None,
 ) -> tuple[NDArray[np.float64], float, str]:
     """Return the outlines of the cells around the middle of a texture.
 
@@ -64,6 +67,8 @@ def continue_cells(
         How far from the middle cells are wanted, along rows and columns, in sizes of a cell.
     seed : int
         Chooses what cannot be continued by rule.
+    seen : (float, float), optional
+        Of cells that are to stay as they are, how far from the middle they are seen.
 
     Returns
     -------
@@ -94,6 +99,8 @@ def continue_cells(
         layout = PointLayout.of(points, cells.labels.shape, wrap, beyond=True)
         places, of, mirrored = layout.within(centre - reach, centre + reach)
         return _copy(cells, usable[of], places, mirrored, centre) * scale, scale, "wrap"
+    if seen is not None and (np.array(seen) / scale <= centre + BESIDE * cells.size).all():
+        return (_reflect(cells, reach - centre) - centre) * scale, scale, ""
     sites = continue_on_lattice(points, cells.size, centre - reach, centre + reach) if len(points) >= 6 else None
     if sites is not None:
         places, of = sites
@@ -107,30 +114,32 @@ def _copy(cells: Cells, of: NDArray[np.intp], places: Points, mirrored: Bools, c
     return (cells.outlines[of] - cells.centre[of][:, None]) * signs + places[:, None] - centre
 
 
-def continue_on_lattice(
-    points: Points, unit: float, low: Points, high: Points
-) -> tuple[Points, NDArray[np.intp]] | None:
-    """Return places and cells on the lattice that points lie on; None where they lie on none."""
-    origin, basis = fit_lattice(points)
-    span = np.linalg.inv(basis)
-    index = np.rint((points - origin) @ span).astype(np.intp)
-    away = np.hypot(*(points - origin - index @ basis).T)
-    # One cell a site.
-    alone = DENSE[0] < np.abs(np.linalg.det(basis)) / unit**2 < DENSE[1] and len(np.unique(index, axis=0)) == len(index)
-    if not alone or np.sqrt((away**2).mean()) > REGULAR * unit:
-        return None
-    corners = np.array([[y, x] for y in (low[0], high[0]) for x in (low[1], high[1])])
-    ends = (corners - origin) @ span
-    first, last = np.floor(ends.min(axis=0)).astype(int), np.ceil(ends.max(axis=0)).astype(int)
-    sites = np.stack(np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(first, last, strict=True)), indexing="ij"), -1)
-    sites = sites.reshape(-1, 2)
-    own = {tuple(k): n for n, k in enumerate(index.tolist())}
-    # A site without a cell of its own takes one by its place, so that the same site always takes the same one.
-    of = np.array([own.get((i, j), (7919 * i + 104729 * j) % len(points)) for i, j in sites.tolist()])
-    mine = np.array([(i, j) in own for i, j in sites.tolist()])
-    places = np.where(mine[:, None], points[of], sites @ basis + origin)
-    inside = ((places >= low) & (places <= high)).all(axis=1)
-    return places[inside], of[inside].astype(np.intp)
+def _reflect(cells: Cells, beyond: Points) -> NDArray[np.float64]:
+    """Return outlines in which those that the border cuts go on beyond it, mirrored; so many pixels, at most the picture's.
+
+    Those that are nearly whole as they are do not: others lie beside them.
+    """
+    cut = cells.area < NEARLY * cells.size**2
+    margin = [int(np.clip(np.ceil(b), 0, n)) for b, n in zip(beyond, cells.labels.shape, strict=True)]
+    at, turns = [], []
+    for side, m in zip(cells.labels.shape, margin, strict=True):
+        turn, place = np.divmod(np.arange(-m, side + m), side)
+        at.append(np.where(turn == 0, place, side - 1 - place))
+        turns.append(turn)
+    labels = cells.labels[at[0][:, None], at[1][None]]
+    # A cell that goes on keeps its number there; what is mirrored of others are others.
+    goes_on = np.concatenate([[False], cut])[labels]
+    near, inside = np.zeros(labels.shape, np.int64), np.where(cells.joints > 0.5, 0, cells.labels)
+    for axis, turn in enumerate(turns):
+        touched = np.zeros((2, cells.count + 1), bool)
+        for end in range(2):
+            touched[end, np.take(inside, -end, axis=axis)] = True
+        turn = np.expand_dims(turn, 1 - axis)
+        own = goes_on & np.where(turn < 0, touched[0][labels], touched[1][labels])
+        near = 3 * near + np.where(own, 0, turn % 3)
+    _, dense = np.unique(labels.astype(np.int64) * 9 + near, return_inverse=True)
+    numbered = dense.reshape(labels.shape).astype(np.int32) + 1
+    return np.asarray(trace(numbered, np.arange(1, int(numbered.max()) + 1)) - np.array(margin), np.float64)
 
 
 def _grow(cells: Cells, far: tuple[float, float], seed: int) -> NDArray[np.float64]:

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from texrs.exemplar.cells import Cells
 from texrs.exemplar.contours import paint
-from texrs.layouts import match_points
 from texrs.papers.splice.cells.outlines import match_outlines, rematch_outlines
 from texrs.papers.splice.cells.tessellation import Tessellation, finish_cells, take_cells
+from texrs.point_sets import match_points
 
 __all__ = ["go_part_of_the_way", "take_own_cells"]
 

@@ -15,8 +15,8 @@ from texrs._typing import Labels
 from texrs.errors import InvalidInput
 from texrs.exemplar.cells import Cells
 from texrs.exemplar.contours import measure_moments, paint, trace
-from texrs.layouts import PointLayout
 from texrs.papers.splice.cells.continuation import continue_cells
+from texrs.point_sets import PointLayout
 
 __all__ = ["Tessellation", "finish_cells", "take_cells", "take_points"]
 
@@ -49,7 +49,7 @@ class Tessellation:
     scale : float
         What the layout was scaled by.
     continued : str
-        How it goes on beyond its picture: "lattice", "wrap", "quilted", "reflected", or "" where it covers the output.
+        How it goes on beyond its picture: "lattice", "wrap", "quilted", "reflected", or "" where it need not.
     start : (n, 2) float64, optional
         Where each cell comes from, of A's own, where it goes part of the way only.
 
@@ -71,9 +71,16 @@ class Tessellation:
 
 
 def take_cells(
-    cells: Cells, wrap: tuple[bool, bool], size: tuple[int, int], unit: float, *, seed: int, margin: int | None = None
+    cells: Cells,
+    wrap: tuple[bool, bool],
+    size: tuple[int, int],
+    unit: float,
+    *,
+    seed: int,
+    margin: int | None = None,
+    exact: bool = False,
 ) -> Tessellation:
-    """Take the cells of a connected texture, at a median size of ``unit`` pixels.
+    """Take the cells of a connected texture, at a median size of ``unit`` pixels; ``exact`` ones that are known, not found.
 
     The margin has so many pixels; by default as many as `MARGIN` says.
 
@@ -84,20 +91,26 @@ def take_cells(
 
     """
     margin = int(np.ceil(MARGIN * unit)) if margin is None else margin
-    far = [n / 2 + margin + unit for n in size]
-    shapes, scale, continued = continue_cells(cells, wrap, (far[0] / unit, far[1] / unit), seed=seed)
+    seen = size[0] / 2 / unit, size[1] / 2 / unit
+    far = seen[0] + margin / unit + 1, seen[1] + margin / unit + 1
+    shapes, scale, continued = continue_cells(cells, wrap, far, seed=seed, seen=seen if exact else None)
     outlines = shapes * unit + (np.array(size) - 1) / 2
     labels = paint(outlines + margin, (size[0] + 2 * margin, size[1] + 2 * margin))
     return finish_cells(labels, margin, scale * unit, continued)
 
 
-def take_points(layout: PointLayout, size: tuple[int, int], unit: float) -> Tessellation:
-    """Take the Voronoi cells of a texture's points, at a median size of ``unit`` pixels."""
+def take_points(
+    layout: PointLayout, size: tuple[int, int], unit: float, *, scale: float | None = None, centre: Points | None = None
+) -> Tessellation:
+    """Take the Voronoi cells of a texture's points, at a median size of ``unit`` pixels, or enlarged as asked.
+
+    Their middle, or the ``centre``, comes to lie on that of the output.
+    """
     from scipy.spatial import cKDTree
 
     # Of the layout as it goes on, so that the cells at its border are like the others.
     low, high = layout.points.min(axis=0), layout.points.max(axis=0)
-    around = layout.within(low - 2 * layout.scale, high + 2 * layout.scale)[0]
+    around, _ = layout.cover(low - 2 * layout.scale, high + 2 * layout.scale)
     step = max(layout.scale / 16, float((high - low).max()) / SAMPLES)
     grid = np.stack(np.meshgrid(*(np.arange(a, b, step) for a, b in zip(low, high, strict=True)), indexing="ij"), -1)
     owner = cKDTree(around).query(grid.reshape(-1, 2))[1]
@@ -105,19 +118,20 @@ def take_points(layout: PointLayout, size: tuple[int, int], unit: float) -> Tess
     counts = np.bincount(owner, minlength=len(around))[inner]
     # Points on one line have no cells between them.
     area = float(np.median(counts[counts > 0])) * step**2 if counts.any() else layout.scale**2
-    scale = unit / np.sqrt(area)
-    margin = int(np.ceil(MARGIN * unit))
-    middle, centre = (np.array(size) - 1) / 2, (low + high) / 2
-    box = [(side * (middle + margin + 2 * unit)) / scale + centre for side in (-1, 1)]
-    wanted, _, mirrored = layout.within(*box)
+    factor = unit / float(np.sqrt(area)) if scale is None else scale
+    # Cells reach as far as they are wide.
+    wide = max(unit, factor * float(np.sqrt(area)))
+    margin = int(np.ceil(MARGIN * wide))
+    middle, origin = (np.array(size) - 1) / 2, (low + high) / 2 if centre is None else centre
+    box = [(side * (middle + margin + 2 * wide)) / factor + origin for side in (-1, 1)]
+    wanted, continued = layout.cover(*box)
     if not len(wanted):
         raise InvalidInput("b: its layout has no point within the output")
-    points = (wanted - centre) * scale + middle + margin
+    points = (wanted - origin) * factor + middle + margin
     shape = (size[0] + 2 * margin, size[1] + 2 * margin)
     pixels = np.stack(np.meshgrid(*(np.arange(n) for n in shape), indexing="ij"), -1).reshape(-1, 2)
     labels = (cKDTree(points).query(pixels)[1] + 1).reshape(shape)
-    continued = "reflected" if mirrored.any() else ""
-    return finish_cells(labels.astype(np.int32), margin, scale, continued)
+    return finish_cells(labels.astype(np.int32), margin, factor, continued)
 
 
 def finish_cells(labels: Labels, margin: int, scale: float, continued: str) -> Tessellation:

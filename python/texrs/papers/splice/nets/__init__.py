@@ -30,12 +30,12 @@ from texrs.elements import Elements, Layout
 from texrs.exemplar import Exemplar
 from texrs.exemplar.cells import Cells
 from texrs.growth.start import OVERLAP, weights_of
-from texrs.layouts import spacing
 from texrs.papers.splice.nets.graph import describe_places, join_knots
 from texrs.papers.splice.nets.knots import Laid, lay_knots
 from texrs.papers.splice.nets.pictures import draw_net_stages
 from texrs.papers.splice.nets.targets import Targets, go_part_of_the_way, take_own_points, take_points
 from texrs.papers.splice.result import list_place, report_ways
+from texrs.point_sets import spacing
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
@@ -68,7 +68,15 @@ def has_knots(entry: Elements) -> bool:
 
 
 def splice_nets(
-    a: Elements, b: Elements, cells: Cells | None, size: tuple[int, int], *, strength: float, seed: int, watch: Progress
+    a: Elements,
+    b: Elements,
+    cells: Cells | None,
+    size: tuple[int, int],
+    *,
+    strength: float,
+    scale: float | None = None,
+    seed: int,
+    watch: Progress,
 ) -> Synthesis:
     """Show the knots of A at the points of B.
 
@@ -82,6 +90,8 @@ def splice_nets(
         Of the result.
     strength : float
         How much of the way knots go, from A's own places, 0, to B's, 1.
+    scale : float, optional
+        What B's layout is enlarged by, not to the spacing of A's knots.
     seed : int
         Of what is chosen by chance.
     watch : callable
@@ -101,7 +111,7 @@ def splice_nets(
     watch("nets", 0.0)
     unit = spacing(a.points)
     shape = (a.mask.shape[0], a.mask.shape[1])
-    wanted = take_points(a, b, cells, size, unit, seed=seed)
+    wanted = take_points(a, b, cells, size, unit, scale=scale, seed=seed)
     if strength < 1:
         wanted = go_part_of_the_way(take_own_points(a, size, unit), wanted, strength)
     mine, theirs = describe_places(a.points, shape, unit), describe_places(wanted.points, size, unit)

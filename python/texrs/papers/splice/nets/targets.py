@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from texrs.elements import Elements
 from texrs.errors import InvalidInput
 from texrs.exemplar.cells import Cells
-from texrs.layouts import match_points, nearest_distances, spacing
-from texrs.papers.splice.cells.continuation import continue_on_lattice
 from texrs.papers.splice.cells.tessellation import take_cells
 from texrs.papers.splice.extension import lay_out
+from texrs.point_sets import match_points, nearest_distances, spacing
 
 __all__ = ["Targets", "go_part_of_the_way", "take_own_points", "take_points"]
 
@@ -51,11 +50,19 @@ class Targets:
 
 
 def take_points(
-    a: Elements, b: Elements, cells: Cells | None, size: tuple[int, int], unit: float, *, seed: int
+    a: Elements,
+    b: Elements,
+    cells: Cells | None,
+    size: tuple[int, int],
+    unit: float,
+    *,
+    scale: float | None = None,
+    seed: int,
 ) -> Targets:
     """Take the centres of B's cells, or its points where it has none, at a spacing of ``unit`` pixels, A's own.
 
-    Layouts whose points lie in pairs or rows are taken larger, so that A's knots have room in these.
+    Layouts whose points lie in pairs or rows are taken larger, so that A's knots have room in these. With a ``scale`` they
+    are enlarged by that, the middle of B's picture upon that of the output.
 
     Raises
     ------
@@ -66,27 +73,24 @@ def take_points(
     around = AROUND * unit
     if cells is not None and cells.whole.sum() >= FEWEST:
         centres = cells.centre[cells.whole]
-        side = unit * measure_gain(a.points, centres * unit / spacing(centres)) * cells.size / spacing(centres)
+        gain = measure_gain(a.points, centres * unit / spacing(centres))
+        side = (unit * gain / spacing(centres) if scale is None else scale) * cells.size
         found = take_cells(cells, b.wrap, size, side, seed=seed, margin=int(np.ceil(around)))
         return Targets(found.centre, found.scale, found.continued)
     layout = lay_out(b, beyond=True)
-    scale = unit / layout.scale
-    scale *= measure_gain(a.points, scale * b.points)
     middle = (np.array(size) - 1) / 2
-    centre = (layout.points.min(axis=0) + layout.points.max(axis=0)) / 2
-    low, high = (centre + side * (middle + around) / scale for side in (-1, 1))
-    regular = len(b.points) >= FEWEST and not any(b.wrap)
-    sites = continue_on_lattice(b.points, layout.scale, low, high) if regular else None
-    if sites is not None:
-        points, continued = sites[0], "lattice"
+    if scale is None:
+        factor = unit / layout.scale
+        factor *= measure_gain(a.points, factor * b.points)
+        centre = (layout.points.min(axis=0) + layout.points.max(axis=0)) / 2
     else:
-        points, _, mirrored = layout.within(low, high)
-        inside = (low >= 0).all() and (high <= np.array(b.mask.shape) - 1).all()
-        continued = "reflected" if mirrored.any() else "" if inside or not any(b.wrap) else "wrap"
-    points = (points - centre) * scale + middle
+        factor, centre = scale, (np.array(b.mask.shape) - 1) / 2
+    low, high = (centre + side * (middle + around) / factor for side in (-1, 1))
+    points, continued = layout.cover(low, high)
+    points = (points - centre) * factor + middle
     if len(points) < 3:
         raise InvalidInput("b: its layout has fewer than three points around the output; take a larger size")
-    return Targets(points, scale, continued)
+    return Targets(points, factor, continued)
 
 
 def measure_gain(mine: Points, theirs: Points) -> float:

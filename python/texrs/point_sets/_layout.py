@@ -1,0 +1,214 @@
+"""How a layout goes on beyond its picture: on its lattice, around, or reflected where that shows least."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs.point_sets._lattice import continue_on_lattice
+from texrs.point_sets._measures import Points, mark_inner, nearest_distances, spacing
+
+__all__ = ["Fold", "PointLayout", "find_fold"]
+
+AROUND = 6
+"""Neighbours that tell how a layout goes on: fewer do not tell rows that are shifted from rows that are not."""
+FEWEST = 9
+"""Points that may tell a lattice."""
+MERGE = 0.6
+"""Points nearer than this, in spacings, that meet where a point set is folded are one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fold:
+    """How an axis goes on beyond its ends: around, or reflected at two lines.
+
+    Attributes
+    ----------
+    low, high : float
+        The lines: of what lies between them the rest is made. An axis that wraps has the period ``high - low``.
+    wrap : bool
+        Around, not reflected.
+
+    """
+
+    low: float
+    high: float
+    wrap: bool
+
+    def apply(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Return what coordinates stand for, between the lines, and whether they are mirrored.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> Fold(0.0, 10.0, False).apply(np.array([-3.0, 4.0, 12.0, 23.0]))
+        (array([3., 4., 8., 3.]), array([ True, False,  True, False]))
+
+        """
+        side = self.high - self.low
+        turn = np.floor((x - self.low) / side)
+        rest = x - self.low - turn * side
+        mirrored = np.zeros(np.shape(x), bool) if self.wrap else np.mod(turn, 2) == 1
+        return self.low + np.where(mirrored, side - rest, rest), mirrored
+
+    def copies(
+        self, x: NDArray[np.float64], low: float, high: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.bool_]]:
+        """Return the places that stand for each coordinate, (n, turns), the turns, and which places lie in [low, high].
+
+        An odd turn is mirrored, if any is.
+        """
+        side = self.high - self.low
+        turns = np.arange(math.floor((low - self.low) / side) - 1, math.floor((high - self.low) / side) + 2)
+        mirrored = np.zeros(len(turns), bool) if self.wrap else turns % 2 == 1
+        at = self.low + turns * side + np.where(mirrored, self.high - x[:, None], x[:, None] - self.low)
+        return np.asarray(at, np.float64), turns, (at >= low) & (at <= high)
+
+
+def find_fold(points: Points, axis: int, ends: tuple[float, float], *, wrap: bool, beyond: bool) -> Fold:
+    """Find the lines at which a layout is reflected along an axis, so that it goes on as it is.
+
+    Each line is tried at several places around the outermost points; the one is taken where those near it have neighbours
+    as far away as points inside have. In a row of a lattice that is on or midway between its points.
+
+    Parameters
+    ----------
+    points : (n, 2) array
+        The layout.
+    axis : int
+        Which axis.
+    ends : (float, float)
+        First and last coordinate of the picture.
+    wrap : bool
+        Whether the picture goes around: then its ends are the lines.
+    beyond : bool
+        Whether lines may lie beyond the picture's ends: so for points alone, for whose pixels nobody asks.
+
+    """
+    if wrap:
+        return Fold(ends[0] - 0.5, ends[1] + 0.5, True)
+    scale = spacing(points)
+    count = min(AROUND, len(points) - 1)
+    far = nearest_distances(points, count)
+    inner = np.median(far[mark_inner(points, far)], axis=0)
+    lines = []
+    for sign in (-1, 1):
+        x = sign * points[:, axis]
+        outermost, end = float(x.max()), sign * (ends[0] if sign < 0 else ends[1])
+        steps = outermost + np.linspace(-0.2, 0.8, 21) * scale
+        if not beyond:
+            # The last pixel itself is a line too: reflected there, no pixel is lost.
+            steps = np.append(steps[steps <= end], end)
+        costs = [_measure_misfit(points, axis, sign, float(at), scale, inner) for at in steps]
+        lines.append(sign * float(steps[int(np.argmin(costs))]))
+    low, high = lines
+    if high - low < 0.5 * scale:
+        low, high = ends
+    if not beyond:
+        low, high = float(np.ceil(low * 2) / 2), float(np.floor(high * 2) / 2)
+    return Fold(low, high, False)
+
+
+def _measure_misfit(points: Points, axis: int, sign: int, line: float, scale: float, inner: Points) -> float:
+    """Return how far the neighbours of points near a line differ from those of points inside."""
+    x = sign * points[:, axis]
+    kept = points[x <= line + 0.25 * scale]
+    if len(kept) < 3:
+        return math.inf
+    mirrored = kept.copy()
+    mirrored[:, axis] = sign * (2 * line) - kept[:, axis]
+    x = sign * kept[:, axis]
+    apart = np.abs(2 * (line - x)) > MERGE * float(inner[0])
+    both = np.concatenate([kept, mirrored[apart]])
+    near = np.flatnonzero(x > line - scale)
+    if len(near) == 0:
+        return math.inf
+    # Those at the sides lack neighbours wherever the line is.
+    aside = kept[near, 1 - axis]
+    middle = (aside > aside.min() + 0.25 * scale) & (aside < aside.max() - 0.25 * scale)
+    near = near[middle] if middle.any() else near
+    found = nearest_distances(kept[near], len(inner) + 1, both)[:, 1:]
+    return float(np.abs(found - inner).mean() + 1e-3 * abs(line - float(x.max())))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointLayout:
+    """A layout that goes on without end.
+
+    Attributes
+    ----------
+    points : (n, 2) float64
+        The points of the picture.
+    folds : (Fold, Fold)
+        How they go on along rows and columns.
+    scale : float
+        Their spacing.
+
+    """
+
+    points: Points
+    folds: tuple[Fold, Fold]
+    scale: float
+
+    @classmethod
+    def of(cls, points: Points, shape: Sequence[int], wrap: Sequence[bool], *, beyond: bool) -> PointLayout:
+        """Find how the layout of a picture goes on."""
+        folds = [find_fold(points, a, (0.0, shape[a] - 1.0), wrap=wrap[a], beyond=beyond) for a in range(2)]
+        return cls(points, (folds[0], folds[1]), spacing(points))
+
+    def within(self, low: Points, high: Points) -> tuple[Points, NDArray[np.intp], NDArray[np.bool_]]:
+        """Return the points in a box, which of ``points`` each stands for, and along which axes it is mirrored."""
+        along = [self.folds[a].copies(self.points[:, a], float(low[a]), float(high[a])) for a in range(2)]
+        which, up, aside = np.nonzero(along[0][2][:, :, None] & along[1][2][:, None])
+        if not len(which):
+            return np.zeros((0, 2)), np.zeros(0, np.intp), np.zeros((0, 2), bool)
+        found = np.stack([along[0][0][which, up], along[1][0][which, aside]], axis=-1)
+        turned = np.stack([along[0][1][up], along[1][1][aside]], axis=-1)
+        # Those of the picture itself come first, then by place: who is merged must not hang on the box.
+        order = np.lexsort((found[:, 1], found[:, 0], turned.any(axis=1)))
+        found, which, turned = found[order], which[order], turned[order]
+        kept = drop_duplicates(found, turned, MERGE * float(np.median(nearest_distances(self.points, 1))))
+        mirrored = (turned % 2 == 1) & [not f.wrap for f in self.folds]
+        return found[kept], which[kept], mirrored[kept]
+
+    def cover(self, low: Points, high: Points) -> tuple[Points, str]:
+        """Return the points in a box, and how the layout goes on there: "lattice", "wrap", "reflected", or "" if it need not.
+
+        What lies on a lattice goes on on it, and not by reflection, which would turn it around where it is oblique.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> oblique = np.argwhere(np.ones((5, 5))) @ np.array([[10.0, 3.0], [0.0, 10.0]])
+        >>> layout = PointLayout.of(oblique, (48, 60), (False, False), beyond=True)
+        >>> points, how = layout.cover(np.zeros(2), np.full(2, 100.0))
+        >>> how, [50.0, 15.0] in points.tolist()
+        ('lattice', True)
+
+        """
+        wraps = any(fold.wrap for fold in self.folds)
+        if len(self.points) >= FEWEST and not wraps:
+            sites = continue_on_lattice(self.points, self.scale, low, high)
+            if sites is not None:
+                return sites[0], "lattice"
+        points, of, mirrored = self.within(low, high)
+        if mirrored.any():
+            return points, "reflected"
+        return points, "wrap" if wraps and (points != self.points[of]).any() else ""
+
+
+def drop_duplicates(points: Points, turn: NDArray[np.intp], apart: float) -> NDArray[np.intp]:
+    """Return which points no earlier one of another turn is nearer to than ``apart``."""
+    from scipy.spatial import cKDTree
+
+    dropped = np.zeros(len(points), bool)
+    pairs = cKDTree(points).query_pairs(apart, output_type="ndarray")
+    for first, second in sorted(map(tuple, np.sort(pairs, axis=1).tolist())):
+        # What lies so near within one picture is so in the layout itself.
+        if not dropped[first] and (turn[first] != turn[second]).any():
+            dropped[second] = True
+    return np.flatnonzero(~dropped)

@@ -1,0 +1,204 @@
+"""Layouts that are drawn: what they hold, and what is brought into them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+import texrs
+from texrs import io, layouts, samples
+from texrs.cli import main
+from texrs.elements import Elements, Layout, correct, load
+from texrs.errors import FileError, InvalidInput, LimitExceeded
+
+DOTS = Elements.of_sample(samples.dots((128, 128)))
+WALL = Elements.of_sample(samples.bricks((160, 160)))
+OBLIQUE = ((0.0, 24.0), (18.0, 8.0))
+RING = 64 + 45 * np.stack([np.sin(np.arange(8) * np.pi / 4), np.cos(np.arange(8) * np.pi / 4)], axis=1)
+
+
+def list_matches(result: texrs.Synthesis, name: str) -> Any:
+    return np.array([m[name] for m in result.report["matches"]], np.float64)
+
+
+def test_points_are_in_the_pixels_of_the_result() -> None:
+    made = texrs.splice(DOTS, layouts.points(RING, 128), 128, layout_scale=1, seed=1)
+    assert len(made.report["matches"]) == len(RING)
+    assert cKDTree(list_matches(made, "found")).query(RING)[0].max() < 1
+    twice = texrs.splice(DOTS, layouts.points(RING, 128), 256, layout_scale=2, seed=1)
+    assert cKDTree(list_matches(twice, "target")).query((RING - 63.5) * 2 + 127.5)[0].max() < 1
+
+
+def test_scale_makes_any_layout_sparser() -> None:
+    counts = [
+        len(texrs.splice(DOTS, layouts.lattice(128, *OBLIQUE), 192, layout_scale=s).report["matches"]) for s in (1, 2)
+    ]
+    assert counts[0] > 3 * counts[1]
+
+
+@pytest.mark.parametrize("entry", [DOTS, WALL], ids=["separate", "cells"])
+def test_an_oblique_lattice_goes_on_as_one(entry: Elements) -> None:
+    made = texrs.splice(entry, layouts.lattice(96, *OBLIQUE), 256, layout_scale=1.4, align=False, seed=1)
+    targets = list_matches(made, "target")
+    inside = targets[((targets > 20) & (targets < 235)).all(axis=1)]
+    index = (inside - inside[0]) @ np.linalg.inv(np.array(OBLIQUE) * 1.4)
+    # Cells end where the picture does, and separate elements make room for each other.
+    assert np.median(np.abs(index - np.rint(index))) < 0.05
+    assert len(inside) >= 0.8 * 215**2 / (1.4**2 * 24 * 18)
+
+
+def test_a_layout_on_a_lattice_has_its_points_in_itself() -> None:
+    found = layouts.lattice(100, (0, 20), (17, 10), origin=(3, 5))
+    assert [3.0, 5.0] in found.points.tolist()
+    assert found.layout == Layout.DISJOINT
+    assert (found.points >= 0).all()
+    assert (found.points <= 99).all()
+    assert len(found.points) == pytest.approx(100 * 100 / 340, rel=0.2)
+
+
+def test_courses_have_the_heights_that_were_asked_for() -> None:
+    wall = layouts.courses(160, [20, 40], 50, shift=0.25, vary=0.4, seed=3)
+    sides = np.bincount(wall.labels.ravel())[1:]
+    assert (sides > 0).all()
+    tops = np.flatnonzero(np.diff(np.concatenate([[0], wall.mask.any(axis=1).astype(int)])) == 1)
+    assert np.diff(tops).tolist() == [20, 40, 20, 40, 20]
+    again = layouts.courses(160, [20, 40], 50, shift=0.25, vary=0.4, seed=3)
+    assert (again.labels == wall.labels).all()
+    assert (layouts.courses(160, [20, 40], 50, vary=0.4, seed=4).labels != wall.labels).any()
+    stack = layouts.courses(160, 20, 40, shift=0)
+    assert (stack.labels[10] > 0).tolist() == (stack.labels[30] > 0).tolist()
+    bond = layouts.courses(160, 20, 40, shift=0.5)
+    assert (bond.labels[10] > 0).tolist() != (bond.labels[30] > 0).tolist()
+
+
+def test_bricks_lie_in_the_courses_that_were_drawn() -> None:
+    drawn = layouts.courses(160, [32, 48], 64, shift=0.3, vary=0.3, seed=1)
+    made = texrs.splice(WALL, drawn, 160, layout_scale=1, seed=1)
+    assert made.report["method"] == "cells"
+    assert made.report["present"] >= 0.95
+    whole = [i for i in drawn.instances if i.mask.size and min(i.origin) > 0]
+    inside = [i.centre for i in whole if all(o + n < 160 for o, n in zip(i.origin, i.mask.shape, strict=True))]
+    assert inside
+    assert cKDTree(list_matches(made, "target")).query(inside)[0].max() < 2
+
+
+def test_cells_are_taken_as_they_are() -> None:
+    panes = np.add.outer(10 * (np.arange(96) // 24), np.arange(96) // 32) + 1
+    layout = layouts.cells(panes)
+    assert len(layout.points) == 12
+    assert (np.bincount(layout.labels.ravel()) == 24 * 32)[1:].all()
+    made = texrs.splice(WALL, layout, 96, layout_scale=1, refine=False)
+    shown = made.source.label
+    assert len(np.unique(shown[4:20, 4:28])) == 1
+    assert shown[12, 12] != shown[12, 48]
+
+
+def test_known_elements_are_elements_of_all() -> None:
+    stones = samples.pebbles((128, 128))
+    assert stones.labels is not None
+    entry = Elements.of_labels(stones.image, stones.labels)
+    assert (entry.labels > 0).tolist() == (stones.labels > 0).tolist()
+    assert len(entry.instances) == len(np.unique(stones.labels)) - 1
+    moved = texrs.self_splice(entry, {"op": "remove", "element": 5})
+    assert moved.report["edit"] == [{"op": "remove", "element": 5}]
+    assert texrs.design(entry, (160, 160), seed=1).image.shape == (160, 160, 3)
+
+
+def test_pieces_of_a_mask_are_elements() -> None:
+    mask = np.zeros((64, 64), bool)
+    for row, column in ((0, 30), (20, 10), (40, 50)):
+        mask[row : row + 8, column : column + 8] = True
+    mask[-4:, 30:38] = True
+    image = np.where(mask, 200, 50).astype(np.uint8)
+    assert len(Elements.of_labels(image, mask).points) == 4
+    around = Elements.of_labels(image, mask, wrap=(True, False))
+    assert len(around.points) == 3
+    assert [1.5, 33.5] in around.points.tolist()
+
+
+def test_known_elements_are_saved(tmp_path: Path) -> None:
+    entry = layouts.courses(96, 24, 32)
+    entry.save(tmp_path / "courses.npz")
+    again = load(tmp_path / "courses.npz")
+    assert again.known is not None
+    assert (again.labels == entry.labels).all()
+    with np.load(tmp_path / "courses.npz") as file:
+        parts = dict(file)
+    parts["known"] = parts["known"] + 1
+    np.savez(tmp_path / "bad.npz", **parts)
+    with pytest.raises(FileError, match="is damaged"):
+        load(tmp_path / "bad.npz")
+
+
+def test_corrections_go_before_known_elements() -> None:
+    entry = layouts.lattice(96, (0, 24), (24, 0))
+    known = Elements.of_labels(entry.image, entry.labels)
+    fewer = correct(known, [{"op": "drop", "elements": [0]}])
+    assert fewer.known is None
+    assert len(fewer.instances) == len(known.points) - 1
+
+
+def test_a_drawn_layout_serves_a_database_and_a_net(tmp_path: Path) -> None:
+    net = texrs.splice(WALL, layouts.lattice(96, *OBLIQUE), 96, nets=True)
+    assert net.report["method"] == "nets"
+    assert net.report["continued"] == "lattice"
+    assert texrs.splice(DOTS, layouts.courses(96, 24, 32), 96, method="preview").image.shape == (96, 96, 3)
+
+
+def test_json_makes_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    said = {"layout": "courses", "size": [96, 96], "height": [16, 24], "length": 40}
+    assert (layouts.make(said).labels == layouts.courses((96, 96), [16, 24], 40).labels).all()
+    io.write("panes.png", (np.add.outer(3 * (np.arange(96) // 32), np.arange(96) // 32) + 1).astype(np.uint8))
+    (tmp_path / "panes.json").write_text(json.dumps({"layout": "cells", "labels": "panes.png"}))
+    for b in (json.dumps(said), "panes.json"):
+        assert main(["splice", "sample:bricks", b, "-o", "out.png", "--size", "96", "--layout-scale", "1", "-q"]) == 0
+        assert io.read("out.png").shape == (96, 96, 3)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: layouts.points([[1, 2], [3, 4]], 64), "places: needs 3"),
+        (lambda: layouts.points([[1, 2], [3, 4], [5, 99]], 64), "places: .* lies outside"),
+        (lambda: layouts.points([[1, 2], [3, 4], [1, 2]], 64), "places: holds one place twice"),
+        (lambda: layouts.points([[1, 2], [3, 4], [5, np.nan]], 64), "places: needs finite"),
+        (lambda: layouts.points("no", 64), "places: needs finite"),
+        (lambda: layouts.points(RING, 8), "size: each side must be at least 16"),
+        (lambda: layouts.lattice(64, (0, 8), (0, 9)), "second: .* lies along first"),
+        (lambda: layouts.lattice(64, (0, 8), (8,)), "second: needs two finite numbers"),
+        (lambda: layouts.lattice(64, (0, 0.1), (0.1, 0)), "first, second: more than"),
+        (lambda: layouts.lattice(64, (0, 800), (800, 0)), "three or more are needed"),
+        (lambda: layouts.cells(np.ones((64, 64), int)), "labels: three elements or more"),
+        (lambda: layouts.cells(np.ones((64, 64, 3), int)), "labels: needs .H, W."),
+        (lambda: layouts.cells(np.full((64, 64), 0.5)), "labels: needs whole numbers"),
+        (lambda: layouts.cells(np.full((64, 64), -1)), "labels: must be 0 or more"),
+        (lambda: layouts.courses(64, 2, 20), "height: needs a number from 4"),
+        (lambda: layouts.courses(64, [], 20), "height: needs one or more"),
+        (lambda: layouts.courses(64, 20, 20, vary=1), "vary: needs a number"),
+        (lambda: layouts.courses(64, 20, 20, joint=15), "joint: needs a number"),
+        (lambda: layouts.make({"layout": "spiral"}), "layout: needs a mapping"),
+        (lambda: layouts.make({"layout": "courses", "size": 64, "height": 20}), "courses needs 'length'"),
+        (lambda: layouts.make({"layout": "courses", "size": 64, "tall": 20}), "courses has no 'tall'"),
+        (lambda: Elements.of_labels(DOTS.image, np.ones((4, 4), int)), "labels: needs whole numbers"),
+        (lambda: Elements.of_labels(DOTS.image, 1 + np.arange(128 * 128).reshape(128, 128)), "separate elements need"),
+        (lambda: texrs.splice(DOTS, replace(WALL, known=np.ones((160, 160), np.int32))), "b.known: needs labels"),
+        (lambda: texrs.splice(DOTS, WALL, layout_scale=0), "layout_scale: needs a number"),
+        (lambda: texrs.splice(DOTS, WALL, layout_scale=1, method="paper"), "layout_scale: method"),
+    ],
+)
+def test_what_is_no_layout_gets_a_sentence(make: Callable[[], object], words: str) -> None:
+    with pytest.raises(InvalidInput, match=words):
+        make()
+
+
+def test_drawings_are_bounded() -> None:
+    with pytest.raises(LimitExceeded, match="size"):
+        layouts.lattice(100_000, (0, 9), (9, 0))
