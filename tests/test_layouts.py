@@ -158,8 +158,9 @@ def test_json_makes_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert (layouts.make(said).labels == layouts.courses((96, 96), [16, 24], 40).labels).all()
     io.write("panes.png", (np.add.outer(3 * (np.arange(96) // 32), np.arange(96) // 32) + 1).astype(np.uint8))
     (tmp_path / "panes.json").write_text(json.dumps({"layout": "cells", "labels": "panes.png"}))
+    WALL.save("bricks.npz")
     for b in (json.dumps(said), "panes.json"):
-        assert main(["splice", "sample:bricks", b, "-o", "out.png", "--size", "96", "--layout-scale", "1", "-q"]) == 0
+        assert main(["splice", "bricks.npz", b, "-o", "out.png", "--size", "96", "--layout-scale", "1", "-q"]) == 0
         assert io.read("out.png").shape == (96, 96, 3)
 
 

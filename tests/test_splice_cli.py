@@ -21,6 +21,9 @@ def pictures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for name in ("dots", "pebbles"):
         io.write(f"{name}.png", texrs.samples.load(name, size=(96, 96)).image)
+    # What is known need not be found.
+    for name, side in (("bricks", 160), ("pebbles", 96)):
+        texrs.Elements.of_sample(texrs.samples.load(name, size=(side, side))).save(f"{name}.npz")
 
 
 def test_splice(tmp_path: Path) -> None:
@@ -51,7 +54,7 @@ def test_splice_by_cells(tmp_path: Path) -> None:
     made = []
     for number, options in enumerate((["--cells"], ["--no-cells"], ["--cells", "--turns", "--strength", "0.5"])):
         stages = tmp_path / str(number)
-        line = ["splice", "sample:bricks", "pebbles.png", "-o", str(tmp_path / "out.png"), "--size", "96", "-q"]
+        line = ["splice", "bricks.npz", "pebbles.npz", "-o", str(tmp_path / "out.png"), "--size", "96", "-q"]
         assert main([*line, *options, "--stages", str(stages)]) == 0
         made.append(json.loads((stages / "report.json").read_text()))
     assert [report["method"] for report in made] == ["cells", "default", "cells"]
@@ -98,7 +101,7 @@ def test_entries_are_taken(tmp_path: Path) -> None:
         (["splice", "dots.png", "pebbles.png", "--method", "fast"], "--method"),
         (["splice", "dots.png", "pebbles.png", "--size", "4"], "--size"),
         (["splice", "dots.png", "pebbles.png", "--strength", "2"], "--strength"),
-        (["splice", "sample:dots", "pebbles.png", "--cells"], "--cells"),
+        (["splice", "dots.png", "pebbles.npz", "--cells"], "--cells"),
         (["self-splice", "dots.png", "--edit", "melt"], "--edit"),
         (["self-splice", "dots.png", "--edit", "[3"], "not JSON"),
         (["self-splice", "dots.png", "--size", "4"], "--size"),

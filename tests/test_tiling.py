@@ -24,7 +24,8 @@ PHOTOGRAPHS = ("brick", "grass", "gravel", "coffee")
 
 @cache
 def picture(name: str, side: int = 256) -> np.ndarray:
-    return samples.load(name, size=(side, side)).image if name in GENERATED else samples.load(name).image[:256, :256]
+    generated = name in GENERATED
+    return samples.load(name, size=(side, side)).image if generated else samples.load(name).image[:side, :side]
 
 
 def jumps(image: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
@@ -73,7 +74,7 @@ def test_searched_joints_cost_less_than_the_usual_one(name):
 
 @pytest.mark.parametrize("name", ["weave", "pebbles", "beans", "grass"])
 def test_a_joint_followed_from_a_small_picture_is_about_as_cheap_as_the_cheapest(name):
-    image = picture(name)
+    image = picture(name, 160)
     most = image.shape[1] // 2
     cost = {
         overlap: texrs.tile(image, wrap=(False, True), overlap=overlap).report["joints"]["columns"]["cost"]

@@ -192,10 +192,11 @@ def splice(
 
     """
     as_method(method, None, "paper", "preview")
-    watch = progress or (lambda stage, share: None)
-    mine, theirs = as_elements(a, "a", watch), as_elements(b, "b", watch)
-    rows, columns = as_size(size if size is not None else mine.mask.shape, minimum=16)
-    number = as_seed(seed)
+    number, part, screening = as_seed(seed), as_float(strength, "strength", 0, 1), _as_screening(blend)
+    enlarged = None if layout_scale is None else as_float(layout_scale, "layout_scale", 0.01, 100)
+    turned = enlarged is None if align is None else as_bool(align, "align")
+    if enlarged is not None and method == "paper":
+        raise InvalidInput('layout_scale: method="paper" brings the layout to the spacing of a')
     given = {"cells": cells, "nets": nets, "turns": turns}
     wanted, net, may_turn = (None if v is None else as_bool(v, n) for n, v in given.items())
     for name, asked in (("cells", wanted), ("nets", net)):
@@ -205,14 +206,11 @@ def splice(
         raise InvalidInput(
             "nets: a texture is put together either from its cells or from its knots; give one of the two"
         )
+    watch, shape = progress or (lambda stage, share: None), None if size is None else as_size(size, minimum=16)
+    mine, theirs = as_elements(a, "a", watch), as_elements(b, "b", watch)
+    rows, columns = shape or as_size(mine.mask.shape, minimum=16)
     if net and not has_knots(mine):
         raise InvalidInput(f"nets: {'separate elements are no net' if mine.layout == Layout.DISJOINT else NO_NET}")
-    part = as_float(strength, "strength", 0, 1)
-    enlarged = None if layout_scale is None else as_float(layout_scale, "layout_scale", 0.01, 100)
-    turned = enlarged is None if align is None else as_bool(align, "align")
-    if enlarged is not None and method == "paper":
-        raise InvalidInput('layout_scale: method="paper" brings the layout to the spacing of a')
-    screening = _as_screening(blend)
     found = find_entry_cells(mine, watch) if method is None and wanted is not False and not net else None
     if wanted and found is None:
         raise InvalidInput(f"cells: {'separate elements have none' if mine.layout == Layout.DISJOINT else NO_CELLS}")
@@ -338,10 +336,10 @@ def self_splice(
 
     """
     as_method(method, None, "paper", "preview")
-    watch = progress or (lambda stage, share: None)
-    asked = None if size is None else as_size(size, minimum=16)
-    mine, number = as_elements(a, "a", watch), as_seed(seed)
+    asked, number = None if size is None else as_size(size, minimum=16), as_seed(seed)
     steps, screening = as_steps(() if edit is None else edit, number), _as_screening(blend)
+    watch = progress or (lambda stage, share: None)
+    mine = as_elements(a, "a", watch)
     if asked is not None and asked != mine.mask.shape:
         rest: dict[str, Any] = {"seed": number, "method": method, "refine": refine, "blend": blend, "progress": watch}
         inside = all(n <= m for n, m in zip(asked, mine.mask.shape, strict=True))
