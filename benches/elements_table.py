@@ -4,12 +4,14 @@ TEXRS_TEXTURES=FOLDER python benches/elements_table.py [PICTURES]
 
 FOLDER holds b-disjoint, c-connected and d-background, each image with its annotation. With PICTURES, a folder, what
 was found is drawn there. Detections within half a box of the border do not count; of the keyboard, whose centres are
-not all listed, recall alone does. After the table it says how reliable what the automatic start states is: in bins of stated
-confidence, how much was right, of layouts and of single elements.
+not all listed, recall alone does. IoU is the mean over the cells of `data/cells.json`, which were drawn by hand, of the
+intersection over the union with the element that covers most of each. After the table it says how reliable what the
+automatic start states is: in bins of stated confidence, how much was right, of layouts and of single elements.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 import time
@@ -25,13 +27,16 @@ from element_checks import Annotated, annotated, pair, passes, score
 
 BINS = (0.0, 0.5, 0.65, 0.8, 0.9, 1.0)
 """Between which stated confidences are put together."""
+DRAWN = Path(__file__).resolve().parent / "data" / "cells.json"
+"""Outlines of cells of ten of the textures, (row, column), drawn by hand; of each some, all over it."""
 Stated = list[tuple[float, bool]]
 """How sure something was said to be, and whether it was right."""
 
 
 def main(folder: Path, pictures: Path | None) -> None:
-    print("| texture | layout | start | elements | of | recall | inner | precision | error | mask | s | S1 |")
-    print("|---|---|---|---|---|---|---|---|---|---|---|---|")
+    print("| texture | layout | start | elements | of | recall | inner | precision | error | IoU | mask | s | S1 |")
+    print("|---|---|---|---|---|---|---|---|---|---|---|---|---|")
+    drawn = json.loads(DRAWN.read_text(encoding="utf-8"))
     totals = {"box": [0, 0, 0], "auto": [0, 0, 0]}
     layouts: Stated = []
     single: Stated = []
@@ -58,6 +63,7 @@ def main(folder: Path, pictures: Path | None) -> None:
                 result = score(found.points, texture.centres, texture.box[2:], image.shape)
                 row += [len(texture.centres), *(f"{v:.2f}" for v in (result.recall, result.inner, result.precision))]
                 row.append(f"{result.error:.1f}")
+            row.append(f"{measure_overlap(found, drawn[texture.name]):.2f}" if texture.name in drawn else "-")
             row += [f"{found.report['mask']} {found.mask.mean():.2f}", f"{seconds:.1f}"]
             if texture.centres is None:
                 row.append("-")
@@ -74,6 +80,21 @@ def main(folder: Path, pictures: Path | None) -> None:
         print(f"{start}: S1 met on {met} of {count}; layout right on {right}")
     print_reliability("layouts", layouts)
     print_reliability("single elements", single)
+
+
+def measure_overlap(found: elements.Elements, cells: list[list[list[float]]]) -> float:
+    """Return the mean intersection over union of drawn cells and the elements that cover most of each."""
+    from skimage.draw import polygon2mask
+
+    labels, shares = found.labels, []
+    area = np.bincount(labels.ravel())
+    for outline in cells:
+        inside = polygon2mask(labels.shape, np.array(outline) + 0.5)
+        seen = np.bincount(labels[inside], minlength=len(area))
+        seen[0] = 0
+        best = int(seen.argmax())
+        shares.append(seen[best] / (inside.sum() + area[best] - seen[best]))
+    return float(np.mean(shares))
 
 
 def judge_elements(found: elements.Elements, texture: Annotated) -> Stated:

@@ -431,8 +431,8 @@ def lay_tiles(shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
 
 def test_a_proposed_layout_is_jointed_where_the_picture_falls_into_cells() -> None:
     image, middles = lay_tiles((192, 192))
-    away = _proposal._measure_distance((192, 192), middles, (41, 41), (False, False))
-    thing, _ = _proposal._compare_things(_proposal.to_lab(image), away, middles)
+    away = _proposal.measure_distance((192, 192), middles, (41, 41), (False, False))
+    thing, _ = _proposal.compare_things(_proposal.to_lab(image), away, middles)
     assert thing >= _proposal.THING
     layout, sure = _proposal._choose_layout(image, away, middles, None)
     assert layout != Layout.DISJOINT
@@ -441,7 +441,7 @@ def test_a_proposed_layout_is_jointed_where_the_picture_falls_into_cells() -> No
 
 def test_a_layout_is_proposed_for_a_long_narrow_picture() -> None:
     places = np.array([(10.0, 15.0 + 30 * k) for k in range(23)])
-    away = _proposal._measure_distance((20, 700), places, (15, 15), (False, False))
+    away = _proposal.measure_distance((20, 700), places, (15, 15), (False, False))
     grain = np.random.default_rng(0).random((20, 700, 1)).astype(np.float32)
     image = np.where((away < 1)[..., None], grain, 0.5).repeat(3, axis=-1).astype(np.float32)
     assert _proposal._choose_layout(image, away, places, None)[0] == Layout.DISJOINT

@@ -14,6 +14,7 @@ from texrs._arrays import as_image, check_memory, guidance
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.elements import _mask
 from texrs.elements._arguments import Arguments, check_consistency, choose_usual_box, find_contradiction
+from texrs.elements._cellular import start_from_cells
 from texrs.elements._corrections import correct, read_steps
 from texrs.elements._elements import Elements
 from texrs.elements._layout import Layout, LayoutName
@@ -118,21 +119,24 @@ def analyse(
     guide = _repeat_channel(guidance(pixels))
 
     # 1. The element, the background and the layout: as said, or proposed.
-    start = propose(guide, given, how.wrap, partial(watch, "propose"))
+    plain = search == ElementSearch() and not how.literal and not any(how.wrap)
+    cellular = start_from_cells(guide, given, watch) if plain else None
+    start = propose(guide, given, how.wrap, partial(watch, "propose")) if cellular is None else cellular.start
     _check(given, start, how)
 
     # 2. Where the texture looks like the element.
-    found = _detect(guide, given, start, how, partial(watch, "search"))
+    found = _detect(guide, given, start, how, partial(watch, "search")) if cellular is None else cellular.found
 
     # 3. What belongs to the elements.
     watch("separate", 0.0)
-    parted = _separate(guide, given, start, found, how)
+    parted = _separate(guide, given, start, found, how) if cellular is None else cellular.parted
     if len(parted.points) < FEWEST:
         raise InvalidInput(
             f"image: {len(parted.points)} elements were found, at least {FEWEST} are needed; try another box, more "
             f"rotations or scales, a lower threshold (it was {found.threshold:.2f}), or give the points"
         )
     entry = _reanalyse(pixels, given, start, parted, how) or _make_entry(pixels, given, start, found, parted, how)
+    entry = entry if cellular is None else replace(entry, known=cellular.labels)
     watch("separate", 1.0)
     unsure = [
         f"{name} is proposed, {sure:.0%} sure: {ADVICE[name]}"

@@ -60,7 +60,8 @@ class Elements:
     sets : Similarity, optional
         What `similarity` returns, where it was made to be kept.
     known : ndarray of shape (height, width), int32, optional
-        The element of each pixel where that is given, not found, as `of_labels` has it.
+        The element of each pixel, from 1 in the order of the points, where that is known at once: given, as to `of_labels`, or
+        of cells beyond doubt.
     """
 
     image: NDArray[Any]
@@ -204,7 +205,7 @@ class Elements:
     @cached_property
     def _labelled(self) -> Labelled:
         if self.known is not None:
-            return Labelled(self.known, self.points, np.ones(len(self.points)))
+            return Labelled(self.known, self.points, np.clip(self.scores, 0, 1))
         found = label_elements(self.image, self.mask, self.points, self.scores, self.box, self.layout, self.wrap)
         found.labels.flags.writeable = False
         return found

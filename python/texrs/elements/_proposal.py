@@ -107,7 +107,7 @@ def propose(guide: Floats, given: Arguments, wrap: tuple[bool, bool], progress: 
     if points is None:
         points = search_similar(guide, box.centre, box.size, wrap=wrap).points
     progress(0.9)
-    away = _measure_distance(size, points, box.size, wrap)
+    away = measure_distance(size, points, box.size, wrap)
     if layout is None:
         layout, sure["layout"] = _choose_layout(guide, away, points, given.whole)
     if blind and "layout" in sure and layout == Layout.CONNECTED:
@@ -130,7 +130,7 @@ def propose(guide: Floats, given: Arguments, wrap: tuple[bool, bool], progress: 
 def _choose_box(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[float], object]) -> tuple[Box, float]:
     """Try boxes in a small picture and take the one that explains most of it."""
     step = max(1, -(-max(guide.shape[:2]) // SMALL))
-    small = _downscale(guide, step)
+    small = downscale(guide, step)
     boxes = propose_boxes(small)
     if not boxes:
         raise InvalidInput("box: none could be proposed for this image; give one, or the points")
@@ -176,7 +176,7 @@ def _choose_box(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[floa
     return as_box((row, column, height, width), whole), sure
 
 
-def _downscale(guide: Floats, step: int) -> Floats:
+def downscale(guide: Floats, step: int) -> Floats:
     """Average squares of pixels."""
     rows, columns = (n // step for n in guide.shape[:2])
     cut = guide[: rows * step, : columns * step]
@@ -279,7 +279,7 @@ def _place_box(points: NDArray[np.float64], size: tuple[int, int]) -> Box:
 # --- background and layout ----------------------------------------------------------------------------------------------
 
 
-def _measure_distance(
+def measure_distance(
     size: tuple[int, int], points: NDArray[np.float64], box: tuple[int, int], wrap: tuple[bool, bool]
 ) -> Floats:
     """Return the distance of each pixel to the nearest element, in halves of its box."""
@@ -313,12 +313,12 @@ def _choose_layout(
         return (Layout.DISJOINT, 0.7) if float((~mask).mean()) > OPEN else (Layout.JOINTED, 0.6)
     if len(points) < 3:
         return Layout.DISJOINT, 0.1
-    thing, contrast = _compare_things(to_lab(guide), away, points)
+    thing, contrast = compare_things(to_lab(guide), away, points)
     sure = _measure_odds(thing / THING)
     if thing >= THING:
         sides = guide.shape[:2]
         step = max(1, min(-(-max(sides) // LARGE), min(sides) // SMALLEST))
-        cells = find_cells(_downscale(guide, step)).confidence
+        cells = find_cells(downscale(guide, step)).confidence
         if cells < CELLS:
             return Layout.DISJOINT, sure
         sure = cells
@@ -334,7 +334,7 @@ def _measure_odds(ratio: float) -> float:
     return float(1 / (1 + min(ratio, 1 / max(ratio, 1e-9)) ** 1.5))
 
 
-def _compare_things(colours: Floats, away: Floats, points: NDArray[np.float64]) -> tuple[float, float]:
+def compare_things(colours: Floats, away: Floats, points: NDArray[np.float64]) -> tuple[float, float]:
     """Return how much elements are things rather than openings, and how their lightness differs from what lies between.
 
     Openings of a net and bricks between joints are even and alike; lines, edges and colours lie between them. Of things on
