@@ -107,7 +107,8 @@ def judge_elements(found: elements.Elements, texture: Annotated) -> Stated:
     half = np.array(texture.box[2:]) / 2
     inner = ((found.points >= half) & (found.points <= np.array(found.mask.shape) - 1 - half)).all(axis=1)
     right = np.isin(np.arange(len(inner)), pair(found.points, texture.centres, texture.box[2:])[0])
-    return list(zip(found.scores[inner].clip(0, 1).tolist(), right[inner].tolist(), strict=True))
+    sure = np.array([one.confidence for one in found.instances[: len(inner)]])
+    return list(zip(sure[inner].tolist(), right[inner].tolist(), strict=True))
 
 
 def print_reliability(name: str, stated: Stated) -> None:

@@ -80,7 +80,11 @@ def test_a_point_on_the_ground_has_nothing() -> None:
 
 
 def test_confidence_is_likeness_and_of_what_has_no_point_its_area() -> None:
-    assert [one.confidence for one in ENTRY.instances[:5]] == [1, 0.875, 0.75, 0.625, 0.5]
+    sure = [one.confidence for one in ENTRY.instances[:5]]
+    assert sure[0] == 1
+    assert sure == sorted(sure, reverse=True)
+    # As often as elements of that likeness, 1 to .5, were some where it is known.
+    np.testing.assert_allclose(sure, [1, 0.97, 0.8, 0.31, 0.05], atol=0.02)
     assert ENTRY.instances[5].confidence > 0.95
     radii = np.array([RADIUS] * 5 + [RADIUS * 0.7])
     small = make_entry(CENTRES, draw_discs(np.concatenate([CENTRES, [ALONE]]), radii)).instances[5]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_image, as_wrap
 from texrs._engine.coherence import Similarity
 from texrs._typing import Array, Labels, Path
-from texrs.elements._instances import Instance, Labelled, cut_instances, label_elements
+from texrs.elements._instances import Instance, Labelled, cut_instances, label_elements, rate_closure
 from texrs.elements._known import as_element_labels, measure_box, measure_centres
 from texrs.elements._layout import Layout, LayoutName
 from texrs.errors import FileError, InvalidInput
@@ -205,7 +205,7 @@ class Elements:
     @cached_property
     def _labelled(self) -> Labelled:
         if self.known is not None:
-            return Labelled(self.known, self.points, np.clip(self.scores, 0, 1))
+            return Labelled(self.known, self.points, rate_closure(self.scores))
         found = label_elements(self.image, self.mask, self.points, self.scores, self.box, self.layout, self.wrap)
         found.labels.flags.writeable = False
         return found
