@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.ndimage import minimum_filter
 from scipy.spatial import cKDTree
 
 import texrs
@@ -17,6 +18,7 @@ from texrs import io, layouts, samples
 from texrs.cli import main
 from texrs.elements import Elements, Layout, correct, load
 from texrs.errors import FileError, InvalidInput, LimitExceeded
+from texrs.exemplar.shapes import mark_outlines
 
 DOTS = Elements.of_sample(samples.dots((128, 128)))
 WALL = Elements.of_sample(samples.bricks((160, 160)))
@@ -98,6 +100,19 @@ def test_cells_are_taken_as_they_are() -> None:
     shown = made.source.label
     assert len(np.unique(shown[4:20, 4:28])) == 1
     assert shown[12, 12] != shown[12, 48]
+
+
+def test_cells_that_the_border_cuts_take_the_joints_beside_them() -> None:
+    at = np.arange(100) - 30
+    inside = np.logical_and.outer(at % 40 >= 4, at % 40 >= 4)
+    labels = np.where(inside, 1 + np.add.outer(3 * ((at + 40) // 40), (at + 40) // 40), 0)
+    image = np.where(inside, 200, 20).astype(np.uint8)
+    entry = Elements.of_labels(image, labels, layout="jointed")
+    made = texrs.splice(entry, layouts.courses(200, 40, 40, joint=4), 200, layout_scale=1, seed=2)
+    assert {m["element"] for m in made.report["matches"]} > {4}
+    dark = minimum_filter(made.image, 7) < 100
+    # Two sides without a joint may still meet.
+    assert dark[mark_outlines(made.source.label.astype(np.int32))].mean() > 0.92
 
 
 def test_known_elements_are_elements_of_all() -> None:

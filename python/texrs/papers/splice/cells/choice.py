@@ -34,6 +34,8 @@ GROUP = 256
 """Targets that are compared at once."""
 ENOUGH = 6
 """Cells to choose from that are wanted before less certain ones are left out."""
+FEW = 3
+"""Whole cells, of whatever certainty, that are wanted before those that the border cuts are left out."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,11 +127,13 @@ def list_usable(cells: Cells) -> NDArray[np.intp]:
     """Return the rows of the cells that may be shown: whole and certain ones, or others where there are few."""
     usual = cells.size**2
     fair = cells.area >= SMALL * usual
-    for allowed in (cells.whole & (cells.certain >= TRUSTED), cells.whole, cells.area >= 0.6 * usual):
+    certain = cells.certain >= TRUSTED
+    # Cells that the border cuts lack a joint there, which is worse than to see the same ones again.
+    for allowed, enough in ((cells.whole & certain, ENOUGH), (cells.whole, FEW), (cells.area >= 0.6 * usual, 1)):
         rows = np.flatnonzero(fair & allowed)
-        if len(rows) >= ENOUGH:
+        if len(rows) >= enough:
             return rows
-    return np.flatnonzero(fair) if not len(rows) else rows
+    return np.flatnonzero(fair)
 
 
 def list_neighbours(wanted: Tessellation) -> list[NDArray[np.intp]]:

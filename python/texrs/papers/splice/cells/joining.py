@@ -54,6 +54,10 @@ def join(image: Array, cells: Cells, charts: Charts, size: tuple[int, int]) -> J
     # The cheapest place is a joint.
     inside = np.clip(STEEP * (looked[:, -1] / (0.5 * cells.joint_width + 0.5) - 1), 0, DEEP)
     samples = Samples(np.ascontiguousarray(looked[:, :-1]), np.ascontiguousarray(inside), (COLOUR, DEPTH))
+    # Where the border cuts a cell it has no joint: the one of whatever lies beside it is shown.
+    limits = np.array(cells.labels.shape) - 1
+    within = 0.5 * cells.joint_width + 1
+    bare: Bools = np.asarray((np.minimum(charts.places, limits - charts.places) < within).any(axis=-1))
     pixel = np.full(size, FREE, np.uint32)
     seams = np.zeros((*size, 2), np.float32)
     for k in range(len(charts.target)):
@@ -62,6 +66,8 @@ def join(image: Array, cells: Cells, charts: Charts, size: tuple[int, int]) -> J
         row = slice(charts.first[k], charts.first[k + 1])
         depth = charts.depth[row].reshape(shape)
         mask: Bools = depth >= -band
+        if not cells.whole[charts.source[k]]:
+            mask &= ~bare[row].reshape(shape) | (depth >= CORE * band)
         if not mask.any():
             continue
         patch = np.arange(row.start, row.stop, dtype=np.uint32).reshape(shape)
