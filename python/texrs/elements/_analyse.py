@@ -55,7 +55,8 @@ def analyse(
     """Find the elements of a texture, what belongs to them and how they are connected [1]_.
 
     Everything may be left out: then the element, the background and the layout are proposed, and the report says how sure
-    that is.
+    that is. Where joints part all of a picture, as of a wall or a comb, its cells are the elements, each as it is; with a
+    ``box``, if they are about as large. Otherwise, and with a ``search`` of one's own, what looks like the chosen one is.
 
     Parameters
     ----------
