@@ -7,6 +7,7 @@ from typing import Any
 from texrs.demo._html import code, figure, grid
 from texrs.demo._workshop import Section, Workshop, load_sample
 from texrs.elements import Elements
+from texrs.layouts import courses, lattice
 from texrs.papers.splice import self_splice, splice
 
 SIDE = 192
@@ -25,7 +26,7 @@ def _load_entry(name: str) -> Elements:
 
 def _splice(workshop: Workshop) -> str:
     total = len(SPLICES) + len(EDITS)
-    spliced, edited = [], []
+    spliced, edited, drawn = [], [], []
     for i, (a, b) in enumerate(SPLICES):
         workshop.watch(i / total)
         elements, layout = _load_entry(a), _load_entry(b)
@@ -36,9 +37,23 @@ def _splice(workshop: Workshop) -> str:
         elements = _load_entry(a)
         made = self_splice(elements, edit, seed=1)
         edited += [figure(elements.image, a), figure(made.image, str(edit["op"]), note=note)]
+    for a, layout, words in (
+        ("bricks", courses(SIDE, [24, 40], 60, shift=1 / 3, vary=0.4, seed=2), "courses"),
+        ("dots", lattice(SIDE, (0, 40), (34, 14)), "a lattice"),
+    ):
+        made = splice(_load_entry(a), layout, seed=1, layout_scale=1)
+        drawn += [
+            figure(layout.image, f"{words}, drawn"),
+            figure(made.image, f"{a} in them" if a == "bricks" else f"{a} on it"),
+        ]
     return (
         code("texrs splice sample:dots sample:net -o result.png --seed 1")
         + grid(spliced, least=180)
+        + code(
+            'texrs splice sample:bricks \'{"layout": "courses", "size": 192, "height": [24, 40], "length": 60}\''
+            " -o result.png --layout-scale 1"
+        )
+        + grid(drawn, least=180)
         + code("texrs self-splice sample:dots --edit regularise -o result.png --seed 1")
         + grid(edited, least=180)
     )
@@ -47,7 +62,7 @@ def _splice(workshop: Workshop) -> str:
 SPLICE = Section(
     "splice",
     "The elements of one texture in the layout of another",
-    "What is rigid is copied pixel by pixel; the ground between is warped, filled and refined by example. The same with the "
-    "texture's own layout, edited.",
+    "What is rigid is copied pixel by pixel, and the ground between is grown by example; walls are put together from their "
+    "bricks, cell by cell. The layout may be drawn, or the texture's own, edited.",
     _splice,
 )
