@@ -58,7 +58,6 @@ fuzz: $(VENV)/.built
 
 lint: $(VENV)/.built
 	cargo fmt --check
-	cargo clippy --all-targets --quiet -- -D warnings
 	cargo clippy --all-targets --quiet --features python -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --quiet
 	$(BIN)/ruff format --check .
