@@ -14,7 +14,7 @@ import texrs
 from reference.look_up import view
 from texrs import DeformationOptions, ElementOptions, samples
 from texrs.errors import Cancelled, InvalidInput, LimitExceeded
-from texrs.exemplar import segment
+from texrs.exemplar import segment, symmetry
 from texrs.papers.design.deformation import deform_elements
 from texrs.papers.design.elements import measure_elements, place
 from texrs.papers.design.logistic_map import iterate
@@ -194,6 +194,32 @@ def test_what_is_lit_from_one_side_is_not_mirrored():
         assert name == "noise" or not any(o[0] == "M" for entry in log for o in entry.get("operations") or [])
     assert mirrors["beans"] == mirrors["bark"] == {(False, False)}
     assert len(mirrors["noise"]) == 4
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ({}, "own"),
+        ({"rotate": 0}, 1),
+        ({"rotate": 0, "mirror": True}, 4),
+        ({"mirror": True}, 4),
+        ({"mirror": False}, 1),
+    ],
+)
+def test_who_forbids_turning_forbids_mirrors_unless_asked_for(options, expected):
+    noise = np.random.default_rng(3).random((96, 96, 3)).astype(np.float32)
+    lit = samples.beans((96, 96)).image
+    for example, own in ((noise, 4), (lit, 1)):
+        exemplar = texrs.Exemplar(example)
+        plan = make_plan(exemplar, exemplar.segment(), DeformationOptions(**options), side=None)
+        assert len(plan.mirrors) == (own if expected == "own" else expected)
+
+
+def test_a_suspected_light_is_enough_not_to_mirror(monkeypatch):
+    noise = np.random.default_rng(3).random((96, 96, 3)).astype(np.float32)
+    for sure, count in ((4.4, 4), (4.6, 2), (5.1, 2)):
+        monkeypatch.setattr(symmetry, "measure_polarity", lambda guide, sure=sure: (sure, 0.0, 0.0))
+        assert len(texrs.Exemplar(noise + np.float32(sure)).mirrors) == count
 
 
 def test_elements_at_the_border_slide_along_it():

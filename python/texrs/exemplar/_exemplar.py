@@ -28,7 +28,7 @@ from texrs.exemplar.instances import Instances, as_instances, find_instances
 from texrs.exemplar.regularity import measure_direction
 from texrs.exemplar.segmentation import ElementOptions, Segmentation, segment
 from texrs.exemplar.stitching import guess_instances, make_stitcher
-from texrs.exemplar.symmetry import Flip, find_mirrors
+from texrs.exemplar.symmetry import SUSPECT, Flip, find_mirrors
 
 T = TypeVar("T")
 
@@ -251,7 +251,7 @@ class Exemplar:
     @property
     def mirrors(self) -> tuple[Flip, ...]:
         """The mirror images that a picture is like, itself first: (rows mirrored, columns mirrored) of each."""
-        return self.remember("mirrors", lambda: find_mirrors(self.guidance))
+        return self.remember("mirrors", lambda: find_mirrors(self.guidance, SUSPECT))
 
     @property
     def directedness(self) -> float:

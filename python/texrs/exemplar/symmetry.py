@@ -20,16 +20,20 @@ NONE: Flip = (False, False)
 ALL: tuple[Flip, ...] = (NONE, (True, False), (False, True), (True, True))
 """The mirror images of an exemplar, itself first."""
 
-POLAR = 5.0
-"""How surely, in standard errors, an exemplar differs from a mirror image of itself from which on it is not mirrored so."""
+POLAR, SUSPECT = 5.0, 4.5
+"""How surely, in standard errors, an exemplar differs from a mirror image of itself from which on the difference is plain, and
+from which on it is suspected. At 3.5 heaps of fruit would be mirrored but left to right, and things would face each other."""
 
 
-def find_mirrors(guide: Floats) -> tuple[Flip, ...]:
-    """Return the mirror images that an exemplar is like, itself first: one lit from the left is not lit from the right."""
+def find_mirrors(guide: Floats, sure: float = POLAR) -> tuple[Flip, ...]:
+    """Return the mirror images that an exemplar is like, itself first: one lit from the left is not lit from the right.
+
+    ``sure`` says how surely it must differ from one, in standard errors, for that to be left out.
+    """
     rows, columns, oblique = measure_polarity(guide)
     # Each mirror turns two of the three round, which are evidence apart from each other.
     odd = {(True, False): (rows, oblique), (False, True): (columns, oblique), (True, True): (rows, columns)}
-    return tuple(f for f in ALL if f == NONE or math.hypot(*odd[f]) < POLAR)
+    return tuple(f for f in ALL if f == NONE or math.hypot(*odd[f]) < sure)
 
 
 def flip(array: Array, axes: Flip) -> Array:

@@ -28,9 +28,10 @@ Departures, with their reasons:
 - Where moved elements are judged clearly worse than the example as it is, they stay where they are, and variety comes from
   patches alone: both are tried at a small size (see `texrs.judging`). In heaps of fruit, where elements can only be cut out
   roughly, torn outlines fall to a third.
-- Nothing is mirrored along an axis on which the example plainly differs from its mirror image (light from one side, leaves
-  that hang), nor turned where the example has directions of its own (bark, brickwork); where it repeats on a lattice, elements
-  move from place to place of the lattice and nowhere else.
+- Nothing is mirrored along an axis on which something tells the example from its mirror image (light from one side, leaves
+  that hang), or at all where ``rotate=0`` says that it has an upper side, unless that is asked for. Nor is it turned where it
+  has directions of its own (bark, brickwork); where it repeats on a lattice, elements move from place to place of the lattice
+  and nowhere else.
 - A cyclic texture (section 3.5) is stitched on the torus from the start: patches are chosen to fit both sides of the
   wrap, where the paper folds a finished picture that was never chosen to fit.
 - Several exemplars are each stitched into a texture of the full size. Which one shows is asked by a map, or drawn as

@@ -31,9 +31,10 @@ class DeformationOptions:
         where the example has directions of its own (bark, brickwork), no separate elements, or a lattice.
     scale : (float, float)
         Least and largest scaling, within 0.5 to 2.
-    mirror : bool
-        Whether elements, backgrounds and patches may be mirrored; False for lettered textures. Where the example plainly
-        differs from its mirror image, as lit from one side, it is not mirrored along that axis in any case.
+    mirror : bool, optional
+        Whether elements, backgrounds and patches may be mirrored; False for lettered textures, True for both axes whatever
+        they show. By default along those axes where nothing tells the example from its mirror image, as light from one side
+        or a slant does; along none where ``rotate=0`` is given, which says that the example has an upper side.
     start : float, optional
         Start of the logistic map (Eq. 2), within (-1, 1); the seed draws one for each element by default.
     growth_rate : float
@@ -62,7 +63,7 @@ class DeformationOptions:
     translate: float = 0.12
     rotate: float | None = None
     scale: tuple[float, float] = (0.8, 1.2)
-    mirror: bool = True
+    mirror: bool | None = None
     start: float | None = None
     growth_rate: float = 2.0
     u: int = 10
@@ -80,7 +81,7 @@ class DeformationOptions:
             "translate": as_float(self.translate, "translate", 0, 0.5),
             "rotate": None if self.rotate is None else as_float(self.rotate, "rotate", 0, 180),
             "scale": (low, high),
-            "mirror": as_bool(self.mirror, "mirror"),
+            "mirror": None if self.mirror is None else as_bool(self.mirror, "mirror"),
             "growth_rate": as_float(self.growth_rate, "growth_rate", 0, 2),
             "u": as_int(self.u, "u", 1, 256),
             "v": as_int(self.v, "v", 1, 4),

@@ -11,7 +11,7 @@ from texrs._typing import Bools, Floats
 from texrs.exemplar import Exemplar
 from texrs.exemplar.patches import choose_usual_side, index_patches, mark_corners
 from texrs.exemplar.segmentation import Segmentation
-from texrs.exemplar.symmetry import NONE, Flip
+from texrs.exemplar.symmetry import ALL, NONE, Flip
 from texrs.kernels.patch_search import PatchIndex
 from texrs.papers.design.operations import Moves
 from texrs.papers.design.options import DeformationOptions
@@ -69,11 +69,19 @@ def make_plan(
     if literal:
         parts, options = replace(parts, kind="none", lattice=None), replace(options, mirror=False)
     guide, extent = exemplar.guidance, side or choose_usual_side(min(exemplar.shape))
-    mirrors = exemplar.mirrors if options.mirror else (NONE,)
+    mirrors = settle_mirrors(exemplar, options)
     moves = settle_moves(exemplar, parts, options, mirrors)
     free = mark_background(parts, extent)
     index = index_patches(guide, extent, mirrors, free)
     return Plan(guide, parts, index, mirrors, moves, extent, literal, free is not None)
+
+
+def settle_mirrors(exemplar: Exemplar, options: DeformationOptions) -> tuple[Flip, ...]:
+    """Return the mirror images that may be used: those asked for, else those that nothing tells from the exemplar."""
+    if options.mirror is None:
+        # Who forbids turning knows of an upper side, light or letters, that the statistics may not show.
+        return (NONE,) if options.rotate == 0 else exemplar.mirrors
+    return ALL if options.mirror else (NONE,)
 
 
 def settle_moves(
