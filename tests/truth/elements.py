@@ -71,6 +71,12 @@ def design_mixed_by_a_map_of_weights() -> Parts:
 
 
 @case
+def design_with_things_scattered() -> Parts:
+    result = texrs.design([clear("grit", 80, 80), clear("pebbles", 80, 96)], (112, 128), density=0.2, tiles=1, seed=3)
+    return parts_of(result, report=(*DESIGNED, "density"), exact=False)
+
+
+@case
 def design_as_printed() -> Parts:
     result = texrs.design(colour("pebbles", 96, 96, seed=1), (128, 144), method="paper", seed=2)
     return parts_of(result, report=DESIGNED, stages=("composite",))

@@ -218,6 +218,15 @@ def read_numbers(path: str, about: About) -> Array:
     return given if given.ndim == about.axes else np.asarray(given.mean(axis=-1))
 
 
+def read_density(text: str, about: About) -> Any:
+    """Return numbers, or shares that a picture shows: all of an integer's range is 0 to 1."""
+    if re.fullmatch(r"[-+.:0-9eE]+", text.strip()):
+        return parse_numbers(text, about.option, "numbers such as 0.3 or 0.3:0.1, or a file")
+    given = np.asarray(read_array(text, about.axes))
+    most = 1.0 if given.dtype.kind == "f" else float(np.iinfo(given.dtype).max)
+    return np.asarray((given if given.ndim == about.axes else given.mean(axis=-1)) / most, np.float64)
+
+
 def read_mask(path: str, axes: int = 2) -> Array:
     """Read a mask: any colour but black, or 0 in all channels, is marked, whatever an alpha channel of a picture says."""
     mask = read_array(path, axes)
@@ -353,6 +362,7 @@ KINDS = {
     "wrap": AXES,
     "repeat": AXES,
     "weights": SHARES,
+    "density": Kind("A:B:...|FILE", read_density, "Or a picture, white where all is to be covered.", file=True),
     "scales": replace(SHARES, show=lambda numbers: ":".join(f"{n:g}" for n in numbers)),
     "scale": Kind("LEAST:LARGEST", parse_range, show=lambda numbers: ":".join(f"{n:g}" for n in numbers)),
     "augment_scales": Kind("auto|yes|no|A:B:...", parse_sizes),

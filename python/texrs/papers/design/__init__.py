@@ -37,6 +37,7 @@ Departures, with their reasons:
 - Several exemplars are each stitched into a texture of the full size. Which one shows is asked by a map, or drawn as
   territories of smooth noise; a cut moves their borders to outlines, by an element at most (`texrs.papers.design.mixing`).
   Dealing patches to exemplars gives rectangles, and no map is obeyed. Colours are not corrected where exemplars meet.
+  Or things of the others are scattered over the first one, as densely as asked (`texrs.papers.design.scattering`).
 - The differences that the colours are corrected to are those of the sources on both sides of a seam, where the paper
   takes those of the picture itself; some weight on the values keeps the colours from drifting. Along the outline of a thing
   the step stays.
@@ -54,7 +55,7 @@ from texrs._typing import Progress
 from texrs.blending import SCREENING
 from texrs.elements import Elements
 from texrs.exemplar import ElementOptions
-from texrs.papers.design.arguments import Arguments, Choice, Exemplars, Method, Size, Weights, check_arguments
+from texrs.papers.design.arguments import Arguments, Choice, Density, Exemplars, Method, Size, Weights, check_arguments
 from texrs.papers.design.options import DeformationOptions
 from texrs.papers.design.plan import Plan, make_plan
 from texrs.papers.design.report import describe, draw_stages
@@ -72,6 +73,7 @@ def design(
     seed: int = 0,
     wrap: bool | Sequence[bool] = (True, True),
     weights: Weights = None,
+    density: Density = None,
     elements: ElementOptions | Elements = ElementOptions(),
     deformation: DeformationOptions = DeformationOptions(),
     plan: Choice = "auto",
@@ -97,6 +99,10 @@ def design(
     weights : (n,), (rows, columns) of int, or (rows, columns, n) array, optional
         Shares of n exemplars in the result, or which one is where, or their shares everywhere; equal by default. Borders
         follow outlines, by an element at most from where a map has them; shares on the whole are kept within 3 %.
+    density : float, (n - 1,), (rows, columns), or (rows, columns, n - 1) array, optional
+        Share of the area on which things of all exemplars but the first are seen, 0 to 1, of each or of all, on the whole or
+        place by place: they are scattered over a texture of the first, each whole, those of the last on top. Not for use
+        with ``weights``. The report's "density" says what was asked and reached, and what their own exemplar has.
     elements : ElementOptions or Elements
         How the elements of the exemplar are found, or what `texrs.elements.analyse` found: its ``labels`` are used.
     deformation : DeformationOptions
@@ -174,6 +180,7 @@ def design(
         seed=seed,
         wrap=wrap,
         weights=weights,
+        density=density,
         elements=elements,
         deformation=deformation,
         plan=plan,
@@ -194,6 +201,7 @@ def design_variants(
     seed: int = 0,
     wrap: bool | Sequence[bool] = (True, True),
     weights: Weights = None,
+    density: Density = None,
     elements: ElementOptions | Elements = ElementOptions(),
     deformation: DeformationOptions = DeformationOptions(),
     plan: Choice = "auto",
@@ -224,6 +232,10 @@ def design_variants(
     weights : (n,), (rows, columns) of int, or (rows, columns, n) array, optional
         Shares of n exemplars in each texture, or which one is where, or their shares everywhere; equal by default. Borders
         follow outlines, by an element at most from where a map has them; shares on the whole are kept within 3 %.
+    density : float, (n - 1,), (rows, columns), or (rows, columns, n - 1) array, optional
+        Share of the area on which things of all exemplars but the first are seen, 0 to 1, of each or of all, on the whole or
+        place by place: they are scattered over a texture of the first, each whole, those of the last on top. Not for use
+        with ``weights``. The report's "density" says what was asked and reached, and what their own exemplar has.
     elements : ElementOptions or Elements
         How the elements of the exemplar are found, or what `texrs.elements.analyse` found: its ``labels`` are used.
     deformation : DeformationOptions
@@ -277,6 +289,7 @@ def design_variants(
         seed=seed,
         wrap=wrap,
         weights=weights,
+        density=density,
         elements=elements,
         deformation=deformation,
         plan=plan,
@@ -310,7 +323,8 @@ def segment(arguments: Arguments) -> list[Plan]:
         chosen = elements.select(number)
         parts = exemplar.segment(chosen, progress=progress)
         plan = make_plan(exemplar, parts, arguments.deformation, side=arguments.side, literal=arguments.literal)
-        plans.append(choose_plan(plan, exemplar, chosen, arguments))
+        scattered = number > 0 and arguments.density is not None
+        plans.append(plan if scattered else choose_plan(plan, exemplar, chosen, arguments))
         arguments.watch("segment", (number + 1) / len(arguments.guides))
     return plans
 

@@ -29,11 +29,12 @@ from texrs.errors import InvalidInput
 from texrs.exemplar import ElementOptions, Exemplar, as_exemplar
 from texrs.papers.design.options import DeformationOptions
 
-__all__ = ["Arguments", "Choice", "Exemplars", "Method", "Size", "Weights", "check_arguments"]
+__all__ = ["Arguments", "Choice", "Density", "Exemplars", "Method", "Size", "Weights", "check_arguments"]
 
 Exemplars: TypeAlias = Array | Exemplar | Elements | Sequence[Array | Exemplar | Elements]
 Size: TypeAlias = int | Sequence[int] | None
 Weights: TypeAlias = Sequence[float] | Array | None
+Density: TypeAlias = float | Sequence[float] | Array | None
 Method: TypeAlias = Literal["paper"] | None
 Choice: TypeAlias = Literal["auto", "move", "still"]
 
@@ -55,6 +56,8 @@ class Arguments:
     wrap: tuple[bool, bool]
     shares: NDArray[np.float64]
     """Of each exemplar: (n,) for the whole, or (rows, columns, n)."""
+    density: NDArray[np.float64] | None
+    """Share of the area on which things of each exemplar but the first are seen: (n - 1,), or (rows, columns, n - 1)."""
     elements: ElementOptions
     deformation: DeformationOptions
     plan: Choice
@@ -85,6 +88,7 @@ def check_arguments(
     seed: int,
     wrap: bool | Sequence[bool],
     weights: Weights,
+    density: Density,
     elements: ElementOptions | Elements,
     deformation: DeformationOptions,
     plan: Choice,
@@ -106,6 +110,9 @@ def check_arguments(
     first, cyclic = as_seed(seed), as_wrap(wrap)
     shares = as_shares(weights, len(exemplars), (rows, columns))
     as_method(method, None, "paper")
+    if density is not None and (weights is not None or method is not None):
+        other = "weights" if weights is not None else "method"
+        raise InvalidInput(f"density: scatters things over the first exemplar, and is not for use with {other}")
     as_choice(plan, "plan", ("auto", "move", "still"))
     arguments = Arguments(
         exemplars,
@@ -114,6 +121,7 @@ def check_arguments(
         [(first + k) % 2**64 for k in range(as_int(count, "count", 1, 4096))],
         (cyclic[0], cyclic[1]),
         shares,
+        None if density is None else as_density(density, len(exemplars), (rows, columns)),
         chosen,
         deformation,
         plan,
@@ -167,7 +175,8 @@ def count_bytes(arguments: Arguments) -> int:
     count = len(arguments.exemplars)
     mixed = 100 + 75 * count if count > 1 else 0
     each = max(18, kept) + 24 * arguments.literal + mixed
-    return int(math.prod(arguments.size) * each + arguments.shares.nbytes + SPARE)
+    maps = arguments.shares.nbytes + (0 if arguments.density is None else arguments.density.nbytes)
+    return int(math.prod(arguments.size) * each + maps + SPARE)
 
 
 def check_together(exemplars: Sequence[Exemplar], labels: object) -> None:
@@ -213,3 +222,22 @@ def as_shares(weights: object, count: int, size: tuple[int, ...]) -> NDArray[np.
         raise InvalidInput("weights: must be finite, not negative, and positive somewhere in each place")
     shares: NDArray[np.float64] = array / array.sum(axis=-1, keepdims=True)
     return shares
+
+
+def as_density(density: object, count: int, size: tuple[int, ...]) -> NDArray[np.float64]:
+    """Check the densities of all exemplars but the first: (count - 1,), or (rows, columns, count - 1) over the texture."""
+    if count < 2:
+        raise InvalidInput("density: scatters things of other exemplars over the first, and there is but one")
+    array = try_array(density, np.float64)
+    if array.ndim == 0:
+        array = np.full(count - 1, float(array))
+    elif array.shape == size:
+        array = np.repeat(array[..., np.newaxis], count - 1, axis=-1)
+    if array.shape not in ((count - 1,), (*size, count - 1)):
+        raise InvalidInput(
+            f"density: needs a number, one for each exemplar but the first, {count - 1}, or a map {size} or "
+            f"{(*size, count - 1)}; got shape {array.shape}"
+        )
+    if not np.isfinite(array).all() or array.min() < 0 or array.sum(axis=-1).max() > 1:
+        raise InvalidInput("density: must be shares of the area, 0 to 1, that together are at most 1")
+    return array

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from texrs._arrays import as_rgb
 from texrs._typing import Array
@@ -62,8 +63,23 @@ def describe(
         "tried": [p.tried and {name: dict(figures) for name, figures in p.tried.items()} for p in plans],
         "rotate": first.moves.rotate,
         "shares": [int(np.count_nonzero(composite.exemplar == which)) for which in range(len(plans))],
+        "density": None if arguments.density is None else describe_density(plans, composite, arguments.density),
         "holes": [t.holes for t in tiles],
         "blend": arguments.screening,
         "seams": seams,
         "operations": [t.log for t in tiles],
     }
+
+
+def describe_density(plans: Sequence[Plan], composite: SourceMap, density: NDArray[np.float64]) -> list[dict[str, Any]]:
+    """Return of each exemplar that was scattered what was asked and reached, what it has itself, and the number of things."""
+    asked = density.reshape(-1, len(plans) - 1).mean(axis=0)
+    return [
+        {
+            "asked": round(float(asked[which - 1]), 4),
+            "reached": round(float((composite.exemplar == which).mean()), 4),
+            "own": round(float((plans[which].parts.elements > 0).mean()), 4),
+            "things": int(np.unique(composite.label[composite.exemplar == which]).size),
+        }
+        for which in range(1, len(plans))
+    ]

@@ -15,6 +15,7 @@ from texrs.kernels.gather import gather
 from texrs.papers.design.arguments import Arguments
 from texrs.papers.design.mixing import Layer, mix
 from texrs.papers.design.plan import Plan
+from texrs.papers.design.scattering import scatter
 from texrs.papers.design.tiles import Tile
 from texrs.quilting import Picture, quilt
 from texrs.source_map import SourceMap
@@ -34,6 +35,9 @@ CLOSE = 0.5
 
 def stitch_tiles(plans: Sequence[Plan], tiles: Sequence[Tile], arguments: Arguments, seed: int) -> SourceMap:
     """Stitch patches of the tiles into a texture of any size, on the torus where it wraps (section 3.1, step 4)."""
+    if arguments.density is not None:
+        ground = stitch_alone(0, plans[:1], tiles, arguments, seed)
+        return scatter(ground, plans, arguments.density, wrap=arguments.wrap, seed=seed)
     each = [
         stitch_alone(number, plans, [t for t in tiles if int(t.source.exemplar[0, 0]) == number], arguments, seed)
         for number in range(len(plans))

@@ -40,7 +40,7 @@ def make_composite(plans: Sequence[Plan], arguments: Arguments, seed: int) -> tu
         arguments.watch("deform and complete", number / count)
         tile, which = divmod(number, len(plans))
         plan = plans[which]
-        if plan.still and tile >= len(plan.mirrors):
+        if (plan.still and tile >= len(plan.mirrors)) or (which and arguments.density is not None):
             continue
         draft = move_layers(plan, seed, which, tile) if plan.literal else deform_elements(plan, seed, tile)
         tiles.append(fill_holes(draft, plan, arguments.shapes, which, (seed + tile) % 2**64))
@@ -84,6 +84,7 @@ def try_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, arguments
         size=(side, side),
         wrap=(True, True),
         shares=np.ones(1),
+        density=None,
         tiles=min(TILES, arguments.tiles),
         watch=lambda stage, share: arguments.watch("try", 0.5 * plan.still),
     )

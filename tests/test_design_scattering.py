@@ -1,0 +1,132 @@
+"""Things of one exemplar scattered over another: whole, apart, and as densely as asked."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import binary_dilation
+
+import texrs
+from texrs import samples
+from texrs.elements import Elements
+from texrs.errors import InvalidInput
+from texrs.exemplar.segmentation import Segmentation
+from texrs.papers.design.elements import measure_elements
+from texrs.papers.design.scattering import EDGE
+
+SIZE = (192, 224)
+COPIED = texrs.DeformationOptions(operations=0)
+
+
+@pytest.fixture(scope="module")
+def grit():
+    return samples.grit((96, 96)).image
+
+
+@pytest.fixture(scope="module")
+def flowers():
+    return samples.leaves_and_flowers((128, 128)).image
+
+
+@pytest.fixture(scope="module")
+def pebbles():
+    return Elements.of_sample(samples.pebbles((112, 112)))
+
+
+def covered(result, which):
+    return float((result.source.exemplar == which).mean())
+
+
+@pytest.mark.parametrize("density", [0.05, 0.15, 0.3, 0.45])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_densities_are_kept(grit, pebbles, density, seed):
+    result = texrs.design([grit, pebbles], SIZE, density=density, seed=seed, tiles=1)
+    [said] = result.report["density"]
+    assert covered(result, 1) == pytest.approx(density, rel=0.03)
+    assert (said["asked"], said["reached"]) == (density, pytest.approx(covered(result, 1), abs=1e-4))
+    assert said["things"] == np.unique(result.source.label[result.source.exemplar == 1]).size > 3
+
+
+def test_things_are_whole_and_apart(grit, pebbles):
+    result = texrs.design([grit, pebbles], SIZE, density=0.15, deformation=COPIED, tiles=1, blend=None)
+    source = result.source
+    whole = {e.label: int((e.distance > EDGE).sum()) for e in measure_elements(pebbles.labels) if not any(e.touches)}
+    lies = source.exemplar == 1
+    shown = np.where(lies, source.label, 0)
+    for label in np.unique(shown[lies]):
+        mine = shown == label
+        row, column = source.coordinates[mine].astype(int).T
+        [element] = np.unique(pebbles.labels[row, column])
+        assert mine.sum() == whole[element]
+        rolled = np.pad(mine, 2, mode="wrap")
+        beside = binary_dilation(rolled)[2:-2, 2:-2] & ~mine
+        assert not lies[beside].any()
+    np.testing.assert_array_equal(result.image[lies], pebbles.image[tuple(source.coordinates[lies].astype(int).T)])
+
+
+def test_a_map_says_where_how_much_lies(grit, pebbles):
+    density = np.zeros(SIZE)
+    density[:, 112:] = 0.3
+    result = texrs.design([grit, pebbles], SIZE, density=density, tiles=1, wrap=False)
+    lies = result.source.exemplar == 1
+    assert lies.mean() == pytest.approx(0.15, rel=0.03)
+    # A thing reaches over by less than its half.
+    assert lies[:, :100].mean() < 0.01
+    assert lies[:, 124:].mean() > 0.25
+
+
+def test_later_exemplars_lie_above(grit, flowers, pebbles):
+    result = texrs.design([grit, flowers, pebbles], SIZE, density=[0.3, 0.15], deformation=COPIED, tiles=1)
+    assert [covered(result, k) for k in (1, 2)] == pytest.approx([0.3, 0.15], rel=0.03)
+    whole = {e.label: int((e.distance > EDGE).sum()) for e in measure_elements(pebbles.labels)}
+    top = result.source.exemplar == 2
+    for label in np.unique(result.source.label[top]):
+        mine = result.source.label == label
+        row, column = result.source.coordinates[mine].astype(int).T
+        assert mine.sum() == whole[int(pebbles.labels[row[0], column[0]])]
+
+
+def test_nothing_is_scattered_at_a_density_of_nothing(grit, pebbles):
+    alone = texrs.design(grit, SIZE, tiles=1)
+    none = texrs.design([grit, pebbles], SIZE, density=0, tiles=1)
+    np.testing.assert_array_equal(alone.image, none.image)
+
+
+def test_what_cannot_be_reached_is_said(grit, pebbles):
+    result = texrs.design([grit, pebbles], (96, 64), density=1.0, tiles=1)
+    [said] = result.report["density"]
+    assert 0.3 < said["reached"] < 1
+    assert said["reached"] == pytest.approx(covered(result, 1), abs=1e-4)
+
+
+def test_things_go_around_the_ends_of_cyclic_axes(grit, pebbles):
+    result = texrs.design([grit, pebbles], 96, density=0.3, tiles=1, wrap=(True, False), seed=2)
+    labels = np.where(result.source.exemplar == 1, result.source.label, 0)
+    around = (labels[0] == labels[-1]) & (labels[0] > 0)
+    aside = (labels[:, 0] == labels[:, -1]) & (labels[:, 0] > 0)
+    assert around.any()
+    assert not aside.any()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"density": 1.2}, "^density: must be shares"),
+        ({"density": -0.1}, "^density: must be shares"),
+        ({"density": [0.2, 0.2]}, "^density: needs a number"),
+        ({"density": np.zeros((5, 5))}, "^density: needs a number"),
+        ({"density": "much"}, "^density"),
+        ({"density": 0.2, "weights": [1, 1]}, "^density: .* not for use with weights"),
+        ({"density": 0.2, "method": "paper"}, "^density: .* not for use with method"),
+    ],
+)
+def test_densities_are_checked(grit, pebbles, options, message):
+    with pytest.raises(InvalidInput, match=message):
+        texrs.design([grit, pebbles], 64, **options)
+
+
+def test_there_must_be_things(grit, pebbles):
+    with pytest.raises(InvalidInput, match="^density: scatters things of other exemplars"):
+        texrs.design(grit, 64, density=0.2)
+    plain = np.full((64, 64, 3), 90, np.uint8)
+    assert isinstance(texrs.Exemplar(plain).segment(), Segmentation)
+    with pytest.raises(InvalidInput, match="^density: of exemplar 1 no separate things"):
+        texrs.design([pebbles, plain], 64, density=0.2)
