@@ -6,6 +6,7 @@ The engine's own is the patch-based initialisation by hashed blocks at the coars
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,9 +35,20 @@ SEPARATE, ANY = Weights(surprise=0.5), Weights()
 """What seams cost where the elements are known, and where they are not."""
 GUESSED = Weights(surprise=0.5, contact=0.0, joint=0.0, jump=0.0, depth=0.15, presence=0.0)
 """And where they are guessed: things in a heap touch and lie on each other, so seams are charged for running inside alone."""
+PLAIN = replace(GUESSED, depth=0.0)
+"""And where elements are to play no part."""
 
 
-def from_patches(exemplar: Exemplar, level: int, seed: int, *, candidates: int = 4, bend: bool | None = None) -> Start:
+def from_patches(
+    exemplar: Exemplar,
+    level: int,
+    seed: int,
+    *,
+    candidates: int = 4,
+    bend: bool | None = None,
+    larger: float = 1.0,
+    plain: bool = False,
+) -> Start:
     """Return the start from patches stitched along minimum cuts: cuts keep elements whole.
 
     Parameters
@@ -51,8 +63,12 @@ def from_patches(exemplar: Exemplar, level: int, seed: int, *, candidates: int =
         Places that are tried for each, of which the best stays.
     bend : bool, optional
         Whether patches bend with a field; None: where the exemplar's edges have a direction, and no separate elements.
+    larger : float
+        Side of the patches, in usual ones.
+    plain : bool
+        Whether elements play no part in what seams cost.
     """
-    axes, side = exemplar.axes, patch_side(exemplar.shape)
+    axes, side = exemplar.axes, larger * patch_side(exemplar.shape)
 
     def make(
         region: Region, frames: NDArray[np.int16], asked: Asked, progress: Progress | None
@@ -66,7 +82,7 @@ def from_patches(exemplar: Exemplar, level: int, seed: int, *, candidates: int =
             overlap=OVERLAP[axes],
             candidates=candidates,
             bend=bent,
-            weights=weights_of(exemplar),
+            weights=PLAIN if plain else weights_of(exemplar),
             seed=seed,
             held=asked.held,
             given=asked.given,

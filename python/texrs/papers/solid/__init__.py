@@ -57,14 +57,16 @@ from typing import Any
 import numpy as np
 
 from texrs._engine.pyramid import ONE, Region, to_fixed
+from texrs._progress import stage
 from texrs._typing import Array, Interpolation, Progress
 from texrs.exemplar import Exemplar
 from texrs.fields import Field
-from texrs.growth import Constraints, Grown, Guide, Windows, from_patches, grow, keep
+from texrs.growth import Constraints, Grown, Guide, Windows, grow, keep
 from texrs.growth.engine import Places, Show
 from texrs.papers.solid.literal import grow_as_printed
+from texrs.papers.solid.plans import PLANS, Choice, Plan, choose_plan
 from texrs.papers.solid.request import Method, Request
-from texrs.papers.solid.settings import CANDIDATES, FAST, Quality
+from texrs.papers.solid.settings import FAST, Quality
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
@@ -188,6 +190,7 @@ def synthesize(
     wrap: bool | Sequence[bool] = False,
     quality: Quality = "preserve",
     bend: bool | None = None,
+    plan: Choice = "usual",
     method: Method = None,
     constraints: Constraints | None = None,
     guide: Guide | None = None,
@@ -216,6 +219,10 @@ def synthesize(
     bend : bool, optional
         Whether patches bend with the field, as courses and nets need, or are turned and scaled as a whole, as separate
         elements do; None goes by whether the exemplar has separate elements.
+    plan : {"usual", "large", "plain", "plain-large", "auto"}
+        How patches are put together. "large": a quarter larger than usual, which tears fewer things and copies more in one
+        piece. "plain": seams may run through elements. "auto": each is tried twice at the exemplar's size and judged
+        (`texrs.judging`), and what is clearly better than the usual is taken; the report's "tried" says how each was judged.
     method : {None, "paper", "paper-compensated"}
         Which algorithm. "paper": the literal one, kept for comparison; "paper-compensated": the same with the windows of
         Lefebvre and Hoppe, which the paper leaves out. They have no ``quality``, take no constraints
@@ -277,6 +284,7 @@ def synthesize(
         wrap=wrap,
         quality=quality,
         bend=bend,
+        plan=plan,
         method=method,
         constraints=constraints,
         guide=guide,
@@ -288,6 +296,7 @@ def synthesize(
 
 def grow_texture(asked: Request, progress: Progress | None) -> Synthesis:
     """Grow the source map, coarse to fine or from patches, and look the exemplar up through it."""
+    said: dict[str, Any] = {"plan": None, "tried": None}
     show = partial(show_places, asked.exemplar.pixels)
     if asked.method is not None:
         grown = grow_as_printed(
@@ -303,19 +312,29 @@ def grow_texture(asked: Request, progress: Progress | None) -> Synthesis:
         windows = analyse(asked)
         grown = windows.grow(asked.region, ask=asked.conditions.at, show=show, progress=progress)
     else:
-        grown = stitch(asked, show, progress)
+        grown, said = stitch(asked, show, progress)
     source = as_source(asked, grown)
     composite = source.render(asked.exemplar.image, interpolation=asked.interpolation)
     last = {} if grown.patches else {f"level {len(grown.levels)}": show(grown.places, asked.region, 1)}
     stages = {**grown.stages, **last, "composite": composite}
-    return Synthesis(asked.conditions.show(composite), source, stages, describe(asked, grown))
+    return Synthesis(asked.conditions.show(composite), source, stages, describe(asked, grown) | said)
 
 
-def stitch(asked: Request, show: Show, progress: Progress | None) -> Grown:
-    """Put patches together along minimum cuts, at full resolution: nothing has to be corrected."""
-    start = from_patches(asked.exemplar, 0, asked.seed, candidates=CANDIDATES[asked.quality], bend=asked.bend)
+def stitch(asked: Request, show: Show, progress: Progress | None) -> tuple[Grown, dict[str, Any]]:
+    """Put patches together along minimum cuts, at full resolution: nothing has to be corrected. Say by which plan."""
+    name, tried = choose_plan(asked.exemplar, asked.plan, asked.quality, partial(try_plan, asked, progress))
+    start = PLANS[name].start(asked.exemplar, asked.seed, asked.quality, asked.bend)
     frames = partial(to_fixed, asked.field)
-    return grow(asked.region, 1, start, keep, frames, ask=asked.conditions.at, show=show, progress=progress)
+    grown = grow(asked.region, 1, start, keep, frames, ask=asked.conditions.at, show=show, progress=progress)
+    return grown, {"plan": name, "tried": tried}
+
+
+def try_plan(asked: Request, progress: Progress | None, plan: Plan, seed: int) -> SourceMap:
+    """Put a picture of the exemplar's size together by a plan, without a field or anything else that is asked."""
+    stage(progress, "try")
+    region = Region.whole(asked.exemplar.shape, (False, False))
+    grown = grow(region, 1, plan.start(asked.exemplar, seed, asked.quality, None), keep, partial(to_fixed, None))
+    return SourceMap.from_coordinates(as_coordinates(grown.places, region), asked.exemplar.shape)
 
 
 def analyse(asked: Request) -> Windows:

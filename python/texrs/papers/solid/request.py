@@ -17,6 +17,7 @@ from texrs.exemplar.analysis import COARSEST
 from texrs.fields import Field
 from texrs.growth import Conditions, Constraints, Guide
 from texrs.papers.solid.limits import check_memory
+from texrs.papers.solid.plans import Choice, check_plan
 from texrs.papers.solid.settings import Quality, as_quality
 from texrs.volume._values import check_field
 
@@ -43,6 +44,8 @@ class Request:
         How much work is done.
     bend : bool, optional
         Whether patches bend with the field; none leaves it to the exemplar.
+    plan : {"usual", "large", "plain", "plain-large", "auto"}
+        How patches are put together.
     method : {None, "paper", "paper-compensated"}
         Which algorithm.
     conditions : Conditions
@@ -58,6 +61,7 @@ class Request:
     seed: int
     quality: Quality
     bend: bool | None
+    plan: Choice
     method: Method
     conditions: Conditions
     interpolation: Interpolation
@@ -79,6 +83,7 @@ class Request:
         guide: Guide | None,
         interpolation: Interpolation | None,
         memory_limit: int | None,
+        plan: Choice = "usual",
     ) -> Request:
         """Return the request of a caller, or raise what is wrong with it."""
         known = as_exemplar(exemplar, axes=axes, minimum=COARSEST)
@@ -89,13 +94,14 @@ class Request:
             raise InvalidInput(f"{what}: the paper's method knows none; leave out {what}, or method={method!r}")
         if bend is not None and not isinstance(bend, bool):
             raise InvalidInput(f"bend: needs True, False or None, got {bend!r}")
+        chosen = check_plan(plan, method, as_quality(quality))
         how = as_interpolation(interpolation, known, "cubic" if method is None else "nearest")
         turned = as_field(field, axes)
         if turned is not None:
             turned = turned.over(region.shape)
         check_memory(known.pixels, region, turned, memory_limit)
         conditions = Conditions.of(known.pixels, region.shape, constraints, guide)
-        return cls(known, region, turned, as_seed(seed), as_quality(quality), bend, method, conditions, how)
+        return cls(known, region, turned, as_seed(seed), as_quality(quality), bend, chosen, method, conditions, how)
 
 
 def as_field(field: object, axes: int) -> Field | None:
