@@ -11,10 +11,11 @@ import texrs
 from reference.look_up import view
 from texrs import samples
 from texrs.completion._judge import Filled, judge_seams
-from texrs.completion._patches import MARGIN, PLACES, choose_part
+from texrs.completion._patches import MARGIN, PLACES, choose_mirrors, choose_part
 from texrs.completion._scene import Scene
 from texrs.errors import Cancelled, InvalidInput
 from texrs.exemplar.patches import mark_corners
+from texrs.exemplar.symmetry import NONE
 
 PEBBLES = samples.pebbles((96, 112)).image
 
@@ -411,3 +412,29 @@ def test_same_bytes_for_any_number_of_threads():
     for other in made[1:]:
         assert other.image.tobytes() == made[0].image.tobytes()
         assert other.source.coordinates.tobytes() == made[0].source.coordinates.tobytes()
+
+
+def test_what_is_lit_from_one_side_is_not_mirrored_whatever_the_hole_holds():
+    noise = np.random.default_rng(3).random((96, 96, 3)).astype(np.float32)
+    hole = np.zeros((96, 96), bool)
+    hole[30:60, 8:40] = True
+    noise[hole] = np.linspace(0, 1, 30 * 32)[:, np.newaxis]
+    lit = samples.beans((96, 96)).image
+    assert len(choose_mirrors([noise], hole, None)) == 4
+    assert choose_mirrors([lit], hole, None) == (NONE,)
+    assert choose_mirrors([noise, lit], hole, None) == (NONE,)
+    assert [len(choose_mirrors([lit], hole, said)) for said in (True, False)] == [4, 1]
+    for picture, mirrored in ((noise, True), (lit, False)):
+        result = texrs.complete(picture, hole)
+        assert result.report["mirror"] is mirrored
+        frames = result.source.frames()
+        assert mirrored or (np.diagonal(frames, axis1=-2, axis2=-1) == 1).all()
+    assert len(choose_mirrors([noise], np.ones((96, 96), bool), None)) == 4
+
+
+def test_patches_that_cover_the_hole_are_tried():
+    hole = np.zeros((128, 128), bool)
+    hole[40:70, 50:80] = True
+    sides = [side for side, _ in texrs.complete(samples.scales((128, 128)).image, hole).report["tried"]]
+    assert max(sides) > 30
+    assert max(sides) <= 1.3 * 30

@@ -19,9 +19,10 @@ from texrs._typing import Array, Bools, Floats, Progress
 from texrs.blending import blend as correct_colours
 from texrs.completion._depth import fill_in_depth
 from texrs.completion._optimise import optimise, recover_scale
-from texrs.completion._patches import LEAST, fill_with_patches, map_untouched
+from texrs.completion._patches import LEAST, choose_mirrors, fill_with_patches, map_untouched
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
+from texrs.exemplar.symmetry import NONE
 from texrs.synthesis import Synthesis
 
 __all__ = ["complete"]
@@ -74,8 +75,9 @@ def complete(
         Width in pixels of the hole's boundary, which may be replaced too, 0 to 1024, so that the seam can run where it shows
         least. 0 leaves all that is known as it is.
     mirror : bool, optional
-        Whether patches may be mirrored; False for lit or lettered textures. By default they may unless there is a scale map:
-        what is seen at an angle has an upper side.
+        Whether patches may be mirrored; False for lettered textures. By default along those axes where nothing tells the
+        picture beside the hole from its mirror image, as light from one side does; not where there is a scale map: what is
+        seen at an angle has an upper side.
     blend : float, optional
         Weight of the values, 0 to 1e6, when colours of what is filled are corrected so that seams disappear: the smaller,
         the wider the correction; 0.003 is good for the picture's own colours, less where an ``exemplar`` has other light.
@@ -123,7 +125,8 @@ def complete(
     as_method(method, "patch", "optimise")
     if exemplar_scale_map is not None and (exemplar is None or scale_map is None):
         raise InvalidInput("exemplar_scale_map: needs an exemplar, and a scale_map whose units it shares")
-    mirror = scale_map is None if mirror is None else as_bool(mirror, "mirror")
+    if mirror is not None or scale_map is not None:
+        mirror = False if mirror is None else as_bool(mirror, "mirror")
     screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
     picture = image.image if isinstance(image, Exemplar) else image
     asked = mark_transparent(picture) if isinstance(hole, str) and hole == "alpha" else hole
@@ -143,6 +146,7 @@ def complete(
     levels: list[dict[str, object]] = []
     tried: list[tuple[int, float]] = []
     wide = widen(open_, width, cyclic)
+    mirrors = choose_mirrors(pictures, open_, mirror) if open_.any() and method == "patch" else (NONE,)
     if open_.any() and method == "optimise":
         places, levels = optimise(
             pictures, open_, scales, wide, wrap=(cyclic[0], cyclic[1]), seed=seed, progress=progress
@@ -150,7 +154,7 @@ def complete(
         count = int(places.label.max())
     elif open_.any():
         deep = None
-        if scales is not None and len(pictures) == 1 and not mirror:
+        if scales is not None and len(pictures) == 1 and len(mirrors) == 1:
             deep = fill_in_depth(
                 pictures[0],
                 open_,
@@ -168,7 +172,7 @@ def complete(
                 scales,
                 chosen,
                 ~wide,
-                mirror=mirror,
+                mirrors=mirrors,
                 wrap=(cyclic[0], cyclic[1]),
                 seed=seed,
                 watch=watch,
@@ -208,7 +212,7 @@ def complete(
         "patch": round(side, 3),
         "tried": [[s, round(shown, 3)] for s, shown in tried],
         "patches": count,
-        "mirror": mirror,
+        "mirror": len(mirrors) > 1,
         "blend": screening,
         "wrap": list(cyclic),
     }

@@ -16,7 +16,7 @@ from texrs.completion._judge import Filled, judge_seams
 from texrs.completion._scene import Scene
 from texrs.errors import InvalidInput
 from texrs.exemplar.patches import choose_usual_side, mark_corners
-from texrs.exemplar.symmetry import ALL, NONE, Flip
+from texrs.exemplar.symmetry import ALL, NONE, SUSPECT, Flip, find_mirrors
 from texrs.source_map import SourceMap
 
 SCALED = np.float32(2.0)
@@ -33,8 +33,8 @@ WIDEST = 0.3
 """The largest of them is at most this share of the shorter side."""
 CLEARLY = 0.97
 """Smaller patches are taken where their seams show less than this share of what those of larger ones show."""
-WITHIN = 0.75
-"""And at most this share of the side of a square of all holes: one that covers a hole shows its outline."""
+WITHIN = 1.3
+"""And at most this share of the side of a square of all holes: in a wall a patch that covers a hole brings its joints along."""
 MANY = 256
 """Only patches are tried of which about so many fill the holes."""
 COVERS = 0.4
@@ -56,7 +56,7 @@ def fill_with_patches(
     chosen: int | None,
     keep: Bools,
     *,
-    mirror: bool,
+    mirrors: Sequence[Flip],
     wrap: tuple[bool, bool],
     seed: int,
     watch: Progress,
@@ -82,7 +82,6 @@ def fill_with_patches(
     known, itself = ~open_[part], len(pictures) == 1
     free = known if itself else np.ones(shapes[-1], bool)
     scene = Scene(guides[0], known, keep[part], guides[-1], free, cyclic)
-    mirrors = ALL if mirror else (NONE,)
     tried: list[tuple[int, float]] = []
     made: Filled | None = None
     if chosen is not None:
@@ -102,6 +101,19 @@ def fill_with_patches(
     source.exemplar[part][new] = len(shapes) - 1
     source.label[part] = made.label
     return SourceMap(source.coordinates, source.exemplar, source.label, made.frames, shapes), side, tried
+
+
+def choose_mirrors(pictures: Sequence[Array], open_: Bools, mirror: bool | None) -> tuple[Flip, ...]:
+    """Return the mirror images that patches are copied from: as was said, or those that nothing tells from the picture."""
+    if mirror is not None:
+        return ALL if mirror else (NONE,)
+    if len(pictures) == 2:
+        return find_mirrors(guidance(as_image(pictures[1])), SUSPECT)
+    rows, columns = (np.flatnonzero(open_.any(axis=1 - axis)) for axis in range(2))
+    beside = [np.s_[: rows[0]], np.s_[rows[-1] + 1 :], np.s_[:, : columns[0]], np.s_[:, columns[-1] + 1 :]]
+    # The outline of a hole would be taken for the light; too little beside it tells nothing.
+    known = max((pictures[0][part] for part in beside), key=lambda p: p.shape[0] * p.shape[1])
+    return find_mirrors(guidance(as_image(known)), SUSPECT) if known.size else ALL
 
 
 def try_sides(
