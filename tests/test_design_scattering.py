@@ -73,6 +73,14 @@ def test_a_map_says_where_how_much_lies(grit, pebbles):
     assert lies[:, 124:].mean() > 0.25
 
 
+def test_a_map_may_rise_slowly(grit, flowers):
+    density = 0.4 * np.linspace(0, 1, 384) * np.ones((256, 1))
+    result = texrs.design([grit, flowers], (256, 384), density=density, tiles=1, wrap=False)
+    lies, parts = result.source.exemplar == 1, [np.s_[:, k : k + 128] for k in (0, 128, 256)]
+    for part in parts:
+        assert lies[part].mean() == pytest.approx(density[part].mean(), abs=0.06)
+
+
 def test_later_exemplars_lie_above(grit, flowers, pebbles):
     result = texrs.design([grit, flowers, pebbles], SIZE, density=[0.3, 0.15], deformation=COPIED, tiles=1)
     assert [covered(result, k) for k in (1, 2)] == pytest.approx([0.3, 0.15], rel=0.03)

@@ -110,9 +110,10 @@ def choose_mirrors(pictures: Sequence[Array], open_: Bools, mirror: bool | None)
     if len(pictures) == 2:
         return find_mirrors(guidance(as_image(pictures[1])), SUSPECT)
     rows, columns = (np.flatnonzero(open_.any(axis=1 - axis)) for axis in range(2))
-    beside = [np.s_[: rows[0]], np.s_[rows[-1] + 1 :], np.s_[:, : columns[0]], np.s_[:, columns[-1] + 1 :]]
+    whole = pictures[0]
+    beside = [whole[: rows[0]], whole[rows[-1] + 1 :], whole[:, : columns[0]], whole[:, columns[-1] + 1 :]]
     # The outline of a hole would be taken for the light; too little beside it tells nothing.
-    known = max((pictures[0][part] for part in beside), key=lambda p: p.shape[0] * p.shape[1])
+    known = max(beside, key=lambda part: part.shape[0] * part.shape[1])
     return find_mirrors(guidance(as_image(known)), SUSPECT) if known.size else ALL
 
 

@@ -41,8 +41,9 @@ TRIES, PATIENCE = 24, 80
 each other after half as many."""
 CLUSTER, UNEVEN = 4.0, 0.5
 """Size of clusters in things, and by how much their density differs from the mean, where no map is given."""
-CELLS, ROUNDS = 0.5, 64
-"""Size in things of the cells in which density is measured, and how often it is at least."""
+CELLS, AROUND, ROUNDS = 0.5, 2.5, 64
+"""Size in things of the cells in which density is measured, how far around each (where few lie, there is always room between
+two), and how often it is at least."""
 EXACT, LAST, FITTED = 0.01, 2.0, 12
 """What a density may be off, of itself; what is left, in things, from which on the next is chosen by its size, and from how
 many."""
@@ -95,13 +96,13 @@ def cut_out(element: Element, moves: Moves, shape: tuple[int, int], seed: int, w
     matrix = np.eye(2)
     for operation in moves.draw_changes(values, moves.count(), 1.0):
         matrix = operation.matrix() @ matrix
-    inverse = np.linalg.inv(matrix)
+    inverse = np.asarray(np.linalg.inv(matrix), np.float64)
     # A whole centre: what is not changed copies samples.
     centre = np.round(element.centre)
     low, high = element.origin - centre, element.origin + np.array(element.distance.shape) - 1 - centre
     corners = np.array([[low[0], low[1]], [low[0], high[1]], [high[0], low[1]], [high[0], high[1]]]) @ matrix.T
     first, last = np.floor(corners.min(axis=0)).astype(int), np.ceil(corners.max(axis=0)).astype(int)
-    away = np.stack(np.mgrid[first[0] : last[0] + 1, first[1] : last[1] + 1], axis=-1).reshape(-1, 2)
+    away = np.moveaxis(np.indices(last - first + 1), 0, -1).reshape(-1, 2) + first
     coordinates = (away @ inverse.T + centre).astype(np.float32)
     local = coordinates - element.origin.astype(np.float32)
     distance = gather(element.distance, local[np.newaxis], interpolation="linear")[0]
@@ -284,8 +285,10 @@ class Room:
 
         # Not where none were asked at all, nor where others hide what lies there.
         open_ = np.isfinite(self.wanted) & (self.free > 0)
-        lack = gaussian_filter(np.where(np.isfinite(self.wanted), self.wanted, 0), 1 / CELLS, mode=self.mode)
-        self.lack = np.cumsum(np.where(open_, np.maximum(lack, 1e-3), 0))
+        lack = gaussian_filter(np.where(np.isfinite(self.wanted), self.wanted, 0), AROUND / CELLS, mode=self.mode)
+        # Where too few find room, what others still lack must not come to lie where nothing is wanted any more.
+        wanting = np.where(open_, np.maximum(lack, 0), 0)
+        self.lack = np.cumsum(wanting if wanting.any() else open_.astype(np.float64))
 
     def draw(self, rng: np.random.Generator, count: int) -> list[tuple[int, int]]:
         """Draw pixels, each with the probability of what is wanted around it."""
