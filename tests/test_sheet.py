@@ -95,7 +95,7 @@ def test_what_a_sheet_shows_is_the_exemplar(disc_floor):
     copies = Copies.of(colours, scale, (1.0, 0.8, 1.25), scale)
     for sheet in (flat, copies):
         rows, columns = np.nonzero(sheet.free)
-        at, frames = sheet.locate(sheet.fix(rows, columns))
+        at, frames = sheet.locate(np.stack([rows, columns], axis=-1).astype(np.int32) * ONE)
         assert (at >= 0).all()
         assert (at <= 127).all()
         assert (np.linalg.det(frames) > 0).all()
@@ -104,6 +104,41 @@ def test_what_a_sheet_shows_is_the_exemplar(disc_floor):
     np.testing.assert_allclose(flat.locate(places)[0], grid, atol=0.01)
     near = np.rint(places / ONE).astype(int)
     assert flat.free[near[:, 0], near[:, 1]].all()
+
+
+def test_copies_have_the_elements_of_the_exemplar():
+    image, scale = checks.floor((128, 128))
+    sheet = Copies.of(texrs.Exemplar(image).guidance, scale, (1.0, 0.64, 1.5625), np.array([0.5, 1.6], np.float32))
+    first = sheet.copies[0]
+    for copy in sheet.copies:
+        labels, depth = (a[copy.window] for a in (sheet.elements.labels, sheet.elements.depth))
+        others = np.delete(
+            sheet.elements.labels.ravel(), np.arange(sheet.free.size).reshape(sheet.free.shape)[copy.window]
+        )
+        assert not np.intersect1d(labels[labels > 0], others).size
+        # As many of them, and as much of them, as where they come from: so many times larger, and so many times as deep.
+        assert len(np.unique(labels)) > 20
+        size = float(np.sqrt(np.prod(copy.factor)))
+        ends = [slice(f, f + round(n / k)) for f, n, k in zip(copy.first, copy.shape, copy.factor, strict=True)]
+        there = sheet.elements.depth[first.window][tuple(ends)]
+        assert (depth > 0).mean() == pytest.approx((there > 0).mean(), rel=0.1)
+        assert depth.max() == pytest.approx(size * there.max(), rel=0.1)
+    # All numbers are used.
+    assert np.array_equal(np.unique(sheet.elements.labels), np.arange(sheet.elements.count + 1))
+    assert (sheet.elements.labels[~sheet.free] == 0).all()
+
+
+def test_a_sheet_shows_pictures_in_register(disc_floor):
+    image, scale = disc_floor
+    colours = texrs.Exemplar(image).guidance
+    for sheet in (
+        Flattened.of(colours, find_plane(colours, scale), scale),
+        Copies.of(colours, scale, (1.0, 0.8), scale),
+    ):
+        shown = sheet.show(colours)
+        assert shown.shape == sheet.colours.shape
+        assert np.abs(shown - sheet.colours)[sheet.free].mean() < 0.03
+        assert (shown[~sheet.free] == 0).all()
 
 
 def test_elements_on_a_plane_are_whole():

@@ -62,6 +62,12 @@ class Copy:
     origin: tuple[int, int]
     shape: tuple[int, int]
 
+    @property
+    def window(self) -> tuple[slice, slice]:
+        """Where in the atlas it lies."""
+        (top, left), (rows, columns) = self.origin, self.shape
+        return slice(top, top + rows), slice(left, left + columns)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AtlasLevel:
@@ -249,7 +255,7 @@ def measure(copies: Sequence[Copy], block: int) -> tuple[int, int]:
     return max(e[0] for e in ends), max(e[1] for e in ends)
 
 
-def fill_gaps(packed: Floats, copies: Sequence[Copy], block: int) -> None:
+def fill_gaps(packed: Array, copies: Sequence[Copy], block: int) -> None:
     """Fill what no copy covers with colours of the first: what is constant would count as texture."""
     empty = np.ones(packed.shape[:2], bool)
     for copy in copies:

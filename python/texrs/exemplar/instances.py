@@ -172,6 +172,8 @@ def label_components(mask: Bools, wrap: Sequence[bool]) -> NDArray[np.intp]:
     from scipy import ndimage
 
     labels, count = ndimage.label(mask)
+    if not any(wrap):
+        return np.asarray(labels, np.intp)
     roots = np.arange(count + 1)
 
     def root(k: int) -> int:

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from texrs._arrays import log_single
 from texrs._engine.pyramid import ONE
 from texrs._engine.stitcher import Stitcher
-from texrs._typing import Bools, Floats
+from texrs._typing import Array, Bools, Floats
+from texrs.exemplar.adjacency import Adjacency, measure_adjacency
 from texrs.exemplar.atlas import BARRED, NAT, Copy, fill_gaps, find_box, measure, pack, resize
 from texrs.exemplar.instances import Instances, find_instances, label_components
 from texrs.exemplar.stitching import make_stitcher
@@ -28,6 +29,8 @@ from texrs.scale_maps._plane import Plane
 
 __all__ = ["Copies", "Flattened", "Sheet", "code", "find_plane"]
 
+OPEN = (False, False)
+"""A sheet repeats along no axis."""
 GAP = 8
 """Samples between copies: patches that lie across it cost too much."""
 BLURRED = 1.8
@@ -106,13 +109,12 @@ class Sheet(ABC):
     @cached_property
     def stitcher(self) -> tuple[Stitcher, Instances | None]:
         """The sheet as patches are cut from it, and its elements."""
-        open_ = (False, False)
-        found = find_instances(self.colours, open_)
-        if found is not None:
-            # What is cut off by a border is another element than what goes on beyond it.
-            labels = label_components((found.labels > 0) & self.free, open_)
-            found = Instances(labels.astype(np.uint32), found.depth) if labels.any() else None
-        return make_stitcher(self.colours, open_, found), found
+        found, beside = self.analyse()
+        return make_stitcher(self.colours, OPEN, found, beside=beside), found
+
+    @abstractmethod
+    def analyse(self) -> tuple[Instances | None, Adjacency]:
+        """Find the separate elements of what may be shown, and which colours lie side by side."""
 
     def values(self, strength: float) -> NDArray[np.int16]:
         """Return what a demand compares: scales, by how much they count, and what is barred: (samples * 4)."""
@@ -121,9 +123,9 @@ class Sheet(ABC):
         values[..., 1] = np.where(self.free, 0, BARRED)
         return values.reshape(-1)
 
-    def fix(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.int32]:
-        """Return the places of samples: (N, 2), in fixed point."""
-        return np.stack([rows, columns], axis=-1).astype(np.int32) * ONE
+    @abstractmethod
+    def show(self, image: Array) -> Array:
+        """Return a picture in register with the exemplar laid out as the sheet is, black where there is nothing."""
 
     @abstractmethod
     def describe(self) -> dict[str, Any]:
@@ -188,6 +190,23 @@ class Flattened(Sheet):
         shown = gather(colours, mirror(at, shape).astype(np.float32), interpolation="linear")
         return cls(shape, shown, log_single(scales), inside, plane, (float(low[0]), float(low[1])), resolution)
 
+    def analyse(self) -> tuple[Instances | None, Adjacency]:
+        """Analyse the plane as it lies flattened: there its elements have one size."""
+        found = find_instances(self.colours, OPEN)
+        if found is not None:
+            # What is cut off by a border is another element than what goes on beyond it.
+            labels = label_components((found.labels > 0) & self.free, OPEN)
+            found = Instances(labels.astype(np.uint32), found.depth) if labels.any() else None
+        return found, measure_adjacency(self.colours, OPEN)
+
+    def show(self, image: Array) -> Array:
+        """Return the plane flattened."""
+        rows, columns = np.nonzero(self.free)
+        shown = np.zeros((*self.free.shape, *image.shape[2:]), image.dtype)
+        places = np.stack([rows, columns], axis=-1).astype(np.int32) * ONE
+        shown[rows, columns] = gather(image, self.locate(places)[0])
+        return shown
+
     def describe(self) -> dict[str, Any]:
         """Return how the plane lies: the tilt in degrees as `texrs.scale_maps`, the ratio of its scales, and the fit."""
         tilt = degrees(atan2(self.plane.down[0], -self.plane.down[1])) % 360
@@ -232,8 +251,8 @@ class Flattened(Sheet):
         if min(target.shape) < 2:
             return 0.0
         steps = np.stack([np.diff(places, axis=0)[:, :-1], np.diff(places, axis=1)[:-1]], axis=-1) / ONE
-        shown = np.maximum(np.abs(np.linalg.det(steps)), 1e-9)
-        asked = np.abs(np.linalg.det(frames.reshape(*target.shape, 2, 2)[:-1, :-1] / ONE))
+        shown = np.maximum(measure_areas(steps), 1e-9)
+        asked = measure_areas(frames.reshape(*target.shape, 2, 2)[:-1, :-1] / ONE)
         return float(np.median(np.abs(np.log(shown / asked)))) / 2
 
     def place(self, coordinates: Floats) -> NDArray[np.int32]:
@@ -271,16 +290,42 @@ class Copies(Sheet):
         shown = np.zeros((*sides, colours.shape[-1]), np.float32)
         free, owner, sized = np.zeros(sides, bool), np.zeros(sides, np.uint16), np.zeros(sides, np.float32)
         for number, copy in enumerate(copies):
-            here = tuple(slice(o, o + n) for o, n in zip(copy.origin, copy.shape, strict=True))
+            here = copy.window
             shown[here], owner[here] = resize(colours, copy), number
             free[here] = True
-            at = [
-                (np.arange(n) + 0.5) / f - 0.5 + o for n, f, o in zip(copy.shape, copy.factor, copy.first, strict=True)
-            ]
-            grid = np.stack(np.meshgrid(*at, indexing="ij"), axis=-1).astype(np.float32)
-            sized[here] = gather(logs, grid, interpolation="linear") + np.float32(np.log(copy.factor).mean())
+            sized[here] = gather(logs, lay_out(copy)) + np.float32(np.log(copy.factor).mean())
         fill_gaps(shown, copies, 1)
         return cls(shape, shown, sized, free, copies, owner)
+
+    def analyse(self) -> tuple[Instances | None, Adjacency]:
+        """Analyse the exemplar, and look up in its copies what has been found: they are many times as large."""
+        colours = self.colours[self.copies[0].window]
+        found, beside = find_instances(colours, OPEN), measure_adjacency(colours, OPEN)
+        classes = np.zeros(self.free.shape, np.uint8)
+        labels, depth = np.zeros(self.free.shape, np.uint32), np.zeros(self.free.shape, np.float32)
+        for number, copy in enumerate(self.copies):
+            here, at = copy.window, lay_out(copy)
+            classes[here] = gather(beside.classes, at, interpolation="nearest")
+            if found is not None:
+                own = gather(found.labels, at, interpolation="nearest")
+                # An element and its copies are different ones.
+                labels[here] = np.where(own > 0, own + number * found.count, 0)
+                # What is interpolated reaches over their borders.
+                inside = gather(found.depth > 0, at, interpolation="nearest")
+                depth[here] = gather(found.depth, at) * inside * np.float32(np.sqrt(np.prod(copy.factor)))
+        fill_gaps(classes, self.copies, 1)
+        if found is not None:
+            there = np.bincount(labels.ravel()) > 0
+            there[0] = False
+            found = Instances(np.where(there, np.cumsum(there), 0).astype(np.uint32)[labels], depth)
+        return found, Adjacency(classes, beside.costs)
+
+    def show(self, image: Array) -> Array:
+        """Return the copies side by side."""
+        shown = np.zeros((*self.free.shape, *image.shape[2:]), image.dtype)
+        for copy in self.copies:
+            shown[copy.window] = gather(image, lay_out(copy))
+        return shown
 
     def describe(self) -> dict[str, Any]:
         """Return the sizes of the copies."""
@@ -319,6 +364,12 @@ class Copies(Sheet):
         return tuple(np.clip(near[..., k], 0, n - 1).astype(np.intp) for k, n in enumerate(self.free.shape))
 
 
+def lay_out(copy: Copy) -> Floats:
+    """Return where in the exemplar the samples of a copy lie: (rows, columns, 2)."""
+    at = [(np.arange(n) + 0.5) / f - 0.5 + o for n, f, o in zip(copy.shape, copy.factor, copy.first, strict=True)]
+    return np.stack(np.meshgrid(*at, indexing="ij"), axis=-1).astype(np.float32)
+
+
 def find_plane(colours: Floats, scale: Floats) -> Plane | None:
     """Return the plane that an exemplar is a picture of, if the evidence is good enough.
 
@@ -352,6 +403,11 @@ def _measure_foreshortening(colours: Floats, plane: Plane) -> float:
     scales = means[0] / count
     scales -= scales.mean()
     return -float((scales * steep).sum() / max(float((scales**2).sum()), 1e-9))
+
+
+def measure_areas(frames: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the absolute values of the determinants of Jacobians (..., 2, 2)."""
+    return np.asarray(np.abs(frames[..., 0, 0] * frames[..., 1, 1] - frames[..., 0, 1] * frames[..., 1, 0]), np.float64)
 
 
 def code(logs: Floats, strength: float) -> NDArray[np.int16]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from texrs._engine.stitcher import Stitcher
 from texrs._typing import Floats
-from texrs.exemplar.adjacency import measure_adjacency
+from texrs.exemplar.adjacency import Adjacency, measure_adjacency
 from texrs.exemplar.instances import Instances
 from texrs.exemplar.segmentation import Segmentation
 
@@ -18,9 +18,16 @@ REACH, DEEP = 3.0, 8.0
 """Depth in pixels from which on cuts cost the same everywhere inside of what may be an element, and what it counts as."""
 
 
-def make_stitcher(colours: Floats, wrap: Sequence[bool], elements: Instances | None, *, sure: bool = True) -> Stitcher:
-    """Return an exemplar as patches are cut from it: with its elements, and which colours lie side by side."""
-    beside = measure_adjacency(colours, wrap)
+def make_stitcher(
+    colours: Floats,
+    wrap: Sequence[bool],
+    elements: Instances | None,
+    *,
+    sure: bool = True,
+    beside: Adjacency | None = None,
+) -> Stitcher:
+    """Return an exemplar as patches are cut from it: with its elements, and which colours lie side by side if that is known."""
+    beside = beside or measure_adjacency(colours, wrap)
     return Stitcher(
         colours,
         wrap=wrap,

@@ -43,7 +43,6 @@ from texrs._typing import Array, Interpolation, Progress
 from texrs.exemplar import Exemplar
 from texrs.exemplar.sheet import Copies, Flattened, Sheet, find_plane
 from texrs.growth import FromSheet, stitch_sheet
-from texrs.kernels.gather import gather
 from texrs.papers.perspective.literal import average_windows
 from texrs.papers.perspective.request import Method, Request
 from texrs.papers.perspective.sizes import Outside, Sizes, bring_within, choose_sizes
@@ -173,18 +172,8 @@ def perspective(
         found.coordinates, asked.exemplar.shape, label=found.patches, frame=found.frames
     )
     composite = source.render(asked.exemplar.image, interpolation=asked.interpolation, antialias=True)
-    stages = {"sheet": show_sheet(asked, sheet), "target": wanted, "composite": composite}
+    stages = {"sheet": sheet.show(asked.exemplar.image), "target": wanted, "composite": composite}
     return Synthesis(composite, source, stages, describe(asked, sheet, found, outside))
-
-
-def show_sheet(asked: Request, sheet: Sheet) -> Array:
-    """Return a picture of what patches are cut from, black where there is nothing."""
-    rows, columns = np.nonzero(sheet.free)
-    image = asked.exemplar.image
-    shown = np.zeros((*sheet.free.shape, *image.shape[2:]), image.dtype)
-    places = sheet.fix(rows, columns)
-    shown[rows, columns] = gather(image, sheet.locate(places)[0], interpolation="linear")
-    return shown
 
 
 def describe(asked: Request, sheet: Sheet, found: FromSheet, outside: Outside) -> dict[str, Any]:
