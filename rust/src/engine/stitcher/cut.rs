@@ -121,12 +121,8 @@ impl<'a, const D: usize> Cutter<'a, D> {
         core: &[bool],
     ) -> View<D> {
         let mut view = View::new(canvas, window, mask, core, self.source());
-        view.points = self.weigh(window, &view.places, &view.distortion);
-        for (cost, &patch) in view.points.iter_mut().zip(&view.patches) {
-            if patch == FREE {
-                *cost = 0.0;
-            }
-        }
+        let counts = |i: usize| mask[i] && view.patches[i] != FREE;
+        view.points = self.weigh(window, &view.places, &view.distortion, counts);
         view
     }
 
@@ -137,13 +133,19 @@ impl<'a, const D: usize> Cutter<'a, D> {
         Proposal {
             window: &chart.window,
             mask: &chart.mask,
-            points: self.weigh(&chart.window, &places, &chart.distortion),
+            points: self.weigh(&chart.window, &places, &chart.distortion, |i| chart.mask[i]),
             places,
         }
     }
 
-    /// What each point of a window costs by itself that shows a place; empty where that is nothing.
-    fn weigh(&self, window: &Window<D>, places: &[Place<D>], distortion: &[f32]) -> Vec<f32> {
+    /// What each point of a window that counts costs by itself that shows a place; empty where that is nothing.
+    fn weigh(
+        &self,
+        window: &Window<D>,
+        places: &[Place<D>],
+        distortion: &[f32],
+        counts: impl Fn(usize) -> bool,
+    ) -> Vec<f32> {
         let (weights, source) = (&self.judge.weights, self.source());
         let presence = if source.has_elements() {
             weights.presence
@@ -154,6 +156,9 @@ impl<'a, const D: usize> Cutter<'a, D> {
             return Vec::new();
         }
         let cost = |(i, &place): (usize, &Place<D>)| {
+            if !counts(i) {
+                return 0.0;
+            }
             let mut cost = weights.distortion * distortion.get(i).copied().unwrap_or(0.0);
             let sample = source.sample(place);
             if let Some(guide) = self.guide {

@@ -7,7 +7,7 @@ use crate::engine::stitcher::source::{Colour, Source};
 use crate::foundation::fixed::nearest;
 
 /// Points of a patch that are compared, at most, of those that are known and of those of which something is asked.
-const POINTS: usize = 4096;
+const POINTS: usize = 1024;
 
 /// What is known of a patch, and what is asked of it.
 pub(super) struct Fit<'a, const D: usize> {

@@ -36,6 +36,8 @@ const CHANCE: f32 = 0.1;
 const OFTEN: f32 = 6.0;
 /// Blocks around which places are looked for, as a multiple of those that are wanted.
 const BLOCKS: usize = 4;
+/// Values in a row of which the least is kept, so that the next best is found without looking at all again.
+const RUN: usize = 512;
 
 /// What it costs to choose places that others have chosen.
 #[derive(Debug, Clone, Copy)]
@@ -322,11 +324,13 @@ impl<const D: usize> Index<D> {
             }
         }
         let mut found = Vec::with_capacity(count);
+        let mut runs: Vec<(f32, usize)> = values.chunks(RUN).map(least).collect();
+        let mut changed = Vec::new();
         while found.len() < count {
             let mut best = (f32::INFINITY, 0);
-            for (k, &v) in values.iter().enumerate() {
+            for (run, &(v, k)) in runs.iter().enumerate() {
                 if v < best.0 {
-                    best = (v, k);
+                    best = (v, run * RUN + k);
                 }
             }
             if best.0 == f32::INFINITY {
@@ -335,8 +339,15 @@ impl<const D: usize> Index<D> {
             let block = blocks.point(best.1);
             found.push(lattice.centre(block, first));
             self.around(blocks, block.map(|x| x as i32), wide(APART), |k| {
-                values[k] = f32::INFINITY
+                values[k] = f32::INFINITY;
+                if changed.last() != Some(&(k / RUN)) {
+                    changed.push(k / RUN);
+                }
             });
+            for run in changed.drain(..) {
+                let end = values.len().min((run + 1) * RUN);
+                runs[run] = least(&values[run * RUN..end]);
+            }
         }
         found
     }
@@ -386,6 +397,12 @@ impl<const D: usize> Range<D> {
             }
         })
     }
+}
+
+/// The least of some values, and where the first of such is.
+fn least(values: &[f32]) -> (f32, usize) {
+    let low = values.iter().fold(f32::INFINITY, |a, &b| a.min(b));
+    (low, values.iter().position(|&v| v == low).unwrap_or(0))
 }
 
 /// The least and the largest step of a chart along each axis.
