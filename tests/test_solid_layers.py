@@ -26,6 +26,7 @@ FIELDS: dict[str, Callable[[int], fields.Field | None]] = {
     "none": lambda axes: None,
     "turned": lambda axes: fields.slant(30, axes=axes),
     "circular": lambda axes: fields.circular(centre=(4 if axes == 2 else -30,) * axes, axes=axes),
+    "zigzag": lambda axes: fields.zigzag(40, 35, axes=axes),
     "ramp": lambda axes: fields.scale_ramp(0.4, 1.8, length=60, axes=axes),
 }
 SIDE = {2: 120, 3: 24}
@@ -209,6 +210,29 @@ def test_the_ground_covers_the_world_with_the_exemplar(field: str, repeat: bool)
     frames = to_fixed(known, here)
     assert len(table) >= 12
     assert frames.shape[0] == 1 or len(np.unique(table[:, 4:8], axis=0)) > 1
+
+
+def test_boxes_end_at_folds() -> None:
+    field = fields.zigzag(24, 35)
+    here = Region((40, 30, 32), (-3, 5, 0), (False,) * 3)
+    _, boxes, table = Ground((64,) * 3, (True,) * 3, 32, 7, field).show(here)
+    # Each shows one band of the field alone, from end to end.
+    assert np.array_equal(table[boxes, 6:15].reshape(-1, 3, 3), to_fixed(field, here))
+    tiles = 3 * 2 * 1
+    assert len(table) <= tiles * (32 // 12 + 2)
+
+
+def test_folds_do_not_shatter_what_lies_between_them() -> None:
+    """Boxes are divided along the axis of the folds alone: across the others patches go from end to end."""
+    plain = layers.Layers(exemplar(3), fields.zigzag(16, 30), 3, candidates=2, cache_bytes=1 << 24)
+    made = next(plain._make_all([(1, 0, 0, 0)], None))
+    assert plain.side > 1.5 * 16
+    assert len(made.table) < 4 * 2 * plain.side / 8 + 4 * plain.side / 8
+    shown, counts = np.unique(made.patches, return_counts=True)
+    assert counts.max() > made.patches.size / 16
+    largest = np.argwhere(made.patches == shown[counts.argmax()])
+    low, high = largest.min(axis=0), largest.max(axis=0)
+    assert (high - low)[:2].min() > 0.5 * plain.side
 
 
 def test_boxes_are_what_was_packed() -> None:

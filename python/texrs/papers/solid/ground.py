@@ -74,8 +74,9 @@ class Ground:
                     line = np.arange(start[axis], stop[axis]) - centre[axis]
                     found = found + line.reshape(-1, *(1,) * (axes - axis)) * frame[:, axis]
                 places[here], boxes[here] = found, len(table)
+                longest = max(b - a for a, b in zip(low, high, strict=True))
                 seen = [c - o for c, o in zip(centre, region.origin, strict=True)]
-                table.append([*seen, *place, *frame.reshape(-1).tolist(), self.side * ONE, 1])
+                table.append([*seen, *place, *frame.reshape(-1).tolist(), longest * ONE, 1])
         return places.reshape(-1), boxes.reshape(-1), np.array(table, np.int32)
 
     def boxes(self, index: Sequence[int]) -> Iterator[tuple[tuple[int, ...], tuple[int, ...], Row]]:
@@ -97,38 +98,58 @@ class Ground:
     def _divide(
         self, low: tuple[int, ...], high: tuple[int, ...]
     ) -> Iterator[tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...], NDArray[np.int64], list[tuple[int, int]]]]:
-        """Return the parts of a box, with their centres, frames, and the samples that the centre may look at."""
+        """Return the parts of a box, with their centres, frames, and the samples that the centre may look at.
+
+        A box is cut in two where its frames differ, across the axis along which they do so most: at a fold, or in the middle.
+        """
         axes = len(low)
+        sides = [b - a for a, b in zip(low, high, strict=True)]
         centre = tuple((a + b) // 2 for a, b in zip(low, high, strict=True))
-        corners = np.array(list(product(*((a, b - 1) for a, b in zip(low, high, strict=True)))))
-        frame, others = self._frames(centre, corners)
-        steps = (corners - centre) @ frame.T
+        frame, apart, folds = self._frames(low, high, centre)
+        steps = (np.array(list(product(*((a, b - 1) for a, b in zip(low, high, strict=True))))) - centre) @ frame.T
         ends, fits = [], True
         for n, closed, least, most in zip(self.shape, self.repeat, steps.min(axis=0), steps.max(axis=0), strict=True):
             first, last = (0, n - 1) if closed else (-(int(least) // ONE), n - 1 - -(-int(most) // ONE))
             fits &= first <= last
             ends.append((first, last) if first <= last else (n // 2, n // 2))
-        side = max(b - a for a, b in zip(low, high, strict=True))
-        apart = np.sqrt(((others - frame) ** 2).sum(axis=(1, 2)).max() / axes) / ONE if len(others) else 0.0
-        if (fits or side <= 1) and (apart <= BENT or side <= LEAST):
+        bent = [a for a in range(axes) if apart[a] > BENT and sides[a] > LEAST]
+        if bent:
+            axis = max(bent, key=lambda a: apart[a])
+            cut = folds[axis]
+        elif not fits and max(sides) > 1:
+            axis = sides.index(max(sides))
+            cut = centre[axis]
+        else:
             yield low, high, centre, frame, ends
             return
-        for corner in product((False, True), repeat=axes):
-            start = tuple(c if up else a for a, c, up in zip(low, centre, corner, strict=True))
-            stop = tuple(b if up else c for b, c, up in zip(high, centre, corner, strict=True))
-            if all(a < b for a, b in zip(start, stop, strict=True)):
-                yield from self._divide(start, stop)
+        yield from self._divide(low, tuple(cut if a == axis else b for a, b in enumerate(high)))
+        yield from self._divide(tuple(cut if a == axis else b for a, b in enumerate(low)), high)
 
     def _frames(
-        self, centre: tuple[int, ...], corners: NDArray[np.int64]
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the Jacobians in the middle of a box, and at its corners where they may be others."""
-        varying = self._varying
+        self, low: tuple[int, ...], high: tuple[int, ...], centre: tuple[int, ...]
+    ) -> tuple[NDArray[np.int64], list[float], list[int]]:
+        """Return the Jacobian in the middle of a box; along each axis how far others are from it, and where to cut."""
+        axes, varying = len(low), self._varying
         if varying is None:
-            frame = to_fixed(self.field, Region.whole((1,) * len(centre)))[0]
-            return frame.astype(np.int64), np.zeros((0, len(centre), len(centre)), np.int64)
-        found = np.rint(varying.jacobians(np.concatenate([[centre], corners])) * ONE).astype(np.int64)
-        return found[0], found[1:]
+            frame = to_fixed(self.field, Region.whole((1,) * axes))[0]
+            return frame.astype(np.int64), [0.0] * axes, list(centre)
+        apart, folds = [], []
+        for axis in range(axes):
+            line = np.repeat([centre], high[axis] - low[axis], axis=0)
+            line[:, axis] = np.arange(low[axis], high[axis])
+            along = np.rint(varying.jacobians(line) * ONE).astype(np.int64)
+            frame = along[centre[axis] - low[axis]]
+            apart.append(float(_measure(along - frame).max()))
+            jumps = _measure(np.diff(along, axis=0))
+            # From one voxel to the next frames change little, unless there is a fold.
+            sharp = len(jumps) > 0 and jumps.max() > 0.5 * BENT
+            folds.append(low[axis] + 1 + int(jumps.argmax()) if sharp else centre[axis])
+        return frame, apart, folds
+
+
+def _measure(frames: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the root mean square of differences of frames over the axes."""
+    return np.asarray(np.sqrt((frames**2).sum(axis=(1, 2)) / frames.shape[-1]) / ONE)
 
 
 def _step_in(

@@ -22,7 +22,8 @@ use crate::{Error, Result};
 
 /// A box is divided where a patch would fill less of it.
 const FILLED: f64 = 0.5;
-/// One is divided too where a patch would be so far from the field, on average, while it shows more than half of a patch.
+/// One is divided too where a patch would be so far from the field, on average: along the axes that the field changes along,
+/// as long as more than half of a patch is shown along them. Slabs between folds are few, and cubes there would be many.
 const STRAY: f32 = 0.2;
 /// Patches that cover seams again are measured by ones of this share of the part, so many of their sides apart.
 const OF_PART: f32 = 0.8;
@@ -176,9 +177,15 @@ impl<const D: usize> Stitching<'_, D> {
         let side = (longest / enlargement(&chart.frame)).min(o.patch);
         let filled = chart.mask.iter().filter(|m| **m).count() as f64;
         let fills = filled >= FILLED * chart.mask.len() as f64;
-        let strays = side > 0.5 * o.patch && mean(&chart.distortion, &chart.mask) > STRAY;
-        let divide: [bool; D] = std::array::from_fn(|a| high[a] - low[a] >= SMALL);
-        if fills && !strays || !divide.contains(&true) {
+        let varies = if fills && mean(&chart.distortion, &chart.mask) > STRAY {
+            self.varies(&chart.window)
+        } else {
+            [!fills; D]
+        };
+        let long = |a: usize| sides[a] as f32 / enlargement(&chart.frame) > 0.5 * o.patch;
+        let divide: [bool; D] =
+            std::array::from_fn(|a| high[a] - low[a] >= SMALL && varies[a] && (!fills || long(a)));
+        if !divide.contains(&true) {
             let centre = std::array::from_fn(|a| chart.window.low[a] + sides[a] as i32 / 2);
             return self.cover_chart(chart, centre, side);
         }
@@ -202,6 +209,23 @@ impl<const D: usize> Stitching<'_, D> {
             self.cover(first, last)?;
         }
         Ok(())
+    }
+
+    /// Along which axes the field changes most of a window: by half as much as along any.
+    fn varies(&self, window: &Window<D>) -> [bool; D] {
+        let (grid, middle) = (&window.grid, window.grid.shape().map(|n| n / 2));
+        let mut sums = [0.0f64; D];
+        for (point, &p) in grid.points().zip(&window.points) {
+            let frame = self.frames.at(p as usize);
+            for (a, sum) in sums.iter_mut().enumerate() {
+                let mut across = point;
+                across[a] = middle[a];
+                let there = window.points[grid.index(across)] as usize;
+                *sum += f64::from(difference(&frame, &self.frames.at(there)));
+            }
+        }
+        let most = sums.iter().fold(0.0, |a: f64, &b| a.max(b));
+        sums.map(|sum| sum >= 0.5 * most)
     }
 
     /// Covers the worst seams again, as often as if patches lay side by side.
