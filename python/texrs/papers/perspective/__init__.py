@@ -6,7 +6,8 @@ flow:
 1. a scale map of the exemplar, from a mask of features or from angles, edited where need be (section 3;
    `texrs.scale_maps`);
 2. the scale map of the output: the exemplar's, brought to its size, or any other (section 4);
-3. the exemplar laid out as a sheet: a plane flattened, anything else as copies in several sizes (`texrs.exemplar.sheet`);
+3. the exemplar laid out as a sheet: a plane flattened, anything else as copies in several sizes, with the elements that are
+   found on the exemplar (`texrs.exemplar.sheet`);
 4. patches of the sheet, each seen in the wanted scale, stitched along minimum cuts (section 4; `texrs.growth.sheets`);
 5. the exemplar looked up through the coordinates, smoothed where it is shrunk.
 
