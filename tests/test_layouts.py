@@ -19,6 +19,8 @@ from texrs.cli import main
 from texrs.elements import Elements, Layout, correct, load
 from texrs.errors import FileError, InvalidInput, LimitExceeded
 from texrs.exemplar.shapes import mark_outlines
+from texrs.papers.splice.sowing import continue_points
+from texrs.point_sets import PointLayout
 
 DOTS = Elements.of_sample(samples.dots((128, 128)))
 WALL = Elements.of_sample(samples.bricks((160, 160)))
@@ -63,6 +65,28 @@ def test_a_layout_on_a_lattice_has_its_points_in_itself() -> None:
     assert (found.points >= 0).all()
     assert (found.points <= 99).all()
     assert len(found.points) == pytest.approx(100 * 100 / 340, rel=0.2)
+
+
+def test_points_go_on_as_they_lie_and_are_not_mirrored() -> None:
+    noise = np.random.default_rng(4)
+    grid = 20.0 * (np.argwhere(np.ones((6, 6))) + 0.4)
+    places = grid + noise.uniform(-7, 7, grid.shape)
+    layout = PointLayout.of(places, (128, 128), (False, False), beyond=True)
+    low, high = np.full(2, -200.0), np.full(2, 327.0)
+    found, how = continue_points(layout, (128, 128), low, high)
+    assert how == "quilted"
+    # The picture's own stay, and the rest lies as dense, but where these are no mirror has put any.
+    assert cKDTree(found).query(places)[0].max() == 0
+    assert len(found) == pytest.approx(len(places) * (527 / 128) ** 2, rel=0.2)
+    apart = cKDTree(found).query(found, k=2)[0][:, 1]
+    assert apart.min() > 0.7 * cKDTree(places).query(places, k=2)[0][:, 1].min()
+    mirrored, _, _ = layout.within(low, high)
+    outside = mirrored[((mirrored < 0) | (mirrored > 127)).any(axis=1)]
+    assert (cKDTree(found).query(outside)[0] < 1).mean() < 0.2
+    _, how = continue_points(layout, (128, 128), np.full(2, -10.0), np.full(2, 137.0))
+    assert how == "reflected"
+    again = continue_points(layout, (128, 128), low, high, around=(low - 50, high + 50))[0]
+    assert ((again >= low) & (again <= high)).all()
 
 
 def test_courses_have_the_heights_that_were_asked_for() -> None:

@@ -20,6 +20,7 @@ from texrs.papers.splice.edit import Step, apply_steps
 from texrs.papers.splice.entry import remember
 from texrs.papers.splice.extension import Extension, count_elements, extend, lay_out
 from texrs.papers.splice.foreground import split_foreground
+from texrs.papers.splice.sowing import continue_points
 from texrs.point_sets import PointLayout, directions, match_points, nearest_distances, spacing
 
 __all__ = [
@@ -126,7 +127,11 @@ def match_layouts(a: Elements, b: Elements, size: tuple[int, int], *, align: boo
             gain = _measure_gain(a, factor * nearest_distances(layout.points, 1)[:, 0])
     beyond = BEYOND * unit
     turns = find_turns(a, b) if align else [0.0]
-    asked = [_place_targets(layout, centre, factor * gain, angle, size, beyond, lattice=disjoint) for angle in turns]
+    shape = b.mask.shape if disjoint and not is_own(a, b) else None
+    asked = [
+        _place_targets(layout, centre, factor * gain, angle, size, beyond, lattice=disjoint, shape=shape)
+        for angle in turns
+    ]
     if not all(len(wanted) for wanted in asked):
         raise InvalidInput("b: its layout has no point within the output")
     most = max(len(wanted) for wanted in asked)
@@ -245,10 +250,12 @@ def _place_targets(
     offset: Points | float = 0.0,
     *,
     lattice: bool = False,
+    shape: tuple[int, ...] | None = None,
 ) -> Points:
     """Scale and turn a layout about a centre into the middle of an output, or beside it, and cover that and a margin.
 
-    With ``lattice`` what lies on one goes on on it; else all is reflected, as a connected figure goes on itself.
+    With the ``shape`` of its picture it goes on as it lies, with ``lattice`` if on a lattice; else it is reflected, as the
+    elements of its own picture are, and as a connected figure goes on.
     """
     turn = math.radians(angle)
     matrix = scale * np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
@@ -256,8 +263,14 @@ def _place_targets(
     low, high = np.full(2, -beyond), np.array(size) - 1 + beyond
     box = np.array([[y, x] for y in (low[0], high[0]) for x in (low[1], high[1])])
     back = (box - middle) @ np.linalg.inv(matrix).T + centre
-    go_on = layout.cover if lattice else layout.within
-    found = go_on(back.min(axis=0), back.max(axis=0))[0]
+    first, last = back.min(axis=0), back.max(axis=0)
+    if shape is None:
+        found = (layout.cover if lattice else layout.within)(first, last)[0]
+    else:
+        # Of the same size for all angles.
+        reach = float(np.hypot(*(high - low))) / 2 / scale + float(np.abs(np.asarray(offset)).max()) / scale
+        around = np.floor(centre - reach), np.ceil(centre + reach)
+        found, _ = continue_points(layout, shape, first, last, around=around)
     moved = (found - centre) @ matrix.T + middle
     return np.asarray(moved[((moved >= low) & (moved <= high)).all(axis=1)], np.float64)
 

@@ -149,7 +149,7 @@ def _take_targets(b: Elements, size: tuple[int, int], unit: float, scale: float 
             wide, exact = unit if scale is None else scale * theirs.size, b.known is not None
             return take_cells(theirs, b.wrap, size, wide, seed=seed, exact=exact)
         centre = None if scale is None else (np.array(b.mask.shape) - 1) / 2
-        return take_points(lay_out(b, beyond=True), size, unit, scale=scale, centre=centre)
+        return take_points(lay_out(b, beyond=True), b.mask.shape, size, unit, scale=scale, centre=centre)
 
     return _TARGETS.get_or_make(key, make)
 

@@ -16,6 +16,7 @@ from texrs.errors import InvalidInput
 from texrs.exemplar.cells import Cells
 from texrs.exemplar.contours import measure_moments, paint, trace
 from texrs.papers.splice.cells.continuation import continue_cells
+from texrs.papers.splice.sowing import continue_points
 from texrs.point_sets import PointLayout
 
 __all__ = ["Tessellation", "finish_cells", "take_cells", "take_points"]
@@ -100,9 +101,15 @@ def take_cells(
 
 
 def take_points(
-    layout: PointLayout, size: tuple[int, int], unit: float, *, scale: float | None = None, centre: Points | None = None
+    layout: PointLayout,
+    shape: tuple[int, ...],
+    size: tuple[int, int],
+    unit: float,
+    *,
+    scale: float | None = None,
+    centre: Points | None = None,
 ) -> Tessellation:
-    """Take the Voronoi cells of a texture's points, at a median size of ``unit`` pixels, or enlarged as asked.
+    """Take the Voronoi cells of a picture's points, at a median size of ``unit`` pixels, or enlarged as asked.
 
     Their middle, or the ``centre``, comes to lie on that of the output.
     """
@@ -124,7 +131,7 @@ def take_points(
     margin = int(np.ceil(MARGIN * wide))
     middle, origin = (np.array(size) - 1) / 2, (low + high) / 2 if centre is None else centre
     box = [(side * (middle + margin + 2 * wide)) / factor + origin for side in (-1, 1)]
-    wanted, continued = layout.cover(*box)
+    wanted, continued = continue_points(layout, shape, box[0], box[1])
     if not len(wanted):
         raise InvalidInput("b: its layout has no point within the output")
     points = (wanted - origin) * factor + middle + margin

@@ -12,6 +12,7 @@ from texrs.errors import InvalidInput
 from texrs.exemplar.cells import Cells
 from texrs.papers.splice.cells.tessellation import take_cells
 from texrs.papers.splice.extension import lay_out
+from texrs.papers.splice.sowing import continue_points
 from texrs.point_sets import match_points, nearest_distances, spacing
 
 __all__ = ["Targets", "go_part_of_the_way", "take_own_points", "take_points"]
@@ -86,7 +87,7 @@ def take_points(
     else:
         factor, centre = scale, (np.array(b.mask.shape) - 1) / 2
     low, high = (centre + side * (middle + around) / factor for side in (-1, 1))
-    points, continued = layout.cover(low, high)
+    points, continued = continue_points(layout, b.mask.shape, low, high)
     points = (points - centre) * factor + middle
     if len(points) < 3:
         raise InvalidInput("b: its layout has fewer than three points around the output; take a larger size")
