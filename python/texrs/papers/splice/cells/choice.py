@@ -95,7 +95,8 @@ def shortlist(cells: Cells, wanted: Tessellation, chosen: NDArray[np.intp], *, t
     used = np.zeros(len(usable))
     taken = np.full(len(wanted.area), -1)
     beside = list_neighbours(wanted)
-    k = min(BEST, len(usable))
+    # Of few cells all would be on each list, and the one that bends best would be shown everywhere.
+    k = min(BEST, max(1, len(usable) // 2))
     source = np.zeros((len(chosen), k), np.intp)
     turn, cost = np.zeros((2, len(chosen), k))
     for row, target in enumerate(chosen.tolist()):
