@@ -192,3 +192,28 @@ def test_design_parts_what_lies_across_a_border() -> None:
 def test_elements_of_another_texture_get_a_sentence(exemplar: object) -> None:
     with pytest.raises(InvalidInput, match=r"elements: those of one texture of \(96, 96\)"):
         texrs.design(exemplar, 64, elements=ENTRY)
+
+
+@pytest.mark.parametrize(("name", "side"), [("pebbles", 128), ("pebbles", 192), ("dots", 128)])
+def test_things_on_a_ground_are_no_cells(name: str, side: int) -> None:
+    for seed in (0, 1):
+        found = elements.analyse(samples.load(name, size=(side, side), seed=seed).image)
+        assert found.layout == Layout.DISJOINT
+        assert found.known is None
+
+
+def test_cells_are_the_elements_where_joints_part_all() -> None:
+    image = samples.load("brick").image[:256, :256]
+    plain = elements.analyse(image)
+    again = elements.analyse(image, box=plain.report["box"], layout="jointed")
+    for found in (plain, again):
+        assert found.report["mask"] == "cells"
+        assert found.layout == Layout.JOINTED
+        assert found.labels.max() == len(found.points) == len(found.instances)
+        assert np.median([one.confidence for one in found.instances]) > 0.9
+    assert min(plain.report["confidence"].values()) >= 0.8
+    assert "box" not in again.report["proposed"]
+    assert abs(len(plain.points) - len(again.points)) <= 2
+    # Nothing is taken for cells where something else was said.
+    for said in ({"layout": "disjoint"}, {"points": plain.points[:9], "layout": "jointed"}, {"box": (80, 80, 15, 15)}):
+        assert elements.analyse(image, **said).report["mask"] != "cells"

@@ -18,7 +18,7 @@ from texrs._typing import Bools, Floats, Labels, Progress
 from texrs.elements._arguments import LEAST, Arguments, Box, as_box
 from texrs.elements._layout import Layout
 from texrs.elements._mask import to_lab
-from texrs.elements._proposal import LARGE, SMALLEST, THING, Start, compare_things, downscale, measure_distance
+from texrs.elements._proposal import CELLS, LARGE, SMALLEST, THING, Start, compare_things, downscale, measure_distance
 from texrs.elements._search import Detections
 from texrs.elements._separation import Separation, find_nearest_pixels
 from texrs.exemplar.cells import Cells, find_cells
@@ -29,9 +29,9 @@ __all__ = ["CellStart", "start_from_cells"]
 SURE = 0.8
 """Confidence in cells from which on they are elements: of 40 photographs those with joints lie above it, those without below
 .7, but for heaps of stones, beans and peppers."""
-HEAPED = 0.95
-"""Confidence from which on even what looks like things on a ground leaves nothing of it: heaps of fruit lie above, pebbles on
-sand below."""
+HEAPED, DARK = 0.95, 0.2
+"""Confidence, and contrast of joints, a lightness of 0 to 1, from which on even what looks like things on a ground leaves
+nothing of it: between heaped fruit it is dark, between pebbles on sand it is not."""
 FEWEST = 4
 """Cells that there must be."""
 NARROW = 0.75
@@ -104,8 +104,9 @@ def _measure_sides(cells: Cells) -> NDArray[np.float64]:
 
 
 def _are_things(small: Floats, cells: Cells) -> bool:
-    """Return whether cells look like things on a ground, between which it is dark; not where they leave nothing of it."""
-    if cells.confidence >= HEAPED or cells.polarity > 0:
+    """Return whether cells look like things on a ground; not where that is lighter, or so dark that there is none."""
+    heaped = cells.confidence >= HEAPED and _measure_contrast(small, cells) >= DARK
+    if cells.polarity > 0 or heaped or cells.confidence >= CELLS:
         return False
     sides = _measure_sides(cells)
     box = (max(1, round(sides[0])), max(1, round(sides[1])))
