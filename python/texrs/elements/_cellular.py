@@ -18,7 +18,7 @@ from texrs._typing import Bools, Floats, Labels, Progress
 from texrs.elements._arguments import LEAST, Arguments, Box, as_box
 from texrs.elements._layout import Layout
 from texrs.elements._mask import to_lab
-from texrs.elements._proposal import CELLS, LARGE, SMALLEST, THING, Start, compare_things, downscale, measure_distance
+from texrs.elements._proposal import CELLS, THING, Start, compare_things, measure_distance, shrink
 from texrs.elements._search import Detections
 from texrs.elements._separation import Separation, find_nearest_pixels
 from texrs.exemplar.cells import Cells, find_cells
@@ -78,8 +78,7 @@ def start_from_cells(guide: Floats, given: Arguments, progress: Progress) -> Cel
         return None
     said = None if given.box is None else float(min(given.box.size))
     if said is None:
-        step = max(1, min(-(-max(guide.shape[:2]) // LARGE), min(guide.shape[:2]) // SMALLEST))
-        small = downscale(guide, step)
+        small, step = shrink(guide)
         seen = find_cells(small, progress=lambda stage, share: progress("propose", 0.3 * share))
         if seen.confidence < SURE or seen.count < FEWEST or (given.layout is None and _are_things(small, seen)):
             return None
@@ -89,7 +88,8 @@ def start_from_cells(guide: Floats, given: Arguments, progress: Progress) -> Cel
     if cells.confidence < SURE or cells.count < FEWEST or _measure_contrast(guide, cells) < FAINT:
         return None
     if given.box is not None:
-        off = np.abs(np.log(np.array(given.box.size) / (_measure_sides(cells) - cells.joint_width)))
+        free = np.maximum(_measure_sides(cells) - cells.joint_width, 1.0)
+        off = np.abs(np.log(np.array(given.box.size) / free))
         if (off > np.log(ALIKE)).any():
             return None
     if given.background is not None and (cells.joints[given.background] > 0.5).mean() < BETWEEN:

@@ -176,6 +176,13 @@ def _choose_box(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[floa
     return as_box((row, column, height, width), whole), sure
 
 
+def shrink(guide: Floats) -> tuple[Floats, int]:
+    """Return the picture in which cells are looked for, and by how much it is smaller."""
+    sides = guide.shape[:2]
+    step = max(1, min(-(-max(sides) // LARGE), min(sides) // SMALLEST))
+    return downscale(guide, step), step
+
+
 def downscale(guide: Floats, step: int) -> Floats:
     """Average squares of pixels."""
     rows, columns = (n // step for n in guide.shape[:2])
@@ -316,9 +323,7 @@ def _choose_layout(
     thing, contrast = compare_things(to_lab(guide), away, points)
     sure = _measure_odds(thing / THING)
     if thing >= THING:
-        sides = guide.shape[:2]
-        step = max(1, min(-(-max(sides) // LARGE), min(sides) // SMALLEST))
-        cells = find_cells(downscale(guide, step)).confidence
+        cells = find_cells(shrink(guide)[0]).confidence
         if cells < CELLS:
             return Layout.DISJOINT, sure
         sure = cells
