@@ -11,6 +11,7 @@ import texrs
 from element_checks import passes, score
 from texrs import elements, samples
 from texrs.elements import Elements, ElementSearch, Layout, _proposal, analyse
+from texrs.elements._consensus import extend_mask
 from texrs.elements._mask import cut_foreground, to_lab
 from texrs.elements._mixture import Mixture
 from texrs.elements._search import Detections, Template, threshold_otsu
@@ -467,3 +468,24 @@ def test_what_is_found_small_is_cut_small() -> None:
         made = cut_foreground(lab, np.concatenate([centres[:1], centres]), box, poses=each, **given)
         shares.append((made & mask).sum() / (made | mask).sum())
     assert shares[0] > 0.93 > shares[1]
+
+
+@pytest.mark.parametrize("offset", [(0, 0), (2, -1)])
+def test_what_all_elements_have_around_them_is_theirs(offset: tuple[int, int]) -> None:
+    image, centres, mask = discs()
+    # A mask of their middles alone, beside the middle: as a cut leaves where the ground's colours claim the rest.
+    middles = np.zeros_like(mask)
+    for centre in centres.astype(int):
+        row, column = centre + offset
+        middles[row - 3 : row + 4, column - 3 : column + 4] = True
+    found = extend_mask(to_lab(image), middles, centres + offset, (13, 13), (False, False), sure=True)
+    assert found is not None
+    both = (found.mask & mask).sum() / (found.mask | mask).sum()
+    assert both > 0.9
+    assert np.abs(found.points - centres).max() < 1.5
+    assert max(found.box) == pytest.approx(2 * DISC + 1, abs=2)
+    # There is nothing to be had beyond what is known already, nor where elements have nothing in common around them.
+    assert extend_mask(to_lab(image), found.mask, found.points, found.box, (False, False), sure=True) is None
+    noise = np.random.default_rng(0).random(image.shape, np.float32)
+    noise[middles] = 1
+    assert extend_mask(to_lab(noise), middles, centres + offset, (13, 13), (False, False), sure=True) is None

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.spatial import Delaunay
+from scipy.spatial import Delaunay, KDTree
 
 import texrs
 from reference.look_up import view
@@ -105,3 +105,24 @@ def test_pictures_of_any_size_take_their_time_only(monkeypatch: pytest.MonkeyPat
     result = texrs.splice(wall, stones, cells=False, seed=1)
     assert max(result.report["system"]) < 128
     np.testing.assert_array_equal(view(result.source, wall.image), result.image)
+
+
+@pytest.mark.parametrize("name", ["pebbles", "dots"])
+def test_separate_elements_go_on_unmirrored_on_their_own_layout(name: str) -> None:
+    mine = Elements.of_sample(samples.load(name, size=(160, 160)))
+    made = texrs.self_splice(mine, size=480, seed=1)
+    found = np.array([match["found"] for match in made.report["matches"]])
+    which = np.array([match["element"] for match in made.report["matches"]])
+    inside = ((found >= 0) & (found < 480)).all(axis=1)
+    found, which = found[inside], which[inside]
+    assert len(found) == pytest.approx(9 * len(mine.points), rel=0.25)
+    # Seen in a mirror at a side of the picture, an element is hardly ever the same one.
+    for axis in range(2):
+        seen = found.copy()
+        seen[:, axis] = 2 * 319.5 - seen[:, axis]
+        away, near = KDTree(found).query(seen)
+        close = away < 3
+        assert (which[near[close]] == which[close]).sum() < 0.2 * len(found)
+    # Nor does it lie beside itself.
+    near = KDTree(found).query(found, k=4)[1][:, 1:]
+    assert (which[near] == which[:, np.newaxis]).mean() < 0.1

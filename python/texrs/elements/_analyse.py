@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from texrs._arrays import as_image, check_memory, guidance
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.elements import _mask
-from texrs.elements._arguments import Arguments, check_consistency, choose_usual_box, find_contradiction
+from texrs.elements._arguments import Arguments, Box, check_consistency, choose_usual_box, find_contradiction
 from texrs.elements._cellular import start_from_cells
+from texrs.elements._consensus import extend_mask
 from texrs.elements._corrections import correct, read_steps
 from texrs.elements._elements import Elements
 from texrs.elements._layout import Layout, LayoutName
@@ -131,6 +132,7 @@ def analyse(
     # 3. What belongs to the elements.
     watch("separate", 0.0)
     parted = _separate(guide, given, start, found, how) if cellular is None else cellular.parted
+    start, parted = _extend(guide, given, start, parted, how) if cellular is None else (start, parted)
     if len(parted.points) < FEWEST:
         raise InvalidInput(
             f"image: {len(parted.points)} elements were found, at least {FEWEST} are needed; try another box, more "
@@ -198,6 +200,22 @@ def _separate(guide: Floats, given: Arguments, start: Start, found: Detections, 
     if not listed and (jointed or mask[find_nearest_pixels(found.points, mask.shape)].mean() < 0.5):
         return add_missing(plain, found.similarity, how.wrap, joints=jointed)
     return plain
+
+
+def _extend(
+    guide: Floats, given: Arguments, start: Start, parted: Separation, how: Settings
+) -> tuple[Start, Separation]:
+    """Extend separate elements by what all of them have around them; what a user says of them stays."""
+    said = given.points is not None or given.whole is not None or given.shape is not None
+    if said or how.literal or start.layout != Layout.DISJOINT or not len(parted.points):
+        return start, parted
+    sure = parted.made_by == "cut"
+    found = extend_mask(_mask.to_lab(guide), parted.mask, parted.points, start.box.size, how.wrap, sure=sure)
+    if found is None:
+        return start, parted
+    points = np.clip(found.points, 0, np.array(found.mask.shape) - 1)
+    start = replace(start, box=Box(start.box.centre, found.box))
+    return start, replace(parted, mask=found.mask, points=points, made_by="consensus")
 
 
 def _cut(guide: Floats, given: Arguments, start: Start, found: Detections, how: Settings) -> Bools:

@@ -43,7 +43,7 @@ class Separation:
     mask : (H, W) bool
         The foreground.
     made_by : str
-        What made the mask: "cut", "elements", copies of the chosen one, or "cells".
+        What made the mask: "cut", "elements", copies of the chosen one, "consensus" of all elements, or "cells".
     """
 
     points: NDArray[np.float64]

@@ -2,7 +2,8 @@
 
 Whatever is spliced must bring elements from outside of the picture: the layout that it takes may be denser, and its own border
 is moved into the output. The picture goes on around its ends where it wraps, and is reflected where it does not. Then
-elements of disjoint foregrounds are turned back, so that none is mirrored, and those that the border cuts are left out.
+elements of disjoint foregrounds are turned back, so that none is mirrored, and those that the border cuts are left out. On
+their own layout they are sown, not reflected, as far as the output goes: a mirror would be seen in which of them lies where.
 """
 
 from __future__ import annotations
@@ -18,9 +19,10 @@ from texrs.elements import Elements, Layout
 from texrs.errors import InvalidInput
 from texrs.papers.splice.entry import remember
 from texrs.papers.splice.foreground import Foreground, split_foreground
+from texrs.papers.splice.sowing import sow_elements
 from texrs.point_sets import Fold, PointLayout
 
-__all__ = ["Extension", "count_elements", "extend"]
+__all__ = ["Extension", "count_elements", "extend", "sow"]
 
 Points = NDArray[np.float64]
 Places = NDArray[np.int32]
@@ -29,6 +31,9 @@ Copies = tuple[Points, NDArray[np.intp], Bools]
 
 EACH = 600
 """Bytes that a pixel of the texture and its surroundings takes, without the factor, which has a limit of its own."""
+
+FREE, SOWN_FREE = 0.9, 0.75
+"""Share of an element, with what lies around it, that must be free where it is put; and where it was sown, so that it fits."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,13 +92,9 @@ def extend(
     layout, low, high = _find_bounds(entry, size, margin, exact=exact)
     shape = np.array(entry.mask.shape)
     offset = (np.array(size) - shape) // 2
-    first, last = low + offset, high + offset
-    check_memory(int(np.prod(last - first)) * EACH)
-    along = [layout.folds[a].apply(np.arange(low[a], high[a], dtype=float)) for a in range(2)]
-    rows, columns = (np.asarray(np.rint(x), np.int32) for x, _ in along)
-    pixel = np.stack(np.broadcast_arrays(rows[:, None], columns[None]), axis=-1)
-    mirrored = np.stack(np.broadcast_arrays(along[0][1][:, None], along[1][1][None]), axis=-1)
-    mask: Bools = entry.mask[rows[:, None], columns[None]]
+    first = low + offset
+    pixel, mirrored = _unfold(layout, low, high)
+    mask: Bools = entry.mask[pixel[..., 0], pixel[..., 1]]
     places, of, flips = layout.within(low.astype(np.float64), (high - 1).astype(np.float64))
     inside = np.asarray(((places >= -0.5) & (places <= shape - 0.5)).all(axis=1) & ~flips.any(axis=1))
     if not whole:
@@ -108,6 +109,34 @@ def extend(
     origin = (int(first[0]), int(first[1]))
     points, rest = places + first, np.zeros((0, 2))
     return Extension(origin, pixel, mask, points, of, none, none > 0, mirrored, none, rest, originals)
+
+
+@remember(4)
+def sow(entry: Elements, size: tuple[int, int], margin: int) -> Extension | None:
+    """Let separate elements go on as they lie, that far beyond an output; None where they go on by a rule, or need not."""
+    layout, low, high = _find_bounds(entry, size, margin, exact=False)
+    parts, shape = split_foreground(entry), entry.mask.shape
+    radius = np.sqrt(np.bincount(parts.core.ravel(), minlength=len(parts.points) + 1)[1:] / np.pi)
+    lying = PointLayout.of(parts.points, shape, entry.wrap, beyond=True)
+    found = sow_elements(lying, shape, parts.whole, radius, low.astype(np.float64), (high - 1).astype(np.float64))
+    if found is None:
+        return None
+    offset = (np.array(size) - np.array(shape)) // 2
+    pixel, mirrored = _unfold(layout, low, high)
+    beyond = (found.points != parts.points[found.of]).any(axis=1)
+    flips = np.repeat(beyond[:, np.newaxis], 2, axis=1)
+    mask: Bools = entry.mask[pixel[..., 0], pixel[..., 1]]
+    # They have room for themselves, if not for what lies around them.
+    return _stamp(entry, pixel, mask, mirrored, (found.points - low, found.of, flips), low + offset, 0, free=SOWN_FREE)
+
+
+def _unfold(layout: PointLayout, low: NDArray[np.intp], high: NDArray[np.intp]) -> tuple[Places, Bools]:
+    """Return the pixel of the picture that each one of a box shows, and along which axes it is mirrored."""
+    check_memory(int(np.prod(high - low)) * EACH)
+    along = [layout.folds[a].apply(np.arange(low[a], high[a], dtype=float)) for a in range(2)]
+    rows, columns = (np.asarray(np.rint(x), np.int32) for x, _ in along)
+    pixel = np.stack(np.broadcast_arrays(rows[:, None], columns[None]), axis=-1)
+    return pixel, np.stack(np.broadcast_arrays(along[0][1][:, None], along[1][1][None]), axis=-1)
 
 
 @remember(256)
@@ -154,6 +183,8 @@ def _stamp(
     copies: Copies,
     first: NDArray[np.intp],
     originals: int,
+    *,
+    free: float = FREE,
 ) -> Extension:
     """Put every whole element where the picture goes on with it, the right way round; the originals in any case."""
     from scipy.ndimage import label
@@ -168,7 +199,7 @@ def _stamp(
     inside = np.zeros(mask.shape, bool)
     if originals:
         inside[tuple(slice(-int(f), -int(f) + int(n)) for f, n in zip(first, shape, strict=True))] = True
-    kept, turns = _place_elements(entry, instance, copies, inside if originals else None, originals)
+    kept, turns = _place_elements(entry, instance, copies, inside if originals else None, originals, least=free)
     for at, pixels in turns:
         pixel.reshape(-1, 2)[at] = pixels
         mirrored.reshape(-1, 2)[at] = False
@@ -198,7 +229,13 @@ def _stamp(
 
 
 def _place_elements(
-    entry: Elements, instance: Labels, copies: Copies, inside: Bools | None, originals: int = 0
+    entry: Elements,
+    instance: Labels,
+    copies: Copies,
+    inside: Bools | None,
+    originals: int = 0,
+    *,
+    least: float = FREE,
 ) -> tuple[list[int], list[tuple[NDArray[np.intp], NDArray[np.intp]]]]:
     """Write into the pixels of each element its number, if it has room: the originals always, others not ``inside``.
 
@@ -226,7 +263,7 @@ def _place_elements(
         pixels, steps = shapes[i]
         at = steps + (int(spots[k, 0]) * width + int(spots[k, 1]))
         free = number.take(at) == 0
-        crowded = np.count_nonzero(free) < 0.9 * len(free)
+        crowded = np.count_nonzero(free) < least * len(free)
         if k >= originals and (crowded or (inside is not None and inside.take(at).any())):
             continue
         kept.append(k)

@@ -18,7 +18,7 @@ from texrs.elements import Elements, Layout
 from texrs.errors import InvalidInput
 from texrs.papers.splice.edit import Step, apply_steps
 from texrs.papers.splice.entry import remember
-from texrs.papers.splice.extension import Extension, count_elements, extend, lay_out
+from texrs.papers.splice.extension import Extension, count_elements, extend, lay_out, sow
 from texrs.papers.splice.foreground import split_foreground
 from texrs.papers.splice.sowing import continue_points
 from texrs.point_sets import PointLayout, directions, match_points, nearest_distances, spacing
@@ -115,8 +115,15 @@ def list_element_points(entry: Elements) -> Points:
 
 
 def match_layouts(a: Elements, b: Elements, size: tuple[int, int], *, align: bool, scale: float | None = None) -> Match:
-    """Match the elements of A with B's layout, brought to the spacing of A, or enlarged as asked, middle upon middle."""
+    """Match the elements of A with B's layout, brought to the spacing of A, or enlarged as asked, middle upon middle.
+
+    Separate elements on their own layout in a larger output lie as they are sown.
+    """
     unit = spacing(a.points)
+    if a.layout == Layout.DISJOINT and scale in (None, 1) and is_own(a, b):
+        sown = sow(a, size, math.ceil(BEYOND * unit))
+        if sown is not None:
+            return Match(sown.points, sown, np.arange(len(sown.points)), 1.0, 0.0, 1.0, 0.0)
     layout = lay_out(b, beyond=True)
     gain, disjoint, centre = 1.0, a.layout == Layout.DISJOINT, layout.points.mean(axis=0)
     if scale is not None:
