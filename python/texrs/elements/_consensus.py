@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._typing import Bools, Floats
+from texrs._typing import Array, Bools, Floats
 from texrs.elements._mask import Wrap, round_to_odd, stamp
 
 __all__ = ["Extent", "extend_mask"]
@@ -24,13 +24,15 @@ FEWEST = 4
 """Elements that must show a place around them, so that it is known what they have there."""
 CLEAR = 1.5
 """Difference of what elements have from the ground, over how much both vary, from which on it belongs to them."""
-GROWN = 1.2
-"""Area that elements have together, over the usual one, from which on the mask is at fault."""
+GROWN, GUESSED = 1.2, 0.4
+"""Area that elements have together, over the usual one, from which on the mask is at fault; and over one that is a guess."""
+PASSES, MOST = 2, 64
+"""How often elements are compared and moved to where they agree, and how many are compared at most."""
 NUDGE = 2
 """Pixels that a whole element is moved by at most, to lie as all of them do; what the border cuts goes farther."""
 SEEN = 0.25
 """Share of an element that must be seen to tell where it lies."""
-SOLID = 0.85
+SOLID = 0.8
 """Share of its convex hull that an element fills at least."""
 
 
@@ -65,53 +67,74 @@ def extend_mask(
         Whether what is in the mask is known to be foreground; else it tells how large elements may be.
 
     """
-    from scipy import ndimage
-    from skimage.morphology import convex_hull_image
-
     half = np.array([round(WIDE * n / 2) for n in box])
     away = np.stack(np.meshgrid(*(np.arange(-h, h + 1) for h in half), indexing="ij"), axis=-1)
-    size = np.array(mask.shape)
-    at = np.rint(points).astype(np.intp)[:, np.newaxis, np.newaxis] + away
-    at = np.where(wrap, at % size, at)
-    shown = ((at >= 0) & (at < size)).all(axis=-1)
-    at = at.clip(0, size - 1)
-    window = np.where(shown[..., np.newaxis], colours[at[..., 0], at[..., 1]], np.nan).astype(np.float64)
-    known, count = mask[at[..., 0], at[..., 1]] & shown, shown.sum(axis=0)
-    enough = count >= FEWEST
     near = np.zeros(mask.shape, bool)
     stamp(near, points, np.ones([round_to_odd(FAR * n) for n in box], bool), wrap)
     ground = colours[~near & ~mask].astype(np.float64)
-    if not enough.any() or len(ground) < LEAST:
+    if len(ground) < LEAST:
         return None
     usual_ground = np.median(ground, axis=0)
-    ground_varies = 1.5 * np.median(np.sqrt(((ground - usual_ground) ** 2).sum(axis=1)))
-    total = np.maximum(count, 1)[..., np.newaxis]
-    mean = np.nansum(window, axis=0) / total
-    spread = np.sqrt(np.nansum((window - mean) ** 2, axis=0) / total)
-    unlike = np.sqrt(((mean - usual_ground) ** 2).sum(axis=-1))
-    varied = np.sqrt((spread**2).sum(axis=-1)) + ground_varies
-    common = enough & ((unlike > CLEAR * varied) | (sure & (known.sum(axis=0) > count / 2)))
+    noise = 1.5 * float(np.median(np.sqrt(((ground - usual_ground) ** 2).sum(axis=1))))
+    places, usual = np.rint(points), 0.0
+    for turn in range(PASSES):
+        # Of many, some tell what all have.
+        window, shown = _look_around(colours, places[:MOST], away, wrap)
+        known = _look_around(mask[..., np.newaxis], places[:MOST], away, wrap)[0][..., 0]
+        typical = np.nanmedian(window, axis=0)
+        varied = np.nanmedian(np.sqrt(((window - typical) ** 2).sum(axis=-1)), axis=0) + noise
+        unlike = np.sqrt(((typical - usual_ground) ** 2).sum(axis=-1))
+        common = unlike > CLEAR * varied
+        if sure:
+            common |= np.nanmedian(known, axis=0) == 1
+        piece = _find_piece(common & (shown.sum(axis=0) >= FEWEST), away, box, notched=not sure)
+        if not turn:
+            inside = (np.abs(away) <= np.array(box) / 2).all(axis=-1)
+            usual = float(np.median(np.nansum(known[:, inside], axis=1)))
+        if piece is None or piece.sum() < (GROWN if sure else GUESSED) * usual:
+            return None
+        one = piece
+        reach, wanted = away[one], typical[one]
+        places = _align(colours, wanted, places, reach, half // 2, wrap)
+    grown = mask.copy() if sure else np.zeros(mask.shape, bool)
+    stamp(grown, places, one, wrap)
+    apart = np.sqrt(((colours - usual_ground) ** 2).sum(axis=-1)) > 0.5 * float(np.median(unlike[one]))
+    grown |= _mark_cut(apart & ~grown, box, wrap)
+    rows, columns = (np.ptp(reach, axis=0) + 1).tolist()
+    return Extent(grown, places + reach.mean(axis=0), (rows, columns))
+
+
+def _look_around(
+    picture: Array, places: NDArray[np.float64], away: NDArray[np.intp], wrap: Wrap
+) -> tuple[NDArray[np.float64], Bools]:
+    """Return what a picture (H, W, c) shows around places, NaN beyond its border, and where it shows something."""
+    size = np.array(picture.shape[:2])
+    at = places.astype(np.intp)[:, np.newaxis, np.newaxis] + away
+    at = np.where(wrap, at % size, at)
+    shown = np.asarray(((at >= 0) & (at < size)).all(axis=-1))
+    at = at.clip(0, size - 1)
+    return np.where(shown[..., np.newaxis], picture[at[..., 0], at[..., 1]], np.nan).astype(np.float64), shown
+
+
+def _find_piece(common: Bools, away: NDArray[np.intp], box: tuple[int, int], *, notched: bool) -> Bools | None:
+    """Return the piece in the middle that hangs together, without holes; None where none is compact and ends in the window.
+
+    With ``notched`` its hull: what varies from one element to the next leaves notches, which no mask is there to fill.
+    """
+    from scipy import ndimage
+    from skimage.morphology import convex_hull_image
+
     pieces, _ = ndimage.label(ndimage.binary_opening(ndimage.binary_fill_holes(common)))
     inner = np.bincount(pieces[(np.abs(away) <= np.array(box) / 4).all(axis=-1)])[1:]
     if not inner.any():
         return None
-    one = pieces == 1 + int(inner.argmax())
-    usual = float(np.median(known.reshape(len(points), -1).sum(axis=1)))
-    border = one.copy()
-    border[1:-1, 1:-1] = False
-    if border.any() or one.sum() < GROWN * usual or one.sum() < SOLID * convex_hull_image(one).sum():
+    one = np.asarray(pieces == 1 + int(inner.argmax()), bool)
+    hull = np.asarray(convex_hull_image(one), bool)
+    ends = one.copy()
+    ends[1:-1, 1:-1] = False
+    if ends.any() or one.sum() < SOLID * hull.sum():
         return None
-    grown = mask.copy() if sure else np.zeros(mask.shape, bool)
-    reach = away[one]
-    found = points.copy()
-    for k, seen in enumerate(shown[:, one].all(axis=1)):
-        found[k] = np.rint(points[k])
-        found[k] += _align(colours, mean, found[k], reach, half, np.full(2, NUDGE) if seen else half // 2, wrap)
-    stamp(grown, found, one, wrap)
-    apart = np.sqrt(((colours - usual_ground) ** 2).sum(axis=-1)) > 0.5 * float(np.median(unlike[one]))
-    grown |= _mark_cut(apart & ~grown, box, wrap)
-    size_of_one = np.ptp(reach, axis=0) + 1
-    return Extent(grown, found + reach.mean(axis=0), (int(size_of_one[0]), int(size_of_one[1])))
+    return hull if notched else one
 
 
 def _mark_cut(unlike: Bools, box: tuple[int, int], wrap: Wrap) -> Bools:
@@ -130,24 +153,27 @@ def _mark_cut(unlike: Bools, box: tuple[int, int], wrap: Wrap) -> Bools:
 
 def _align(
     colours: Floats,
-    mean: Floats,
-    point: NDArray[np.float64],
+    wanted: NDArray[np.float64],
+    places: NDArray[np.float64],
     reach: NDArray[np.intp],
-    half: NDArray[np.intp],
     far: NDArray[np.intp],
     wrap: Wrap,
-) -> NDArray[np.intp]:
-    """Return what to move an element by, so far at most, that what is seen of it looks most like all of them."""
-    size, wanted = np.array(colours.shape[:2]), mean[tuple((reach + half).T)]
+) -> NDArray[np.float64]:
+    """Move elements to where what is seen of them looks most like all: whole ones a little, others so far at most."""
+    size = np.array(colours.shape[:2])
     moves = np.stack(np.meshgrid(*(np.arange(-f, f + 1) for f in far), indexing="ij"), axis=-1).reshape(-1, 2)
-    best, step = np.inf, np.zeros(2, np.intp)
-    for move in moves[np.argsort((moves**2).sum(axis=1), kind="stable")]:
-        at = point.astype(np.intp) + reach + move
-        at = np.where(wrap, at % size, at)
-        seen = ((at >= 0) & (at < size)).all(axis=1)
-        if seen.mean() < SEEN:
-            continue
-        apart = float(((colours[tuple(at[seen].T)] - wanted[seen]) ** 2).sum(axis=-1).mean())
-        if apart < best - 1e-9:
-            best, step = apart, move
-    return step
+    moves = moves[np.argsort((moves**2).sum(axis=1), kind="stable")]
+    found = places.copy()
+    for k, place in enumerate(places.astype(np.intp)):
+        whole = all(w or (p.min() >= 0 and p.max() < n) for p, n, w in zip((place + reach).T, size, wrap, strict=True))
+        best = np.inf
+        for move in moves[(np.abs(moves) <= NUDGE).all(axis=1)] if whole else moves:
+            at = place + reach + move
+            at = np.where(wrap, at % size, at)
+            seen = ((at >= 0) & (at < size)).all(axis=1)
+            if seen.mean() < SEEN:
+                continue
+            apart = float(((colours[tuple(at[seen].T)] - wanted[seen]) ** 2).sum(axis=-1).mean())
+            if apart < best - 1e-9:
+                best, found[k] = apart, place + move
+    return found
