@@ -1,13 +1,14 @@
 """A table of splices, each texture on the layout of each, and a contact sheet of them.
 
-    TEXRS_TEXTURES=FOLDER python benches/splice_table.py OUT [--size 192] [--auto]
+    TEXRS_TEXTURES=FOLDER python benches/splice_table.py OUT [--size 192] [--auto] [--tears deep_quality.py]
 
 The folder holds ``b-disjoint``, ``c-connected`` and ``d-background``: pictures beside JSON files with a box, scribbles and a
 tag, all of them (x, y). With ``--auto`` only the pictures are used. Without a folder the built-in samples are spliced.
 
-A line a texture, means over all other layouts: how it was put together, the share of targets with an element within .25 of its
-size (by the source map), how much of the wanted way was realised, the sharpness (mean gradient, over the texture's own), how
-alike the results are on two layouts (correlation), and the seconds of a processor.
+A line a texture, means over all other layouts: how it was put together, the share of targets with an element within .2 of its
+size (by the source map), how much of the wanted way was realised, the sharpness (mean gradient, over the texture's own), lines
+that break off (`texrs.judging`), how alike the results are on two layouts (correlation), and the seconds of a processor. With
+``--tears``, a module with `Judge(exemplar).scores(picture)`, the share of torn cells on its own layout and on others.
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ from pathlib import Path
 
 import numpy as np
 
+import evaluators
 import texrs
-from texrs import elements, io, samples
+from texrs import elements, io, judging, samples
 from texrs.elements import Elements
 from texrs.errors import TexrsError
 from texrs.papers.splice.pictures import to_picture
@@ -95,9 +97,12 @@ def main() -> None:
     known = entries(os.environ.get("TEXRS_TEXTURES"), auto="--auto" in sys.argv)
     out.mkdir(parents=True, exist_ok=True)
     rows = [np.concatenate([small(np.zeros((4, 4), np.uint8)), *(small(b.image) for b in known.values())], axis=1)]
-    print("| texture | method | present | realised | sharpness | alike | s |\n|---|---|---|---|---|---|---|")
+    tears = evaluators.load(Path(sys.argv[sys.argv.index("--tears") + 1])) if "--tears" in sys.argv else None
+    head = ("texture", "method", "present", "realised", "sharpness", "broken", "torn: own", "others", "alike", "s")
+    print("| " + " | ".join(head) + " |\n" + "|---" * len(head) + "|")
     for mine, a in known.items():
-        row, made, numbers, methods = [small(a.image)], [], [], set()
+        row, made, numbers, methods, torn = [small(a.image)], [], [], set(), {True: [np.nan], False: []}
+        judge = None if tears is None else tears.Judge(evaluators.as_float(a.image))
         for theirs, b in known.items():
             start = time.process_time()
             try:
@@ -110,14 +115,19 @@ def main() -> None:
             io.write(out / f"{mine}-on-{theirs}.png", result.image)
             row.append(small(result.image))
             methods.add(result.report["method"])
+            if judge is not None:
+                torn[theirs == mine].append(judge.scores(evaluators.as_float(result.image))["tear"])
             if theirs != mine:
                 made.append(result.image)
                 sharp = measure_sharpness(result.image) / measure_sharpness(a.image)
-                numbers.append((measure_present(result), result.report["realised"], sharp, spent))
-        present, realised, sharp, spent = (float(np.nanmean(c)) for c in zip(*numbers, strict=True))
+                broken = judging.judge(a.image, result.source, result.image).broken
+                numbers.append((measure_present(result), result.report["realised"], sharp, broken, spent))
+        present, realised, sharp, broken, spent = (float(np.nanmean(c)) for c in zip(*numbers, strict=True))
         how, alike = " ".join(sorted(methods)), measure_likeness(made)
         print(
-            f"| {mine} | {how} | {present:.2f} | {realised:.2f} | {sharp:.2f} | {alike:.2f} | {spent:.1f} |", flush=True
+            f"| {mine} | {how} | {present:.2f} | {realised:.2f} | {sharp:.2f} | {broken:.3f} | {torn[True][-1]:.3f} "
+            f"| {np.mean(torn[False] or [np.nan]):.3f} | {alike:.2f} | {spent:.1f} |",
+            flush=True,
         )
         rows.append(np.concatenate(row, axis=1))
         io.write(out / "matrix.png", np.concatenate(rows))

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 import texrs
-from texrs import elements, samples
+from texrs import elements, layouts, samples
 from texrs.elements import Elements, Layout
 from texrs.errors import InvalidInput
 from texrs.exemplar import ElementOptions
 from texrs.papers.splice.foreground import split_foreground
+from texrs.point_sets import find_courses, find_lattice, spacing
 
 RADIUS, SIDE = 8, 96
 CENTRES = np.array([[20.0, 20], [20, 34], [20, 70], [60, 20], [60, 50]])
@@ -217,3 +218,31 @@ def test_cells_are_the_elements_where_joints_part_all() -> None:
     # Nothing is taken for cells where something else was said.
     for said in ({"layout": "disjoint"}, {"points": plain.points[:9], "layout": "jointed"}, {"box": (80, 80, 15, 15)}):
         assert elements.analyse(image, **said).report["mask"] != "cells"
+
+
+@pytest.mark.parametrize(
+    ("name", "regular", "rows"), [("net", True, True), ("bricks", True, True), ("dots", False, False)]
+)
+def test_the_arrangement_is_known(name: str, regular: bool, rows: bool) -> None:
+    entry = Elements.of_sample(samples.load(name, size=(192, 192)))
+    found = entry.arrangement
+    assert (found.lattice is not None, found.courses is not None) == (regular, rows)
+    if found.courses is not None:
+        # Each element lies in a course, but where the border cuts them.
+        apart = np.abs(entry.points[:, :1] - np.array(found.courses)).min(axis=1)
+        assert np.median(apart) < 0.1 * found.spacing
+    light = entry.image.mean(axis=-1)
+    assert found.darker == bool(np.median(light[~entry.mask]) < np.median(light[entry.mask]))
+    words = found.describe(entry.layout)
+    assert ("lattice" in words) == regular
+    assert words in elements.page(entry)
+
+
+def test_courses_of_unequal_stones_are_found_and_a_heap_has_none() -> None:
+    wall = layouts.courses(160, [20, 40], 50, shift=0.25, vary=0.4, seed=3)
+    assert wall.arrangement.lattice is None
+    assert wall.arrangement.courses is not None
+    assert np.diff(wall.arrangement.courses)[:-1] == pytest.approx(30, abs=1.5)
+    heap = np.random.default_rng(2).uniform(0, 200, (60, 2))
+    assert find_courses(heap, spacing(heap)) is None
+    assert find_lattice(heap, spacing(heap)) is None

@@ -199,6 +199,7 @@ def explain(entry: Any, *, quiet: bool) -> None:
     for name in entry.report["proposed"]:
         value = {"box": ",".join(map(str, entry.report["box"])), "layout": entry.layout}.get(name, "as drawn")
         note(f"proposed {name}: {value} ({sure.get(name, 0):.0%} sure)", quiet=quiet)
+    note(f"elements: {entry.arrangement.describe(entry.layout)}", quiet=quiet)
     for doubt in entry.report["doubts"]:
         note(f"doubtful: {doubt}", quiet=quiet)
 

@@ -2,13 +2,14 @@
 
 `analyse` finds them, from a box around one and a few places between them, or by itself; `correct` puts right what it got
 wrong, and `page` shows it; `load` reads what `Elements.save` wrote. `Elements.of_sample` takes over what is known of a
-generated texture. `Elements.instances` are the elements one by one. `Layout` says how they hang together, and
-`ElementSearch` how they are looked for.
+generated texture. `Elements.instances` are the elements one by one, `Elements.arrangement` how they lie. `Layout` says how
+they hang together, and `ElementSearch` how they are looked for.
 """
 
 from __future__ import annotations
 
 from texrs.elements._analyse import analyse
+from texrs.elements._arrangement import Arrangement
 from texrs.elements._corrections import correct
 from texrs.elements._elements import FORMAT, Elements, digest, load
 from texrs.elements._instances import Instance
@@ -19,6 +20,7 @@ from texrs.elements._pictures import pictures
 
 __all__ = [
     "FORMAT",
+    "Arrangement",
     "ElementSearch",
     "Elements",
     "Instance",

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_image, as_wrap
 from texrs._engine.coherence import Similarity
 from texrs._typing import Array, Labels, Path
+from texrs.elements._arrangement import Arrangement, describe_arrangement
 from texrs.elements._instances import Instance, Labelled, cut_instances, label_elements, rate_closure
 from texrs.elements._known import as_element_labels, measure_box, measure_centres
 from texrs.elements._layout import Layout, LayoutName
@@ -165,6 +166,22 @@ class Elements:
         return cls(
             image, points, mask, measure_box(known), kind, np.ones(count), wrap=(around[0], around[1]), known=known
         )
+
+    @cached_property
+    def arrangement(self) -> Arrangement:
+        """How the elements are arranged: their spacing, the lattice or the courses that they lie in, what is darker.
+
+        Examples
+        --------
+        >>> from texrs import layouts
+        >>> drawn = layouts.lattice(100, (0, 20), (17, 10))
+        >>> drawn.arrangement.lattice
+        ((0.0, 20.0), (17.0, -10.0))
+        >>> layouts.courses(160, 20, 40, shift=0.3).arrangement.courses is None
+        False
+
+        """
+        return describe_arrangement(self.image, self.points, self.mask)
 
     @cached_property
     def labels(self) -> Labels:

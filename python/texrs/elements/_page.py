@@ -65,7 +65,8 @@ def page(entry: Elements, title: str = "elements") -> str:
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <meta name="color-scheme" content="light dark"><title>{escape(title)}</title><style>{STYLE}</style></head><body>
 <h1>{escape(title)}</h1>
-<p>{len(entry.points)} elements in {height} x {width} pixels; foreground {entry.mask.mean():.0%}.</p>
+<p>{len(entry.points)} elements in {height} x {width} pixels; foreground {entry.mask.mean():.0%};
+{escape(entry.arrangement.describe(entry.layout))}.</p>
 <table>{"".join(rows)}</table>{f"<ul>{doubts}</ul>" if doubts else ""}
 <p>Click an element to drop it, and any other place to add one. Elements: <label>layout <select id="layout">{options}</select>
 </label></p>

@@ -7,7 +7,7 @@ Here also: what the paper is silent about, namely how both point sets go on beyo
 
 from __future__ import annotations
 
-from texrs.point_sets._lattice import continue_on_lattice, fit_lattice
+from texrs.point_sets._lattice import continue_on_lattice, find_courses, find_lattice, fit_lattice
 from texrs.point_sets._layout import Fold, PointLayout, find_fold
 from texrs.point_sets._matching import match_points
 from texrs.point_sets._measures import directions, nearest_distances, spacing
@@ -17,7 +17,9 @@ __all__ = [
     "PointLayout",
     "continue_on_lattice",
     "directions",
+    "find_courses",
     "find_fold",
+    "find_lattice",
     "fit_lattice",
     "match_points",
     "nearest_distances",

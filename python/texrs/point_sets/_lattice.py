@@ -7,12 +7,15 @@ from numpy.typing import NDArray
 
 from texrs.point_sets._measures import Points, spacing
 
-__all__ = ["continue_on_lattice", "fit_lattice"]
+__all__ = ["continue_on_lattice", "find_courses", "find_lattice", "fit_lattice"]
 
 VOTERS = 400
 """Points in the middle of a layout that say which lattice it lies on."""
 REGULAR = 0.12
 """Root mean square distance of points from their places on a lattice, in spacings, up to which they are continued on it."""
+FEWEST, SHARE, STEP, STRAIGHT = 3, 0.8, 0.2, 0.06
+"""Courses, and points in courses of two or more, that make a wall; distance of rows, in spacings, that parts two courses; root
+mean square distance of points from their course, in steps from one to the next: random points lie .07 apart or more."""
 AREAS = (0.6, 1.6)
 """Least and greatest area of a lattice's cell, in squared spacings, for it to be of the points."""
 
@@ -60,6 +63,47 @@ def fit_lattice(points: Points) -> tuple[Points, Points]:
     return origin, basis
 
 
+def find_lattice(points: Points, unit: float) -> tuple[Points, Points, NDArray[np.intp]] | None:
+    """Return the lattice that points lie on, one a site: its origin, vectors as rows and their sites; None where on none.
+
+    ``unit`` is their spacing.
+    """
+    origin, basis = fit_lattice(points)
+    index = np.rint((points - origin) @ np.linalg.inv(basis)).astype(np.intp)
+    beside = points - origin - index @ basis
+    alone = AREAS[0] < np.abs(np.linalg.det(basis)) / unit**2 < AREAS[1] and len(np.unique(index, axis=0)) == len(index)
+    if not alone or np.sqrt((beside**2).sum(axis=1).mean()) > REGULAR * unit:
+        return None
+    return origin, basis, index
+
+
+def find_courses(points: Points, unit: float) -> Points | None:
+    """Return the rows (n,) of the courses that points lie in, in pixels; None where they lie in none.
+
+    ``unit`` is their spacing.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> find_courses(np.array([[5, 3], [5, 20], [5, 44], [25, 10], [26, 30], [45, 2], [45, 25]]), 20.0)
+    array([ 5. , 25.5, 45. ])
+
+    """
+    rows = np.sort(points[:, 0])
+    if not len(rows):
+        return None
+    course = np.concatenate([[0], np.cumsum(np.diff(rows) > STEP * unit)])
+    count = np.bincount(course)
+    mean = np.bincount(course, rows) / count
+    long = count >= 2
+    if long.sum() < FEWEST or count[long].sum() < SHARE * len(rows):
+        return None
+    beside = np.sqrt(((rows - mean[course])[long[course]] ** 2).mean())
+    if beside > STRAIGHT * float(np.median(np.diff(mean[long]))):
+        return None
+    return np.asarray(mean[long], np.float64)
+
+
 def continue_on_lattice(
     points: Points, unit: float, low: Points, high: Points
 ) -> tuple[Points, NDArray[np.intp]] | None:
@@ -67,14 +111,11 @@ def continue_on_lattice(
 
     Points lie a little beside their sites: those that stand for others do so too.
     """
-    origin, basis = fit_lattice(points)
-    span = np.linalg.inv(basis)
-    index = np.rint((points - origin) @ span).astype(np.intp)
-    beside = points - origin - index @ basis
-    # One point a site.
-    alone = AREAS[0] < np.abs(np.linalg.det(basis)) / unit**2 < AREAS[1] and len(np.unique(index, axis=0)) == len(index)
-    if not alone or np.sqrt((beside**2).sum(axis=1).mean()) > REGULAR * unit:
+    found = find_lattice(points, unit)
+    if found is None:
         return None
+    origin, basis, index = found
+    span, beside = np.linalg.inv(basis), points - origin - index @ basis
     corners = np.array([[y, x] for y in (low[0], high[0]) for x in (low[1], high[1])])
     ends = (corners - origin) @ span
     first, last = np.floor(ends.min(axis=0)).astype(int), np.ceil(ends.max(axis=0)).astype(int)

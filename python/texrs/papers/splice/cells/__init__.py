@@ -45,7 +45,7 @@ __all__ = ["find_entry_cells", "splice_cells"]
 
 FEWEST = 3
 """Cells that can be shown, at least."""
-HERE = 0.25
+HERE = 0.2
 """Sizes from a cell's centre within which a pixel of the output must show it, for the cell to be there."""
 
 _TARGETS: Cache[bytes, Tessellation] = Cache(16)

@@ -1,0 +1,67 @@
+"""How the elements of a texture are arranged: their spacing, and the lattice or the courses that they lie in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_image, guidance
+from texrs._typing import Array, Bools
+from texrs.elements._layout import Layout
+from texrs.elements._mask import to_lab
+from texrs.point_sets import find_courses, find_lattice, spacing
+
+__all__ = ["Arrangement", "describe_arrangement"]
+
+
+@dataclass(frozen=True, slots=True)
+class Arrangement:
+    """How elements are arranged.
+
+    Attributes
+    ----------
+    spacing : float
+        How far they lie apart, in pixels.
+    lattice : ((float, float), (float, float)) or None
+        The two steps, (rows, columns) in pixels, of the lattice that they lie on; None where on none.
+    courses : tuple of float or None
+        The rows, in pixels, of the courses that they lie in; None where in none.
+    darker : bool
+        Whether what is not foreground, the ground, the joints or what is seen through a net, is darker than what is.
+
+    """
+
+    spacing: float
+    lattice: tuple[tuple[float, float], tuple[float, float]] | None
+    courses: tuple[float, ...] | None
+    darker: bool
+
+    def describe(self, layout: Layout) -> str:
+        """Return it in words."""
+        words = [f"{self.spacing:.0f} pixels apart"]
+        if self.lattice is not None:
+            words.append(
+                "on a lattice of " + " and ".join(f"({row:.1f}, {column:.1f})" for row, column in self.lattice)
+            )
+        elif self.courses is not None:
+            words.append(f"in {len(self.courses)} courses")
+        rest = {"disjoint": "ground", "jointed": "joints", "connected": "openings"}[str(layout)]
+        return f"{', '.join(words)}; {rest} {'darker' if self.darker else 'lighter'}"
+
+
+def describe_arrangement(image: Array, points: NDArray[np.float64], mask: Bools) -> Arrangement:
+    """Return how elements are arranged, of a texture's picture, their centres (n, 2), n >= 2, and its foreground (H, W)."""
+    unit = spacing(points)
+    found = find_lattice(points, unit) if len(points) > 3 else None
+    rows = find_courses(points, unit)
+    light = to_lab(guidance(as_image(image, "image")))[..., 0]
+    inner, outer = (float(np.median(light[side])) if side.any() else 0.0 for side in (mask, ~mask))
+    steps = None if found is None else [(round(float(v[0]), 3) + 0.0, round(float(v[1]), 3) + 0.0) for v in found[1]]
+    return Arrangement(
+        round(unit, 3),
+        None if steps is None else (steps[0], steps[1]),
+        None if rows is None else tuple(round(float(row), 3) for row in rows),
+        outer < inner,
+    )
