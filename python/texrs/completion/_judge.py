@@ -13,9 +13,6 @@ from texrs._typing import Bools, Floats
 STRONG = 1.4
 """Power of a difference: a few large ones show more than many small ones of the same sum."""
 
-STRONG = 1.4
-"""Power of a difference: a few large ones show more than many small ones of the same sum."""
-
 Places = tuple[NDArray[np.intp], NDArray[np.intp]]
 
 
