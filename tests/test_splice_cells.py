@@ -67,6 +67,25 @@ def test_cells_are_where_they_are_wanted(a: str, b: str, spliced: Any) -> None:
     assert np.median(away) <= 0.15 * report["cells"]["size"]
 
 
+@pytest.mark.parametrize("side", [128, 320])
+def test_what_is_known_of_a_sample_is_put_together_from_its_cells(side: int) -> None:
+    wall = samples.bricks((side, side))
+    entry = Elements.of_sample(wall)
+    assert len(entry.points) < entry.labels.max() == wall.labels.max()
+    report = texrs.self_splice(entry, size=(side + 64, side + 80), seed=1).report
+    assert (report["method"], report["present"]) == ("cells", 1)
+
+
+def test_few_whole_cells_keep_their_size() -> None:
+    entry = Elements.of_sample(samples.bricks((128, 128)))
+    wide = texrs.self_splice(entry, size=(192, 208), seed=1)
+    there = wide.source.render(entry.mask, interpolation="nearest")
+    assert there.mean() == pytest.approx(entry.mask.mean(), abs=0.05)
+    # As many elements for its area, whole ones and those that the border cuts.
+    share = len(np.unique(wide.source.label)) / entry.labels.max() / (192 * 208 / 128**2)
+    assert share == pytest.approx(0.85, abs=0.2)
+
+
 @pytest.mark.parametrize(("a", "b"), [("stones", "wall"), ("stones", "dots")])
 def test_cells_are_found_again_in_the_picture(a: str, b: str, spliced: Any) -> None:
     result = spliced(a, b)

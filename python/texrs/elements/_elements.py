@@ -17,7 +17,7 @@ from texrs._engine.coherence import Similarity
 from texrs._typing import Array, Labels, Path
 from texrs.elements._arrangement import Arrangement, describe_arrangement
 from texrs.elements._instances import Instance, Labelled, cut_instances, label_elements, rate_closure
-from texrs.elements._known import as_element_labels, measure_box, measure_centres
+from texrs.elements._known import as_element_labels, extend_points, measure_box, measure_centres
 from texrs.elements._layout import Layout, LayoutName
 from texrs.errors import FileError, InvalidInput
 from texrs.exemplar import Exemplar
@@ -62,7 +62,7 @@ class Elements:
         What `similarity` returns, where it was made to be kept.
     known : ndarray of shape (height, width), int32, optional
         The element of each pixel, from 1 in the order of the points, where that is known at once: given, as to `of_labels`, or
-        of cells beyond doubt.
+        of cells beyond doubt. Numbers after those of all points are of elements that only enter the picture.
     """
 
     image: NDArray[Any]
@@ -114,7 +114,10 @@ class Elements:
             raise InvalidInput(f"sample: needs a picture with three known elements or more, got {sample!r}")
         mask = sample.labels > 0 if sample.mask is None else sample.mask
         layout, scores = Layout(sample.layout or "disjoint"), np.ones(len(sample.centres))
-        return cls(sample.image, sample.centres, mask, measure_box(sample.labels), layout, scores, wrap=wrap)
+        # The cells of a wall are what it is put together from; how separate elements part is read off their mask.
+        known = sample.labels if layout == Layout.JOINTED else None
+        box = measure_box(sample.labels)
+        return cls(sample.image, sample.centres, mask, box, layout, scores, wrap=wrap, known=known)
 
     @classmethod
     def of_labels(
@@ -222,7 +225,9 @@ class Elements:
     @cached_property
     def _labelled(self) -> Labelled:
         if self.known is not None:
-            return Labelled(self.known, self.points, rate_closure(self.scores))
+            points = extend_points(self.points, self.known, self.wrap)
+            scores = np.concatenate([self.scores, np.ones(len(points) - len(self.points))])
+            return Labelled(self.known, points, rate_closure(scores))
         found = label_elements(self.image, self.mask, self.points, self.scores, self.box, self.layout, self.wrap)
         found.labels.flags.writeable = False
         return found
@@ -331,7 +336,8 @@ def load(path: Path) -> Elements:
             if sets.sets.ndim != 2 or len(sets.sets) != size[0] * size[1] or int(sets.sets.max()) >= len(sets.sets):
                 raise InvalidInput("similarity sets")
         known = parts["known"].astype(np.int32) if "known" in parts else None
-        if known is not None and not np.array_equal(np.unique(known[known != 0]), np.arange(1, count + 1)):
+        named = count if known is None else max(count, int(known.max()))
+        if known is not None and not np.array_equal(np.unique(known[known != 0]), np.arange(1, named + 1)):
             raise InvalidInput("known elements")
         rows, columns = (int(n) for n in parts["box"])
         return Elements(

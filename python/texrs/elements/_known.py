@@ -11,7 +11,7 @@ from texrs._typing import Labels
 from texrs.elements._separation import label_components
 from texrs.errors import InvalidInput
 
-__all__ = ["as_element_labels", "measure_box", "measure_centres"]
+__all__ = ["as_element_labels", "extend_points", "measure_box", "measure_centres"]
 
 Points = NDArray[np.float64]
 
@@ -36,6 +36,11 @@ def measure_box(labels: Labels) -> tuple[int, int]:
     found = [box for box in find_objects(labels) if box is not None]
     height, width = (int(np.median([box[axis].stop - box[axis].start for box in found])) | 1 for axis in (0, 1))
     return height, width
+
+
+def extend_points(points: Points, labels: Labels, wrap: tuple[bool, ...]) -> Points:
+    """Return the points, and after them the centroids of the elements that are numbered beyond them."""
+    return np.concatenate([points, measure_centres(labels, wrap)[len(points) :]])
 
 
 def measure_centres(labels: Labels, wrap: tuple[bool, ...]) -> Points:

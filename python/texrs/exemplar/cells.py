@@ -104,10 +104,10 @@ class Cells:
         """Side of a square of the median cell's area, in pixels.
 
         Of whole cells, each weighed by how seldom a cell of its height and width lies whole in such a picture (Miles and
-        Lantuéjoul): borders cut large cells more often than small ones.
+        Lantuéjoul): borders cut large cells more often than small ones. Where too few are whole, of the larger half.
         """
         if np.count_nonzero(self.whole) < FEWEST:
-            return float(np.sqrt(np.median(self.area)))
+            return float(np.sqrt(np.quantile(self.area, 0.75)))
         rows, columns = self.labels.shape
         high, wide = np.ptp(self.outlines[self.whole], axis=1).T
         weight = 1 / (np.maximum(rows - high, 1) * np.maximum(columns - wide, 1))

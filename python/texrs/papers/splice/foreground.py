@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from texrs._typing import Bools, Labels
 from texrs.elements import Elements
 from texrs.elements._foreground import divide_foreground
+from texrs.elements._known import extend_points
 from texrs.papers.splice.entry import remember
 
 __all__ = ["Foreground", "split_foreground"]
@@ -63,7 +64,7 @@ def split_foreground(entry: Elements) -> Foreground:
     if entry.known is None:
         points, core = divide_foreground(np.asarray(entry.mask, bool), entry.points)
     else:
-        points, core = entry.points, entry.known
+        points, core = extend_points(entry.points, entry.known, entry.wrap), entry.known
     core = _open_gaps(core)
     region = _open_gaps(expand_labels(core, FRINGE).astype(np.int32))
     cut = np.zeros((len(points), 2, 2), bool)

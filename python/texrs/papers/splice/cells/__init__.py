@@ -106,9 +106,7 @@ def splice_cells(
     """
     watch("cells", 0.0)
     may_turn = (True, True) in find_mirrors(guidance(as_image(a.image))) if turns is None else turns
-    # The size of those that can be shown: these come as large as they are.
-    unit = float(np.sqrt(np.median(cells.area[list_usable(cells)])))
-    wanted = _take_targets(b, size, unit, scale, seed)
+    wanted = _take_targets(b, size, cells.size, scale, seed)
     if strength < 1:
         wanted = go_part_of_the_way(take_own_cells(cells, a.wrap, size, wanted.margin, seed=seed), wanted, strength)
     chosen = _list_shown(wanted)
