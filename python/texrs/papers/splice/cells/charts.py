@@ -26,7 +26,7 @@ BAND = 0.12
 """Sizes of a cell beyond its outline that it is drawn for, so that it can be cut against those beside it."""
 JOINT = 0.25
 """Sizes from the outline within which distances to it are those of the target."""
-SMOOTH = 0.06
+SMOOTH = 0.09
 """Standard deviation, in sizes, of the Gaussian that distances to outlines are smoothed by: within a joint outlines waver, and
 what follows them would. Both sides alike, so that corners meet corners."""
 SLIDES, SLIDE = 4, 0.9
