@@ -144,11 +144,40 @@ def test_v_chooses_among_the_first_operations():
 # --- lattices --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("name", ["bricks", "weave"])
+def test_on_a_lattice_periods_go_around_a_whole_number_of_times(name):
+    """What lies a side of the texture away is the same place of the lattice."""
+    wall = samples.load(name, size=(160, 160)).image
+    lattice = texrs.exemplar.segment(wall).lattice
+    assert lattice is not None
+    made = texrs.design(wall, (200, 232), seed=1, tiles=2, plan="still")
+    [closing] = made.report["stretched"]
+    size = np.diag([200.0, 232.0])
+    times = np.linalg.solve(np.array(closing) @ lattice.vectors, size)
+    assert np.abs(times - np.rint(times)).max() < 0.02
+    # Shown as it is but for that; patches lie where it repeats, by a sixth of a period.
+    frames = np.abs(made.source.frames().reshape(-1, 2, 2)) - np.abs(np.linalg.inv(closing))
+    assert np.abs(frames).max() < 0.01
+    places = np.moveaxis(np.indices((200, 232)), 0, -1).astype(float)
+    looked = made.source.coordinates @ np.array(closing).T
+    plain = np.linalg.det(made.source.frames()) > 0
+    moved = (places - looked)[plain & (made.source.frames()[..., 0, 0] > 0)]
+    phase = np.exp(2j * np.pi * np.linalg.solve(np.array(closing) @ lattice.vectors, moved.T))
+    assert (np.abs(phase.mean(axis=1)) > 0.6).all()
+
+
+def test_a_lattice_is_not_stretched_where_nothing_goes_around():
+    wall = samples.bricks((160, 160)).image
+    made = texrs.design(wall, (200, 232), seed=1, tiles=2, plan="still", wrap=False)
+    assert made.report["stretched"] == [None]
+    assert (np.abs(made.source.frames()) == np.eye(2)).all()
+
+
 def test_on_a_lattice_elements_move_by_its_shifts_alone():
     weave = samples.weave((160, 160)).image
     found = texrs.exemplar.segment(weave)
     assert found.lattice is not None
-    made = texrs.design(weave, 96, tiles=2, seed=2)
+    made = texrs.design(weave, 96, tiles=2, seed=2, plan="move")
     assert "lattice" in made.report["reason"]
     assert (made.report["rotate"], made.report["holes"]) == (0, [0, 0])
     lattice = np.array([found.lattice.a, found.lattice.b], float).T

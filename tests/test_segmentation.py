@@ -12,7 +12,7 @@ from texrs.errors import InvalidInput
 from texrs.exemplar import ElementOptions, segment
 from texrs.exemplar.components import fill_crescents, find_elements
 from texrs.exemplar.evidence import measure_creases, to_lab
-from texrs.exemplar.regularity import find_lattice, measure_direction, measure_polarity
+from texrs.exemplar.regularity import Lattice, find_lattice, measure_direction, measure_polarity
 from texrs.exemplar.shapes import Shapes, measure_solidity
 
 
@@ -225,6 +225,33 @@ def test_the_periods_of_a_tiling_are_found():
     assert shifts[0] in ((20, 0), (-20, 0))
     assert {(40, 0), (0, 28), (-20, 28)} <= set(shifts)
     assert all(is_in(s, found) and np.hypot(*s) <= 45 for s in shifts)
+
+
+def test_periods_are_known_to_parts_of_a_pixel():
+    rows, columns = np.mgrid[:160, :170].astype(np.float32)
+    waves = np.cos(2 * np.pi * rows / 17.3) + np.cos(2 * np.pi * columns / 23.6)
+    found = find_lattice(np.maximum(waves, 0)[..., None])
+    assert found is not None
+    assert np.abs(found.vectors).max(axis=1) == pytest.approx([17.3, 23.6], abs=0.1)
+
+
+@pytest.mark.parametrize("wrap", [(True, True), (True, False), (False, False)])
+def test_a_lattice_closes_on_a_torus(wrap):
+    lattice = Lattice((26, 40), (27, -40), 0.9, ((26.7, 39.5), (26.7, -39.6)))
+    closing = lattice.close((512, 400), wrap)
+    assert closing is not None
+    assert np.abs(closing - np.eye(2)).max() <= 0.15
+    for axis, side in enumerate((512, 400)):
+        times = np.linalg.solve(closing @ lattice.vectors, side * np.eye(2)[axis])
+        assert wrap[axis] == (np.abs(times - np.rint(times)).max() < 1e-9)
+    assert any(wrap) or (closing == np.eye(2)).all()
+
+
+def test_a_lattice_that_would_be_bent_too_far_does_not_close():
+    lattice = Lattice((40, 0), (0, 40), 0.9)
+    assert lattice.close((60, 400), (True, True)) is None
+    assert lattice.close((20, 400), (True, True)) is None
+    assert lattice.close((60, 400), (False, True)) is not None
 
 
 def test_direction_sees_one_direction_and_two_at_right_angles():

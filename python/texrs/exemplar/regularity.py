@@ -23,6 +23,10 @@ REGULAR = 0.3
 """Mean correlation on a lattice from which on it is believed; scattered things have up to 0.2."""
 DIP = 0.75
 """A correlation falls below this share of its peak on the way to it, else it is a stripe and no period."""
+NEAR = 2
+"""Pixels around where the multiple of a period is expected, within which it is looked for."""
+BENT = 0.15
+"""By how much an image may be stretched or sheared for its lattice to close on a torus."""
 FINE, BLOCKS = (0.7, 1.5), 4
 """Standard deviations of the Gaussians under which an image is compared with its mirror image; parts of a side that its spread
 is known from."""
@@ -36,9 +40,16 @@ class Lattice:
     b: Vector
     correlation: float
     """Mean over the lattice of the correlation of the image with itself, shifted."""
+    exact: tuple[tuple[float, float], tuple[float, float]] | None = None
+    """The two vectors to parts of a pixel, from how far their multiples go."""
 
     def __str__(self) -> str:
         return f"a lattice of periods {self.a} and {self.b} (correlation {self.correlation:.2f})"
+
+    @property
+    def vectors(self) -> NDArray[np.float64]:
+        """The two vectors as columns, (2, 2), to parts of a pixel."""
+        return np.array(self.exact or (self.a, self.b), np.float64).T
 
     def shifts(self, reach: float) -> list[Vector]:
         """Return the shifts within ``reach`` pixels, and those to the next places in any case; the shortest first."""
@@ -48,6 +59,34 @@ class Lattice:
         found = [i * a + j * b for i in range(-most, most + 1) for j in range(-most, most + 1) if i or j]
         found.sort(key=lambda v: (int(v @ v), tuple(v)))
         return [(int(v[0]), int(v[1])) for v in found if v @ v <= reach**2 + 0.5]
+
+    def close(self, size: tuple[int, int], wrap: tuple[bool, bool]) -> NDArray[np.float64] | None:
+        """Return the linear map of (row, column), near the identity, after which the lattice closes on a torus.
+
+        Its image has the height and the width of the torus among its shifts, along the axes that wrap: without it courses
+        and joints that leave a texture on one side do not come in again on the other.
+
+        Parameters
+        ----------
+        size : (rows, columns)
+            Of the torus.
+        wrap : (bool, bool)
+            Axes along which it goes around.
+
+        Returns
+        -------
+        (2, 2) float64, or None
+            None where the lattice would have to be changed by more than `BENT`.
+
+        """
+        vectors = self.vectors
+        sides = np.diag(np.array(size, np.float64))
+        # The shift of the lattice that is nearest to each side.
+        nearest = np.where(wrap, vectors @ np.rint(np.linalg.solve(vectors, sides)), sides)
+        if abs(np.linalg.det(nearest)) < 0.5 * abs(np.linalg.det(sides)):
+            return None
+        turned = np.asarray(sides @ np.linalg.inv(nearest), np.float64)
+        return turned if np.abs(turned - np.eye(2)).max() <= BENT else None
 
 
 def find_lattice(guide: Floats) -> Lattice | None:
@@ -119,7 +158,34 @@ def _fit_lattice(correlation: Floats) -> Lattice | None:
     best = max(mean for mean, _ in found.values())
     good = [(cell, pair, mean) for pair, (mean, cell) in found.items() if mean >= 0.85 * best]
     _, (first, second), mean = min(good)
-    return Lattice(first, second, mean)
+    return Lattice(first, second, mean, _refine(correlation, first, second))
+
+
+def _refine(correlation: Floats, a: Vector, b: Vector) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return two periods to parts of a pixel: what fits the peaks near their multiples, from the nearest ones outwards."""
+    reach = np.array(correlation.shape) // 2
+    found = np.array([a, b], np.float64)
+    most = int(np.hypot(*reach) * 2 / max(1.0, min(np.hypot(*a), np.hypot(*b)))) + 1
+    steps = np.stack(np.meshgrid(*(np.arange(-most, most + 1),) * 2, indexing="ij"), axis=-1).reshape(-1, 2)
+    steps = steps[(steps[:, 0] > 0) | ((steps[:, 0] == 0) & (steps[:, 1] > 0))]
+    order = np.argsort(np.abs(steps).max(axis=1), kind="stable")
+    times, peaks, weights = [], [], []
+    for step in steps[order]:
+        expected = np.rint(step @ found).astype(np.intp)
+        if (np.abs(expected) > reach - NEAR).any():
+            continue
+        low = expected + reach - NEAR
+        near = correlation[low[0] : low[0] + 2 * NEAR + 1, low[1] : low[1] + 2 * NEAR + 1]
+        at = np.unravel_index(int(near.argmax()), near.shape)
+        times.append(step)
+        peaks.append(expected - NEAR + at)
+        # Peaks at the end of a window lie beyond it, or nowhere.
+        inside = all(0 < place < 2 * NEAR for place in at)
+        weights.append(max(float(near.max()), 0.0) * (1.0 if inside else 0.01))
+        root = np.sqrt(weights)[:, None]
+        if len(times) >= 2 and np.linalg.matrix_rank(root * np.array(times)) == 2:
+            found = np.linalg.lstsq(root * np.array(times), root * np.array(peaks), rcond=None)[0]
+    return (float(found[0, 0]), float(found[0, 1])), (float(found[1, 0]), float(found[1, 1]))
 
 
 def _reduce(one: NDArray[np.intp], other: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -9,9 +9,6 @@ import numpy as np
 from texrs._typing import Bools, Floats
 from texrs.kernels.patch_search import Match, PatchIndex
 
-POOL = 48
-"""Matches that are looked at for what they repeat."""
-
 
 class Finder:
     """Finds matches in pictures: everywhere at half their size, then exactly around the few that are taken."""
@@ -21,10 +18,10 @@ class Finder:
         self.whole = PatchIndex(colours, max_patch=patch)
         self.half = PatchIndex([halve(c) for c in colours], max_patch=(patch[0] // 2, patch[1] // 2))
 
-    def find_pool(self, colours: Floats, known: Bools) -> list[Match]:
-        """Return matches of a patch that are apart, to within a pixel."""
+    def find_pool(self, colours: Floats, known: Bools, count: int) -> list[Match]:
+        """Return so many matches of a patch that are apart, to within a pixel."""
         weight = halve(known[..., np.newaxis].astype(np.float32))[..., 0] == 1
-        found = self.half.best(halve(colours), weight, count=POOL, separation=max(1, min(weight.shape) // 16))
+        found = self.half.best(halve(colours), weight, count=count, separation=max(1, min(weight.shape) // 16))
         pool = []
         for m in found:
             row, column = (

@@ -15,6 +15,8 @@ from texrs.quilting._finder import Finder
 from texrs.quilting._windows import Surroundings, Window
 from texrs.source_map import SourceMap, chain_pixels
 
+POOL = (48, 96)
+"""Matches that are looked at for what they repeat; more on a lattice, where many are out of step."""
 CANDIDATES = 3
 """Matches of the pool that are cut in."""
 REPETITION, GOOD, ON_LATTICE = 10.0, 0.1, 2.5
@@ -25,6 +27,9 @@ COLOUR, DEPTH = 1.0, 1.0
 """What a seam costs: squared differences of the colours, and the depth inside of elements of the pixels that meet there."""
 CONTINUATION = 2.0
 """Charge for going on with the piece of the exemplar that lies there already, in units of a typical match."""
+IN_STEP, AS_WELL = 0.15, 1.3
+"""How far a patch of what repeats on a lattice may be out of step, in shifts of the lattice, and by what factor a match that is
+in step may be worse: where a lattice is only about regular, what fits is more than what is in step."""
 CELL = 8
 """Use is counted in cells of so many pixels a side, and overlaps are compared on as many rows and columns."""
 CALM, RUN = 64, 9
@@ -45,6 +50,8 @@ class Picture:
     """(h, w): how deep inside an element each pixel is, 0 between elements, where seams are cheap."""
     regular: bool = False
     """Whether it repeats on a lattice."""
+    lattice: NDArray[np.float64] | None = None
+    """(2, 2): the lattice, a shift (row, column) in each column, where the texture has it too."""
 
 
 class Quilt:
@@ -69,6 +76,7 @@ class Quilt:
         self.all_hands = np.concatenate([np.linalg.det(p.source.frames()).ravel() > 0 for p in pictures])
         self.cells = np.concatenate([number_cells(p.source).ravel() for p in pictures])
         self.used = np.zeros(int(self.cells.max()) + 1)
+        self.steps: dict[int, NDArray[np.float64]] = {}
 
     def list_places(self, matches: Sequence[Match], window: Window, step: int = 1) -> NDArray[np.uint32]:
         """Return the places in the row that matches copy, or of each ``step``-th row and column: (matches, rows, columns)."""
@@ -83,15 +91,16 @@ class Quilt:
         """Cut the most promising matches into what is there, and keep the one that shows and repeats the least."""
         old, known = self.place[window.index(self.size)], window.mark_known()
         colours = self.all_colours.take(old, axis=0, mode="clip")
-        pool = finder.find_pool(colours, known)
+        regular = self.pictures[0].regular
+        pool = finder.find_pool(colours, known, POOL[regular])
         shown = self.list_places(pool, window, CELL)
         good, usual = np.quantile([m.cost for m in pool], (GOOD, 0.5)).tolist()
         usual = usual or 1.0
-        regular = self.pictures[0].regular
         charges = (ON_LATTICE if regular else REPETITION * (good or usual) / usual) * self.measure_repetition(shown)
         continued, mirrored = self.measure_likeness(shown, known, old)
         charges += CONTINUATION * continued
         free = np.flatnonzero(mirrored <= MIRRORED) if (mirrored <= MIRRORED).any() else np.arange(len(pool))
+        free = self.keep_in_step(pool, free, window)
         best = sorted(free.tolist(), key=lambda k: pool[k].cost / usual + charges[k])[:CANDIDATES]
         exact = finder.refine([pool[k] for k in best], colours, known)
         around = window.surround(self.size, self.wrap)
@@ -110,6 +119,7 @@ class Quilt:
     def lay(self, window: Window, match: Match, mask: Bools | None = None) -> None:
         """Lay a patch, or what of it a mask marks."""
         at, [places] = window.index(self.size), self.list_places([match], window)
+        self.steps.setdefault(match.exemplar, np.subtract(window.corner, (match.row, match.column)).astype(np.float64))
         self.place[at] = places if mask is None else np.where(mask, places, self.place[at])
         self.label[at] = self.pastes if mask is None else np.where(mask, np.uint32(self.pastes), self.label[at])
         self.used[np.unique(self.cells[places[::CELL, ::CELL]])] += 1
@@ -139,6 +149,22 @@ class Quilt:
             near &= np.abs(place[here] - place[there]) <= NEAR
         turned = self.all_hands[here] != self.all_hands[there]
         return (near & ~turned).mean(axis=1), (near & turned).mean(axis=1)
+
+    def keep_in_step(self, pool: Sequence[Match], free: NDArray[np.intp], window: Window) -> NDArray[np.intp]:
+        """Return those of some matches that are in step with what their pictures show elsewhere, if these match as well."""
+        away = np.zeros(len(free))
+        for k, m in enumerate(pool[i] for i in free.tolist()):
+            lattice = self.pictures[m.exemplar].lattice
+            if lattice is not None and m.exemplar in self.steps:
+                moved = np.subtract(window.corner, (m.row, m.column)) - self.steps[m.exemplar]
+                times = np.linalg.solve(lattice, moved)
+                # The nearest shift is one of the four around.
+                around = np.floor(times)[:, np.newaxis] + [[0, 0, 1, 1], [0, 1, 0, 1]]
+                rest = np.linalg.norm(moved[:, np.newaxis] - lattice @ around, axis=0).min()
+                away[k] = rest / np.linalg.norm(lattice, axis=0).min()
+        kept = free[away <= IN_STEP]
+        least, least_kept = (min((pool[i].cost for i in rows.tolist()), default=np.inf) for rows in (free, kept))
+        return kept if least_kept <= AS_WELL * least else free
 
     def measure_repetition(self, shown: NDArray[np.uint32]) -> NDArray[np.float64]:
         """Return how much of each match others show: 0 nothing, 1 what they all do."""

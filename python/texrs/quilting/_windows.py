@@ -57,6 +57,11 @@ class Window:
         """Rows and columns of the patch."""
         return self.rows.extent, self.columns.extent
 
+    @property
+    def corner(self) -> tuple[int, int]:
+        """Its first row and column."""
+        return self.rows.start, self.columns.start
+
     def mark_known(self) -> Bools:
         """Mark what other patches cover."""
         known = np.zeros(self.shape, bool)

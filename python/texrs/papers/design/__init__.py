@@ -32,6 +32,9 @@ Departures, with their reasons:
   that hang), or at all where ``rotate=0`` says that it has an upper side, unless that is asked for. Nor is it turned where it
   has directions of its own (bark, brickwork); where it repeats on a lattice, elements move from place to place of the lattice
   and nowhere else.
+- What repeats on a lattice is stretched and sheared a little, by 15 % at most, so that a whole number of periods goes around
+  a cyclic texture, and patches are taken in step with each other: else bricks run together where the courses close. The
+  report's "stretched" says by how much.
 - A cyclic texture (section 3.5) is stitched on the torus from the start: patches are chosen to fit both sides of the
   wrap, where the paper folds a finished picture that was never chosen to fit.
 - Several exemplars are each stitched into a texture of the full size. Which one shows is asked by a map, or drawn as

@@ -61,6 +61,7 @@ def describe(
         "arrangement": [classify(p.parts) for p in plans],
         "plan": ["still" if p.still else "move" for p in plans],
         "tried": [p.tried and {name: dict(figures) for name, figures in p.tried.items()} for p in plans],
+        "stretched": [describe_closing(p, arguments) for p in plans],
         "rotate": first.moves.rotate,
         "shares": [int(np.count_nonzero(composite.exemplar == which)) for which in range(len(plans))],
         "density": None if arguments.density is None else describe_density(plans, composite, arguments.density),
@@ -69,6 +70,14 @@ def describe(
         "seams": seams,
         "operations": [t.log for t in tiles],
     }
+
+
+def describe_closing(plan: Plan, arguments: Arguments) -> list[list[float]] | None:
+    """Return by what linear map of (row, column) an exemplar is stretched for its lattice to close, if it is."""
+    closing = None
+    if plan.parts.lattice is not None and any(arguments.wrap):
+        closing = plan.parts.lattice.close(arguments.size, arguments.wrap)
+    return None if closing is None else [[round(float(x), 4) for x in row] for row in closing]
 
 
 def describe_density(plans: Sequence[Plan], composite: SourceMap, density: NDArray[np.float64]) -> list[dict[str, Any]]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from texrs._typing import Array, Floats, Progress
 from texrs.blending import blend, measure_visibility
+from texrs.exemplar.symmetry import flip_frame
 from texrs.kernels.gather import gather
 from texrs.papers.design.arguments import Arguments
 from texrs.papers.design.mixing import Layer, mix
@@ -61,13 +62,22 @@ def stitch_alone(
 ) -> SourceMap:
     """Stitch patches of the tiles of one exemplar."""
     plan = plans[number]
-    depth, regular = measure_depth(plan), plan.parts.lattice is not None
+    depth, lattice = measure_depth(plan), plan.parts.lattice
     side = min(depth.shape)
+    closing = None if lattice is None else lattice.close(arguments.size, arguments.wrap)
+    pictures = []
+    for tile in tiles:
+        colours, source, shifts = tile.colours, tile.source, None
+        if lattice is not None and closing is not None:
+            mirror = flip_frame(tile.mirror)
+            shifts = mirror @ closing @ lattice.vectors
+            if any(arguments.wrap):
+                source = bend(source.shape, mirror @ closing @ mirror).compose(source)
+                colours = gather(plan.guide, source.coordinates, interpolation="cubic")
+        shown = gather(depth, source.coordinates, interpolation="nearest")
+        pictures.append(Picture(colours, source, shown, lattice is not None, shifts))
     return quilt(
-        [
-            Picture(t.colours, t.source, gather(depth, t.source.coordinates, interpolation="nearest"), regular)
-            for t in tiles
-        ],
+        pictures,
         arguments.size,
         patch=round(PATCH * side),
         overlap=round(OVERLAP * side),
@@ -75,6 +85,19 @@ def stitch_alone(
         seed=seed,
         progress=partial(report_share, arguments.watch, number, len(plans)),
     )
+
+
+def bend(shape: tuple[int, ...], matrix: Array) -> SourceMap:
+    """Return the map of a picture that is brought to a linear image of itself, as much of it as a rectangle holds."""
+    inverse = np.linalg.inv(matrix)
+    half = (np.array(shape) - 1) / 2
+    # What is sheared needs room on both sides.
+    reach = np.floor(np.maximum(np.linalg.solve(np.abs(inverse), half), 8))
+    away = np.stack(np.meshgrid(*(np.arange(-r, r + 1) for r in reach), indexing="ij"), axis=-1)
+    places = np.clip(away @ inverse.T + half, 0, 2 * half).astype(np.float32)
+    size = places.shape[:2]
+    zeros = np.zeros(size, np.uint16)
+    return SourceMap(places, zeros, zeros.astype(np.uint32), inverse[np.newaxis].astype(np.float32), (tuple(shape),))
 
 
 def report_share(watch: Progress, number: int, count: int, share: float) -> None:

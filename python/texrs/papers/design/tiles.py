@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from texrs._typing import Array, Bools, Floats
 from texrs.exemplar.patches import place_patches
-from texrs.exemplar.symmetry import flip, flip_coordinates, flip_frame
+from texrs.exemplar.symmetry import Flip, flip, flip_coordinates, flip_frame
 from texrs.kernels.complete import complete
 from texrs.kernels.gather import gather
 from texrs.papers.design.canvas import Draft
@@ -33,6 +33,8 @@ class Tile:
     colours: Floats
     holes: float
     """Share of it that was open."""
+    mirror: Flip
+    """The mirror image of the exemplar that it was made from."""
     log: list[dict[str, Any]]
     """What was done to each element."""
     stages: dict[str, Array]
@@ -84,7 +86,7 @@ def fill_holes(draft: Draft, plan: Plan, shapes: tuple[tuple[int, ...], ...], wh
     colours = gather(plan.guide, coordinates, interpolation="cubic")
     deformed = np.where(holes[..., np.newaxis], np.float32(0), draft.colours)
     stages = {"deformed": deformed, "holes": holes, "completed": colours}
-    return Tile(source, colours, float(holes.mean()), draft.log, stages)
+    return Tile(source, colours, float(holes.mean()), draft.mirror, draft.log, stages)
 
 
 def mark_elements(draft: Draft, plan: Plan) -> Bools:
