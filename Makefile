@@ -41,8 +41,9 @@ demo: $(VENV)/.built
 	$(BIN)/texrs demo -o demo
 	@echo "Open demo/index.html in a browser."
 
+# All Rust tests are in the library: to build it once more for others would take a minute.
 test: $(VENV)/.built
-	cargo test --quiet
+	cargo test --quiet --lib
 	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal -q
 
 # Rounds with a seed each, until one fails or the time is up; with a SEED, the round of that seed.
