@@ -243,7 +243,7 @@ def test_a_lattice_closes_on_a_torus(wrap):
     assert np.abs(closing - np.eye(2)).max() <= 0.15
     for axis, side in enumerate((512, 400)):
         times = np.linalg.solve(closing @ lattice.vectors, side * np.eye(2)[axis])
-        assert wrap[axis] == (np.abs(times - np.rint(times)).max() < 1e-9)
+        assert wrap[axis] == (np.abs(times - np.rint(times)).max() < 1e-4)
     assert any(wrap) or (closing == np.eye(2)).all()
 
 

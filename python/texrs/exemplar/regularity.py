@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from texrs._typing import Floats
 
-__all__ = ["Lattice", "find_lattice", "measure_direction", "measure_polarity"]
+__all__ = ["FRACTIONS", "Lattice", "find_lattice", "measure_direction", "measure_polarity"]
 
 Vector = tuple[int, int]
 
@@ -27,6 +27,9 @@ NEAR = 2
 """Pixels around where the multiple of a period is expected, within which it is looked for."""
 BENT = 0.15
 """By how much an image may be stretched or sheared for its lattice to close on a torus."""
+PARTS, FRACTIONS = 2.0**8, 2.0**20
+"""Of a pixel to which periods are known, and of 1 to which matrices are: what is calculated with them is exact on every
+processor."""
 FINE, BLOCKS = (0.7, 1.5), 4
 """Standard deviations of the Gaussians under which an image is compared with its mirror image; parts of a side that its spread
 is known from."""
@@ -85,7 +88,7 @@ class Lattice:
         nearest = np.where(wrap, vectors @ np.rint(np.linalg.solve(vectors, sides)), sides)
         if abs(np.linalg.det(nearest)) < 0.5 * abs(np.linalg.det(sides)):
             return None
-        turned = np.asarray(sides @ np.linalg.inv(nearest), np.float64)
+        turned = np.rint(sides @ np.linalg.inv(nearest) * FRACTIONS) / FRACTIONS
         return turned if np.abs(turned - np.eye(2)).max() <= BENT else None
 
 
@@ -185,6 +188,7 @@ def _refine(correlation: Floats, a: Vector, b: Vector) -> tuple[tuple[float, flo
         root = np.sqrt(weights)[:, None]
         if len(times) >= 2 and np.linalg.matrix_rank(root * np.array(times)) == 2:
             found = np.linalg.lstsq(root * np.array(times), root * np.array(peaks), rcond=None)[0]
+    found = np.rint(found * PARTS) / PARTS
     return (float(found[0, 0]), float(found[0, 1])), (float(found[1, 0]), float(found[1, 1]))
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from texrs._typing import Array, Floats, Progress
 from texrs.blending import blend, measure_visibility
+from texrs.exemplar.regularity import FRACTIONS
 from texrs.exemplar.symmetry import flip_frame
 from texrs.kernels.gather import gather
 from texrs.papers.design.arguments import Arguments
@@ -89,7 +90,7 @@ def stitch_alone(
 
 def bend(shape: tuple[int, ...], matrix: Array) -> SourceMap:
     """Return the map of a picture that is brought to a linear image of itself, as much of it as a rectangle holds."""
-    inverse = np.linalg.inv(matrix)
+    inverse = np.rint(np.linalg.inv(matrix) * FRACTIONS) / FRACTIONS
     half = (np.array(shape) - 1) / 2
     # What is sheared needs room on both sides.
     reach = np.floor(np.maximum(np.linalg.solve(np.abs(inverse), half), 8))
