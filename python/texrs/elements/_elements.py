@@ -336,9 +336,10 @@ def load(path: Path) -> Elements:
             if sets.sets.ndim != 2 or len(sets.sets) != size[0] * size[1] or int(sets.sets.max()) >= len(sets.sets):
                 raise InvalidInput("similarity sets")
         known = parts["known"].astype(np.int32) if "known" in parts else None
-        named = count if known is None else max(count, int(known.max()))
-        if known is not None and not np.array_equal(np.unique(known[known != 0]), np.arange(1, named + 1)):
-            raise InvalidInput("known elements")
+        if known is not None:
+            names = np.unique(known[known != 0])
+            if len(names) < count or not np.array_equal(names, np.arange(1, len(names) + 1)):
+                raise InvalidInput("known elements")
         rows, columns = (int(n) for n in parts["box"])
         return Elements(
             image,

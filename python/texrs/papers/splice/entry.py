@@ -60,7 +60,7 @@ def check_entry(entry: Elements, name: str) -> Elements:
         )
     as_wrap(entry.wrap, f"{name}.wrap")
     known = entry.known
-    if known is not None and (known.shape != shape or known.min() < 0 or int(known.max()) < len(points)):
+    if known is not None and (known.shape != shape or known.min() < 0 or not len(points) <= known.max() <= known.size):
         raise InvalidInput(f"{name}.known: needs labels of shape {shape} from 1 to {len(points)} or more, one a point")
     return replace(entry, points=points)
 
