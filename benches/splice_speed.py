@@ -66,7 +66,7 @@ def forget() -> None:
 
 
 def splices(sides: list[int]) -> None:
-    print("splice            side  system   cold ms (processors)   cached ms (processors)")
+    print("splice            side  system   cold ms (processors)   cached ms (processors)   preview, cached")
     for side in sides:
         for a, b in (("dots", "pebbles"), ("net", "pebbles"), ("bricks", "pebbles")):
             if a == "net" and side > 256:
@@ -79,7 +79,8 @@ def splices(sides: list[int]) -> None:
             # What is put together from cells or knots has no system to solve.
             system = work().report.get("system", [0])
             cold, cached = best(work, forget), best(work)
-            times = "   ".join(f"{wall:8.1f} ({busy:8.1f})" for wall, busy in (cold, cached))
+            preview = best(lambda mine=mine, theirs=theirs: texrs.splice(mine, theirs, seed=1, method="preview"))
+            times = "   ".join(f"{wall:8.1f} ({busy:8.1f})" for wall, busy in (cold, cached, preview))
             print(f"{a + '/' + b:16s} {side:5d}  {system[0]:4d}^2  {times}", flush=True)
 
 

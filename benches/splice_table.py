@@ -1,14 +1,15 @@
 """A table of splices, each texture on the layout of each, and a contact sheet of them.
 
-    TEXRS_TEXTURES=FOLDER python benches/splice_table.py OUT [--size 192] [--auto] [--tears deep_quality.py]
+    TEXRS_TEXTURES=FOLDER python benches/splice_table.py OUT [--size 192] [--auto] [--method paper] [--tears deep_quality.py]
 
 The folder holds ``b-disjoint``, ``c-connected`` and ``d-background``: pictures beside JSON files with a box, scribbles and a
 tag, all of them (x, y). With ``--auto`` only the pictures are used. Without a folder the built-in samples are spliced.
 
 A line a texture, means over all other layouts: how it was put together, the share of targets with an element within .2 of its
-size (by the source map), how much of the wanted way was realised, the sharpness (mean gradient, over the texture's own), lines
-that break off (`texrs.judging`), how alike the results are on two layouts (correlation), and the seconds of a processor. With
-``--tears``, a module with `Judge(exemplar).scores(picture)`, the share of torn cells on its own layout and on others.
+size (by the source map), how much of the wanted way was realised, the sharpness (mean gradient, over the texture's own), the
+same of the ground between separate elements alone, lines that break off (`texrs.judging`), how alike the results are on two
+layouts (correlation), and the seconds of a processor. With ``--tears``, a module with `Judge(exemplar).scores(picture)`, the
+share of torn cells on its own layout and on others.
 """
 
 from __future__ import annotations
@@ -21,14 +22,18 @@ from itertools import combinations
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import binary_dilation
 
 import evaluators
 import texrs
 from texrs import elements, io, judging, samples
-from texrs.elements import Elements
+from texrs.elements import Elements, Layout
 from texrs.errors import TexrsError
 from texrs.papers.splice.pictures import to_picture
 
+CLEAR = 4
+"""How far, in pixels, the ground that is measured lies from any element: nearer is what comes with it, its shadow."""
+HEAD = "| texture | method | present | realised | sharpness | ground | broken | torn: own | others | alike | s |"
 SAMPLES = ("dots", "pebbles", "leaves_and_flowers", "net", "bricks", "scales", "weave")
 
 
@@ -68,6 +73,17 @@ def measure_sharpness(image: np.ndarray) -> float:
     return float(np.hypot(*np.gradient(grey)).mean())
 
 
+def measure_ground(a: Elements, result: texrs.Synthesis) -> float:
+    """Return the mean gradient of the ground between separate elements, over the texture's own; nan where that is flat."""
+
+    def steep(image: np.ndarray, elements: np.ndarray) -> float:
+        grey = to_picture(image).mean(axis=-1)
+        return float(np.hypot(*np.gradient(grey))[~binary_dilation(elements, iterations=CLEAR)].mean())
+
+    own = steep(a.image, a.mask) if a.layout == Layout.DISJOINT else 0.0
+    return steep(result.image, result.source.label > 0) / own if own else np.nan
+
+
 def measure_likeness(images: list[np.ndarray]) -> float:
     """Return the mean correlation of all pairs of pictures."""
     flat = [to_picture(i).mean(axis=-1).ravel() for i in images]
@@ -94,19 +110,19 @@ def main() -> None:
     words = [w for w in sys.argv[1:] if not w.startswith("--")]
     out = Path(words[0] if words else "splice-table")
     size = int(sys.argv[sys.argv.index("--size") + 1]) if "--size" in sys.argv else 192
+    method = sys.argv[sys.argv.index("--method") + 1] if "--method" in sys.argv else None
     known = entries(os.environ.get("TEXRS_TEXTURES"), auto="--auto" in sys.argv)
     out.mkdir(parents=True, exist_ok=True)
     rows = [np.concatenate([small(np.zeros((4, 4), np.uint8)), *(small(b.image) for b in known.values())], axis=1)]
     tears = evaluators.load(Path(sys.argv[sys.argv.index("--tears") + 1])) if "--tears" in sys.argv else None
-    head = ("texture", "method", "present", "realised", "sharpness", "broken", "torn: own", "others", "alike", "s")
-    print("| " + " | ".join(head) + " |\n" + "|---" * len(head) + "|")
+    print(f"{HEAD}\n" + "|---" * (HEAD.count("|") - 1) + "|")
     for mine, a in known.items():
         row, made, numbers, methods, torn = [small(a.image)], [], [], set(), {True: [np.nan], False: []}
         judge = None if tears is None else tears.Judge(evaluators.as_float(a.image))
         for theirs, b in known.items():
             start = time.process_time()
             try:
-                result = texrs.splice(a, b, size, seed=1)
+                result = texrs.splice(a, b, size, seed=1, method=method)
             except TexrsError as error:
                 print(f"{mine} on {theirs}: {error}")
                 row.append(small(np.zeros((4, 4), np.uint8)))
@@ -121,11 +137,13 @@ def main() -> None:
                 made.append(result.image)
                 sharp = measure_sharpness(result.image) / measure_sharpness(a.image)
                 broken = judging.judge(a.image, result.source, result.image).broken
-                numbers.append((measure_present(result), result.report["realised"], sharp, broken, spent))
-        present, realised, sharp, broken, spent = (float(np.nanmean(c)) for c in zip(*numbers, strict=True))
+                ground = measure_ground(a, result)
+                numbers.append((measure_present(result), result.report["realised"], sharp, ground, broken, spent))
+        present, realised, sharp, ground, broken, spent = np.mean(numbers, axis=0)
         how, alike = " ".join(sorted(methods)), measure_likeness(made)
         print(
-            f"| {mine} | {how} | {present:.2f} | {realised:.2f} | {sharp:.2f} | {broken:.3f} | {torn[True][-1]:.3f} "
+            f"| {mine} | {how} | {present:.2f} | {realised:.2f} | {sharp:.2f} | {ground:.2f} | {broken:.3f} "
+            f"| {torn[True][-1]:.3f} "
             f"| {np.mean(torn[False] or [np.nan]):.3f} | {alike:.2f} | {spent:.1f} |",
             flush=True,
         )

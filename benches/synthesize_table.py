@@ -1,9 +1,10 @@
-"""`texrs.synthesize` over many pictures, beside plain image quilting and the Resynthesizer, judged by evaluators.
+"""`texrs.synthesize` or `texrs.design` over many pictures, beside plain quilting and the Resynthesizer, judged by evaluators.
 
-    python benches/synthesize_table.py OUT --evaluator FILE.py ... [--seeds 3] [--quality preserve] [--only NAME]
-        [--resynthesizer PROGRAM] PICTURE ...
+    python benches/synthesize_table.py OUT --evaluator FILE.py ... [--verb synthesize] [--seeds 3] [--whole] [--size 768]
+        [--shown 768] [--quality preserve] [--only NAME] [--resynthesizer PROGRAM] PICTURE ...
 
-The exemplar is the middle 256 a side of each picture; results are twice as large and kept in OUT. A result is fine where
+The exemplar is the middle 256 a side of each picture, or the whole of it; results are twice as large, or of the size that is
+asked for, and kept in OUT. Evaluators are shown the middle of them where they are larger than `--shown`. A result is fine where
 every score of every evaluator is in its bounds, or no worse than 1.1 times that of a second crop of the same photograph, as
 far from the exemplar as can be. Quilting is `texrs.design` with nothing deformed, mirrored or blended. The Resynthesizer is an
 external program (`completion_vs_peers.py` says how it is built); it is given the exemplar with the rest to fill, once.
@@ -29,9 +30,9 @@ SIDE = 256
 STILL = texrs.DeformationOptions(operations=0, mirror=False)
 
 
-def middle(image: np.ndarray) -> np.ndarray:
-    row, column = ((n - min(n, SIDE)) // 2 for n in image.shape[:2])
-    return np.ascontiguousarray(image[row : row + SIDE, column : column + SIDE])
+def middle(image: np.ndarray, side: int = SIDE) -> np.ndarray:
+    row, column = ((n - min(n, side)) // 2 for n in image.shape[:2])
+    return np.ascontiguousarray(image[row : row + side, column : column + side])
 
 
 def second(image: np.ndarray) -> np.ndarray | None:
@@ -61,9 +62,13 @@ def by_resynthesizer(program: Path, image: np.ndarray) -> np.ndarray:
 
 def results(image: np.ndarray, options: argparse.Namespace) -> Iterator[tuple[str, int, np.ndarray]]:
     """Return each way's results, one for each seed."""
-    size = (2 * image.shape[0], 2 * image.shape[1])
+    size = (options.size, options.size) if options.size else (2 * image.shape[0], 2 * image.shape[1])
     for seed in range(1, options.seeds + 1):
-        yield "texrs", seed, texrs.synthesize(image, size, seed=seed, quality=options.quality).image
+        if options.verb == "design":
+            made = texrs.design(image, size, seed=seed)
+        else:
+            made = texrs.synthesize(image, size, seed=seed, quality=options.quality)
+        yield "texrs", seed, made.image
         if options.peers:
             plain = texrs.design(image, size, seed=seed, tiles=1, deformation=STILL, blend=None)
             yield "quilting", seed, plain.image
@@ -71,9 +76,8 @@ def results(image: np.ndarray, options: argparse.Namespace) -> Iterator[tuple[st
         yield "resynthesizer", 1, by_resynthesizer(options.resynthesizer, image)
 
 
-def judged(judges: evaluators.Judges, picture: np.ndarray, real: dict[str, float]) -> tuple[list[str], str]:
+def judged(judges: evaluators.Judges, scores: dict[str, float], real: dict[str, float]) -> tuple[list[str], str]:
     """Return which scores are neither in bounds nor like a real crop's, and them in words."""
-    scores = judges.scores(picture)
     bad = [n for n in judges.failed(scores) if n not in real or judges.worse(n, scores[n], real[n]) > 1.1]
     return bad, " ".join(f"{n} {scores[n]:.2f}" for n in bad)
 
@@ -83,7 +87,11 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("pictures", type=Path, nargs="+")
     parser.add_argument("--evaluator", type=Path, action="append", required=True)
+    parser.add_argument("--verb", default="synthesize", choices=("synthesize", "design"))
     parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--whole", action="store_true", help="the whole pictures are the exemplars")
+    parser.add_argument("--size", type=int, help="side of the results")
+    parser.add_argument("--shown", type=int, default=768, help="side of the middle that evaluators are shown")
     parser.add_argument("--quality", default="preserve", choices=("preserve", "fast", "optimise"))
     parser.add_argument("--only", default="", help="pictures whose names hold this")
     parser.add_argument("--peers", action="store_true", help="plain quilting as well")
@@ -92,28 +100,30 @@ def main() -> None:
     modules = [evaluators.load(path) for path in options.evaluator]
     options.out.mkdir(parents=True, exist_ok=True)
     fine: dict[str, list[list[bool]]] = {}
-    print("| picture | way | fine | out of bounds (seed: score) |\n|---|---|---|---|", flush=True)
+    print("| picture | way | fine | tear | verbatim | out of bounds (seed: score) |\n" + "|---" * 6 + "|", flush=True)
     for path in options.pictures:
         if options.only not in path.stem:
             continue
         whole = texrs.io.read(path)
-        image = middle(whole)
+        image = whole if options.whole else middle(whole)
         judges = evaluators.Judges(modules, image)
-        crop, real = second(whole), None
+        crop, real = None if options.whole else second(whole), None
         texrs.io.write(options.out / f"{path.stem}.png", image)
-        rows: dict[str, list[tuple[int, str]]] = {}
+        rows: dict[str, list[tuple[int, str, dict[str, float]]]] = {}
         for way, seed, picture in results(image, options):
             texrs.io.write(options.out / f"{path.stem}-{way}-{seed}.png", picture)
-            bad, words = judged(judges, picture, {})
+            scores = judges.scores(middle(picture, options.shown))
+            bad, words = judged(judges, scores, {})
             if bad and crop is not None:
                 real = judges.scores(crop) if real is None else real
-                bad, words = judged(judges, picture, real)
-            rows.setdefault(way, []).append((seed, words))
+                bad, words = judged(judges, scores, real)
+            rows.setdefault(way, []).append((seed, words, scores))
         for way, found in rows.items():
-            good = [not words for _, words in found]
+            good = [not words for _, words, _ in found]
+            most = " | ".join(f"{max(s.get(n, np.nan) for _, _, s in found):.3f}" for n in ("tear", "verbatim_share"))
             fine.setdefault(way, []).append(good)
-            said = "; ".join(f"{seed}: {words}" for seed, words in found if words)
-            print(f"| {path.stem} | {way} | {sum(good)}/{len(good)} | {said} |", flush=True)
+            said = "; ".join(f"{seed}: {words}" for seed, words, _ in found if words)
+            print(f"| {path.stem} | {way} | {sum(good)}/{len(good)} | {most} | {said} |", flush=True)
     for way, pictures in fine.items():
         count, total = sum(map(sum, pictures)), sum(map(len, pictures))
         print(f"\n{way}: {count} of {total} results fine; {sum(map(all, pictures))} of {len(pictures)} in all seeds")

@@ -360,6 +360,9 @@ def test_entries_that_cannot_be_read(tmp_path: Path, entry: Elements) -> None:
         elements.load(written(points=parts["points"][:, :1]))
     with pytest.raises(FileError, match="damaged .*layout"):
         elements.load(written(layout=np.frombuffer(b"F=x", np.uint8)))
+    for labels in (np.full(entry.mask.shape, 2**31 - 1), np.zeros(entry.mask.shape)):
+        with pytest.raises(FileError, match="damaged .*known elements"):
+            elements.load(written(known=labels.astype(np.int32)))
     np.savez(path, other=np.zeros(3))
     with pytest.raises(FileError, match="is no entry"):
         elements.load(path)
