@@ -18,6 +18,7 @@ LAYERS = (
     ("io",),
     ("source_map",),
     ("fields", "scale_maps", "samples", "point_sets"),
+    ("planes",),
     ("exemplar",),
     ("elements",),
     ("volume", "layouts"),
@@ -27,7 +28,7 @@ LAYERS = (
     ("blending", "tiling"),
     ("completion",),
     ("papers",),
-    ("database",),
+    ("database", "rectification"),
     ("demo",),
     ("cli",),
 )

@@ -221,5 +221,15 @@ def test_a_word_means_the_same_in_every_command() -> None:
 
 
 def test_commands_are_those_of_the_verbs() -> None:
-    assert {"design", "splice", "self-splice", "perspective", "solid", "synthesize", "tile", "complete"} == set(VERBS)
+    assert {
+        "design",
+        "splice",
+        "self-splice",
+        "perspective",
+        "rectify",
+        "solid",
+        "synthesize",
+        "tile",
+        "complete",
+    } == set(VERBS)
     assert all(callable(getattr(texrs, name.replace("-", "_"))) for name in VERBS)

@@ -15,6 +15,8 @@ CALLS = {
     "solid": "texrs.solid(image, 128",
     "synthesize": "texrs.synthesize(image, 128",
     "tile": "texrs.tile(image",
+    "rectify": "texrs.rectify(image",
+    "Plane": "texrs.Plane((32, 32), 45",
     "complete": "texrs.complete(image, image",
     "blend": "texrs.blend(source, image, wrap=True",
     "analyse": "texrs.elements.analyse(image",

@@ -1,5 +1,5 @@
 # The public names of texrs and where they live: read by type checkers, and by lazy_loader when texrs is imported.
-from . import elements, errors, exemplar, fields, io, judging, kernels, layouts, samples, scale_maps, volume
+from . import elements, errors, exemplar, fields, io, judging, kernels, layouts, planes, samples, scale_maps, volume
 from ._threads import threads
 from ._version import __version__
 from .blending import blend
@@ -13,6 +13,8 @@ from .papers.perspective import perspective
 from .papers.solid import solid, synthesize
 from .papers.solid.window import PlaneTexture, SolidTexture
 from .papers.splice import self_splice, splice
+from .planes import Plane
+from .rectification import rectify
 from .source_map import Reuse, SourceMap
 from .synthesis import Synthesis
 from .tiling import tile
@@ -24,6 +26,7 @@ __all__ = [
     "Elements",
     "Exemplar",
     "Guide",
+    "Plane",
     "PlaneTexture",
     "Reuse",
     "SolidTexture",
@@ -44,6 +47,8 @@ __all__ = [
     "kernels",
     "layouts",
     "perspective",
+    "planes",
+    "rectify",
     "samples",
     "scale_maps",
     "self_splice",

@@ -100,6 +100,18 @@ def scale_maps_edited() -> Parts:
 
 
 @case
+def rectified_by_angles() -> Parts:
+    wall = deep("tilted_bricks", 112, 128)
+    return parts_of(texrs.rectify(wall, slant=40, tilt=200, fov=60, wrap=(False, True), size=96))
+
+
+@case
+def rectified_as_found() -> Parts:
+    floor = sample("tilted_discs", 112, 128)
+    return parts_of(texrs.rectify(floor.image, plane=texrs.planes.find(floor.image)), report=("plane",))
+
+
+@case
 def tile() -> Parts:
     result = texrs.tile(colour("pebbles", 144, 160))
     return parts_of(result, report=("overlap", "joints"), stages=("swapped", "pieces"))

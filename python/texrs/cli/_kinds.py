@@ -379,6 +379,10 @@ KINDS = {
     "target": MAP,
     "mask": MASK,
     "within": MASK,
+    "ground": MASK,
+    "corners": Kind(
+        "ROW,COL ...", lambda text, about: parse_places([text], about), "Four, with spaces between them.", plain=True
+    ),
     "labels": Kind("FILE", read_labels, "Or an entry that texrs analyse wrote (.npz).", file=True),
     "values": Kind("FILE", read_values, file=True),
     "coordinates": Kind("FILE", lambda path, about: np.asarray(read_array(path, about.axes)), file=True),

@@ -119,7 +119,7 @@ class Verb:
 
 # --- the verbs -------------------------------------------------------------------------------------------------------
 
-NAMES = ("complete", "design", "perspective", "self-splice", "solid", "splice", "synthesize", "tile")
+NAMES = ("complete", "design", "perspective", "rectify", "self-splice", "solid", "splice", "synthesize", "tile")
 TWICE = {"size": "twice the exemplar"}
 GROWN = {"constraints": "constraint", "guide": "guide", "exemplar.image": "exemplar"}
 
@@ -143,6 +143,11 @@ def make_verb(name: str) -> Verb:
 
             options = Options(perspective, arguments={"exemplar": PICTURE}, optional=TWICE)
             return Verb(options, times=2, shape="target")
+        case "rectify":
+            from texrs.rectification import rectify
+
+            left = {"plane": "the command says how it lies by corners or angles"}
+            return Verb(Options(rectify, arguments={"image": PICTURE}, leave=left), says=say_plane)
         case "solid":
             from texrs.papers.solid import solid
 
@@ -168,6 +173,13 @@ def make_verb(name: str) -> Verb:
 def count_moved(result: Synthesis) -> str:
     """Return how many elements moved."""
     return f", {len(result.report['matches'])} elements moved"
+
+
+def say_plane(result: Synthesis) -> str:
+    """Return how the plane lies that was flattened."""
+    plane = result.report["plane"]
+    found = f", found with confidence {plane['confidence']:.2f}" if result.report["found"] else ""
+    return f", slant {plane['slant']:.1f} and tilt {plane['tilt']:.1f}{found}"
 
 
 def _grow(verb: Callable[..., Synthesis], kind: Kind, axes: int) -> Verb:

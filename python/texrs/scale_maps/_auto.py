@@ -75,7 +75,7 @@ def auto_mask(image: object, *, detail: float | None = None, trend: Trend = "pla
     colours = guidance(pixels)
     if float(colours[there].std(axis=0).max()) < _FLAT:
         raise InvalidInput("image: has one colour, so there are no features; give the scale by a mask or by angles")
-    grey = _take_grey(colours, there)
+    grey = take_grey(colours, there)
     # What is finer than `detail` is not looked at, so large pictures need not be looked at pixel by pixel.
     cells = Lattice((size[0], size[1]), max(1, int(fine / 2)), 1)
     small, seen = (grey, there) if cells.cell == 1 else shrink(grey, there, cells.cell)
@@ -100,7 +100,7 @@ def _measure(mask: Bools, trend: Trend, known: Bools) -> Floats:
         ) from None
 
 
-def _take_grey(colours: Floats, known: Bools) -> Floats:
+def take_grey(colours: Floats, known: Bools) -> Floats:
     """Return lightness, or where the colours differ in hue rather than in that, the channel that shows most."""
     light = np.asarray(colours.mean(-1), np.float32)
     if colours.shape[2] == 1:
@@ -120,14 +120,14 @@ class _Blurs:
 
     def __init__(self, grey: Floats, known: Bools, sigma: float) -> None:
         self._known = None if known.all() else known.astype(np.float32)
-        self._take_grey = grey if self._known is None else grey * self._known
+        self._grey = grey if self._known is None else grey * self._known
         self._sigma = sigma
         self._kept: dict[int, Floats] = {}
 
     def sample(self, octaves: Floats) -> Floats:
         """Return each pixel as its own octave has it, linear between the whole ones."""
         where = np.clip(octaves, -_RANGE, _RANGE)
-        result = np.zeros_like(self._take_grey)
+        result = np.zeros_like(self._grey)
         for level in range(int(np.floor(where.min())), int(np.ceil(where.max())) + 1):
             if level not in self._kept:
                 self._kept[level] = self._blur_octaves(self._sigma * 2.0**level)
@@ -136,5 +136,5 @@ class _Blurs:
 
     def _blur_octaves(self, sigma: float) -> Floats:
         if self._known is None:
-            return blur(self._take_grey, sigma)
-        return np.asarray(blur(self._take_grey, sigma) / np.maximum(blur(self._known, sigma), 1e-6), np.float32)
+            return blur(self._grey, sigma)
+        return np.asarray(blur(self._grey, sigma) / np.maximum(blur(self._known, sigma), 1e-6), np.float32)

@@ -1,0 +1,438 @@
+"""A plane as a pinhole camera sees it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import atan, cos, degrees, hypot, radians, sin, tan
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_array, as_choice, as_float, as_size
+from texrs._typing import Array, Floats
+from texrs.errors import InvalidInput
+from texrs.planes._projective import along, find_focal, lift, to_digits, to_grid, transform
+from texrs.scale_maps._maps import LEAST, as_map
+from texrs.scale_maps._plane import Plane as Slope
+
+__all__ = ["FOV", "STEEPEST", "Plane"]
+
+Pair = tuple[float, float]
+
+FOV = 60.0
+"""Degrees that the longer side of a picture spans where nobody says: about those of a telephone, or of 30 mm on film."""
+STEEPEST = 88.0
+"""Degrees of slant beyond which a plane is seen edge on."""
+FIT = 0.15
+"""Residual of a scale map, in natural logarithms, at which the confidence in its plane is 1 / e."""
+FLAT = 1e-9
+"""What is nearer to the picture's middle line than this share of its side, seen as a point at infinity."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plane:
+    """A plane as a pinhole camera sees it: where each pixel of a picture lies on it, and how large things are there.
+
+    The camera looks along the picture's middle, (size - 1) / 2. A point of the flattened plane is given in (row, column), in
+    pixels of the picture's middle, which is (0, 0) there: near it the flat plane is the picture, stretched along its slope.
+
+    Parameters
+    ----------
+    shape : (rows, columns)
+        Of the picture.
+    slant : float
+        Degrees between the line of sight and the plane's normal, 0 (seen from the front) to 88.
+    tilt : float
+        Direction in the picture in which depth grows: degrees counter-clockwise from +x with y up, 90 for a floor.
+    fov : float, optional
+        Degrees that the longer side of the picture spans, 1 to 170. `FOV` where nothing is known: what is far is then
+        as small as it should be only if that is about right.
+    turn : float
+        Degrees by which the flattened plane is turned, counter-clockwise: for courses that are to lie level.
+    confidence : float
+        How sure the plane is, 0 to 1; of one that is given, 1.
+
+    Raises
+    ------
+    InvalidInput
+        Angles outside these ranges.
+
+    Examples
+    --------
+    A floor at 60 degrees: its horizon, and the size of what lies at the lower border over that in the middle.
+
+    >>> from texrs import Plane
+    >>> floor = Plane((101, 201), slant=60, tilt=90, fov=60)
+    >>> [round(float(row), 1) for row, _ in floor.horizon]
+    [-50.5, -50.5]
+    >>> round(float(floor.width([[100, 100]])[0]), 2)
+    1.5
+    >>> floor.project(floor.flatten([[20.0, 7.0]])).round(6).tolist()
+    [[20.0, 7.0]]
+
+    """
+
+    shape: tuple[int, int]
+    slant: float
+    tilt: float = 90.0
+    fov: float = FOV
+    turn: float = 0.0
+    confidence: float = 1.0
+
+    def __post_init__(self) -> None:
+        rows, columns = as_size(self.shape, "shape")
+        values = {
+            "shape": (rows, columns),
+            "slant": as_float(self.slant, "slant", 0, STEEPEST),
+            "tilt": as_float(self.tilt, "tilt", -1e6, 1e6) % 360,
+            "fov": as_float(self.fov, "fov", 1, 170),
+            "turn": (as_float(self.turn, "turn", -1e6, 1e6) + 180) % 360 - 180,
+            "confidence": as_float(self.confidence, "confidence", 0, 1),
+        }
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    # --- other ways to say where it lies -----------------------------------------------------------------------------
+
+    @classmethod
+    def of_horizon(
+        cls, shape: Sequence[int], horizon: Array | Sequence[Sequence[float]], *, fov: float | None = None
+    ) -> Plane:
+        """Return the plane with a horizon through two points.
+
+        Parameters
+        ----------
+        shape : (rows, columns)
+            Of the picture.
+        horizon : (2, 2) array_like
+            Two points (row, column), also outside of the picture. The plane is what lies on the side of the picture's middle.
+        fov : float, optional
+            Degrees that the longer side spans; `FOV` by default.
+
+        Raises
+        ------
+        InvalidInput
+            Points that are one, or a horizon through the picture's middle.
+
+        Examples
+        --------
+        >>> from texrs import Plane
+        >>> round(Plane.of_horizon((101, 201), [[-50.5, 0], [-50.5, 200]], fov=60).slant, 1)
+        60.0
+
+        """
+        size = as_size(shape, "shape")
+        points = as_array(horizon, "horizon", np.float64, (2, 2))
+        line = np.cross(*lift(points, size))
+        return cls._of_line(size, line, "horizon", fov)
+
+    @classmethod
+    def of_vanishing_points(
+        cls, shape: Sequence[int], points: Array | Sequence[Sequence[float]], *, fov: float | None = None
+    ) -> Plane:
+        """Return the plane of two directions at right angles to each other, by the points where their lines meet.
+
+        Parameters
+        ----------
+        shape : (rows, columns)
+            Of the picture.
+        points : (2, 2) array_like
+            Where lines of the one direction meet, and those of the other: (row, column), far outside for lines that are
+            parallel in the picture.
+        fov : float, optional
+            Degrees that the longer side spans. By default what makes the two directions meet at right angles, where both
+            points lie near enough to say, else `FOV`.
+
+        Returns
+        -------
+        Plane
+            Turned so that lines to the first point are columns of the flattened plane, or rows where that is nearer.
+
+        Raises
+        ------
+        InvalidInput
+            Points that are one, or in line with the picture's middle.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from texrs import Plane
+        >>> floor = Plane((240, 320), slant=50, tilt=70, fov=55)
+        >>> seen = Plane.of_vanishing_points((240, 320), floor.vanishing_points)
+        >>> [round(v, 6) for v in (seen.slant, seen.tilt, seen.fov)]
+        [50.0, 70.0, 55.0]
+
+        """
+        size = as_size(shape, "shape")
+        lifted = lift(as_array(points, "points", np.float64, (2, 2)), size)
+        return cls._of_directions(size, lifted, "points", fov)
+
+    @classmethod
+    def of_corners(
+        cls, shape: Sequence[int], corners: Array | Sequence[Sequence[float]], *, fov: float | None = None
+    ) -> Plane:
+        """Return the plane of a rectangle, by where its four corners are seen.
+
+        Parameters
+        ----------
+        shape : (rows, columns)
+            Of the picture.
+        corners : (4, 2) array_like
+            (row, column) of each, in the order in which one goes around.
+        fov : float, optional
+            Degrees that the longer side spans. By default what makes the corners right angles, where two sides and two others
+            meet near enough to say, else `FOV`.
+
+        Returns
+        -------
+        Plane
+            Turned so that the rectangle lies level.
+
+        Raises
+        ------
+        InvalidInput
+            Corners that are no convex quadrilateral.
+
+        Examples
+        --------
+        >>> from texrs import Plane
+        >>> floor = Plane((240, 320), slant=50, tilt=70, fov=55)
+        >>> corners = floor.project([[-20, -30], [-20, 40], [25, 40], [25, -30]])
+        >>> round(Plane.of_corners((240, 320), corners).slant, 6)
+        50.0
+
+        """
+        size = as_size(shape, "shape")
+        given = as_array(corners, "corners", np.float64, (4, 2))
+        sides = np.roll(given, -1, axis=0) - given
+        after = np.roll(sides, -1, axis=0)
+        turns = sides[:, 0] * after[:, 1] - sides[:, 1] * after[:, 0]
+        if not (np.all(turns > 1e-6) or np.all(turns < -1e-6)):
+            raise InvalidInput("corners: needs the four of a convex shape, in the order in which one goes around")
+        lifted = lift(given, size)
+        lines = [np.cross(lifted[i], lifted[(i + 1) % 4]) for i in range(4)]
+        # Opposite sides meet in a vanishing point.
+        return cls._of_directions(
+            size, np.array([np.cross(lines[1], lines[3]), np.cross(lines[0], lines[2])]), "corners", fov
+        )
+
+    @classmethod
+    def of_scale_map(cls, scale: Array, *, kind: Literal["width", "area"] = "area", fov: float | None = None) -> Plane:
+        """Return the plane that a scale map is of.
+
+        Parameters
+        ----------
+        scale : (H, W) float array
+            How large things are (`texrs.scale_maps`).
+        kind : {"area", "width"}
+            "area": square roots of areas, as `texrs.scale_maps.from_mask` measures them; "width": widths across the slope, as
+            `texrs.scale_maps.from_angles` gives them.
+        fov : float, optional
+            Degrees that the longer side spans; `FOV` by default.
+
+        Returns
+        -------
+        Plane
+            With a confidence by how well the map fits.
+
+        Raises
+        ------
+        InvalidInput
+            A map that is no scale map, or whose horizon would lie across the picture's middle.
+
+        Examples
+        --------
+        >>> from texrs import Plane, scale_maps
+        >>> scale = scale_maps.from_angles((96, 128), 50, 120, fov=60)
+        >>> plane = Plane.of_scale_map(scale, kind="width", fov=60)
+        >>> round(plane.slant, 2), round(plane.tilt, 2)
+        (50.0, 120.0)
+
+        """
+        given = as_map(scale)
+        what = as_choice(kind, "kind", ("area", "width"))
+        size = (given.shape[0], given.shape[1])
+        slope = Slope.fit(given, 1.0 if what == "width" else 2 / 3)
+        if slope is None:
+            return cls(size, 0.0, 90.0, FOV if fov is None else fov)
+        rise = np.array(slope.down) * (slope.slope / slope.scale)
+        sure = float(np.exp(-((slope.residual / FIT) ** 2)))
+        return cls._of_line(size, np.array([*rise, 1.0]), "scale", fov, confidence=sure)
+
+    @classmethod
+    def of(cls, given: Mapping[str, Any]) -> Plane:
+        """Return the plane that `as_dict` told."""
+        if not isinstance(given, Mapping) or not {"shape", "slant"} <= set(given) <= set(cls.__dataclass_fields__):
+            raise InvalidInput(
+                f"plane: needs a mapping with shape, slant, tilt, fov, turn and confidence, got {given!r}"
+            )
+        return cls(**given)
+
+    @classmethod
+    def _of_directions(cls, size: tuple[int, ...], points: NDArray[np.float64], name: str, fov: float | None) -> Plane:
+        """Return the plane of two vanishing points (2, 3), from the middle, of directions at right angles."""
+        long_ = max(size)
+        finite = [abs(p[2]) * 50 * long_ > hypot(p[0], p[1]) for p in points]
+        if fov is None and all(finite):
+            first, second = (p[:2] / p[2] for p in points)
+            squared = -float(first @ second)
+            if squared > 0:
+                found = 2 * degrees(atan(long_ / 2 / squared**0.5))
+                fov = found if 5 <= found <= 150 else None
+        plane = cls._of_line(size, np.cross(*points), name, fov)
+        # Where the first direction, and the second at right angles, run on the flattened plane.
+        ways = [plane._affine @ (p[:2] / np.linalg.norm(p)) for p in points]
+        angles = [degrees(np.arctan2(-way[0], way[1])) for way in ways]
+        # The one that is nearer to a column, or a row, is laid along it: by the lines that are seen best.
+        off = [(a + 45) % 90 - 45 for a in angles]
+        return cls(plane.shape, plane.slant, plane.tilt, plane.fov, to_digits(-off[0]), plane.confidence)
+
+    @classmethod
+    def _of_line(
+        cls, size: tuple[int, ...], line: NDArray[np.float64], name: str, fov: float | None, confidence: float = 1.0
+    ) -> Plane:
+        """Return the plane of a horizon, (row, column, 1) from the middle: where its product with a point is 0."""
+        scale = np.linalg.norm(line[:2]) * max(size) + abs(line[2])
+        if not np.isfinite(line).all() or scale == 0:
+            raise InvalidInput(f"{name}: the points are one, and have no line")
+        if abs(line[2]) < 1e-6 * scale:
+            raise InvalidInput(
+                f"{name}: the horizon runs through the picture's middle; a crop of the plane has it outside"
+            )
+        rise = line[:2] / line[2]
+        angle = FOV if fov is None else as_float(fov, "fov", 1, 170)
+        steep = hypot(*rise)
+        slant = degrees(atan(steep * find_focal(size, angle)))
+        if slant > STEEPEST:
+            raise InvalidInput(
+                f"{name}: the plane is seen edge on, {slant:.1f} degrees; up to {STEEPEST:.0f} are allowed"
+            )
+        # Depth grows where the scale falls.
+        tilt = degrees(np.arctan2(rise[0], -rise[1])) if steep > FLAT / max(size) else 90.0
+        return cls((size[0], size[1]), to_digits(slant), to_digits(tilt), to_digits(angle), 0.0, confidence)
+
+    # --- what it says -----------------------------------------------------------------------------------------------
+
+    @property
+    def middle(self) -> Pair:
+        """Row and column of the picture's middle."""
+        return (self.shape[0] - 1) / 2, (self.shape[1] - 1) / 2
+
+    @property
+    def focal(self) -> float:
+        """Focal length in pixels."""
+        return find_focal(self.shape, self.fov)
+
+    @property
+    def homography(self) -> NDArray[np.float64]:
+        """The matrix (3, 3) that takes (row, column, 1) of the picture to multiples of (row, column, 1) of the flat plane."""
+        move = np.eye(3)
+        move[:2, 2] = np.negative(self.middle)
+        matrix = np.eye(3)
+        matrix[:2, :2], matrix[2, :2] = self._affine, self._rise
+        return np.asarray(matrix @ move, np.float64)
+
+    @property
+    def horizon(self) -> tuple[Pair, Pair] | None:
+        """Two points (row, column) of the horizon, a picture's longer side apart; none of a plane seen from the front."""
+        rise = self._rise
+        steep = float(rise @ rise)
+        if steep < (FLAT / max(self.shape)) ** 2:
+            return None
+        foot = np.array(self.middle) - rise / steep
+        along = np.array([-rise[1], rise[0]]) / steep**0.5 * max(self.shape) / 2
+        ends = foot - along, foot + along
+        first, second = sorted(ends, key=lambda p: (p[1], p[0]))
+        return (float(first[0]), float(first[1])), (float(second[0]), float(second[1]))
+
+    @property
+    def vanishing_points(self) -> NDArray[np.float64]:
+        """Where the columns of the flat plane meet in the picture, and where its rows do: (2, 2), (row, column)."""
+        ways = np.concatenate([np.eye(2), np.zeros((2, 1))], axis=1) @ np.linalg.inv(self.homography).T
+        tiny = np.where(np.abs(ways[:, 2:]) < 1e-12, 1e-12, ways[:, 2:])
+        return np.asarray(ways[:, :2] / tiny, np.float64)
+
+    def width(self, points: Array | Sequence[Sequence[float]]) -> NDArray[np.float64]:
+        """Return how wide things are seen at points (..., 2), across the slope: 1 in the middle, 0 at the horizon."""
+        return 1 + along(np.asarray(points, np.float64) - self.middle, self._rise)
+
+    def scale_map(self, kind: Literal["width", "area"] = "width") -> Floats:
+        """Return how large things are at each pixel.
+
+        Parameters
+        ----------
+        kind : {"width", "area"}
+            Widths across the slope, or square roots of areas, which are their power 3/2: along the slope things are
+            foreshortened besides.
+
+        Returns
+        -------
+        (H, W) float32
+            1 in the picture's middle; held at .001 at the horizon and beyond.
+
+        Examples
+        --------
+        >>> from texrs import Plane
+        >>> Plane((3, 3), slant=0).scale_map().ravel().tolist() == [1.0] * 9
+        True
+
+        """
+        what = as_choice(kind, "kind", ("width", "area"))
+        wide = np.maximum(self.width(np.moveaxis(np.indices(self.shape), 0, -1)), LEAST)
+        return np.maximum(wide if what == "width" else wide**1.5, LEAST).astype(np.float32)
+
+    def flatten(self, points: Array | Sequence[Sequence[float]]) -> NDArray[np.float64]:
+        """Return where points (..., 2) of the picture lie on the flat plane; far away beyond the horizon."""
+        given = np.asarray(points, np.float64)
+        wide = np.maximum(self.width(given), LEAST)
+        return transform(self._affine, given - self.middle) / wide[..., np.newaxis]
+
+    def project(self, points: Array | Sequence[Sequence[float]]) -> NDArray[np.float64]:
+        """Return where points (..., 2) of the flat plane are seen, (row, column); nan for what lies behind the camera."""
+        given = transform(self._inverse, np.asarray(points, np.float64))
+        nearness = 1 - along(given, self._rise)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            seen = given / np.where(nearness > 0, nearness, np.nan)[..., np.newaxis]
+        return np.asarray(seen + self.middle, np.float64)
+
+    def unfold(self, points: Array | Sequence[Sequence[float]]) -> NDArray[np.float64]:
+        """Return the Jacobians of `project` at points (..., 2) of the flat plane: (..., 2, 2)."""
+        given = transform(self._inverse, np.asarray(points, np.float64))
+        wide = (1 / (1 - along(given, self._rise)))[..., np.newaxis, np.newaxis]
+        bent = np.eye(2) + wide * given[..., :, np.newaxis] * self._rise
+        return np.asarray(wide * np.einsum("...ij,jk->...ik", bent, self._inverse), np.float64)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what makes it anew, as JSON types: `Plane.of` takes it."""
+        return {name: getattr(self, name) for name in self.__dataclass_fields__} | {"shape": list(self.shape)}
+
+    @property
+    def _way(self) -> NDArray[np.float64]:
+        """The direction in the picture in which depth grows, (row, column)."""
+        angle = radians(self.tilt)
+        return to_grid([-sin(angle), cos(angle)])
+
+    @property
+    def _rise(self) -> NDArray[np.float64]:
+        """By how much the width grows a pixel."""
+        return to_grid(-self._way * (tan(radians(self.slant)) / self.focal))
+
+    @property
+    def _affine(self) -> NDArray[np.float64]:
+        """The stretch along the slope, and the turn after it."""
+        return to_grid(np.einsum("ij,jk->ik", self._turned, self._stretched(1 / cos(radians(self.slant)))))
+
+    @property
+    def _inverse(self) -> NDArray[np.float64]:
+        return to_grid(np.einsum("ij,kj->ik", self._stretched(cos(radians(self.slant))), self._turned))
+
+    @property
+    def _turned(self) -> NDArray[np.float64]:
+        """Counter-clockwise as it is seen: rows grow downwards."""
+        angle = radians(self.turn)
+        return np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
+
+    def _stretched(self, factor: float) -> NDArray[np.float64]:
+        return np.asarray(np.eye(2) + (factor - 1) * np.outer(self._way, self._way), np.float64)

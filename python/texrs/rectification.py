@@ -1,0 +1,355 @@
+"""The flat texture of a plane that was photographed aslant.
+
+The plane is flattened at one resolution. What would be blurred there, for the camera saw it from too far away or too much
+foreshortened, is not used: of the rest the largest rectangle is the texture, and where a larger or a cyclic one is asked for
+it is grown from that. The source map leads to the photograph, so any map in register with that is rectified alike.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import ceil
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_float, as_image, as_mask, as_seed, as_size, as_wrap, check_memory, guidance
+from texrs._typing import Array, Bools, Interpolation, Progress
+from texrs.errors import InvalidInput
+from texrs.planes import FOV, Plane, find
+from texrs.source_map import SourceMap
+from texrs.synthesis import Synthesis
+from texrs.tiling import tile
+
+__all__ = ["rectify"]
+
+SHARP = 0.5
+"""Pixels of the photograph for each of the texture, along the direction that has fewest, from which on it is sharp enough."""
+SMALLEST = 32
+"""Pixels across the smallest flat texture."""
+LEAST = 0.05
+"""Nearer to the horizon than this share of the middle's scale nothing is used."""
+LARGER = 8
+"""The flattened plane has at most so many times the pixels of the photograph."""
+SHOWN = 640
+"""The plane is first flattened with at most so many pixels a side."""
+CELLS = 160
+"""The largest rectangle is looked for on a lattice of so many cells a side."""
+SURE = 0.4
+"""Confidence below which it is said that a plane that was found may be wrong."""
+COURSES = 0.35
+"""How much edges must agree in two directions at right angles for the texture to be turned until these are level."""
+
+
+def rectify(
+    image: Array,
+    *,
+    plane: Plane | None = None,
+    corners: Sequence[Sequence[float]] | Array | None = None,
+    slant: float | None = None,
+    tilt: float | None = None,
+    fov: float | None = None,
+    ground: Array | None = None,
+    resolution: float | None = None,
+    size: int | Sequence[int] | None = None,
+    wrap: bool | Sequence[bool] = False,
+    seed: int = 0,
+    interpolation: Interpolation = "cubic",
+    progress: Progress | None = None,
+) -> Synthesis:
+    """Make the flat texture of a plane that was photographed aslant.
+
+    Parameters
+    ----------
+    image : (H, W) or (H, W, C) array
+        The photograph, any real dtype, each side at least 64.
+    plane : Plane, optional
+        How the plane lies. By default what ``corners``, or ``slant``, says, else it is found (`texrs.planes.find`).
+    corners : four of (row, column), optional
+        Where the corners of a rectangle of the plane are seen, in the order in which one goes around.
+    slant : float, optional
+        Degrees between the line of sight and the plane's normal, 0 (seen from the front) to 88.
+    tilt : float, optional
+        With ``slant``: the direction in the picture in which depth grows, degrees counter-clockwise from the right; by default
+        90, a floor.
+    fov : float, optional
+        Degrees that the longer side of the photograph spans, 1 to 170. By default what the corners tell, else 60.
+    ground : (H, W) array, optional
+        Not 0 where the photograph shows the plane; all of it by default.
+    resolution : float, optional
+        Pixels of the texture for one of the photograph's middle, 0.05 to 8. By default as large as things are seen in the mean
+        of it.
+    size : int or (rows, columns), optional
+        Of the texture, in pixels. By default all that is sharp, as a rectangle. What is larger is grown by example, what is
+        smaller is its middle.
+    wrap : bool or (rows, columns)
+        Axes along which the texture is to be cyclic (`texrs.tile`).
+    seed : int
+        Chooses what is grown.
+    interpolation : {"cubic", "linear", "nearest"}
+        Between pixels of the photograph.
+    progress : callable, optional
+        Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
+
+    Returns
+    -------
+    Synthesis
+        The texture, in the dtype and with the channels of the photograph; its source map leads to the photograph, with the
+        frames of the plane, by which normals turn. The stages are ``"flat"``, all of the plane that is seen,
+        ``"sharp"``, what of that is used, and ``"composite"``. The report has the plane.
+
+    Raises
+    ------
+    InvalidInput
+        Options out of their ranges, two ways to say how the plane lies, or a plane of which too little is sharp.
+
+    Warns
+    -----
+    UserWarning
+        A plane that was found with a confidence below 0.4: give corners, or angles.
+
+    Examples
+    --------
+    >>> import texrs
+    >>> floor = texrs.samples.tilted_discs((192, 192))
+    >>> flat = texrs.rectify(floor.image, slant=50, fov=53)
+    >>> flat.source.shapes, flat.report["plane"]["slant"]
+    (((192, 192),), 50.0)
+
+    """
+    pixels = as_image(image, minimum=64)
+    shape = pixels.shape[0], pixels.shape[1]
+    watch = progress or (lambda stage, share: None)
+    cyclic, number = as_wrap(wrap), as_seed(seed)
+    asked = None if size is None else as_size(size, minimum=SMALLEST)
+    fine = None if resolution is None else as_float(resolution, "resolution", 0.05, 8)
+    there = np.ones(shape, np.bool_) if ground is None else as_mask(ground, "ground", shape)
+    watch("plane", 0.0)
+    seen, found = choose_plane(pixels, there, plane, corners, slant, tilt, fov)
+    watch("plane", 1.0)
+    fine = choose_resolution(seen, there, fine)
+    sheet = Sheet.of(seen, there, fine)
+    if found:
+        seen = level(seen, sheet.source.render(pixels, interpolation="linear"), sheet.sharp)
+        sheet = Sheet.of(seen, there, fine)
+    start, sides = sheet.find_rectangle()
+    if min(sides) < SMALLEST:
+        raise InvalidInput(
+            f"image: of the plane {sides[0]} x {sides[1]} pixels are sharp at this resolution, {SMALLEST} x {SMALLEST} are "
+            "needed; give a smaller resolution, or another plane"
+        )
+    known, _ = lay(seen, start, sides, fine)
+    texture = known.render(pixels, interpolation=interpolation, antialias=True)
+    source, grown, corrected = grow(texture, asked, cyclic, number, watch)
+    source = source.compose(known)
+    as_it_is = source.shape == known.shape and not any(cyclic)
+    composite = texture if as_it_is else source.render(pixels, interpolation=interpolation, antialias=True)
+    squeeze = np.asarray(image).ndim == 2
+    shown = composite if corrected is None else corrected
+    stages = {
+        "flat": sheet.source.render(pixels, interpolation="linear"),
+        "sharp": sheet.sharp,
+        "composite": composite[..., 0] if squeeze else composite,
+    }
+    report: dict[str, Any] = {
+        "plane": seen.as_dict(),
+        "found": found,
+        "resolution": round(fine, 6),
+        "sharp": round(float(sheet.sharp.mean()), 4),
+        "rectangle": list(sides),
+        "grown": grown,
+        "wrap": list(cyclic),
+        "seed": number,
+        "interpolation": interpolation,
+    }
+    return Synthesis(shown[..., 0] if squeeze and shown.ndim == 3 else shown, source, stages, report)
+
+
+def choose_plane(
+    pixels: Array,
+    ground: Bools,
+    plane: Plane | None,
+    corners: object,
+    slant: float | None,
+    tilt: float | None,
+    fov: float | None,
+) -> tuple[Plane, bool]:
+    """Return the plane that was given in one of three ways, or the one that is found, and whether it was."""
+    size = pixels.shape[0], pixels.shape[1]
+    ways = {"plane": plane, "corners": corners, "slant": slant}
+    given = [name for name, value in ways.items() if value is not None]
+    if len(given) > 1:
+        raise InvalidInput(f"{given[1]}: {given[0]} says how the plane lies already")
+    if tilt is not None and slant is None:
+        raise InvalidInput("tilt: needs slant")
+    if plane is not None:
+        if not isinstance(plane, Plane) or plane.shape != size:
+            raise InvalidInput(f"plane: needs a texrs.Plane of a picture of {size[0]} x {size[1]}, got {plane!r}")
+        if fov is not None:
+            raise InvalidInput("fov: the plane has one already")
+        return plane, False
+    if corners is not None:
+        return Plane.of_corners(size, np.asarray(corners, np.float64), fov=fov), False
+    if slant is not None:
+        return Plane(size, slant, 90.0 if tilt is None else tilt, FOV if fov is None else fov), False
+    found = find(pixels, fov=fov, known=ground)
+    if found.confidence < SURE:
+        warnings.warn(
+            f"the plane was found with a confidence of {found.confidence:.2f} of 1 (slant {found.slant:.0f}, tilt "
+            f"{found.tilt:.0f}); where the texture does not look flat give the corners of a rectangle, or slant and tilt",
+            stacklevel=3,
+        )
+    return found, True
+
+
+def choose_resolution(plane: Plane, ground: Bools, asked: float | None) -> float:
+    """Return the resolution that is asked for, or that of the photograph in the mean of what is seen of the plane."""
+    width = plane.width(np.argwhere(ground))
+    if np.count_nonzero(width > LEAST) < SMALLEST**2:
+        raise InvalidInput(
+            "ground: too little of the plane lies before its horizon; give a mask of it, or another plane"
+        )
+    resolution = asked or float(np.median(width[width > LEAST]))
+    while True:
+        low, high = measure_extent(plane, ground, resolution)
+        most = (LARGER * ground.size / max(float(np.prod(high - low)), 1e-9)) ** 0.5
+        if resolution <= most:
+            return resolution
+        if asked is not None:
+            raise InvalidInput(f"resolution: at most {most:.3g} for this plane, got {resolution:.3g}")
+        resolution = most
+
+
+def measure_extent(plane: Plane, ground: Bools, resolution: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the least and the largest (row, column) of what may be sharp of a plane."""
+    # Its outermost pixels, and every few of the others.
+    step = max(1, min(ground.shape) // 256)
+    thin = np.zeros_like(ground)
+    thin[::step, ::step] = thin[[0, -1]] = thin[:, [0, -1]] = True
+    grid = np.argwhere(ground & thin)
+    near = grid[plane.width(grid) > max(LEAST, SHARP * resolution)]
+    if len(near) * step**2 < SMALLEST**2:
+        raise InvalidInput(f"resolution: at {resolution:.3g} hardly anything of this plane is sharp; give less")
+    points = plane.flatten(near)
+    return points.min(axis=0), points.max(axis=0)
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """All of a plane that may be sharp, flattened at every so many pixels of a texture."""
+
+    source: SourceMap
+    sharp: Bools
+    low: NDArray[np.float64]
+    """Point of the plane that the first pixel shows."""
+    step: int
+    resolution: float
+    """Of the texture."""
+
+    @classmethod
+    def of(cls, plane: Plane, ground: Bools, resolution: float) -> Sheet:
+        """Flatten a plane, and find where it is seen sharp enough for a resolution."""
+        from scipy.ndimage import minimum_filter
+
+        low, high = measure_extent(plane, ground, resolution)
+        sides = (high - low) * resolution
+        step = max(1, ceil(float(sides.max()) / SHOWN))
+        source, inside = lay(plane, low, (int(sides[0] / step) + 1, int(sides[1] / step) + 1), resolution / step)
+        # What lies between the samples must be ground too.
+        solid = ground if step == 1 or ground.all() else minimum_filter(ground, 2 * step + 1)
+        nearest = np.rint(source.coordinates).astype(np.intp)
+        inside &= solid[nearest[..., 0], nearest[..., 1]]
+        # The least singular value: how few pixels of the photograph a pixel sees.
+        frames = source.frames()
+        squares, area = np.square(frames).sum(axis=(-2, -1)), cross(frames[..., 0, :], frames[..., 1, :])
+        fewest = np.sqrt(np.maximum(squares - np.sqrt(np.maximum(squares**2 - 4 * area**2, 0)), 0) / 2)
+        return cls(source, np.asarray(inside & (fewest >= SHARP * step)), low, step, resolution)
+
+    def find_rectangle(self) -> tuple[NDArray[np.float64], tuple[int, int]]:
+        """Return the first point of about the largest rectangle that is sharp, and its sides in pixels of the texture."""
+        top, bottom, left, right = find_rectangle(self.sharp)
+        start = self.low + np.array([top, left]) * (self.step / self.resolution)
+        rows, columns = (max(0, (n - 1) * self.step + 1) for n in (bottom - top, right - left))
+        return start, (rows, columns)
+
+
+def cross(one: Array, other: Array) -> Array:
+    """Return the area between vectors (..., 2)."""
+    return np.asarray(one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0])
+
+
+def lay(plane: Plane, low: NDArray[np.float64], sides: tuple[int, int], resolution: float) -> tuple[SourceMap, Bools]:
+    """Return the map of a rectangle of a plane from a point on, and where it lies within the photograph."""
+    check_memory(sides[0] * sides[1] * 128, "resolution")
+    most = np.array(plane.shape) - 1
+    flat = low + np.moveaxis(np.indices(sides), 0, -1) / resolution
+    with np.errstate(invalid="ignore", divide="ignore"):
+        at, frames = plane.project(flat), plane.unfold(flat) / resolution
+        inside: Bools = np.asarray(((at >= 0) & (at <= most)).all(axis=-1))
+    at[~inside], frames[~inside] = 0, np.eye(2)
+    return SourceMap.from_coordinates(at.astype(np.float32), plane.shape, frame=frames.astype(np.float32)), inside
+
+
+def level(plane: Plane, flat: Array, sharp: Bools) -> Plane:
+    """Turn a plane so that courses, where its flat texture has any, lie along an axis."""
+    from scipy.ndimage import binary_erosion, gaussian_filter
+
+    light = guidance(flat).mean(axis=-1, dtype=np.float64)
+    rows, columns = np.gradient(gaussian_filter(light, 1.5))
+    slope = (columns - 1j * rows)[binary_erosion(sharp, iterations=4)]
+    energy = np.abs(slope) ** 2
+    total = float(energy.sum())
+    if total < 1e-9 * max(1, energy.size):
+        return plane
+    fourth = complex((slope**4 / np.maximum(energy, 1e-300)).sum()) / total
+    if abs(fourth) < COURSES:
+        return plane
+    return replace(plane, turn=float(f"{plane.turn - np.degrees(np.angle(fourth)) / 4:.5g}"))
+
+
+def find_rectangle(mask: Bools) -> tuple[int, int, int, int]:
+    """Return where about the largest rectangle of a mask begins and ends, in rows and columns: of cells that are full."""
+    step = max(1, -(-max(mask.shape) // CELLS))
+    rows, columns = (n // step for n in mask.shape)
+    cells = np.asarray(mask[: rows * step, : columns * step].reshape(rows, step, columns, step).all(axis=(1, 3)))
+    heights: NDArray[np.intp] = np.zeros(columns + 1, np.intp)
+    best = (0, 0, 0, 0, 0)
+    for row in range(rows):
+        heights[:-1] = np.where(cells[row], heights[:-1] + 1, 0)
+        # Columns whose heights grow: of each the rectangle as far as it is the lowest.
+        open_: list[tuple[int, int]] = []
+        for column, height in enumerate(heights.tolist()):
+            start = column
+            while open_ and open_[-1][1] >= height:
+                start, tall = open_.pop()
+                best = max(best, (tall * (column - start), row + 1 - tall, row + 1, start, column))
+            open_.append((start, height))
+    _, top, bottom, left, right = best
+    return top * step, bottom * step, left * step, right * step
+
+
+def cut(source: SourceMap, box: tuple[slice, slice]) -> SourceMap:
+    """Return a rectangle of a map."""
+    return SourceMap.from_coordinates(source.coordinates[box], source.shapes[0], frame=source.frames()[box])
+
+
+def grow(
+    flat: Array, size: tuple[int, ...] | None, wrap: tuple[bool, ...], seed: int, watch: Progress
+) -> tuple[SourceMap, str, Array | None]:
+    """Return the map of a texture of any size, cyclic or not, into a flat one; by what, and its picture where corrected."""
+    shape = (flat.shape[0], flat.shape[1])
+    if any(wrap):
+        made = tile(flat, wrap=wrap, size=size, progress=watch)
+        return made.source, "tile", None
+    if size is None or size == shape:
+        return SourceMap.identity(shape), "nothing", None
+    if all(n <= m for n, m in zip(size, shape, strict=True)):
+        places = [slice((m - n) // 2, (m - n) // 2 + n) for n, m in zip(size, shape, strict=True)]
+        return cut(SourceMap.identity(shape), (places[0], places[1])), "nothing", None
+    from texrs.papers.design import design
+
+    made = design(flat, size, seed=seed, wrap=False, progress=watch)
+    return made.source, "design", made.image

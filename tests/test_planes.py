@@ -1,0 +1,123 @@
+"""Planes: what is said of one in any way is the same plane, and what is found is the one that was seen."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from plane_checks import look, look_twice, turn_between
+from texrs import Plane, planes, samples, scale_maps
+from texrs.errors import InvalidInput
+
+FLOOR = Plane((240, 320), slant=50, tilt=70, fov=55)
+TURNED = Plane((240, 320), slant=50, tilt=70, fov=55, turn=20)
+POINTS = np.random.default_rng(0).uniform((60, 0), (239, 319), (40, 2))
+
+
+@pytest.mark.parametrize("plane", [FLOOR, TURNED, Plane((64, 64), 0)])
+def test_there_and_back(plane: Plane) -> None:
+    points = POINTS % 64 if plane.slant == 0 else POINTS
+    there = plane.flatten(points)
+    np.testing.assert_allclose(plane.project(there), points, atol=1e-8)
+    lifted = np.concatenate([points, np.ones((len(points), 1))], axis=1) @ plane.homography.T
+    np.testing.assert_allclose(lifted[:, :2] / lifted[:, 2:], there, atol=1e-8)
+    step = 1e-5
+    slopes = [(plane.project(there + step * way) - plane.project(there - step * way)) / (2 * step) for way in np.eye(2)]
+    np.testing.assert_allclose(plane.unfold(there), np.stack(slopes, axis=-1), atol=1e-6)
+    # Areas are seen as the frames say: as the power 3/2 of widths.
+    areas = np.sqrt(np.abs(np.linalg.det(plane.unfold(there))))
+    np.testing.assert_allclose(areas / plane.width(points) ** 1.5, np.cos(np.radians(plane.slant)) ** 0.5)
+
+
+def test_scales_are_those_of_the_angles() -> None:
+    np.testing.assert_allclose(FLOOR.scale_map(), scale_maps.from_angles(FLOOR.shape, 50, 70, fov=55), rtol=1e-5)
+    np.testing.assert_allclose(FLOOR.scale_map("area"), FLOOR.scale_map() ** 1.5, rtol=1e-5)
+
+
+def test_all_ways_to_say_it_are_one_plane() -> None:
+    corners = FLOOR.project([[-20, -30], [-20, 40], [25, 40], [25, -30]])
+    assert FLOOR.horizon is not None
+    said = {
+        "corners": Plane.of_corners(FLOOR.shape, corners),
+        "corners the other way round": Plane.of_corners(FLOOR.shape, corners[::-1]),
+        "vanishing points": Plane.of_vanishing_points(FLOOR.shape, FLOOR.vanishing_points),
+        "horizon": Plane.of_horizon(FLOOR.shape, FLOOR.horizon, fov=55),
+        "widths": Plane.of_scale_map(FLOOR.scale_map(), kind="width", fov=55),
+        "areas": Plane.of_scale_map(FLOOR.scale_map("area"), fov=55),
+        "dictionary": Plane.of(FLOOR.as_dict()),
+    }
+    for name, plane in said.items():
+        assert max(turn_between(plane, FLOOR)) < 0.1, name
+        assert abs(plane.fov - 55) < 0.1, name
+
+
+@pytest.mark.parametrize("turn", [-40.0, 0.0, 45.0])
+def test_a_rectangle_lies_level(turn: float) -> None:
+    plane = Plane((240, 320), slant=50, tilt=70, fov=55, turn=turn)
+    corners = plane.project([[-20, -30], [-20, 40], [25, 40], [25, -30]])
+    found = Plane.of_corners(plane.shape, corners)
+    flat = found.flatten(corners)
+    sides = np.roll(flat, -1, axis=0) - flat
+    assert np.abs(sides).min(axis=1).max() < 1e-4
+    np.testing.assert_allclose(np.sort(np.abs(sides).max(axis=1)), [45, 45, 70, 70], rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Plane((64, 64), 89), "slant: needs a number"),
+        (lambda: Plane((64, 64), float("nan")), "slant"),
+        (lambda: Plane((0, 64), 10), "shape"),
+        (lambda: Plane((64, 64), 10, fov=0.5), "fov: needs a number"),
+        (lambda: Plane.of_corners((64, 64), [[0, 0], [9, 9], [0, 9], [9, 0]]), "corners: needs the four of a convex"),
+        (lambda: Plane.of_corners((64, 64), [[0, 0], [9, 9], [0, 9]]), "corners"),
+        (lambda: Plane.of_horizon((64, 64), [[-5, 3], [-5, 3]]), "horizon: the points are one"),
+        (lambda: Plane.of_horizon((64, 64), [[31.5, 0], [31.5, 9]]), "runs through the picture's middle"),
+        (lambda: Plane.of_horizon((64, 64), [[31.0, 0], [31.0, 9]]), "edge on"),
+        (lambda: Plane.of_vanishing_points((64, 64), [[1, 2], [np.nan, 2]]), "points"),
+        (lambda: Plane.of_scale_map(np.ones((32, 32)), kind="volume"), "kind"),  # type: ignore[arg-type]
+        (lambda: Plane.of({"slant": 4}), "plane: needs a mapping"),
+        (lambda: planes.find(np.zeros((128, 128), np.uint8)), "one colour"),
+        (lambda: planes.find(np.zeros((32, 128), np.uint8)), "at least 64"),
+        (lambda: planes.find(samples.dots().image, known=np.zeros((256, 256), bool)), "known: 0 pixels"),
+    ],
+)
+def test_what_is_no_plane_gets_a_sentence(make: Callable[[], object], words: str) -> None:
+    with pytest.raises(InvalidInput, match=words):
+        make()
+
+
+@pytest.mark.parametrize("name", ["pebbles", "dots", "weave"])
+@pytest.mark.parametrize(("slant", "tilt", "noise"), [(35, 90, 0), (45, 205, 6)])
+def test_planes_are_found(name: str, slant: float, tilt: float, noise: float) -> None:
+    plane = Plane((192, 224), slant, tilt, fov=55)
+    found = planes.find(look(name, plane, seed=3, noise=noise), fov=55)
+    steep, aside = turn_between(found, plane)
+    assert steep <= 8
+    assert aside <= 15
+
+
+def test_what_is_seen_from_the_front_is_no_slope() -> None:
+    for name in ("pebbles", "weave"):
+        assert planes.find(samples.load(name, size=(192, 192)).image).slant < 12
+
+
+def test_what_is_not_the_plane_does_not_count() -> None:
+    plane = Plane((192, 224), 40, 90, fov=55)
+    picture = look("pebbles", plane)
+    ground = np.ones(plane.shape, bool)
+    ground[:60] = False
+    covered = picture.copy()
+    covered[:60] = samples.load("bark", size=(60, 224)).image
+    one, other = (planes.find(p, fov=55, known=ground) for p in (picture, covered))
+    assert max(turn_between(one, plane)) <= 10
+    assert max(turn_between(one, other)) <= 2
+
+
+def test_confidence_says_what_to_believe() -> None:
+    floor = look("weave", Plane((192, 224), 35, 90, fov=55))
+    sure = planes.find(floor, fov=55)
+    assert planes.find(floor, fov=55) == sure
+    # Two planes in one picture, and a wall.
+    torn = planes.find(look_twice(), fov=55)
+    assert 0 <= torn.confidence < sure.confidence <= 1
