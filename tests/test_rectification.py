@@ -156,3 +156,22 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert io.read(out).shape == (96, 96, 3)
     assert main(["rectify", photo, "-o", out, "--corners", "1,2 3,4"]) == 2
     assert "corners" in capsys.readouterr().err
+
+
+def test_what_a_camera_states_is_used(tmp_path: Path) -> None:
+    from PIL import Image
+
+    exif = Image.Exif()
+    exif.get_ifd(0x8769)[0xA405] = 28
+    photo, out = tmp_path / "floor.jpg", tmp_path / "flat.png"
+    Image.fromarray(FLOOR).save(photo, exif=exif, quality=95)
+    fov = io.read_fov(photo)
+    assert fov == pytest.approx(65.47, abs=0.01)
+    said = ["rectify", str(photo), "-o", str(out), "--slant", "45"]
+    assert main([*said, "--stages", str(tmp_path)]) == 0
+    assert json.loads((tmp_path / "report.json").read_text())["plane"]["fov"] == pytest.approx(fov)
+    assert main([*said, "--fov", "50", "--stages", str(tmp_path)]) == 0
+    assert json.loads((tmp_path / "report.json").read_text())["plane"]["fov"] == 50
+    for damaged in (photo.read_bytes()[:200], b"", b"\xff\xd8\xff\xe1\xff\xffExif\0\0II*\0\xff\xff\xff\xff"):
+        (tmp_path / "damaged.jpg").write_bytes(damaged)
+        assert io.read_fov(tmp_path / "damaged.jpg") is None

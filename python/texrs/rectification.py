@@ -76,7 +76,8 @@ def rectify(
         With ``slant``: the direction in the picture in which depth grows, degrees counter-clockwise from the right; by default
         90, a floor.
     fov : float, optional
-        Degrees that the longer side of the photograph spans, 1 to 170. By default what the corners tell, else 60.
+        Degrees that the longer side of the photograph spans, 1 to 170 (`texrs.io.read_fov`; the command reads it of the
+        file). By default what the corners tell, else 60.
     ground : (H, W) array, optional
         Not 0 where the photograph shows the plane; all of it by default.
     resolution : float, optional

@@ -40,6 +40,8 @@ class Verb:
     """The function that makes ``count`` of them."""
     says: Callable[[Synthesis], str] = lambda result: ""
     """What else is to be said of the result."""
+    knows: Callable[[Mapping[str, Any]], Mapping[str, Any]] = lambda given: {}
+    """Arguments that the texts of the options tell, where they are not given."""
 
     def make_command(self) -> Callable[..., None]:
         """Return the function of the command."""
@@ -80,7 +82,7 @@ class Verb:
         ):
             warnings.simplefilter("always")
             values |= options.read(given, about, which=lambda o: o.file and o.path not in values)
-            call = options.call(values)
+            call = {**self.knows(given), **options.call(values)}
             if any(o.name == "size" and o.required for o in options):
                 call["size"] = size
             if variants is None or self.several is None:
@@ -147,7 +149,7 @@ def make_verb(name: str) -> Verb:
             from texrs.rectification import rectify
 
             left = {"plane": "the command says how it lies by corners or angles"}
-            return Verb(Options(rectify, arguments={"image": PICTURE}, leave=left), says=say_plane)
+            return Verb(Options(rectify, arguments={"image": PICTURE}, leave=left), says=say_plane, knows=read_camera)
         case "solid":
             from texrs.papers.solid import solid
 
@@ -173,6 +175,12 @@ def make_verb(name: str) -> Verb:
 def count_moved(result: Synthesis) -> str:
     """Return how many elements moved."""
     return f", {len(result.report['matches'])} elements moved"
+
+
+def read_camera(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the angle of view that the photograph states."""
+    fov = None if given["image"].startswith(_outputs.SAMPLE) else io.read_fov(given["image"])
+    return {} if fov is None else {"fov": fov}
 
 
 def say_plane(result: Synthesis) -> str:

@@ -39,7 +39,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from itertools import chain
-from math import prod
+from math import atan, degrees, prod
 from pathlib import Path
 
 import numpy as np
@@ -53,7 +53,21 @@ from texrs.io._files import atomic
 from texrs.io._formats import FORMATS, VOLUMES, as_spacing, check, detect_kind
 from texrs.io._npy import read_arrays
 
-__all__ = ["atomic", "read", "read_arrays", "read_volume", "write", "write_slabs", "write_surface", "write_volume"]
+__all__ = [
+    "atomic",
+    "read",
+    "read_arrays",
+    "read_fov",
+    "read_volume",
+    "write",
+    "write_slabs",
+    "write_surface",
+    "write_volume",
+]
+
+
+FILM = 36.0
+"""Millimetres of the longer side of the film by which focal lengths are stated."""
 
 
 def __dir__() -> list[str]:
@@ -116,6 +130,34 @@ def read(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
         return _pillow.read_bmp(name, file, limit)
     with _files.translate_errors(name, "decoding"):
         return _files.turn_upright(*_image_io.decode(name, file, limit))
+
+
+def read_fov(path: PathLike) -> float | None:
+    """Return the angle of view of a photograph, as its Exif states it.
+
+    Parameters
+    ----------
+    path : path_like
+        JPEG, TIFF, PNG or WebP.
+
+    Returns
+    -------
+    float or None
+        Degrees that the longer side spans, of the whole picture that the camera took; None where the file does not say.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "grey.png")
+    ...     write(path, np.zeros((8, 8), np.uint8))
+    ...     read_fov(path) is None
+    True
+
+    """
+    focal = _pillow.read_focal(_files.as_path(path))
+    return None if focal is None else 2 * degrees(atan(FILM / 2 / focal))
 
 
 def read_volume(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:

@@ -19,6 +19,10 @@ from texrs._typing import Array
 from texrs.errors import FileError, LimitExceeded
 from texrs.io._files import check_size, translate_errors, turn_upright
 
+EXIF, FOCAL = 0x8769, 0xA405
+"""Tags of Exif: where what cameras say begins, and FocalLengthIn35mmFilm."""
+MOST = 3.0, 2000.0
+"""Focal lengths that are believed."""
 QUALITY = 95
 """Of JPEG files that are written; colour is not subsampled."""
 
@@ -45,6 +49,21 @@ def read_bmp(path: Path, file: bytes, limit: int) -> Array:
         sides = tuple(abs(int.from_bytes(file[i : i + 4], "little", signed=True)) for i in (22, 18))
     array = _decode(path, file, ".bmp", sides, 4, limit)
     return array.astype(np.uint8) * np.uint8(255) if array.dtype == np.bool_ else array
+
+
+def read_focal(path: Path) -> float | None:
+    """Return the focal length that a file's Exif states, in millimetres on 36 x 24 mm film; None where it says nothing."""
+    from PIL import Image
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            with Image.open(path) as opened:
+                stated = opened.getexif().get_ifd(EXIF).get(FOCAL)
+            focal = float(stated) if stated is not None else 0.0
+        except Exception:  # Whatever a file holds, what it says of its camera is never needed.
+            return None
+    return focal if MOST[0] <= focal <= MOST[1] else None
 
 
 def encode(array: Array, suffix: str) -> bytes:
