@@ -10,6 +10,7 @@ from texrs.completion import complete
 from texrs.demo._html import code, figure, grid
 from texrs.demo._workshop import Section, Workshop
 from texrs.papers.perspective import perspective
+from texrs.rectification import rectify
 
 SIDE, SIZE = 192, 224
 """Pixels a side of the example, and of what is grown."""
@@ -50,6 +51,12 @@ def _perspective(workshop: Workshop) -> str:
         figure(np.where(hole[..., np.newaxis], 128, floor.image).astype(np.uint8), "With a hole"),
         figure(filled.image, "Filled", note="--scale-map"),
     ]
+    flat = rectify(floor.image, wrap=True, seed=3)
+    levelled = [
+        figure(floor.image, "As it was seen"),
+        figure(flat.stages["flat"], "Flat", note="the plane was found in the picture"),
+        figure(np.tile(flat.image, (2, 2, 1)), "Cyclic", note="four side by side"),
+    ]
     return (
         code("texrs scale-map floor.png -o scale.npy --slant 50 --tilt 90")
         + code(
@@ -58,6 +65,8 @@ def _perspective(workshop: Workshop) -> str:
         + grid(grown, least=200)
         + code("texrs complete floor.png hole.png -o filled.png --scale-map scale.npy")
         + grid(mended, least=200)
+        + code("texrs rectify floor.png -o flat.png --wrap xy --seed 3")
+        + grid(levelled, least=200)
     )
 
 
@@ -65,6 +74,6 @@ PERSPECTIVE = Section(
     "perspective",
     "Elements of the right size",
     "A picture taken at an angle has elements of every size. A scale map says which; textures are grown, and holes filled, "
-    "with elements as large as it, or any other map, asks for.",
+    "with elements as large as it, or any other map, asks for; and the plane itself is made flat.",
     _perspective,
 )
