@@ -41,10 +41,11 @@ demo: $(VENV)/.built
 	$(BIN)/texrs demo -o demo
 	@echo "Open demo/index.html in a browser."
 
-# All Rust tests are in the library: to build it once more for others would take a minute.
+# All Rust tests are in the library: to build it once more for others would take a minute. Workers share the processors: were
+# each to have threads for matrices too, these would wait for each other.
 test: $(VENV)/.built
 	cargo test --quiet --lib
-	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal -q
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal -q
 
 # Rounds with a seed each, until one fails or the time is up; with a SEED, the round of that seed.
 fuzz: $(VENV)/.built
