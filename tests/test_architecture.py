@@ -28,7 +28,7 @@ LAYERS = (
     ("blending", "tiling"),
     ("completion",),
     ("papers",),
-    ("database", "rectification"),
+    ("database", "extension", "rectification"),
     ("demo",),
     ("cli",),
 )

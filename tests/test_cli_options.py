@@ -221,15 +221,17 @@ def test_a_word_means_the_same_in_every_command() -> None:
 
 
 def test_commands_are_those_of_the_verbs() -> None:
-    assert {
+    drawn = {
+        "complete",
         "design",
-        "splice",
-        "self-splice",
+        "extend",
         "perspective",
         "rectify",
+        "self-splice",
         "solid",
+        "splice",
         "synthesize",
         "tile",
-        "complete",
-    } == set(VERBS)
+    }
+    assert drawn == set(VERBS)
     assert all(callable(getattr(texrs, name.replace("-", "_"))) for name in VERBS)

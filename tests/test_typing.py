@@ -16,6 +16,7 @@ CALLS = {
     "synthesize": "texrs.synthesize(image, 128",
     "tile": "texrs.tile(image",
     "rectify": "texrs.rectify(image",
+    "extend": "texrs.extend(image",
     "Plane": "texrs.Plane((32, 32), 45",
     "complete": "texrs.complete(image, image",
     "blend": "texrs.blend(source, image, wrap=True",

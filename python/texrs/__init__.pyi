@@ -7,6 +7,7 @@ from .completion import complete
 from .database import TextureDatabase
 from .elements import Elements
 from .exemplar import ElementOptions, Exemplar
+from .extension import extend
 from .growth.constraints import Constraints, Guide
 from .papers.design import DeformationOptions, design, design_variants
 from .papers.perspective import perspective
@@ -41,6 +42,7 @@ __all__ = [
     "elements",
     "errors",
     "exemplar",
+    "extend",
     "fields",
     "io",
     "judging",

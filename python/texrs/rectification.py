@@ -7,7 +7,6 @@ it is grown from that. The source map leads to the photograph, so any map in reg
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import ceil
@@ -19,7 +18,8 @@ from numpy.typing import NDArray
 from texrs._arrays import as_float, as_image, as_mask, as_seed, as_size, as_wrap, check_memory, guidance
 from texrs._typing import Array, Bools, Interpolation, Progress
 from texrs.errors import InvalidInput
-from texrs.planes import FOV, Plane, find
+from texrs.planes import Plane
+from texrs.planes._choose import choose_plane
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 from texrs.tiling import tile
@@ -38,8 +38,6 @@ SHOWN = 640
 """The plane is first flattened with at most so many pixels a side."""
 CELLS = 160
 """The largest rectangle is looked for on a lattice of so many cells a side."""
-SURE = 0.4
-"""Confidence below which it is said that a plane that was found may be wrong."""
 COURSES = 0.35
 """How much edges must agree in two directions at right angles for the texture to be turned until these are level."""
 
@@ -167,43 +165,6 @@ def rectify(
         "interpolation": interpolation,
     }
     return Synthesis(shown[..., 0] if squeeze and shown.ndim == 3 else shown, source, stages, report)
-
-
-def choose_plane(
-    pixels: Array,
-    ground: Bools,
-    plane: Plane | None,
-    corners: object,
-    slant: float | None,
-    tilt: float | None,
-    fov: float | None,
-) -> tuple[Plane, bool]:
-    """Return the plane that was given in one of three ways, or the one that is found, and whether it was."""
-    size = pixels.shape[0], pixels.shape[1]
-    ways = {"plane": plane, "corners": corners, "slant": slant}
-    given = [name for name, value in ways.items() if value is not None]
-    if len(given) > 1:
-        raise InvalidInput(f"{given[1]}: {given[0]} says how the plane lies already")
-    if tilt is not None and slant is None:
-        raise InvalidInput("tilt: needs slant")
-    if plane is not None:
-        if not isinstance(plane, Plane) or plane.shape != size:
-            raise InvalidInput(f"plane: needs a texrs.Plane of a picture of {size[0]} x {size[1]}, got {plane!r}")
-        if fov is not None:
-            raise InvalidInput("fov: the plane has one already")
-        return plane, False
-    if corners is not None:
-        return Plane.of_corners(size, np.asarray(corners, np.float64), fov=fov), False
-    if slant is not None:
-        return Plane(size, slant, 90.0 if tilt is None else tilt, FOV if fov is None else fov), False
-    found = find(pixels, fov=fov, known=ground)
-    if found.confidence < SURE:
-        warnings.warn(
-            f"the plane was found with a confidence of {found.confidence:.2f} of 1 (slant {found.slant:.0f}, tilt "
-            f"{found.tilt:.0f}); where the texture does not look flat give the corners of a rectangle, or slant and tilt",
-            stacklevel=3,
-        )
-    return found, True
 
 
 def choose_resolution(plane: Plane, ground: Bools, asked: float | None) -> float:

@@ -112,6 +112,12 @@ def rectified_as_found() -> Parts:
 
 
 @case
+def extended() -> Parts:
+    floor = sample("tilted_discs", 96, 112)
+    return parts_of(texrs.extend(floor.image, left=24, right=32, slant=34, fov=60, seed=1))
+
+
+@case
 def tile() -> Parts:
     result = texrs.tile(colour("pebbles", 144, 160))
     return parts_of(result, report=("overlap", "joints"), stages=("swapped", "pieces"))

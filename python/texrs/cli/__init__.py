@@ -27,6 +27,7 @@ COMMANDS = {
     "database": "Keep analysed textures in a folder: add, list, or splice all with all.",
     "demo": "Write a page that shows what texrs makes, on built-in examples.",
     "design": "Design a texture of any size from one example.",
+    "extend": "Make a photograph of a plane larger, on any side, in the same perspective.",
     "info": "Say what an image or a source map holds.",
     "perspective": "Grow a picture whose elements are as large as a scale map says.",
     "rectify": "Make the flat texture of a plane that was photographed aslant.",

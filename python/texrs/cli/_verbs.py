@@ -121,7 +121,18 @@ class Verb:
 
 # --- the verbs -------------------------------------------------------------------------------------------------------
 
-NAMES = ("complete", "design", "perspective", "rectify", "self-splice", "solid", "splice", "synthesize", "tile")
+NAMES = (
+    "complete",
+    "design",
+    "extend",
+    "perspective",
+    "rectify",
+    "self-splice",
+    "solid",
+    "splice",
+    "synthesize",
+    "tile",
+)
 TWICE = {"size": "twice the exemplar"}
 GROWN = {"constraints": "constraint", "guide": "guide", "exemplar.image": "exemplar"}
 
@@ -148,8 +159,11 @@ def make_verb(name: str) -> Verb:
         case "rectify":
             from texrs.rectification import rectify
 
-            left = {"plane": "the command says how it lies by corners or angles"}
-            return Verb(Options(rectify, arguments={"image": PICTURE}, leave=left), says=say_plane, knows=read_camera)
+            return _see(rectify)
+        case "extend":
+            from texrs.extension import extend
+
+            return _see(extend)
         case "solid":
             from texrs.papers.solid import solid
 
@@ -188,6 +202,11 @@ def say_plane(result: Synthesis) -> str:
     plane = result.report["plane"]
     found = f", found with confidence {plane['confidence']:.2f}" if result.report["found"] else ""
     return f", slant {plane['slant']:.1f} and tilt {plane['tilt']:.1f}{found}"
+
+
+def _see(verb: Callable[..., Synthesis]) -> Verb:
+    left = {"plane": "the command says how it lies by corners or angles"}
+    return Verb(Options(verb, arguments={"image": PICTURE}, leave=left), says=say_plane, knows=read_camera)
 
 
 def _grow(verb: Callable[..., Synthesis], kind: Kind, axes: int) -> Verb:

@@ -1,0 +1,137 @@
+"""More of a plane that was photographed: the picture goes on beyond its borders, in the same perspective.
+
+What is beyond them is a hole that is filled by example (`texrs.complete`), with a scale map that goes on too: that of the
+picture's plane, which is said, or found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from texrs._arrays import as_image, as_int, as_mask, check_memory
+from texrs._typing import Array, Progress
+from texrs.completion import complete
+from texrs.errors import InvalidInput
+from texrs.planes import Plane
+from texrs.planes._choose import choose_plane
+from texrs.source_map import SourceMap
+from texrs.synthesis import Synthesis
+
+__all__ = ["extend"]
+
+MOST = 8192
+"""Pixels that are added on a side, at most."""
+LEAST = 0.05
+"""Nearer to the horizon than this share of the middle's scale a picture does not go on."""
+
+
+def extend(
+    image: Array,
+    *,
+    top: int = 0,
+    bottom: int = 0,
+    left: int = 0,
+    right: int = 0,
+    plane: Plane | None = None,
+    corners: Sequence[Sequence[float]] | Array | None = None,
+    slant: float | None = None,
+    tilt: float | None = None,
+    fov: float | None = None,
+    ground: Array | None = None,
+    boundary: int = 0,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Synthesis:
+    """Make a photograph of a plane larger, on any side, in the same perspective.
+
+    Parameters
+    ----------
+    image : (H, W) or (H, W, C) array
+        The photograph, any real dtype, each side at least 64.
+    top, bottom, left, right : int
+        Pixels that are added there, 0 to 8192; some somewhere. Towards the horizon only as far as it.
+    plane : Plane, optional
+        How the plane lies. By default what ``corners``, or ``slant``, says, else it is found (`texrs.planes.find`).
+    corners : four of (row, column), optional
+        Where the corners of a rectangle of the plane are seen, in the order in which one goes around.
+    slant : float, optional
+        Degrees between the line of sight and the plane's normal, 0 (seen from the front) to 88.
+    tilt : float, optional
+        With ``slant``: the direction in the picture in which depth grows, degrees counter-clockwise from the right; by default
+        90, a floor.
+    fov : float, optional
+        Degrees that the longer side of the photograph spans, 1 to 170. By default what the corners tell, else 60.
+    ground : (H, W) array, optional
+        Not 0 where the photograph shows the plane, where that is found; all of it by default.
+    boundary : int
+        How many known pixels at the border may change, 0 to 64, which hides it better; by default none.
+    seed : int
+        Chooses among what fits.
+    progress : callable, optional
+        Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
+
+    Returns
+    -------
+    Synthesis
+        The larger picture, in the dtype and with the channels of the photograph, of which no pixel changes but those within
+        ``boundary``. Its source map leads to the photograph. The report has the plane and what was added.
+
+    Raises
+    ------
+    InvalidInput
+        Options out of their ranges, nothing to add, two ways to say how the plane lies, or a picture that would reach the
+        horizon.
+
+    Warns
+    -----
+    UserWarning
+        A plane that was found with a confidence below 0.4: give corners, or angles.
+
+    Examples
+    --------
+    >>> import texrs
+    >>> floor = texrs.samples.tilted_discs((128, 128))
+    >>> larger = texrs.extend(floor.image, right=64, slant=35, fov=60, seed=1)
+    >>> larger.image.shape, bool((larger.image[:, :128] == floor.image).all())
+    ((128, 192, 3), True)
+
+    """
+    pixels = as_image(image, minimum=64)
+    rows, columns = pixels.shape[:2]
+    added = {
+        name: as_int(value, name, 0, MOST)
+        for name, value in (("top", top), ("bottom", bottom), ("left", left), ("right", right))
+    }
+    if not any(added.values()):
+        raise InvalidInput("top, bottom, left, right: all are 0, so there is nothing to add")
+    size = rows + added["top"] + added["bottom"], columns + added["left"] + added["right"]
+    check_memory(size[0] * size[1] * (64 + pixels.shape[2] * pixels.itemsize), "top, bottom, left, right")
+    rim = as_int(boundary, "boundary", 0, 64)
+    watch = progress or (lambda stage, share: None)
+    there = np.ones((rows, columns), np.bool_) if ground is None else as_mask(ground, "ground", (rows, columns))
+    watch("plane", 0.0)
+    seen, found = choose_plane(pixels, there, plane, corners, slant, tilt, fov)
+    watch("plane", 1.0)
+    first = np.array([added["top"], added["left"]])
+    places = np.moveaxis(np.indices(size), 0, -1) - first
+    width = seen.width(places)
+    if width.min() < LEAST:
+        raise InvalidInput(
+            "top, bottom, left, right: the picture would reach the plane's horizon; add fewer pixels, or say how the plane lies"
+        )
+    inner = (slice(first[0], first[0] + rows), slice(first[1], first[1] + columns))
+    canvas, hole = np.zeros((*size, pixels.shape[2]), pixels.dtype), np.ones(size, np.bool_)
+    canvas[inner], hole[inner] = pixels, False
+    made = complete(canvas, hole, scale_map=width.astype(np.float32), boundary=rim, seed=seed, progress=progress)
+    # It copies nothing from beyond the photograph's borders.
+    inside = np.clip(places, 0, [rows - 1, columns - 1]).astype(np.float32)
+    source = made.source.compose(SourceMap.from_coordinates(inside, (rows, columns)))
+    report: dict[str, Any] = {**made.report, "plane": seen.as_dict(), "found": found, "added": added}
+    composite = source.render(pixels, antialias=True)
+    if np.asarray(image).ndim == 2:
+        composite = composite[..., 0]
+    stages = {"known": made.stages["known"], "patches": made.stages["patches"], "composite": composite}
+    return Synthesis(composite, source, stages, report)

@@ -1,0 +1,74 @@
+"""Photographs of planes that go on beyond their borders, in the same perspective; what a user may do wrong; the command."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import texrs
+from plane_checks import look, turn_between
+from texrs import Plane, io, planes
+from texrs.cli import main
+from texrs.errors import InvalidInput
+
+PLANE = Plane((160, 176), 40, 100, fov=55)
+FLOOR = look("pebbles", PLANE)
+LARGER = texrs.extend(FLOOR, left=64, right=80, bottom=24, plane=PLANE, seed=2)
+
+
+def test_nothing_known_changes() -> None:
+    assert LARGER.image.shape == (184, 320, 3)
+    np.testing.assert_array_equal(LARGER.image[:160, 64:240], FLOOR)
+    np.testing.assert_array_equal(LARGER.source.render(FLOOR, antialias=True), LARGER.stages["composite"])
+    inside = np.moveaxis(np.indices((160, 176)), 0, -1)
+    np.testing.assert_array_equal(LARGER.source.coordinates[:160, 64:240], inside)
+    assert LARGER.report["added"] == {"top": 0, "bottom": 24, "left": 64, "right": 80}
+
+
+def test_it_is_the_same_plane() -> None:
+    """What is found of the whole is what was found of the photograph, seen from further left."""
+    before, after = (planes.find(picture, fov=50) for picture in (FLOOR, LARGER.image[:160, :240]))
+    steep, aside = turn_between(before, after)
+    assert steep <= 12
+    assert aside <= 25
+    # Things are as large in what was added as they were beside it.
+    scales = np.abs(np.linalg.det(LARGER.source.frames()[:160, 250:310]))
+    assert 0.6 < np.median(scales) < 1.7
+
+
+def test_again_and_otherwise() -> None:
+    again = texrs.extend(FLOOR, left=64, right=80, bottom=24, plane=PLANE, seed=2)
+    np.testing.assert_array_equal(again.image, LARGER.image)
+    grey = texrs.extend(FLOOR[..., 0].astype(np.uint16), top=16, slant=40, tilt=100, fov=55, boundary=2)
+    assert grey.image.shape == (176, 176)
+    assert grey.image.dtype == np.uint16
+    assert grey.stages["composite"].shape == (176, 176)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: texrs.extend(FLOOR), "nothing to add"),
+        (lambda: texrs.extend(FLOOR, right=-4), "right: "),
+        (lambda: texrs.extend(FLOOR, right=10**6), "right: "),
+        (lambda: texrs.extend(FLOOR, top=300, plane=PLANE), "reach the plane's horizon"),
+        (lambda: texrs.extend(FLOOR, top=8, slant=40, corners=[[0, 0]] * 4), "slant: corners says"),
+        (lambda: texrs.extend(FLOOR, top=8, plane=PLANE, boundary=65), "boundary: "),
+        (lambda: texrs.extend(FLOOR[:40], top=8), "each side must be at least 64"),
+    ],
+)
+def test_what_cannot_be_extended_gets_a_sentence(make: Callable[[], object], words: str) -> None:
+    with pytest.raises(InvalidInput, match=words):
+        make()
+
+
+def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    photo, out = str(tmp_path / "floor.png"), str(tmp_path / "larger.png")
+    io.write(photo, FLOOR)
+    said = ["--slant", "40", "--tilt", "100", "--fov", "55", "--seed", "2"]
+    assert main(["extend", photo, "-o", out, "--left", "64", "--right", "80", "--bottom", "24", *said]) == 0
+    np.testing.assert_array_equal(io.read(out), LARGER.image)
+    assert main(["extend", photo, "-o", str(tmp_path / "none.png"), *said]) == 2
+    assert "nothing to add" in capsys.readouterr().err
+    assert not (tmp_path / "none.png").exists()
