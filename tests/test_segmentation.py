@@ -275,6 +275,18 @@ def test_what_is_lit_from_one_side_differs_from_its_mirror_image(name, axes):
     assert np.allclose(measure_polarity(np.swapaxes(picture, 0, 1)), (found[1], found[0], found[2]), rtol=0.05)
 
 
+@pytest.mark.parametrize("angle", [0, 20, 45])
+def test_a_lattice_that_leans_differs_from_its_mirror_image(angle):
+    """Two directions at right angles lean to one side, but for those that are a mirror image of themselves."""
+    rows, columns = np.indices((192, 192))
+    turn = np.radians(angle)
+    along, across = columns * np.cos(turn) + rows * np.sin(turn), rows * np.cos(turn) - columns * np.sin(turn)
+    rng = np.random.default_rng(0)
+    lines = np.cos(along / 2.5) + np.cos(across / 2.5) + rng.normal(0, 0.2, along.shape)
+    oblique = measure_polarity(lines[..., np.newaxis].astype(np.float32))[2]
+    assert (oblique > 5) == (angle == 20)
+
+
 def test_what_is_oblique_is_like_itself_turned_round():
     rows, columns = np.mgrid[:256, :256]
     noise = np.random.default_rng(2).normal(size=(256, 256))

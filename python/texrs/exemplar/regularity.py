@@ -252,7 +252,8 @@ def measure_polarity(guide: Floats) -> tuple[float, float, float]:
     Three values: by what a mirror along rows turns round, by what one along columns does, and by what either does and both
     together do not. What is lit from one side grows dark slowly and bright at once, on the way along rows or along columns:
     slopes weighed by their square, or by that of the other slope, do not sum to 0 as they do where a mirror image is as likely.
-    What is oblique has slopes whose product does not.
+    What is oblique has slopes whose product does not; of what has two directions at right angles, neither of them upright, its
+    like of fourth order does not.
     """
     from scipy.ndimage import gaussian_filter
 
@@ -267,7 +268,9 @@ def measure_polarity(guide: Floats) -> tuple[float, float, float]:
         cubes = energy * np.sqrt(energy)
         for axis, slope in enumerate((rows, columns)):
             along[axis] = max(along[axis], *(_measure_oddness(slope * square, cubes) for square in squares))
-        along[2] = max(along[2], _measure_oddness(rows * columns, energy))
+        turned = rows * columns
+        fourth = turned * (squares[1] - squares[0]) / np.maximum(energy, 1e-12)
+        along[2] = max(along[2], _measure_oddness(turned, energy), _measure_oddness(fourth, energy))
     return along[0], along[1], along[2]
 
 
