@@ -167,10 +167,18 @@ def rectify(
     return Synthesis(shown[..., 0] if squeeze and shown.ndim == 3 else shown, source, stages, report)
 
 
+def list_points(ground: Bools) -> NDArray[np.intp]:
+    """Return the outermost pixels of a picture that are ground, and every few of the others: enough to measure a plane by."""
+    step = max(1, min(ground.shape) // 256)
+    thin = np.zeros_like(ground)
+    thin[::step, ::step] = thin[[0, -1]] = thin[:, [0, -1]] = True
+    return np.argwhere(ground & thin)
+
+
 def choose_resolution(plane: Plane, ground: Bools, asked: float | None) -> float:
     """Return the resolution that is asked for, or that of the photograph in the mean of what is seen of the plane."""
-    width = plane.width(np.argwhere(ground))
-    if np.count_nonzero(width > LEAST) < SMALLEST**2:
+    width = plane.width(list_points(ground))
+    if np.count_nonzero(width > LEAST) < SMALLEST:
         raise InvalidInput(
             "ground: too little of the plane lies before its horizon; give a mask of it, or another plane"
         )
@@ -182,18 +190,15 @@ def choose_resolution(plane: Plane, ground: Bools, asked: float | None) -> float
             return resolution
         if asked is not None:
             raise InvalidInput(f"resolution: at most {most:.3g} for this plane, got {resolution:.3g}")
-        resolution = most
+        # Where it is coarser, more of the plane is sharp, up to its horizon.
+        resolution = 0.9 * most
 
 
 def measure_extent(plane: Plane, ground: Bools, resolution: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the least and the largest (row, column) of what may be sharp of a plane."""
-    # Its outermost pixels, and every few of the others.
-    step = max(1, min(ground.shape) // 256)
-    thin = np.zeros_like(ground)
-    thin[::step, ::step] = thin[[0, -1]] = thin[:, [0, -1]] = True
-    grid = np.argwhere(ground & thin)
+    grid = list_points(ground)
     near = grid[plane.width(grid) > max(LEAST, SHARP * resolution)]
-    if len(near) * step**2 < SMALLEST**2:
+    if len(near) < SMALLEST:
         raise InvalidInput(f"resolution: at {resolution:.3g} hardly anything of this plane is sharp; give less")
     points = plane.flatten(near)
     return points.min(axis=0), points.max(axis=0)

@@ -25,11 +25,15 @@ DIP = 0.75
 """A correlation falls below this share of its peak on the way to it, else it is a stripe and no period."""
 NEAR = 2
 """Pixels around where the multiple of a period is expected, within which it is looked for."""
+OFTEN = 64
+"""Periods are fitted anew after each of so many peaks, and after that once a ring of them."""
 BENT = 0.15
 """By how much an image may be stretched or sheared for its lattice to close on a torus."""
 PARTS, FRACTIONS = 2.0**8, 2.0**20
 """Of a pixel to which periods are known, and of 1 to which matrices are: what is calculated with them is exact on every
 processor."""
+LEANS = 3.0
+"""Standard errors of a lattice that leans for one that counts: a wall that was taken a little aslant leans by up to 10."""
 FINE, BLOCKS = (0.7, 1.5), 4
 """Standard deviations of the Gaussians under which an image is compared with its mirror image; parts of a side that its spread
 is known from."""
@@ -165,33 +169,34 @@ def _fit_lattice(correlation: Floats) -> Lattice | None:
 
 
 def _refine(correlation: Floats, a: Vector, b: Vector) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return two periods to parts of a pixel: what fits the peaks near their multiples, ring by ring outwards."""
+    """Return two periods to parts of a pixel: what fits the peaks near their multiples, from the nearest ones outwards."""
     reach = np.array(correlation.shape) // 2
     found = np.array([a, b], np.float64)
     most = int(np.hypot(*reach) * 2 / max(1.0, min(np.hypot(*a), np.hypot(*b)))) + 1
     steps = np.stack(np.meshgrid(*(np.arange(-most, most + 1),) * 2, indexing="ij"), axis=-1).reshape(-1, 2)
     steps = steps[(steps[:, 0] > 0) | ((steps[:, 0] == 0) & (steps[:, 1] > 0))]
     ring = np.abs(steps).max(axis=1)
-    window = np.argwhere(np.ones((2 * NEAR + 1, 2 * NEAR + 1), bool)) - NEAR
-    # The normal equations of all rings so far.
-    left, right = np.zeros((2, 2)), np.zeros((2, 2))
-    for number in range(1, most + 1):
-        times = steps[ring == number]
-        expected = np.rint(times @ found).astype(np.intp)
-        inside = (np.abs(expected) <= reach - NEAR).all(axis=1)
-        if not inside.any():
-            break
-        times, expected = times[inside], expected[inside]
-        places = expected[:, None] + window
-        near = correlation[tuple(np.moveaxis(places + reach, -1, 0))]
-        best = near.argmax(axis=1)
+    order = np.argsort(ring, kind="stable")
+    times, peaks, weights, fitted = [], [], [], 0
+    for step, number in zip(steps[order], ring[order].tolist(), strict=True):
+        expected = np.rint(step @ found).astype(np.intp)
+        if (np.abs(expected) > reach - NEAR).any():
+            continue
+        low = expected + reach - NEAR
+        near = correlation[low[0] : low[0] + 2 * NEAR + 1, low[1] : low[1] + 2 * NEAR + 1]
+        at = np.unravel_index(int(near.argmax()), near.shape)
+        times.append(step)
+        peaks.append(expected - NEAR + at)
         # Peaks at the end of a window lie beyond it, or nowhere.
-        sure = np.where((np.abs(window[best]) < NEAR).all(axis=1), 1.0, 0.01)
-        weighed = times * (sure * near.max(axis=1).clip(0.0))[:, None]
-        left += weighed.T @ times
-        right += weighed.T @ (expected + window[best])
-        if np.linalg.det(left) > 1e-9 * np.trace(left) ** 2:
-            found[:] = np.linalg.solve(left, right)
+        inside = all(0 < place < 2 * NEAR for place in at)
+        weights.append(max(float(near.max()), 0.0) * (1.0 if inside else 0.01))
+        # Of many, those of a ring are expected by what is nearer.
+        if len(times) > OFTEN and number == fitted:
+            continue
+        fitted = number
+        root = np.sqrt(weights)[:, None]
+        if len(times) >= 2 and np.linalg.matrix_rank(root * np.array(times)) == 2:
+            found = np.linalg.lstsq(root * np.array(times), root * np.array(peaks), rcond=None)[0]
     found = np.rint(found * PARTS) / PARTS + 0.0
     return (float(found[0, 0]), float(found[0, 1])), (float(found[1, 0]), float(found[1, 1]))
 
@@ -270,7 +275,7 @@ def measure_polarity(guide: Floats) -> tuple[float, float, float]:
             along[axis] = max(along[axis], *(_measure_oddness(slope * square, cubes) for square in squares))
         turned = rows * columns
         fourth = turned * (squares[1] - squares[0]) / np.maximum(energy, 1e-12)
-        along[2] = max(along[2], _measure_oddness(turned, energy), _measure_oddness(fourth, energy))
+        along[2] = max(along[2], _measure_oddness(turned, energy), _measure_oddness(fourth, energy) / LEANS)
     return along[0], along[1], along[2]
 
 
