@@ -8,8 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Floats
+from texrs.source_map import SourceMap
 
-__all__ = ["FRACTIONS", "Lattice", "find_lattice", "measure_direction", "measure_polarity"]
+__all__ = [
+    "FRACTIONS",
+    "WINDOW",
+    "Lattice",
+    "bend",
+    "correlate",
+    "crop_light",
+    "find_lattice",
+    "measure_direction",
+    "measure_polarity",
+]
 
 Vector = tuple[int, int]
 
@@ -107,7 +118,7 @@ def find_lattice(guide: Floats) -> Lattice | None:
         return None
     rows, columns = np.gradient(gaussian_filter(light, 1.0))
     edges = np.hypot(rows, columns)
-    found = [_fit_lattice(_correlate(picture)) for picture in (light, np.minimum(edges, np.quantile(edges, 0.95)))]
+    found = [_fit_lattice(correlate(picture)) for picture in (light, np.minimum(edges, np.quantile(edges, 0.95)))]
     believed = [each for each in found if each is not None and each.correlation >= REGULAR]
     # Edges are told apart less well than colours: two of them may be half a period apart.
     return believed[0] if believed else None
@@ -120,7 +131,7 @@ def crop_light(guide: Floats) -> Floats:
     return light
 
 
-def _correlate(picture: Floats) -> Floats:
+def correlate(picture: Floats) -> Floats:
     """Correlate a picture with itself, without its slow changes; the middle is no shift at all."""
     from scipy.fft import irfft2, next_fast_len, rfft2
     from scipy.ndimage import gaussian_filter, uniform_filter
@@ -286,3 +297,16 @@ def _measure_oddness(odd: Floats, scale: Floats) -> float:
     sums, scales = (p.sum(axis=(1, 3), dtype=np.float64).ravel() for p in parts)
     mean = sums.sum() / max(scales.sum(), 1e-12)
     return abs(float(sums.sum())) / max(float(np.sqrt(((sums - mean * scales) ** 2).sum())), 1e-12)
+
+
+def bend(shape: tuple[int, ...], matrix: NDArray[np.float64]) -> SourceMap:
+    """Return the map of a picture that is brought to a linear image of itself, as much of it as a rectangle holds."""
+    inverse = np.rint(np.linalg.inv(matrix) * FRACTIONS) / FRACTIONS
+    half = (np.array(shape) - 1) / 2
+    # What is sheared needs room on both sides.
+    reach = np.floor(np.maximum(np.linalg.solve(np.abs(inverse), half), 8))
+    away = np.stack(np.meshgrid(*(np.arange(-r, r + 1) for r in reach), indexing="ij"), axis=-1)
+    places = np.clip(away @ inverse.T + half, 0, 2 * half).astype(np.float32)
+    size = places.shape[:2]
+    zeros = np.zeros(size, np.uint16)
+    return SourceMap(places, zeros, zeros.astype(np.uint32), inverse[np.newaxis].astype(np.float32), (tuple(shape),))

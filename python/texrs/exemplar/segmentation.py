@@ -21,6 +21,7 @@ from texrs._typing import Array, Floats, Labels, Progress
 from texrs.errors import InvalidInput
 from texrs.exemplar.backgrounds import USUAL_LAYERS, find_foreground
 from texrs.exemplar.components import fill_crescents
+from texrs.exemplar.courses import Courses, find_courses
 from texrs.exemplar.layers import Regions
 from texrs.exemplar.regularity import Lattice, find_lattice
 from texrs.exemplar.shapes import mark_outlines
@@ -106,6 +107,8 @@ class Segmentation:
         empty otherwise.
     lattice : Lattice, optional
         The lattice that the exemplar repeats on, if any. Elements marked by hand are free of it.
+    courses : Courses, optional
+        The courses that it lies in, if any, where it does not repeat along them; there is no lattice then.
 
     """
 
@@ -114,6 +117,7 @@ class Segmentation:
     kind: str
     reason: str
     lattice: Lattice | None = None
+    courses: Courses | None = None
 
     @property
     def count(self) -> int:
@@ -188,15 +192,17 @@ def segment(
         whole = regions.layers(options.layers or USUAL_LAYERS)
         return Segmentation(whole, whole.copy(), "none", "")
     lattice = find_lattice(rgb)
-    reasons = [f"elements keep to {lattice}"] if lattice else []
+    courses = find_courses(rgb, lattice)
+    lattice = None if courses else lattice
+    reasons = [f"elements keep to {kept}" for kept in (lattice, courses) if kept]
     if options.kind == "grid":
         layers = regions.layers(options.layers or USUAL_LAYERS)
     else:
         layers, elements, fault = find_foreground(rgb, regions, options.layers, watch)
         if options.kind == "components" or not fault:
-            return Segmentation(layers, fill_crescents(elements), "components", "; ".join(reasons), lattice)
+            return Segmentation(layers, fill_crescents(elements), "components", "; ".join(reasons), lattice, courses)
         reasons.insert(0, fault)
-    return Segmentation(layers, draw_cells(height, width), "grid", "; ".join(reasons), lattice)
+    return Segmentation(layers, draw_cells(height, width), "grid", "; ".join(reasons), lattice, courses)
 
 
 class Steps:

@@ -16,6 +16,7 @@ Departures, with their reasons:
 - On a lattice a patch also pays for what it does not fit: a seam through plain ground does not show that it is out of step.
 - A patch is charged for showing what others show already, and for going on where a neighbour ends. A charge that
   multiplies the match would let the exact continuation of a neighbour, whose match costs nothing, win for ever.
+- What lies in courses is quilted along them alone: its pictures are laid so that their joints lie at the same places.
 - A patch that shows the mirror image of what it overlaps is refused: along the axis of a mirror the two meet without a
   seam, and the eye sees nothing else.
 """
@@ -41,6 +42,7 @@ def quilt(
     patch: int,
     overlap: int,
     wrap: tuple[bool, bool],
+    fixed: int | None = None,
     seed: int,
     progress: Callable[[float], object],
 ) -> SourceMap:
@@ -57,6 +59,9 @@ def quilt(
         patches divide the texture evenly.
     wrap : (bool, bool)
         Axes along which the texture is cyclic.
+    fixed : int, optional
+        Axis along which patches keep the places that they have in the pictures, which then reach as far as the texture, and on
+        by a patch where it is cyclic.
     seed : int
         Chooses the first patch, and where a cyclic texture begins.
     progress : callable
@@ -71,7 +76,7 @@ def quilt(
     sides = [min(p.colours.shape[axis] for p in pictures) for axis in range(2)]
     rows, columns = (divide_axis(size[a], sides[a], min(patch, sides[a]), overlap, wrap[a]) for a in range(2))
     shape = (rows[0].extent, columns[0].extent)
-    finder = Finder([p.colours for p in pictures], shape)
+    finder = Finder([p.colours for p in pictures], shape, fixed)
     canvas = Quilt(pictures, size, wrap)
     windows = [Window(r, c) for r in rows for c in columns]
     for number, window in enumerate(windows):
@@ -79,7 +84,10 @@ def quilt(
         if number == 0:
             which = int(uniform(seed, 0, 0, 0, 3) * len(pictures))
             free = [n - m + 1 for n, m in zip(pictures[which].colours.shape, shape, strict=False)]
-            row, column = (int(uniform(seed, 1 + axis, 0, 0, 3) * n) for axis, n in enumerate(free))
+            row, column = (
+                window.corner[axis] if axis == fixed else int(uniform(seed, 1 + axis, 0, 0, 3) * n)
+                for axis, n in enumerate(free)
+            )
             canvas.lay(window, Match(0.0, which, row, column))
         else:
             canvas.paste(window, finder)

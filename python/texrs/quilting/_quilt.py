@@ -92,7 +92,7 @@ class Quilt:
         old, known = self.place[window.index(self.size)], window.mark_known()
         colours = self.all_colours.take(old, axis=0, mode="clip")
         regular = self.pictures[0].regular
-        pool = finder.find_pool(colours, known, POOL[regular])
+        pool = finder.find_pool(colours, known, POOL[regular], window.corner)
         shown = self.list_places(pool, window, CELL)
         good, usual = np.quantile([m.cost for m in pool], (GOOD, 0.5)).tolist()
         usual = usual or 1.0

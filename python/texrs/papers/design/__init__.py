@@ -35,6 +35,9 @@ Departures, with their reasons:
 - What repeats on a lattice is stretched and sheared a little, by 15 % at most, so that a whole number of periods goes around
   a cyclic texture, and patches are taken in step with each other: else bricks run together where the courses close. The
   report's "stretched" says by how much.
+- What lies in courses without repeating along them, as a wall of stones of all lengths, is made level and laid course by
+  course, as tall as the texture, a few times, those as tall exchanged for each other; patches are free along the courses and
+  keep their places across, so all joints go through (`texrs.papers.design.sheets`). The report's "courses" says what was found.
 - A cyclic texture (section 3.5) is stitched on the torus from the start: patches are chosen to fit both sides of the
   wrap, where the paper folds a finished picture that was never chosen to fit.
 - Several exemplars are each stitched into a texture of the full size. Which one shows is asked by a map, or drawn as
@@ -113,7 +116,8 @@ def design(
     plan : {"auto", "move", "still"}
         What is done with elements. "move": they are deformed, as the paper has it. "still": they stay as they are, and
         patches of the exemplar and its mirror images are joined between them. "auto": both are tried at a small size and
-        judged, and the better one is taken; where ``deformation`` is given, or the ``method``, elements move.
+        judged, and the better one is taken; where ``deformation`` is given, or the ``method``, elements move. What lies in
+        courses is laid course by course unless they move.
     tiles : int
         Deformed copies of the exemplar that the result is stitched from, 1 to 64.
     patch : int, optional
@@ -246,7 +250,8 @@ def design_variants(
     plan : {"auto", "move", "still"}
         What is done with elements. "move": they are deformed, as the paper has it. "still": they stay as they are, and
         patches of the exemplar and its mirror images are joined between them. "auto": both are tried at a small size and
-        judged, and the better one is taken; where ``deformation`` is given, or the ``method``, elements move.
+        judged, and the better one is taken; where ``deformation`` is given, or the ``method``, elements move. What lies in
+        courses is laid course by course unless they move.
     tiles : int
         Deformed copies of the exemplar that each texture is stitched from, 1 to 64.
     patch : int, optional

@@ -67,7 +67,7 @@ def make_plan(
 
     """
     if literal:
-        parts, options = replace(parts, kind="none", lattice=None), replace(options, mirror=False)
+        parts, options = replace(parts, kind="none", lattice=None, courses=None), replace(options, mirror=False)
     guide, extent = exemplar.guidance, side or choose_usual_side(min(exemplar.shape))
     mirrors = settle_mirrors(exemplar, options)
     moves = settle_moves(exemplar, parts, options, mirrors)

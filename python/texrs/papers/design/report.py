@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -58,9 +59,10 @@ def describe(
         "elements": sum(p.parts.count for p in plans),
         "kind": first.parts.kind,
         "reason": first.parts.reason,
-        "arrangement": [classify(p.parts) for p in plans],
+        "arrangement": ["courses" if p.still and p.parts.courses else classify(p.parts) for p in plans],
         "plan": ["still" if p.still else "move" for p in plans],
         "tried": [p.tried and {name: dict(figures) for name, figures in p.tried.items()} for p in plans],
+        "courses": [describe_courses(p) for p in plans],
         "stretched": [describe_closing(p, arguments) for p in plans],
         "rotate": first.moves.rotate,
         "shares": [int(np.count_nonzero(composite.exemplar == which)) for which in range(len(plans))],
@@ -78,6 +80,12 @@ def describe_closing(plan: Plan, arguments: Arguments) -> list[list[float]] | No
     if plan.parts.lattice is not None and any(arguments.wrap):
         closing = plan.parts.lattice.close(arguments.size, arguments.wrap)
     return None if closing is None else [[round(float(x), 4) for x in row] for row in closing]
+
+
+def describe_courses(plan: Plan) -> dict[str, Any] | None:
+    """Return the courses that an exemplar is laid in, if it is."""
+    courses = plan.parts.courses if plan.still else None
+    return None if courses is None else asdict(courses)
 
 
 def describe_density(plans: Sequence[Plan], composite: SourceMap, density: NDArray[np.float64]) -> list[dict[str, Any]]:

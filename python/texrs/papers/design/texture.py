@@ -11,13 +11,14 @@ import numpy as np
 
 from texrs._typing import Array, Floats, Progress
 from texrs.blending import blend, measure_visibility
-from texrs.exemplar.regularity import FRACTIONS
+from texrs.exemplar.regularity import bend
 from texrs.exemplar.symmetry import flip_frame
 from texrs.kernels.gather import gather
 from texrs.papers.design.arguments import Arguments
 from texrs.papers.design.mixing import Layer, mix
 from texrs.papers.design.plan import Plan
 from texrs.papers.design.scattering import scatter
+from texrs.papers.design.sheets import lay_sheets, measure_stones
 from texrs.papers.design.tiles import Tile
 from texrs.quilting import Picture, quilt
 from texrs.source_map import SourceMap
@@ -63,8 +64,26 @@ def stitch_alone(
 ) -> SourceMap:
     """Stitch patches of the tiles of one exemplar."""
     plan = plans[number]
+    courses = plan.parts.courses if plan.still else None
+    side = min(plan.guide.shape[:2])
+    pictures = (
+        draw_pictures(plan, tiles, arguments) if courses is None else draw_sheets(plan, tiles[0], arguments, seed)
+    )
+    return quilt(
+        pictures,
+        arguments.size,
+        patch=round(PATCH * side),
+        overlap=round(OVERLAP * side),
+        wrap=arguments.wrap,
+        fixed=None if courses is None else courses.axis,
+        seed=seed,
+        progress=partial(report_share, arguments.watch, number, len(plans)),
+    )
+
+
+def draw_pictures(plan: Plan, tiles: Sequence[Tile], arguments: Arguments) -> list[Picture]:
+    """Return tiles as what patches are taken from, those of a lattice stretched so that it closes on the torus."""
     depth, lattice = measure_depth(plan), plan.parts.lattice
-    side = min(depth.shape)
     closing = None if lattice is None else lattice.close(arguments.size, arguments.wrap)
     pictures = []
     for tile in tiles:
@@ -77,28 +96,32 @@ def stitch_alone(
                 colours = gather(plan.guide, source.coordinates, interpolation="cubic")
         shown = gather(depth, source.coordinates, interpolation="nearest")
         pictures.append(Picture(colours, source, shown, lattice is not None, shifts))
-    return quilt(
-        pictures,
-        arguments.size,
-        patch=round(PATCH * side),
-        overlap=round(OVERLAP * side),
-        wrap=arguments.wrap,
+    return pictures
+
+
+def draw_sheets(plan: Plan, tile: Tile, arguments: Arguments, seed: int) -> list[Picture]:
+    """Return an exemplar that lies in courses as what patches are taken from: its courses laid as tall as the texture."""
+    courses = plan.parts.courses
+    assert courses is not None
+    axis = courses.axis
+    level = courses.level(plan.guide.shape[:2]).compose(tile.source)
+    depth = DEEP * measure_stones(courses, gather(plan.guide, level.coordinates, interpolation="cubic"), DEEP)
+    sheets = lay_sheets(
+        courses,
+        level.shape,
+        arguments.size[axis],
+        min(level.shape),
+        count=arguments.tiles,
+        wrap=arguments.wrap[axis],
+        mirror=(axis == 1, axis == 0) in plan.mirrors,
         seed=seed,
-        progress=partial(report_share, arguments.watch, number, len(plans)),
     )
-
-
-def bend(shape: tuple[int, ...], matrix: Array) -> SourceMap:
-    """Return the map of a picture that is brought to a linear image of itself, as much of it as a rectangle holds."""
-    inverse = np.rint(np.linalg.inv(matrix) * FRACTIONS) / FRACTIONS
-    half = (np.array(shape) - 1) / 2
-    # What is sheared needs room on both sides.
-    reach = np.floor(np.maximum(np.linalg.solve(np.abs(inverse), half), 8))
-    away = np.stack(np.meshgrid(*(np.arange(-r, r + 1) for r in reach), indexing="ij"), axis=-1)
-    places = np.clip(away @ inverse.T + half, 0, 2 * half).astype(np.float32)
-    size = places.shape[:2]
-    zeros = np.zeros(size, np.uint16)
-    return SourceMap(places, zeros, zeros.astype(np.uint32), inverse[np.newaxis].astype(np.float32), (tuple(shape),))
+    pictures = []
+    for sheet in sheets:
+        source = sheet.compose(level)
+        colours = gather(plan.guide, source.coordinates, interpolation="cubic")
+        pictures.append(Picture(colours, source, gather(depth, sheet.coordinates, interpolation="nearest")))
+    return pictures
 
 
 def report_share(watch: Progress, number: int, count: int, share: float) -> None:

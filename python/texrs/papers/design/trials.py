@@ -63,6 +63,8 @@ def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, argume
 
     """
     still = replace(plan, still=True)
+    if plan.parts.courses and arguments.plan != "move":
+        return still
     if plan.literal or arguments.plan != "auto" or arguments.deformation != DeformationOptions():
         return still if arguments.plan == "still" and not plan.literal else plan
     ways = {"move": plan, "still": still}

@@ -1,0 +1,183 @@
+"""Courses: the rows that a wall, a parquet or a hem is laid in, whatever their heights, and free along them.
+
+What lies in courses need not repeat: each has a height of its own, and what stands in it begins anywhere. What goes through
+all of it is the joints between courses, lines that are straight, alike all along, and thin.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Floats
+from texrs.exemplar.regularity import FRACTIONS, WINDOW, Lattice, bend, correlate, crop_light
+from texrs.kernels.gather import gather
+from texrs.source_map import SourceMap
+
+__all__ = ["Courses", "find_courses"]
+
+STRIPS = 24
+"""Strips across the courses that are compared."""
+STEEPEST, SLOPES = 0.15, (41, 21)
+"""Steepest courses that are levelled, in rows a column, and the number of slopes tried, coarsely and then finely."""
+AGREE = 0.6
+"""Share of the slopes across that all strips have in common from which on there are courses: textures without have .05 to .25,
+denim .46, walls .9."""
+CLEAR = 0.4
+"""A joint stands out by so much of what the strongest do, and in a strip by so much of what it does on the average."""
+THROUGH, MOST = 0.8, 0.75
+"""Share of strips that a joint goes through, and of all lines that stand out which do so."""
+FEWEST, LEAST = 4, 6.0
+"""Courses that make a wall, and their least height in pixels."""
+GAIN = 0.15
+"""By how much places of a lattice must correlate better than others of the same course to be one of more than courses."""
+PARTS = 2.0**4
+"""Of a pixel to which joints are known: exact on every processor."""
+
+
+@dataclass(frozen=True, slots=True)
+class Courses:
+    """The courses of an exemplar.
+
+    Attributes
+    ----------
+    axis : int
+        The axis across them: 0 for level courses, 1 for upright ones.
+    slope : float
+        By how many pixels along that axis they climb a pixel of the other one.
+    joints : tuple of float
+        Where they meet, in pixels along the axis, in the exemplar once it is level.
+
+    """
+
+    axis: int
+    slope: float
+    joints: tuple[float, ...]
+
+    def __str__(self) -> str:
+        least, most = self.heights.min(), self.heights.max()
+        tall = f"{least:.0f}" if round(least) == round(most) else f"{least:.0f} to {most:.0f}"
+        return f"{len(self.heights)} {('level', 'upright')[self.axis]} courses of {tall} pixels"
+
+    @property
+    def heights(self) -> NDArray[np.float64]:
+        """Heights of the courses, in pixels."""
+        return np.diff(self.joints)
+
+    def level(self, shape: tuple[int, ...]) -> SourceMap:
+        """Return the map of an exemplar of a shape that is turned so that its courses are level."""
+        return bend(shape, turn(self.slope, self.axis)) if self.slope else SourceMap.identity(shape)
+
+
+def turn(slope: float, axis: int) -> NDArray[np.float64]:
+    """Return the rotation of (row, column) that makes level what climbs by a slope."""
+    cosine = 1 / np.hypot(1, slope)
+    sine = slope * cosine * (1 if axis == 0 else -1)
+    return np.rint(np.array([[cosine, -sine], [sine, cosine]]) * FRACTIONS) / FRACTIONS
+
+
+def find_courses(guide: Floats, lattice: Lattice | None) -> Courses | None:
+    """Find the courses of an image; none where it repeats along them, too, on a lattice."""
+    if min(guide.shape[:2]) < STRIPS * 2:
+        return None
+    light = guide.mean(axis=-1, dtype=np.float64)
+    agreement, slope, axis = max((*measure_slope(light if axis == 0 else light.T), axis) for axis in range(2))
+    if agreement < AGREE:
+        return None
+    courses = Courses(axis, slope, ())
+    shown = courses.level(guide.shape[:2])
+    level = gather(guide, shown.coordinates, interpolation="cubic") if slope else guide
+    light = level.mean(axis=-1, dtype=np.float64)
+    joints = find_joints(light if axis == 0 else light.T)
+    if len(joints) <= FEWEST or (lattice is not None and repeats(lattice, courses, level)):
+        return None
+    return Courses(axis, slope, joints)
+
+
+def cut_strips(light: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the means (rows, strips) of an image in strips, and where these lie from the middle."""
+    from scipy.ndimage import gaussian_filter1d
+
+    ends = np.linspace(0, light.shape[1], STRIPS + 1).astype(int)
+    means = np.add.reduceat(light, ends[:-1], axis=1) / np.diff(ends)
+    return gaussian_filter1d(means, 1.0, axis=0), (ends[1:] + ends[:-1] - light.shape[1]) / 2
+
+
+def measure_slope(light: NDArray[np.float64]) -> tuple[float, float]:
+    """Return the share of the slopes down an image that its strips have in common, and by how much they climb to have most."""
+    first = max(0, light.shape[1] - WINDOW) // 2
+    strips, away = cut_strips(light[:, first : first + WINDOW])
+
+    def agree(slope: float) -> float:
+        # Each strip moved by whole rows and the rest of one.
+        down = slope * away
+        whole = np.floor(down).astype(np.intp)
+        inside = int(np.abs(whole).max()) + 1
+        if inside > len(strips) // 4:
+            return 0.0
+        rows = np.arange(inside, len(strips) - inside)[:, np.newaxis] + whole
+        numbers = np.arange(STRIPS)
+        share = down - whole
+        moved = (1 - share) * strips[rows, numbers] + share * strips[rows + 1, numbers]
+        slopes = moved[1:] - moved[:-1]
+        every = float((slopes**2).mean())
+        return round(float((slopes.mean(axis=1) ** 2).mean()) / every, 6) if every > 1e-12 else 0.0
+
+    middle, reach, best = 0.0, STEEPEST, 0.0
+    for count in SLOPES:
+        tried = np.linspace(middle - reach, middle + reach, count)
+        found = [agree(slope) for slope in tried.tolist()]
+        # Of those that agree alike, the least.
+        best, _, middle = max((value, -abs(slope), slope) for value, slope in zip(found, tried.tolist(), strict=True))
+        if best < AGREE / 2:
+            return best, 0.0
+        reach *= 2 / (count - 1)
+    # What climbs by less than half a pixel is level.
+    steep = abs(middle) * light.shape[1] > 0.5 and best > agree(0.0) + 1e-3
+    return best, float(np.rint(middle * FRACTIONS) / FRACTIONS) if steep else 0.0
+
+
+def find_joints(light: NDArray[np.float64]) -> tuple[float, ...]:
+    """Return the rows of the thin lines that go through a level image, bright or dark ones; none where few do."""
+    from scipy.ndimage import gaussian_filter1d, maximum_filter1d
+
+    strips, _ = cut_strips(light)
+    detail = strips - gaussian_filter1d(strips, 2 * LEAST, axis=0)
+    best: tuple[float, tuple[float, ...]] = (0.0, ())
+    for sign in (1, -1):
+        shown = sign * detail
+        line, near = shown.mean(axis=1), maximum_filter1d(shown, 5, axis=0)
+        peaks = np.flatnonzero((maximum_filter1d(line, int(LEAST) | 1) == line) & (line > 0))
+        peaks = peaks[(peaks > 0) & (peaks < len(line) - 1)]
+        if not len(peaks):
+            continue
+        peaks = peaks[line[peaks] > CLEAR * np.quantile(line[peaks], THROUGH)]
+        through = (near[peaks] > CLEAR * line[peaks, np.newaxis]).mean(axis=1)
+        kept = peaks[through >= THROUGH]
+        if len(kept) < MOST * len(peaks):
+            continue
+        # A parabola through three rows.
+        low, high = line[kept] - line[kept - 1], line[kept] - line[kept + 1]
+        joints = kept + 0.5 * (low - high) / np.maximum(low + high, 1e-9)
+        joints = np.rint(joints * PARTS) / PARTS
+        best = max(best, (float(through.mean()), tuple(joints.tolist())))
+    return best[1]
+
+
+def repeats(lattice: Lattice, courses: Courses, level: Floats) -> bool:
+    """Whether a level image correlates better with itself at the places of a lattice than elsewhere along the same courses."""
+    from scipy.ndimage import maximum_filter
+
+    correlation = maximum_filter(correlate(crop_light(level)), 5)
+    reach = np.array(correlation.shape) // 2
+    vectors = turn(courses.slope, courses.axis) @ lattice.vectors
+    times = np.arange(-max(reach), max(reach) + 1) if min(reach) < 30 else np.arange(-30, 31)
+    steps = np.stack(np.meshgrid(times, times, indexing="ij"), axis=-1).reshape(-1, 2)
+    places = np.rint(steps @ vectors.T).astype(np.intp)
+    places = places[(np.abs(places) <= reach - 2).all(axis=1) & places.any(axis=1)] + reach
+    if not len(places):
+        return False
+    usual = correlation.mean(axis=1 - courses.axis)[places[:, courses.axis]]
+    return bool((correlation[tuple(places.T)] - usual).mean() > GAIN)

@@ -1,0 +1,140 @@
+"""Sheets: an exemplar that lies in courses, laid anew as tall as the texture, course by course.
+
+A departure from the paper, which knows no walls. The sheets of a texture have their joints at the same places, so that its
+patches, which keep their places across the courses and are free along them, meet joint to joint wherever they come from.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._engine.noise import uniform
+from texrs._typing import Floats
+from texrs.exemplar.courses import Courses
+from texrs.source_map import SourceMap
+
+__all__ = ["lay_sheets", "measure_stones"]
+
+TRIES = 64
+"""Orders of courses that are drawn for a cyclic texture; the one is taken that must be stretched the least."""
+ALIKE = 0.16
+"""Courses stand for each other whose heights differ by no more, as a share."""
+
+
+def lay_sheets(
+    courses: Courses,
+    shape: tuple[int, ...],
+    size: int,
+    beyond: int,
+    *,
+    count: int,
+    wrap: bool,
+    mirror: bool,
+    seed: int,
+) -> list[SourceMap]:
+    """Lay the courses of an exemplar on top of each other, in several ways.
+
+    Parameters
+    ----------
+    courses : Courses
+        Of the exemplar.
+    shape : (rows, columns)
+        Of the exemplar, once it is level.
+    size : int
+        Of the texture across the courses, in pixels.
+    beyond : int
+        Pixels by which sheets go on beyond that; where it wraps, as they begin.
+    count : int
+        Number of sheets.
+    wrap : bool
+        Whether the texture goes around across the courses.
+    mirror : bool
+        Whether every other sheet is mirrored along the courses.
+    seed : int
+        Chooses the courses.
+
+    Returns
+    -------
+    list of SourceMap
+        Into the exemplar, once it is level; as long as that along the courses.
+
+    """
+    axis = courses.axis
+    order = order_courses(courses.heights, size, wrap, seed)
+    heights = courses.heights[order]
+    # What does not go around begins anywhere in its first course.
+    ends = np.concatenate([[0.0], np.cumsum(heights * (size / heights.sum() if wrap else 1.0))])
+    rows = np.arange(size + beyond) + 0.5
+    rows = rows % size if wrap else rows + uniform(seed, 0, 0, 1, 7) * heights[0]
+    laid = np.minimum(np.searchsorted(ends, rows, side="right") - 1, len(order) - 1)
+    share = (rows - ends[laid]) / np.diff(ends)[laid]
+    length = shape[1 - axis]
+    sheets = []
+    for sheet in range(count):
+        taken = exchange_courses(courses.heights, order, sheet, seed)
+        across = np.array(courses.joints)[taken[laid]] + share * courses.heights[taken[laid]]
+        along = np.arange(length, dtype=np.float64)
+        turned = mirror and sheet % 2 == 1
+        grid = np.meshgrid(across, along[::-1] if turned else along, indexing="ij")
+        frames = np.zeros((len(order), 2, 2), np.float32)
+        frames[:, axis, axis] = courses.heights[taken] / np.diff(ends)
+        frames[:, 1 - axis, 1 - axis] = -1.0 if turned else 1.0
+        places = np.stack(grid if axis == 0 else [grid[1].T, grid[0].T], axis=-1).astype(np.float32)
+        label = np.broadcast_to(laid[:, np.newaxis], grid[0].shape).astype(np.uint32)
+        label = np.ascontiguousarray(label if axis == 0 else label.T)
+        sheets.append(SourceMap(places, np.zeros(label.shape, np.uint16), label, frames, ((shape[0], shape[1]),)))
+    return sheets
+
+
+def order_courses(heights: NDArray[np.float64], size: int, wrap: bool, seed: int) -> NDArray[np.intp]:
+    """Return which courses lie on top of each other: as in the exemplar, and on from anywhere where that ends."""
+    found: list[tuple[float, list[int]]] = []
+    for attempt in range(TRIES if wrap else 1):
+        # What begins within a course needs one more.
+        order: list[int] = []
+        missing = size if wrap else size + heights.max() + 1
+        at = int(uniform(seed, attempt, 0, 0, 7) * len(heights))
+        while not order or missing > (heights[at] / 2 if wrap else 0):
+            order.append(at)
+            missing -= heights[at]
+            at += 1
+            if at == len(heights):
+                at = int(uniform(seed, attempt, len(order), 0, 7) * (len(heights) - 1))
+        found.append((abs(math.log(size / heights[order].sum())), order))
+    return np.array(min(found)[1], np.intp)
+
+
+def exchange_courses(
+    heights: NDArray[np.float64], order: Sequence[int] | NDArray[np.intp], sheet: int, seed: int
+) -> NDArray[np.intp]:
+    """Return the courses that stand for others in a sheet: of those as tall another one in each sheet, none next to itself."""
+    taken: list[int] = []
+    for place, own in enumerate(order):
+        alike = np.flatnonzero(np.abs(np.log(heights / heights[own])) <= ALIKE).tolist()
+        drawn = sorted(alike, key=lambda k: uniform(seed, place, k, 0, 8))
+        turn = sheet % len(drawn)
+        others = [k for k in drawn[turn:] + drawn[:turn] if not taken or k != taken[-1]]
+        taken.append((others or drawn)[0])
+    return np.array(taken, np.intp)
+
+
+def measure_stones(courses: Courses, level: Floats, reach: float) -> Floats:
+    """Return how deep inside a stone each pixel of a level exemplar is: 0 at joints, 1 from ``reach`` pixels on.
+
+    Joints along a course are told by the colour of those between courses.
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    lines = np.moveaxis(level, courses.axis, 0)
+    between = np.zeros(len(lines), bool)
+    between[np.rint(courses.joints).astype(np.intp)] = True
+    joint, stone = (lines[rows].mean(axis=(0, 1), dtype=np.float64) for rows in (between, ~between))
+    apart = joint - stone
+    inside = (level - (joint + stone) / 2) @ apart < 0
+    if not inside.any() or inside.all():
+        return np.zeros(level.shape[:2], np.float32)
+    return np.asarray(np.clip(distance_transform_edt(inside) / reach, 0, 1), np.float32)
