@@ -28,7 +28,7 @@ LAYERS = (
     ("blending", "tiling"),
     ("completion",),
     ("papers",),
-    ("database", "extension", "rectification"),
+    ("database", "extension", "rectification", "removal"),
     ("demo",),
     ("cli",),
 )

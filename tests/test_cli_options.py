@@ -227,6 +227,7 @@ def test_commands_are_those_of_the_verbs() -> None:
         "extend",
         "perspective",
         "rectify",
+        "remove",
         "self-splice",
         "solid",
         "splice",

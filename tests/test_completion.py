@@ -275,9 +275,9 @@ def test_seams_are_judged_by_what_patches_show_beyond_them():
 def test_what_is_around_the_holes_is_looked_at(box, wrap, part, cyclic):
     hole = np.zeros((2000, 2000), bool)
     hole[box[0] : box[1], box[2] : box[3]] = True
-    rows, columns = choose_part(hole, ~hole, wrap)[0]
+    rows, columns = choose_part(hole, ~hole, wrap, ~hole)[0]
     assert (rows.start, rows.stop, columns.start, columns.stop) == part
-    assert choose_part(hole, ~hole, wrap)[1] == cyclic
+    assert choose_part(hole, ~hole, wrap, ~hole)[1] == cyclic
 
 
 def test_holes_far_from_the_corner_are_filled_from_what_is_around_them():

@@ -17,6 +17,7 @@ CALLS = {
     "tile": "texrs.tile(image",
     "rectify": "texrs.rectify(image",
     "extend": "texrs.extend(image",
+    "remove": "texrs.remove(image, image",
     "Plane": "texrs.Plane((32, 32), 45",
     "complete": "texrs.complete(image, image",
     "blend": "texrs.blend(source, image, wrap=True",

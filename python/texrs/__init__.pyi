@@ -16,6 +16,7 @@ from .papers.solid.window import PlaneTexture, SolidTexture
 from .papers.splice import self_splice, splice
 from .planes import Plane
 from .rectification import rectify
+from .removal import remove
 from .source_map import Reuse, SourceMap
 from .synthesis import Synthesis
 from .tiling import tile
@@ -51,6 +52,7 @@ __all__ = [
     "perspective",
     "planes",
     "rectify",
+    "remove",
     "samples",
     "scale_maps",
     "self_splice",

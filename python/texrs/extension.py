@@ -6,17 +6,17 @@ picture's plane, which is said, or found.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from texrs._arrays import as_image, as_int, as_mask, check_memory
+from texrs._arrays import as_image, as_int, as_size, check_memory
 from texrs._typing import Array, Progress
 from texrs.completion import complete
 from texrs.errors import InvalidInput
 from texrs.planes import Plane
-from texrs.planes._choose import choose_plane
+from texrs.planes._choose import choose_ground, choose_plane
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
@@ -35,6 +35,7 @@ def extend(
     bottom: int = 0,
     left: int = 0,
     right: int = 0,
+    to: int | Sequence[int] | None = None,
     plane: Plane | None = None,
     corners: Sequence[Sequence[float]] | Array | None = None,
     slant: float | None = None,
@@ -53,6 +54,9 @@ def extend(
         The photograph, any real dtype, each side at least 64.
     top, bottom, left, right : int
         Pixels that are added there, 0 to 8192; some somewhere. Towards the horizon only as far as it.
+    to : int or (rows, columns), optional
+        Size of the larger picture: what the sides above do not add to it is added evenly, but towards the horizon only as far
+        as the plane goes, and on the other side then.
     plane : Plane, optional
         How the plane lies. By default what ``corners``, or ``slant``, says, else it is found (`texrs.planes.find`).
     corners : four of (row, column), optional
@@ -65,7 +69,8 @@ def extend(
     fov : float, optional
         Degrees that the longer side of the photograph spans, 1 to 170. By default what the corners tell, else 60.
     ground : (H, W) array, optional
-        Not 0 where the photograph shows the plane, where that is found; all of it by default.
+        Not 0 where the photograph shows the plane: only that is copied. By default all of it, and where the plane is found what
+        is (`texrs.planes.find_ground`).
     boundary : int
         How many known pixels at the border may change, 0 to 64, which hides it better; by default none.
     seed : int
@@ -105,16 +110,29 @@ def extend(
         name: as_int(value, name, 0, MOST)
         for name, value in (("top", top), ("bottom", bottom), ("left", left), ("right", right))
     }
-    if not any(added.values()):
+    size = add_sizes((rows, columns), added) if to is None else as_size(to, "to")
+    missing = [n - m for n, m in zip(size, add_sizes((rows, columns), added), strict=True)]
+    if min(missing) < 0 or max(missing) > 2 * MOST:
+        raise InvalidInput(
+            f"to: needs {rows} x {columns} pixels, and what the sides add, at least, and at most {2 * MOST} more; got "
+            f"{size[0]} x {size[1]}"
+        )
+    if size == (rows, columns):
         raise InvalidInput("top, bottom, left, right: all are 0, so there is nothing to add")
-    size = rows + added["top"] + added["bottom"], columns + added["left"] + added["right"]
     check_memory(size[0] * size[1] * (64 + pixels.shape[2] * pixels.itemsize), "top, bottom, left, right")
     rim = as_int(boundary, "boundary", 0, 64)
     watch = progress or (lambda stage, share: None)
-    there = np.ones((rows, columns), np.bool_) if ground is None else as_mask(ground, "ground", (rows, columns))
+    there = choose_ground(pixels, ground, plane, corners, slant)
     watch("plane", 0.0)
     seen, found = choose_plane(pixels, there, plane, corners, slant, tilt, fov)
     watch("plane", 1.0)
+    for axis, before, after in ((1, "left", "right"), (0, "top", "bottom")):
+        added[before] += missing[axis] // 2
+        added[after] += missing[axis] - missing[axis] // 2
+        room = measure_room(seen, added, axis)
+        if missing[axis] and sum(room) >= added[before] + added[after]:
+            over = max(0, added[before] - room[0]) - max(0, added[after] - room[1])
+            added[before], added[after] = added[before] - over, added[after] + over
     first = np.array([added["top"], added["left"]])
     places = np.moveaxis(np.indices(size), 0, -1) - first
     width = seen.width(places)
@@ -125,7 +143,12 @@ def extend(
     inner = (slice(first[0], first[0] + rows), slice(first[1], first[1] + columns))
     canvas, hole = np.zeros((*size, pixels.shape[2]), pixels.dtype), np.ones(size, np.bool_)
     canvas[inner], hole[inner] = pixels, False
-    made = complete(canvas, hole, scale_map=width.astype(np.float32), boundary=rim, seed=seed, progress=progress)
+    allowed = None
+    if not there.all():
+        allowed = np.zeros(size, np.bool_)
+        allowed[inner] = there
+    scale = width.astype(np.float32)
+    made = complete(canvas, hole, allowed=allowed, scale_map=scale, boundary=rim, seed=seed, progress=progress)
     # It copies nothing from beyond the photograph's borders.
     inside = np.clip(places, 0, [rows - 1, columns - 1]).astype(np.float32)
     source = made.source.compose(SourceMap.from_coordinates(inside, (rows, columns)))
@@ -135,3 +158,26 @@ def extend(
         composite = composite[..., 0]
     stages = {"known": made.stages["known"], "patches": made.stages["patches"], "composite": composite}
     return Synthesis(composite, source, stages, report)
+
+
+def add_sizes(shape: tuple[int, int], added: Mapping[str, int]) -> tuple[int, int]:
+    """Return the size of a picture with what is added on its sides."""
+    return shape[0] + added["top"] + added["bottom"], shape[1] + added["left"] + added["right"]
+
+
+def measure_room(plane: Plane, added: Mapping[str, int], axis: int) -> tuple[int, int]:
+    """Return by how many pixels a picture can go on before and after it along an axis, up to the horizon, `MOST` at most."""
+    low = -np.array([added["top"], added["left"]])
+    high = np.array(plane.shape) - 1 + np.array([added["bottom"], added["right"]])
+    low[axis], high[axis] = 0, plane.shape[axis] - 1
+    corners = np.array([[y, x] for y in (low[0], high[0]) for x in (low[1], high[1])], np.float64)
+    step = np.zeros(2)
+    step[axis] = 1.0
+    # Widths grow evenly along each axis.
+    rise = float(np.diff(plane.width(np.stack([np.zeros(2), step])))[0])
+    found = []
+    for end, sign in ((low, -1), (high, 1)):
+        width = float(plane.width(corners[corners[:, axis] == end[axis]]).min())
+        fall = -sign * rise
+        found.append(MOST if fall <= 0 else int(min(MOST, max(0.0, (width - LEAST) / fall * 0.999))))
+    return found[0], found[1]

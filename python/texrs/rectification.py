@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float, as_image, as_mask, as_seed, as_size, as_wrap, check_memory, guidance
+from texrs._arrays import as_float, as_image, as_seed, as_size, as_wrap, check_memory, guidance
 from texrs._typing import Array, Bools, Interpolation, Progress
 from texrs.errors import InvalidInput
 from texrs.planes import Plane
-from texrs.planes._choose import choose_plane
+from texrs.planes._choose import choose_ground, choose_plane
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 from texrs.tiling import tile
@@ -77,7 +77,8 @@ def rectify(
         Degrees that the longer side of the photograph spans, 1 to 170 (`texrs.io.read_fov`; the command reads it of the
         file). By default what the corners tell, else 60.
     ground : (H, W) array, optional
-        Not 0 where the photograph shows the plane; all of it by default.
+        Not 0 where the photograph shows the plane. By default all of it, and where that is found what is
+        (`texrs.planes.find_ground`).
     resolution : float, optional
         Pixels of the texture for one of the photograph's middle, 0.05 to 8. By default as large as things are seen in the mean
         of it.
@@ -120,12 +121,11 @@ def rectify(
 
     """
     pixels = as_image(image, minimum=64)
-    shape = pixels.shape[0], pixels.shape[1]
     watch = progress or (lambda stage, share: None)
     cyclic, number = as_wrap(wrap), as_seed(seed)
     asked = None if size is None else as_size(size, minimum=SMALLEST)
     fine = None if resolution is None else as_float(resolution, "resolution", 0.05, 8)
-    there = np.ones(shape, np.bool_) if ground is None else as_mask(ground, "ground", shape)
+    there = choose_ground(pixels, ground, plane, corners, slant)
     watch("plane", 0.0)
     seen, found = choose_plane(pixels, there, plane, corners, slant, tilt, fov)
     watch("plane", 1.0)

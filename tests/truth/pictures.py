@@ -118,6 +118,13 @@ def extended() -> Parts:
 
 
 @case
+def removed() -> Parts:
+    floor = sample("tilted_discs", 112, 128).image.copy()
+    floor[:20] = floor[:1, :1]
+    return parts_of(texrs.remove(floor, box((112, 128), (50, 80), (40, 70)), slant=34, fov=60, seed=1))
+
+
+@case
 def tile() -> Parts:
     result = texrs.tile(colour("pebbles", 144, 160))
     return parts_of(result, report=("overlap", "joints"), stages=("swapped", "pieces"))

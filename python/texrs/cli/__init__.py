@@ -31,6 +31,7 @@ COMMANDS = {
     "info": "Say what an image or a source map holds.",
     "perspective": "Grow a picture whose elements are as large as a scale map says.",
     "rectify": "Make the flat texture of a plane that was photographed aslant.",
+    "remove": "Take something out of a photograph, and fill in the plane behind it in its perspective.",
     "samples": "List the built-in examples, or write them to a folder.",
     "scale-map": "Make a scale map: how large the elements of a picture are at each place.",
     "self-splice": "Edit the layout of a texture's own elements.",

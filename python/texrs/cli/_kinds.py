@@ -358,6 +358,7 @@ SHARES = Kind("A:B:...", lambda text, about: parse_numbers(text, about.option, "
 
 KINDS = {
     "size": SIZE,
+    "to": SIZE,
     "overlap": SIZE,
     "wrap": AXES,
     "repeat": AXES,
@@ -380,6 +381,7 @@ KINDS = {
     "mask": MASK,
     "within": MASK,
     "ground": MASK,
+    "allowed": MASK,
     "corners": Kind(
         "ROW,COL ...", lambda text, about: parse_places([text], about), "Four, with spaces between them.", plain=True
     ),

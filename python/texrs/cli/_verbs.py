@@ -17,7 +17,20 @@ from texrs._threads import threads
 from texrs._typing import Array
 from texrs.cli import _outputs
 from texrs.cli._console import note, show_progress
-from texrs.cli._kinds import ENTRIES, ENTRY, HOLE, LAYOUT, MAP_OR_AUTO, NUMBERS, PICTURE, UNKNOWN, VOLUME, About, Kind
+from texrs.cli._kinds import (
+    ENTRIES,
+    ENTRY,
+    HOLE,
+    LAYOUT,
+    MAP_OR_AUTO,
+    MASK,
+    NUMBERS,
+    PICTURE,
+    UNKNOWN,
+    VOLUME,
+    About,
+    Kind,
+)
 from texrs.cli._options import Options, as_command, make_parameter
 from texrs.cli._outputs import Quiet, Threads, describe, name_arguments, to_write
 from texrs.synthesis import Synthesis
@@ -127,6 +140,7 @@ NAMES = (
     "extend",
     "perspective",
     "rectify",
+    "remove",
     "self-splice",
     "solid",
     "splice",
@@ -164,6 +178,10 @@ def make_verb(name: str) -> Verb:
             from texrs.extension import extend
 
             return _see(extend)
+        case "remove":
+            from texrs.removal import remove
+
+            return _see(remove, mask=MASK)
         case "solid":
             from texrs.papers.solid import solid
 
@@ -200,13 +218,15 @@ def read_camera(given: Mapping[str, Any]) -> dict[str, Any]:
 def say_plane(result: Synthesis) -> str:
     """Return how the plane lies that was flattened."""
     plane = result.report["plane"]
+    if plane is None:
+        return ", no plane followed"
     found = f", found with confidence {plane['confidence']:.2f}" if result.report["found"] else ""
     return f", slant {plane['slant']:.1f} and tilt {plane['tilt']:.1f}{found}"
 
 
-def _see(verb: Callable[..., Synthesis]) -> Verb:
+def _see(verb: Callable[..., Synthesis], **more: Kind) -> Verb:
     left = {"plane": "the command says how it lies by corners or angles"}
-    return Verb(Options(verb, arguments={"image": PICTURE}, leave=left), says=say_plane, knows=read_camera)
+    return Verb(Options(verb, arguments={"image": PICTURE, **more}, leave=left), says=say_plane, knows=read_camera)
 
 
 def _grow(verb: Callable[..., Synthesis], kind: Kind, axes: int) -> Verb:

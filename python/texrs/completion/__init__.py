@@ -33,6 +33,7 @@ def complete(
     hole: Array | str,
     *,
     exemplar: Array | Exemplar | None = None,
+    allowed: Array | None = None,
     scale_map: Array | str | None = None,
     exemplar_scale_map: Array | str | None = None,
     method: Literal["patch", "optimise"] = "patch",
@@ -54,6 +55,9 @@ def complete(
         True, or not zero, where the picture is to be filled; "alpha": where its last channel of two or four is 0.
     exemplar : (h, w) or (h, w, C) array, or Exemplar, optional
         Another picture to copy from, of the same dtype and channels; by default what is known of ``image``.
+    allowed : (H, W) array, optional
+        Not 0 where patches may be copied from: of a floor the floor, not the sky above it. By default all that is known. Not
+        for use with ``exemplar``, or "optimise".
     scale_map : {None, "auto"} or (H, W) float array, optional
         For pictures taken at an angle: how large the elements are at each pixel (`texrs.scale_maps`), so that the hole is
         filled with elements of the size that belongs there [2]_. "auto" measures it. In the hole it may be NaN; it is
@@ -100,8 +104,8 @@ def complete(
     Raises
     ------
     InvalidInput
-        A hole of another shape; an exemplar of another dtype or other channels; nothing known to copy from; a patch larger
-        than the pictures, with no place for it outside the hole, or given to "optimise".
+        A hole or ``allowed`` of another shape; an exemplar of another dtype or other channels; nothing to copy from; a
+        patch larger than the pictures, with no place for it outside the hole, or given to "optimise".
 
     References
     ----------
@@ -132,6 +136,7 @@ def complete(
     asked = mark_transparent(picture) if isinstance(hole, str) and hole == "alpha" else hole
     pictures, open_ = check_pictures(picture, asked, exemplar)
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
+    usable = check_allowed(allowed, open_, exemplar is None and method == "patch")
     cyclic, seed = as_wrap(wrap), as_seed(seed)
     width = as_int(boundary, "boundary", 0, 1024)
     if patch is not None and method == "optimise":
@@ -142,7 +147,7 @@ def complete(
     watch("complete", 0.0)
     places, side, count = map_untouched(shapes), 0.0, 0
     between = method == "optimise"
-    scales = recover_scales(pictures, open_, scale_map, exemplar_scale_map) if open_.any() else None
+    scales = recover_scales(pictures, ~usable, scale_map, exemplar_scale_map) if open_.any() else None
     levels: list[dict[str, object]] = []
     tried: list[tuple[int, float]] = []
     wide = widen(open_, width, cyclic)
@@ -160,6 +165,7 @@ def complete(
                 open_,
                 scales[0],
                 wide,
+                usable=usable,
                 side=chosen,
                 wrap=(cyclic[0], cyclic[1]),
                 seed=seed,
@@ -172,6 +178,7 @@ def complete(
                 scales,
                 chosen,
                 ~wide,
+                usable=usable,
                 mirrors=mirrors,
                 wrap=(cyclic[0], cyclic[1]),
                 seed=seed,
@@ -232,6 +239,18 @@ def mark_transparent(image: object) -> Bools:
     if not hole.any():
         raise InvalidInput("hole: nothing in the image is wholly transparent, so there is nothing to fill")
     return hole
+
+
+def check_allowed(allowed: object, open_: Bools, fits: bool) -> Bools:
+    """Return what patches may be copied from: what is known, and allowed if anything is said of that."""
+    if allowed is None:
+        return ~open_
+    if not fits:
+        raise InvalidInput("allowed: is not for use with an exemplar, or method 'optimise'")
+    usable: Bools = as_mask(allowed, "allowed", open_.shape) & ~open_
+    if not usable.any():
+        raise InvalidInput("allowed: marks nothing that is known, so there is nothing to copy from")
+    return usable
 
 
 def recover_scales(pictures: Sequence[Array], open_: Bools, own: object, of_exemplar: object) -> list[Floats] | None:

@@ -30,6 +30,7 @@ def fill_in_depth(
     scale: Floats,
     wide: Bools,
     *,
+    usable: Bools,
     side: int | None,
     wrap: tuple[bool, bool],
     seed: int,
@@ -45,6 +46,8 @@ def fill_in_depth(
         The hole, and what may be replaced.
     scale : (H, W) float32
         How large elements are.
+    usable : (H, W) bool
+        What may be copied.
     side : int, optional
         Of the patches, in pixels.
     wrap : (bool, bool)
@@ -63,7 +66,7 @@ def fill_in_depth(
     known = Exemplar(picture[tuple(nearest)])
     colours = known.guidance
     # What is interpolated from pixels of the hole is not known.
-    whole: Bools = ndimage.minimum_filter(~open_, TAPS, mode="nearest")
+    whole: Bools = ndimage.minimum_filter(usable, TAPS, mode="nearest")
     asked = np.ascontiguousarray(scale)
     plane = find_plane(colours, asked)
     if plane is None:

@@ -56,6 +56,7 @@ def fill_with_patches(
     chosen: int | None,
     keep: Bools,
     *,
+    usable: Bools,
     mirrors: Sequence[Flip],
     wrap: tuple[bool, bool],
     seed: int,
@@ -74,13 +75,13 @@ def fill_with_patches(
 
     """
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
-    part, cyclic = choose_part(open_, keep, wrap)
+    part, cyclic = choose_part(open_, keep, wrap, usable)
     guides = guide_together([pictures[0][part], *pictures[1:]])
     if scales is not None:
         pairs = zip(guides, (scales[0][part], *scales[1:]), strict=True)
         guides = [np.concatenate([g, SCALED * log_single(s)[..., np.newaxis]], axis=-1) for g, s in pairs]
     known, itself = ~open_[part], len(pictures) == 1
-    free = known if itself else np.ones(shapes[-1], bool)
+    free = usable[part] if itself else np.ones(shapes[-1], bool)
     scene = Scene(guides[0], known, keep[part], guides[-1], free, cyclic)
     tried: list[tuple[int, float]] = []
     made: Filled | None = None
@@ -148,7 +149,9 @@ def try_sides(
     return chosen, tried, None
 
 
-def choose_part(open_: Bools, keep: Bools, wrap: tuple[bool, bool]) -> tuple[tuple[slice, slice], tuple[bool, bool]]:
+def choose_part(
+    open_: Bools, keep: Bools, wrap: tuple[bool, bool], usable: Bools
+) -> tuple[tuple[slice, slice], tuple[bool, bool]]:
     """Return the part of a picture that is looked at, and which of its axes are cyclic: what is around its holes."""
     parts, cyclic = [], []
     for axis, closed in enumerate(wrap):
@@ -162,7 +165,7 @@ def choose_part(open_: Bools, keep: Bools, wrap: tuple[bool, bool]) -> tuple[tup
         cyclic.append(closed and high - low == side)
     part = (parts[0], parts[1])
     holes = open_[part]
-    if holes.size < (1 + PLENTY) * np.count_nonzero(holes):
+    if np.count_nonzero(usable[part]) < PLENTY * np.count_nonzero(holes):
         return (slice(0, open_.shape[0]), slice(0, open_.shape[1])), wrap
     return part, (cyclic[0], cyclic[1])
 

@@ -11,6 +11,7 @@ from texrs.demo._html import code, figure, grid
 from texrs.demo._workshop import Section, Workshop
 from texrs.papers.perspective import perspective
 from texrs.rectification import rectify
+from texrs.removal import remove
 
 SIDE, SIZE = 192, 224
 """Pixels a side of the example, and of what is grown."""
@@ -57,6 +58,15 @@ def _perspective(workshop: Workshop) -> str:
         figure(flat.stages["flat"], "Flat", note="the plane was found in the picture"),
         figure(np.tile(flat.image, (2, 2, 1)), "Cyclic", note="four side by side"),
     ]
+    thing = np.zeros((SIDE, SIDE), bool)
+    thing[70:150, 80:120] = True
+    stood = np.where(thing[..., np.newaxis], np.array([40, 90, 160], np.uint8), floor.image)
+    cleared = [
+        figure(stood, "Something on it"),
+        figure(
+            remove(stood, thing, seed=3).image, "Taken out", note="the plane and the ground were found in the picture"
+        ),
+    ]
     return (
         code("texrs scale-map floor.png -o scale.npy --slant 50 --tilt 90")
         + code(
@@ -67,6 +77,8 @@ def _perspective(workshop: Workshop) -> str:
         + grid(mended, least=200)
         + code("texrs rectify floor.png -o flat.png --wrap xy --seed 3")
         + grid(levelled, least=200)
+        + code("texrs remove floor.png thing.png -o cleared.png --seed 3")
+        + grid(cleared, least=200)
     )
 
 

@@ -6,13 +6,23 @@ import warnings
 
 import numpy as np
 
+from texrs._arrays import as_mask
 from texrs._typing import Array, Bools
 from texrs.errors import InvalidInput
 from texrs.planes._find import find
+from texrs.planes._ground import find_ground
 from texrs.planes._plane import FOV, Plane
 
 SURE = 0.4
 """Confidence below which it is said that a plane that was found may be wrong."""
+
+
+def choose_ground(pixels: Array, ground: object, *said: object) -> Bools:
+    """Return where the picture shows the plane: as is given, or found where nothing is said of how the plane lies."""
+    size = pixels.shape[0], pixels.shape[1]
+    if ground is not None:
+        return as_mask(ground, "ground", size)
+    return find_ground(pixels) if all(s is None for s in said) else np.ones(size, np.bool_)
 
 
 def choose_plane(

@@ -1,0 +1,246 @@
+"""Where a photograph shows its ground, and where something else: sky, walls, things that stand on it.
+
+A ground is one texture. Its colours, and how much they vary, are about the same all over it, or change slowly with the light
+and with how far it is. What is looked for is the slow change that most of the picture follows, and what does not follow it.
+Windows say that, which blur every border; so where the two meet the colours decide that each side has elsewhere.
+"""
+
+from __future__ import annotations
+
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_image, as_mask, guidance
+from texrs._typing import Bools, Floats
+from texrs.errors import InvalidInput
+
+__all__ = ["find_ground"]
+
+SMALLEST = 64
+"""Pixels across the smallest picture that a ground is looked for in."""
+LARGEST = 240
+"""A longer side is shrunk to so many pixels."""
+WINDOW = 0.045
+"""Standard deviation of the windows, as a share of the shorter side."""
+BANDS = 1.0, 2.5
+"""Standard deviations of the Gaussians beyond which colours are detail, in pixels of what is shrunk."""
+COLOUR, CONTRAST = 0.02, 0.2
+"""What colours, of 1, and logarithms of contrast deviate in any case."""
+RANGE, PLAIN = np.array([1.0, 1.0, 1.0, 4.0, 4.0]), -5.0
+"""Range of the same, where nothing is said; logarithm of the contrast of what is smooth."""
+LOOSE = 1.5
+"""Times what they deviate in any case that they may deviate of one ground."""
+POWER = 4
+"""Of the mean of what is off."""
+EVEN = 1.0
+"""By how much no change at all is preferred, of the variance of places."""
+FAR = 4.0
+"""Standard deviations from which on a window does not follow the ground."""
+ROUNDS = 20
+"""Steps of a robust fit."""
+BINS, FINE = 12, 0.012
+"""Bins of colours, of each channel; standard deviation of the windows, as a share of the shorter side, in which they decide."""
+DOUBT = 2.0
+"""Windows of the first kind around a border in which colours decide."""
+PART, USUAL = 0.08, 0.25
+"""Share of a picture up to which a part may be ground that windows find unlike it, and the quantile of what ground has that its
+colours must reach."""
+LEAST, THING = 0.004, 0.02
+"""Share of a picture below which a part of it is no part of its own, of the ground and of what is not: one button among many is
+no thing that stands on a floor."""
+FEWEST = 0.03
+"""Where less than this share of a picture does not follow the ground all of it is ground."""
+
+
+def find_ground(image: object, *, known: object = None) -> Bools:
+    """Find where a picture shows its ground: the texture that most of it shows.
+
+    Parameters
+    ----------
+    image : (H, W) or (H, W, C) array
+        A photograph, any real dtype, each side at least 64.
+    known : (H, W) bool array, optional
+        Where it says anything; all of it by default.
+
+    Returns
+    -------
+    (H, W) bool array
+        True on the ground; False where it is not known.
+
+    Raises
+    ------
+    InvalidInput
+        A picture that is too small, or of which nothing is known.
+
+    Examples
+    --------
+    >>> from texrs import planes, samples
+    >>> floor = samples.tilted_discs((128, 128)).image
+    >>> bool(planes.find_ground(floor).all())
+    True
+    >>> floor[:40] = (150, 180, 230)
+    >>> bool(planes.find_ground(floor)[:30].any())
+    False
+
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    pixels = as_image(image, minimum=SMALLEST)
+    size = pixels.shape[0], pixels.shape[1]
+    there = np.ones(size, np.bool_) if known is None else as_mask(known, "known", size)
+    if not there.any():
+        raise InvalidInput("known: nothing of the picture is known")
+    colours, seen = shrink(guidance(pixels), there)
+    follows = find_windows(colours, seen)
+    if np.count_nonzero(seen & ~follows) < FEWEST * np.count_nonzero(seen):
+        return there
+    ground = settle(colours, seen, follows)
+    if np.count_nonzero(seen & ~ground) < THING * ground.size:
+        return there
+    # What is not wholly known is what lies nearest to it.
+    nearest = distance_transform_edt(~seen, return_distances=False, return_indices=True)
+    ground = ground[tuple(nearest)]
+    rows, columns = (np.minimum(np.arange(n) * m // n, m - 1) for n, m in zip(size, ground.shape, strict=True))
+    return np.asarray(ground[np.ix_(rows, columns)] & there, np.bool_)
+
+
+def shrink(colours: Floats, known: Bools) -> tuple[NDArray[np.float64], Bools]:
+    """Return a picture of three channels of at most `LARGEST` pixels a side, by means of squares, and what of it is known."""
+    step = max(1, ceil(max(known.shape) / LARGEST))
+    rows, columns = (n // step * step for n in known.shape)
+    three = colours if colours.shape[2] == 3 else np.repeat(colours[..., :1], 3, axis=2)
+    parts = three[:rows, :columns].reshape(rows // step, step, columns // step, step, 3)
+    whole = known[:rows, :columns].reshape(rows // step, step, columns // step, step).all(axis=(1, 3))
+    return parts.mean(axis=(1, 3), dtype=np.float64), np.asarray(whole)
+
+
+def blur(values: NDArray[np.float64], known: Bools, sigma: float) -> NDArray[np.float64]:
+    """Return the means of what is known in windows around each pixel, channel by channel."""
+    from scipy.ndimage import gaussian_filter
+
+    seen = known.astype(np.float64)
+    share = np.maximum(gaussian_filter(seen, sigma), 1e-6)
+    channels = [gaussian_filter(c * seen, sigma) / share for c in np.moveaxis(values, -1, 0)]
+    return np.stack(channels, axis=-1)
+
+
+def find_windows(colours: NDArray[np.float64], known: Bools) -> Bools:
+    """Mark the pixels whose windows follow what most of the picture follows."""
+    sigma = WINDOW * min(known.shape)
+    details = [np.square(colours - blur(colours, known, s)).sum(axis=-1) for s in BANDS]
+    facts = blur(np.stack([*np.moveaxis(colours, -1, 0), *details], axis=-1), known, sigma)
+    facts[..., 3:] = 0.5 * np.log(facts[..., 3:] + 1e-5)
+    least = np.array([COLOUR] * 3 + [CONTRAST] * len(BANDS))
+    step = max(1, int(sigma / 2))
+    thin = np.zeros_like(known)
+    thin[step // 2 :: step, step // 2 :: step] = True
+    thin &= known
+    places = np.indices(known.shape).astype(np.float64)
+    terms = np.stack([np.ones(known.shape), *(2 * p / max(known.shape) - 1 for p in places)], axis=-1)
+    best: tuple[float, NDArray[np.float64]] | None = None
+    for start in list_starts(thin):
+        coefficients, spread = fit(terms[thin], facts[thin], start[thin], least)
+        off = np.sqrt(measure_off(facts - terms @ coefficients, spread))
+        # How much likelier it is than anything in the range; and what has detail is a ground sooner than what has not.
+        gain = np.log(RANGE / (2.5 * spread)).sum() - len(spread) * off[thin] ** 2 / 2
+        value = float((np.maximum(gain, 0) * np.clip(facts[thin][:, 3] - PLAIN, 0.2, 2)).sum())
+        if best is None or value > best[0]:
+            best = value, off
+    assert best is not None
+    return np.asarray((best[1] < FAR) & known, np.bool_)
+
+
+def list_starts(thin: Bools) -> list[Bools]:
+    """Return parts of a picture that may be ground: all of it, its halves, and its middle."""
+    rows, columns = np.indices(thin.shape)
+    height, width = thin.shape
+    middle = (np.abs(rows - height / 2) < height / 4) & (np.abs(columns - width / 2) < width / 4)
+    halves = [rows >= height * 0.6, rows < height * 0.4, columns < width * 0.4, columns >= width * 0.6, middle]
+    return [thin, *(h & thin for h in halves if (h & thin).sum() >= 8)]
+
+
+def measure_off(rest: NDArray[np.float64], spread: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return squares of how far facts are off, in standard deviations: what is far off in one alone is far off."""
+    return np.asarray((np.abs(rest / spread) ** POWER).mean(axis=-1) ** (2 / POWER), np.float64)
+
+
+def fit(
+    terms: NDArray[np.float64], facts: NDArray[np.float64], start: Bools, least: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the slow change (terms, facts) that a part follows, and all that follows it; and by how much these deviate."""
+    weight = start.astype(np.float64)
+    coefficients, spread = np.zeros((terms.shape[1], facts.shape[1])), least
+    even = np.diag([0.0] + [EVEN] * (terms.shape[1] - 1))
+    for _ in range(ROUNDS):
+        if weight.sum() < 8:
+            break
+        scaled = terms * weight[:, np.newaxis]
+        coefficients = np.linalg.solve(scaled.T @ terms + weight.sum() * even, scaled.T @ facts)
+        rest = facts - terms @ coefficients
+        own = np.abs(rest[weight > 0.1 * weight.max()])
+        spread = np.clip(1.4826 * np.median(own, axis=0), least, LOOSE * least)
+        off = measure_off(rest, spread)
+        # Tukey's biweight.
+        weight = np.square(np.maximum(0, 1 - off / FAR**2))
+    return coefficients, spread
+
+
+def measure_chances(cell: NDArray[np.intp], part: Bools) -> NDArray[np.float64]:
+    """Return the logarithm of the chance that a part of a picture has the colour of each pixel."""
+    from scipy.ndimage import gaussian_filter
+
+    count = np.bincount(np.ravel_multi_index(tuple(cell[part].T), (BINS,) * 3), minlength=BINS**3).astype(np.float64)
+    smooth = gaussian_filter(count.reshape((BINS,) * 3), 0.7, mode="nearest")
+    return np.asarray(np.log(smooth / smooth.sum() + 1e-4)[tuple(np.moveaxis(cell, -1, 0))], np.float64)
+
+
+def return_parts(cell: NDArray[np.intp], known: Bools, ground: Bools) -> Bools:
+    """Return the ground with those smaller parts of the rest whose colours it has elsewhere, as one large tile of a floor."""
+    from scipy.ndimage import label
+
+    own = ground & known
+    if not own.any():
+        return ground
+    chance = measure_chances(cell, own)
+    usual = float(np.quantile(chance[own], USUAL))
+    pieces, count = label(~ground & known)
+    result = ground.copy()
+    for number in range(1, count + 1):
+        piece = pieces == number
+        if piece.sum() < PART * known.size and float(np.median(chance[piece])) >= usual:
+            result |= piece
+    return result
+
+
+def settle(colours: NDArray[np.float64], known: Bools, follows: Bools) -> Bools:
+    """Draw the border of what follows the ground by the colours of both sides."""
+    from scipy.ndimage import distance_transform_edt, label, median_filter
+
+    side = min(known.shape)
+    wide = DOUBT * WINDOW * side
+    low, high = colours.min(axis=(0, 1)), colours.max(axis=(0, 1))
+    scaled = (colours - low) / np.maximum(high - low, 1e-6)
+    cell = np.minimum((scaled * BINS).astype(np.intp), BINS - 1)
+    ground = return_parts(cell, known, follows)
+    for _ in range(3):
+        if not (ground & known).any() or not (~ground & known).any():
+            break
+        inside, outside = (
+            distance_transform_edt(np.pad(m, 1, constant_values=True))[1:-1, 1:-1] for m in (ground | ~known, ~ground)
+        )
+        sure = [(ground & known & (inside > wide / 2)), (~ground & known & (outside > wide / 2))]
+        sure = [s if s.any() else part for s, part in zip(sure, (ground & known, ~ground & known), strict=True)]
+        chances = [measure_chances(cell, part) for part in sure]
+        says = blur(np.clip(chances[0] - chances[1], -3, 3)[..., np.newaxis], known, max(1.0, FINE * side))[..., 0]
+        near = np.where(ground, inside, outside) < wide
+        ground = np.where(near, says > 0, ground) & known
+        ground = median_filter(ground, 5) & known
+    for value, least in ((True, LEAST), (False, THING)):
+        # Crumbs belong to what is around them.
+        pieces, _ = label(ground == value)
+        small = np.bincount(pieces.ravel()) < least * ground.size
+        small[0] = False
+        ground = np.where(small[pieces], not value, ground)
+    return np.asarray(ground & known, np.bool_)

@@ -1,0 +1,180 @@
+"""Things taken out of photographs: what is ground, what lies behind, what a user may do wrong; the command."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+import texrs
+from plane_checks import look
+from texrs import Plane, io, planes
+from texrs.cli import main
+from texrs.errors import InvalidInput
+
+SIZE = (180, 240)
+PLANE = Plane(SIZE, 48, 90, fov=55)
+
+
+def see(
+    name: str, *, sky: bool = False, thing: bool = False
+) -> tuple[NDArray[np.uint8], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return a picture of a floor, what of it is floor, and what stands on that."""
+    picture = look(name, PLANE, noise=2.0).astype(float)
+    ground, marked = np.ones(SIZE, bool), np.zeros(SIZE, bool)
+    if sky:
+        rng = np.random.default_rng(1)
+        clouds = np.clip(15 * gaussian_filter(rng.normal(0, 1, SIZE), 15), 0, 1)[..., np.newaxis]
+        rows = np.arange(SIZE[0])[:, np.newaxis, np.newaxis] / SIZE[0]
+        blue = np.array([150, 185, 230]) + 60 * rows + 30 * clouds
+        ground[:55] = False
+        picture[:55] = blue[:55]
+    if thing:
+        marked[60:120, 100:135] = True
+        picture[marked] = (70, 40, 200)
+    return np.clip(np.rint(picture), 0, 255).astype(np.uint8), ground, marked
+
+
+@pytest.mark.parametrize("name", ["pebbles", "dots", "weave", "beans", "grit", "scales"])
+def test_ground_is_told_from_sky_and_things(name: str) -> None:
+    plain, *_ = see(name)
+    assert planes.find_ground(plain).all()
+    picture, ground, marked = see(name, sky=True, thing=True)
+    found, there = planes.find_ground(picture), ground & ~marked
+    assert (found & there).sum() / (found | there).sum() >= 0.9
+    # What is not known is neither.
+    known = planes.find_ground(picture, known=~marked)
+    assert not known[marked].any()
+    assert (known & there).sum() / (known | there).sum() >= 0.9
+
+
+def test_a_large_tile_is_no_thing() -> None:
+    squares = np.kron((np.indices((8, 8)).sum(axis=0) % 2), np.ones((24, 24)))
+    rng = np.random.default_rng(0)
+    chequers = 60 + 120 * squares[..., np.newaxis] + rng.normal(0, 6, (192, 192, 3))
+    assert planes.find_ground(chequers.astype(np.uint8)).mean() > 0.97
+
+
+def test_what_goes_is_filled_from_the_ground_alone() -> None:
+    picture, ground, marked = see("beans", sky=True, thing=True)
+    made = texrs.remove(picture, marked, seed=1)
+    assert made.report["found"]
+    assert made.report["beyond"] == 0
+    wide = made.stages["known"] != picture
+    assert wide.any(axis=2)[marked].all()
+    np.testing.assert_array_equal(made.image[~wide.any(axis=2)], picture[~wide.any(axis=2)])
+    # Sky is blue, beans are not, nor did the thing leave anything.
+    filled = made.image[marked].astype(float)
+    assert (filled[:, 2] < filled[:, 0] + 30).mean() > 0.99
+    rows, columns = np.rint(made.source.coordinates[marked]).astype(int).T
+    assert ground[rows, columns].all()
+    assert not marked[rows, columns].any()
+
+
+def test_what_it_hid_of_the_sky_is_sky() -> None:
+    picture, _, _ = see("beans", sky=True)
+    marked = np.zeros(SIZE, bool)
+    marked[20:100, 100:130] = True
+    picture[marked] = (70, 40, 200)
+    made = texrs.remove(picture, marked, seed=1)
+    assert made.report["beyond"] > 0
+    blue = made.image[..., 2].astype(int) > made.image[..., 0]
+    upper, lower = marked.copy(), marked.copy()
+    upper[50:], lower[:62] = False, False
+    assert blue[upper].mean() > 0.97
+    assert blue[lower].mean() < 0.05
+
+
+def test_a_plane_seen_from_the_front_needs_no_perspective() -> None:
+    wall = texrs.samples.bricks((128, 128)).image
+    marked = np.zeros((128, 128), bool)
+    marked[40:70, 50:90] = True
+    made = texrs.remove(wall, marked, slant=0)
+    assert made.report["plane"] is None
+    np.testing.assert_array_equal(made.image[:30], wall[:30])
+
+
+def test_a_doubtful_plane_is_said_and_not_followed() -> None:
+    rng = np.random.default_rng(3)
+    noise = np.clip(128 + 60 * gaussian_filter(rng.normal(0, 1, (96, 96, 3)), (12, 12, 0)) * 12, 0, 255).astype(
+        np.uint8
+    )
+    noise[:48] = noise[:48] // 2
+    marked = np.zeros((96, 96), bool)
+    marked[50:60, 50:60] = True
+    with pytest.warns(UserWarning, match="not followed"):
+        made = texrs.remove(noise, marked)
+    assert made.report["plane"] is None
+
+
+def test_grey_pictures_of_16_bit_and_again() -> None:
+    floor = look("pebbles", PLANE)[..., 0].astype(np.uint16) * 200
+    marked = np.zeros(SIZE, bool)
+    marked[70:90, 60:90] = True
+    one, two = (texrs.remove(floor, marked, plane=PLANE, seed=4, blend=None) for _ in range(2))
+    assert one.image.dtype == np.uint16
+    assert one.image.shape == SIZE
+    assert one.stages["composite"].shape == SIZE
+    np.testing.assert_array_equal(one.image, two.image)
+    np.testing.assert_array_equal(one.source.render(floor), one.image)
+
+
+FLOOR = look("pebbles", PLANE)
+MARKED = np.zeros(SIZE, bool)
+MARKED[70:90, 60:90] = True
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: texrs.remove(FLOOR, ~(MARKED | True)), "mask: marks nothing"),
+        (lambda: texrs.remove(FLOOR, MARKED | True), "mask: with its margin it covers"),
+        (lambda: texrs.remove(FLOOR, MARKED[:40]), "mask: "),
+        (lambda: texrs.remove(FLOOR, MARKED, ground=MARKED), "ground: nothing of it is left"),
+        (lambda: texrs.remove(FLOOR, MARKED, margin=65), "margin: "),
+        (lambda: texrs.remove(FLOOR, MARKED, slant=40, plane=PLANE), "slant: plane says"),
+        (lambda: texrs.remove(FLOOR[:40], MARKED[:40]), "each side must be at least 64"),
+        (lambda: planes.find_ground(FLOOR, known=MARKED & False), "known: nothing"),
+        (lambda: texrs.complete(FLOOR, MARKED, allowed=MARKED), "allowed: marks nothing"),
+        (lambda: texrs.complete(FLOOR, MARKED, allowed=~MARKED, method="optimise"), "allowed: is not for use"),
+        (lambda: texrs.complete(FLOOR, MARKED, allowed=~MARKED, exemplar=FLOOR), "allowed: is not for use"),
+    ],
+)
+def test_what_cannot_be_done_gets_a_sentence(make: Callable[[], object], words: str) -> None:
+    with pytest.raises(InvalidInput, match=words):
+        make()
+
+
+def test_patches_come_from_where_they_may() -> None:
+    allowed = np.zeros(SIZE, bool)
+    allowed[100:, :] = True
+    made = texrs.complete(FLOOR, MARKED, allowed=allowed)
+    assert (made.source.coordinates[MARKED][:, 0] >= 99.5).all()
+
+
+def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    photo, mask, out = (str(tmp_path / f"{name}.png") for name in ("photo", "mask", "out"))
+    io.write(photo, FLOOR)
+    io.write(mask, MARKED.astype(np.uint8) * 255)
+    assert main(["remove", photo, mask, "-o", out, "--slant", "48", "--fov", "55", "--seed", "2"]) == 0
+    assert "slant 48.0" in capsys.readouterr().err
+    np.testing.assert_array_equal(io.read(out), texrs.remove(FLOOR, MARKED, slant=48, fov=55, seed=2).image)
+    assert main(["remove", photo, mask, "-o", str(tmp_path / "no.png"), "--margin", "99"]) == 2
+    assert "--margin" in capsys.readouterr().err
+    assert not (tmp_path / "no.png").exists()
+
+
+def test_a_photograph_is_extended_to_a_size() -> None:
+    made = texrs.extend(FLOOR, to=(200, 300), plane=PLANE, seed=1)
+    assert made.image.shape == (200, 300, 3)
+    assert made.report["added"] == {"top": 10, "bottom": 10, "left": 30, "right": 30}
+    steep = Plane(SIZE, 62, 90, fov=55)
+    up = texrs.extend(
+        look("pebbles", Plane(SIZE, 60, 90, fov=55)), to=(260, 240), plane=steep, bottom=10, seed=1
+    ).report["added"]
+    assert up["top"] < 35 < up["bottom"]
+    assert up["top"] + up["bottom"] == 80
+    with pytest.raises(InvalidInput, match="to: needs 180 x 240"):
+        texrs.extend(FLOOR, to=(100, 300), plane=PLANE)
