@@ -71,6 +71,8 @@ def understood(option: Option, text: Any, axes: int) -> Any:
     """Return what the text of a default means to the function."""
     if option.kind is None or text is None or text == "default":
         return None if text == "default" else text
+    if text in option.kind.words:
+        return text
     return option.kind.read(text, About(option.flag, axes=axes))
 
 

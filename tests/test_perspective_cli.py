@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import texrs
 from texrs import SourceMap, io, samples
 from texrs.cli import main
 
@@ -57,7 +58,6 @@ def test_holes_are_filled_by_scale(files):
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        ("perspective @floor.png -o @out.png", "--scale"),
         ("perspective @floor.png --scale-map @hole.png -o @out.png --size 0", "--size"),
         (
             "perspective @floor.png --scale-map @scale.npy -o @out.png --method best",
@@ -81,3 +81,16 @@ def test_bad_input_is_named(files, capsys, line, words):
     assert run(files, line) == 2
     assert words in capsys.readouterr().err
     assert not (files / "out.png").exists()
+
+
+def test_a_picture_is_enough(files, capsys):
+    """The plane is found; what is no photograph of one is said to be doubtful."""
+    io.write(files / "discs.png", texrs.samples.tilted_discs((128, 128)).image)
+    assert run(files, "perspective @discs.png -o @out.png --size 96x160 --seed 1") == 0
+    assert "no plane" not in capsys.readouterr().err
+    discs = texrs.samples.tilted_discs((128, 128)).image
+    made = texrs.perspective(discs, texrs.planes.find(discs).scale_map(), (96, 160), seed=1)
+    np.testing.assert_array_equal(io.read(files / "out.png"), made.image)
+    assert run(files, "perspective @floor.png -o @twice.png") == 0
+    assert "no plane was found surely" in capsys.readouterr().err
+    assert io.read(files / "twice.png").shape[:2] == tuple(2 * n for n in io.read(files / "floor.png").shape[:2])

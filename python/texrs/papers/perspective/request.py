@@ -14,6 +14,7 @@ from texrs._typing import Array, Floats, Interpolation
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
 from texrs.papers.perspective.sizes import Sizes
+from texrs.planes._choose import measure_scale
 from texrs.scale_maps._maps import as_map
 
 __all__ = ["Method", "Request"]
@@ -65,8 +66,8 @@ class Request:
     def check(
         cls,
         exemplar: Array | Exemplar,
-        scale_map: Array,
-        size: int | Sequence[int],
+        scale_map: Array | str,
+        size: int | Sequence[int] | None,
         *,
         target: Array | None,
         method: Method,
@@ -78,7 +79,13 @@ class Request:
     ) -> Request:
         """Return the request of a caller, or raise what is wrong with it."""
         known = as_exemplar(exemplar, minimum=LEAST)
-        mine = as_map(scale_map, "scale_map", known.shape)
+        if isinstance(scale_map, str):
+            as_choice(scale_map, "scale_map", ("auto",))
+            mine = measure_scale(known.image, np.ones(known.shape, np.bool_))
+        else:
+            mine = as_map(scale_map, "scale_map", known.shape)
+        if size is None:
+            size = [2 * n for n in known.shape] if target is None else np.asarray(target).shape[:2]
         sides = as_size(size)
         shape = (sides[0], sides[1])
         wanted = scale_maps.resample(mine, shape) if target is None else as_map(target, "target", shape)
