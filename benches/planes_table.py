@@ -5,7 +5,8 @@
 Floors are flat samples seen by a pinhole camera: slants of 20 to 65 degrees, tilts all round, four angles of view, with noise
 and without. FOLDER holds pictures and ``ground-truth.json``, which tells slant, tilt and focal length of some. With
 `--pictures` each is drawn beside its flat texture. After the errors of each texture it says how often planes were right
-that were said to be sure, and what finding and rectifying take at 1024 x 1024.
+that were said to be sure, how well the ground is found beside skies, walls and things, and what each verb takes at 1024 x
+1024.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ import texrs
 from texrs import Plane, io, planes
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
-from plane_checks import look, turn_between
+from plane_checks import dress, look, turn_between
 
 NAMES = ("bricks", "pebbles", "dots", "weave", "beans", "scales")
 SIZE = (256, 320)
@@ -57,6 +58,27 @@ def told(folder: str | None) -> Iterator[tuple[str, Plane, np.ndarray]]:
                 yield Path(name).stem, Plane(image.shape[:2], truth["slant_deg"], truth["tilt_deg"], fov), image
 
 
+SCENES = {"nothing": {}, "sky": {"above": "sky"}, "things": {"things": 3}, "sky, things": {"above": "sky", "things": 3}}
+SCENES |= {f"a wall of {name}": {"above": name} for name in ("bark", "grit", "bricks")}
+
+
+def print_grounds() -> None:
+    """Print how well the ground of each scene is found, and its plane then, as intersection over union and degrees."""
+    print("\n| beside the floor | ground: mean | least | plane off: slant | tilt, medians |\n" + "|---" * 5 + "|")
+    for kind, options in SCENES.items():
+        over, offs = [], []
+        for number, name in enumerate(NAMES):
+            plane = Plane((300, 400), 30.0 + 6 * number, 60.0 + 12 * number, 55)
+            if f"wall of {name}" in kind:
+                continue
+            picture, truth = dress(look(name, plane), plane.tilt, seed=number, **options)
+            found = planes.find_ground(picture)
+            over.append((found & truth).sum() / (found | truth).sum())
+            offs.append(turn_between(planes.find(picture, fov=55, known=found), plane))
+        slant, tilt = np.median(offs, axis=0)
+        print(f"| {kind} | {np.mean(over):.2f} | {min(over):.2f} | {slant:.1f} | {tilt:.1f} |")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=4)
@@ -84,11 +106,17 @@ def main() -> None:
     for low, high in pairwise(BINS):
         right = [good for sure, good in stated if low <= sure < high or sure == high == 1]
         print(f"| {low} to {high} | {len(right)} | {np.mean(right) if right else float('nan'):.2f} |")
+    print_grounds()
     plane = Plane((1024, 1024), 45, 90, 55)
     picture = look("pebbles", plane)
+    hole = np.zeros((1024, 1024), np.bool_)
+    hole[500:756, 300:556] = True
     for name, work in (
         ("find", lambda: planes.find(picture, fov=55)),
+        ("ground", lambda: planes.find_ground(picture)),
         ("rectify", lambda: texrs.rectify(picture, plane=plane)),
+        ("extend by 256", lambda: texrs.extend(picture, right=256, plane=plane)),
+        ("remove a sixteenth", lambda: texrs.remove(picture, hole)),
     ):
         spent = []
         for _ in range(3):

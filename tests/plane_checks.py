@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
 
 from texrs import Plane, SourceMap, samples
 
@@ -34,6 +35,32 @@ def look(
     )
     seen = shown.reshape(rows, OVER, columns, OVER, -1).mean(axis=(1, 3)) + rng.normal(0, noise, (rows, columns, 1))
     return np.clip(np.rint(seen), 0, 255).astype(np.uint8)
+
+
+def dress(
+    picture: NDArray[np.uint8], tilt: float, *, above: str = "", things: int = 0, seed: int = 0
+) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+    """Put a sky, or a wall, over the far third of a floor, and things on it; return what is seen and where that is floor."""
+    rng = np.random.default_rng(seed)
+    rows, columns = picture.shape[:2]
+    y, x = np.indices((rows, columns))
+    shown, ground = picture.astype(np.float64), np.ones((rows, columns), np.bool_)
+    if above:
+        ahead = (x - columns / 2) * np.cos(np.radians(tilt)) - (y - rows / 2) * np.sin(np.radians(tilt))
+        ground = ahead <= np.quantile(ahead, rng.uniform(0.6, 0.75))
+        clouds = 40 * np.clip(25 * gaussian_filter(rng.normal(0, 1, (rows, columns)), 25), 0, 1)[..., np.newaxis]
+        sky = np.stack([150 + 60 * y / rows, 180 + 40 * y / rows, np.full(y.shape, 220.0)], axis=-1) + clouds
+        behind = sky if above == "sky" else samples.load(above, size=(rows, columns)).image
+        shown[~ground] = behind[~ground]
+    for number in range(things):
+        middle = rng.uniform(0.35, 0.85) * rows, rng.uniform(0.1, 0.9) * columns
+        high, wide = rng.uniform(0.1, 0.17) * rows, rng.uniform(0.06, 0.1) * columns
+        away = np.abs(y - middle[0]) / high, np.abs(x - middle[1]) / wide
+        thing = np.maximum(*away) < 1 if number % 2 else np.hypot(*away) < 1
+        grain = 90 * gaussian_filter(rng.normal(0, 1, (rows, columns)), 3) + 0.6 * (x - middle[1])
+        shown[thing] = rng.uniform(20, 235, 3) + grain[thing, np.newaxis]
+        ground &= ~thing
+    return np.clip(np.rint(shown + rng.normal(0, 3, shown.shape)), 0, 255).astype(np.uint8), ground
 
 
 def look_twice() -> NDArray[np.uint8]:
