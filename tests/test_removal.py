@@ -59,7 +59,7 @@ def test_a_large_tile_is_no_thing() -> None:
 
 def test_what_goes_is_filled_from_the_ground_alone() -> None:
     picture, ground, marked = see("beans", sky=True, thing=True)
-    made = texrs.remove(picture, marked, seed=1)
+    made = texrs.remove(picture, marked, boundary=0, seed=1)
     assert made.report["found"]
     assert made.report["beyond"] == 0
     wide = made.stages["known"] != picture
@@ -71,6 +71,14 @@ def test_what_goes_is_filled_from_the_ground_alone() -> None:
     rows, columns = np.rint(made.source.coordinates[marked]).astype(int).T
     assert ground[rows, columns].all()
     assert not marked[rows, columns].any()
+
+
+def test_seams_may_run_a_little_around_it() -> None:
+    rows, columns = np.nonzero(
+        (texrs.remove(FLOOR, MARKED, plane=PLANE, margin=2, boundary=5).image != FLOOR).any(axis=2)
+    )
+    assert 63 <= rows.min() <= 68
+    assert 91 <= columns.max() <= 97
 
 
 def test_what_it_hid_of_the_sky_is_sky() -> None:
@@ -134,6 +142,7 @@ MARKED[70:90, 60:90] = True
         (lambda: texrs.remove(FLOOR, MARKED[:40]), "mask: "),
         (lambda: texrs.remove(FLOOR, MARKED, ground=MARKED), "ground: nothing of it is left"),
         (lambda: texrs.remove(FLOOR, MARKED, margin=65), "margin: "),
+        (lambda: texrs.remove(FLOOR, MARKED, boundary=65), "boundary: "),
         (lambda: texrs.remove(FLOOR, MARKED, slant=40, plane=PLANE), "slant: plane says"),
         (lambda: texrs.remove(FLOOR[:40], MARKED[:40]), "each side must be at least 64"),
         (lambda: planes.find_ground(FLOOR, known=MARKED & False), "known: nothing"),

@@ -26,6 +26,8 @@ __all__ = ["remove"]
 
 MARGIN = 1 / 150
 """By how much a mask is widened, of the shorter side: outlines are drawn too close, and things have soft edges."""
+RIM = 1 / 40
+"""How far around it seams may run, of the shorter side."""
 FLAT = 8.0
 """Degrees of slant up to which a plane is taken for seen from the front."""
 LEAST = 0.05
@@ -45,6 +47,7 @@ def remove(
     fov: float | None = None,
     ground: Array | None = None,
     margin: int | None = None,
+    boundary: int | None = None,
     patch: int | None = None,
     blend: float | None = 0.1,
     seed: int = 0,
@@ -75,6 +78,9 @@ def remove(
         Not 0 where the photograph shows the plane; by default it is found (`texrs.planes.find_ground`).
     margin : int, optional
         Pixels by which the mask is widened, 0 to 64; by default 1/150 of the shorter side.
+    boundary : int, optional
+        Pixels around that which may change too, 0 to 64, so that seams run where they show least, between things; by default
+        1/40 of the shorter side.
     patch : int, optional
         Side of the patches in pixels, as in `texrs.complete`.
     blend : float, optional
@@ -88,9 +94,9 @@ def remove(
     Returns
     -------
     Synthesis
-        The photograph without it, in its dtype and with its channels; nothing changes but what is marked and its margin. Its
-        source map leads to the photograph. The stages are ``"known"``, ``"ground"``, ``"patches"`` and ``"composite"``. The
-        report has the plane, if one was followed.
+        The photograph without it, in its dtype and with its channels; nothing changes but what is marked, its margin and
+        boundary. Its source map leads to the photograph. The stages are ``"known"``, ``"ground"``, ``"patches"`` and
+        ``"composite"``. The report has the plane, if one was followed.
 
     Raises
     ------
@@ -121,6 +127,7 @@ def remove(
     if not marked.any():
         raise InvalidInput("mask: marks nothing, so there is nothing to remove")
     wide = max(1, round(MARGIN * min(shape))) if margin is None else as_int(margin, "margin", 0, 64)
+    rim = round(RIM * min(shape)) if boundary is None else as_int(boundary, "boundary", 0, 64)
     screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
     number = as_seed(seed)
     watch = progress or (lambda stage, share: None)
@@ -136,7 +143,13 @@ def remove(
     watch("plane", 1.0)
     width = None if seen is None else seen.scale_map("width")
     on = choose_side(hole, shown, None if seen is None else seen.width(list_places(shape)).reshape(shape) > LEAST)
-    options: dict[str, Any] = {"patch": patch, "blend": screening, "seed": number, "progress": progress}
+    options: dict[str, Any] = {
+        "boundary": rim,
+        "patch": patch,
+        "blend": screening,
+        "seed": number,
+        "progress": progress,
+    }
     made: Synthesis | None = None
     steps = []
     beyond = hole & ~on
@@ -157,6 +170,7 @@ def remove(
         "hole": float(hole.mean()),
         "patches": steps,
         "margin": wide,
+        "boundary": rim,
         "plane": None if seen is None else seen.as_dict(),
         "found": found,
         "ground": round(float(shown.mean()), 4),
