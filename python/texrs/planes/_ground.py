@@ -18,12 +18,12 @@ from texrs.errors import InvalidInput
 
 __all__ = ["find_ground"]
 
-SMALLEST = 64
-"""Pixels across the smallest picture that a ground is looked for in."""
+SMALLEST, TELLING = 64, 160
+"""Pixels across the smallest picture that a ground is looked for in, and across the smallest that shows enough to tell."""
 LARGEST = 240
 """A longer side is shrunk to so many pixels."""
-WINDOW = 0.045
-"""Standard deviation of the windows, as a share of the shorter side."""
+WINDOW, NARROWEST = 0.045, 8.0
+"""Standard deviation of the windows, as a share of the shorter side, and the least in pixels of what is shrunk."""
 BANDS = 1.0, 2.5
 """Standard deviations of the Gaussians beyond which colours are detail, in pixels of what is shrunk."""
 COLOUR, CONTRAST = 0.02, 0.2
@@ -57,6 +57,8 @@ FEWEST = 0.03
 def find_ground(image: object, *, known: object = None) -> Bools:
     """Find where a picture shows its ground: the texture that most of it shows.
 
+    A picture of less than 160 pixels across shows too few things to tell what else is one; all of it is taken for ground.
+
     Parameters
     ----------
     image : (H, W) or (H, W, C) array
@@ -77,11 +79,11 @@ def find_ground(image: object, *, known: object = None) -> Bools:
     Examples
     --------
     >>> from texrs import planes, samples
-    >>> floor = samples.tilted_discs((128, 128)).image
+    >>> floor = samples.tilted_discs((192, 192)).image
     >>> bool(planes.find_ground(floor).all())
     True
-    >>> floor[:40] = (150, 180, 230)
-    >>> bool(planes.find_ground(floor)[:30].any())
+    >>> floor[:60] = (150, 180, 230)
+    >>> bool(planes.find_ground(floor)[:50].any())
     False
 
     """
@@ -92,6 +94,8 @@ def find_ground(image: object, *, known: object = None) -> Bools:
     there = np.ones(size, np.bool_) if known is None else as_mask(known, "known", size)
     if not there.any():
         raise InvalidInput("known: nothing of the picture is known")
+    if min(size) < TELLING:
+        return there
     colours, seen = shrink(guidance(pixels), there)
     follows = find_windows(colours, seen)
     if np.count_nonzero(seen & ~follows) < FEWEST * np.count_nonzero(seen):
@@ -128,7 +132,7 @@ def blur(values: NDArray[np.float64], known: Bools, sigma: float) -> NDArray[np.
 
 def find_windows(colours: NDArray[np.float64], known: Bools) -> Bools:
     """Mark the pixels whose windows follow what most of the picture follows."""
-    sigma = WINDOW * min(known.shape)
+    sigma = max(NARROWEST, WINDOW * min(known.shape))
     details = [np.square(colours - blur(colours, known, s)).sum(axis=-1) for s in BANDS]
     facts = blur(np.stack([*np.moveaxis(colours, -1, 0), *details], axis=-1), known, sigma)
     facts[..., 3:] = 0.5 * np.log(facts[..., 3:] + 1e-5)
@@ -219,7 +223,7 @@ def settle(colours: NDArray[np.float64], known: Bools, follows: Bools) -> Bools:
     from scipy.ndimage import distance_transform_edt, label, median_filter
 
     side = min(known.shape)
-    wide = DOUBT * WINDOW * side
+    wide = DOUBT * max(NARROWEST, WINDOW * side)
     low, high = colours.min(axis=(0, 1)), colours.max(axis=(0, 1))
     scaled = (colours - low) / np.maximum(high - low, 1e-6)
     cell = np.minimum((scaled * BINS).astype(np.intp), BINS - 1)
