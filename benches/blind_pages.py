@@ -1,6 +1,6 @@
 """Blind pages: an exemplar, ours and the Resynthesizer's result, in an order that is drawn and hidden until all are judged.
 
-    python benches/blind_pages.py OUT --resynthesizer PROGRAM [--seed 1] PICTURE ...
+    python benches/blind_pages.py OUT PICTURE ... --resynthesizer PROGRAM [--seed 1]
     python benches/blind_pages.py OUT --votes votes.json
 
 The first makes `OUT/NAME.png` for each picture, the exemplar in the middle of results A and B, and `OUT/key.json`, which is not
