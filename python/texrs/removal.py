@@ -142,7 +142,7 @@ def remove(
     seen, found = follow_plane(pixels, shown, plane, corners, slant, tilt, fov)
     watch("plane", 1.0)
     width = None if seen is None else seen.scale_map("width")
-    on = choose_side(hole, shown, None if seen is None else seen.width(list_places(shape)).reshape(shape) > LEAST)
+    on = choose_side(hole, shown, None if width is None else width > LEAST)
     options: dict[str, Any] = {
         "boundary": rim,
         "patch": patch,
@@ -190,11 +190,6 @@ def widen(mask: Bools, width: int) -> Bools:
     from scipy.ndimage import distance_transform_edt
 
     return mask if not width else np.asarray(distance_transform_edt(~mask) <= width, np.bool_)
-
-
-def list_places(shape: tuple[int, int]) -> Array:
-    """Return the (row, column) of all pixels, (n, 2)."""
-    return np.moveaxis(np.indices(shape), 0, -1).reshape(-1, 2)
 
 
 def follow_plane(
