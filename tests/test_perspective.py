@@ -97,6 +97,44 @@ def test_scales_that_the_exemplar_has_not_are_made_or_brought_to_those_it_has(fl
         grow(floor, 48, target=small, augment_scales=False)
 
 
+def test_a_target_of_another_size_is_stretched(floor):
+    pattern = np.array([[0.6, 1.2], [0.8, 1.6]], np.float32)
+    result = grow(floor, (40, 60), target=pattern, seed=1)
+    np.testing.assert_array_equal(result.stages["target"], texrs.scale_maps.resample(pattern, (40, 60)))
+    assert result.report["scale_error"] <= 0.15
+
+
+def test_scales_are_measured_in_a_mask_where_that_is_asked():
+    image = samples.tilted_discs((128, 128)).image
+    how = texrs.scale_maps.Measuring(detail=2, foreshortened=True)
+    made = texrs.perspective(image, size=64, measuring=how, seed=1)
+    given = texrs.perspective(image, how.measure(image), 64, seed=1)
+    np.testing.assert_array_equal(made.image, given.image)
+    mask = texrs.scale_maps.auto_mask(image, detail=2)
+    wide = texrs.scale_maps.from_mask(mask, trend="plane", foreshortened=True)
+    np.testing.assert_array_equal(made.stages["target"], texrs.scale_maps.resample(wide, (64, 64)))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"size": 0},
+        {"seed": -1},
+        {"augment_scales": [9.0]},
+        {"wrap": "xy"},
+        {"target": np.zeros((4, 4), np.float32)},
+        {"interpolation": "sinc"},
+    ],
+)
+def test_bad_input_is_refused_before_anything_is_measured(floor, change, monkeypatch):
+    def measure(*_):
+        raise AssertionError("measured")
+
+    monkeypatch.setattr("texrs.papers.perspective.request.measure_scale", measure)
+    with pytest.raises(InvalidInput, match=next(iter(change))):
+        texrs.perspective(floor.image, **change)
+
+
 def test_without_weight_scales_do_not_count(floor):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -127,7 +165,10 @@ BAD = [
     ({"scale_map": np.full((32, 32), -1.0)}, "scale_map: "),
     ({"scale_map": np.full((32, 32), np.nan)}, "scale_map: .* NaN"),
     ({"scale_map": np.ones((32, 32), np.uint8)}, "scale_map: needs float scales"),
-    ({"target": np.ones((5, 5), np.float32)}, "target: needs shape"),
+    ({"target": np.ones((5, 5, 7), np.float32)}, "target: needs shape"),
+    ({"measuring": {"detail": 3}}, "measuring: a scale map is given"),
+    ({"scale_map": "auto", "measuring": {"detail": 3}}, "measuring: needs a texrs.scale_maps.Measuring"),
+    ({"scale_map": "auto", "measuring": texrs.scale_maps.Measuring(detail=9)}, "detail: needs a number from 0.5 to 8"),
     ({"size": 0}, "size: "),
     ({"size": "large"}, "size: "),
     ({"seed": -1}, "seed: "),

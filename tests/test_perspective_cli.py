@@ -40,6 +40,22 @@ def test_targets_and_sizes(files):
     assert io.read(files / "out.png").shape == (40, 40, 3)
 
 
+def test_a_mask_is_measured_as_is_said(files):
+    io.write(files / "discs.png", samples.tilted_discs((128, 128)).image)
+    line = "perspective @discs.png -o @out.png --detail 2 --trend linear --foreshortened --size 48 -q"
+    assert run(files, line) == 0
+    how = texrs.scale_maps.Measuring(detail=2, trend="linear", foreshortened=True)
+    made = texrs.perspective(io.read(files / "discs.png"), size=48, measuring=how)
+    np.testing.assert_array_equal(io.read(files / "out.png"), made.image)
+
+
+def test_a_target_is_stretched_to_the_size(files):
+    io.write(files / "target.npy", np.full((8, 10), 0.6, np.float32))
+    line = "perspective @floor.png --scale-map @scale.npy --target @target.npy -o @out.png --size 40x64 -q"
+    assert run(files, line) == 0
+    assert io.read(files / "out.png").shape == (40, 64, 3)
+
+
 def test_holes_are_filled_by_scale(files):
     for given in ("--scale-map @scale.npy", "--scale-map auto", "--method optimise --scale-map @scale.npy"):
         assert run(files, f"complete @floor.png @hole.png -o @out.png {given} -q") == 0
@@ -71,6 +87,12 @@ def test_holes_are_filled_by_scale(files):
         (
             "perspective @floor.png --scale-map @scale.npy -o @out.png --scale-weight 99",
             "--scale-weight: needs a number",
+        ),
+        ("perspective @floor.png --detail 0 -o @out.png", "--detail: needs a number from 0.5"),
+        ("perspective @floor.png --trend steep -o @out.png", "--trend: allowed are none, plane, linear and quadratic"),
+        (
+            "perspective @floor.png --scale-map @scale.npy --detail 3 --foreshortened -o @out.png",
+            "--detail and --foreshortened: a scale map is given",
         ),
         ("complete @floor.png alpha -o @out.png", "HOLE: 'alpha' needs an image with an alpha channel"),
         ("complete @floor.png @hole.png -o @out.png --method heal", "--method: allowed are"),

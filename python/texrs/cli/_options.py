@@ -127,12 +127,12 @@ class Options:
         return iter(self.all)
 
     def name_values(self, given: Mapping[str, Any]) -> dict[str, str]:
-        """Return what errors call each parameter: the file that was given, or the option; of several, all files."""
+        """Return what errors call each parameter: the file that was given, or the option; of several, all that were given."""
         called = {option.path[-1]: option.name_value(given[option.name]) for option in reversed(self.all)}
         for name in self.groups:
-            there = [
-                o.name_value(given[o.name]) for o in self if o.path[0] == name and o.file and given[o.name] is not None
-            ]
+            inside = [o for o in self if o.path[0] == name and len(o.path) == 2]
+            used = [o for o in inside if given[o.name] not in (None, o.default)]
+            there = [o.name_value(given[o.name]) for o in used if o.file or not any(i.file for i in inside)]
             called |= {name: " and ".join(there)} if there else {}
         return called
 

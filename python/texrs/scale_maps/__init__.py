@@ -7,6 +7,7 @@ and gives new ones; nothing is changed in place.
 ===================  ==========================================================================
 `from_mask`          the map measured from a mask of features
 `auto_mask`          a mask of features, found in the picture
+`Measuring`          how a map is measured in such a mask, where nobody gives one
 `from_angles`        the map of a plane seen aslant
 `slant_for_ratio`    the slant at which near elements are so many times as large as far ones
 `resample`           a map for another size: stretched, continued, drawn or by angles
@@ -33,6 +34,7 @@ from texrs.scale_maps._edit import edit
 from texrs.scale_maps._extend import extend
 from texrs.scale_maps._maps import LARGEST, LEAST
 from texrs.scale_maps._mask import Measure, from_mask
+from texrs.scale_maps._measuring import Measuring
 from texrs.scale_maps._pictures import Encoding, decode, encode, picture
 from texrs.scale_maps._resample import resample
 from texrs.scale_maps._trend import Trend
@@ -43,6 +45,7 @@ __all__ = [
     "STEEPEST",
     "Encoding",
     "Measure",
+    "Measuring",
     "Trend",
     "auto_mask",
     "decode",

@@ -52,7 +52,11 @@ def encode(scale: object, encoding: Encoding = "log2") -> NDArray[np.uint8]:
 
     """
     values = as_map(scale)
-    grey = 128 * values if as_choice(encoding, "encoding", _ENCODINGS) == "paper" else 128 + 64 * np.log2(values)
+    grey = (
+        128 * values
+        if as_choice(encoding, "encoding", _ENCODINGS) == "paper"
+        else 128 + 64 * np.log2(values, dtype=np.float64)
+    )
     levels: NDArray[np.uint8] = np.clip(np.rint(grey), 0, 255).astype(np.uint8)
     return levels
 
@@ -97,7 +101,7 @@ def decode(image: object, encoding: Encoding = "log2") -> Floats:
         levels /= 257
     if as_choice(encoding, "encoding", _ENCODINGS) == "paper":
         return np.asarray(np.maximum(levels, 0.5) / 128, np.float32)
-    return np.asarray(np.exp2((levels - 128) / 64), np.float32)
+    return np.exp2((levels - 128) / 64, dtype=np.float64).astype(np.float32)
 
 
 def picture(scale: object, largest: float | None = None) -> NDArray[np.uint8]:

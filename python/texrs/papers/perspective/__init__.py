@@ -47,6 +47,7 @@ from texrs.growth import FromSheet, stitch_sheet
 from texrs.papers.perspective.literal import average_windows
 from texrs.papers.perspective.request import Method, Request
 from texrs.papers.perspective.sizes import Outside, Sizes, bring_within, choose_sizes
+from texrs.scale_maps import Measuring
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
@@ -59,6 +60,7 @@ def perspective(
     size: int | Sequence[int] | None = None,
     *,
     target: Array | None = None,
+    measuring: Measuring | None = None,
     method: Method = None,
     scale_weight: float = 1.0,
     augment_scales: Sizes = "auto",
@@ -80,8 +82,10 @@ def perspective(
     size : int or (int, int), optional
         Rows and columns of the result: by default those of the ``target``, else twice the exemplar's.
     target : (rows, columns) float array, optional
-        How large they are to be at each pixel of the result, in the units of ``scale_map``. None stretches
-        ``scale_map`` to the size (`texrs.scale_maps.resample`).
+        How large they are to be at each pixel of the result, in the units of ``scale_map``. One of another size is stretched to
+        that of the result, its borders on the borders (`texrs.scale_maps.resample`). None: ``scale_map``, stretched.
+    measuring : Measuring, optional
+        How the ``scale_map`` "auto" is measured in a mask of features (`texrs.scale_maps.Measuring`), rather than by a plane.
     method : {None, "paper"}
         Which algorithm. "paper": the literal one, kept for comparison: averages, and slow. It does not wrap, and
         takes up to four channels.
@@ -141,6 +145,7 @@ def perspective(
         scale_map,
         size,
         target=target,
+        measuring=measuring,
         method=method,
         scale_weight=scale_weight,
         augment_scales=augment_scales,

@@ -13,8 +13,9 @@ from texrs._arrays import as_choice, as_float, as_method, as_seed, as_size, as_w
 from texrs._typing import Array, Floats, Interpolation
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
-from texrs.papers.perspective.sizes import Sizes
+from texrs.papers.perspective.sizes import Sizes, check_sizes
 from texrs.planes._choose import measure_scale
+from texrs.scale_maps import Measuring
 from texrs.scale_maps._maps import as_map
 
 __all__ = ["Method", "Request"]
@@ -70,6 +71,7 @@ class Request:
         size: int | Sequence[int] | None,
         *,
         target: Array | None,
+        measuring: Measuring | None,
         method: Method,
         scale_weight: float,
         augment_scales: Sizes,
@@ -79,22 +81,36 @@ class Request:
     ) -> Request:
         """Return the request of a caller, or raise what is wrong with it."""
         known = as_exemplar(exemplar, minimum=LEAST)
-        if isinstance(scale_map, str):
-            as_choice(scale_map, "scale_map", ("auto",))
-            mine = measure_scale(known.image, np.ones(known.shape, np.bool_))
-        else:
-            mine = as_map(scale_map, "scale_map", known.shape)
-        if size is None:
-            size = [2 * n for n in known.shape] if target is None else np.asarray(target).shape[:2]
-        sides = as_size(size)
-        shape = (sides[0], sides[1])
-        wanted = scale_maps.resample(mine, shape) if target is None else as_map(target, "target", shape)
-        closed = as_wrap(wrap)
-        check_wrap(wanted, closed, target is None)
+        # What is cheap to check comes before what is measured.
         strength = as_float(scale_weight, "scale_weight", 0, 16)
         as_method(method, None, "paper")
         as_choice(interpolation, "interpolation", ("nearest", "linear", "cubic"))
-        return cls(known, mine, wanted, method, strength, augment_scales, closed, as_seed(seed), interpolation)
+        check_sizes(augment_scales)
+        closed, number = as_wrap(wrap), as_seed(seed)
+        asked = None if target is None else as_map(target, "target")
+        if size is None:
+            size = [2 * n for n in known.shape] if asked is None else asked.shape
+        sides = as_size(size)
+        shape = (sides[0], sides[1])
+        if isinstance(scale_map, str):
+            as_choice(scale_map, "scale_map", ("auto",))
+            mine = find_scale(known, measuring)
+        elif measuring is not None:
+            raise InvalidInput("measuring: a scale map is given, so that nothing is measured; leave out one of them")
+        else:
+            mine = as_map(scale_map, "scale_map", known.shape)
+        wanted = scale_maps.resample(mine if asked is None else asked, shape)
+        check_wrap(wanted, closed, asked is None)
+        return cls(known, mine, wanted, method, strength, augment_scales, closed, number, interpolation)
+
+
+def find_scale(exemplar: Exemplar, measuring: Measuring | None) -> Floats:
+    """Return how large elements are in an exemplar of which nothing is said, or only how that is measured."""
+    if measuring is None:
+        return measure_scale(exemplar.image, np.ones(exemplar.shape, np.bool_))
+    if not isinstance(measuring, Measuring):
+        raise InvalidInput(f"measuring: needs a texrs.scale_maps.Measuring, got {measuring!r}")
+    return measuring.measure(exemplar.image)
 
 
 def check_wrap(target: Floats, wrap: Sequence[bool], stretched: bool) -> None:

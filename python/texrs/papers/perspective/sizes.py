@@ -14,7 +14,7 @@ from texrs.errors import InvalidInput
 from texrs.exemplar.atlas import LARGEST, SMALLEST, extend_sizes
 from texrs.scale_maps._plane import Plane
 
-__all__ = ["Outside", "Sizes", "bring_within", "choose_sizes", "count_samples"]
+__all__ = ["Outside", "Sizes", "bring_within", "check_sizes", "choose_sizes", "count_samples"]
 
 Sizes: TypeAlias = Literal["auto"] | bool | Sequence[float]
 
@@ -30,17 +30,20 @@ def choose_sizes(scale: Floats, target: Floats, asked: Sizes, plane: Plane | Non
     """Return the sizes of the copies, the exemplar's own first; those that a plane can be seen in."""
     if plane is not None:
         return (1.0, SMALLEST, LARGEST)
-    if isinstance(asked, bool | np.bool_):
-        if not asked:
-            return (1.0,)
-    elif not (isinstance(asked, str) and asked == "auto"):
-        return _check_sizes(asked)
-    elif count_samples(scale, target) >= PLENTY:
+    given = check_sizes(asked)
+    if given is not None:
+        return given
+    if isinstance(asked, str) and count_samples(scale, target) >= PLENTY:
         return (1.0,)
     return extend_sizes(FACTORS, scale, (float(target.min()), float(target.max())))
 
 
-def _check_sizes(asked: object) -> tuple[float, ...]:
+def check_sizes(asked: object) -> tuple[float, ...] | None:
+    """Return the sizes that were given, 1 first; None where they are to be chosen."""
+    if isinstance(asked, bool | np.bool_):
+        return None if asked else (1.0,)
+    if isinstance(asked, str) and asked == "auto":
+        return None
     if isinstance(asked, Sequence) and not isinstance(asked, str) and 1 <= len(asked) <= 16:
         sizes = [as_float(s, "augment_scales", SMALLEST, LARGEST) for s in asked]
         # The exemplar itself is always there.
