@@ -11,6 +11,7 @@ automatic start states is: in bins of stated confidence, how much was right, of 
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import sys
@@ -128,9 +129,11 @@ def print_reliability(name: str, stated: Stated) -> None:
 
 
 if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("pictures", type=Path, nargs="?", help="folder for pictures of what was found")
+    where = parser.parse_args().pictures
     if "TEXRS_TEXTURES" not in os.environ:
-        sys.exit("TEXRS_TEXTURES: needs the folder of the annotated textures")
-    where = Path(sys.argv[1]) if len(sys.argv) > 1 else None
+        parser.error("TEXRS_TEXTURES: needs the folder of the annotated textures")
     if where is not None:
         where.mkdir(parents=True, exist_ok=True)
     main(Path(os.environ["TEXRS_TEXTURES"]), where)

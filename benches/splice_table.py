@@ -14,9 +14,9 @@ share of torn cells on its own layout and on others.
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
-import sys
 import time
 from itertools import combinations
 from pathlib import Path
@@ -107,14 +107,18 @@ def small(image: np.ndarray, side: int = 192) -> np.ndarray:
 
 
 def main() -> None:
-    words = [w for w in sys.argv[1:] if not w.startswith("--")]
-    out = Path(words[0] if words else "splice-table")
-    size = int(sys.argv[sys.argv.index("--size") + 1]) if "--size" in sys.argv else 192
-    method = sys.argv[sys.argv.index("--method") + 1] if "--method" in sys.argv else None
-    known = entries(os.environ.get("TEXRS_TEXTURES"), auto="--auto" in sys.argv)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", type=Path, nargs="?", default=Path("splice-table"), help="folder for the pictures")
+    parser.add_argument("--size", type=int, default=192)
+    parser.add_argument("--method")
+    parser.add_argument("--auto", action="store_true", help="use the pictures alone, no annotations")
+    parser.add_argument("--tears", type=Path, help="module with Judge(exemplar).scores(picture)")
+    options = parser.parse_args()
+    out, size, method = options.out, options.size, options.method
+    known = entries(os.environ.get("TEXRS_TEXTURES"), auto=options.auto)
     out.mkdir(parents=True, exist_ok=True)
     rows = [np.concatenate([small(np.zeros((4, 4), np.uint8)), *(small(b.image) for b in known.values())], axis=1)]
-    tears = evaluators.load(Path(sys.argv[sys.argv.index("--tears") + 1])) if "--tears" in sys.argv else None
+    tears = evaluators.load(options.tears) if options.tears else None
     print(f"{HEAD}\n" + "|---" * (HEAD.count("|") - 1) + "|")
     for mine, a in known.items():
         row, made, numbers, methods, torn = [small(a.image)], [], [], set(), {True: [np.nan], False: []}

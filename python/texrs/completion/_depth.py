@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
+from texrs._arrays import power_single
 from texrs._engine.pyramid import Region
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.exemplar import Exemplar
@@ -71,7 +72,7 @@ def fill_in_depth(
     plane = find_plane(colours, asked)
     if plane is None:
         return None
-    asked = asked**plane.power
+    asked = power_single(asked, plane.power)
     sheet = Flattened.of(colours, plane, asked[wide][np.newaxis], whole)
     if not sheet.free.any():
         return None

@@ -125,8 +125,8 @@ def stitch_sheet(
     )
     places = made.places.reshape(*region.shape, 2)
     coordinates, seen = sheet.locate(places.reshape(-1, 2))
-    # In double precision, for products of single precision differ in the last bit from processor to processor.
-    jacobians = (seen @ (frames / np.float64(ONE))).astype(np.float32)
+    # In double precision and in one order, for matrix products differ in the last bit from processor to processor.
+    jacobians = np.einsum("...ij,...jk->...ik", seen, frames / np.float64(ONE), dtype=np.float64).astype(np.float32)
     return FromSheet(
         coordinates.reshape(places.shape),
         np.minimum(made.patches, np.uint32(len(made.frames))).reshape(region.shape),

@@ -78,8 +78,12 @@ class Plane:
         slope = hypot(*rise)
         if not at > HORIZON * largest or slope <= 0:
             return None
-        down = rise[0] / slope, rise[1] / slope
+        # What is level to nine digits is level: rounded by itself, its noise would stay.
+        down = round(rise[0] / slope, 9) + 0.0, round(rise[1] / slope, 9) + 0.0
+        down = down[0] / hypot(*down), down[1] / hypot(*down)
         residual = float(np.sqrt(np.mean((np.log(surface) - logs) ** 2)))
+        # So do those of exponentials.
+        least, largest = (float(f"{f:.9g}") for f in (least, largest))
         return cls(middle, at, slope, down, (-down[1], down[0]), least, largest, residual, power)
 
     @property
