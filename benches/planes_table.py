@@ -95,7 +95,7 @@ def main() -> None:
             if options.pictures:
                 options.pictures.mkdir(parents=True, exist_ok=True)
                 io.write(options.pictures / f"{name}-{number}.png", picture)
-                flat = texrs.rectify(picture, plane=found)
+                flat = texrs.rectify(picture, view=found)
                 io.write(options.pictures / f"{name}-{number}-flat.png", flat.image)
     print("| texture | floors | slant off: median | 90 % | tilt off: median | 90 % |\n" + "|---" * 6 + "|")
     generated = [off for name in NAMES for off in errors[name]]
@@ -114,8 +114,8 @@ def main() -> None:
     for name, work in (
         ("find", lambda: planes.find(picture, fov=55)),
         ("ground", lambda: planes.find_ground(picture)),
-        ("rectify", lambda: texrs.rectify(picture, plane=plane)),
-        ("extend by 256", lambda: texrs.extend(picture, right=256, plane=plane)),
+        ("rectify", lambda: texrs.rectify(picture, view=plane)),
+        ("extend by 256", lambda: texrs.extend(picture, right=256, view=plane)),
         ("remove a sixteenth", lambda: texrs.remove(picture, hole)),
     ):
         spent = []

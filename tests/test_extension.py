@@ -8,13 +8,13 @@ import pytest
 
 import texrs
 from plane_checks import look, turn_between
-from texrs import Plane, io, planes
+from texrs import Plane, View, io, planes
 from texrs.cli import main
 from texrs.errors import InvalidInput
 
 PLANE = Plane((160, 176), 40, 100, fov=55)
 FLOOR = look("pebbles", PLANE)
-LARGER = texrs.extend(FLOOR, left=64, right=80, bottom=24, plane=PLANE, seed=2)
+LARGER = texrs.extend(FLOOR, left=64, right=80, bottom=24, view=PLANE, seed=2)
 
 
 def test_nothing_known_changes() -> None:
@@ -38,9 +38,9 @@ def test_it_is_the_same_plane() -> None:
 
 
 def test_again_and_otherwise() -> None:
-    again = texrs.extend(FLOOR, left=64, right=80, bottom=24, plane=PLANE, seed=2)
+    again = texrs.extend(FLOOR, left=64, right=80, bottom=24, view=PLANE, seed=2)
     np.testing.assert_array_equal(again.image, LARGER.image)
-    grey = texrs.extend(FLOOR[..., 0].astype(np.uint16), top=16, slant=40, tilt=100, fov=55, boundary=2)
+    grey = texrs.extend(FLOOR[..., 0].astype(np.uint16), top=16, view=View(slant=40, tilt=100, fov=55), boundary=2)
     assert grey.image.shape == (176, 176)
     assert grey.image.dtype == np.uint16
     assert grey.stages["composite"].shape == (176, 176)
@@ -52,9 +52,9 @@ def test_again_and_otherwise() -> None:
         (lambda: texrs.extend(FLOOR), "nothing to add"),
         (lambda: texrs.extend(FLOOR, right=-4), "right: "),
         (lambda: texrs.extend(FLOOR, right=10**6), "right: "),
-        (lambda: texrs.extend(FLOOR, top=300, plane=PLANE), "reach the plane's horizon"),
-        (lambda: texrs.extend(FLOOR, top=8, slant=40, corners=[[0, 0]] * 4), "slant: corners says"),
-        (lambda: texrs.extend(FLOOR, top=8, plane=PLANE, boundary=65), "boundary: "),
+        (lambda: texrs.extend(FLOOR, top=300, view=PLANE), "reach the plane's horizon"),
+        (lambda: texrs.extend(FLOOR, top=8, view=View(corners=[[0, 0]] * 4)), "corners: needs the four of a convex"),
+        (lambda: texrs.extend(FLOOR, top=8, view=PLANE, boundary=65), "boundary: "),
         (lambda: texrs.extend(FLOOR[:40], top=8), "each side must be at least 64"),
     ],
 )

@@ -9,7 +9,7 @@ import pytest
 
 import texrs
 from plane_checks import SIDE, look, look_twice
-from texrs import Plane, io, scale_maps
+from texrs import Plane, View, io, scale_maps
 from texrs.cli import main
 from texrs.errors import InvalidInput
 
@@ -22,7 +22,7 @@ def test_a_flat_texture_is_as_it_was() -> None:
     rows, columns = np.indices((SIDE, SIDE))
     lines = np.where((rows % 32 < 4) | (columns % 48 < 4), 40, 200).astype(np.uint8)[..., np.newaxis]
     plane = Plane((240, 288), 45, 60, fov=55)
-    flat = texrs.rectify(look("", plane, flat=lines), plane=plane, resolution=1.0).image[..., 0].astype(float)
+    flat = texrs.rectify(look("", plane, flat=lines), view=plane, resolution=1.0).image[..., 0].astype(float)
     for axis, period in ((1, 32), (0, 48)):
         profile = flat.mean(axis=axis) - flat.mean()
         power = np.abs(np.fft.rfft(profile * np.hanning(len(profile)), 4096))
@@ -32,7 +32,7 @@ def test_a_flat_texture_is_as_it_was() -> None:
 
 
 def test_scales_are_even() -> None:
-    result = texrs.rectify(FLOOR, slant=45, fov=55)
+    result = texrs.rectify(FLOOR, view=View(slant=45, fov=55))
     before, after = (
         np.log(scale_maps.from_mask(scale_maps.auto_mask(picture), trend="plane")).std()
         for picture in (FLOOR, result.image)
@@ -44,7 +44,7 @@ def test_scales_are_even() -> None:
 
 
 def test_pixels_are_the_photograph_s() -> None:
-    result = texrs.rectify(FLOOR, plane=PLANE)
+    result = texrs.rectify(FLOOR, view=PLANE)
     np.testing.assert_array_equal(result.source.render(FLOOR, antialias=True), result.image)
     np.testing.assert_array_equal(result.stages["composite"], result.image)
     # A map that is in register with the photograph follows: here where its pixels are.
@@ -60,21 +60,21 @@ def test_pixels_are_the_photograph_s() -> None:
 @pytest.mark.parametrize("dtype", [np.uint16, np.float32])
 def test_dtypes_and_channels_stay(dtype: type) -> None:
     grey = FLOOR[..., 0].astype(dtype)
-    result = texrs.rectify(grey, plane=PLANE)
+    result = texrs.rectify(grey, view=PLANE)
     assert result.image.dtype == dtype
     assert result.image.ndim == 2
     assert result.stages["composite"].shape == result.image.shape
 
 
 def test_any_size_and_cyclic() -> None:
-    whole = texrs.rectify(FLOOR, plane=PLANE)
+    whole = texrs.rectify(FLOOR, view=PLANE)
     rows, columns = whole.image.shape[:2]
-    middle = texrs.rectify(FLOOR, plane=PLANE, size=(rows - 10, columns - 20))
+    middle = texrs.rectify(FLOOR, view=PLANE, size=(rows - 10, columns - 20))
     np.testing.assert_array_equal(middle.source.coordinates, whole.source.coordinates[5:-5, 10:-10])
-    larger = texrs.rectify(FLOOR, plane=PLANE, size=(rows + 64, columns), seed=3)
+    larger = texrs.rectify(FLOOR, view=PLANE, size=(rows + 64, columns), seed=3)
     assert larger.image.shape[:2] == (rows + 64, columns)
     assert larger.report["grown"] == "design"
-    cyclic = texrs.rectify(FLOOR, plane=PLANE, wrap=True, size=128)
+    cyclic = texrs.rectify(FLOOR, view=PLANE, wrap=True, size=128)
     assert cyclic.image.shape == (128, 128, 3)
     image = cyclic.image.astype(float)
     inside = np.abs(np.diff(image, axis=0)).mean()
@@ -99,7 +99,7 @@ def test_doubtful_planes_are_told() -> None:
 def test_only_the_ground_is_used() -> None:
     ground = np.zeros(PLANE.shape, bool)
     ground[100:, 40:] = True
-    result = texrs.rectify(FLOOR, plane=PLANE, ground=ground)
+    result = texrs.rectify(FLOOR, view=View(plane=PLANE, ground=ground))
     rows, columns = np.rint(result.source.coordinates).astype(int).reshape(-1, 2).T
     assert ground[rows, columns].mean() > 0.99
 
@@ -107,16 +107,15 @@ def test_only_the_ground_is_used() -> None:
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: texrs.rectify(FLOOR, slant=40, corners=[[0, 0]] * 4), "slant: corners says how the plane lies"),
-        (lambda: texrs.rectify(FLOOR, tilt=40), "tilt: needs slant"),
-        (lambda: texrs.rectify(FLOOR, plane=Plane((9, 9), 0)), "plane: needs a texrs.Plane of a picture of 240 x 288"),
-        (lambda: texrs.rectify(FLOOR, plane=PLANE, fov=50), "fov: the plane has one already"),
-        (lambda: texrs.rectify(FLOOR, slant=40, resolution=9), "resolution: needs a number"),
-        (lambda: texrs.rectify(FLOOR, slant=40, resolution=7.9), "resolution: at most|hardly anything"),
-        (lambda: texrs.rectify(FLOOR, slant=40, size=8), "size"),
-        (lambda: texrs.rectify(FLOOR, slant=88, fov=10), "sharp|before its horizon|are sharp"),
-        (lambda: texrs.rectify(FLOOR, slant=40, ground=np.zeros((240, 288), bool)), "ground"),
-        (lambda: texrs.rectify(FLOOR[:32], slant=40), "image: each side must be at least 64"),
+        (lambda: texrs.rectify(FLOOR, view=Plane((9, 9), 0)), "plane: needs one of a picture of 240 x 288"),
+        (lambda: texrs.rectify(FLOOR, view=[PLANE]), "view: needs a texrs.View"),
+        (lambda: texrs.rectify(FLOOR, view=PLANE, resolution=9), "resolution: needs a number"),
+        (lambda: texrs.rectify(FLOOR, view=PLANE, resolution=7.9), "resolution: at most|hardly anything"),
+        (lambda: texrs.rectify(FLOOR, view=PLANE, size=8), "size"),
+        (lambda: texrs.rectify(FLOOR, view=View(slant=88, fov=10)), "sharp|before its horizon|are sharp"),
+        (lambda: texrs.rectify(FLOOR, view=View(ground=np.zeros((240, 288), bool))), "ground: marks nothing"),
+        (lambda: texrs.rectify(FLOOR, view=View(ground=np.zeros((9, 9), bool))), "ground"),
+        (lambda: texrs.rectify(FLOOR[:32], view=PLANE), "image: each side must be at least 64"),
     ],
 )
 def test_what_cannot_be_rectified_gets_a_sentence(make: Callable[[], object], words: str) -> None:
@@ -147,7 +146,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
         == 0
     )
     assert "slant 45.0 and tilt 90.0" in capsys.readouterr().err
-    np.testing.assert_array_equal(io.read(out), texrs.rectify(FLOOR, slant=45, fov=55).image)
+    np.testing.assert_array_equal(io.read(out), texrs.rectify(FLOOR, view=View(slant=45, fov=55)).image)
     assert json.loads((tmp_path / "s" / "report.json").read_text())["plane"]["fov"] == 55
     assert main(["apply", source, photo, "-o", str(tmp_path / "again.png")]) == 0
     corners = PLANE.project([[-20, -30], [-20, 40], [25, 40], [25, -30]])

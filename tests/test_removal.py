@@ -10,7 +10,7 @@ from scipy.ndimage import gaussian_filter
 
 import texrs
 from plane_checks import look
-from texrs import Plane, io, planes
+from texrs import Plane, View, io, planes
 from texrs.cli import main
 from texrs.errors import InvalidInput
 
@@ -75,7 +75,7 @@ def test_what_goes_is_filled_from_the_ground_alone() -> None:
 
 def test_seams_may_run_a_little_around_it() -> None:
     rows, columns = np.nonzero(
-        (texrs.remove(FLOOR, MARKED, plane=PLANE, margin=2, boundary=5).image != FLOOR).any(axis=2)
+        (texrs.remove(FLOOR, MARKED, view=PLANE, margin=2, boundary=5).image != FLOOR).any(axis=2)
     )
     assert 63 <= rows.min() <= 68
     assert 91 <= columns.max() <= 97
@@ -99,7 +99,7 @@ def test_a_plane_seen_from_the_front_needs_no_perspective() -> None:
     wall = texrs.samples.bricks((128, 128)).image
     marked = np.zeros((128, 128), bool)
     marked[40:70, 50:90] = True
-    made = texrs.remove(wall, marked, slant=0)
+    made = texrs.remove(wall, marked, view=View(slant=0))
     assert made.report["plane"] is None
     np.testing.assert_array_equal(made.image[:30], wall[:30])
 
@@ -121,7 +121,7 @@ def test_grey_pictures_of_16_bit_and_again() -> None:
     floor = look("pebbles", PLANE)[..., 0].astype(np.uint16) * 200
     marked = np.zeros(SIZE, bool)
     marked[70:90, 60:90] = True
-    one, two = (texrs.remove(floor, marked, plane=PLANE, seed=4, blend=None) for _ in range(2))
+    one, two = (texrs.remove(floor, marked, view=PLANE, seed=4, blend=None) for _ in range(2))
     assert one.image.dtype == np.uint16
     assert one.image.shape == SIZE
     assert one.stages["composite"].shape == SIZE
@@ -140,10 +140,10 @@ MARKED[70:90, 60:90] = True
         (lambda: texrs.remove(FLOOR, ~(MARKED | True)), "mask: marks nothing"),
         (lambda: texrs.remove(FLOOR, MARKED | True), "mask: with its margin it covers"),
         (lambda: texrs.remove(FLOOR, MARKED[:40]), "mask: "),
-        (lambda: texrs.remove(FLOOR, MARKED, ground=MARKED), "ground: nothing of it is left"),
+        (lambda: texrs.remove(FLOOR, MARKED, view=View(ground=MARKED)), "ground: nothing of it is left"),
         (lambda: texrs.remove(FLOOR, MARKED, margin=65), "margin: "),
         (lambda: texrs.remove(FLOOR, MARKED, boundary=65), "boundary: "),
-        (lambda: texrs.remove(FLOOR, MARKED, slant=40, plane=PLANE), "slant: plane says"),
+        (lambda: texrs.remove(FLOOR, MARKED, view=40), "view: needs a texrs.View"),
         (lambda: texrs.remove(FLOOR[:40], MARKED[:40]), "each side must be at least 64"),
         (lambda: planes.find_ground(FLOOR, known=MARKED & False), "known: nothing"),
         (lambda: texrs.complete(FLOOR, MARKED, allowed=MARKED), "allowed: marks nothing"),
@@ -169,21 +169,21 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     io.write(mask, MARKED.astype(np.uint8) * 255)
     assert main(["remove", photo, mask, "-o", out, "--slant", "48", "--fov", "55", "--seed", "2"]) == 0
     assert "slant 48.0" in capsys.readouterr().err
-    np.testing.assert_array_equal(io.read(out), texrs.remove(FLOOR, MARKED, slant=48, fov=55, seed=2).image)
+    np.testing.assert_array_equal(io.read(out), texrs.remove(FLOOR, MARKED, view=View(slant=48, fov=55), seed=2).image)
     assert main(["remove", photo, mask, "-o", str(tmp_path / "no.png"), "--margin", "99"]) == 2
     assert "--margin" in capsys.readouterr().err
     assert not (tmp_path / "no.png").exists()
 
 
 def test_a_photograph_is_extended_to_a_size() -> None:
-    made = texrs.extend(FLOOR, to=(196, 260), plane=PLANE, seed=1)
+    made = texrs.extend(FLOOR, to=(196, 260), view=PLANE, seed=1)
     assert made.image.shape == (196, 260, 3)
     assert made.report["added"] == {"top": 8, "bottom": 8, "left": 10, "right": 10}
     steep = Plane(SIZE, 62, 90, fov=55)
     up = texrs.extend(
-        look("pebbles", Plane(SIZE, 60, 90, fov=55)), to=(260, 240), plane=steep, bottom=10, seed=1
+        look("pebbles", Plane(SIZE, 60, 90, fov=55)), to=(260, 240), view=steep, bottom=10, seed=1
     ).report["added"]
     assert up["top"] < 35 < up["bottom"]
     assert up["top"] + up["bottom"] == 80
     with pytest.raises(InvalidInput, match="to: needs 180 x 240"):
-        texrs.extend(FLOOR, to=(100, 300), plane=PLANE)
+        texrs.extend(FLOOR, to=(100, 300), view=PLANE)

@@ -19,6 +19,7 @@ CALLS = {
     "extend": "texrs.extend(image",
     "remove": "texrs.remove(image, image",
     "Plane": "texrs.Plane((32, 32), 45",
+    "View": "texrs.View(",
     "complete": "texrs.complete(image, image",
     "blend": "texrs.blend(source, image, wrap=True",
     "analyse": "texrs.elements.analyse(image",

@@ -14,7 +14,7 @@ from .papers.perspective import perspective
 from .papers.solid import solid, synthesize
 from .papers.solid.window import PlaneTexture, SolidTexture
 from .papers.splice import self_splice, splice
-from .planes import Plane
+from .planes import Plane, View
 from .rectification import rectify
 from .removal import remove
 from .source_map import Reuse, SourceMap
@@ -35,6 +35,7 @@ __all__ = [
     "SourceMap",
     "Synthesis",
     "TextureDatabase",
+    "View",
     "__version__",
     "blend",
     "complete",

@@ -15,8 +15,8 @@ from texrs._arrays import as_image, as_int, as_size, check_memory
 from texrs._typing import Array, Progress
 from texrs.completion import complete
 from texrs.errors import InvalidInput
-from texrs.planes import Plane
-from texrs.planes._choose import choose_ground, choose_plane
+from texrs.planes import Plane, View
+from texrs.planes._choose import see
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
@@ -36,12 +36,7 @@ def extend(
     left: int = 0,
     right: int = 0,
     to: int | Sequence[int] | None = None,
-    plane: Plane | None = None,
-    corners: Sequence[Sequence[float]] | Array | None = None,
-    slant: float | None = None,
-    tilt: float | None = None,
-    fov: float | None = None,
-    ground: Array | None = None,
+    view: View | Plane | None = None,
     boundary: int = 0,
     seed: int = 0,
     progress: Progress | None = None,
@@ -57,20 +52,9 @@ def extend(
     to : int or (rows, columns), optional
         Size of the larger picture: what the sides above do not add to it is added evenly, but towards the horizon only as far
         as the plane goes, and on the other side then.
-    plane : Plane, optional
-        How the plane lies. By default what ``corners``, or ``slant``, says, else it is found (`texrs.planes.find`).
-    corners : four of (row, column), optional
-        Where the corners of a rectangle of the plane are seen, in the order in which one goes around.
-    slant : float, optional
-        Degrees between the line of sight and the plane's normal, 0 (seen from the front) to 88.
-    tilt : float, optional
-        With ``slant``: the direction in the picture in which depth grows, degrees counter-clockwise from the right; by default
-        90, a floor.
-    fov : float, optional
-        Degrees that the longer side of the photograph spans, 1 to 170. By default what the corners tell, else 60.
-    ground : (H, W) array, optional
-        Not 0 where the photograph shows the plane: only that is copied. By default all of it, and where the plane is found what
-        is (`texrs.planes.find_ground`).
+    view : View or Plane, optional
+        How the photograph shows the plane, as far as that is to be said; what is not is found. Of its ground alone is
+        copied.
     boundary : int
         How many known pixels at the border may change, 0 to 64, which hides it better; by default none.
     seed : int
@@ -99,7 +83,7 @@ def extend(
     --------
     >>> import texrs
     >>> floor = texrs.samples.tilted_discs((128, 128))
-    >>> larger = texrs.extend(floor.image, right=64, slant=35, fov=60, seed=1)
+    >>> larger = texrs.extend(floor.image, right=64, view=texrs.View(slant=35, fov=60), seed=1)
     >>> larger.image.shape, bool((larger.image[:, :128] == floor.image).all())
     ((128, 192, 3), True)
 
@@ -122,20 +106,19 @@ def extend(
     check_memory(size[0] * size[1] * (64 + pixels.shape[2] * pixels.itemsize), "top, bottom, left, right")
     rim = as_int(boundary, "boundary", 0, 64)
     watch = progress or (lambda stage, share: None)
-    there = choose_ground(pixels, ground, plane, corners, slant)
     watch("plane", 0.0)
-    seen, found = choose_plane(pixels, there, plane, corners, slant, tilt, fov)
+    seen = see(pixels, View.of(view))
     watch("plane", 1.0)
     for axis, before, after in ((1, "left", "right"), (0, "top", "bottom")):
         added[before] += missing[axis] // 2
         added[after] += missing[axis] - missing[axis] // 2
-        room = measure_room(seen, added, axis)
+        room = measure_room(seen.plane, added, axis)
         if missing[axis] and sum(room) >= added[before] + added[after]:
             over = max(0, added[before] - room[0]) - max(0, added[after] - room[1])
             added[before], added[after] = added[before] - over, added[after] + over
     first = np.array([added["top"], added["left"]])
     places = np.moveaxis(np.indices(size), 0, -1) - first
-    width = seen.width(places)
+    width = seen.plane.width(places)
     if width.min() < LEAST:
         raise InvalidInput(
             "top, bottom, left, right: the picture would reach the plane's horizon; add fewer pixels, or say how the plane lies"
@@ -144,15 +127,15 @@ def extend(
     canvas, hole = np.zeros((*size, pixels.shape[2]), pixels.dtype), np.ones(size, np.bool_)
     canvas[inner], hole[inner] = pixels, False
     allowed = None
-    if not there.all():
+    if not seen.ground.all():
         allowed = np.zeros(size, np.bool_)
-        allowed[inner] = there
+        allowed[inner] = seen.ground
     scale = width.astype(np.float32)
     made = complete(canvas, hole, allowed=allowed, scale_map=scale, boundary=rim, seed=seed, progress=progress)
     # It copies nothing from beyond the photograph's borders.
     inside = np.clip(places, 0, [rows - 1, columns - 1]).astype(np.float32)
     source = made.source.compose(SourceMap.from_coordinates(inside, (rows, columns)))
-    report: dict[str, Any] = {**made.report, "plane": seen.as_dict(), "found": found, "added": added}
+    report: dict[str, Any] = {**made.report, "plane": seen.plane.as_dict(), "found": seen.found, "added": added}
     composite = source.render(pixels, antialias=True)
     if np.asarray(image).ndim == 2:
         composite = composite[..., 0]

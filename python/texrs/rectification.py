@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from texrs._arrays import as_float, as_image, as_seed, as_size, as_wrap, check_memory, guidance
 from texrs._typing import Array, Bools, Interpolation, Progress
 from texrs.errors import InvalidInput
-from texrs.planes import Plane
-from texrs.planes._choose import choose_ground, choose_plane
+from texrs.planes import Plane, View
+from texrs.planes._choose import see
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 from texrs.tiling import tile
@@ -45,12 +45,7 @@ COURSES = 0.35
 def rectify(
     image: Array,
     *,
-    plane: Plane | None = None,
-    corners: Sequence[Sequence[float]] | Array | None = None,
-    slant: float | None = None,
-    tilt: float | None = None,
-    fov: float | None = None,
-    ground: Array | None = None,
+    view: View | Plane | None = None,
     resolution: float | None = None,
     size: int | Sequence[int] | None = None,
     wrap: bool | Sequence[bool] = False,
@@ -64,21 +59,8 @@ def rectify(
     ----------
     image : (H, W) or (H, W, C) array
         The photograph, any real dtype, each side at least 64.
-    plane : Plane, optional
-        How the plane lies. By default what ``corners``, or ``slant``, says, else it is found (`texrs.planes.find`).
-    corners : four of (row, column), optional
-        Where the corners of a rectangle of the plane are seen, in the order in which one goes around.
-    slant : float, optional
-        Degrees between the line of sight and the plane's normal, 0 (seen from the front) to 88.
-    tilt : float, optional
-        With ``slant``: the direction in the picture in which depth grows, degrees counter-clockwise from the right; by default
-        90, a floor.
-    fov : float, optional
-        Degrees that the longer side of the photograph spans, 1 to 170 (`texrs.io.read_fov`; the command reads it of the
-        file). By default what the corners tell, else 60.
-    ground : (H, W) array, optional
-        Not 0 where the photograph shows the plane. By default all of it, and where that is found what is
-        (`texrs.planes.find_ground`).
+    view : View or Plane, optional
+        How the photograph shows the plane, as far as that is to be said; what is not is found.
     resolution : float, optional
         Pixels of the texture for one of the photograph's middle, 0.05 to 8. By default as large as things are seen in the mean
         of it.
@@ -115,7 +97,7 @@ def rectify(
     --------
     >>> import texrs
     >>> floor = texrs.samples.tilted_discs((192, 192))
-    >>> flat = texrs.rectify(floor.image, slant=50, fov=53)
+    >>> flat = texrs.rectify(floor.image, view=texrs.View(slant=50, fov=53))
     >>> flat.source.shapes, flat.report["plane"]["slant"]
     (((192, 192),), 50.0)
 
@@ -125,22 +107,22 @@ def rectify(
     cyclic, number = as_wrap(wrap), as_seed(seed)
     asked = None if size is None else as_size(size, minimum=SMALLEST)
     fine = None if resolution is None else as_float(resolution, "resolution", 0.05, 8)
-    there = choose_ground(pixels, ground, plane, corners, slant)
     watch("plane", 0.0)
-    seen, found = choose_plane(pixels, there, plane, corners, slant, tilt, fov)
+    seen = see(pixels, View.of(view))
     watch("plane", 1.0)
-    fine = choose_resolution(seen, there, fine)
-    sheet = Sheet.of(seen, there, fine)
-    if found:
-        seen = level(seen, sheet.source.render(pixels, interpolation="linear"), sheet.sharp)
-        sheet = Sheet.of(seen, there, fine)
+    plane = seen.plane
+    fine = choose_resolution(plane, seen.ground, fine)
+    sheet = Sheet.of(plane, seen.ground, fine)
+    if seen.found:
+        plane = level(plane, sheet.source.render(pixels, interpolation="linear"), sheet.sharp)
+        sheet = Sheet.of(plane, seen.ground, fine)
     start, sides = sheet.find_rectangle()
     if min(sides) < SMALLEST:
         raise InvalidInput(
             f"image: of the plane {sides[0]} x {sides[1]} pixels are sharp at this resolution, {SMALLEST} x {SMALLEST} are "
             "needed; give a smaller resolution, or another plane"
         )
-    known, _ = lay(seen, start, sides, fine)
+    known, _ = lay(plane, start, sides, fine)
     texture = known.render(pixels, interpolation=interpolation, antialias=True)
     source, grown, corrected = grow(texture, asked, cyclic, number, watch)
     source = source.compose(known)
@@ -154,8 +136,8 @@ def rectify(
         "composite": composite[..., 0] if squeeze else composite,
     }
     report: dict[str, Any] = {
-        "plane": seen.as_dict(),
-        "found": found,
+        "plane": plane.as_dict(),
+        "found": seen.found,
         "resolution": round(fine, 6),
         "sharp": round(float(sheet.sharp.mean()), 4),
         "rectangle": list(sides),

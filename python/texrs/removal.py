@@ -8,7 +8,6 @@ above a floor, is filled from what is not ground.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,10 +15,10 @@ import numpy as np
 from texrs._arrays import as_float, as_image, as_int, as_mask, as_seed
 from texrs._typing import Array, Bools, Progress
 from texrs.completion import complete
+from texrs.completion._holes import widen
 from texrs.errors import InvalidInput
-from texrs.planes import Plane
-from texrs.planes._choose import SURE, choose_plane
-from texrs.planes._ground import find_ground
+from texrs.planes import Plane, View, find, find_ground
+from texrs.planes._choose import SURE
 from texrs.synthesis import Synthesis
 
 __all__ = ["remove"]
@@ -40,12 +39,7 @@ def remove(
     image: Array,
     mask: Array,
     *,
-    plane: Plane | None = None,
-    corners: Sequence[Sequence[float]] | Array | None = None,
-    slant: float | None = None,
-    tilt: float | None = None,
-    fov: float | None = None,
-    ground: Array | None = None,
+    view: View | Plane | None = None,
     margin: int | None = None,
     boundary: int | None = None,
     patch: int | None = None,
@@ -61,21 +55,9 @@ def remove(
         The photograph, any real dtype, each side at least 64.
     mask : (H, W) array
         Not 0 where there is what is to go, its shadow included.
-    plane : Plane, optional
-        How the plane lies that it stands on. By default what ``corners``, or ``slant``, says, else it is found
-        (`texrs.planes.find`); where that is not sure, or the plane is seen from the front, things are filled in as large as
-        they are seen anywhere.
-    corners : four of (row, column), optional
-        Where the corners of a rectangle of the plane are seen, in the order in which one goes around.
-    slant : float, optional
-        Degrees between the line of sight and the plane's normal, 0 (seen from the front) to 88.
-    tilt : float, optional
-        With ``slant``: the direction in the picture in which depth grows, degrees counter-clockwise from the right; by default
-        90, a floor.
-    fov : float, optional
-        Degrees that the longer side of the photograph spans, 1 to 170. By default what the corners tell, else 60.
-    ground : (H, W) array, optional
-        Not 0 where the photograph shows the plane; by default it is found (`texrs.planes.find_ground`).
+    view : View or Plane, optional
+        How the photograph shows the plane that it stands on, as far as that is to be said; what is not is found. Where that
+        is not sure, or the plane is seen from the front, things are filled in as large as they are seen anywhere.
     margin : int, optional
         Pixels by which the mask is widened, 0 to 64; by default 1/150 of the shorter side.
     boundary : int, optional
@@ -116,7 +98,7 @@ def remove(
     >>> floor = texrs.samples.tilted_discs((128, 128)).image
     >>> mask = np.zeros((128, 128), bool)
     >>> mask[60:90, 50:80] = True
-    >>> mended = texrs.remove(floor, mask, slant=35, fov=60)
+    >>> mended = texrs.remove(floor, mask, view=texrs.View(slant=35, fov=60))
     >>> bool((mended.image[:50] == floor[:50]).all())
     True
 
@@ -132,14 +114,15 @@ def remove(
     number = as_seed(seed)
     watch = progress or (lambda stage, share: None)
     hole = widen(marked, wide)
+    asked = View.of(view)
+    said, ground = asked.settle(shape)
     if hole.all():
         raise InvalidInput("mask: with its margin it covers the whole photograph, so nothing is left to fill it from")
     watch("plane", 0.0)
-    shown = as_mask(ground, "ground", shape) if ground is not None else find_ground(pixels, known=~hole)
-    shown = np.asarray(shown & ~hole, np.bool_)
+    shown = np.asarray((find_ground(pixels, known=~hole) if ground is None else ground) & ~hole, np.bool_)
     if not shown.any():
         raise InvalidInput("ground: nothing of it is left beside the mask")
-    seen, found = follow_plane(pixels, shown, plane, corners, slant, tilt, fov)
+    seen, found = follow_plane(pixels, shown, said, asked.fov)
     watch("plane", 1.0)
     width = None if seen is None else seen.scale_map("width")
     on = choose_side(hole, shown, None if width is None else width > LEAST)
@@ -185,39 +168,23 @@ def remove(
     return Synthesis(result, made.source, stages, report)
 
 
-def widen(mask: Bools, width: int) -> Bools:
-    """Widen a mask by so many pixels all around."""
-    from scipy.ndimage import distance_transform_edt
-
-    return mask if not width else np.asarray(distance_transform_edt(~mask) <= width, np.bool_)
-
-
-def follow_plane(
-    pixels: Array,
-    ground: Bools,
-    plane: Plane | None,
-    corners: object,
-    slant: float | None,
-    tilt: float | None,
-    fov: float | None,
-) -> tuple[Plane | None, bool]:
+def follow_plane(pixels: Array, ground: Bools, said: Plane | None, fov: float | None) -> tuple[Plane | None, bool]:
     """Return the plane that is said, or found surely enough, and whether it was found; none that is seen from the front."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        try:
-            seen, found = choose_plane(pixels, ground, plane, corners, slant, tilt, fov)
-        except InvalidInput:
-            if (plane, corners, slant, tilt) != (None, None, None, None):
-                raise
-            return None, False
-    if found and seen.confidence < SURE:
+    if said is not None:
+        return (None if said.slant < FLAT else said), False
+    try:
+        seen = find(pixels, fov=fov, known=ground)
+    except InvalidInput:
+        # Too little of it is known.
+        return None, False
+    if seen.confidence < SURE:
         warnings.warn(
             f"the plane was found with a confidence of {seen.confidence:.2f} of 1, so it is not followed; give the corners "
             "of a rectangle of it, or slant and tilt",
             stacklevel=3,
         )
         return None, False
-    return (None, False) if seen.slant < FLAT else (seen, found)
+    return (None, False) if seen.slant < FLAT else (seen, True)
 
 
 def choose_side(hole: Bools, ground: Bools, before: Bools | None) -> Bools:

@@ -102,26 +102,26 @@ def scale_maps_edited() -> Parts:
 @case
 def rectified_by_angles() -> Parts:
     wall = deep("tilted_bricks", 112, 128)
-    return parts_of(texrs.rectify(wall, slant=40, tilt=200, fov=60, wrap=(False, True), size=96))
+    return parts_of(texrs.rectify(wall, view=texrs.View(slant=40, tilt=200, fov=60), wrap=(False, True), size=96))
 
 
 @case
 def rectified_as_found() -> Parts:
     floor = sample("tilted_discs", 112, 128)
-    return parts_of(texrs.rectify(floor.image, plane=texrs.planes.find(floor.image)), report=("plane",))
+    return parts_of(texrs.rectify(floor.image, view=texrs.planes.find(floor.image)), report=("plane",))
 
 
 @case
 def extended() -> Parts:
     floor = sample("tilted_discs", 96, 112)
-    return parts_of(texrs.extend(floor.image, left=24, right=32, slant=34, fov=60, seed=1))
+    return parts_of(texrs.extend(floor.image, left=24, right=32, view=texrs.View(slant=34, fov=60), seed=1))
 
 
 @case
 def removed() -> Parts:
     floor = sample("tilted_discs", 112, 128).image.copy()
     floor[:20] = floor[:1, :1]
-    return parts_of(texrs.remove(floor, box((112, 128), (50, 80), (40, 70)), slant=34, fov=60, seed=1))
+    return parts_of(texrs.remove(floor, box((112, 128), (50, 80), (40, 70)), view=texrs.View(slant=34, fov=60), seed=1))
 
 
 @case

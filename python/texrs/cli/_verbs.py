@@ -53,8 +53,8 @@ class Verb:
     """The function that makes ``count`` of them."""
     says: Callable[[Synthesis], str] = lambda result: ""
     """What else is to be said of the result."""
-    knows: Callable[[Mapping[str, Any]], Mapping[str, Any]] = lambda given: {}
-    """Arguments that the texts of the options tell, where they are not given."""
+    knows: Callable[[Mapping[str, Any]], Mapping[tuple[str, ...], Any]] = lambda given: {}
+    """Values that the texts of the options tell, where they are not given."""
 
     def make_command(self) -> Callable[..., None]:
         """Return the function of the command."""
@@ -95,7 +95,7 @@ class Verb:
         ):
             warnings.simplefilter("always")
             values |= options.read(given, about, which=lambda o: o.file and o.path not in values)
-            call = {**self.knows(given), **options.call(values)}
+            call = options.call({**self.knows(given), **values})
             if any(o.name == "size" and o.required for o in options):
                 call["size"] = size
             if variants is None or self.several is None:
@@ -209,10 +209,10 @@ def count_moved(result: Synthesis) -> str:
     return f", {len(result.report['matches'])} elements moved"
 
 
-def read_camera(given: Mapping[str, Any]) -> dict[str, Any]:
+def read_camera(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
     """Return the angle of view that the photograph states."""
     fov = None if given["image"].startswith(_outputs.SAMPLE) else io.read_fov(given["image"])
-    return {} if fov is None else {"fov": fov}
+    return {} if fov is None else {("view", "fov"): fov}
 
 
 def say_plane(result: Synthesis) -> str:
@@ -225,7 +225,7 @@ def say_plane(result: Synthesis) -> str:
 
 
 def _see(verb: Callable[..., Synthesis], **more: Kind) -> Verb:
-    left = {"plane": "the command says how it lies by corners or angles"}
+    left = {"view.plane": "the command says how it lies by corners or angles"}
     return Verb(Options(verb, arguments={"image": PICTURE, **more}, leave=left), says=say_plane, knows=read_camera)
 
 

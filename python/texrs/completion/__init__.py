@@ -18,6 +18,7 @@ from texrs._arrays import as_bool, as_float, as_image, as_int, as_mask, as_metho
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.blending import blend as correct_colours
 from texrs.completion._depth import fill_in_depth
+from texrs.completion._holes import widen
 from texrs.completion._optimise import optimise, recover_scale
 from texrs.completion._patches import LEAST, choose_mirrors, fill_with_patches, map_untouched
 from texrs.errors import InvalidInput
@@ -290,18 +291,6 @@ def check_pictures(image: object, hole: object, exemplar: object | None) -> tupl
     if mask.all():
         pixels[...] = other[0, 0]
     return [pixels.reshape(array.shape), other.reshape(other.shape[: array.ndim])], mask
-
-
-def widen(mask: Bools, width: int, wrap: Sequence[bool]) -> Bools:
-    """Widen a mask by so many pixels, around the edges of axes that wrap."""
-    if not width:
-        return mask
-    from scipy.ndimage import maximum_filter1d
-
-    for axis, cyclic in enumerate(wrap):
-        reach = min(width, mask.shape[axis])
-        mask = maximum_filter1d(mask, 2 * reach + 1, axis, mode="wrap" if cyclic else "nearest")
-    return mask
 
 
 def find_places(marked: Array) -> tuple[NDArray[np.intp], ...]:

@@ -1,14 +1,15 @@
 """Planes in photographs: how they lie, where each pixel is on them, and how large things are there.
 
 A `Plane` is said by angles, by four corners of a rectangle, by two vanishing points, by its horizon or by a scale map; `find`
-finds it in a picture alone, and `find_ground` where the picture shows it.
+finds it in a picture alone, and `find_ground` where the picture shows it. A `View` is what somebody says of both.
 """
 
 from texrs.planes._find import find
 from texrs.planes._ground import find_ground
 from texrs.planes._plane import FOV, STEEPEST, Plane
+from texrs.planes._view import View
 
-__all__ = ["FOV", "STEEPEST", "Plane", "find", "find_ground"]
+__all__ = ["FOV", "STEEPEST", "Plane", "View", "find", "find_ground"]
 
 
 def __dir__() -> list[str]:

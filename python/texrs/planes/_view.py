@@ -1,0 +1,112 @@
+"""What is said of a plane in a photograph: how it lies, and where it is seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from texrs._arrays import as_array, as_float, as_mask
+from texrs._typing import Array, Bools
+from texrs.errors import InvalidInput
+from texrs.planes._plane import FOV, STEEPEST, Plane
+
+__all__ = ["View"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class View:
+    """How a photograph shows a plane, as far as somebody says: what is not said is found.
+
+    `texrs.rectify`, `texrs.extend` and `texrs.remove` take one, or a `Plane` alone, as ``view``.
+
+    Parameters
+    ----------
+    plane : Plane, optional
+        How the plane lies. By default what ``corners``, or ``slant``, says, else it is found (`texrs.planes.find`).
+    corners : four of (row, column), optional
+        Where the corners of a rectangle of the plane are seen, in the order in which one goes around.
+    slant : float, optional
+        Degrees between the line of sight and the plane's normal, 0 (seen from the front) to 88.
+    tilt : float, optional
+        With ``slant``: the direction in the picture in which depth grows, degrees counter-clockwise from the right; by default
+        90, a floor.
+    fov : float, optional
+        Degrees that the longer side of the photograph spans, 1 to 170 (`texrs.io.read_fov`; the command reads it of the
+        file). By default what the corners tell, else 60.
+    ground : (H, W) array, optional
+        Not 0 where the photograph shows the plane. By default what is found (`texrs.planes.find_ground`), or, to be made flat
+        or larger, all of a photograph of which is said how the plane lies.
+
+    Raises
+    ------
+    InvalidInput
+        Options out of their ranges, or two ways to say how the plane lies.
+
+    Examples
+    --------
+    >>> import texrs
+    >>> floor = texrs.samples.tilted_discs((128, 128)).image
+    >>> texrs.extend(floor, right=32, view=texrs.View(slant=35, fov=55)).image.shape
+    (128, 160, 3)
+    >>> texrs.View(slant=35, corners=[[9, 20], [9, 80], [90, 99], [90, 4]])
+    Traceback (most recent call last):
+        ...
+    texrs.errors.InvalidInput: slant: corners says how the plane lies already
+
+    """
+
+    plane: Plane | None = None
+    corners: Sequence[Sequence[float]] | Array | None = None
+    slant: float | None = None
+    tilt: float | None = None
+    fov: float | None = None
+    ground: Array | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        given = [name for name in ("plane", "corners", "slant") if getattr(self, name) is not None]
+        if len(given) > 1:
+            raise InvalidInput(f"{given[1]}: {given[0]} says how the plane lies already")
+        if self.plane is not None and not isinstance(self.plane, Plane):
+            raise InvalidInput(f"plane: needs a texrs.Plane, got {self.plane!r}")
+        if self.tilt is not None and self.slant is None:
+            raise InvalidInput("tilt: needs slant")
+        if self.plane is not None and self.fov is not None:
+            raise InvalidInput("fov: the plane has one already")
+        for name, least, most in (("slant", 0, STEEPEST), ("tilt", -1e6, 1e6), ("fov", 1, 170)):
+            value = getattr(self, name)
+            object.__setattr__(self, name, None if value is None else as_float(value, name, least, most))
+        if self.corners is not None:
+            object.__setattr__(self, "corners", as_array(self.corners, "corners", np.float64, (4, 2)))
+
+    @classmethod
+    def of(cls, given: View | Plane | None) -> View:
+        """Return a view as it is, one of a plane, or one of which nothing is said."""
+        if given is None or isinstance(given, Plane):
+            return cls(plane=given)
+        if not isinstance(given, View):
+            raise InvalidInput(f"view: needs a texrs.View, or a texrs.Plane, got {given!r}")
+        return given
+
+    def settle(self, shape: Sequence[int]) -> tuple[Plane | None, Bools | None]:
+        """Return the plane that is said, and the ground, in a photograph of (rows, columns); None for what is to be found.
+
+        Raises
+        ------
+        InvalidInput
+            A plane or a ground of another shape, a ground that marks nothing, or corners of no convex shape.
+
+        """
+        size = shape[0], shape[1]
+        ground = None if self.ground is None else as_mask(self.ground, "ground", size)
+        if ground is not None and not ground.any():
+            raise InvalidInput("ground: marks nothing, so the plane is nowhere seen")
+        if self.plane is not None and self.plane.shape != size:
+            raise InvalidInput(f"plane: needs one of a picture of {size[0]} x {size[1]}, got {self.plane!r}")
+        if self.corners is not None:
+            return Plane.of_corners(size, np.asarray(self.corners), fov=self.fov), ground
+        if self.slant is not None:
+            tilt, fov = 90.0 if self.tilt is None else self.tilt, FOV if self.fov is None else self.fov
+            return Plane(size, self.slant, tilt, fov), ground
+        return self.plane, ground
