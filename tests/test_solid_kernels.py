@@ -141,8 +141,10 @@ def test_kernels_report_and_stop():
     def stop(share):
         raise KeyError("enough")
 
+    # What is done before the first report, a twentieth of a second after the start, cannot be stopped.
+    long = Region.whole((64, 64, 64))
     with pytest.raises((Cancelled, KeyError)):
-        appearance.blocks(region, frames, progress=stop)
+        appearance.blocks(long, to_fixed(None, long), progress=stop)
 
 
 def test_wrong_arrays_get_a_sentence():
