@@ -70,7 +70,9 @@ KNOWN[30:60, 40:80] = False
 def test_it_writes_what_the_functions_make(here: Path, capsys: Capture, arguments: str, expected) -> None:
     assert main(["scale-map", "in.png", "-o", "out.tif", *arguments.split()]) == 0
     assert (io.read("out.tif") == expected()).all()
-    assert re.search(r"texrs: wrote out\.tif: \d+ x \d+, scales \S+ to \S+, in", capsys.readouterr().err)
+    assert re.search(
+        r"texrs: wrote out\.tif: \d+ x \d+, (widths|roots of areas) \S+ to \S+, in", capsys.readouterr().err
+    )
 
 
 def test_a_map_made_before_is_edited_and_encoded(here: Path) -> None:

@@ -238,15 +238,19 @@ def read_mask(path: str, axes: int = 2) -> Array:
 
 
 def read_scale_map(path: str, encoding: str = "log2") -> Floats:
-    """Read a scale map: floats are scales, grey levels are decoded."""
+    """Read a scale map, with its kind where the file says it: floats are scales, grey levels are decoded."""
     from texrs import scale_maps
+    from texrs.scale_maps._kinds import keep_kind, parse_kind
 
-    values = io.read(path)
+    values, kind = io.read(path), parse_kind(io.read_description(path))
     if values.dtype.kind == "f":
-        return np.asarray(values if values.ndim == 2 else values[..., 0], np.float32)
-    levels: Any = encoding
-    with name_arguments(image=path):
-        return scale_maps.decode(values, levels)
+        scale = np.asarray(values if values.ndim == 2 else values[..., 0], np.float32)
+    else:
+        levels: Any = encoding
+        with name_arguments(image=path):
+            scale = scale_maps.decode(values, levels)
+    with name_arguments(scale=path):
+        return keep_kind(scale, kind)
 
 
 def read_field(text: str, size: tuple[int, ...]) -> Any:

@@ -20,6 +20,7 @@ from texrs.cli._kinds import read_mask, read_picture, read_scale_map
 from texrs.cli._options import Options, check_needed, make_choice, take_options
 from texrs.cli._outputs import Quiet, Threads, make_argument, make_option, name_arguments, to_write
 from texrs.errors import InvalidInput
+from texrs.scale_maps._kinds import describe_kind, find_kind
 from texrs.synthesis import preview
 
 FLOATS = (".npy", ".npz", ".tif", ".tiff", ".exr")
@@ -80,12 +81,14 @@ def scale_map_command(
     sides = asked.get(("size",), pixels.shape[:2])
     _outputs.check_output(out, np.ones(1, np.uint8 if levels else np.float32)[0], sides)
     shown: dict[str, Array] = {}
+    narrow = False
     names = {"image": image, "mask": mask or image, "known": str(hole), "steps": "--edit", "count": "--threads"}
     with name_arguments(**names), threads(count):
         if scale_map is not None:
             made = read_scale_map(scale_map, encoding or "log2")
         elif given["slant"] is not None:
-            angles = {"tilt": 90.0} | ANGLES.call(ANGLES.read(given))
+            angles = {"tilt": 90.0} | find_fov(image) | ANGLES.call(ANGLES.read(given))
+            narrow = "fov" not in angles
             made = scale_maps.from_angles(pixels.shape[:2], **angles)
         else:
             known = None if hole is None else check_same_size(read_mask(hole), pixels, "--hole") == 0
@@ -102,17 +105,29 @@ def scale_map_command(
         if ("size",) in asked:
             made = scale_maps.resample(made, **RESIZED.call(RESIZED.read(given)))
             shown["resampled"] = scale_maps.picture(made)
-    least, largest = float(made.min()), float(made.max())
+    least, largest, kind = float(made.min()), float(made.max()), find_kind(made)
     with _outputs.write_output(out) as temporary:
-        io.write(temporary, made if levels is None else scale_maps.encode(made, levels))
+        io.write(
+            temporary, made if levels is None else scale_maps.encode(made, levels), description=describe_kind(made)
+        )
         if stages is not None:
             said = {name: value for name, value in given.items() if value is not None and name not in ("steps", "size")}
             inputs = {"mask": mask, "auto": auto or None, "scale_map": scale_map, "hole": hole, "encoding": levels}
             report = said | {name: value for name, value in inputs.items() if value is not None}
             report |= {"edit": asked["steps",]} if ("steps",) in asked else {}
+            report |= {} if kind is None else {"kind": kind}
             save(shown, {**report, "size": made.shape, "least": least, "largest": largest}, stages)
     extent, seconds = " x ".join(map(str, made.shape)), time.monotonic() - start
-    note(f"wrote {out}: {extent}, scales {least:.3g} to {largest:.3g}, in {seconds:.1f} s", quiet=quiet)
+    what = {None: "scales", "width": "widths", "area": "roots of areas"}[kind]
+    if narrow:
+        note("without --fov sizes vary less than a camera shows them, by up to a factor of two", quiet=quiet)
+    note(f"wrote {out}: {extent}, {what} {least:.3g} to {largest:.3g}, in {seconds:.1f} s", quiet=quiet)
+
+
+def find_fov(image: str) -> dict[str, float]:
+    """Return the angle of view that a photograph states, as an argument."""
+    fov = None if image.startswith(_outputs.SAMPLE) else io.read_fov(image)
+    return {} if fov is None else {"fov": fov}
 
 
 def check_same_size(mask: Array, pixels: Array, option: str) -> Array:

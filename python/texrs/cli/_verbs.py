@@ -168,7 +168,12 @@ def make_verb(name: str) -> Verb:
         case "perspective":
             from texrs.papers.perspective import perspective
 
-            options = Options(perspective, arguments={"exemplar": PICTURE}, kinds={"scale_map": MAP_OR_AUTO})
+            options = Options(
+                perspective,
+                arguments={"exemplar": PICTURE},
+                kinds={"scale_map": MAP_OR_AUTO},
+                names={"kind": "scale-kind"},
+            )
             return Verb(options, times=2, shape="target")
         case "rectify":
             from texrs.rectification import rectify

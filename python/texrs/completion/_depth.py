@@ -15,6 +15,7 @@ from texrs._typing import Array, Bools, Floats, Progress
 from texrs.exemplar import Exemplar
 from texrs.exemplar.sheet import Flattened, find_plane
 from texrs.growth import stitch_sheet
+from texrs.scale_maps._kinds import find_kind
 from texrs.source_map import SourceMap
 
 __all__ = ["fill_in_depth"]
@@ -69,7 +70,7 @@ def fill_in_depth(
     # What is interpolated from pixels of the hole is not known.
     whole: Bools = ndimage.minimum_filter(usable, TAPS, mode="nearest")
     asked = np.ascontiguousarray(scale)
-    plane = find_plane(colours, asked)
+    plane = find_plane(colours, asked, find_kind(scale))
     if plane is None:
         return None
     asked = power_single(asked, plane.power)

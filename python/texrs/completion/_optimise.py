@@ -21,6 +21,7 @@ from texrs.exemplar.analysis import count_levels
 from texrs.exemplar.atlas import RADIUS, Atlas, extend_sizes
 from texrs.growth import FROM_ATLAS, Surroundings, grow_from_atlas
 from texrs.planes._choose import measure_scale
+from texrs.scale_maps._kinds import find_kind, keep_kind
 from texrs.scale_maps._maps import as_map
 from texrs.source_map import SourceMap
 
@@ -49,14 +50,14 @@ def recover_scale(picture: Array, open_: Bools, given: object, name: str = "scal
         if not known.any():
             raise InvalidInput(f"{name}: 'auto' measures what is known, and the hole covers everything; give a map")
         return measure_scale(picture, known)
-    scale = np.asarray(given)
+    scale, kind = np.asarray(given), find_kind(given)
     if scale.shape == open_.shape and scale.dtype.kind == "f":
         # Where there is a hole, a map may have one too.
         with np.errstate(invalid="ignore"):
             bad = open_ & ~(np.isfinite(scale) & (scale > 0))
         if bad.any() and not bad.all():
-            return scale_maps.extend(scale, ~bad)
-    return as_map(scale, name, open_.shape)
+            return scale_maps.extend(keep_kind(np.where(bad, 1, scale), kind), ~bad)
+    return keep_kind(as_map(scale, name, open_.shape), kind)
 
 
 def optimise(

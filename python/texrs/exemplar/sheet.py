@@ -25,6 +25,7 @@ from texrs.exemplar.atlas import BARRED, NAT, Copy, fill_gaps, find_box, measure
 from texrs.exemplar.instances import Instances, find_instances, label_components
 from texrs.exemplar.stitching import make_stitcher
 from texrs.kernels.gather import gather
+from texrs.scale_maps._kinds import AREAS, Kind, find_kind
 from texrs.scale_maps._plane import Plane
 
 __all__ = ["Copies", "Flattened", "Sheet", "code", "find_plane"]
@@ -53,8 +54,8 @@ FORESHORTENED = 0.2
 """How much steeper edges must get with distance where there is doubt: less than 1, for few lie just across the slope."""
 FRONTAL = 0.05
 """Where they get less steep than this it is no plane, however well the map fits: round things, each seen from the front."""
-AREAS, BETTER, SURE = 2 / 3, 0.5, 1e-3
-"""Power of a map of areas that is one of widths, and how much better it must fit to be taken for one."""
+BETTER, SURE = 0.5, 1e-3
+"""How much better a map must fit as one of areas to be taken for one."""
 BANDS = 8
 """Bands of scales that edges are compared in."""
 PLANAR = 0.02
@@ -370,15 +371,18 @@ def lay_out(copy: Copy) -> Floats:
     return np.stack(np.meshgrid(*at, indexing="ij"), axis=-1).astype(np.float32)
 
 
-def find_plane(colours: Floats, scale: Floats) -> Plane | None:
+def find_plane(colours: Floats, scale: Floats, kind: Kind | None = None) -> Plane | None:
     """Return the plane that an exemplar is a picture of, if the evidence is good enough.
 
     A map may hold the widths of elements, or the square roots of their areas, which are the 3/2 power of those; the plane is
-    one of widths (see `Plane.power`). Maps that are measured are not quite those of a plane, and those of round things that get
-    smaller are not far from it. So edges decide: on a plane they get steeper along the slope with distance. Where the fit is
-    good a little of that is enough; without any, a plane may have been fitted to what is none.
+    one of widths (see `Plane.power`). If neither the caller nor the map says which, it is what fits. Maps that are measured are
+    not quite those of a plane, and those of round things that get smaller are not far from it. So edges decide: on a plane they
+    get steeper along the slope with distance. Where the fit is good a little of that is enough; without any, a plane may have
+    been fitted to what is none.
     """
-    plane, other = Plane.fit(scale), Plane.fit(scale, AREAS)
+    holds = find_kind(scale) if kind is None else kind
+    plane = Plane.fit(scale, AREAS if holds == "area" else 1.0)
+    other = Plane.fit(scale, AREAS) if holds is None else None
     if plane is not None and other is not None and other.residual < BETTER * AREAS * plane.residual - SURE:
         plane = other
     if plane is None or plane.residual > FAIR:

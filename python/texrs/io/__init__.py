@@ -48,7 +48,7 @@ from texrs._arrays import MAX_PIXELS, as_int
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput
-from texrs.io import _files, _image_io, _npy, _pillow, _slabs, _tiff, _volumes
+from texrs.io import _descriptions, _files, _image_io, _npy, _pillow, _slabs, _tiff, _volumes
 from texrs.io._files import atomic
 from texrs.io._formats import FORMATS, VOLUMES, as_spacing, check, detect_kind
 from texrs.io._npy import read_arrays
@@ -57,6 +57,7 @@ __all__ = [
     "atomic",
     "read",
     "read_arrays",
+    "read_description",
     "read_fov",
     "read_volume",
     "write",
@@ -160,6 +161,33 @@ def read_fov(path: PathLike) -> float | None:
     return None if focal is None else 2 * degrees(atan(FILM / 2 / focal))
 
 
+def read_description(path: PathLike) -> str | None:
+    """Return what a file says of itself in words.
+
+    Parameters
+    ----------
+    path : path_like
+        PNG (a text named Description) or TIFF (its ImageDescription).
+
+    Returns
+    -------
+    str or None
+        None where the file does not say anything.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "grey.png")
+    ...     write(path, np.zeros((8, 8), np.uint8), description="nothing but black")
+    ...     read_description(path)
+    'nothing but black'
+
+    """
+    return _descriptions.read(_files.as_path(path))
+
+
 def read_volume(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
     """Return the volume of a file.
 
@@ -210,7 +238,7 @@ def read_volume(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
     return _read_numpy(name, kind, limit, 3)
 
 
-def write(path: PathLike, array: Array, *, overwrite: bool = True) -> None:
+def write(path: PathLike, array: Array, *, overwrite: bool = True, description: str | None = None) -> None:
     """Write an image, whole or not at all.
 
     Parameters
@@ -221,6 +249,8 @@ def write(path: PathLike, array: Array, *, overwrite: bool = True) -> None:
         Shape (H, W) or (H, W, C).
     overwrite : bool
         Whether a file that exists may be replaced.
+    description : str, optional
+        What the file is to say of itself, in letters of ASCII: PNG and TIFF keep it (`read_description`), the others do not.
 
     Raises
     ------
@@ -240,7 +270,9 @@ def write(path: PathLike, array: Array, *, overwrite: bool = True) -> None:
     texrs.errors.InvalidInput: array: .png cannot hold float32 with 1 channel; .exr, ... can
 
     """
-    _write(path, array, 2, overwrite, None)
+    if description is not None and not (isinstance(description, str) and description.isascii()):
+        raise InvalidInput(f"description: needs letters of ASCII, got {description!r}")
+    _write(path, array, 2, overwrite, None, description)
 
 
 def write_volume(
@@ -388,7 +420,14 @@ def _read_numpy(name: Path, kind: str, limit: int, axes: int) -> Array:
     return array
 
 
-def _write(path: PathLike, value: Array, axes: int, overwrite: bool, spacing: Sequence[float] | None) -> None:
+def _write(
+    path: PathLike,
+    value: Array,
+    axes: int,
+    overwrite: bool,
+    spacing: Sequence[float] | None,
+    description: str | None = None,
+) -> None:
     target = _files.as_path(path)
     suffix = ".nii.gz" if target.name.lower().endswith(".nii.gz") else target.suffix.lower()
     if suffix not in FORMATS:
@@ -406,7 +445,7 @@ def _write(path: PathLike, value: Array, axes: int, overwrite: bool, spacing: Se
         if suffix in (".tif", ".tiff"):
             planes = array if axes == 3 else array[np.newaxis]
             planes = planes if planes.ndim == 4 else planes[..., np.newaxis]
-            _tiff.write_tiff(temporary, planes, planes.shape[3], planes.nbytes)
+            _tiff.write_tiff(temporary, planes, planes.shape[3], planes.nbytes, description)
             return
         if axes == 3:
             volume = array[..., 0] if array.ndim == 4 and array.shape[3] == 1 else array
@@ -423,4 +462,6 @@ def _write(path: PathLike, value: Array, axes: int, overwrite: bool, spacing: Se
             file = _pillow.encode(array, ".bmp" if suffix == ".bmp" else ".jpg")
         else:
             file = _image_io.encode(target, array, suffix[1:])
+            if suffix == ".png" and description is not None:
+                file = _descriptions.describe_png(file, description)
         temporary.write_bytes(file)

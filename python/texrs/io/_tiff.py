@@ -76,12 +76,14 @@ def take_volume(path: Path, planes: Array, orientation: int) -> Array:
     return planes[..., 0] if planes.shape[3] == 1 else planes
 
 
-def write_tiff(path: Path, planes: Iterable[Array], channels: int, size: int) -> None:
+def write_tiff(path: Path, planes: Iterable[Array], channels: int, size: int, description: str | None = None) -> None:
     """Write planes of rows, columns, channels, of so many bytes in all: one page a plane, uncompressed."""
     import tifffile
 
     extra = {2: ["unassalpha"], 4: ["unassalpha"]}.get(channels, ["unspecified"] * (channels - 1))
     options: dict[str, Any] = {"photometric": "rgb" if channels in (3, 4) else "minisblack", "metadata": None}
+    if description is not None:
+        options["description"] = description
     if channels not in (1, 3):
         options["extrasamples"] = extra
     if channels > 1:

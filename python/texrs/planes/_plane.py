@@ -10,10 +10,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_array, as_choice, as_float, as_size
-from texrs._typing import Array, Floats
+from texrs._arrays import as_array, as_float, as_size
+from texrs._typing import Array
 from texrs.errors import InvalidInput
 from texrs.planes._projective import along, find_focal, lift, to_digits, to_grid, transform
+from texrs.scale_maps._kinds import AREAS, ScaleMap, as_kind, find_kind
 from texrs.scale_maps._maps import LEAST, as_map
 from texrs.scale_maps._plane import Plane as Slope
 
@@ -219,16 +220,19 @@ class Plane:
         )
 
     @classmethod
-    def of_scale_map(cls, scale: Array, *, kind: Literal["width", "area"] = "area", fov: float | None = None) -> Plane:
+    def of_scale_map(
+        cls, scale: Array, *, kind: Literal["width", "area"] | None = None, fov: float | None = None
+    ) -> Plane:
         """Return the plane that a scale map is of.
 
         Parameters
         ----------
         scale : (H, W) float array
             How large things are (`texrs.scale_maps`).
-        kind : {"area", "width"}
+        kind : {"area", "width"}, optional
             "area": square roots of areas, as `texrs.scale_maps.from_mask` measures them; "width": widths across the slope, as
-            `texrs.scale_maps.from_angles` gives them.
+            `texrs.scale_maps.from_angles` gives them. By default what the map says (`texrs.scale_maps.ScaleMap`); of one that
+            does not, areas.
         fov : float, optional
             Degrees that the longer side spans; `FOV` by default.
 
@@ -246,15 +250,15 @@ class Plane:
         --------
         >>> from texrs import Plane, scale_maps
         >>> scale = scale_maps.from_angles((96, 128), 50, 120, fov=60)
-        >>> plane = Plane.of_scale_map(scale, kind="width", fov=60)
+        >>> plane = Plane.of_scale_map(scale, fov=60)
         >>> round(plane.slant, 2), round(plane.tilt, 2)
         (50.0, 120.0)
 
         """
         given = as_map(scale)
-        what = as_choice(kind, "kind", ("area", "width"))
+        what = find_kind(scale) or "area" if kind is None else as_kind(kind)
         size = (given.shape[0], given.shape[1])
-        slope = Slope.fit(given, 1.0 if what == "width" else 2 / 3)
+        slope = Slope.fit(given, 1.0 if what == "width" else AREAS)
         if slope is None:
             return cls(size, 0.0, 90.0, FOV if fov is None else fov)
         rise = np.array(slope.down) * (slope.slope / slope.scale)
@@ -358,7 +362,7 @@ class Plane:
         """Return how wide things are seen at points (..., 2), across the slope: 1 in the middle, 0 at the horizon."""
         return 1 + along(np.asarray(points, np.float64) - self.middle, self._rise)
 
-    def scale_map(self, kind: Literal["width", "area"] = "width") -> Floats:
+    def scale_map(self, kind: Literal["width", "area"] = "width") -> ScaleMap:
         """Return how large things are at each pixel.
 
         Parameters
@@ -369,8 +373,8 @@ class Plane:
 
         Returns
         -------
-        (H, W) float32
-            1 in the picture's middle; held at .001 at the horizon and beyond.
+        (H, W) ScaleMap
+            Float32, 1 in the picture's middle; held at .001 at the horizon and beyond.
 
         Examples
         --------
@@ -379,9 +383,9 @@ class Plane:
         True
 
         """
-        what = as_choice(kind, "kind", ("width", "area"))
+        what = as_kind(kind)
         wide = np.maximum(self.width(np.moveaxis(np.indices(self.shape), 0, -1)), LEAST)
-        return np.maximum(wide if what == "width" else wide**1.5, LEAST).astype(np.float32)
+        return ScaleMap(np.maximum(wide if what == "width" else wide ** (1 / AREAS), LEAST).astype(np.float32), what)
 
     def flatten(self, points: Array | Sequence[Sequence[float]]) -> NDArray[np.float64]:
         """Return where points (..., 2) of the picture lie on the flat plane; far away beyond the horizon."""

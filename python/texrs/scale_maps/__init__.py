@@ -5,6 +5,7 @@ twice as large. Only ratios count, so maps that are measured have a geometric me
 and gives new ones; nothing is changed in place.
 
 ===================  ==========================================================================
+`ScaleMap`           an array that says whether it holds widths, or square roots of areas
 `from_mask`          the map measured from a mask of features
 `auto_mask`          a mask of features, found in the picture
 `Measuring`          how a map is measured in such a mask, where nobody gives one
@@ -16,6 +17,10 @@ and gives new ones; nothing is changed in place.
 `encode` `decode`    8-bit pictures of maps, for other programs
 `picture`            false colours with a scale bar, to look at
 ===================  ==========================================================================
+
+What is seen aslant is as wide as it is near, and foreshortened besides: maps of widths (`from_angles`) are linear in the
+picture of a plane, and maps of areas (`from_mask`), which hold their square roots, are the power 3/2 of those. What makes maps
+gives a `ScaleMap`, which says which of them it is, and PNG and TIFF files keep that; of other arrays it is told by which fits.
 
 Two angles say how a plane lies. `slant` is that between the line of sight and the plane's normal: 0 is seen from the
 front, 85 nearly edge on. `tilt` is the direction in the picture in which depth grows, in degrees counter-clockwise from
@@ -32,6 +37,7 @@ from texrs.scale_maps._angles import STEEPEST, from_angles, slant_for_ratio
 from texrs.scale_maps._auto import auto_mask
 from texrs.scale_maps._edit import edit
 from texrs.scale_maps._extend import extend
+from texrs.scale_maps._kinds import ScaleMap
 from texrs.scale_maps._maps import LARGEST, LEAST
 from texrs.scale_maps._mask import Measure, from_mask
 from texrs.scale_maps._measuring import Measuring
@@ -46,6 +52,7 @@ __all__ = [
     "Encoding",
     "Measure",
     "Measuring",
+    "ScaleMap",
     "Trend",
     "auto_mask",
     "decode",

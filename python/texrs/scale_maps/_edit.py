@@ -13,6 +13,7 @@ from texrs._arrays import exp_single, log_single
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.scale_maps._blur import blur
+from texrs.scale_maps._kinds import find_kind, keep_kind
 from texrs.scale_maps._maps import as_map
 from texrs.scale_maps._regions import as_number, as_points, centre, stroke, weights
 
@@ -55,7 +56,7 @@ def edit(scale: object, steps: Sequence[Mapping[str, Any] | str] | str) -> Float
     Returns
     -------
     ndarray
-        Float32, (H, W).
+        Float32, (H, W); a `ScaleMap` if ``scale`` is one.
 
     Raises
     ------
@@ -93,7 +94,7 @@ def edit(scale: object, steps: Sequence[Mapping[str, Any] | str] | str) -> Float
         low, high = np.minimum(logs, np.log(np.float32(_LEAST))), np.maximum(logs, np.log(np.float32(_LARGEST)))
         logs = np.clip(changed, low, high).astype(np.float32)
     # What no step reached is what it was, to the last bit.
-    return np.where(logs == before, given, exp_single(logs))
+    return keep_kind(np.where(logs == before, given, exp_single(logs)), find_kind(scale))
 
 
 def _read_all(steps: object) -> list[tuple[str, dict[str, Any]]]:

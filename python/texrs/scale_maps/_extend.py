@@ -8,8 +8,9 @@ from texrs._arrays import as_image, as_mask, exp_single, log_single
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.kernels import poisson
+from texrs.scale_maps._kinds import find_kind, keep_kind
 from texrs.scale_maps._maps import LARGEST, LEAST, as_map
-from texrs.scale_maps._trend import Trend, as_trend, follow
+from texrs.scale_maps._trend import Trend, as_trend, follow_kind
 
 
 def extend(scale: object, known: object, *, trend: Trend = "plane") -> Floats:
@@ -25,13 +26,13 @@ def extend(scale: object, known: object, *, trend: Trend = "plane") -> Floats:
     known : array_like of bool
         Shape (H, W): where the map holds. Known pixels come back as they are.
     trend : {"plane", "linear", "quadratic", "none"}
-        ``"plane"``: a flat surface in perspective, whose S is linear in the picture. ``"linear"`` and ``"quadratic"``:
+        ``"plane"``: a flat surface in perspective, on which widths are linear in the picture. ``"linear"`` and ``"quadratic"``:
         log S is, for what is curved. ``"none"``: the membrane alone.
 
     Returns
     -------
     ndarray
-        Float32, (H, W).
+        Float32, (H, W); a `ScaleMap` if ``scale`` is one.
 
     Raises
     ------
@@ -50,7 +51,7 @@ def extend(scale: object, known: object, *, trend: Trend = "plane") -> Floats:
     True
 
     """
-    given = np.asarray(scale)
+    given, holds = np.asarray(scale), find_kind(scale)
     there = as_mask(known, "known", given.shape[:2])
     if not there.any():
         raise InvalidInput("known: no pixel of the map is known; there must be some to go on from")
@@ -59,13 +60,14 @@ def extend(scale: object, known: object, *, trend: Trend = "plane") -> Floats:
     kind = as_trend(trend)
     values = as_map(as_image(given, "scale"))
     if there.all():
-        return values
+        return keep_kind(values, holds)
     logs = log_single(values)
-    course = follow(logs, kind, there)
+    course = follow_kind(logs, kind, holds, there)
     logs -= course
     logs[~there] = 0
     nothing = np.zeros_like(logs)
     membrane = poisson.solve(logs, nothing, nothing, screening=0, boundary="free", mask=~there)
     # As the trend, no more than four times beyond what is known.
     low, high = max(LEAST, float(values[there].min()) / 4), min(LARGEST, float(values[there].max()) * 4)
-    return np.where(there, values, np.clip(exp_single(course + membrane), np.float32(low), np.float32(high)))
+    filled = np.where(there, values, np.clip(exp_single(course + membrane), np.float32(low), np.float32(high)))
+    return keep_kind(filled, holds)

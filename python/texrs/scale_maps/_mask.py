@@ -12,8 +12,9 @@ from texrs._arrays import as_choice, as_image, as_int, as_mask, exp_single, log_
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.scale_maps._extend import extend
+from texrs.scale_maps._kinds import AREAS, Kind, ScaleMap
 from texrs.scale_maps._maps import centre_logs
-from texrs.scale_maps._trend import Trend, as_trend, follow, gradient
+from texrs.scale_maps._trend import Trend, as_trend, follow_kind, gradient
 from texrs.scale_maps._windows import Lattice, smooth
 
 Measure: TypeAlias = Literal["boundary", "skeleton", "count", "area"]
@@ -40,7 +41,7 @@ def from_mask(
     trend: Trend = "none",
     foreshortened: bool = False,
     known: object = None,
-) -> Floats:
+) -> ScaleMap:
     """Return the scale map of a mask: the size of elements, by how densely the features of the mask lie.
 
     Where elements are seen twice as large there are half as many outlines in a window (equation 1 of [1]_, which counts
@@ -60,8 +61,8 @@ def from_mask(
         Side of the windows in pixels, 16 or more. By default eight times the spacing of the features, up to a third of
         the shorter side.
     trend : {"none", "plane", "linear", "quadratic"}
-        What the map is brought to by a robust fit: ``"plane"``, a flat surface in perspective, whose S is linear in the
-        picture; ``"linear"`` or ``"quadratic"``, log S is.
+        What the map is brought to by a robust fit: ``"plane"``, a flat surface in perspective, on which widths are linear in
+        the picture; ``"linear"`` or ``"quadratic"``, log S is.
     foreshortened : bool
         Whether the picture shows a plane aslant. A mask gives the size of elements as the square root of their area; in
         perspective that is the 3/2 power of their width across the slope, which is what `from_angles` gives. With True
@@ -72,8 +73,8 @@ def from_mask(
 
     Returns
     -------
-    ndarray
-        Float32, (H, W), with a geometric mean of 1.
+    ScaleMap
+        Float32, (H, W), with a geometric mean of 1; of areas, or if ``foreshortened`` of widths.
 
     Raises
     ------
@@ -107,12 +108,13 @@ def from_mask(
     side = None if window is None else as_int(window, "window", SMALLEST, max(SMALLEST, *size))
     logs = _measure_as_printed(given, there, side) if what == "area" else _measure(given, there, what, side)
     if foreshortened:
-        logs *= np.float32(2 / 3)
+        logs *= np.float32(AREAS)
+    holds: Kind = "width" if foreshortened else "area"
     if kind != "none":
-        logs = follow(logs, kind, there)
+        logs = follow_kind(logs, kind, holds, there)
     elif there is not None:
-        return extend(centre_logs(logs), there)
-    return centre_logs(logs)
+        return ScaleMap(extend(ScaleMap(centre_logs(logs), holds), there), holds)
+    return ScaleMap(centre_logs(logs), holds)
 
 
 def _refuse_bare(mask: Bools, known: Bools | None) -> None:
@@ -150,7 +152,7 @@ def _measure(mask: Bools, known: Bools | None, what: str, window: int | None) ->
     logs += (down * rows + across * columns).astype(np.float32)
     logs = smooth(logs, enough, _ROUNDS)
     if not enough.all():
-        logs = log_single(extend(exp_single(logs), enough))
+        logs = log_single(extend(ScaleMap(exp_single(logs), "area"), enough))
     return lattice.spread(logs)
 
 

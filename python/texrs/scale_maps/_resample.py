@@ -12,6 +12,7 @@ from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.scale_maps._angles import from_angles
 from texrs.scale_maps._extend import extend
+from texrs.scale_maps._kinds import find_kind, keep_kind
 from texrs.scale_maps._maps import as_map
 
 
@@ -45,7 +46,7 @@ def resample(
     Returns
     -------
     ndarray
-        Float32, of that size.
+        Float32, of that size; a `ScaleMap` if what it is made of is one.
 
     Raises
     ------
@@ -71,9 +72,11 @@ def resample(
     if how == "user":
         if pattern is None:
             raise InvalidInput("pattern: the mode 'user' needs a pattern of scales")
-        return _stretch(as_map(pattern, "pattern"), sides)
-    given = as_map(scale)
-    return _stretch(given, sides) if how == "stretch" else _continue(given, sides)
+        return keep_kind(_stretch(as_map(pattern, "pattern"), sides), find_kind(pattern))
+    given, kind = as_map(scale), find_kind(scale)
+    if how == "stretch":
+        return keep_kind(_stretch(given, sides), kind)
+    return _continue(keep_kind(given, kind), sides)
 
 
 def _stretch(scale: Floats, size: tuple[int, ...]) -> Floats:
@@ -98,4 +101,4 @@ def _continue(scale: Floats, size: tuple[int, ...]) -> Floats:
         here.append(slice((m - overlap) // 2, (m - overlap) // 2 + overlap))
     result[tuple(there)] = scale[tuple(here)]
     known[tuple(there)] = True
-    return extend(result, known)
+    return extend(keep_kind(result, find_kind(scale)), known)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_choice
 from texrs._typing import Bools, Floats
+from texrs.scale_maps._kinds import AREAS, Kind
 
 Trend: TypeAlias = Literal["none", "plane", "linear", "quadratic"]
 """What a map is brought to: itself; a flat surface in perspective, whose S is linear in the picture; or a linear or a
@@ -58,6 +59,13 @@ def follow(logs: Floats, trend: str, known: Bools | None = None) -> Floats:
     if trend == "plane":
         surface = np.asarray(np.log(np.maximum(surface, np.exp(low))), np.float64)
     return np.asarray(np.clip(surface, low, high), np.float32)
+
+
+def follow_kind(logs: Floats, trend: str, kind: Kind | None, known: Bools | None = None) -> Floats:
+    """Return the logarithms of a trend as `follow` does, of a map of some kind: on a plane it is widths that are linear."""
+    if trend != "plane" or kind != "area":
+        return follow(logs, trend, known)
+    return follow(logs * np.float32(AREAS), trend, known) / np.float32(AREAS)
 
 
 def gradient(

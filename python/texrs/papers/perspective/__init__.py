@@ -48,6 +48,7 @@ from texrs.papers.perspective.literal import average_windows
 from texrs.papers.perspective.request import Method, Request
 from texrs.papers.perspective.sizes import Outside, Sizes, bring_within, choose_sizes
 from texrs.scale_maps import Measuring
+from texrs.scale_maps._kinds import Kind
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
@@ -60,6 +61,7 @@ def perspective(
     size: int | Sequence[int] | None = None,
     *,
     target: Array | None = None,
+    kind: Kind | None = None,
     measuring: Measuring | None = None,
     method: Method = None,
     scale_weight: float = 1.0,
@@ -76,14 +78,17 @@ def perspective(
     exemplar : (H, W) or (H, W, C) array, or Exemplar
         Any real dtype and channels; each side at least 16.
     scale_map : (H, W) float array, or "auto"
-        How large the exemplar's elements are at each pixel, positive; only ratios count (`texrs.scale_maps`). Widths, or the
-        square roots of areas. "auto": those of the plane that is found in it (`texrs.planes.find`), or where none is surely, of
-        a mask of features, with a warning.
+        How large the exemplar's elements are at each pixel, positive; only ratios count (`texrs.scale_maps`). "auto":
+        those of the plane that is found in it (`texrs.planes.find`), or where none is surely, of a mask of features, with a
+        warning.
     size : int or (int, int), optional
         Rows and columns of the result: by default those of the ``target``, else twice the exemplar's.
     target : (rows, columns) float array, optional
         How large they are to be at each pixel of the result, in the units of ``scale_map``. One of another size is stretched to
         that of the result, its borders on the borders (`texrs.scale_maps.resample`). None: ``scale_map``, stretched.
+    kind : {"width", "area"}, optional
+        What maps hold that do not say so themselves (`texrs.scale_maps.ScaleMap`): "width", widths across the slope; "area",
+        square roots of areas. None: what the scale map fits best, as a map of a plane; the target holds the same.
     measuring : Measuring, optional
         How the ``scale_map`` "auto" is measured in a mask of features (`texrs.scale_maps.Measuring`), rather than by a plane.
     method : {None, "paper"}
@@ -145,6 +150,7 @@ def perspective(
         scale_map,
         size,
         target=target,
+        kind=kind,
         measuring=measuring,
         method=method,
         scale_weight=scale_weight,
@@ -157,7 +163,9 @@ def perspective(
         return average_windows(asked, progress)
     colours = asked.exemplar.guidance
     resized = asked.strength > 0 and (asked.sizes is True or asked.sizes == "auto")
-    plane = find_plane(colours, asked.scale) if resized else None
+    plane = find_plane(colours, asked.scale, asked.kinds[0]) if resized else None
+    if plane is not None:
+        asked = asked.match_kinds(plane.power)
     sizes = choose_sizes(asked.scale, asked.target, asked.sizes, plane)
     wanted, outside = bring_within(asked.scale, asked.target, sizes)
     if outside.share > 0 and asked.strength > 0:

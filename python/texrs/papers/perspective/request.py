@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
 import numpy as np
 
 from texrs import scale_maps
-from texrs._arrays import as_choice, as_float, as_method, as_seed, as_size, as_wrap
+from texrs._arrays import as_choice, as_float, as_method, as_seed, as_size, as_wrap, power_single
 from texrs._typing import Array, Floats, Interpolation
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
 from texrs.papers.perspective.sizes import Sizes, check_sizes
 from texrs.planes._choose import measure_scale
 from texrs.scale_maps import Measuring
+from texrs.scale_maps._kinds import AREAS, Kind, as_kind, find_kind
 from texrs.scale_maps._maps import as_map
 
 __all__ = ["Method", "Request"]
@@ -38,6 +39,8 @@ class Request:
         How large its elements are.
     target : (rows, columns) float32
         How large those of the output are to be.
+    kinds : (kind, kind)
+        What the two maps hold; None where nobody says.
     method : {None, "paper"}
         Which algorithm.
     strength : float
@@ -56,6 +59,7 @@ class Request:
     exemplar: Exemplar
     scale: Floats
     target: Floats
+    kinds: tuple[Kind | None, Kind | None]
     method: Method
     strength: float
     sizes: Sizes
@@ -71,6 +75,7 @@ class Request:
         size: int | Sequence[int] | None,
         *,
         target: Array | None,
+        kind: Kind | None,
         measuring: Measuring | None,
         method: Method,
         scale_weight: float,
@@ -87,6 +92,7 @@ class Request:
         as_choice(interpolation, "interpolation", ("nearest", "linear", "cubic"))
         check_sizes(augment_scales)
         closed, number = as_wrap(wrap), as_seed(seed)
+        said = None if kind is None else as_kind(kind)
         asked = None if target is None else as_map(target, "target")
         if size is None:
             size = [2 * n for n in known.shape] if asked is None else asked.shape
@@ -94,14 +100,21 @@ class Request:
         shape = (sides[0], sides[1])
         if isinstance(scale_map, str):
             as_choice(scale_map, "scale_map", ("auto",))
-            mine = find_scale(known, measuring)
+            scale = find_scale(known, measuring)
         elif measuring is not None:
             raise InvalidInput("measuring: a scale map is given, so that nothing is measured; leave out one of them")
         else:
-            mine = as_map(scale_map, "scale_map", known.shape)
+            scale = scale_map
+        mine = as_map(scale, "scale_map", known.shape)
+        kinds = find_kind(scale) or said, find_kind(scale if target is None else target) or said
         wanted = scale_maps.resample(mine if asked is None else asked, shape)
         check_wrap(wanted, closed, asked is None)
-        return cls(known, mine, wanted, method, strength, augment_scales, closed, number, interpolation)
+        return cls(known, mine, wanted, kinds, method, strength, augment_scales, closed, number, interpolation)
+
+    def match_kinds(self, power: float) -> Request:
+        """Return the request with a target that holds what the exemplar's map does: a power of it holds widths."""
+        theirs = {None: power, "width": 1.0, "area": AREAS}[self.kinds[1]]
+        return self if theirs == power else replace(self, target=power_single(self.target, theirs / power))
 
 
 def find_scale(exemplar: Exemplar, measuring: Measuring | None) -> Floats:
