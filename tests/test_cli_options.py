@@ -23,7 +23,7 @@ GROUP: Any = typer.main.get_command(app)
 VERBS = {name: make_verb(name) for name in NAMES}
 STANDING = {name: (verb.options,) for name, verb in VERBS.items()} | {
     "analyse": (_elements.PICTURED,),
-    "apply": (_maps.RENDERED, _maps.BLENDED),
+    "apply": (_maps.APPLIED,),
 }
 """Commands that stand for a function, and all of the options that they take from it."""
 

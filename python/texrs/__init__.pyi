@@ -2,7 +2,7 @@
 from . import elements, errors, exemplar, fields, io, judging, kernels, layouts, planes, samples, scale_maps, volume
 from ._threads import threads
 from ._version import __version__
-from .blending import blend
+from .blending import apply, blend
 from .completion import complete
 from .database import TextureDatabase
 from .elements import Elements
@@ -17,7 +17,7 @@ from .papers.splice import self_splice, splice
 from .planes import Plane, View
 from .rectification import rectify
 from .removal import remove
-from .source_map import Reuse, SourceMap
+from .source_map import Finish, Reuse, SourceMap
 from .synthesis import Synthesis
 from .tiling import tile
 
@@ -27,6 +27,7 @@ __all__ = [
     "ElementOptions",
     "Elements",
     "Exemplar",
+    "Finish",
     "Guide",
     "Plane",
     "PlaneTexture",
@@ -37,6 +38,7 @@ __all__ = [
     "TextureDatabase",
     "View",
     "__version__",
+    "apply",
     "blend",
     "complete",
     "design",

@@ -135,6 +135,7 @@ def extend(
     # It copies nothing from beyond the photograph's borders.
     inside = np.clip(places, 0, [rows - 1, columns - 1]).astype(np.float32)
     source = made.source.compose(SourceMap.from_coordinates(inside, (rows, columns)))
+    source = source.finished((False, False), antialias=True)
     report: dict[str, Any] = {**made.report, "plane": seen.plane.as_dict(), "found": seen.found, "added": added}
     composite = source.render(pixels, antialias=True)
     if np.asarray(image).ndim == 2:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_image, as_seed, as_size, as_wrap, check_memory, guidance
 from texrs._typing import Array, Bools, Interpolation, Progress
+from texrs.blending import apply
 from texrs.errors import InvalidInput
 from texrs.planes import Plane, View
 from texrs.planes._choose import see
@@ -124,12 +125,14 @@ def rectify(
         )
     known, _ = lay(plane, start, sides, fine)
     texture = known.render(pixels, interpolation=interpolation, antialias=True)
-    source, grown, corrected = grow(texture, asked, cyclic, number, watch)
-    source = source.compose(known)
+    laid, grown = grow(texture, asked, cyclic, number, watch)
+    # Seams of a texture that is grown are made to disappear as those of any other.
+    rest = {} if laid.finish is None else {"screening": laid.finish.screening, "across": laid.finish.across}
+    source = laid.compose(known).finished(cyclic, interpolation=interpolation, antialias=True, **rest)
     as_it_is = source.shape == known.shape and not any(cyclic)
     composite = texture if as_it_is else source.render(pixels, interpolation=interpolation, antialias=True)
     squeeze = np.asarray(image).ndim == 2
-    shown = composite if corrected is None else corrected
+    shown = apply(source, pixels, progress=watch) if rest.get("screening") else composite
     stages = {
         "flat": sheet.source.render(pixels, interpolation="linear"),
         "sharp": sheet.sharp,
@@ -287,18 +290,17 @@ def cut(source: SourceMap, box: tuple[slice, slice]) -> SourceMap:
 
 def grow(
     flat: Array, size: tuple[int, ...] | None, wrap: tuple[bool, ...], seed: int, watch: Progress
-) -> tuple[SourceMap, str, Array | None]:
-    """Return the map of a texture of any size, cyclic or not, into a flat one; by what, and its picture where corrected."""
+) -> tuple[SourceMap, str]:
+    """Return the map of a texture of any size, cyclic or not, into a flat one, and by what it was made."""
     shape = (flat.shape[0], flat.shape[1])
     if any(wrap):
         made = tile(flat, wrap=wrap, size=size, progress=watch)
-        return made.source, "tile", None
+        return made.source, "tile"
     if size is None or size == shape:
-        return SourceMap.identity(shape), "nothing", None
+        return SourceMap.identity(shape), "nothing"
     if all(n <= m for n, m in zip(size, shape, strict=True)):
         places = [slice((m - n) // 2, (m - n) // 2 + n) for n, m in zip(size, shape, strict=True)]
-        return cut(SourceMap.identity(shape), (places[0], places[1])), "nothing", None
+        return cut(SourceMap.identity(shape), (places[0], places[1])), "nothing"
     from texrs.papers.design import design
 
-    made = design(flat, size, seed=seed, wrap=False, progress=watch)
-    return made.source, "design", made.image
+    return design(flat, size, seed=seed, wrap=False, progress=watch).source, "design"

@@ -14,6 +14,7 @@ import numpy as np
 
 from texrs._arrays import as_float, as_image, as_int, as_mask, as_seed
 from texrs._typing import Array, Bools, Progress
+from texrs.blending import apply
 from texrs.completion import complete
 from texrs.completion._holes import widen
 from texrs.errors import InvalidInput
@@ -141,8 +142,13 @@ def remove(
         if part.any():
             before = pixels if made is None else made.image
             new = complete(before, open_, allowed=usable if usable.any() else None, scale_map=scale, **options)
-            source = new.source if made is None else new.source.compose(made.source)
-            made = Synthesis(new.image, source, new.stages, new.report)
+            source, result = new.source, new.image
+            if made is not None:
+                source = source.compose(made.source)
+                how = {"within": source.label > 0, "known": (~hole,)} if screening else {}
+                source = source.finished((False, False), screening=screening or None, **how)
+                result = apply(source, pixels)
+            made = Synthesis(result, source, new.stages, new.report)
             steps.append(new.report["patches"])
     assert made is not None
     squeeze = np.asarray(image).ndim == 2

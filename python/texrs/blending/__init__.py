@@ -13,20 +13,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from texrs._arrays import as_bool, as_float, as_image, as_int, as_list, as_mask, as_wrap
+from texrs._arrays import as_bool, as_choice, as_float, as_image, as_int, as_list, as_mask, as_wrap
 from texrs._typing import Array, Floats, Interpolation, Progress
 from texrs.blending._correction import divide_strips, solve_correction
 from texrs.blending._seams import Look, Seam, take_rows
 from texrs.blending._values import Samples
 from texrs.blending._visibility import Visibility, measure_visibility
 from texrs.errors import InvalidInput
-from texrs.source_map import SourceMap
+from texrs.source_map import Finish, SourceMap
 
-__all__ = ["SCREENING", "Visibility", "blend", "measure_visibility"]
+__all__ = ["SCREENING", "Visibility", "apply", "blend", "measure_visibility"]
 
 SCREENING = 0.15
 """Weight of the values: with less, rare colours drift by three grey levels and more, with this by two; seams show 1 to
@@ -45,6 +45,7 @@ def blend(
     across: bool = True,
     outlines: bool = True,
     interpolation: Interpolation = "cubic",
+    antialias: bool = False,
     kind: Literal["colour", "normal"] = "colour",
     green: Literal["up", "down"] = "up",
     progress: Progress | None = None,
@@ -84,6 +85,8 @@ def blend(
         Whether the step across a seam stays where it is the outline of a thing. False: all steps are evened out, as the
         paper does.
     interpolation : {"cubic", "linear", "nearest"}
+        As in `SourceMap.render`.
+    antialias : bool
         As in `SourceMap.render`.
     kind, green
         As in `SourceMap.render`; normals are brought back to unit length.
@@ -138,7 +141,7 @@ def blend(
     weight = as_float(screening, "screening", 0, 1e6)
     width = None if band is None else as_int(band, "band", 1, 2**31)
     inside = None if within is None else as_mask(within, "within", source.shape)
-    result = source.render(exemplars, interpolation=interpolation, kind=kind, green=green)
+    result = source.render(exemplars, interpolation=interpolation, antialias=antialias, kind=kind, green=green)
     several = as_list(exemplars)
     shown = None if known is None else as_known(known, source.shapes)
     samples = Samples.scale([as_image(e) for e in several], kind)
@@ -163,6 +166,89 @@ def blend(
         if progress is not None:
             progress("blend", (number + 1) / len(steps))
     return result
+
+
+def apply(
+    source: SourceMap,
+    exemplars: Array | Sequence[Array],
+    *,
+    kind: Literal["colour", "normal", "label"] = "colour",
+    green: Literal["up", "down"] = "up",
+    finish: Finish | None = None,
+    progress: Progress | None = None,
+) -> Array:
+    """Look a map of the exemplar up through a source map, and finish it as the verb that made it finished its picture.
+
+    ``apply(result.source, exemplar)`` is ``result.image``, bit for bit, but where things are lit anew (`texrs.splice`): seams
+    disappear, samples are interpolated, and what is kept is kept, in the same way. Of a map without a finish nothing is
+    corrected.
+
+    Parameters
+    ----------
+    source : SourceMap
+        Of a picture or a volume.
+    exemplars : array, or a sequence of one an exemplar
+        Any map of the exemplar's height and width (and depth), any dtype and channels.
+    kind : {"colour", "normal", "label"}
+        "normal": a tangent-space normal map, as in `SourceMap.render`. "label": values that have no meaning between them; the
+        nearest sample is taken, and nothing corrected.
+    green : {"up", "down"}
+        Whether the y of normals grows up (OpenGL) or down (DirectX).
+    finish : Finish, optional
+        Another finish than that of the map.
+    progress : callable, optional
+        Called as ``progress("blend", share)`` where seams are corrected; raising stops the work.
+
+    Returns
+    -------
+    array
+        Shape of the output with the map's channels, in the map's dtype.
+
+    Raises
+    ------
+    InvalidInput
+        Another number of exemplars, or of another size, than the map was made from; a kind that is not known.
+
+    See Also
+    --------
+    texrs.SourceMap.render : The look-up alone.
+    blend : The correction alone, in any strength.
+
+    Examples
+    --------
+    >>> import texrs
+    >>> pebbles = texrs.samples.pebbles((64, 64)).image
+    >>> result = texrs.design(pebbles, 64)
+    >>> bool((texrs.apply(result.source, pebbles) == result.image).all())
+    True
+    >>> heights = pebbles[..., :1].astype("float32")
+    >>> texrs.apply(result.source, heights).dtype
+    dtype('float32')
+
+    """
+    as_choice(kind, "kind", ("colour", "normal", "label"))
+    if kind == "label":
+        return source.render(exemplars, interpolation="nearest")
+    how = finish or source.finish
+    if how is None or how.screening is None:
+        rest: dict[str, Any] = {} if how is None else {"interpolation": how.interpolation, "antialias": how.antialias}
+        return source.render(exemplars, kind=kind, green=green, **rest)
+    return blend(
+        source,
+        exemplars,
+        wrap=how.wrap,
+        screening=how.screening,
+        band=how.band,
+        within=how.within,
+        known=how.known,
+        across=how.across,
+        outlines=how.outlines,
+        interpolation=how.interpolation,
+        antialias=how.antialias,
+        kind=kind,
+        green=green,
+        progress=progress,
+    )
 
 
 def _scale_progress(progress: Progress, number: int, steps: int) -> Callable[[float], object]:

@@ -3,39 +3,38 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 from texrs import io
 from texrs._arrays import as_float
 from texrs._threads import threads
-from texrs.blending import blend
+from texrs.blending import apply
 from texrs.cli import _outputs
 from texrs.cli._console import note, say
-from texrs.cli._options import Options, check_needed, take_options
+from texrs.cli._options import Options, take_options
 from texrs.cli._outputs import Quiet, Threads, describe, make_argument, name_arguments, to_write
 from texrs.errors import FileError, InvalidInput
-from texrs.source_map import SourceMap
+from texrs.source_map import Finish, SourceMap
 
-RENDERED = Options(SourceMap.render, leave={"exemplars": "they are arguments, as many as wanted"})
-BLENDED = Options(
-    blend,
-    names={"screening": "blend"},
+APPLIED = Options(
+    apply,
+    names={"finish.screening": "blend"},
     leave={
         "source": "it is an argument",
         "exemplars": "they are arguments, as many as wanted",
-        "known": "one an exemplar, and no map is of them",
-        "interpolation": "as of render",
-        "kind": "as of render",
-        "green": "as of render",
+        "finish.known": "one an exemplar, and no map is of them",
     },
-    optional={"wrap": "xy", "screening": "0"},
+    optional=dict.fromkeys(
+        ("wrap", "interpolation", "antialias", "screening", "across", "outlines"), "as the map says"
+    ),
 )
 
 
-@take_options(RENDERED, BLENDED)
+@take_options(APPLIED)
 def apply_command(
     source: Annotated[str, make_argument("MAP.npz", "A source map that --map wrote.")],
     maps: Annotated[list[str], make_argument("IMAGE", "Images in register with the exemplar.")],
@@ -44,33 +43,37 @@ def apply_command(
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
-    """Make the heights, normals or labels of a result, through its source map."""
-    options = RENDERED.call(RENDERED.read(given))
-    weight, blended = given["screening"], BLENDED.read(given, which=lambda o: not o.file)
-    if not weight:
-        check_needed({**given, "screening": None}, {"--blend": BLENDED}, "")
-    as_float(weight or 0.0, "--blend", 0, 1e6)
+    """Make the heights, normals or labels of a result through its source map, finished as the result was."""
+    values = APPLIED.read(given, which=lambda o: not o.file)
     places = SourceMap.load(source)
-    if weight and places.axes != 2:
+    if given["finish_screening"] and places.axes != 2:
         raise InvalidInput("--blend: is for pictures; the source map is that of a volume")
     groups = group(maps, len(places.shapes))
     targets = name_targets(groups, out, [source, *maps])
     read = io.read if places.axes == 2 else io.read_volume
     write = io.write if places.axes == 2 else io.write_volume
-    blended |= {("wrap",): (True, True)} | blended | BLENDED.read(given, which=lambda o: o.file)
+    finish = change_finish(places, values | APPLIED.read(given, which=lambda o: o.file))
     # All results or none take their names, at the end.
     with ExitStack() as stack, threads(count):
         for paths, target in zip(groups, targets, strict=True):
             images = [read(path) for path in paths]
             _outputs.check_output(target, images[0], places.shape)
             temporary = stack.enter_context(_outputs.write_output(target))
-            with name_arguments(**BLENDED.name_values(given), exemplars=" and ".join(paths)):
-                if weight:
-                    image = blend(places, images, **BLENDED.call(blended), **options)
-                else:
-                    image = places.render(images, **options)
+            with name_arguments(**APPLIED.name_values(given), exemplars=" and ".join(paths)):
+                image = apply(
+                    places, images, finish=finish, **{path[0]: v for path, v in values.items() if len(path) == 1}
+                )
             write(temporary, image)
             note(f"{paths[0]} gives {target}: {describe(image, places.axes)}", quiet=quiet)
+
+
+def change_finish(places: SourceMap, values: Mapping[tuple[str, ...], Any]) -> Finish:
+    """Return how results are finished: as the map says, but for what is said here."""
+    known = places.finish or Finish((True,) * places.axes)
+    fields = {path[1]: value for path, value in values.items() if path[0] == "finish"}
+    if "screening" in fields:
+        fields["screening"] = as_float(fields["screening"], "--blend", 0, 1e6) or None
+    return replace(known, **fields)
 
 
 def info_command(file: Annotated[str, make_argument("FILE", "An image or a source map.")]) -> None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_bool, as_float, as_image, as_int, as_mask, as_method, as_seed, as_wrap
 from texrs._typing import Array, Bools, Floats, Progress
-from texrs.blending import blend as correct_colours
+from texrs.blending import apply
 from texrs.completion._depth import fill_in_depth
 from texrs.completion._holes import widen
 from texrs.completion._optimise import optimise, recover_scale
@@ -200,11 +200,11 @@ def complete(
         result[new] = pictures[-1][row, column]
     composite = result
     if screening and count:
-        known = [~open_, *(np.ones(s, bool) for s in shapes[1:])]
-        replaced = places.label > 0
-        result = correct_colours(
-            places, pictures, wrap=cyclic, screening=screening, within=replaced, known=known, progress=progress
-        )
+        known = (~open_, *(np.ones(s, bool) for s in shapes[1:]))
+        places = places.finished(cyclic, screening=screening, within=places.label > 0, known=known)
+        result = apply(places, pictures, progress=progress)
+    else:
+        places = places.finished(cyclic)
     watch("done", 1.0)
     bare = pictures[0].copy()
     # The hole is painted over with a known pixel, which does not change the least value.

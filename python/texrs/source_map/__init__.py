@@ -7,7 +7,7 @@ map that is in register with the exemplar: colours, normals, heights, labels, in
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -18,9 +18,10 @@ from texrs._typing import Array, Bools, Frames, Interpolation, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.kernels.gather import gather
 from texrs.source_map._antialias import gather_smoothed
+from texrs.source_map._finish import Finish
 from texrs.source_map._pixels import Pixels, divide_bands, label_pieces, number_pairs
 
-__all__ = ["Reuse", "SourceMap"]
+__all__ = ["Finish", "Reuse", "SourceMap"]
 
 FORMAT = 1
 """Version of the file layout."""
@@ -65,6 +66,9 @@ class SourceMap:
         output.
     shapes : tuple of tuple of int
         Shapes of the exemplars, without channels: what `render` expects.
+    finish : Finish, optional
+        How the verb that made the map finished its picture, which `texrs.apply` does with other maps; none of maps that are
+        put together by hand.
 
     """
 
@@ -73,6 +77,7 @@ class SourceMap:
     label: NDArray[np.uint32]
     frame: NDArray[np.float32] | Frames | None
     shapes: tuple[tuple[int, ...], ...]
+    finish: Finish | None = None
 
     def __post_init__(self) -> None:
         """Check that the parts agree."""
@@ -181,6 +186,29 @@ class SourceMap:
         sides = coordinates.shape[:-1]
         patches = np.zeros(sides, np.uint32) if label is None else label
         return cls(coordinates, np.zeros(sides, np.uint16), patches, frame, (shape,))
+
+    def finished(self, wrap: Sequence[bool], **how: Any) -> SourceMap:
+        """Return the map of a picture that is finished in a way.
+
+        Parameters
+        ----------
+        wrap : sequence of bool
+            Axes along which the picture is cyclic.
+        **how : object
+            The other attributes of a `Finish`.
+
+        Returns
+        -------
+        SourceMap
+
+        Examples
+        --------
+        >>> from texrs import SourceMap
+        >>> SourceMap.identity((2, 3)).finished((True, True), screening=0.15).finish.screening
+        0.15
+
+        """
+        return replace(self, finish=Finish(tuple(wrap), **how))
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -534,6 +562,8 @@ class SourceMap:
         }
         if (frame := self.frame_array()) is not None:
             parts["frame"] = frame
+        if self.finish is not None:
+            parts |= self.finish.arrays()
         with atomic(path) as temporary, open(temporary, "wb") as file:
             np.savez_compressed(file, **parts)
 
@@ -549,7 +579,7 @@ class SourceMap:
         Returns
         -------
         SourceMap
-            With the frames as an array.
+            With the frames as an array, and its finish.
 
         Raises
         ------
@@ -577,7 +607,10 @@ class SourceMap:
             raise FileError(f"{path}: has another layout than {FORMAT}, which this version of texrs reads")
         try:
             shapes = tuple(tuple(int(n) for n in s) for s in parts["shapes"])
-            return cls(parts["coordinates"], parts["exemplar"], parts["label"], parts.get("frame"), shapes)
+            made = cls(parts["coordinates"], parts["exemplar"], parts["label"], parts.get("frame"), shapes)
+            if "finish" not in parts:
+                return made
+            return replace(made, finish=Finish.from_arrays(parts, made.shape, shapes))
         except (InvalidInput, TypeError, ValueError) as error:
             raise FileError(f"{path}: is damaged ({error})") from None
 

@@ -114,6 +114,7 @@ def tile(
         source, firsts = extend(exemplar.guidance, wanted, cyclic, watch), (0, 0)
     else:
         source, found, firsts = join_ends(exemplar.guidance, wanted, choices, cyclic, watch)
+    source = source.finished(cyclic)
     result = source.render(exemplar.image)
     watch("done", 1.0)
     stages = {

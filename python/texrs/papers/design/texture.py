@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from texrs._typing import Array, Floats, Progress
-from texrs.blending import blend, measure_visibility
+from texrs.blending import apply, measure_visibility
 from texrs.exemplar.regularity import bend
 from texrs.exemplar.symmetry import flip_frame
 from texrs.kernels.gather import gather
@@ -23,7 +23,7 @@ from texrs.papers.design.tiles import Tile
 from texrs.quilting import Picture, quilt
 from texrs.source_map import SourceMap
 
-__all__ = ["correct_colours", "stitch_tiles"]
+__all__ = ["correct_colours", "say_finish", "stitch_tiles"]
 
 PATCH, OVERLAP = 0.6, 0.25
 """Side of a patch and overlap of two, as shares of the exemplar's shorter side."""
@@ -161,20 +161,22 @@ def measure_depth(plan: Plan) -> Floats:
     return DEEP * parts.measure_depth(DEEP)
 
 
+def say_finish(composite: SourceMap, arguments: Arguments) -> SourceMap:
+    """Say how the colours of a texture are corrected so that its seams disappear (section 3.6)."""
+    wrap, literal = arguments.wrap, arguments.literal
+    if not arguments.screening:
+        return composite.finished(wrap)
+    if literal:
+        return composite.finished((False, False), screening=0.0)
+    return composite.finished(wrap, screening=arguments.screening, across=False)
+
+
 def correct_colours(composite: SourceMap, picture: Array, arguments: Arguments) -> tuple[Array, dict[str, Any]]:
-    """Correct the colours of a picture so that its seams disappear (section 3.6), and measure the seams before and after."""
-    images, wrap, literal = arguments.images, arguments.wrap, arguments.literal
+    """Correct the colours of a picture as its map says, and measure the seams before and after."""
+    images, wrap = arguments.images, arguments.wrap
     before = after = measure_visibility(composite, images, picture, wrap=wrap)
     image = picture
     if arguments.screening:
-        image = blend(
-            composite,
-            images,
-            wrap=False if literal else wrap,
-            screening=0.0 if literal else arguments.screening,
-            across=literal,
-            outlines=not literal,
-            progress=arguments.watch,
-        )
+        image = apply(composite, images, progress=arguments.watch)
         after = measure_visibility(composite, images, image, wrap=wrap)
     return image, {"before": asdict(before), "after": asdict(after)}

@@ -18,7 +18,7 @@ from texrs.papers.design.deformation import deform_elements
 from texrs.papers.design.literal import move_layers
 from texrs.papers.design.options import DeformationOptions
 from texrs.papers.design.plan import Plan
-from texrs.papers.design.texture import correct_colours, stitch_tiles
+from texrs.papers.design.texture import correct_colours, say_finish, stitch_tiles
 from texrs.papers.design.tiles import Tile, fill_holes
 from texrs.source_map import SourceMap
 
@@ -33,7 +33,7 @@ TILES = 2
 
 
 def make_composite(plans: Sequence[Plan], arguments: Arguments, seed: int) -> tuple[list[Tile], SourceMap]:
-    """Deform the elements of each tile, fill its holes, and stitch the tiles: steps 2 to 5."""
+    """Deform the elements of each tile, fill its holes, and stitch the tiles: steps 2 to 5; say how it is finished."""
     tiles = []
     count = arguments.tiles * len(plans)
     for number in range(count):
@@ -44,7 +44,7 @@ def make_composite(plans: Sequence[Plan], arguments: Arguments, seed: int) -> tu
             continue
         draft = move_layers(plan, seed, which, tile) if plan.literal else deform_elements(plan, seed, tile)
         tiles.append(fill_holes(draft, plan, arguments.shapes, which, (seed + tile) % 2**64))
-    return tiles, stitch_tiles(plans, tiles, arguments, seed)
+    return tiles, say_finish(stitch_tiles(plans, tiles, arguments, seed), arguments)
 
 
 def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, arguments: Arguments) -> Plan:

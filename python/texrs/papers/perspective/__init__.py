@@ -190,7 +190,7 @@ def perspective(
     )
     source = SourceMap.from_coordinates(
         found.coordinates, asked.exemplar.shape, label=found.patches, frame=found.frames
-    )
+    ).finished(asked.wrap, interpolation=asked.interpolation, antialias=True)
     composite = source.render(asked.exemplar.image, interpolation=asked.interpolation, antialias=True)
     stages = {"sheet": sheet.show(asked.exemplar.image), "target": wanted, "composite": composite}
     return Synthesis(composite, source, stages, describe(asked, sheet, found, outside))

@@ -136,6 +136,7 @@ class _Texture:
         region = Region(as_size(size, axes=self.axes), start, (False,) * self.axes)
         self._check(region)
         places, source = self._look(region, progress)
+        source = source.finished(region.wrap, interpolation=self._how)
         image = self._show(places)
         report = {
             "quality": self._quality,

@@ -30,6 +30,7 @@ def crop(a: Elements, size: Sequence[int]) -> Synthesis:
     first = [(n - m) // 2 for n, m in zip(shape, size, strict=True)]
     places = np.moveaxis(np.indices(tuple(size)), 0, -1) + first
     source = SourceMap.from_coordinates(places.astype(np.float32), (shape[0], shape[1]))
+    source = source.finished((False, False), interpolation="nearest")
     image = source.render(a.image, interpolation="nearest")
     matches = [
         {"target": place, "found": place, "realised": None, "element": k, "point": list_place(point)}
@@ -78,7 +79,9 @@ def report_resized(
     a: Elements, entry: Elements, resized: Synthesis, edited: Synthesis, steps: Sequence[Step]
 ) -> Synthesis:
     """Return an edit of a texture in another size as one of the texture itself."""
-    whole = edited.source if edited is resized else edited.source.compose(resized.source)
+    whole = edited.source
+    if edited is not resized:
+        whole = replace(whole.compose(resized.source), finish=whole.finish)
     report: dict[str, Any] = {
         **edited.report,
         "edit": list(steps),

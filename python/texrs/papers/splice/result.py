@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Array, Bools
-from texrs.blending import blend
+from texrs.blending import apply
 from texrs.elements import Elements, Layout
 from texrs.papers.splice.backward_warp import BackwardWarp
 from texrs.papers.splice.energy import choose_coarseness
@@ -47,9 +47,10 @@ def compose(
     size = label.shape
     frames = _make_frames(filled.mirrored)
     source = SourceMap.from_coordinates(places.astype(np.float32), shape, label=label, frame=frames)
+    source = say_finish(source, screening)
     image = source.render(a.image, interpolation="nearest")
     if screening:
-        image = correct_colours(a, source, screening, light, None if light is None else light.spread(size))
+        image = correct_colours(a, source, light, None if light is None else light.spread(size))
     step = STEP if a.layout == Layout.DISJOINT else choose_coarseness(match.extension.mask.shape)
     matches, realised = _list_matches(a, match)
     report: dict[str, Any] = {
@@ -74,10 +75,11 @@ def compose_edit(a: Elements, laid: Rearrangement, *, seed: int, screening: floa
     """Return the result of an edit whose elements were rearranged."""
     shape = (a.mask.shape[0], a.mask.shape[1])
     source = SourceMap.from_coordinates(laid.filled.places.astype(np.float32), shape, label=laid.label)
+    # Elements keep their colours, which another one that they cover would change.
+    source = say_finish(source, screening if laid.changed.any() else 0.0, laid.changed & ~laid.pasted)
     image = source.render(a.image, interpolation="nearest")
     if screening and laid.changed.any():
-        # Elements keep their colours, which another one that they cover would change.
-        lit = correct_colours(a, source, screening, laid.light, laid.field, laid.changed & ~laid.pasted)
+        lit = correct_colours(a, source, laid.light, laid.field)
         image[laid.changed] = lit[laid.changed]
     matches, realised = _list_matches(a, laid.match)
     report: dict[str, Any] = {
@@ -98,18 +100,17 @@ def compose_edit(a: Elements, laid: Rearrangement, *, seed: int, screening: floa
     return Synthesis(image, source, draw_stages(a, None, laid.match, None, laid.draft, laid.filled, image), report)
 
 
-def correct_colours(
-    a: Elements,
-    source: SourceMap,
-    screening: float,
-    light: Light | None,
-    field: NDArray[np.float32] | None,
-    within: Bools | None = None,
-) -> Array:
-    """Return the picture of a source map in the light that is to fall on it, with its seams made to disappear."""
+def say_finish(source: SourceMap, screening: float, within: Bools | None = None) -> SourceMap:
+    """Say how the seams of a picture are made to disappear."""
+    if not screening:
+        return source.finished((False, False), interpolation="nearest")
     # Between whole pixels nothing is looked up: "linear" is "nearest" that may be corrected.
-    shown = a.image if light is None else light.even
-    image = blend(source, shown, wrap=False, screening=screening, within=within, interpolation="linear")
+    return source.finished((False, False), interpolation="linear", screening=screening, within=within)
+
+
+def correct_colours(a: Elements, source: SourceMap, light: Light | None, field: NDArray[np.float32] | None) -> Array:
+    """Return the picture of a source map in the light that is to fall on it, with its seams made to disappear."""
+    image = apply(source, a.image if light is None else light.even)
     if light is None or field is None:
         return image
     return light.put_back(image, field, source.coordinates.astype(np.int32), a.image)

@@ -1,0 +1,106 @@
+"""How a picture is finished when it is looked up: kept with its source map, so that other maps are finished in the same way."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+
+from texrs._arrays import as_bool, as_choice, as_float, as_int
+from texrs._typing import Array, Bools, Interpolation
+from texrs.errors import InvalidInput
+
+__all__ = ["Finish"]
+
+PLAIN = ("wrap", "interpolation", "antialias", "screening", "band", "across", "outlines")
+"""What is said in words; the rest are masks."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Finish:
+    """How a verb looks its exemplar up through its source map, and makes the seams disappear.
+
+    `texrs.apply` does the same with any map in register, and ``texrs apply`` with files.
+
+    Attributes
+    ----------
+    wrap : tuple of bool
+        Axes along which the picture is cyclic.
+    interpolation : {"cubic", "linear", "nearest"}
+        Between samples.
+    antialias : bool
+        Whether the exemplar is smoothed where it is shrunk.
+    screening : float, optional
+        Weight of the values when seams are made to disappear, see `texrs.blend`. None: they stay as they are.
+    band : int, optional
+        Correct only what is at most this many pixels from a seam; all else keeps its values. None: everything.
+    across : bool
+        Whether values are corrected also where two exemplars meet.
+    outlines : bool
+        Whether the step across a seam stays where it is the outline of a thing.
+    within : (rows, columns) bool, optional
+        Correct only pixels that are True; all else keeps its values. None: everything.
+    known : tuple of (h, w) bool, optional
+        What of each exemplar may be looked at beyond a seam. None: everything.
+
+    """
+
+    wrap: tuple[bool, ...]
+    interpolation: Interpolation = "cubic"
+    antialias: bool = False
+    screening: float | None = None
+    band: int | None = None
+    across: bool = True
+    outlines: bool = True
+    within: Bools | None = None
+    known: tuple[Bools, ...] | None = None
+
+    def arrays(self) -> dict[str, Array]:
+        """Return what is written to a file: the words as the bytes of a JSON text, and the masks."""
+        words = json.dumps({name: getattr(self, name) for name in PLAIN})
+        parts: dict[str, Array] = {"finish": np.frombuffer(words.encode(), np.uint8)}
+        if self.within is not None:
+            parts["finish/within"] = self.within
+        parts |= {f"finish/known/{i}": mask for i, mask in enumerate(self.known or ())}
+        return parts
+
+    @classmethod
+    def from_arrays(
+        cls, parts: Mapping[str, Array], shape: tuple[int, ...], shapes: tuple[tuple[int, ...], ...]
+    ) -> Finish:
+        """Return what `arrays` wrote of a map of a shape, which looks into exemplars of other shapes.
+
+        Raises
+        ------
+        InvalidInput
+            Something else, or masks of other shapes.
+        ValueError
+            Not the text that is expected.
+
+        """
+        words: dict[str, Any] = json.loads(parts["finish"].tobytes())
+        if not isinstance(words, dict) or words.keys() != set(PLAIN):
+            raise InvalidInput(f"finish: needs {', '.join(PLAIN)}")
+        if not isinstance(words["wrap"], list) or len(words["wrap"]) != len(shape):
+            raise InvalidInput(f"finish: wrap needs {len(shape)} values")
+        masks = [parts[name] for i in range(len(shapes)) if (name := f"finish/known/{i}") in parts]
+        within = parts.get("finish/within")
+        if masks and [m.shape for m in masks] != list(shapes):
+            raise InvalidInput(f"finish: known needs masks of shapes {shapes}")
+        if within is not None and within.shape != shape:
+            raise InvalidInput(f"finish: within needs a mask of shape {shape}")
+        screening, band = words["screening"], words["band"]
+        return cls(
+            tuple(as_bool(w, "wrap") for w in words["wrap"]),
+            cast(Interpolation, as_choice(words["interpolation"], "interpolation", ("nearest", "linear", "cubic"))),
+            as_bool(words["antialias"], "antialias"),
+            None if screening is None else as_float(screening, "screening", 0, 1e6),
+            None if band is None else as_int(band, "band", 1, 2**31),
+            as_bool(words["across"], "across"),
+            as_bool(words["outlines"], "outlines"),
+            None if within is None else within.astype(np.bool_),
+            tuple(m.astype(np.bool_) for m in masks) if masks else None,
+        )

@@ -1,0 +1,93 @@
+"""Source maps say how their pictures were finished: other maps are finished in the same way."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import texrs
+from texrs import Finish, SourceMap, Synthesis, samples
+from texrs.errors import FileError, InvalidInput
+
+PEBBLES = samples.pebbles((64, 80)).image
+HOLE = np.zeros((64, 80), np.bool_)
+HOLE[20:40, 30:50] = True
+FLOOR = samples.load("tilted_discs", size=(96, 112)).image
+
+VERBS: dict[str, tuple[Callable[[], Synthesis], np.ndarray]] = {
+    "design": (lambda: texrs.design(PEBBLES, (72, 64)), PEBBLES),
+    "design without blending": (lambda: texrs.design(PEBBLES, 64, blend=None), PEBBLES),
+    "design as printed": (lambda: texrs.design(PEBBLES, 64, method="paper"), PEBBLES),
+    "tile": (lambda: texrs.tile(PEBBLES), PEBBLES),
+    "complete": (lambda: texrs.complete(PEBBLES, HOLE), PEBBLES),
+    "complete and blend": (lambda: texrs.complete(PEBBLES, HOLE, blend=0.1), PEBBLES),
+    "synthesize": (lambda: texrs.synthesize(PEBBLES, 64), PEBBLES),
+    "perspective": (lambda: texrs.perspective(FLOOR, texrs.scale_maps.from_angles((96, 112), 34, 90), 64), FLOOR),
+    "rectify": (lambda: texrs.rectify(FLOOR, view=texrs.View(slant=34, fov=60)), FLOOR),
+    "rectify and grow": (lambda: texrs.rectify(FLOOR, size=150, view=texrs.View(slant=34, fov=60)), FLOOR),
+    "extend": (lambda: texrs.extend(FLOOR, right=24, view=texrs.View(slant=34, fov=60)), FLOOR),
+    "remove": (lambda: texrs.remove(FLOOR, np.pad(HOLE, ((0, 32), (0, 32))), view=texrs.View(slant=34, fov=60)), FLOOR),
+    "self-splice": (
+        lambda: texrs.self_splice(samples.dots((64, 64)).image, "regularise"),
+        samples.dots((64, 64)).image,
+    ),
+}
+
+
+@pytest.fixture(scope="module", params=VERBS)
+def made(request: pytest.FixtureRequest) -> tuple[Synthesis, np.ndarray]:
+    make, image = VERBS[request.param]
+    return make(), image
+
+
+def test_applying_a_map_does_what_the_verb_did(made: tuple[Synthesis, np.ndarray]) -> None:
+    result, image = made
+    again = texrs.apply(result.source, image)
+    assert again.dtype == image.dtype
+    assert (again == result.image).all()
+
+
+def test_a_finish_comes_back_from_a_file(made: tuple[Synthesis, np.ndarray], tmp_path: Path) -> None:
+    result, image = made
+    result.source.save(tmp_path / "map.npz")
+    back = SourceMap.load(tmp_path / "map.npz")
+    assert (texrs.apply(back, image) == result.image).all()
+
+
+def test_labels_are_never_mixed() -> None:
+    source = texrs.design(PEBBLES, 64).source
+    labels = (PEBBLES[..., 0] // 64 * 50).astype(np.uint8)
+    found = texrs.apply(source, labels, kind="label")
+    assert set(np.unique(found)) <= set(np.unique(labels))
+    with pytest.raises(InvalidInput, match="kind: allowed are colour, normal and label"):
+        texrs.apply(source, labels, kind="labels")  # type: ignore[arg-type]
+
+
+def test_another_finish_may_be_asked_for() -> None:
+    source = texrs.design(PEBBLES, 64).source
+    plain = texrs.apply(source, PEBBLES, finish=Finish((True, True)))
+    assert (plain == source.render(PEBBLES)).all()
+    assert (plain != texrs.apply(source, PEBBLES)).any()
+    # Put together by hand a map says nothing, and is looked up.
+    bare = SourceMap(source.coordinates, source.exemplar, source.label, source.frame, source.shapes)
+    assert (texrs.apply(bare, PEBBLES) == plain).all()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"finish": np.zeros(3, np.uint8)},
+        {"finish": np.frombuffer(b"{}", np.uint8)},
+        {"finish/within": np.zeros((3, 3), np.bool_)},
+        {"finish/known/0": np.zeros((3, 3), np.bool_)},
+    ],
+    ids=["no text", "other words", "another hole", "another example"],
+)
+def test_a_damaged_finish_is_said(change: dict[str, np.ndarray], tmp_path: Path) -> None:
+    texrs.complete(PEBBLES, HOLE, blend=0.1).source.save(tmp_path / "map.npz")
+    with np.load(tmp_path / "map.npz") as file:
+        parts = {**file, **change}
+    np.savez(tmp_path / "map.npz", **parts)
+    with pytest.raises(FileError, match="is damaged"):
+        SourceMap.load(tmp_path / "map.npz")
