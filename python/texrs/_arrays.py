@@ -154,8 +154,9 @@ def _as_ndarray(value: object, name: str) -> Array:
 
 def _make_contiguous(array: Array, name: str, dtype: np.dtype[Any]) -> Array:
     """Return the values in a dtype, in order and aligned; a view of less memory than it has values may be of any size."""
-    if array.dtype != dtype or not (array.flags.c_contiguous and array.flags.aligned):
-        check_memory(array.size * dtype.itemsize, name)
+    if array.dtype == dtype and array.flags.c_contiguous and array.flags.aligned:
+        return array
+    check_memory(array.size * dtype.itemsize, name)
     with np.errstate(over="ignore"):
         return np.require(array, dtype, ("C", "A"))
 

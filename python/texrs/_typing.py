@@ -13,6 +13,8 @@ Array: TypeAlias = NDArray[Any]
 Floats: TypeAlias = NDArray[np.float32]
 Bools: TypeAlias = NDArray[np.bool_]
 Labels: TypeAlias = NDArray[np.int32]
+Matrix: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
+"""A linear map of two axes by its rows."""
 Path: TypeAlias = str | PathLike[str]
 Interpolation: TypeAlias = Literal["nearest", "linear", "cubic"]
 Progress: TypeAlias = Callable[[str, float], object]

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import chain, islice, pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_float
 from texrs.errors import InvalidInput
 
-__all__ = ["iterate"]
+__all__ = ["follow", "iterate"]
 
 LOOKED_AT, PERIODIC, STEADY = 64, 1.4, 3
 """Iterates that are looked at; the growth rate up to which the map is periodic anyway; how many equal neighbours tell a fixed
@@ -45,16 +48,32 @@ def iterate(start: float, growth_rate: float = 2.0, count: int = 64, *, burn_in:
     [194, 41, 241, 202, 67]
 
     """
-    x = as_float(start, "start", -1, 1)
-    as_float(growth_rate, "growth_rate", 0, 2)
+    return np.fromiter(follow(start, growth_rate, burn_in=burn_in), np.float64, count)
+
+
+def follow(start: float, growth_rate: float = 2.0, *, burn_in: int = 0) -> Iterator[float]:
+    """Return what `iterate` does one by one, without an end; a bad start is refused at once.
+
+    Examples
+    --------
+    >>> [int(next(values)) for values in 3 * [follow(0.76234783)]]
+    [194, 41, 241]
+
+    """
+    x, rate = as_float(start, "start", -1, 1), as_float(growth_rate, "growth_rate", 0, 2)
     if abs(x) == 1:
         raise InvalidInput(f"start: needs a number inside (-1, 1), got {start!r}")
-    values = np.empty(max(LOOKED_AT, burn_in + count))
-    for k in range(len(values)):
-        values[k] = abs(x)
-        x = 1 - growth_rate * (x * x)
-    if growth_rate > PERIODIC and (np.diff(values[:LOOKED_AT]) == 0).sum() >= STEADY:
+    sizes = (abs(x) for x in walk(x, rate))
+    first = list(islice(sizes, LOOKED_AT))
+    if rate > PERIODIC and sum(a == b for a, b in pairwise(first)) >= STEADY:
         raise InvalidInput(
             f"start: the sequence is absorbed by a fixed point when it starts at {start!r}; take another start"
         )
-    return 255 * values[burn_in : burn_in + count]
+    return (255 * size for size in islice(chain(first, sizes), burn_in, None))
+
+
+def walk(x: float, rate: float) -> Iterator[float]:
+    """Return the iterates of the map."""
+    while True:
+        yield x
+        x = 1 - rate * (x * x)

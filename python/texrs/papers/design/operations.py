@@ -5,18 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from texrs._engine.noise import uniform
+from texrs._typing import Matrix
 from texrs.errors import InvalidInput
 from texrs.exemplar.symmetry import Flip
-from texrs.papers.design.logistic_map import iterate
+from texrs.papers.design.logistic_map import follow
 from texrs.papers.design.options import DeformationOptions
 
-__all__ = ["TRIES", "Moves", "Operation"]
+__all__ = ["TRIES", "Moves", "Operation", "compose"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,18 +31,22 @@ class Operation:
     axis: int
     """T and M: 0 along rows, 1 along columns."""
 
-    def matrix(self) -> NDArray[np.float64]:
-        """Return the linear part, (row, column) order."""
+    def rows(self) -> Matrix:
+        """Return the linear part by its rows, (row, column) order."""
         match self.kind:
             case "R":
                 c, s = math.cos(math.radians(self.amount)), math.sin(math.radians(self.amount))
-                return np.array([[c, -s], [s, c]])
+                return (c, -s), (s, c)
             case "M":
-                return np.diag([-1.0, 1.0]) if self.axis == 0 else np.diag([1.0, -1.0])
+                return ((-1.0, 0.0), (0.0, 1.0)) if self.axis == 0 else ((1.0, 0.0), (0.0, -1.0))
             case "S":
-                return np.eye(2) * self.amount
+                return (self.amount, 0.0), (0.0, self.amount)
             case _:
-                return np.eye(2)
+                return (1.0, 0.0), (0.0, 1.0)
+
+    def matrix(self) -> NDArray[np.float64]:
+        """Return the linear part."""
+        return np.array(self.rows())
 
     def shift(self) -> NDArray[np.float64]:
         """Return the translation, (row, column)."""
@@ -49,6 +55,22 @@ class Operation:
     def describe(self) -> list[Any]:
         """Return kind, extent and axis as the log tells them."""
         return [self.kind, round(self.amount, 3), self.axis]
+
+
+def compose(operations: Sequence[Operation]) -> tuple[Matrix, tuple[float, float]]:
+    """Return the linear part of operations that are done one after the other, and their shift.
+
+    In plain numbers: of so few, arrays take ten times as long.
+    """
+    (a, b), (c, d) = (1.0, 0.0), (0.0, 1.0)
+    shift = [0.0, 0.0]
+    for operation in operations:
+        if operation.kind == "T":
+            shift[operation.axis] += operation.amount
+        else:
+            (p, q), (r, s) = operation.rows()
+            (a, b), (c, d) = (p * a + q * c, p * b + q * d), (r * a + s * c, r * b + s * d)
+    return ((a, b), (c, d)), (shift[0], shift[1])
 
 
 TRIES = 12
@@ -98,11 +120,9 @@ class Moves:
                 near = options.start * (1 - 1e-6 * (start + 1))
                 start = near if (tile, element) != (0, 1) or attempt else options.start
             try:
-                sequence = iterate(start, options.growth_rate, count, burn_in=BURN_IN)
+                return islice(follow(start, options.growth_rate, burn_in=BURN_IN), count)
             except InvalidInput:
                 attempt += 1
-                continue
-            return iter(sequence.tolist())
 
     def draw_operations(
         self, values: Iterator[float], touches: tuple[bool, bool], side: int, reach: float = 1.0
