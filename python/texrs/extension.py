@@ -13,8 +13,10 @@ import numpy as np
 
 from texrs._arrays import as_image, as_int, as_size, check_memory
 from texrs._typing import Array, Progress
+from texrs._verbs import takes_materials
 from texrs.completion import complete
 from texrs.errors import InvalidInput
+from texrs.materials import Material
 from texrs.planes import Plane, View
 from texrs.planes._choose import see
 from texrs.source_map import SourceMap
@@ -28,8 +30,9 @@ LEAST = 0.05
 """Nearer to the horizon than this share of the middle's scale a picture does not go on."""
 
 
+@takes_materials("image")
 def extend(
-    image: Array,
+    image: Array | Material,
     *,
     top: int = 0,
     bottom: int = 0,

@@ -14,10 +14,12 @@ import numpy as np
 
 from texrs._arrays import as_float, as_image, as_int, as_mask, as_seed
 from texrs._typing import Array, Bools, Progress
+from texrs._verbs import takes_materials
 from texrs.blending import apply
 from texrs.completion import complete
 from texrs.completion._holes import widen
 from texrs.errors import InvalidInput
+from texrs.materials import Material
 from texrs.planes import Plane, View, find, find_ground
 from texrs.planes._choose import SURE
 from texrs.synthesis import Synthesis
@@ -36,8 +38,9 @@ FEWEST = 0.02
 """Share of the photograph that something beside the ground must take for anything to lie behind it."""
 
 
+@takes_materials("image")
 def remove(
-    image: Array,
+    image: Array | Material,
     mask: Array,
     *,
     view: View | Plane | None = None,
