@@ -63,6 +63,14 @@ def dress(
     return np.clip(np.rint(shown + rng.normal(0, 3, shown.shape)), 0, 255).astype(np.uint8), ground
 
 
+def look_at_room(shape: tuple[int, int]) -> tuple[NDArray[np.uint8], NDArray[np.bool_], Plane, Plane]:
+    """Return a picture of a floor of pebbles before a brick wall, where it is floor, and both planes; they meet in a line."""
+    floor, wall = Plane(shape, 50, 90, fov=55), Plane(shape, 35, 10, fov=55)
+    y, x = np.indices(shape)
+    low = y - 0.12 * (x - shape[1] / 2) > 0.47 * shape[0]
+    return np.where(low[..., np.newaxis], look("pebbles", floor), look("bricks", wall)), low, floor, wall
+
+
 def look_twice() -> NDArray[np.uint8]:
     """Return a picture of two planes and a wall, of which no plane is true."""
     upper, lower = (look("pebbles", Plane((64, 224), 35, tilt, fov=55)) for tilt in (90, 270))

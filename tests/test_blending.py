@@ -463,3 +463,18 @@ def test_the_public_name_is_the_function():
     assert (healed[within] != plain[within]).any()
     everywhere = texrs.blend(source, image, wrap=False, within=within)
     assert (healed != everywhere).any()
+
+
+def test_parts_do_not_stain_each_other() -> None:
+    whole = texrs.SourceMap.identity((12, 40))
+    places = np.concatenate([whole.coordinates[:, :10], whole.coordinates[:, 30:]], axis=1)
+    source = texrs.SourceMap(places, whole.exemplar[:, :20], whole.label[:, :20], None, whole.shapes)
+    image = np.zeros((12, 40), np.uint8)
+    image[:, 20:] = 200
+    shown = source.render(image)
+    parts = np.zeros((12, 20), np.uint16)
+    assert (texrs.blend(source, image, wrap=False, parts=parts) != shown).any()
+    parts[:, 10:] = 1
+    np.testing.assert_array_equal(texrs.blend(source, image, wrap=False, parts=parts), shown)
+    with pytest.raises(InvalidInput, match="parts: needs shape"):
+        texrs.blend(source, image, wrap=False, parts=parts[:4])

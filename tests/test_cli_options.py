@@ -215,9 +215,9 @@ def test_a_word_means_the_same_in_every_command() -> None:
                 form = form.replace("xyz|...", "xy|x|y")
                 forms.setdefault(max(parameter.opts, key=len), set()).add(form)
     # A folder, an entry or a picture is written; each verb has algorithms and plans of its own; a picture of a volume is a
-    # square.
+    # square; a photograph may show several planes.
     several = {flag for flag, found in forms.items() if len(found) > 1}
-    assert several == {"--out", "--method", "--plan", "--size"}
+    assert several == {"--out", "--method", "--plan", "--size", "--slant", "--tilt", "--fov"}
     assert not {"--source", "--source-image", "--held", "--rim", "--children"} & set(forms)
     assert forms["--map"] == {"OUT.npz"}
 

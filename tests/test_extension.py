@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import texrs
-from plane_checks import look, turn_between
+from plane_checks import look, look_at_room, turn_between
 from texrs import Plane, View, io, planes
 from texrs.cli import main
 from texrs.errors import InvalidInput
@@ -21,6 +21,7 @@ def test_nothing_known_changes() -> None:
     assert LARGER.image.shape == (184, 320, 3)
     np.testing.assert_array_equal(LARGER.image[:160, 64:240], FLOOR)
     np.testing.assert_array_equal(LARGER.source.render(FLOOR, antialias=True), LARGER.stages["composite"])
+    np.testing.assert_array_equal(texrs.apply(LARGER.source, FLOOR), LARGER.image)
     inside = np.moveaxis(np.indices((160, 176)), 0, -1)
     np.testing.assert_array_equal(LARGER.source.coordinates[:160, 64:240], inside)
     assert LARGER.report["added"] == {"top": 0, "bottom": 24, "left": 64, "right": 80}
@@ -35,6 +36,24 @@ def test_it_is_the_same_plane() -> None:
     # Things are as large in what was added as they were beside it.
     scales = np.abs(np.linalg.det(LARGER.source.frames()[:160, 250:310]))
     assert 0.6 < np.median(scales) < 1.7
+
+
+def test_a_sky_goes_on_above_the_floor_and_a_wall_behind_it() -> None:
+    picture, low, floor, wall = look_at_room((160, 200))
+    sky = np.broadcast_to(np.array([150, 185, 230], np.uint8), picture.shape)
+    above = np.where(low[..., np.newaxis], picture, sky)
+    made = texrs.extend(above, right=40, view=View(plane=floor, ground=low), seed=1)
+    new = made.image[:, 200:].astype(int)
+    blue = new[..., 2] > new[..., 0] + 40
+    # The line between them goes on.
+    y, x = np.indices((160, 240))[:, :, 200:]
+    line = y - 0.12 * (x - 100) - 0.47 * 160
+    assert blue[line < -4].mean() > 0.99
+    assert blue[line > 4].mean() < 0.02
+    views = [View(plane=floor, ground=low), View(plane=wall, ground=~low)]
+    room = texrs.extend(picture, right=40, view=views, seed=1)
+    rows, columns = np.rint(room.source.coordinates[:, 200:]).astype(int).reshape(-1, 2).T
+    assert (low[rows, columns] == (line > 0).ravel()).mean() > 0.97
 
 
 def test_again_and_otherwise() -> None:

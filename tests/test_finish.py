@@ -7,13 +7,15 @@ import numpy as np
 import pytest
 
 import texrs
-from texrs import Finish, SourceMap, Synthesis, samples
+from plane_checks import look_at_room
+from texrs import Finish, SourceMap, Synthesis, View, samples
 from texrs.errors import FileError, InvalidInput
 
 PEBBLES = samples.pebbles((64, 80)).image
 HOLE = np.zeros((64, 80), np.bool_)
 HOLE[20:40, 30:50] = True
 FLOOR = samples.load("tilted_discs", size=(96, 112)).image
+ROOM, LOW, LOWER, UPPER = look_at_room((96, 112))
 
 VERBS: dict[str, tuple[Callable[[], Synthesis], np.ndarray]] = {
     "design": (lambda: texrs.design(PEBBLES, (72, 64)), PEBBLES),
@@ -28,6 +30,14 @@ VERBS: dict[str, tuple[Callable[[], Synthesis], np.ndarray]] = {
     "rectify and grow": (lambda: texrs.rectify(FLOOR, size=150, view=texrs.View(slant=34, fov=60)), FLOOR),
     "extend": (lambda: texrs.extend(FLOOR, right=24, view=texrs.View(slant=34, fov=60)), FLOOR),
     "remove": (lambda: texrs.remove(FLOOR, np.pad(HOLE, ((0, 32), (0, 32))), view=texrs.View(slant=34, fov=60)), FLOOR),
+    "remove from a room": (
+        lambda: texrs.remove(
+            ROOM,
+            np.pad(HOLE, ((16, 16), (16, 16))),
+            view=[View(plane=LOWER, ground=LOW), View(plane=UPPER, ground=~LOW)],
+        ),
+        ROOM,
+    ),
     "self-splice": (
         lambda: texrs.self_splice(samples.dots((64, 64)).image, "regularise"),
         samples.dots((64, 64)).image,
@@ -60,7 +70,7 @@ def test_labels_are_never_mixed() -> None:
     labels = (PEBBLES[..., 0] // 64 * 50).astype(np.uint8)
     found = texrs.apply(source, labels, kind="label")
     assert set(np.unique(found)) <= set(np.unique(labels))
-    with pytest.raises(InvalidInput, match="kind: allowed are colour, normal, vector and label"):
+    with pytest.raises(InvalidInput, match="kind: allowed are colour, normal and label"):
         texrs.apply(source, labels, kind="labels")  # type: ignore[arg-type]
 
 
@@ -80,9 +90,10 @@ def test_another_finish_may_be_asked_for() -> None:
         {"finish": np.zeros(3, np.uint8)},
         {"finish": np.frombuffer(b"{}", np.uint8)},
         {"finish/within": np.zeros((3, 3), np.bool_)},
+        {"finish/parts": np.zeros((3, 3), np.uint16)},
         {"finish/known/0": np.zeros((3, 3), np.bool_)},
     ],
-    ids=["no text", "other words", "another hole", "another example"],
+    ids=["no text", "other words", "another hole", "other parts", "another example"],
 )
 def test_a_damaged_finish_is_said(change: dict[str, np.ndarray], tmp_path: Path) -> None:
     texrs.complete(PEBBLES, HOLE, blend=0.1).source.save(tmp_path / "map.npz")

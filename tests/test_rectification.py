@@ -108,7 +108,7 @@ def test_only_the_ground_is_used() -> None:
     ("make", "words"),
     [
         (lambda: texrs.rectify(FLOOR, view=Plane((9, 9), 0)), "plane: needs one of a picture of 240 x 288"),
-        (lambda: texrs.rectify(FLOOR, view=[PLANE]), "view: needs a texrs.View"),
+        (lambda: texrs.rectify(FLOOR, view=[PLANE, PLANE]), "view: one plane is made flat"),
         (lambda: texrs.rectify(FLOOR, view=PLANE, resolution=9), "resolution: needs a number"),
         (lambda: texrs.rectify(FLOOR, view=PLANE, resolution=7.9), "resolution: at most|hardly anything"),
         (lambda: texrs.rectify(FLOOR, view=PLANE, size=8), "size"),

@@ -1,5 +1,6 @@
 """Things taken out of photographs: what is ground, what lies behind, what a user may do wrong; the command."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,9 +10,10 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 import texrs
-from plane_checks import look
+from plane_checks import look, look_at_room
 from texrs import Plane, View, io, planes
 from texrs.cli import main
+from texrs.completion._sides import share_out
 from texrs.errors import InvalidInput
 
 SIZE = (180, 240)
@@ -60,7 +62,7 @@ def test_a_large_tile_is_no_thing() -> None:
 def test_what_goes_is_filled_from_the_ground_alone() -> None:
     picture, ground, marked = see("beans", sky=True, thing=True)
     made = texrs.remove(picture, marked, boundary=0, seed=1)
-    assert made.report["found"]
+    assert made.report["planes"][0]["found"]
     assert made.report["beyond"] == 0
     wide = made.stages["known"] != picture
     assert wide.any(axis=2)[marked].all()
@@ -71,6 +73,51 @@ def test_what_goes_is_filled_from_the_ground_alone() -> None:
     rows, columns = np.rint(made.source.coordinates[marked]).astype(int).T
     assert ground[rows, columns].all()
     assert not marked[rows, columns].any()
+
+
+def test_each_of_several_planes_is_filled_from_its_own() -> None:
+    picture, low, floor, wall = look_at_room((160, 200))
+    marked = np.zeros(low.shape, bool)
+    marked[40:110, 80:110] = True
+    views = [View(plane=floor, ground=low), View(plane=wall, ground=~low)]
+    made = texrs.remove(np.where(marked[..., np.newaxis], np.uint8(9), picture), marked, view=views, seed=1)
+    changed = made.source.label > 0
+    rows, columns = np.rint(made.source.coordinates[changed]).astype(int).T
+    # They meet in the line in which they meet beside it.
+    assert (low[rows, columns] == low[changed]).mean() > 0.97
+    assert not marked[rows, columns].any()
+    assert [each["plane"]["slant"] for each in made.report["planes"]] == [50, 35]
+    assert min(made.report["patches"]) > 0
+    np.testing.assert_array_equal(made.image[~changed], picture[~changed])
+    # Neither stains the other: bricks are red, pebbles are not.
+    red = made.image[..., 0] - made.image[..., 2].astype(float)
+    assert np.median(red[changed & ~low]) > 40 > 25 > np.median(red[changed & low])
+
+
+@pytest.mark.parametrize("slope", [0.0, -0.4, 1.7])
+def test_parts_meet_in_a_hole_in_their_line(slope: float) -> None:
+    rows, columns = np.indices((90, 120))
+    low = rows - 45 > slope * (columns - 60)
+    hole = np.zeros(low.shape, bool)
+    # Nearer to the one than to the other.
+    hole[20:52, 40:85] = True
+    everywhere = np.ones_like(hole)
+    owner = share_out(hole, [low & ~hole, ~low & ~hole], [everywhere, everywhere])
+    assert (owner[hole] == ~low[hole]).mean() > 0.98
+    assert (owner[~hole] == -1).all()
+    # What cannot go on there does not.
+    assert (share_out(hole, [low & ~hole, ~low & ~hole], [~everywhere, everywhere])[hole] == 1).all()
+
+
+def test_parts_that_meet_in_no_line_go_on_where_they_are_nearer() -> None:
+    rows, columns = np.indices((80, 80))
+    disc = np.hypot(rows - 40, columns - 40) < 18
+    hole = np.zeros(disc.shape, bool)
+    hole[25:55, 35:75] = True
+    everywhere = np.ones_like(hole)
+    owner = share_out(hole, [disc & ~hole, ~disc & ~hole], [everywhere, everywhere])
+    assert (owner[30:50, 36:40] == 0).all()
+    assert (owner[30:50, 66:75] == 1).all()
 
 
 def test_seams_may_run_a_little_around_it() -> None:
@@ -100,7 +147,7 @@ def test_a_plane_seen_from_the_front_needs_no_perspective() -> None:
     marked = np.zeros((128, 128), bool)
     marked[40:70, 50:90] = True
     made = texrs.remove(wall, marked, view=View(slant=0))
-    assert made.report["plane"] is None
+    assert made.report["planes"][0]["plane"] is None
     np.testing.assert_array_equal(made.image[:30], wall[:30])
 
 
@@ -114,7 +161,7 @@ def test_a_doubtful_plane_is_said_and_not_followed() -> None:
     marked[50:60, 50:60] = True
     with pytest.warns(UserWarning, match="not followed"):
         made = texrs.remove(noise, marked)
-    assert made.report["plane"] is None
+    assert made.report["planes"][0]["plane"] is None
 
 
 def test_grey_pictures_of_16_bit_and_again() -> None:
@@ -141,7 +188,15 @@ MARKED[70:90, 60:90] = True
         (lambda: texrs.remove(FLOOR, MARKED | True), "mask: with its margin it covers"),
         (lambda: texrs.remove(FLOOR, MARKED[:40]), "mask: "),
         (lambda: texrs.remove(FLOOR, MARKED, view=View(ground=MARKED)), "ground: nothing of it is left"),
+        (lambda: texrs.remove(FLOOR, MARKED, view=[]), "view: needs at least one"),
+        (lambda: texrs.remove(FLOOR, MARKED, view=[PLANE, PLANE]), "ground: of several planes all but one"),
+        (
+            lambda: texrs.remove(FLOOR, MARKED, view=[View(ground=~MARKED), View(ground=~MARKED)]),
+            "ground: nothing of it is left",
+        ),
+        (lambda: texrs.remove(FLOOR, MARKED, view=[PLANE, View(ground=MARKED | True)]), "ground: the others leave"),
         (lambda: texrs.remove(FLOOR, MARKED, margin=65), "margin: "),
+        (lambda: texrs.remove(FLOOR, MARKED, patch=2), "patch: "),
         (lambda: texrs.remove(FLOOR, MARKED, boundary=65), "boundary: "),
         (lambda: texrs.remove(FLOOR, MARKED, view=40), "view: needs a texrs.View"),
         (lambda: texrs.remove(FLOOR[:40], MARKED[:40]), "each side must be at least 64"),
@@ -173,6 +228,24 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert main(["remove", photo, mask, "-o", str(tmp_path / "no.png"), "--margin", "99"]) == 2
     assert "--margin" in capsys.readouterr().err
     assert not (tmp_path / "no.png").exists()
+    picture, low, floor, wall = look_at_room((160, 200))
+    marked = np.zeros(low.shape, bool)
+    marked[60:90, 80:100] = True
+    lower, upper = (str(tmp_path / f"{name}.png") for name in ("lower", "upper"))
+    for path, what in ((photo, picture), (mask, marked * 255), (lower, low * 255), (upper, ~low * 255)):
+        io.write(path, what.astype(np.uint8))
+    said = ["remove", photo, mask, "-o", out, "--ground", lower, "--ground", upper]
+    assert main([*said, "--fov", "55", "--slant", "50", "--slant", "35", "--tilt", "90", "--tilt", "10"]) == 0
+    views = [View(plane=floor, ground=low), View(plane=wall, ground=~low)]
+    np.testing.assert_array_equal(io.read(out), texrs.remove(picture, marked, view=views).image)
+    capsys.readouterr()
+    for more, words in (
+        (["--slant", "50"], "--slant: needs one for each of 2 grounds"),
+        (["--slant", "fifty", "--slant", "3"], "--slant: needs a number, or found"),
+        (["--ground", "found", "--ground", "found"], "--ground: of several"),
+    ):
+        assert main([*said, *more]) == 2
+        assert re.search(words, capsys.readouterr().err)
 
 
 def test_a_photograph_is_extended_to_a_size() -> None:

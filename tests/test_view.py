@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import texrs
-from texrs import Plane, View, removal
+from texrs import Plane, View
 from texrs.completion._holes import widen
 from texrs.errors import InvalidInput
 from texrs.planes import _choose
@@ -70,7 +70,7 @@ def test_nothing_is_looked_for_before_all_is_checked(
 
 
 def test_nor_is_it_in_what_is_taken_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(removal, "find_ground", None)
+    monkeypatch.setattr(_choose, "find_ground", None)
     with pytest.raises(InvalidInput, match="plane: needs one of"):
         texrs.remove(PICTURE, MASK, view=Plane((9, 9), 20))
     with pytest.raises(InvalidInput, match="corners: needs the four"):

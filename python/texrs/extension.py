@@ -1,7 +1,7 @@
 """More of a plane that was photographed: the picture goes on beyond its borders, in the same perspective.
 
-What is beyond them is a hole that is filled by example (`texrs.complete`), with a scale map that goes on too: that of the
-picture's plane, which is said, or found.
+What is beyond them is a hole that is filled by example, as `texrs.remove` fills one, from the plane that the picture shows,
+which is said, or found.
 """
 
 from __future__ import annotations
@@ -11,14 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from texrs._arrays import as_image, as_int, as_size, check_memory
+from texrs._arrays import as_float, as_image, as_int, as_seed, as_size, check_memory
 from texrs._typing import Array, Progress
-from texrs._verbs import takes_materials
-from texrs.completion import complete
+from texrs.blending import apply
+from texrs.completion._planes import LEAST, Part, add_rest, fill_parts
 from texrs.errors import InvalidInput
-from texrs.materials import Material
 from texrs.planes import Plane, View
-from texrs.planes._choose import see
+from texrs.planes._choose import as_views, find_grounds, see_in
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
@@ -26,21 +25,19 @@ __all__ = ["extend"]
 
 MOST = 8192
 """Pixels that are added on a side, at most."""
-LEAST = 0.05
-"""Nearer to the horizon than this share of the middle's scale a picture does not go on."""
 
 
-@takes_materials("image")
 def extend(
-    image: Array | Material,
+    image: Array,
     *,
     top: int = 0,
     bottom: int = 0,
     left: int = 0,
     right: int = 0,
     to: int | Sequence[int] | None = None,
-    view: View | Plane | None = None,
+    view: View | Plane | Sequence[View | Plane] | None = None,
     boundary: int = 0,
+    blend: float | None = 0.1,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Synthesis:
@@ -55,11 +52,14 @@ def extend(
     to : int or (rows, columns), optional
         Size of the larger picture: what the sides above do not add to it is added evenly, but towards the horizon only as far
         as the plane goes, and on the other side then.
-    view : View or Plane, optional
-        How the photograph shows the plane, as far as that is to be said; what is not is found. Of its ground alone is
-        copied.
+    view : View or Plane, or a sequence of them, optional
+        How the photograph shows the plane, as far as that is to be said; what is not is found. What is no ground, as the sky
+        above a floor, goes on as it lies. Of several planes, as a floor and a wall, each goes on by itself, up to the line
+        in which they meet; all but one need a ground.
     boundary : int
         How many known pixels at the border may change, 0 to 64, which hides it better; by default none.
+    blend : float, optional
+        Weight of the values when the colours of what is added are corrected, as in `texrs.complete`; None or 0: no correction.
     seed : int
         Chooses among what fits.
     progress : callable, optional
@@ -69,7 +69,7 @@ def extend(
     -------
     Synthesis
         The larger picture, in the dtype and with the channels of the photograph, of which no pixel changes but those within
-        ``boundary``. Its source map leads to the photograph. The report has the plane and what was added.
+        ``boundary``. Its source map leads to the photograph. The report has the planes and what was added.
 
     Raises
     ------
@@ -107,44 +107,60 @@ def extend(
     if size == (rows, columns):
         raise InvalidInput("top, bottom, left, right: all are 0, so there is nothing to add")
     check_memory(size[0] * size[1] * (64 + pixels.shape[2] * pixels.itemsize), "top, bottom, left, right")
-    rim = as_int(boundary, "boundary", 0, 64)
+    screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
+    rim, number = as_int(boundary, "boundary", 0, 64), as_seed(seed)
     watch = progress or (lambda stage, share: None)
+    views = as_views(view)
+    settled = [v.settle((rows, columns)) for v in views]
     watch("plane", 0.0)
-    seen = see(pixels, View.of(view))
+    grounds = find_grounds(pixels, settled, np.ones((rows, columns), np.bool_), everywhere=True)
+    seen = [see_in(pixels, v, said, ground) for v, (said, _), ground in zip(views, settled, grounds, strict=True)]
     watch("plane", 1.0)
+    # Beyond the horizon of a plane that is all there is lies nothing.
+    alone = len(add_rest([Part(ground) for ground in grounds], np.zeros((rows, columns), np.bool_))) == 1
     for axis, before, after in ((1, "left", "right"), (0, "top", "bottom")):
         added[before] += missing[axis] // 2
         added[after] += missing[axis] - missing[axis] // 2
-        room = measure_room(seen.plane, added, axis)
-        if missing[axis] and sum(room) >= added[before] + added[after]:
+        room = measure_room(seen[0].plane, added, axis)
+        if alone and missing[axis] and sum(room) >= added[before] + added[after]:
             over = max(0, added[before] - room[0]) - max(0, added[after] - room[1])
             added[before], added[after] = added[before] - over, added[after] + over
     first = np.array([added["top"], added["left"]])
-    places = np.moveaxis(np.indices(size), 0, -1) - first
-    width = seen.plane.width(places)
-    if width.min() < LEAST:
-        raise InvalidInput(
-            "top, bottom, left, right: the picture would reach the plane's horizon; add fewer pixels, or say how the plane lies"
-        )
     inner = (slice(first[0], first[0] + rows), slice(first[1], first[1] + columns))
     canvas, hole = np.zeros((*size, pixels.shape[2]), pixels.dtype), np.ones(size, np.bool_)
     canvas[inner], hole[inner] = pixels, False
-    allowed = None
-    if not seen.ground.all():
-        allowed = np.zeros(size, np.bool_)
-        allowed[inner] = seen.ground
-    scale = width.astype(np.float32)
-    made = complete(canvas, hole, allowed=allowed, scale_map=scale, boundary=rim, seed=seed, progress=progress)
+    parts = []
+    for each in seen:
+        ground = np.zeros(size, np.bool_)
+        ground[inner] = each.ground
+        parts.append(Part.of(ground, each.plane, (-added["top"], -added["left"])))
+    if len(parts := add_rest(parts, hole)) == 1 and not parts[0].everywhere:
+        raise InvalidInput(
+            "top, bottom, left, right: the picture would reach the plane's horizon; add fewer pixels, or say how the plane lies"
+        )
+    made = fill_parts(canvas, hole, parts, boundary=rim, seed=number, progress=progress)
     # It copies nothing from beyond the photograph's borders.
+    places = np.moveaxis(np.indices(size), 0, -1) - first
     inside = np.clip(places, 0, [rows - 1, columns - 1]).astype(np.float32)
     source = made.source.compose(SourceMap.from_coordinates(inside, (rows, columns)))
-    source = source.finished((False, False), antialias=True)
-    report: dict[str, Any] = {**made.report, "plane": seen.plane.as_dict(), "found": seen.found, "added": added}
-    composite = source.render(pixels, antialias=True)
+    source = source.finished((False, False), antialias=True, **made.even_out(screening))
+    result = apply(source, pixels, progress=progress)
+    watch("done", 1.0)
+    stages = made.show(canvas, hole) | {"composite": source.render(pixels, antialias=True)}
     if np.asarray(image).ndim == 2:
-        composite = composite[..., 0]
-    stages = {"known": made.stages["known"], "patches": made.stages["patches"], "composite": composite}
-    return Synthesis(composite, source, stages, report)
+        result = result.reshape(size)
+        stages |= {name: stages[name].reshape(size) for name in ("known", "composite")}
+    report: dict[str, Any] = {
+        "added": added,
+        "patches": list(made.counts),
+        "replaced_outside": int(np.count_nonzero(made.replaced & ~hole)),
+        "boundary": rim,
+        "blend": screening,
+        "seed": number,
+        "planes": [{"plane": each.plane.as_dict(), "found": each.found} for each in seen],
+        "ground": [round(float(each.ground.mean()), 4) for each in seen],
+    }
+    return Synthesis(result, source, stages, report)
 
 
 def add_sizes(shape: tuple[int, int], added: Mapping[str, int]) -> tuple[int, int]:

@@ -2,26 +2,25 @@
 
 Completion with everything on (`texrs.complete`): the plane is found in what is known of the ground, patches are copied from
 the ground alone, each as large as things are there, and colours follow the light. What lies beyond the ground, as the sky
-above a floor, is filled from what is not ground.
+above a floor, is filled from what is not ground; so is each of several planes from its own.
 """
 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from texrs._arrays import as_float, as_image, as_int, as_mask, as_seed
 from texrs._typing import Array, Bools, Progress
-from texrs._verbs import takes_materials
 from texrs.blending import apply
-from texrs.completion import complete
 from texrs.completion._holes import widen
+from texrs.completion._planes import Part, add_rest, fill_parts
 from texrs.errors import InvalidInput
-from texrs.materials import Material
-from texrs.planes import Plane, View, find, find_ground
-from texrs.planes._choose import SURE
+from texrs.planes import Plane, View, find
+from texrs.planes._choose import SURE, as_views, find_grounds
 from texrs.synthesis import Synthesis
 
 __all__ = ["remove"]
@@ -32,18 +31,13 @@ RIM = 1 / 40
 """How far around it seams may run, of the shorter side."""
 FLAT = 8.0
 """Degrees of slant up to which a plane is taken for seen from the front."""
-LEAST = 0.05
-"""Nearer to the horizon than this share of the middle's scale nothing is ground."""
-FEWEST = 0.02
-"""Share of the photograph that something beside the ground must take for anything to lie behind it."""
 
 
-@takes_materials("image")
 def remove(
-    image: Array | Material,
+    image: Array,
     mask: Array,
     *,
-    view: View | Plane | None = None,
+    view: View | Plane | Sequence[View | Plane] | None = None,
     margin: int | None = None,
     boundary: int | None = None,
     patch: int | None = None,
@@ -59,9 +53,10 @@ def remove(
         The photograph, any real dtype, each side at least 64.
     mask : (H, W) array
         Not 0 where there is what is to go, its shadow included.
-    view : View or Plane, optional
+    view : View or Plane, or a sequence of them, optional
         How the photograph shows the plane that it stands on, as far as that is to be said; what is not is found. Where that
-        is not sure, or the plane is seen from the front, things are filled in as large as they are seen anywhere.
+        is not sure, or the plane is seen from the front, things are filled in as large as they are seen anywhere. Of several
+        planes, as a floor and a wall, each is filled in by itself; all but one need a ground.
     margin : int, optional
         Pixels by which the mask is widened, 0 to 64; by default 1/150 of the shorter side.
     boundary : int, optional
@@ -81,8 +76,8 @@ def remove(
     -------
     Synthesis
         The photograph without it, in its dtype and with its channels; nothing changes but what is marked, its margin and
-        boundary. Its source map leads to the photograph. The stages are ``"known"``, ``"ground"``, ``"patches"`` and
-        ``"composite"``. The report has the plane, if one was followed.
+        boundary. Its source map leads to the photograph. The stages are ``"known"``, ``"ground"``, each plane in a shade of
+        its own, ``"patches"`` and ``"composite"``. The report has the planes that were followed.
 
     Raises
     ------
@@ -117,64 +112,41 @@ def remove(
     screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
     number = as_seed(seed)
     watch = progress or (lambda stage, share: None)
+    side = None if patch is None else as_int(patch, "patch", 4, min(shape))
+    views = as_views(view)
+    settled = [v.settle(shape) for v in views]
     hole = widen(marked, wide)
-    asked = View.of(view)
-    said, ground = asked.settle(shape)
     if hole.all():
         raise InvalidInput("mask: with its margin it covers the whole photograph, so nothing is left to fill it from")
     watch("plane", 0.0)
-    shown = np.asarray((find_ground(pixels, known=~hole) if ground is None else ground) & ~hole, np.bool_)
-    if not shown.any():
-        raise InvalidInput("ground: nothing of it is left beside the mask")
-    seen, found = follow_plane(pixels, shown, said, asked.fov)
+    grounds = find_grounds(pixels, settled, ~hole, everywhere=False)
+    planes = [
+        follow_plane(pixels, ground, said, v.fov) for v, (said, _), ground in zip(views, settled, grounds, strict=True)
+    ]
     watch("plane", 1.0)
-    width = None if seen is None else seen.scale_map("width")
-    on = choose_side(hole, shown, None if width is None else width > LEAST)
-    options: dict[str, Any] = {
-        "boundary": rim,
-        "patch": patch,
-        "blend": screening,
-        "seed": number,
-        "progress": progress,
-    }
-    made: Synthesis | None = None
-    steps = []
-    beyond = hole & ~on
-    # What is farther away lies behind, and goes on behind what is nearer.
-    for part, open_, usable, scale in ((beyond, hole, ~shown & ~hole, None), (on, on, shown, width)):
-        if part.any():
-            before = pixels if made is None else made.image
-            new = complete(before, open_, allowed=usable if usable.any() else None, scale_map=scale, **options)
-            source, result = new.source, new.image
-            if made is not None:
-                source = source.compose(made.source)
-                how = {"within": source.label > 0, "known": (~hole,)} if screening else {}
-                source = source.finished((False, False), screening=screening or None, **how)
-                result = apply(source, pixels)
-            made = Synthesis(result, source, new.stages, new.report)
-            steps.append(new.report["patches"])
-    assert made is not None
-    squeeze = np.asarray(image).ndim == 2
-    bare = pixels.copy()
-    bare[hole] = bare.min() if hole.any() else 0
+    parts = add_rest([Part.of(g, plane) for g, (plane, _) in zip(grounds, planes, strict=True)], hole)
+    made = fill_parts(pixels, hole, parts, boundary=rim, patch=side, seed=number, progress=progress)
+    evened = made.even_out(screening)
+    source = made.source.finished((False, False), **evened, **({"known": (~hole,)} if evened else {}))
+    result = apply(source, pixels, progress=progress)
+    watch("done", 1.0)
+    stages = made.show(pixels, hole) | {"composite": source.render(pixels)}
     report: dict[str, Any] = {
-        **made.report,
         "hole": float(hole.mean()),
-        "patches": steps,
+        "patches": list(made.counts),
+        "replaced_outside": int(np.count_nonzero(made.replaced & ~hole)),
         "margin": wide,
         "boundary": rim,
-        "plane": None if seen is None else seen.as_dict(),
-        "found": found,
-        "ground": round(float(shown.mean()), 4),
-        "beyond": round(float(beyond.mean()), 6),
+        "blend": screening,
+        "seed": number,
+        "planes": [{"plane": None if plane is None else plane.as_dict(), "found": found} for plane, found in planes],
+        "ground": [round(float(ground.mean()), 4) for ground in grounds],
+        "beyond": round(float((hole & (made.owner >= len(grounds))).mean()), 6),
     }
-    composite = made.source.render(pixels, interpolation="cubic")
-    stages = {"known": bare, "ground": shown, "patches": made.stages["patches"], "composite": composite}
-    result = made.image
-    if squeeze:
+    if np.asarray(image).ndim == 2:
         result = result.reshape(shape)
-        stages["known"], stages["composite"] = bare[..., 0], composite[..., 0]
-    return Synthesis(result, made.source, stages, report)
+        stages |= {name: stages[name].reshape(shape) for name in ("known", "composite")}
+    return Synthesis(result, source, stages, report)
 
 
 def follow_plane(pixels: Array, ground: Bools, said: Plane | None, fov: float | None) -> tuple[Plane | None, bool]:
@@ -190,22 +162,7 @@ def follow_plane(pixels: Array, ground: Bools, said: Plane | None, fov: float | 
         warnings.warn(
             f"the plane was found with a confidence of {seen.confidence:.2f} of 1, so it is not followed; give the corners "
             "of a rectangle of it, or slant and tilt",
-            stacklevel=3,
+            stacklevel=4,
         )
         return None, False
     return (None, False) if seen.slant < FLAT else (seen, True)
-
-
-def choose_side(hole: Bools, ground: Bools, before: Bools | None) -> Bools:
-    """Mark the part of a hole that lies on the ground: nearer to it than to what is not, and before the horizon."""
-    from scipy.ndimage import distance_transform_edt, label
-
-    pieces, _ = label(~ground & ~hole)
-    large = np.bincount(pieces.ravel()) >= FEWEST * hole.size
-    large[0] = False
-    other = large[pieces]
-    if not other.any():
-        return hole
-    nearest = distance_transform_edt(~ground) <= distance_transform_edt(~other)
-    on = hole & nearest & (True if before is None else before)
-    return np.asarray(on, np.bool_)

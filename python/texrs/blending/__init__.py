@@ -17,7 +17,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from texrs._arrays import as_bool, as_choice, as_float, as_image, as_int, as_list, as_mask, as_wrap
+from texrs._arrays import as_array, as_bool, as_choice, as_float, as_image, as_int, as_list, as_mask, as_wrap
 from texrs._typing import Array, Floats, Interpolation, Progress
 from texrs.blending._correction import divide_strips, solve_correction
 from texrs.blending._seams import Look, Seam, take_rows
@@ -43,10 +43,11 @@ def blend(
     within: Array | None = None,
     known: Array | Sequence[Array] | None = None,
     across: bool = True,
+    parts: Array | None = None,
     outlines: bool = True,
     interpolation: Interpolation = "cubic",
     antialias: bool = False,
-    kind: Literal["colour", "normal", "vector"] = "colour",
+    kind: Literal["colour", "normal"] = "colour",
     green: Literal["up", "down"] = "up",
     progress: Progress | None = None,
 ) -> Array:
@@ -81,6 +82,8 @@ def blend(
     across : bool
         Whether values are corrected also where two exemplars meet. `texrs.design` does not: flowers on moss end at an edge,
         and one would stain the other.
+    parts : (H, W) integers, optional
+        What each pixel belongs to, as a floor or a wall: nothing is corrected where two of these meet.
     outlines : bool
         Whether the step across a seam stays where it is the outline of a thing. False: all steps are evened out, as the
         paper does.
@@ -141,6 +144,7 @@ def blend(
     weight = as_float(screening, "screening", 0, 1e6)
     width = None if band is None else as_int(band, "band", 1, 2**31)
     inside = None if within is None else as_mask(within, "within", source.shape)
+    apart = None if parts is None else as_array(parts, "parts", np.uint16, source.shape)
     result = source.render(exemplars, interpolation=interpolation, antialias=antialias, kind=kind, green=green)
     several = as_list(exemplars)
     shown = None if known is None else as_known(known, source.shapes)
@@ -156,7 +160,8 @@ def blend(
     for number, (part, channels) in enumerate(steps):
         closed = (part.cyclic, cyclic[1])
         if channels == groups[0]:
-            look = Look(samples, shown, take_rows(source, part.rows), across, outlines, interpolation, kind, green)
+            own = None if apart is None else apart[part.rows]
+            look = Look(samples, shown, take_rows(source, part.rows), across, own, outlines, interpolation, kind, green)
             seen = [look.find_seams(axis, closed[axis]) for axis in range(2)]
         if any(len(seam.lack) for seam in seen):
             report = None if progress is None else _scale_progress(progress, number, len(steps))
@@ -172,7 +177,7 @@ def apply(
     source: SourceMap,
     exemplars: Array | Sequence[Array],
     *,
-    kind: Literal["colour", "normal", "vector", "label"] = "colour",
+    kind: Literal["colour", "normal", "label"] = "colour",
     green: Literal["up", "down"] = "up",
     finish: Finish | None = None,
     progress: Progress | None = None,
@@ -189,11 +194,11 @@ def apply(
         Of a picture or a volume.
     exemplars : array, or a sequence of one an exemplar
         Any map of the exemplar's height and width (and depth), any dtype and channels.
-    kind : {"colour", "normal", "vector", "label"}
-        "normal", "vector": tangent-space normals, directions on the surface, as in `SourceMap.render`. "label": values that
-        have no meaning between them; the nearest sample is taken, and nothing corrected.
+    kind : {"colour", "normal", "label"}
+        "normal": a tangent-space normal map, as in `SourceMap.render`. "label": values that have no meaning between them; the
+        nearest sample is taken, and nothing corrected.
     green : {"up", "down"}
-        Whether the y of normals and vectors grows up (OpenGL) or down (DirectX).
+        Whether the y of normals grows up (OpenGL) or down (DirectX).
     finish : Finish, optional
         Another finish than that of the map.
     progress : callable, optional
@@ -226,7 +231,7 @@ def apply(
     dtype('float32')
 
     """
-    as_choice(kind, "kind", ("colour", "normal", "vector", "label"))
+    as_choice(kind, "kind", ("colour", "normal", "label"))
     if kind == "label":
         return source.render(exemplars, interpolation="nearest")
     how = finish or source.finish
@@ -242,6 +247,7 @@ def apply(
         within=how.within,
         known=how.known,
         across=how.across,
+        parts=how.parts,
         outlines=how.outlines,
         interpolation=how.interpolation,
         antialias=how.antialias,

@@ -28,10 +28,12 @@ class Look:
     source: SourceMap
     across: bool
     """Whether there is a seam where two exemplars meet."""
+    parts: NDArray[np.uint16] | None
+    """(H, W): what each pixel belongs to; there is no seam where two of these meet."""
     outlines: bool
     """Whether outlines of things keep their step."""
     interpolation: Interpolation
-    kind: Literal["colour", "normal", "vector"]
+    kind: Literal["colour", "normal"]
     green: Literal["up", "down"]
 
     def look_beside(self, at: tuple[Array, ...], axis: int, step: int) -> tuple[Floats, Bools]:
@@ -47,7 +49,7 @@ class Look:
             places[np.newaxis],
             which[np.newaxis],
             np.arange(len(which), dtype=np.uint32)[np.newaxis],
-            None if self.kind == "colour" else frames,
+            frames if self.kind == "normal" else None,
             source.shapes,
         )
         shown = row.render(self.samples.images, interpolation=self.interpolation, kind=self.kind, green=self.green)
@@ -60,6 +62,9 @@ class Look:
         at, after = list_seams(self.source, axis, wrap)
         if not self.across:
             same = self.source.exemplar[at] == self.source.exemplar[after]
+            at, after = (tuple(index[same] for index in ends) for ends in (at, after))
+        if self.parts is not None:
+            same = self.parts[at] == self.parts[after]
             at, after = (tuple(index[same] for index in ends) for ends in (at, after))
         if not len(at[0]):
             return Seam(at, after, np.zeros((0, self.samples.channels), np.float32))

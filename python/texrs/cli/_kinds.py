@@ -18,6 +18,8 @@ from texrs._typing import Array, Floats
 from texrs.cli._outputs import SAMPLE, name_arguments
 from texrs.errors import FileError, InvalidInput
 
+FOUND = "found"
+"""Stands for what is not said of a plane."""
 PLACE = r"\s*-?[0-9]+(\.[0-9]*)?\s*,\s*-?[0-9]+(\.[0-9]*)?\s*"
 """A row and a column, as text."""
 
@@ -130,6 +132,17 @@ def parse_bytes(text: str, option: str = "--memory-limit") -> int:
 def parse_box(text: str, about: About) -> list[float]:
     """Return the middle and the sides of a box."""
     return _parse_finite(text, 4, about.option, "ROW,COL,HEIGHT,WIDTH, as in 96,92,50,50")
+
+
+def parse_each(texts: Sequence[str], about: About) -> list[float | None]:
+    """Return a number for each plane, or None for one that is to be found."""
+    found: list[float | None] = []
+    for text in texts:
+        word = text.strip().lower()
+        found.append(
+            None if word == FOUND else parse_numbers(word, about.option, f"a number, or {FOUND}", counts=(1,))[0]
+        )
+    return found
 
 
 def parse_places(texts: Sequence[str], about: About) -> list[list[float]]:
@@ -342,6 +355,22 @@ ENTRIES = replace(
     many=True,
 )
 MASK = Kind("FILE", lambda path, about: read_mask(path, about.axes), "What is not black is marked.", file=True)
+GROUNDS = replace(
+    MASK,
+    metavar=f"FILE|{FOUND}",
+    words=(FOUND,),
+    read=lambda texts, about: [None if text == FOUND else read_mask(text, about.axes) for text in texts],
+    note=f"What is not black is marked; the option may be repeated, for several planes, one of which may be {FOUND}.",
+    many=True,
+)
+CORNERS = Kind(
+    "ROW,COL ...",
+    lambda texts, about: [None if text == FOUND else parse_places([text], about) for text in texts],
+    f"Four, with spaces between them; of several planes in the order of their grounds, or {FOUND}.",
+    many=True,
+)
+EACH = Kind("NUMBER", parse_each, f"Of several planes in the order of their grounds, or {FOUND}.", many=True)
+"""Of each plane of a photograph."""
 HOLE = replace(MASK, words=("alpha",))
 MAP = Kind("FILE", lambda path, about: read_scale_map(path), "A file that texrs scale-map wrote.", file=True)
 MAP_OR_AUTO = replace(MAP, metavar="FILE|auto", words=("auto",))

@@ -27,6 +27,7 @@ APPLIED = Options(
         "source": "it is an argument",
         "exemplars": "they are arguments, as many as wanted",
         "finish.known": "one an exemplar, and no map is of them",
+        "finish.parts": "the verb knows them",
     },
     optional=dict.fromkeys(
         ("wrap", "interpolation", "antialias", "screening", "across", "outlines"), "as the map says"

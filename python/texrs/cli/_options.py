@@ -64,9 +64,10 @@ class Option:
 
     def name_value(self, text: object) -> str:
         """Return what errors call it: the file that was given, or the option."""
-        if self.kind is None or not self.kind.file or text is None or text in self.kind.words:
+        texts = text if isinstance(text, list) else [text]
+        if self.kind is None or not self.kind.file or any(t is None or t in self.kind.words for t in texts):
             return self.flag
-        return " ".join(text) if isinstance(text, list) else str(text)
+        return " ".join(map(str, texts))
 
     def make_parameter(self) -> inspect.Parameter:
         """Return the parameter that makes typer take this option."""
@@ -91,7 +92,7 @@ class Options:
     leave : mapping
         Parameters that are no options, and why; fields are written ``parameter.field``.
     makers : mapping
-        What makes the values of parameters that are no dataclasses of options of its own.
+        What makes the values of parameters of options of its own, where that is not the dataclass alone.
     only : collection of str
         Parameters that are; all by default.
     optional : mapping
@@ -177,7 +178,7 @@ class Options:
             if group is None or name in self._kinds:
                 yield (name,), each, texts.get(name, "")
                 continue
-            self.groups[name] = group
+            self.groups.setdefault(name, group)
             inner = describe(group)
             for part, one in inspect.signature(group, eval_str=True).parameters.items():
                 if f"{name}.{part}" not in self.leave and part != "axes":

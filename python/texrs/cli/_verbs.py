@@ -18,8 +18,11 @@ from texrs._typing import Array
 from texrs.cli import _outputs
 from texrs.cli._console import note, show_progress
 from texrs.cli._kinds import (
+    CORNERS,
+    EACH,
     ENTRIES,
     ENTRY,
+    GROUNDS,
     HOLE,
     LAYOUT,
     MAP_OR_AUTO,
@@ -33,6 +36,7 @@ from texrs.cli._kinds import (
 )
 from texrs.cli._options import Options, as_command, make_parameter
 from texrs.cli._outputs import Quiet, Threads, describe, name_arguments, to_write
+from texrs.errors import InvalidInput
 from texrs.synthesis import Synthesis
 
 VARIANTS = typer.Option(
@@ -220,18 +224,54 @@ def read_camera(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
     return {} if fov is None else {("view", "fov"): fov}
 
 
-def say_plane(result: Synthesis) -> str:
-    """Return how the plane lies that was flattened."""
-    plane = result.report["plane"]
-    if plane is None:
-        return ", no plane followed"
-    found = f", found with confidence {plane['confidence']:.2f}" if result.report["found"] else ""
-    return f", slant {plane['slant']:.1f} and tilt {plane['tilt']:.1f}{found}"
+def say_planes(result: Synthesis) -> str:
+    """Return how the planes lie that were followed."""
+    said = []
+    for each in result.report.get("planes", [result.report]):
+        plane = each["plane"]
+        if plane is None:
+            said.append(", no plane followed")
+            continue
+        found = f", found with confidence {plane['confidence']:.2f}" if each["found"] else ""
+        said.append(f", slant {plane['slant']:.1f} and tilt {plane['tilt']:.1f}{found}")
+    return "".join(said)
+
+
+def make_views(
+    corners: list[Any] | None = None,
+    slant: list[float | None] | None = None,
+    tilt: list[float | None] | None = None,
+    fov: list[float | None] | float | None = None,
+    ground: list[Array | None] | None = None,
+) -> Any:
+    """Return what is said of each plane: of one for each ground, or of the only one."""
+    from texrs.planes import View
+
+    given = {"corners": corners, "slant": slant, "tilt": tilt, "fov": fov, "ground": ground}
+    several = {n: value if isinstance(value, list) else [value] for n, value in given.items() if value is not None}
+    count = len(several.get("ground", [None]))
+    # One camera sees all of them.
+    several |= {"fov": several["fov"] * count} if len(several.get("fov", [])) == 1 else {}
+    for name, values in several.items():
+        if len(values) != count:
+            many = f"one for each of {count} grounds, in their order, or 'found'" if count > 1 else "to be given once"
+            raise InvalidInput(f"{name}: needs {many}; it was given {len(values)} times")
+    fields: list[dict[str, Any]] = [{name: values[k] for name, values in several.items()} for k in range(count)]
+    views = [View(**each) for each in fields]
+    return views if count > 1 else views[0]
 
 
 def _see(verb: Callable[..., Synthesis], **more: Kind) -> Verb:
     left = {"view.plane": "the command says how it lies by corners or angles"}
-    return Verb(Options(verb, arguments={"image": PICTURE, **more}, leave=left), says=say_plane, knows=read_camera)
+    kinds = {"ground": GROUNDS, "corners": CORNERS, "slant": EACH, "tilt": EACH, "fov": EACH}
+    options = Options(
+        verb,
+        arguments={"image": PICTURE, **more},
+        kinds={f"view.{name}": kind for name, kind in kinds.items()},
+        leave=left,
+        makers={"view": make_views},
+    )
+    return Verb(options, says=say_planes, knows=read_camera)
 
 
 def _grow(verb: Callable[..., Synthesis], kind: Kind, axes: int) -> Verb:

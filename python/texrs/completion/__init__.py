@@ -16,27 +16,25 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_bool, as_float, as_image, as_int, as_mask, as_method, as_seed, as_wrap
 from texrs._typing import Array, Bools, Floats, Progress
-from texrs._verbs import takes_materials
 from texrs.blending import apply
-from texrs.completion._depth import fill_in_depth
+from texrs.completion._depth import see_plane
+from texrs.completion._fill import Filling, fill
 from texrs.completion._holes import widen
 from texrs.completion._optimise import optimise, recover_scale
-from texrs.completion._patches import LEAST, choose_mirrors, fill_with_patches, map_untouched
+from texrs.completion._patches import LEAST, choose_mirrors, map_untouched
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
 from texrs.exemplar.symmetry import NONE
-from texrs.materials import Material
 from texrs.synthesis import Synthesis
 
 __all__ = ["complete"]
 
 
-@takes_materials("image", "exemplar")
 def complete(
-    image: Array | Exemplar | Material,
+    image: Array | Exemplar,
     hole: Array | str,
     *,
-    exemplar: Array | Exemplar | Material | None = None,
+    exemplar: Array | Exemplar | None = None,
     allowed: Array | None = None,
     scale_map: Array | str | None = None,
     exemplar_scale_map: Array | str | None = None,
@@ -150,53 +148,35 @@ def complete(
     watch = progress or (lambda stage, share: None)
 
     watch("complete", 0.0)
-    places, side, count = map_untouched(shapes), 0.0, 0
-    between = method == "optimise"
+    made = Filling(map_untouched(shapes), 0.0, 0, [], True)
     scales = recover_scales(pictures, ~usable, scale_map, exemplar_scale_map) if open_.any() else None
     levels: list[dict[str, object]] = []
-    tried: list[tuple[int, float]] = []
     wide = widen(open_, width, cyclic)
     mirrors = choose_mirrors(pictures, open_, mirror) if open_.any() and method == "patch" else (NONE,)
+    across = (cyclic[0], cyclic[1])
     if open_.any() and method == "optimise":
-        places, levels = optimise(
-            pictures, open_, scales, wide, wrap=(cyclic[0], cyclic[1]), seed=seed, progress=progress
-        )
-        count = int(places.label.max())
+        places, levels = optimise(pictures, open_, scales, wide, wrap=across, seed=seed, progress=progress)
+        made = Filling(places, 0.0, int(places.label.max()), [], False)
     elif open_.any():
-        deep = None
-        if scales is not None and len(pictures) == 1 and len(mirrors) == 1:
-            deep = fill_in_depth(
-                pictures[0],
-                open_,
-                scales[0],
-                wide,
-                usable=usable,
-                side=chosen,
-                wrap=(cyclic[0], cyclic[1]),
-                seed=seed,
-                progress=progress,
-            )
-        if deep is None:
-            places, side, tried = fill_with_patches(
-                pictures,
-                open_,
-                scales,
-                chosen,
-                ~wide,
-                usable=usable,
-                mirrors=mirrors,
-                wrap=(cyclic[0], cyclic[1]),
-                seed=seed,
-                watch=watch,
-            )
-            count = int(places.label.max())
-        else:
-            places, side, count = deep
-        between = deep is not None
+        own = scales is not None and len(pictures) == 1 and len(mirrors) == 1
+        made = fill(
+            pictures,
+            open_,
+            wide,
+            usable=usable,
+            plane=see_plane(pictures[0], open_, scales[0]) if own and scales is not None else None,
+            scales=scales,
+            patch=chosen,
+            mirrors=mirrors,
+            wrap=across,
+            seed=seed,
+            progress=progress,
+        )
+    places, count = made.source, made.count
     new = find_places(places.label)
     # What is kept maps to itself; of patches every coordinate is whole, but where they are seen in depth.
     result = pictures[0].copy()
-    if between:
+    if not made.whole:
         result[new] = places.render(pictures, interpolation="cubic")[new]
     else:
         row, column = places.coordinates[new].astype(np.intp).T
@@ -221,8 +201,8 @@ def complete(
         "hole": float(open_.mean()),
         "scaled": scale_map is not None,
         "replaced_outside": int(np.count_nonzero(~open_[new])),
-        "patch": round(side, 3),
-        "tried": [[s, round(shown, 3)] for s, shown in tried],
+        "patch": round(made.side, 3),
+        "tried": [[s, round(shown, 3)] for s, shown in made.tried],
         "patches": count,
         "mirror": len(mirrors) > 1,
         "blend": screening,

@@ -6,30 +6,39 @@ is known, continued into the hole, and the hole synthesised with the rest as the
 
 from __future__ import annotations
 
+from math import ceil
+
 import numpy as np
 from scipy import ndimage
 
-from texrs._arrays import power_single
-from texrs._engine.pyramid import Region
+from texrs._arrays import guidance
 from texrs._typing import Array, Bools, Floats, Progress
-from texrs.exemplar import Exemplar
+from texrs.completion._holes import look_around, paint_over
 from texrs.exemplar.sheet import Flattened, find_plane
 from texrs.growth import stitch_sheet
 from texrs.scale_maps._kinds import find_kind
+from texrs.scale_maps._plane import Plane
 from texrs.source_map import SourceMap
 
-__all__ = ["fill_in_depth"]
+__all__ = ["fill_in_depth", "see_plane"]
 
 SIDE = 0.6
 """Side of the patches, as a share of what a whole picture is grown of: holes are small."""
 TAPS = 5
 """Samples that one between them is interpolated from, and one more: all must be known."""
+AROUND = 2.0
+"""Known pixels around a hole that patches are to fit, in sides of the largest."""
+
+
+def see_plane(picture: Array, open_: Bools, scale: Floats) -> Plane | None:
+    """Return the plane whose scale map that of a picture with holes is, if it is one's."""
+    return find_plane(guidance(paint_over(picture, open_)), np.ascontiguousarray(scale), find_kind(scale))
 
 
 def fill_in_depth(
     picture: Array,
     open_: Bools,
-    scale: Floats,
+    plane: Plane,
     wide: Bools,
     *,
     usable: Bools,
@@ -46,8 +55,8 @@ def fill_in_depth(
         What it holds in the hole does not matter.
     open_, wide : (H, W) bool
         The hole, and what may be replaced.
-    scale : (H, W) float32
-        How large elements are.
+    plane : texrs.scale_maps._plane.Plane
+        The plane that it shows.
     usable : (H, W) bool
         What may be copied.
     side : int, optional
@@ -62,37 +71,41 @@ def fill_in_depth(
     Returns
     -------
     tuple or None
-        None where the picture is not one of a plane, or too little of it is known.
+        None where too little of the plane is known.
     """
-    nearest = ndimage.distance_transform_edt(open_, return_distances=False, return_indices=True)
-    known = Exemplar(picture[tuple(nearest)])
-    colours = known.guidance
     # What is interpolated from pixels of the hole is not known.
     whole: Bools = ndimage.minimum_filter(usable, TAPS, mode="nearest")
-    asked = np.ascontiguousarray(scale)
-    plane = find_plane(colours, asked, find_kind(scale))
-    if plane is None:
+    if not whole.any():
         return None
-    asked = power_single(asked, plane.power)
-    sheet = Flattened.of(colours, plane, asked[wide][np.newaxis], whole)
+    asked = plane.scales(np.argwhere(wide)).astype(np.float32)
+    sheet = Flattened.of(guidance(paint_over(picture, open_)), plane, asked, whole)
     if not sheet.free.any():
         return None
-    own = SIDE * sheet.side(asked) if side is None else side * sheet.steps_at(float(np.median(asked[wide])))
-    grid = np.moveaxis(np.indices(open_.shape), 0, -1).astype(np.float32)
+    own = SIDE * sheet.side(asked) if side is None else side * sheet.steps_at(float(np.median(asked)))
+    region = look_around(wide, ceil(AROUND * own * float(asked.max()) / sheet.resolution), 1, wrap)
+    part = tuple(slice(o, o + n) for o, n in zip(region.origin, region.shape, strict=True))
+    grid = np.moveaxis(np.mgrid[part], 0, -1).astype(np.float32)
+    inside = wide[part]
     found = stitch_sheet(
         sheet,
-        Region.whole(open_.shape, wrap),
-        asked,
+        region,
+        plane.scales(grid).astype(np.float32),
         side=own,
         seed=seed,
-        held=~wide,
+        held=~inside,
         given=sheet.place(grid),
+        frames=sheet.fix(plane.fold(grid)),
         progress=progress,
     )
     identity = SourceMap.identity(open_.shape)
-    coordinates = np.where(wide[..., np.newaxis], found.coordinates, identity.coordinates)
-    frames = np.where(wide[..., np.newaxis, np.newaxis], found.frames, np.eye(2, dtype=np.float32))
-    number, count = np.unique(found.patches[wide], return_inverse=True)
+    frames = np.broadcast_to(np.eye(2, dtype=np.float32), (*open_.shape, 2, 2)).copy()
     label = np.zeros(open_.shape, np.uint32)
-    label[wide] = count + 1
-    return SourceMap(coordinates, identity.exemplar, label, frames, (open_.shape,)), found.side, len(number)
+    number, count = np.unique(found.patches[inside], return_inverse=True)
+    identity.coordinates[part][inside] = found.coordinates[inside]
+    frames[part][inside] = found.frames[inside]
+    label[part][inside] = count.ravel() + 1
+    return (
+        SourceMap(identity.coordinates, identity.exemplar, label, frames, (open_.shape,)),
+        found.side,
+        len(number),
+    )

@@ -7,15 +7,13 @@ is known, continued into the hole, and the hole synthesised with the rest as the
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from scipy import ndimage
 
 from texrs import scale_maps
 from texrs._arrays import as_image, guidance
-from texrs._engine.pyramid import Region
 from texrs._typing import Array, Bools, Floats, Progress
+from texrs.completion._holes import look_around, paint_over
 from texrs.errors import InvalidInput
 from texrs.exemplar.analysis import count_levels
 from texrs.exemplar.atlas import RADIUS, Atlas, extend_sizes
@@ -82,7 +80,7 @@ def optimise(
     # Windows may not leave a copy, but those of known pixels at the border do.
     margin = RADIUS << (levels - 1)
     atlas = _make_atlas(pictures, open_, scales, wide, levels, margin)
-    region = _look_around(wide, AROUND << (levels - 1), 1 << (levels - 1), wrap)
+    region = look_around(wide, AROUND << (levels - 1), 1 << (levels - 1), wrap)
     part = tuple(slice(o, o + n) for o, n in zip(region.origin, region.shape, strict=True))
     row, column = np.mgrid[part]
     # The picture is the first copy of the atlas.
@@ -137,7 +135,7 @@ def _lay_out(
     Beside an exemplar the picture is there for what is around the hole to look like, and nothing is copied from it.
     """
     wide = ((margin, margin), (margin, margin))
-    image = np.pad(_paint_over(as_image(pictures[0]), open_), (*wide, (0, 0)), mode="symmetric")
+    image = np.pad(paint_over(as_image(pictures[0]), open_), (*wide, (0, 0)), mode="symmetric")
     if len(pictures) == 1:
         scale = None if scales is None else np.pad(scales[0], wide, mode="edge")
         return image, np.pad(~open_, wide), scale
@@ -151,26 +149,3 @@ def _lay_out(
     scale = np.full(free.shape, NOWHERE, np.float32)
     scale[len(image) :, : exemplar.shape[1]] = scales[1]
     return np.concatenate(parts), free, scale
-
-
-def _look_around(open_: Bools, margin: int, step: int, wrap: tuple[bool, bool]) -> Region:
-    """Return the part of a picture that a filling looks at: all of an axis that wraps."""
-    origin, shape, whole = [], [], []
-    for axis, closed in enumerate(wrap):
-        n = open_.shape[axis]
-        at = np.nonzero(open_.any(axis=1 - axis))[0]
-        low, high = int(at[0]) - margin, int(at[-1]) + 1 + margin
-        if closed or high - low >= n:
-            low, high = 0, n
-        low, high = max(0, low) // step * step, min(n, -(-high // step) * step)
-        origin.append(low)
-        shape.append(high - low)
-        whole.append(closed and high - low == n)
-    return Region(tuple(shape), tuple(origin), tuple(whole))
-
-
-def _paint_over(image: Array, open_: Bools) -> Array:
-    """Paint over holes with the nearest known colours, which is what windows at their boundary see."""
-    nearest: Any = ndimage.distance_transform_edt(open_, return_distances=False, return_indices=True)
-    painted: Array = image[tuple(nearest)]
-    return painted

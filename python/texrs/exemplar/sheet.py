@@ -237,6 +237,10 @@ class Flattened(Sheet):
             # A target that grows along a line is seen as the plane itself, if that is its own slope.
             aligned = abs(float(np.dot(other.down, self.plane.down))) > ALIGNED
             frames = self.plane.jacobians(target, other if aligned else None)
+        return self.fix(frames)
+
+    def fix(self, frames: NDArray[np.float64]) -> NDArray[np.int16]:
+        """Return Jacobians (..., 2, 2), in units of the plane, as steps of the sheet in fixed point: (N, 2, 2)."""
         fixed = np.clip(np.rint(frames * (self.resolution * ONE)), -STEEP * ONE, STEEP * ONE)
         return np.ascontiguousarray(fixed.astype(np.int16).reshape(-1, 2, 2))
 

@@ -71,6 +71,7 @@ def stitch_sheet(
     seed: int = 0,
     held: NDArray[np.bool_] | None = None,
     given: NDArray[np.int32] | None = None,
+    frames: NDArray[np.int16] | None = None,
     progress: Progress | None = None,
 ) -> FromSheet:
     """Stitch an output whose elements are as large as a map says.
@@ -93,6 +94,8 @@ def stitch_sheet(
         Pixels that keep their places.
     given : (rows, columns, 2) int32, optional
         The places of those in the sheet, in fixed point.
+    frames : (N, 2, 2) int16, optional
+        How the sheet is to be seen, in all or at each pixel, in fixed point; None goes by the target.
     progress : callable, optional
         Called with the stage and the share of it that is done.
 
@@ -104,7 +107,7 @@ def stitch_sheet(
     stitcher, elements = sheet.stitcher
     wanted = sheet.side(target) if side is None else side
     patch = float(max(min(wanted, FITS * min(sheet.free.shape), MOST), LEAST))
-    frames = sheet.frames(target, region.wrap)
+    frames = sheet.frames(target, region.wrap) if frames is None else frames
     weight = np.array([round(UNIT * sheet.weight)], np.uint16)
     made = stitcher.stitch(
         region,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,9 +33,13 @@ class Seen:
 
 def see(pixels: Array, view: View) -> Seen:
     """Return what is said of a plane, and what is found where nothing is: all is checked before anything is looked for."""
-    said, ground = view.settle(pixels.shape)
-    if ground is None:
-        ground = find_ground(pixels) if said is None else np.ones((pixels.shape[0], pixels.shape[1]), np.bool_)
+    said = view.settle(pixels.shape)
+    known = np.ones((pixels.shape[0], pixels.shape[1]), np.bool_)
+    return see_in(pixels, view, said[0], find_grounds(pixels, [said], known, everywhere=True)[0])
+
+
+def see_in(pixels: Array, view: View, said: Plane | None, ground: Bools) -> Seen:
+    """Return the plane of a ground, found where it is not said, and with a warning where that is not sure."""
     if said is not None:
         return Seen(said, ground, False)
     found = find(pixels, fov=view.fov, known=ground)
@@ -42,9 +47,54 @@ def see(pixels: Array, view: View) -> Seen:
         warnings.warn(
             f"the plane was found with a confidence of {found.confidence:.2f} of 1 (slant {found.slant:.0f}, tilt "
             f"{found.tilt:.0f}); where the result does not look right give the corners of a rectangle, or slant and tilt",
-            stacklevel=3,
+            stacklevel=4,
         )
     return Seen(found, ground, True)
+
+
+def as_views(view: View | Plane | Sequence[View | Plane] | None) -> list[View]:
+    """Return what is said of one plane, or of each of several."""
+    if not isinstance(view, Sequence):
+        return [View.of(view)]
+    if not view:
+        raise InvalidInput("view: needs at least one, got an empty list")
+    views = [View.of(each) for each in view]
+    if len(views) > 1 and sum(v.ground is None for v in views) > 1:
+        raise InvalidInput("ground: of several planes all but one need one, for they are told apart by that")
+    return views
+
+
+def find_grounds(
+    pixels: Array, settled: Sequence[tuple[Plane | None, Bools | None]], known: Bools, *, everywhere: bool
+) -> list[Bools]:
+    """Return where the picture shows each plane: as is given, or as is found in what the others leave.
+
+    Parameters
+    ----------
+    pixels : (H, W, C) array
+        The picture.
+    settled : sequence of (Plane, (H, W) bool)
+        What is said of each plane (`View.settle`). Of two grounds that overlap the first counts.
+    known : (H, W) bool
+        Where the picture says anything.
+    everywhere : bool
+        Whether a plane is seen in all that the others leave where it is said how it lies.
+
+    """
+    free, found = known.copy(), []
+    for _, ground in settled:
+        if ground is not None:
+            found.append(np.asarray(ground & free, np.bool_))
+            free &= ~ground
+            if not found[-1].any():
+                raise InvalidInput("ground: nothing of it is left beside what is to be filled, and other planes")
+    missing = next((n for n, (_, ground) in enumerate(settled) if ground is None), None)
+    if missing is not None:
+        if not free.any():
+            raise InvalidInput("ground: the others leave nothing for the plane whose ground is not said")
+        whole = everywhere and settled[missing][0] is not None
+        found.insert(missing, free if whole else find_ground(pixels, known=free))
+    return found
 
 
 def measure_scale(pixels: Array, known: Bools) -> Floats:

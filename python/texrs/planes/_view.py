@@ -81,10 +81,12 @@ class View:
             object.__setattr__(self, "corners", as_array(self.corners, "corners", np.float64, (4, 2)))
 
     @classmethod
-    def of(cls, given: View | Plane | None) -> View:
+    def of(cls, given: View | Plane | Sequence[View | Plane] | None) -> View:
         """Return a view as it is, one of a plane, or one of which nothing is said."""
         if given is None or isinstance(given, Plane):
             return cls(plane=given)
+        if isinstance(given, list | tuple):
+            raise InvalidInput(f"view: one plane is made flat at a time, got {len(given)}")
         if not isinstance(given, View):
             raise InvalidInput(f"view: needs a texrs.View, or a texrs.Plane, got {given!r}")
         return given

@@ -121,6 +121,14 @@ class Plane:
         by_v = grown * (d / self.slope + points[..., 1:2] * e)
         return np.stack([by_v, scale[..., np.newaxis] * e], axis=-1)
 
+    def fold(self, points: Array) -> NDArray[np.float64]:
+        """Return the Jacobians of `flatten` at points (..., 2) of the picture: (..., 2, 2)."""
+        scale = self.scales(points)[..., np.newaxis]
+        d, e = np.array(self.down), np.array(self.across)
+        by_v = self.scale / scale**2 * d
+        by_u = e / scale - (self._along(points, self.across) * self.slope)[..., np.newaxis] / scale**2 * d
+        return np.stack([by_v, by_u], axis=-2)
+
     def order(self, scales: Floats) -> float:
         """Return how far a map is from one that grows along the slope alone: root mean square, of logarithms."""
         logs = log_single(scales)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from texrs._arrays import as_bool, as_choice, as_float, as_int
 from texrs._typing import Array, Bools, Interpolation
@@ -45,6 +46,8 @@ class Finish:
         Correct only pixels that are True; all else keeps its values. None: everything.
     known : tuple of (h, w) bool, optional
         What of each exemplar may be looked at beyond a seam. None: everything.
+    parts : (rows, columns) uint16, optional
+        What each pixel belongs to; nothing is corrected where two of these meet. None: everywhere.
 
     """
 
@@ -57,6 +60,7 @@ class Finish:
     outlines: bool = True
     within: Bools | None = None
     known: tuple[Bools, ...] | None = None
+    parts: NDArray[np.uint16] | None = None
 
     def arrays(self) -> dict[str, Array]:
         """Return what is written to a file: the words as the bytes of a JSON text, and the masks."""
@@ -64,6 +68,8 @@ class Finish:
         parts: dict[str, Array] = {"finish": np.frombuffer(words.encode(), np.uint8)}
         if self.within is not None:
             parts["finish/within"] = self.within
+        if self.parts is not None:
+            parts["finish/parts"] = self.parts
         parts |= {f"finish/known/{i}": mask for i, mask in enumerate(self.known or ())}
         return parts
 
@@ -90,6 +96,9 @@ class Finish:
         within = parts.get("finish/within")
         if masks and [m.shape for m in masks] != list(shapes):
             raise InvalidInput(f"finish: known needs masks of shapes {shapes}")
+        apart = parts.get("finish/parts")
+        if apart is not None and (apart.shape != shape or apart.dtype != np.uint16):
+            raise InvalidInput(f"finish: parts needs uint16 of shape {shape}")
         if within is not None and within.shape != shape:
             raise InvalidInput(f"finish: within needs a mask of shape {shape}")
         screening, band = words["screening"], words["band"]
@@ -103,4 +112,5 @@ class Finish:
             as_bool(words["outlines"], "outlines"),
             None if within is None else within.astype(np.bool_),
             tuple(m.astype(np.bool_) for m in masks) if masks else None,
+            apart,
         )

@@ -58,7 +58,6 @@ from dataclasses import replace
 from functools import partial
 
 from texrs._typing import Progress
-from texrs._verbs import takes_materials
 from texrs.blending import SCREENING
 from texrs.elements import Elements
 from texrs.exemplar import ElementOptions
@@ -73,7 +72,6 @@ from texrs.synthesis import Synthesis
 __all__ = ["DeformationOptions", "design", "design_variants"]
 
 
-@takes_materials("exemplar")
 def design(
     exemplar: Exemplars,
     size: Size = None,
@@ -202,7 +200,6 @@ def design(
     return next(variants)
 
 
-@takes_materials("exemplar")
 def design_variants(
     exemplar: Exemplars,
     count: int,

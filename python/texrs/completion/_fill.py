@@ -1,0 +1,98 @@
+"""One hole filled: in depth where a plane is seen, else with patches as they lie."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from texrs._typing import Array, Bools, Floats, Progress
+from texrs.completion._depth import fill_in_depth
+from texrs.completion._patches import fill_with_patches
+from texrs.exemplar.symmetry import Flip
+from texrs.scale_maps._plane import Plane
+from texrs.source_map import SourceMap
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Filling:
+    """A picture whose hole is filled, and by what."""
+
+    source: SourceMap
+    side: float
+    """Of the patches."""
+    count: int
+    """How many there are."""
+    tried: list[tuple[int, float]]
+    """The sides that were tried, and what the seams of each show."""
+    whole: bool
+    """Whether every coordinate is that of a pixel."""
+
+
+def fill(
+    pictures: Sequence[Array],
+    open_: Bools,
+    wide: Bools,
+    *,
+    usable: Bools,
+    plane: Plane | None,
+    scales: Sequence[Floats] | None,
+    patch: int | None,
+    mirrors: Sequence[Flip],
+    wrap: tuple[bool, bool],
+    seed: int,
+    progress: Progress | None,
+) -> Filling:
+    """Fill a hole.
+
+    Parameters
+    ----------
+    pictures : sequence of array
+        The picture, and another one to copy from if there is one.
+    open_, wide : (H, W) bool
+        The hole, and what may be replaced.
+    usable : (H, W) bool
+        What may be copied.
+    plane : Plane, optional
+        The plane that is copied from, and filled in.
+    scales : sequence of (H, W) float32, optional
+        How large elements are, where there is no plane, or too little of it.
+    patch : int, optional
+        Side of the patches, in pixels.
+    mirrors : sequence of Flip
+        Mirror images that patches are copied from; not of a plane.
+    wrap : (bool, bool)
+        Axes along which the picture is cyclic.
+    seed : int
+        Chooses patches where nothing is known around.
+    progress : callable, optional
+        Called with the stage and the share of it that is done.
+
+    """
+    if plane is not None:
+        deep = fill_in_depth(
+            pictures[0],
+            open_,
+            plane,
+            wide,
+            usable=usable,
+            side=patch,
+            wrap=wrap,
+            seed=seed,
+            progress=progress,
+        )
+        if deep is not None:
+            source, side, count = deep
+            return Filling(source, side, count, [], False)
+    source, whole_side, tried = fill_with_patches(
+        pictures,
+        open_,
+        scales,
+        patch,
+        ~wide,
+        usable=usable,
+        mirrors=mirrors,
+        wrap=wrap,
+        seed=seed,
+        watch=progress or (lambda stage, share: None),
+    )
+    return Filling(source, whole_side, int(source.label.max()), tried, True)

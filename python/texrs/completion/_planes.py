@@ -1,0 +1,204 @@
+"""Holes in pictures of several planes: each is filled in by itself, from what is seen of it, and as it is seen.
+
+What is none of the planes, as the sky above a floor, goes on behind them as it lies. Where two meet in a hole neither sees the
+other: both are filled in a little further than they show, and cut where one ends (`texrs.completion._sides`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import hypot
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Array, Bools, Progress
+from texrs.completion._fill import fill
+from texrs.completion._holes import paint_over, widen
+from texrs.completion._patches import choose_mirrors
+from texrs.completion._sides import share_out
+from texrs.exemplar.symmetry import NONE
+from texrs.planes import Plane
+from texrs.scale_maps._plane import LEVEL
+from texrs.scale_maps._plane import Plane as Slope
+from texrs.source_map import SourceMap
+
+LEAST = 0.05
+"""Nearer to the horizon than this share of the middle's scale nothing is seen of a plane."""
+FEWEST = 0.02
+"""Share of a picture that something beside the planes must take for anything to lie behind them."""
+BAND, NARROWEST, WIDEST = 0.4, 16, 64
+"""By how much more of a plane is filled in than is shown, where it meets another: in roots of its area, and in pixels."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """Something that a picture with holes shows, and that goes on in them."""
+
+    shown: Bools
+    """(H, W): where it is seen."""
+    slope: Slope | None = None
+    """How it lies; None of what is seen from the front."""
+    reach: Bools | None = None
+    """(H, W): where it can be seen at all; None for everywhere."""
+    large: Bools | None = None
+    """(H, W): where so much of it is seen that it may go on behind something; None for wherever it is seen."""
+
+    @property
+    def everywhere(self) -> bool:
+        """Whether it can be seen everywhere."""
+        return self.reach is None or bool(self.reach.all())
+
+    @classmethod
+    def of(cls, shown: Bools, plane: Plane | None, origin: Sequence[int] = (0, 0)) -> Part:
+        """Return what a picture shows of a plane; it begins at a point (row, column) of the plane's own picture."""
+        if plane is None:
+            return cls(shown)
+        places = np.moveaxis(np.indices(shown.shape), 0, -1) + np.asarray(origin)
+        return cls(shown, lay(plane, shown.shape, origin), plane.width(places) > LEAST)
+
+
+def lay(plane: Plane, shape: Sequence[int], origin: Sequence[int] = (0, 0)) -> Slope | None:
+    """Return a plane by the sizes of things in a picture (rows, columns) that begins at a point of its own picture.
+
+    None where it is seen from the front. What lies beyond its horizon does not count.
+    """
+    middle = np.array(plane.middle) - origin
+    corners = np.array([[y, x] for y in (0, shape[0] - 1) for x in (0, shape[1] - 1)], np.float64)
+    widths = plane.width(corners + np.asarray(origin))
+    least, largest = max(float(widths.min()), LEAST), float(widths.max())
+    if largest < LEVEL * least:
+        return None
+    row, column = plane.middle
+    one, *beside = plane.width([[row, column], [row + 1, column], [row, column + 1]]).tolist()
+    rise = [round(w - one, 12) for w in beside]
+    steep = hypot(*rise)
+    down = (rise[0] / steep, rise[1] / steep)
+    return Slope((float(middle[0]), float(middle[1])), 1.0, steep, down, (-down[1], down[0]), least, largest, 0.0)
+
+
+def add_rest(parts: Sequence[Part], hole: Bools) -> list[Part]:
+    """Return the parts with what is none of them: it goes on behind them where enough of it is seen."""
+    from scipy.ndimage import label
+
+    rest = ~hole
+    for part in parts:
+        rest = rest & ~part.shown
+    pieces, _ = label(rest)
+    large = np.bincount(pieces.ravel()) >= FEWEST * np.count_nonzero(~hole)
+    large[0] = False
+    return [*parts, Part(rest, large=large[pieces])] if large.any() else list(parts)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mended:
+    """A picture whose holes are filled, each part by itself."""
+
+    source: SourceMap
+    owner: NDArray[np.uint16]
+    """(H, W): the part that each pixel shows."""
+    replaced: Bools
+    """(H, W): what does not come from where it is."""
+    counts: tuple[int, ...]
+    """Patches of each part."""
+    shades: NDArray[np.uint8]
+    """(H, W): where each part was seen, the lighter the earlier; 0 in the holes, and of what is none of them."""
+
+    def even_out(self, screening: float) -> dict[str, Any]:
+        """Return how its seams are evened out, for a `Finish`; not where two parts meet, for one would stain the other."""
+        if not screening:
+            return {}
+        apart = self.owner if len(self.counts) > 1 else None
+        return {"screening": screening, "within": self.replaced, "parts": apart}
+
+    def show(self, pixels: Array, hole: Bools) -> dict[str, Array]:
+        """Return the stages: what is known, what each part shows, and the patches, each in a shade of its own."""
+        known = pixels.copy()
+        known[hole] = pixels[~hole].min()
+        shades = np.zeros(hole.shape, np.uint8)
+        shades[self.replaced] = 55 + self.source.label[self.replaced] * 67 % 200
+        return {"known": known, "ground": self.shades, "patches": shades}
+
+
+def fill_parts(
+    pixels: Array,
+    hole: Bools,
+    parts: Sequence[Part],
+    *,
+    boundary: int = 0,
+    patch: int | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Mended:
+    """Fill the holes of a picture.
+
+    Parameters
+    ----------
+    pixels : (H, W, C) array
+        What it holds in the holes does not matter.
+    hole : (H, W) bool
+        What is to be filled.
+    parts : sequence of Part
+        What goes on there.
+    boundary : int
+        Pixels around the holes that may change too.
+    patch : int, optional
+        Side of the patches in pixels.
+    seed : int
+        Chooses patches where nothing is known around.
+    progress : callable, optional
+        Called with the stage and the share of it that is done.
+
+    """
+    everywhere = np.ones_like(hole)
+    seen = [p.shown if p.large is None else p.large for p in parts]
+    owner = share_out(hole, seen, [everywhere if p.reach is None else p.reach for p in parts])
+    known = paint_over(pixels, hole)
+    identity = SourceMap.identity(hole.shape)
+    coordinates, label = identity.coordinates, identity.label
+    frames = np.broadcast_to(np.eye(2, dtype=np.float32), (*hole.shape, 2, 2)).copy()
+    counts = []
+    for number, part in enumerate(parts):
+        region = owner == number
+        if not region.any():
+            counts.append(0)
+            continue
+        open_, accepted = region, region | (widen(region, boundary) & part.shown)
+        if len(parts) > 1:
+            band = round(min(max(BAND * float(np.count_nonzero(region)) ** 0.5, NARROWEST), WIDEST))
+            open_ = region | (widen(region, band) & ~part.shown)
+        usable = part.shown if part.shown.any() else ~hole
+        made = fill(
+            [known],
+            open_,
+            open_ | accepted,
+            usable=usable & ~hole,
+            plane=part.slope,
+            scales=None,
+            patch=patch,
+            mirrors=(NONE,) if part.slope is not None else choose_mirrors([known], open_, None),
+            wrap=(False, False),
+            seed=seed,
+            progress=progress,
+        )
+        new = accepted & (made.source.label > 0)
+        coordinates[new] = made.source.coordinates[new]
+        frames[new] = made.source.frames()[new]
+        label[new] = made.source.label[new] + sum(counts)
+        counts.append(made.count)
+        owner[new] = number
+    shades = np.zeros(hole.shape, np.uint8)
+    for number, part in enumerate(parts):
+        owner[(owner < 0) & part.shown] = number
+        if part.large is None:
+            shades[part.shown] = 255 - 40 * min(number, 5)
+    owner[owner < 0] = len(parts) - 1
+    return Mended(
+        SourceMap(coordinates, identity.exemplar, label, frames, (hole.shape,)),
+        owner.astype(np.uint16),
+        label > 0,
+        tuple(counts),
+        shades,
+    )
