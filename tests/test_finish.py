@@ -70,7 +70,7 @@ def test_labels_are_never_mixed() -> None:
     labels = (PEBBLES[..., 0] // 64 * 50).astype(np.uint8)
     found = texrs.apply(source, labels, kind="label")
     assert set(np.unique(found)) <= set(np.unique(labels))
-    with pytest.raises(InvalidInput, match="kind: allowed are colour, normal and label"):
+    with pytest.raises(InvalidInput, match="kind: allowed are colour, normal, vector and label"):
         texrs.apply(source, labels, kind="labels")  # type: ignore[arg-type]
 
 

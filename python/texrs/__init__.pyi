@@ -1,5 +1,19 @@
 # The public names of texrs and where they live: read by type checkers, and by lazy_loader when texrs is imported.
-from . import elements, errors, exemplar, fields, io, judging, kernels, layouts, planes, samples, scale_maps, volume
+from . import (
+    elements,
+    errors,
+    exemplar,
+    fields,
+    io,
+    judging,
+    kernels,
+    layouts,
+    materials,
+    planes,
+    samples,
+    scale_maps,
+    volume,
+)
 from ._threads import threads
 from ._version import __version__
 from .blending import apply, blend
@@ -9,6 +23,7 @@ from .elements import Elements
 from .exemplar import ElementOptions, Exemplar
 from .extension import extend
 from .growth.constraints import Constraints, Guide
+from .materials import Material
 from .papers.design import DeformationOptions, design, design_variants
 from .papers.perspective import perspective
 from .papers.solid import solid, synthesize
@@ -29,6 +44,7 @@ __all__ = [
     "Exemplar",
     "Finish",
     "Guide",
+    "Material",
     "Plane",
     "PlaneTexture",
     "Reuse",
@@ -52,6 +68,7 @@ __all__ = [
     "judging",
     "kernels",
     "layouts",
+    "materials",
     "perspective",
     "planes",
     "rectify",

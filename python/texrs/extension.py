@@ -13,9 +13,11 @@ import numpy as np
 
 from texrs._arrays import as_float, as_image, as_int, as_seed, as_size, check_memory
 from texrs._typing import Array, Progress
+from texrs._verbs import takes_materials
 from texrs.blending import apply
 from texrs.completion._planes import LEAST, Part, add_rest, fill_parts
 from texrs.errors import InvalidInput
+from texrs.materials import Material
 from texrs.planes import Plane, View
 from texrs.planes._choose import as_views, find_grounds, see_in
 from texrs.source_map import SourceMap
@@ -27,8 +29,9 @@ MOST = 8192
 """Pixels that are added on a side, at most."""
 
 
+@takes_materials("image")
 def extend(
-    image: Array,
+    image: Array | Material,
     *,
     top: int = 0,
     bottom: int = 0,

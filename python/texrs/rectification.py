@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_image, as_seed, as_size, as_wrap, check_memory, guidance
 from texrs._typing import Array, Bools, Interpolation, Progress
+from texrs._verbs import takes_materials
 from texrs.blending import apply
 from texrs.errors import InvalidInput
+from texrs.materials import Material
 from texrs.planes import Plane, View
 from texrs.planes._choose import see
 from texrs.source_map import SourceMap
@@ -43,8 +45,9 @@ COURSES = 0.35
 """How much edges must agree in two directions at right angles for the texture to be turned until these are level."""
 
 
+@takes_materials("image")
 def rectify(
-    image: Array,
+    image: Array | Material,
     *,
     view: View | Plane | None = None,
     resolution: float | None = None,

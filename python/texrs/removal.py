@@ -15,10 +15,12 @@ import numpy as np
 
 from texrs._arrays import as_float, as_image, as_int, as_mask, as_seed
 from texrs._typing import Array, Bools, Progress
+from texrs._verbs import takes_materials
 from texrs.blending import apply
 from texrs.completion._holes import widen
 from texrs.completion._planes import Part, add_rest, fill_parts
 from texrs.errors import InvalidInput
+from texrs.materials import Material
 from texrs.planes import Plane, View, find
 from texrs.planes._choose import SURE, as_views, find_grounds
 from texrs.synthesis import Synthesis
@@ -33,8 +35,9 @@ FLAT = 8.0
 """Degrees of slant up to which a plane is taken for seen from the front."""
 
 
+@takes_materials("image")
 def remove(
-    image: Array,
+    image: Array | Material,
     mask: Array,
     *,
     view: View | Plane | Sequence[View | Plane] | None = None,

@@ -13,6 +13,7 @@ import numpy as np
 
 from texrs._arrays import to_unit
 from texrs._typing import Array, Path
+from texrs.materials._material import Material
 from texrs.source_map import SourceMap
 
 __all__ = ["Synthesis"]
@@ -33,6 +34,8 @@ class Synthesis:
         correction.
     report : mapping of str to object
         What was decided and measured: JSON types only.
+    material : Material, optional
+        All maps of the result, where the exemplar was a `texrs.Material`; ``image`` is the one that shows it then.
 
     """
 
@@ -40,6 +43,7 @@ class Synthesis:
     source: SourceMap
     stages: Mapping[str, Array] = field(default_factory=dict)
     report: Mapping[str, Any] = field(default_factory=dict)
+    material: Material | None = None
 
     def save_stages(self, folder: Path) -> list[FilePath]:
         """Write each stage as a numbered PNG, and the report as ``report.json``.

@@ -47,7 +47,7 @@ def blend(
     outlines: bool = True,
     interpolation: Interpolation = "cubic",
     antialias: bool = False,
-    kind: Literal["colour", "normal"] = "colour",
+    kind: Literal["colour", "normal", "vector"] = "colour",
     green: Literal["up", "down"] = "up",
     progress: Progress | None = None,
 ) -> Array:
@@ -177,7 +177,7 @@ def apply(
     source: SourceMap,
     exemplars: Array | Sequence[Array],
     *,
-    kind: Literal["colour", "normal", "label"] = "colour",
+    kind: Literal["colour", "normal", "vector", "label"] = "colour",
     green: Literal["up", "down"] = "up",
     finish: Finish | None = None,
     progress: Progress | None = None,
@@ -194,11 +194,11 @@ def apply(
         Of a picture or a volume.
     exemplars : array, or a sequence of one an exemplar
         Any map of the exemplar's height and width (and depth), any dtype and channels.
-    kind : {"colour", "normal", "label"}
-        "normal": a tangent-space normal map, as in `SourceMap.render`. "label": values that have no meaning between them; the
-        nearest sample is taken, and nothing corrected.
+    kind : {"colour", "normal", "vector", "label"}
+        "normal", "vector": tangent-space normals, directions on the surface, as in `SourceMap.render`. "label": values that
+        have no meaning between them; the nearest sample is taken, and nothing corrected.
     green : {"up", "down"}
-        Whether the y of normals grows up (OpenGL) or down (DirectX).
+        Whether the y of normals and vectors grows up (OpenGL) or down (DirectX).
     finish : Finish, optional
         Another finish than that of the map.
     progress : callable, optional
@@ -231,7 +231,7 @@ def apply(
     dtype('float32')
 
     """
-    as_choice(kind, "kind", ("colour", "normal", "label"))
+    as_choice(kind, "kind", ("colour", "normal", "vector", "label"))
     if kind == "label":
         return source.render(exemplars, interpolation="nearest")
     how = finish or source.finish

@@ -33,7 +33,7 @@ class Look:
     outlines: bool
     """Whether outlines of things keep their step."""
     interpolation: Interpolation
-    kind: Literal["colour", "normal"]
+    kind: Literal["colour", "normal", "vector"]
     green: Literal["up", "down"]
 
     def look_beside(self, at: tuple[Array, ...], axis: int, step: int) -> tuple[Floats, Bools]:
@@ -49,7 +49,7 @@ class Look:
             places[np.newaxis],
             which[np.newaxis],
             np.arange(len(which), dtype=np.uint32)[np.newaxis],
-            frames if self.kind == "normal" else None,
+            None if self.kind == "colour" else frames,
             source.shapes,
         )
         shown = row.render(self.samples.images, interpolation=self.interpolation, kind=self.kind, green=self.green)

@@ -34,10 +34,11 @@ class Samples:
     def scale(cls, exemplars: Sequence[Array], kind: str) -> Samples | None:
         """Scale them; None where no values between theirs make sense."""
         dtype, channels = exemplars[0].dtype, exemplars[0].shape[-1]
-        if kind == "normal":
-            top = float(np.iinfo(dtype).max) if dtype.kind in "ui" else 1.0
-            low = -top if dtype.kind != "u" and min(float(e[..., :3].min()) for e in exemplars) < 0 else 0.0
-            high, channels = top, 3
+        if kind != "colour":
+            # Half way is no slope, or no step, so that they can be turned as they are.
+            top, channels = float(np.iinfo(dtype).max) if dtype.kind in "ui" else 1.0, 3 if kind == "normal" else 2
+            low = -top if dtype.kind != "u" and min(float(e[..., :channels].min()) for e in exemplars) < 0 else 0.0
+            high = top
         else:
             if dtype.kind in "bi":
                 return None
@@ -59,7 +60,7 @@ class Samples:
 
     def group_channels(self, strips: int, pixels: int, kind: str) -> list[slice]:
         """Return the channels that are solved together: all, but one by one where a large picture is one strip."""
-        if strips > 1 or pixels <= STRIP or kind == "normal":
+        if strips > 1 or pixels <= STRIP or kind != "colour":
             return [slice(0, self.channels)]
         return [slice(c, c + 1) for c in range(self.channels)]
 

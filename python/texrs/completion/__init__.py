@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_bool, as_float, as_image, as_int, as_mask, as_method, as_seed, as_wrap
 from texrs._typing import Array, Bools, Floats, Progress
+from texrs._verbs import takes_materials
 from texrs.blending import apply
 from texrs.completion._depth import see_plane
 from texrs.completion._fill import Filling, fill
@@ -25,16 +26,18 @@ from texrs.completion._patches import LEAST, choose_mirrors, map_untouched
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
 from texrs.exemplar.symmetry import NONE
+from texrs.materials import Material
 from texrs.synthesis import Synthesis
 
 __all__ = ["complete"]
 
 
+@takes_materials("image", "exemplar")
 def complete(
-    image: Array | Exemplar,
+    image: Array | Exemplar | Material,
     hole: Array | str,
     *,
-    exemplar: Array | Exemplar | None = None,
+    exemplar: Array | Exemplar | Material | None = None,
     allowed: Array | None = None,
     scale_map: Array | str | None = None,
     exemplar_scale_map: Array | str | None = None,

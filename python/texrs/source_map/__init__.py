@@ -263,7 +263,7 @@ class SourceMap:
         *,
         interpolation: Interpolation = "cubic",
         antialias: bool = False,
-        kind: Literal["colour", "normal"] = "colour",
+        kind: Literal["colour", "normal", "vector"] = "colour",
         green: Literal["up", "down"] = "up",
     ) -> Array:
         """Return what a map that is in register with the exemplar looks like through this source map.
@@ -276,11 +276,12 @@ class SourceMap:
             Between samples; use "nearest" for labels. Samples at whole coordinates are copied bit for bit.
         antialias : bool
             Whether the exemplar is smoothed where the frames say that it is shrunk. Not for labels, nor with "nearest".
-        kind : {"colour", "normal"}
+        kind : {"colour", "normal", "vector"}
             "normal": a tangent-space normal map (channels x, y, z; unsigned values mean 2 v - 1). Its vectors turn
-            with the local frame.
+            with the local frame. "vector": directions on the surface (channels x, y, and what does not turn), such as those
+            of flow or of brushed metal; they turn and keep their length.
         green : {"up", "down"}
-            Whether the y of normals grows up (OpenGL) or down (DirectX).
+            Whether the y of normals and vectors grows up (OpenGL) or down (DirectX).
 
         Returns
         -------
@@ -313,10 +314,13 @@ class SourceMap:
             out = gather_smoothed(out, several, self.coordinates, self.exemplar, self._shrunk(), interpolation)
         if kind == "colour":
             return out
-        if kind != "normal" or green not in ("up", "down"):
-            raise InvalidInput(f"kind, green: allowed are colour or normal, up or down; got {kind!r}, {green!r}")
+        if kind not in ("normal", "vector") or green not in ("up", "down"):
+            raise InvalidInput(
+                f"kind, green: allowed are colour, normal or vector, up or down; got {kind!r}, {green!r}"
+            )
         # Asked of the exemplars, for a part of them that a picture shows may have no negative value.
-        return self._turn_normals(out, green, any(float(e[..., :3].min()) < 0 for e in images))
+        channels = 3 if kind == "normal" else 2
+        return self._turn(out, kind, green, any(float(e[..., :channels].min()) < 0 for e in images))
 
     def _shrunk(self) -> NDArray[np.float32]:
         """Return by how much each pixel's surroundings are smaller than in the exemplar, as a length."""
@@ -326,27 +330,37 @@ class SourceMap:
         shrunk = power_single(np.abs(np.linalg.det(frame.astype(np.float64))), 1 / self.axes)
         return np.asarray(shrunk[self.label] if frame.ndim == 3 else shrunk, np.float32)
 
-    def _turn_normals(self, normals: Array, green: str, signed: bool) -> Array:
-        """Turn tangent-space normals with the frame: a surface h(S(p)) has the slope J^T grad h."""
-        if self.axes != 2 or normals.ndim != 3 or normals.shape[-1] < 3:
-            raise InvalidInput(f"exemplars: a normal map needs shape (rows, columns, 3), got {normals.shape}")
-        if normals.dtype == np.bool_:
-            raise InvalidInput("exemplars: a normal map cannot be bool")
+    def _turn(self, vectors: Array, kind: str, green: str, signed: bool) -> Array:
+        """Turn vectors with the frame: a surface h(S(p)) has the slope J^T grad h, and a step J^-1 v shows the step v."""
+        count = 3 if kind == "normal" else 2
+        what = "a normal map" if kind == "normal" else "a map of vectors"
+        if self.axes != 2 or vectors.ndim != 3 or vectors.shape[-1] < count:
+            raise InvalidInput(f"exemplars: {what} needs shape (rows, columns, {count}), got {vectors.shape}")
+        if vectors.dtype == np.bool_:
+            raise InvalidInput(f"exemplars: {what} cannot be bool")
         if self.frame is None:
-            return normals
-        integers = normals.dtype.kind in "ui"
-        top = float(np.iinfo(normals.dtype).max) if integers else 1.0
+            return vectors
+        integers = vectors.dtype.kind in "ui"
+        top = float(np.iinfo(vectors.dtype).max) if integers else 1.0
         offset = 0.0 if signed else 1.0
         scale = (2.0 if offset else 1.0) / top
-        n = normals[..., :3].astype(np.float64) * scale - offset
+        v = vectors[..., :count].astype(np.float64) * scale - offset
         down = -1.0 if green == "up" else 1.0
-        flat = np.stack([n[..., 1] * down, n[..., 0]], axis=-1)
-        turned = np.einsum("...ji,...j->...i", self.frames().astype(np.float64), flat)
-        n = np.stack([turned[..., 1], turned[..., 0] * down, n[..., 2]], axis=-1)
-        n /= np.maximum(np.linalg.norm(n, axis=-1, keepdims=True), 1e-12)
-        value = (n + offset) / scale
-        out = normals.copy()
-        out[..., :3] = np.rint(value) if integers else value
+        flat = np.stack([v[..., 1] * down, v[..., 0]], axis=-1)
+        frames = self.frames().astype(np.float64)
+        if kind == "normal":
+            turned, length = np.einsum("...ji,...j->...i", frames, flat), 1.0
+        else:
+            # The inverse but for its determinant, whose sign says which way.
+            (a, b), (c, d) = np.moveaxis(frames, (-2, -1), (0, 1))
+            turned = np.stack([d * flat[..., 0] - b * flat[..., 1], a * flat[..., 1] - c * flat[..., 0]], axis=-1)
+            turned *= np.where(a * d < b * c, -1.0, 1.0)[..., np.newaxis]
+            length = np.linalg.norm(flat, axis=-1, keepdims=True)
+        v = np.concatenate([turned[..., 1:], turned[..., :1] * down, v[..., 2:]], axis=-1)
+        v *= length / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-12)
+        value = (v + offset) / scale
+        out = vectors.copy()
+        out[..., :count] = np.rint(value) if integers else value
         return out
 
     def compose(self, inner: SourceMap | Sequence[SourceMap]) -> SourceMap:

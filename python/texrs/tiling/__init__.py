@@ -28,8 +28,10 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_int, as_size, as_wrap
 from texrs._typing import Array, Floats, Progress
+from texrs._verbs import takes_materials
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
+from texrs.materials import Material
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 from texrs.tiling._extend import extend
@@ -46,8 +48,9 @@ LARGE = 0.22
 AXES = ("rows", "columns")
 
 
+@takes_materials("image")
 def tile(
-    image: Array | Exemplar,
+    image: Array | Exemplar | Material,
     *,
     wrap: bool | Sequence[bool] = (True, True),
     size: int | Sequence[int] | None = None,

@@ -58,6 +58,7 @@ from dataclasses import replace
 from functools import partial
 
 from texrs._typing import Progress
+from texrs._verbs import takes_materials
 from texrs.blending import SCREENING
 from texrs.elements import Elements
 from texrs.exemplar import ElementOptions
@@ -72,6 +73,7 @@ from texrs.synthesis import Synthesis
 __all__ = ["DeformationOptions", "design", "design_variants"]
 
 
+@takes_materials("exemplar")
 def design(
     exemplar: Exemplars,
     size: Size = None,
@@ -200,6 +202,7 @@ def design(
     return next(variants)
 
 
+@takes_materials("exemplar")
 def design_variants(
     exemplar: Exemplars,
     count: int,

@@ -27,11 +27,12 @@ from texrs._typing import Array, Progress
 from texrs.elements import Elements
 from texrs.errors import InvalidInput
 from texrs.exemplar import ElementOptions, Exemplar, as_exemplar
+from texrs.materials import Material
 from texrs.papers.design.options import DeformationOptions
 
 __all__ = ["Arguments", "Choice", "Density", "Exemplars", "Method", "Size", "Weights", "check_arguments"]
 
-Exemplars: TypeAlias = Array | Exemplar | Elements | Sequence[Array | Exemplar | Elements]
+Exemplars: TypeAlias = Array | Exemplar | Elements | Material | Sequence[Array | Exemplar | Elements | Material]
 Size: TypeAlias = int | Sequence[int] | None
 Weights: TypeAlias = Sequence[float] | Array | None
 Density: TypeAlias = float | Sequence[float] | Array | None

@@ -41,9 +41,11 @@ import numpy as np
 from texrs._arrays import power_single
 from texrs._engine.pyramid import Region
 from texrs._typing import Array, Interpolation, Progress
+from texrs._verbs import takes_materials
 from texrs.exemplar import Exemplar
 from texrs.exemplar.sheet import Copies, Flattened, Sheet, find_plane
 from texrs.growth import FromSheet, stitch_sheet
+from texrs.materials import Material
 from texrs.papers.perspective.literal import average_windows
 from texrs.papers.perspective.request import Method, Request
 from texrs.papers.perspective.sizes import Outside, Sizes, bring_within, choose_sizes
@@ -55,8 +57,9 @@ from texrs.synthesis import Synthesis
 __all__ = ["perspective"]
 
 
+@takes_materials("exemplar")
 def perspective(
-    exemplar: Array | Exemplar,
+    exemplar: Array | Exemplar | Material,
     scale_map: Array | str = "auto",
     size: int | Sequence[int] | None = None,
     *,

@@ -13,6 +13,7 @@ from texrs._arrays import as_choice, as_float, as_method, as_seed, as_size, as_w
 from texrs._typing import Array, Floats, Interpolation
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
+from texrs.materials import Material
 from texrs.papers.perspective.sizes import Sizes, check_sizes
 from texrs.planes._choose import measure_scale
 from texrs.scale_maps import Measuring
@@ -70,7 +71,7 @@ class Request:
     @classmethod
     def check(
         cls,
-        exemplar: Array | Exemplar,
+        exemplar: Array | Exemplar | Material,
         scale_map: Array | str,
         size: int | Sequence[int] | None,
         *,

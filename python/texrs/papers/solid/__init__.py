@@ -59,10 +59,12 @@ import numpy as np
 from texrs._engine.pyramid import ONE, Region, to_fixed
 from texrs._progress import stage
 from texrs._typing import Array, Interpolation, Progress
+from texrs._verbs import takes_materials
 from texrs.exemplar import Exemplar
 from texrs.fields import Field
 from texrs.growth import Constraints, Grown, Guide, Windows, grow, keep
 from texrs.growth.engine import Places, Show
+from texrs.materials import Material
 from texrs.papers.solid.literal import grow_as_printed
 from texrs.papers.solid.plans import PLANS, Choice, Plan, choose_plan
 from texrs.papers.solid.request import Method, Request
@@ -73,8 +75,9 @@ from texrs.synthesis import Synthesis
 __all__ = ["solid", "synthesize"]
 
 
+@takes_materials("exemplar")
 def solid(
-    exemplar: Array | Exemplar,
+    exemplar: Array | Exemplar | Material,
     size: int | Sequence[int],
     *,
     field: Field | None = None,
@@ -181,8 +184,9 @@ def solid(
     return grow_texture(request, progress)
 
 
+@takes_materials("exemplar")
 def synthesize(
-    exemplar: Array | Exemplar,
+    exemplar: Array | Exemplar | Material,
     size: int | Sequence[int],
     *,
     field: Field | None = None,

@@ -16,6 +16,7 @@ from texrs.exemplar import Exemplar, as_exemplar
 from texrs.exemplar.analysis import COARSEST
 from texrs.fields import Field
 from texrs.growth import Conditions, Constraints, Guide
+from texrs.materials import Material
 from texrs.papers.solid.limits import check_memory
 from texrs.papers.solid.plans import Choice, check_plan
 from texrs.papers.solid.settings import Quality, as_quality
@@ -69,7 +70,7 @@ class Request:
     @classmethod
     def check(
         cls,
-        exemplar: Array | Exemplar,
+        exemplar: Array | Exemplar | Material,
         size: int | Sequence[int],
         *,
         axes: int,

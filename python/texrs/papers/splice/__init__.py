@@ -59,8 +59,10 @@ from typing import Any, Literal, TypeAlias
 
 from texrs._arrays import as_bool, as_float, as_method, as_seed, as_size
 from texrs._typing import Array, Progress
+from texrs._verbs import takes_materials
 from texrs.elements import Elements, Layout
 from texrs.errors import InvalidInput
+from texrs.materials import Material
 from texrs.papers.splice.adjustment import adjust_targets, crop_extension, straighten_rows
 from texrs.papers.splice.backward_warp import warp_backwards
 from texrs.papers.splice.cells import find_entry_cells, splice_cells
@@ -98,9 +100,10 @@ SCREENING = 0.01
 Edit: TypeAlias = str | Mapping[str, Any] | Sequence[Mapping[str, Any]]
 
 
+@takes_materials("a", beside=("b",))
 def splice(
-    a: Elements | Array,
-    b: Elements | Array,
+    a: Elements | Material | Array,
+    b: Elements | Material | Array,
     size: int | Sequence[int] | None = None,
     *,
     seed: int = 0,
@@ -261,8 +264,9 @@ def splice(
     )
 
 
+@takes_materials("a")
 def self_splice(
-    a: Elements | Array,
+    a: Elements | Material | Array,
     edit: Edit | None = None,
     size: int | Sequence[int] | None = None,
     *,

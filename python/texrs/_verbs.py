@@ -1,0 +1,108 @@
+"""Verbs that take materials wherever they take examples."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import replace
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar, cast
+
+from texrs._typing import Progress
+from texrs.errors import InvalidInput
+from texrs.materials._material import Material, apply_materials, guide_materials
+from texrs.synthesis import Synthesis
+
+__all__ = ["takes_materials"]
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def takes_materials(*names: str, beside: tuple[str, ...] = ()) -> Callable[[Callable[P, T]], Callable[P, T]]:
+    """Let a verb take materials for its examples: it decides on what they tell, and all their maps come of it.
+
+    Parameters
+    ----------
+    *names : str
+        The verb's parameters that its source map looks into, in the order of its exemplars; one may hold a list.
+    beside : tuple of str
+        Parameters of which only what they look like counts.
+
+    Returns
+    -------
+    callable
+        Decorates a function that returns a `texrs.Synthesis`, or an iterator of them: its ``material`` is set, and its
+        ``image`` is the map that shows it.
+
+    Raises
+    ------
+    InvalidInput
+        Some exemplars are materials and others are not, or their maps differ.
+
+    """
+
+    def decorate(verb: Callable[P, T]) -> Callable[P, T]:
+        signature = inspect.signature(verb)
+
+        @wraps(verb)
+        def run(*args: P.args, **kwargs: P.kwargs) -> T:
+            if not any(_holds(value) for value in (*args, *kwargs.values())):
+                return verb(*args, **kwargs)
+            given = signature.bind(*args, **kwargs)
+            for name in beside:
+                if isinstance(given.arguments.get(name), Material):
+                    given.arguments[name] = given.arguments[name].guide
+            used = [name for name in names if given.arguments.get(name) is not None]
+            several = [m for name in used for m in _as_list(given.arguments[name])]
+            if not any(isinstance(m, Material) for m in several):
+                return verb(*given.args, **given.kwargs)
+            materials = _check(several, used)
+            guides = iter(guide_materials(materials))
+            for name in used:
+                value = given.arguments[name]
+                given.arguments[name] = (
+                    [next(guides) for _ in value] if isinstance(value, list | tuple) else next(guides)
+                )
+            watch = given.arguments.get("progress")
+            made: Any = verb(*given.args, **given.kwargs)
+            if isinstance(made, Synthesis):
+                return cast(T, finish(made, materials, watch))
+            return cast(T, (finish(one, materials, watch) for one in made))
+
+        return run
+
+    return decorate
+
+
+def finish(made: Synthesis, materials: list[Material], progress: Progress | None) -> Synthesis:
+    """Return what a verb made of guides as what it makes of their materials."""
+    material = apply_materials(materials, made.source, progress)
+    stages = {"guide" if name == "composite" else name: stage for name, stage in made.stages.items()}
+    maps = {name: each.role.value for name, each in material.items()}
+    return replace(
+        made,
+        image=material.base,
+        stages={**stages, "composite": material.base},
+        report={**made.report, "maps": maps},
+        material=material,
+    )
+
+
+def _as_list(value: object) -> list[object]:
+    return list(value) if isinstance(value, list | tuple) else [value]
+
+
+def _holds(value: object) -> bool:
+    """Return whether a value is a material, or a list with one."""
+    return any(isinstance(each, Material) for each in _as_list(value))
+
+
+def _check(several: list[object], names: list[str]) -> list[Material]:
+    """Check that all exemplars are materials."""
+    materials = [each for each in several if isinstance(each, Material)]
+    if len(materials) < len(several):
+        raise InvalidInput(
+            f"{', '.join(names)}: either all are materials or none is; got {len(materials)} of {len(several)}"
+        )
+    return materials

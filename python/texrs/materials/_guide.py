@@ -1,0 +1,102 @@
+"""What decisions are made on where there are several maps: the three channels that tell most of all of them.
+
+A seam that the albedo hides may be seen in the normals. Each map is brought to a scale on which the same difference is about
+as visible, and weighted; the leading principal components of all channels together are kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from texrs._arrays import power_single, to_unit
+from texrs._typing import Array, Floats
+from texrs.materials._roles import Role
+
+__all__ = ["WEIGHTS", "make_guides", "take_features"]
+
+WEIGHTS: dict[Role, float] = {
+    Role.COLOUR: 1.0,
+    Role.NORMAL: 1.0,
+    Role.NORMAL_DX: 1.0,
+    Role.HEIGHT: 0.75,
+    Role.ROUGHNESS: 0.5,
+    Role.METALLIC: 0.5,
+    Role.OCCLUSION: 0.5,
+    Role.OPACITY: 0.5,
+    Role.EMISSION: 0.5,
+    Role.ORM: 0.5,
+    Role.MASK: 0.5,
+    Role.LABELS: 0.0,
+    Role.VECTOR: 0.5,
+    Role.OTHER: 0.25,
+}
+"""How much maps count, unless it is said: light falls on normals, heights are seen by them."""
+DISPLAY = 1 / 2.2
+"""Power that light is shown by."""
+TAILS = 0.005
+"""Share of heights at either end that their range leaves out."""
+CHANNELS = 3
+LEAST = 1e-3
+"""Share of all that varies below which a component tells nothing."""
+SAMPLES = 1 << 18
+"""Pixels that components are measured on, about."""
+
+
+def take_features(pixels: Array, role: Role, space: str, axes: int) -> Floats:
+    """Return what a map tells: (..., C) float32, of which a difference of 1 is as visible as that of black and white."""
+    image = pixels if pixels.ndim > axes else pixels[..., np.newaxis]
+    if role.normal or role is Role.VECTOR:
+        # The slopes: what they say of the light. The third number follows from them.
+        vector = _decode(image)
+        return vector[..., : min(2, vector.shape[-1])] * np.float32(0.5)
+    if role is Role.HEIGHT:
+        values = to_unit(image) if image.dtype.kind in "b" else image.astype(np.float32)
+        low, high = np.quantile(values, [TAILS, 1 - TAILS])
+        shown: Floats = np.clip((values - np.float32(low)) / np.float32(max(high - low, 1e-12)), 0, 1)
+        return shown
+    unit = to_unit(image)
+    if role.coloured:
+        if space == "linear":
+            unit = power_single(unit, DISPLAY)
+        if unit.shape[-1] in (2, 4):
+            unit = np.concatenate([unit[..., :-1] * unit[..., -1:], unit[..., -1:]], axis=-1)
+    return unit
+
+
+def _decode(image: Array) -> Floats:
+    """Return vectors within [-1, 1]: unsigned values mean 2 v - 1, and so do floats that are never negative."""
+    values = to_unit(image) if image.dtype.kind in "ub" else image.astype(np.float32)
+    if image.dtype.kind == "i":
+        return np.asarray(values / np.float32(np.iinfo(image.dtype).max), np.float32)
+    return values if image.dtype.kind == "f" and values.min() < 0 else values * np.float32(2) - np.float32(1)
+
+
+def make_guides(features: Sequence[Sequence[Floats]]) -> list[Floats]:
+    """Return guides of several exemplars that can be compared: the same components of all of them, in [0, 1]."""
+    stacks = [np.concatenate(list(each), axis=-1) for each in features]
+    channels = stacks[0].shape[-1]
+    flat = [s.reshape(-1, channels) for s in stacks]
+    step = max(1, sum(len(f) for f in flat) // SAMPLES)
+    some = np.concatenate([f[::step] for f in flat]).astype(np.float64)
+    mean = some.mean(axis=0)
+    some -= mean
+    # Sums in one order: of a matrix product the last bits hang on the processor.
+    spread = np.einsum("ni,nj->ij", some, some) / len(some)
+    # The last bits of a decomposition hang on it too.
+    values, vectors = np.linalg.eigh(np.round(spread, 9))
+    count = max(1, int(np.count_nonzero(values[::-1][:CHANNELS] > LEAST * values.sum())))
+    leading = np.round(vectors[:, : -count - 1 : -1], 6)
+    leading *= np.where(leading[np.abs(leading).argmax(axis=0), np.arange(count)] < 0, -1.0, 1.0)
+    if count == 2:
+        # The second of two channels would be taken for transparency.
+        leading = np.pad(leading, ((0, 0), (0, 1)))
+    middle = (mean[:, np.newaxis] * leading).sum(axis=0)
+    found = [np.einsum("nc,ck->nk", f, leading, dtype=np.float64) - middle for f in flat]
+    reach = max(float(np.quantile(np.abs(f), 1 - TAILS / 5)) for f in found)
+    scale = 0.5 / max(reach, 1e-9)
+    return [
+        np.clip(0.5 + scale * f, 0, 1).astype(np.float32).reshape(*stack.shape[:-1], -1)
+        for f, stack in zip(found, stacks, strict=True)
+    ]

@@ -1,0 +1,387 @@
+"""Materials: maps in register, each with its role, that go wherever an example goes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path as FilePath
+from typing import Literal
+
+import numpy as np
+
+from texrs._arrays import as_choice, as_float, as_image, as_int
+from texrs._typing import Array, Floats, Path, Progress
+from texrs.blending import apply
+from texrs.errors import InvalidInput
+from texrs.materials._guide import WEIGHTS, make_guides, take_features
+from texrs.materials._map import Map, Space
+from texrs.materials._roles import Role, as_role, guess_role
+from texrs.source_map import SourceMap
+
+__all__ = ["Material"]
+
+CHANNELS = {Role.NORMAL: (3, 4), Role.NORMAL_DX: (3, 4), Role.ORM: (3, 4), Role.VECTOR: (2, 3), Role.LABELS: (1,)}
+"""How many channels maps of a role may have; of others any."""
+
+
+class Material(Mapping[str, Map]):
+    """Maps in register, by name, such as the albedo, the normals and the heights of one surface.
+
+    A material goes wherever an example goes: `texrs.design`, `texrs.tile`, `texrs.complete` and all other verbs decide on what
+    its maps tell together (`guide`), and look every map up through the one source map, so that all stay in register: colours
+    and heights are blended, normals turned and brought back to unit length, labels and masks never mixed.
+
+    Parameters
+    ----------
+    maps : mapping of str to array or Map
+        By name; the name says the role (see `texrs.materials.guess_role`), where ``roles`` does not. All have the same size.
+    roles : mapping of str to Role or str, optional
+        What maps are for whose name does not say it, or says something else.
+    spaces : mapping of str to {"srgb", "linear"}, optional
+        How maps encode light; integers of colours and emission are sRGB, all else is linear.
+    weights : mapping of str to float, optional
+        How much maps count for decisions, 0 to 100; by default 1 for colours and normals, .75 for heights, .5 for roughness,
+        metal, occlusion, opacity, emission and masks, .25 for others and 0 for labels.
+    axes : int
+        2 for pictures, 3 for volumes.
+
+    Raises
+    ------
+    InvalidInput
+        No maps, of several sizes, a name that says no role, or a map that its role cannot have.
+
+    Examples
+    --------
+    >>> import texrs
+    >>> pebbles = texrs.samples.pebbles((64, 64)).image
+    >>> stones = texrs.Material({"albedo": pebbles, "height": pebbles[..., 1].astype("float32") / 255})
+    >>> stones
+    <Material of 64 x 64: albedo (colour, uint8), height (height, float32)>
+    >>> made = texrs.design(stones, (96, 128)).material
+    >>> {name: each.pixels.shape for name, each in made.items()}
+    {'albedo': (96, 128, 3), 'height': (96, 128)}
+
+    """
+
+    def __init__(
+        self,
+        maps: Mapping[str, Array | Map],
+        *,
+        roles: Mapping[str, Role | str] | None = None,
+        spaces: Mapping[str, Space] | None = None,
+        weights: Mapping[str, float] | None = None,
+        axes: int = 2,
+    ) -> None:
+        if not isinstance(maps, Mapping) or not maps:
+            raise InvalidInput("maps: needs a mapping of names to arrays, with at least one")
+        self._axes = as_int(axes, "axes", 2, 3)
+        said, how, share = dict(roles or {}), dict(spaces or {}), dict(weights or {})
+        for option, given in (("roles", said), ("spaces", how), ("weights", share)):
+            if unknown := given.keys() - maps.keys():
+                raise InvalidInput(f"{option}: there is no map {sorted(unknown)[0]!r}; there are {', '.join(maps)}")
+        self._maps = {name: self._check(name, each, said.get(name), how.get(name)) for name, each in maps.items()}
+        sizes = {name: each.pixels.shape[: self._axes] for name, each in self._maps.items()}
+        self._shape = next(iter(sizes.values()))
+        for name, size in sizes.items():
+            if size != self._shape:
+                raise InvalidInput(f"{name}: all maps must have one size, got {size} beside {self._shape}")
+        self._weights = {name: as_float(w, f"weights[{name!r}]", 0, 100) for name, w in share.items()}
+        if len(self) > 1 and not any(self._weights.get(name, WEIGHTS[each.role]) for name, each in self.items()):
+            raise InvalidInput("weights: all are 0, so there is nothing to decide on")
+
+    def _check(self, name: str, value: Array | Map, role: Role | str | None, space: Space | None) -> Map:
+        pixels = value.pixels if isinstance(value, Map) else value
+        image = as_image(pixels, name, axes=self._axes)
+        known = value.role if isinstance(value, Map) else guess_role(name)
+        chosen = known if role is None else as_role(role, f"roles[{name!r}]")
+        if chosen is None:
+            raise InvalidInput(
+                f"{name}: the name does not say what the map is for; say it by roles, as {name!r}: 'other'"
+            )
+        allowed = CHANNELS.get(chosen)
+        if allowed is not None and image.shape[-1] not in allowed:
+            counts = " or ".join(map(str, allowed))
+            raise InvalidInput(f"{name}: a map of role {chosen.value} has {counts} channels, got {image.shape[-1]}")
+        usual: Space = "srgb" if chosen.coloured and image.dtype.kind in "ui" else "linear"
+        if isinstance(value, Map) and chosen == value.role:
+            usual = value.space
+        if space is not None:
+            as_choice(space, f"spaces[{name!r}]", ("srgb", "linear"))
+        kept = image if np.ndim(pixels) > self._axes else image[..., 0]
+        return Map(kept, chosen, space or usual)
+
+    @classmethod
+    def read(cls, path: Path, *, roles: Mapping[str, Role | str] | None = None, axes: int = 2) -> Material:
+        """Return the material whose maps are the files of a folder, by the usual names.
+
+        Parameters
+        ----------
+        path : path_like
+            A folder, or an EXR file of several layers.
+        roles : mapping of str to Role or str, optional
+            What files are for, by their names, with or without the suffix.
+        axes : int
+            2 for pictures, 3 for volumes.
+
+        Returns
+        -------
+        Material
+            Its maps have the names of the files, without what all of them begin with (``rock_albedo``, ``rock_normal``).
+
+        Raises
+        ------
+        FileError
+            Not a folder, none of its files is a map, or one cannot be read.
+        InvalidInput
+            Maps of several sizes, or a role of a file that is not there.
+
+        Warns
+        -----
+        UserWarning
+            Pictures are left out, for their names do not say what they are for.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import texrs
+        >>> pebbles = texrs.samples.pebbles((64, 64)).image
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     texrs.io.write(f"{folder}/stones_2k_albedo.png", pebbles)
+        ...     texrs.io.write(f"{folder}/stones_2k_height.png", pebbles[..., 1])
+        ...     texrs.Material.read(folder)
+        <Material of 64 x 64: albedo (colour, uint8), height (height, uint8)>
+
+        """
+        from texrs.materials._files import read_maps
+
+        maps, found = read_maps(path, dict(roles or {}), axes)
+        return cls(maps, roles=found, axes=axes)
+
+    def save(
+        self, folder: Path, *, depth: Literal[8, 16, 32] | None = None, suffix: str | None = None
+    ) -> list[FilePath]:
+        """Write each map to a file of its name, all or none.
+
+        Parameters
+        ----------
+        folder : path_like
+            Made where it is missing; files of these names are replaced.
+        depth : {8, 16, 32}, optional
+            Bits of each sample: integers of 8 or 16, floats of 32. By default those of each map.
+        suffix : str, optional
+            Of all files, such as ``".tif"``, which says the format; by default PNG, or TIFF and EXR for what it cannot hold.
+
+        Returns
+        -------
+        list of pathlib.Path
+            The files, in the order of the maps.
+
+        Raises
+        ------
+        FileError
+            A file cannot be written. What was there is as it was.
+        InvalidInput
+            Another depth, or values that the format cannot hold.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import numpy as np
+        >>> import texrs
+        >>> stones = texrs.Material({"albedo": np.zeros((8, 8, 3), np.uint8), "height": np.zeros((8, 8), np.float32)})
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     [path.name for path in stones.save(folder)], texrs.Material.read(folder)["height"].depth
+        (['albedo.png', 'height.exr'], 32)
+
+        """
+        from texrs.materials._files import write_maps
+
+        if depth not in (None, 8, 16, 32):
+            raise InvalidInput(f"depth: allowed are 8, 16 and 32, got {depth!r}")
+        return write_maps(self, folder, axes=self.axes, depth=depth, suffix=suffix)
+
+    # --- the maps ----------------------------------------------------------------------------------------------------
+
+    def __getitem__(self, name: str) -> Map:
+        """Return a map by its name."""
+        return self._maps[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Return the names."""
+        return iter(self._maps)
+
+    def __len__(self) -> int:
+        """Return how many maps there are."""
+        return len(self._maps)
+
+    def __repr__(self) -> str:
+        """Return the size, and the name, role and dtype of each map."""
+        maps = ", ".join(f"{name} ({each.role.value}, {each.pixels.dtype})" for name, each in self.items())
+        return f"<Material of {' x '.join(map(str, self._shape))}: {maps}>"
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Samples along each axis, without the channels."""
+        return self._shape
+
+    @property
+    def axes(self) -> int:
+        """2 for pictures, 3 for volumes."""
+        return self._axes
+
+    @property
+    def base(self) -> Array:
+        """The map that shows the material: its colours, or the first where it has none."""
+        return next((m for m in self.values() if m.role is Role.COLOUR), next(iter(self.values()))).pixels
+
+    def find(self, role: Role | str) -> str | None:
+        """Return the name of the first map of a role, if there is one.
+
+        Parameters
+        ----------
+        role : Role or str
+            Which.
+
+        Returns
+        -------
+        str or None
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import texrs
+        >>> texrs.Material({"rock_nor_gl": np.zeros((8, 8, 3), np.uint8)}).find("normal")
+        'rock_nor_gl'
+
+        """
+        wanted = as_role(role, "role")
+        return next((name for name, each in self.items() if each.role is wanted), None)
+
+    def replace(self, **maps: Array) -> Material:
+        """Return a material with other values in some of its maps.
+
+        Parameters
+        ----------
+        **maps : array
+            By name; roles stay.
+
+        Returns
+        -------
+        Material
+
+        Raises
+        ------
+        InvalidInput
+            There is no such map, or its size is another.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import texrs
+        >>> flat = texrs.Material({"height": np.zeros((8, 8), np.float32)})
+        >>> float(flat.replace(height=np.ones((8, 8), np.float32))["height"].pixels.max())
+        1.0
+
+        """
+        for name in maps:
+            if name not in self:
+                raise InvalidInput(f"maps: there is no map {name!r}; there are {', '.join(self)}")
+        changed = {name: replace(each, pixels=maps[name]) if name in maps else each for name, each in self.items()}
+        return Material(changed, weights=self._weights, axes=self._axes)
+
+    # --- what is decided on, and what is made --------------------------------------------------------------------------
+
+    @property
+    def guide(self) -> Floats:
+        """What decisions are made on: (..., C) float32 in [0, 1], up to three channels that tell most of all maps."""
+        return guide_materials([self])[0]
+
+    def features(self) -> list[Floats]:
+        """Return what each map tells, times its weight: of one size, on scales that can be compared."""
+        found = []
+        for name, each in self.items():
+            weight = self._weights.get(name, WEIGHTS[each.role])
+            if weight > 0:
+                found.append(np.float32(weight) * take_features(each.pixels, each.role, each.space, self._axes))
+        return found
+
+    def apply(self, source: SourceMap, *, progress: Progress | None = None) -> Material:
+        """Return the material that a source map makes of this one, finished as the verb that made the map does.
+
+        Parameters
+        ----------
+        source : SourceMap
+            Which looks into one exemplar, of the size of the maps.
+        progress : callable, optional
+            Called as ``progress(stage, share)``; raising stops the work.
+
+        Returns
+        -------
+        Material
+            The same maps, dtypes, roles and names.
+
+        Raises
+        ------
+        InvalidInput
+            The source map looks into pictures of another size, or into several.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import texrs
+        >>> stones = texrs.Material({"height": np.arange(12, dtype=np.uint16).reshape(3, 4)})
+        >>> bool((stones.apply(texrs.SourceMap.identity((3, 4)))["height"].pixels == stones["height"].pixels).all())
+        True
+
+        """
+        return apply_materials([self], source, progress)
+
+
+def guide_materials(materials: Sequence[Material]) -> list[Floats]:
+    """Return what decisions are made on, of materials that are compared with each other: of the same maps."""
+    check_alike(materials)
+    first = materials[0]
+    if len(first) == 1:
+        # What a picture is decided on.
+        return [np.asarray(next(iter(m.values())).pixels) for m in materials]
+    return make_guides([m.features() for m in materials])
+
+
+def apply_materials(materials: Sequence[Material], source: SourceMap, progress: Progress | None = None) -> Material:
+    """Return the material that a source map makes of several with the same maps."""
+    check_alike(materials)
+    first, made = materials[0], {}
+    for number, (name, each) in enumerate(first.items()):
+
+        def watch(stage: str, share: float, number: int = number, name: str = name) -> None:
+            if progress is not None:
+                progress(f"map {name}", (number + share) / len(first))
+
+        watch("", 0.0)
+        images = [m[name].pixels for m in materials]
+        if each.role.labelled:
+            pixels = apply(source, images, kind="label", progress=watch)
+        elif each.role.normal:
+            green: Literal["up", "down"] = "up" if each.role is Role.NORMAL else "down"
+            pixels = apply(source, images, kind="normal", green=green, progress=watch)
+        elif each.role is Role.VECTOR:
+            pixels = apply(source, images, kind="vector", progress=watch)
+        else:
+            pixels = apply(source, images, progress=watch)
+        made[name] = replace(each, pixels=pixels)
+    return Material(made, weights=first._weights, axes=first.axes)
+
+
+def check_alike(materials: Sequence[Material]) -> None:
+    """Check that materials have the same maps, with the same roles, dtypes and channels."""
+    first = materials[0]
+    for other in materials[1:]:
+        if list(other) != list(first):
+            raise InvalidInput(
+                f"exemplars: need materials with the same maps, got {', '.join(first)} and {', '.join(other)}"
+            )
+        for name, each in first.items():
+            theirs = other[name]
+            mine, its = ((m.role.value, str(m.pixels.dtype), m.channels) for m in (each, theirs))
+            if mine != its:
+                raise InvalidInput(f"exemplars: the maps {name!r} differ: {mine} and {its}")
