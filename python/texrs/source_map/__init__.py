@@ -20,6 +20,7 @@ from texrs.kernels.gather import gather
 from texrs.source_map._antialias import gather_smoothed
 from texrs.source_map._finish import Finish
 from texrs.source_map._pixels import Pixels, divide_bands, label_pieces, number_pairs
+from texrs.source_map._vectors import turn_vectors
 
 __all__ = ["Finish", "Reuse", "SourceMap"]
 
@@ -338,29 +339,16 @@ class SourceMap:
             raise InvalidInput(f"exemplars: {what} needs shape (rows, columns, {count}), got {vectors.shape}")
         if vectors.dtype == np.bool_:
             raise InvalidInput(f"exemplars: {what} cannot be bool")
-        if self.frame is None:
+        frame = self.frame_array()
+        if frame is None:
             return vectors
-        integers = vectors.dtype.kind in "ui"
-        top = float(np.iinfo(vectors.dtype).max) if integers else 1.0
-        offset = 0.0 if signed else 1.0
-        scale = (2.0 if offset else 1.0) / top
-        v = vectors[..., :count].astype(np.float64) * scale - offset
-        down = -1.0 if green == "up" else 1.0
-        flat = np.stack([v[..., 1] * down, v[..., 0]], axis=-1)
-        frames = self.frames().astype(np.float64)
-        if kind == "normal":
-            turned, length = np.einsum("...ji,...j->...i", frames, flat), 1.0
-        else:
-            # The inverse but for its determinant, whose sign says which way.
-            (a, b), (c, d) = np.moveaxis(frames, (-2, -1), (0, 1))
-            turned = np.stack([d * flat[..., 0] - b * flat[..., 1], a * flat[..., 1] - c * flat[..., 0]], axis=-1)
-            turned *= np.where(a * d < b * c, -1.0, 1.0)[..., np.newaxis]
-            length = np.linalg.norm(flat, axis=-1, keepdims=True)
-        v = np.concatenate([turned[..., 1:], turned[..., :1] * down, v[..., 2:]], axis=-1)
-        v *= length / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-12)
-        value = (v + offset) / scale
         out = vectors.copy()
-        out[..., :count] = np.rint(value) if integers else value
+        # A band at a time, for what is computed of a pixel takes many times its size.
+        for band in divide_bands(self.shape):
+            frames = frame[self.label[band]] if frame.ndim == 3 else frame[band]
+            out[band] = turn_vectors(
+                vectors[band], frames.astype(np.float64), kind, down=green == "down", signed=signed
+            )
         return out
 
     def compose(self, inner: SourceMap | Sequence[SourceMap]) -> SourceMap:
