@@ -13,6 +13,7 @@ from texrs._arrays import as_choice, as_float, as_image, as_int
 from texrs._typing import Array, Floats, Path, Progress
 from texrs.blending import apply
 from texrs.errors import InvalidInput
+from texrs.materials._exports import Exports
 from texrs.materials._guide import WEIGHTS, make_guides, take_features
 from texrs.materials._map import Map, Space
 from texrs.materials._roles import Role, as_role, guess_role
@@ -24,7 +25,7 @@ CHANNELS = {Role.NORMAL: (3, 4), Role.NORMAL_DX: (3, 4), Role.ORM: (3, 4), Role.
 """How many channels maps of a role may have; of others any."""
 
 
-class Material(Mapping[str, Map]):
+class Material(Exports):
     """Maps in register, by name, such as the albedo, the normals and the heights of one surface.
 
     A material goes wherever an example goes: `texrs.design`, `texrs.tile`, `texrs.complete` and all other verbs decide on what

@@ -1,0 +1,226 @@
+"""A material under a light: what its maps look like together.
+
+Light comes from one direction and, weaker, from all of them; it is looked at from straight above. Diffuse light is Lambert's;
+highlights are those of small mirrors (Cook and Torrance 1982) spread as Walter et al. 2007 say (GGX), shadowed after Smith in
+Schlick's form, with Schlick's Fresnel term; of the surroundings they reflect what Karis 2014 fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import ceil, cos, pi, radians, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_float, as_int, as_tuple, exp_single, to_unit
+from texrs._typing import Floats
+from texrs.errors import InvalidInput
+from texrs.materials._light import decode_normals, encode_srgb, find_map, shrink, to_light, to_share
+from texrs.materials._map import Map
+from texrs.materials._roles import Role
+
+__all__ = ["render_preview"]
+
+AMBIENT = 0.3
+"""Light from everywhere, where 1 shows a flat, dull surface in its own colours."""
+GREY = 0.5
+"""Linear light that a surface without colours throws back."""
+ROUGH, METAL = 0.6, 0.0
+"""Of surfaces whose maps do not say it."""
+MIRROR = 0.04
+"""Share of light from straight above that what is not metal mirrors."""
+STEEPNESS = 0.4
+"""Root mean square slope that heights are shown with, for nothing says in what units they are."""
+SHOULDER = 0.8
+"""Linear light above which highlights are rolled off."""
+STRIP = 1 << 19
+"""Pixels that are shaded at a time."""
+
+
+def render_preview(
+    maps: Mapping[str, Map], tiles: Sequence[int], light: Sequence[float], side: int
+) -> NDArray[np.uint8]:
+    """Return the picture of maps under a light, of at most so many pixels along a side."""
+    down, right = (
+        as_int(n, "tiles", 1, 64) for n in as_tuple(tiles, "tiles", 2, "how often it is shown (down, across)")
+    )
+    given = as_tuple(light, "light", 2, "(azimuth, elevation) in degrees")
+    azimuth, elevation = as_float(given[0], "light[0]", -360, 360), as_float(given[1], "light[1]", 1, 90)
+    most = as_int(side, "side", 1, 1 << 16)
+    first = next(iter(maps.values())).pixels
+    rows, columns = first.shape[:2]
+    if most < max(down, right):
+        raise InvalidInput(f"side: {most} pixels do not hold {max(down, right)} tiles")
+    scale = min(1.0, most / max(rows * down, columns * right))
+    shape = max(1, int(rows * scale)), max(1, int(columns * scale))
+    slopes = measure_slopes(maps, (down > 1, right > 1))
+    toward = as_vector(azimuth, elevation)
+    shown = np.empty((rows, shape[1], 3), np.float32)
+    step = max(1, STRIP // columns)
+    signed = {name: each.pixels.dtype.kind == "f" and bool(each.pixels.min() < 0) for name, each in maps.items()}
+    for start in range(0, rows, step):
+        part = slice(start, min(start + step, rows))
+        cut = {name: Map(each.pixels[part], each.role, each.space) for name, each in maps.items()}
+        bent = None if slopes is None else slopes[part]
+        lit = shade(cut, signed, bent, toward)
+        back = find_opacity(cut)
+        if back is not None:
+            board = lay_checks(part, rows, columns)
+            lit = lit * back + board * (1 - back)
+        shown[part] = np.swapaxes(shrink(np.swapaxes(lit, 0, 1), shape[1:]), 0, 1)
+    encoded = encode_srgb(roll_off(shrink(shown, shape)))
+    tile = np.rint(np.clip(encoded, 0, 1) * np.float32(255)).astype(np.uint8)
+    return np.tile(tile, (down, right, 1))
+
+
+def as_vector(azimuth: float, elevation: float) -> Floats:
+    """Return where the light comes from: x to the right, y up, z out of the picture."""
+    a, e = radians(azimuth), radians(elevation)
+    return np.array([cos(a) * cos(e), sin(a) * cos(e), sin(e)], np.float32)
+
+
+def shade(cut: Mapping[str, Map], signed: Mapping[str, bool], slopes: Floats | None, toward: Floats) -> Floats:
+    """Return the light (..., 3) that a part of a surface throws straight up."""
+    shape = next(iter(cut.values())).pixels.shape[:2]
+    colour = take_colour(find_map(cut, Role.COLOUR), shape)
+    rough, metal, open_ = take_surface(cut)
+    normal = take_normals(cut, signed, slopes, shape)
+    facing = np.maximum(normal[..., 2:], np.float32(1e-3))
+    lit = np.maximum(dot(normal, toward), 0)
+    # As much light as makes a flat surface 1 - AMBIENT bright.
+    strength = np.float32((1 - AMBIENT) / float(toward[2]))
+    base = np.float32(MIRROR) * (1 - metal) + colour * metal
+    dull = colour * (1 - metal)
+
+    half = toward + np.array([0, 0, 1], np.float32)
+    half = half / np.sqrt((half * half).sum())
+    along = np.clip(dot(normal, half), 0, 1)
+    alpha = np.maximum(rough * rough, np.float32(2e-3))
+    spread = alpha * alpha
+    lobe = spread / (np.float32(pi) * np.square(along * along * (spread - 1) + 1))
+    shadow = np.square(rough + 1) / 8
+    hidden = (facing / (facing * (1 - shadow) + shadow)) * (
+        lit / np.maximum(lit * (1 - shadow) + shadow, np.float32(1e-6))
+    )
+    fresnel = base + (1 - base) * np.float32((1 - float(half[2])) ** 5)
+    # The light's share of pi is that by which Lambert's is divided.
+    mirrored = np.float32(pi / 4) * lobe * hidden * fresnel / facing
+    direct = strength * (lit * dull * (1 - fresnel) + mirrored)
+    around = np.float32(AMBIENT) * open_ * (dull + reflect_surroundings(base, rough, facing))
+    shown: Floats = direct + around
+    emission = find_map(cut, Role.EMISSION)
+    if emission is not None:
+        shown = shown + take_colour(emission, shape)
+    return shown
+
+
+def dot(vectors: Floats, other: Floats) -> Floats:
+    """Return products (..., 1) of vectors with one, summed in one order."""
+    product: Floats = vectors[..., :1] * other[0] + vectors[..., 1:2] * other[1] + vectors[..., 2:] * other[2]
+    return product
+
+
+def reflect_surroundings(base: Floats, rough: Floats, facing: Floats) -> Floats:
+    """Return the share of even light that is mirrored (Karis 2014, after Lazarov)."""
+    one, two, three, four = (
+        rough * np.float32(a) + np.float32(b)
+        for a, b in ((-1.0, 1.0), (-0.0275, 0.0425), (-0.572, 1.04), (0.022, -0.04))
+    )
+    grazing = exp_single(np.float32(-9.28 * 0.6931472) * facing)
+    mixed = np.minimum(one * one, grazing) * one + two
+    reflected: Floats = base * (np.float32(-1.04) * mixed + three) + (np.float32(1.04) * mixed + four)
+    return np.maximum(reflected, 0)
+
+
+def take_colour(each: Map | None, shape: tuple[int, ...]) -> Floats:
+    """Return linear colours (..., 3), without transparency; grey where there are none."""
+    if each is None:
+        return np.full((*shape, 3), GREY, np.float32)
+    pixels = each.pixels[..., np.newaxis] if each.pixels.ndim == 2 else each.pixels
+    light = np.maximum(to_light(pixels[..., : 3 if pixels.shape[-1] > 2 else 1], each.space), 0)
+    return np.broadcast_to(light, (*shape, 3)) if light.shape[-1] == 1 else light
+
+
+def take_surface(cut: Mapping[str, Map]) -> tuple[Floats, Floats, Floats]:
+    """Return roughness, metal and how open to the light places are, each (..., 1) in [0, 1], or a number for all."""
+    packed = find_map(cut, Role.ORM)
+    found = []
+    for role, channel, usual in ((Role.ROUGHNESS, 1, ROUGH), (Role.METALLIC, 2, METAL), (Role.OCCLUSION, 0, 1.0)):
+        each = find_map(cut, role)
+        if each is not None:
+            pixels = each.pixels if each.pixels.ndim > 2 else each.pixels[..., np.newaxis]
+            found.append(to_share(pixels[..., :1]))
+        elif packed is not None:
+            found.append(to_share(packed.pixels[..., channel : channel + 1]))
+        else:
+            found.append(np.full((1, 1, 1), usual, np.float32))
+    rough, metal, open_ = found
+    return rough, metal, open_
+
+
+def take_normals(
+    cut: Mapping[str, Map], signed: Mapping[str, bool], slopes: Floats | None, shape: tuple[int, ...]
+) -> Floats:
+    """Return normals of unit length, y up: those of the map, else those of the heights, else straight up."""
+    name = next((n for role in (Role.NORMAL, Role.NORMAL_DX) for n, m in cut.items() if m.role is role), None)
+    if name is not None:
+        return decode_normals(cut[name].pixels, cut[name].role, signed=signed[name])
+    if slopes is None:
+        return np.broadcast_to(np.array([0, 0, 1], np.float32), (*shape, 3))
+    normal = np.concatenate([-slopes, np.ones_like(slopes[..., :1])], axis=-1)
+    normal /= np.sqrt((normal * normal).sum(axis=-1, keepdims=True))
+    return normal
+
+
+def measure_slopes(maps: Mapping[str, Map], wrap: tuple[bool, bool]) -> Floats | None:
+    """Return how heights grow to the right and upwards, where they are what tells how the surface lies."""
+    height = find_map(maps, Role.HEIGHT)
+    if height is None or find_map(maps, Role.NORMAL, Role.NORMAL_DX) is not None:
+        return None
+    pixels = height.pixels if height.pixels.ndim == 2 else height.pixels[..., 0]
+    values = to_unit(pixels) if pixels.dtype.kind in "bui" else pixels.astype(np.float32)
+    found = np.stack([differ(values, 1, wrap[1]), -differ(values, 0, wrap[0])], axis=-1)
+    steep = float(np.sqrt(np.mean(np.square(found, dtype=np.float64))))
+    return found * np.float32(STEEPNESS / steep) if steep > 0 else found
+
+
+def differ(values: Floats, axis: int, wrap: bool) -> Floats:
+    """Return central differences along an axis; one-sided at borders that do not meet."""
+    if values.shape[axis] == 1:
+        return np.zeros_like(values)
+    found: Floats = (np.roll(values, -1, axis) - np.roll(values, 1, axis)) * np.float32(0.5)
+    if not wrap:
+        moved, ends = np.moveaxis(found, axis, 0), np.moveaxis(values, axis, 0)
+        moved[0], moved[-1] = ends[1] - ends[0], ends[-1] - ends[-2]
+    return found
+
+
+def find_opacity(cut: Mapping[str, Map]) -> Floats | None:
+    """Return how much of a surface is there, (..., 1): by its opacity, else by the transparency of its colours."""
+    each = find_map(cut, Role.OPACITY)
+    if each is not None:
+        return to_share(each.pixels if each.pixels.ndim > 2 else each.pixels[..., np.newaxis])[..., :1]
+    colour = find_map(cut, Role.COLOUR)
+    if colour is not None and colour.channels in (2, 4):
+        return to_share(colour.pixels[..., -1:])
+    return None
+
+
+def lay_checks(part: slice, rows: int, columns: int) -> Floats:
+    """Return the squares in two greys that transparency is shown over, an even number of them along each side."""
+    square = max(1, ceil(max(rows, columns) / 32))
+    counts = [2 * max(1, round(n / (2 * square))) for n in (rows, columns)]
+    down = np.arange(part.start, part.stop) * counts[0] // rows
+    across = np.arange(columns) * counts[1] // columns
+    odd = (down[:, np.newaxis] + across) % 2
+    squares: Floats = np.where(odd, np.float32(0.2), np.float32(0.35))[..., np.newaxis]
+    return squares
+
+
+def roll_off(light: Floats) -> Floats:
+    """Return light in [0, 1], whose highlights come near to 1 instead of being cut off."""
+    over = np.maximum(light - np.float32(SHOULDER), 0)
+    room = np.float32(1 - SHOULDER)
+    rolled: Floats = np.minimum(light, np.float32(SHOULDER)) + room * (1 - exp_single(-over / room))
+    return rolled
