@@ -20,6 +20,8 @@ from texrs.errors import FileError, InvalidInput
 
 FOUND = "found"
 """Stands for what is not said of a plane."""
+PLANE = "plane:"
+"""Before the words that say how a plane lies."""
 PLACE = r"\s*-?[0-9]+(\.[0-9]*)?\s*,\s*-?[0-9]+(\.[0-9]*)?\s*"
 """A row and a column, as text."""
 
@@ -266,6 +268,23 @@ def read_scale_map(path: str, encoding: str = "log2") -> Floats:
         return keep_kind(scale, kind)
 
 
+def read_target(text: str) -> Any:
+    """Read what an output is to show: a scale map, normals, texture coordinates, or Jacobians; of a plane the words stay."""
+    if text.lower().startswith(PLANE):
+        return text
+    try:
+        values = io.read(text)
+    except FileError:
+        if Path(text).suffix.lower() not in (".npy", ".npz"):
+            raise
+        # Jacobians have four axes.
+        return io.read_volume(text)
+    if values.ndim == 3 and values.shape[2] == 2:
+        return values
+    colours = values.ndim == 3 and values.shape[2] >= 3 and bool((values[..., :3] != values[..., :1]).any())
+    return values[..., :3] if colours else read_scale_map(text)
+
+
 def read_field(text: str, size: tuple[int, ...]) -> Any:
     """Return the field that words describe, or that of the frames in an .npz file, over an output of a size."""
     from texrs import fields
@@ -373,6 +392,19 @@ EACH = Kind("NUMBER", parse_each, f"Of several planes in the order of their grou
 """Of each plane of a photograph."""
 HOLE = replace(MASK, words=("alpha",))
 MAP = Kind("FILE", lambda path, about: read_scale_map(path), "A file that texrs scale-map wrote.", file=True)
+SEEN = Kind(
+    "FILE|auto",
+    lambda text, about: text if text.startswith(PLANE) else read_scale_map(text),
+    "A file that texrs scale-map wrote; or front; or plane:slant=50,tilt=90.",
+    file=True,
+    words=("auto", "front"),
+)
+TARGET = Kind(
+    "FILE|plane:...",
+    lambda text, about: read_target(text),
+    "A file that texrs scale-map wrote, a normal map, or coordinates or Jacobians (.npy).",
+    file=True,
+)
 MAP_OR_AUTO = replace(MAP, metavar="FILE|auto", words=("auto",))
 NUMBERS = Kind("FILE", read_numbers, "Of several channels the mean counts.", file=True)
 AXES = Kind(

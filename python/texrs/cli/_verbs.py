@@ -29,6 +29,8 @@ from texrs.cli._kinds import (
     MASK,
     NUMBERS,
     PICTURE,
+    SEEN,
+    TARGET,
     UNKNOWN,
     VOLUME,
     About,
@@ -131,8 +133,8 @@ class Verb:
         """Return about how large the result will be."""
         if ("size",) in values:
             return tuple(values["size",])
-        if (self.shape,) in values:
-            return tuple(values[self.shape,].shape)
+        if (self.shape,) in values and not isinstance(values[self.shape,], str):
+            return tuple(values[self.shape,].shape[: self.options.axes])
         return tuple(self.times * n for n in example.shape[: self.options.axes])
 
 
@@ -175,10 +177,10 @@ def make_verb(name: str) -> Verb:
             options = Options(
                 perspective,
                 arguments={"exemplar": PICTURE},
-                kinds={"scale_map": MAP_OR_AUTO},
+                kinds={"scale_map": SEEN, "target": TARGET},
                 names={"kind": "scale-kind"},
             )
-            return Verb(options, times=2, shape="target")
+            return Verb(options, times=2, shape="target", knows=read_exemplar_camera)
         case "rectify":
             from texrs.rectification import rectify
 
@@ -216,6 +218,12 @@ def make_verb(name: str) -> Verb:
 def count_moved(result: Synthesis) -> str:
     """Return how many elements moved."""
     return f", {len(result.report['matches'])} elements moved"
+
+
+def read_exemplar_camera(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
+    """Return the angle of view that an exemplar states."""
+    fovs = list(read_camera({"image": given["exemplar"]}).values())
+    return {("fov",): fovs[0]} if fovs else {}
 
 
 def read_camera(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:

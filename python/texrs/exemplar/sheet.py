@@ -28,7 +28,7 @@ from texrs.kernels.gather import gather
 from texrs.scale_maps._kinds import AREAS, Kind, find_kind
 from texrs.scale_maps._plane import Plane
 
-__all__ = ["Copies", "Flattened", "Sheet", "code", "find_plane"]
+__all__ = ["OPEN", "Copies", "Flattened", "Sheet", "code", "find_plane", "measure_seen", "multiply", "round_frames"]
 
 OPEN = (False, False)
 """A sheet repeats along no axis."""
@@ -137,8 +137,21 @@ class Sheet(ABC):
         """Return the side of a patch for an output that is to follow a map, in samples of the sheet."""
 
     @abstractmethod
-    def frames(self, target: Floats, wrap: Sequence[bool]) -> NDArray[np.int16]:
-        """Return the Jacobians of an output whose elements are to be as large as a map says, in fixed point."""
+    def frames(
+        self, target: Floats, wrap: Sequence[bool], turn: NDArray[np.float64] | None = None
+    ) -> NDArray[np.int16]:
+        """Return the Jacobians of an output whose elements are to be as large as a map says, in fixed point.
+
+        They are turned by rotations (rows, columns, 2, 2), if there are any: of a plane on it.
+        """
+
+    @abstractmethod
+    def bend(self, jacobians: NDArray[np.float64], target: Floats) -> NDArray[np.int16]:
+        """Return the Jacobians of an output that shows a surface, in fixed point.
+
+        Those of the surface, (rows, columns, 2, 2), take steps in the picture to steps on a texture in its normal size; the
+        target holds the sizes that they make.
+        """
 
     @abstractmethod
     def locate(self, places: NDArray[np.int32]) -> tuple[Floats, Floats]:
@@ -228,7 +241,9 @@ class Flattened(Sheet):
         """Return a share of what there is: patches bend with the map."""
         return FLAT * float(np.sqrt(np.count_nonzero(self.free)))
 
-    def frames(self, target: Floats, wrap: Sequence[bool]) -> NDArray[np.int16]:
+    def frames(
+        self, target: Floats, wrap: Sequence[bool], turn: NDArray[np.float64] | None = None
+    ) -> NDArray[np.int16]:
         """Return the Jacobians of the plane, seen as large as a map says."""
         other = None if any(wrap) or min(target.shape) < 2 else Plane.fit(target)
         if other is None or other.order(target) > PLANAR:
@@ -237,12 +252,19 @@ class Flattened(Sheet):
             # A target that grows along a line is seen as the plane itself, if that is its own slope.
             aligned = abs(float(np.dot(other.down, self.plane.down))) > ALIGNED
             frames = self.plane.jacobians(target, other if aligned else None)
+        if turn is not None:
+            upright = self.plane.upright
+            return round_frames(multiply(multiply(upright, multiply(turn, invert(upright))), frames) * self.resolution)
         return self.fix(frames)
 
     def fix(self, frames: NDArray[np.float64]) -> NDArray[np.int16]:
         """Return Jacobians (..., 2, 2), in units of the plane, as steps of the sheet in fixed point: (N, 2, 2)."""
         fixed = np.clip(np.rint(frames * (self.resolution * ONE)), -STEEP * ONE, STEEP * ONE)
         return np.ascontiguousarray(fixed.astype(np.int16).reshape(-1, 2, 2))
+
+    def bend(self, jacobians: NDArray[np.float64], target: Floats) -> NDArray[np.int16]:
+        """Return the Jacobians of the plane as a surface shows it."""
+        return round_frames(multiply(self.plane.upright, jacobians) * self.resolution)
 
     def locate(self, places: NDArray[np.int32]) -> tuple[Floats, Floats]:
         """Return the coordinates, and how the plane is seen there."""
@@ -253,12 +275,7 @@ class Flattened(Sheet):
 
     def measure_error(self, places: NDArray[np.int32], target: Floats, frames: NDArray[np.int16]) -> float:
         """Return the median, by the area of the plane that each pixel shows."""
-        if min(target.shape) < 2:
-            return 0.0
-        steps = np.stack([np.diff(places, axis=0)[:, :-1], np.diff(places, axis=1)[:-1]], axis=-1) / ONE
-        shown = np.maximum(measure_areas(steps), 1e-9)
-        asked = measure_areas(frames.reshape(*target.shape, 2, 2)[:-1, :-1] / ONE)
-        return float(np.median(np.abs(np.log(shown / asked)))) / 2
+        return measure_seen(places, frames)
 
     def place(self, coordinates: Floats) -> NDArray[np.int32]:
         """Return where the plane shows what lies at coordinates."""
@@ -343,9 +360,15 @@ class Copies(Sheet):
         steep = np.hypot(down, right)
         return min(COPIED * float(np.sqrt(np.prod(self.shape))), VARIES / max(float(np.quantile(steep, 0.75)), 1e-6))
 
-    def frames(self, target: Floats, wrap: Sequence[bool]) -> NDArray[np.int16]:
-        """Return the identity: sizes are those of the copies."""
-        return np.eye(2, dtype=np.int16)[np.newaxis] * np.int16(ONE)
+    def frames(
+        self, target: Floats, wrap: Sequence[bool], turn: NDArray[np.float64] | None = None
+    ) -> NDArray[np.int16]:
+        """Return the identity, or rotations: sizes are those of the copies."""
+        return np.eye(2, dtype=np.int16)[np.newaxis] * np.int16(ONE) if turn is None else round_frames(turn)
+
+    def bend(self, jacobians: NDArray[np.float64], target: Floats) -> NDArray[np.int16]:
+        """Return the Jacobians without their sizes, which are those of the copies."""
+        return round_frames(jacobians * target[..., np.newaxis, np.newaxis].astype(np.float64))
 
     def locate(self, places: NDArray[np.int32]) -> tuple[Floats, Floats]:
         """Return the coordinates, and the sizes of the copies there."""
@@ -413,9 +436,37 @@ def _measure_foreshortening(colours: Floats, plane: Plane) -> float:
     return -float((scales * steep).sum() / max(float((scales**2).sum()), 1e-9))
 
 
+def measure_seen(places: NDArray[np.int32], frames: NDArray[np.int16]) -> float:
+    """Return the median of how far logarithms of sizes are from those asked, by the area of a sheet that each pixel shows."""
+    if min(places.shape[:2]) < 2:
+        return 0.0
+    steps = np.stack([np.diff(places, axis=0)[:, :-1], np.diff(places, axis=1)[:-1]], axis=-1) / ONE
+    shown = np.maximum(measure_areas(steps), 1e-9)
+    asked = np.maximum(measure_areas(frames.reshape(*places.shape[:2], 2, 2)[:-1, :-1] / ONE), 1e-9)
+    return float(np.median(np.abs(np.log(shown / asked)))) / 2
+
+
 def measure_areas(frames: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the absolute values of the determinants of Jacobians (..., 2, 2)."""
     return np.asarray(np.abs(frames[..., 0, 0] * frames[..., 1, 1] - frames[..., 0, 1] * frames[..., 1, 0]), np.float64)
+
+
+def multiply(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return products of matrices (..., 2, 2): the last bits of those of libraries hang on the processor."""
+    return np.asarray(a[..., :, :1] * b[..., :1, :] + a[..., :, 1:] * b[..., 1:, :], np.float64)
+
+
+def invert(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the inverse of a matrix (2, 2)."""
+    (a, b), (c, d) = matrix
+    return np.asarray(np.array([[d, -b], [-c, a]]) / (a * d - b * c), np.float64)
+
+
+def round_frames(frames: NDArray[np.float64]) -> NDArray[np.int16]:
+    """Return Jacobians in fixed point, (points, 2, 2); those that are too steep for that are made smaller as a whole."""
+    steepest = np.abs(frames).max(axis=(-2, -1), keepdims=True)
+    held = frames * np.minimum(1, STEEP / np.maximum(steepest, 1e-9))
+    return np.ascontiguousarray(np.rint(held * ONE).astype(np.int16).reshape(-1, 2, 2))
 
 
 def code(logs: Floats, strength: float) -> NDArray[np.int16]:

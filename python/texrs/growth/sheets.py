@@ -85,7 +85,7 @@ def stitch_sheet(
     target : (rows, columns) float32
         The scales that are wanted.
     strength : float
-        How much they count; 1 is the usual amount.
+        How much scales count; 1 is the usual amount.
     side : float, optional
         Of a patch, in samples of the sheet; None goes by how much there is.
     seed : int

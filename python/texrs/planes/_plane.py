@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import atan, cos, degrees, hypot, radians, sin, tan
 from typing import Any, Literal
 
@@ -407,6 +407,32 @@ class Plane:
         wide = (1 / (1 - along(given, self._rise)))[..., np.newaxis, np.newaxis]
         bent = np.eye(2) + wide * given[..., :, np.newaxis] * self._rise
         return np.asarray(wide * np.einsum("...ij,jk->...ik", bent, self._inverse), np.float64)
+
+    def jacobians(self) -> NDArray[np.float64]:
+        """Return the Jacobians of `flatten` at each pixel: how the plane is seen there.
+
+        Returns
+        -------
+        (H, W, 2, 2) float64 array
+            Times a step (row, column) in the picture it is the step on the flat plane; beyond the horizon it means nothing.
+
+        Examples
+        --------
+        >>> from texrs import Plane
+        >>> floor = Plane((101, 101), slant=60, tilt=90, fov=60)
+        >>> floor.jacobians()[50, 50].round(6).tolist()
+        [[2.0, 0.0], [0.0, 1.0]]
+
+        """
+        away = np.moveaxis(np.indices(self.shape, np.float64), 0, -1) - self.middle
+        wide = np.maximum(1 + along(away, self._rise), LEAST)[..., np.newaxis, np.newaxis]
+        flat = transform(self._affine, away)
+        return np.asarray(self._affine / wide - flat[..., :, np.newaxis] * self._rise / (wide * wide), np.float64)
+
+    def as_slope(self) -> Slope | None:
+        """Return it as a map of widths tells it, with what that does not; none where it is seen from the front."""
+        found = Slope.fit(self.scale_map())
+        return None if found is None else replace(found, lean=cos(radians(self.slant)), turn=self.turn)
 
     def as_dict(self) -> dict[str, Any]:
         """Return what makes it anew, as JSON types: `Plane.of` takes it."""

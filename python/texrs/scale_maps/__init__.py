@@ -14,6 +14,7 @@ and gives new ones; nothing is changed in place.
 `resample`           a map for another size: stretched, continued, drawn or by angles
 `extend`             a map continued into what is not known
 `edit`               a map changed by a list of edits
+`jacobians_of_...`   how surfaces are seen, by their normals or by the UV coordinates of a mesh
 `encode` `decode`    8-bit pictures of maps, for other programs
 `picture`            false colours with a scale bar, to look at
 ===================  ==========================================================================
@@ -37,6 +38,7 @@ from texrs.scale_maps._angles import STEEPEST, from_angles, slant_for_ratio
 from texrs.scale_maps._auto import auto_mask
 from texrs.scale_maps._edit import edit
 from texrs.scale_maps._extend import extend
+from texrs.scale_maps._jacobians import jacobians_of_coordinates, jacobians_of_normals
 from texrs.scale_maps._kinds import ScaleMap
 from texrs.scale_maps._maps import LARGEST, LEAST
 from texrs.scale_maps._mask import Measure, from_mask
@@ -61,6 +63,8 @@ __all__ = [
     "extend",
     "from_angles",
     "from_mask",
+    "jacobians_of_coordinates",
+    "jacobians_of_normals",
     "picture",
     "resample",
     "slant_for_ratio",

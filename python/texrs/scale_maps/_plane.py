@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import hypot
+from math import cos, hypot, radians, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,10 @@ class Plane:
         Root mean square of the difference of the logarithms of the map and of this.
     power : float
         S is this power of the scale map.
+    lean : float
+        Cosine of the slant, where it is known: the plane is so many times as long as it is seen in the middle.
+    turn : float
+        Degrees by which its texture is turned on it, counter-clockwise, to lie level.
 
     """
 
@@ -55,6 +59,8 @@ class Plane:
     largest: float
     residual: float
     power: float = 1.0
+    lean: float = 1.0
+    turn: float = 0.0
 
     @classmethod
     def fit(cls, scale: Floats, power: float = 1.0) -> Plane | None:
@@ -90,6 +96,16 @@ class Plane:
     def kappa(self) -> float:
         """How far the points of the plane lie apart along the slope."""
         return self.scale / self.slope
+
+    @property
+    def upright(self) -> NDArray[np.float64]:
+        """The matrix (2, 2) that takes a step (row, column) on the flat texture, upright, to a step (v, u)."""
+        angle = radians(self.turn)
+        c, s = cos(angle), sin(angle)
+        level = np.array([[c, s], [-s, c]])
+        rows = np.array([[self.lean * self.down[0], self.lean * self.down[1]], self.across])
+        # By sums of two products: the last bits of matrix products hang on the processor.
+        return np.asarray(rows[:, :1] * level[0] + rows[:, 1:] * level[1], np.float64)
 
     def scales(self, points: Array) -> NDArray[np.float64]:
         """Return S at points (..., 2) of the picture; held above the horizon."""

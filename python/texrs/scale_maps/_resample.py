@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from texrs._arrays import as_choice, as_size, exp_single, log_single
-from texrs._typing import Floats
+from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput
 from texrs.scale_maps._angles import from_angles
 from texrs.scale_maps._extend import extend
@@ -79,17 +79,19 @@ def resample(
     return _continue(keep_kind(given, kind), sides)
 
 
-def _stretch(scale: Floats, size: tuple[int, ...]) -> Floats:
-    if scale.shape == size:
-        return scale.copy()
-    logs = log_single(scale)
+def stretch(values: Array, size: Sequence[int]) -> Array:
+    """Return values (rows, columns, ...) for another size, linear between them, with the borders on the borders."""
     for axis, sides in enumerate(size):
-        at = np.clip((np.arange(sides) + 0.5) * (logs.shape[axis] / sides) - 0.5, 0, logs.shape[axis] - 1)
+        at = np.clip((np.arange(sides) + 0.5) * (values.shape[axis] / sides) - 0.5, 0, values.shape[axis] - 1)
         first = np.floor(at).astype(np.intp)
-        second = np.minimum(first + 1, logs.shape[axis] - 1)
-        share = np.expand_dims((at - first).astype(np.float32), 1 - axis)
-        logs = np.take(logs, first, axis) * (1 - share) + np.take(logs, second, axis) * share
-    return exp_single(logs)
+        second = np.minimum(first + 1, values.shape[axis] - 1)
+        share = (at - first).astype(np.float32).reshape([-1 if k == axis else 1 for k in range(values.ndim)])
+        values = np.take(values, first, axis) * (1 - share) + np.take(values, second, axis) * share
+    return values
+
+
+def _stretch(scale: Floats, size: tuple[int, ...]) -> Floats:
+    return scale.copy() if scale.shape == size else exp_single(stretch(log_single(scale), size))
 
 
 def _continue(scale: Floats, size: tuple[int, ...]) -> Floats:

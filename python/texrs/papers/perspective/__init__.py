@@ -24,6 +24,8 @@ Departures, with their reasons:
   at a place, (log S_e - log S_o)^2, not a channel of windows: ratios of scales are what is seen. Of planes it counts a
   seventh where elements are shrunk: what is magnified is blurred. The output's map stays as asked.
 - What is found are coordinates, so that the last word is a copy, not a weighted mean: nothing blurs.
+- A target may be a surface: another plane, normals, texture coordinates, Jacobians (`targets`). Patches are bent to it, so that
+  elements are foreshortened as the surface is; its sizes stand in for S_o.
 - In place of the histograms of Eq. 8, places are charged for what has been shown often, and for classes of colour in excess.
 
 ``method="paper"`` leaves the departures out (`texrs.papers.perspective.literal`).
@@ -33,22 +35,21 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from texrs._arrays import power_single
 from texrs._engine.pyramid import Region
 from texrs._typing import Array, Interpolation, Progress
 from texrs._verbs import takes_materials
 from texrs.exemplar import Exemplar
-from texrs.exemplar.sheet import Copies, Flattened, Sheet, find_plane
 from texrs.growth import FromSheet, stitch_sheet
 from texrs.materials import Material
+from texrs.papers.perspective.laying import Laid, lay_out
 from texrs.papers.perspective.literal import average_windows
 from texrs.papers.perspective.request import Method, Request
-from texrs.papers.perspective.sizes import Outside, Sizes, bring_within, choose_sizes
+from texrs.papers.perspective.sizes import Sizes
+from texrs.planes import Plane
 from texrs.scale_maps import Measuring
 from texrs.scale_maps._kinds import Kind
 from texrs.source_map import SourceMap
@@ -60,11 +61,12 @@ __all__ = ["perspective"]
 @takes_materials("exemplar")
 def perspective(
     exemplar: Array | Exemplar | Material,
-    scale_map: Array | str = "auto",
+    scale_map: Array | Plane | str = "auto",
     size: int | Sequence[int] | None = None,
     *,
-    target: Array | None = None,
+    target: Array | Plane | str | None = None,
     kind: Kind | None = None,
+    fov: float | None = None,
     measuring: Measuring | None = None,
     method: Method = None,
     scale_weight: float = 1.0,
@@ -80,18 +82,26 @@ def perspective(
     ----------
     exemplar : (H, W) or (H, W, C) array, or Exemplar
         Any real dtype and channels; each side at least 16.
-    scale_map : (H, W) float array, or "auto"
-        How large the exemplar's elements are at each pixel, positive; only ratios count (`texrs.scale_maps`). "auto":
-        those of the plane that is found in it (`texrs.planes.find`), or where none is surely, of a mask of features, with a
-        warning.
+    scale_map : (H, W) float array, Plane, "auto" or "front"
+        How large the exemplar's elements are at each pixel, positive; only ratios count (`texrs.scale_maps`). A `texrs.Plane`,
+        or its words ``"plane:slant=50,tilt=90,fov=60"``: those of a plane. "auto": those of the plane that is found in it
+        (`texrs.planes.find`), or where none is surely, of a mask of features, with a warning. "front": all alike.
     size : int or (int, int), optional
         Rows and columns of the result: by default those of the ``target``, else twice the exemplar's.
-    target : (rows, columns) float array, optional
-        How large they are to be at each pixel of the result, in the units of ``scale_map``. One of another size is stretched to
-        that of the result, its borders on the borders (`texrs.scale_maps.resample`). None: ``scale_map``, stretched.
+    target : array or Plane, optional
+        How large they are to be at each pixel of the result, in the units of ``scale_map``: a map (rows, columns); or a surface
+        that the texture is to lie on. A `texrs.Plane`, or its words: another plane, with elements of size 1 in its middle.
+        Normals (rows, columns, 3) of a curved surface, seen from far away. Coordinates (rows, columns, 2) on a surface, or
+        Jacobians (rows, columns, 2, 2): for each pixel the step on the texture that a step in the picture is
+        (`texrs.scale_maps.jacobians_of_normals`, `texrs.scale_maps.jacobians_of_coordinates`, `texrs.Plane.jacobians`). One of
+        another size is stretched to that of the result, its borders on the borders (`texrs.scale_maps.resample`). None:
+        ``scale_map``, stretched.
     kind : {"width", "area"}, optional
         What maps hold that do not say so themselves (`texrs.scale_maps.ScaleMap`): "width", widths across the slope; "area",
         square roots of areas. None: what the scale map fits best, as a map of a plane; the target holds the same.
+    fov : float, optional
+        Degrees that the longer side of the exemplar spans, 1 to 170; `texrs.planes.FOV` by default. How much a plane is
+        foreshortened besides what a scale map says; a ``target`` that is a surface, and ``direction``, need it.
     measuring : Measuring, optional
         How the ``scale_map`` "auto" is measured in a mask of features (`texrs.scale_maps.Measuring`), rather than by a plane.
     method : {None, "paper"}
@@ -147,6 +157,15 @@ def perspective(
     >>> result.image.shape, result.report["scale_error"] < 0.1
     ((96, 128, 3), True)
 
+    The same discs around a column, by its normals:
+
+    >>> import numpy as np
+    >>> x = np.linspace(-0.9, 0.9, 96)[np.newaxis].repeat(96, axis=0)
+    >>> column = np.stack([x, 0 * x, np.sqrt(1 - x**2)], axis=-1)
+    >>> around = texrs.perspective(floor.image, floor.scale_map, target=column, seed=1)
+    >>> around.image.shape, around.report["surface"]
+    ((96, 96, 3), True)
+
     """
     asked = Request.check(
         exemplar,
@@ -154,6 +173,7 @@ def perspective(
         size,
         target=target,
         kind=kind,
+        fov=fov,
         measuring=measuring,
         method=method,
         scale_weight=scale_weight,
@@ -164,29 +184,14 @@ def perspective(
     )
     if asked.method == "paper":
         return average_windows(asked, progress)
-    colours = asked.exemplar.guidance
-    resized = asked.strength > 0 and (asked.sizes is True or asked.sizes == "auto")
-    plane = find_plane(colours, asked.scale, asked.kinds[0]) if resized else None
-    if plane is not None:
-        asked = asked.match_kinds(plane.power)
-    sizes = choose_sizes(asked.scale, asked.target, asked.sizes, plane)
-    wanted, outside = bring_within(asked.scale, asked.target, sizes)
-    if outside.share > 0 and asked.strength > 0:
-        warnings.warn(outside.describe(sizes), stacklevel=2)
-    if plane is not None:
-        # From here on scales are widths.
-        asked = replace(asked, scale=power_single(asked.scale, plane.power), target=power_single(wanted, plane.power))
-    else:
-        asked = replace(asked, target=wanted)
-    sheet: Sheet = (
-        Copies.of(colours, asked.scale, sizes, asked.target)
-        if plane is None
-        else Flattened.of(colours, plane, asked.target)
-    )
+    laid = lay_out(asked)
+    if laid.outside.share > 0 and asked.strength > 0:
+        warnings.warn(laid.outside.describe(laid.sizes), stacklevel=2)
     found = stitch_sheet(
-        sheet,
-        Region.whole(wanted.shape, asked.wrap),
-        asked.target,
+        laid.sheet,
+        Region.whole(laid.wanted.shape, asked.wrap),
+        laid.target,
+        frames=laid.frames,
         strength=asked.strength,
         seed=asked.seed,
         progress=progress,
@@ -195,19 +200,20 @@ def perspective(
         found.coordinates, asked.exemplar.shape, label=found.patches, frame=found.frames
     ).finished(asked.wrap, interpolation=asked.interpolation, antialias=True)
     composite = source.render(asked.exemplar.image, interpolation=asked.interpolation, antialias=True)
-    stages = {"sheet": sheet.show(asked.exemplar.image), "target": wanted, "composite": composite}
-    return Synthesis(composite, source, stages, describe(asked, sheet, found, outside))
+    stages = {"sheet": laid.sheet.show(asked.exemplar.image), "target": laid.wanted, "composite": composite}
+    return Synthesis(composite, source, stages, describe(asked, laid, found))
 
 
-def describe(asked: Request, sheet: Sheet, found: FromSheet, outside: Outside) -> dict[str, Any]:
+def describe(asked: Request, laid: Laid, found: FromSheet) -> dict[str, Any]:
     """Return the report: JSON types."""
-    elements = sheet.elements
+    elements = laid.sheet.elements
     return {
         "method": "default",
         "seed": asked.seed,
         "scale_weight": asked.strength,
-        "sheet": sheet.describe(),
-        "outside": {"share": outside.share, "factor": outside.factor},
+        "sheet": laid.sheet.describe(),
+        "surface": asked.surface is not None,
+        "outside": {"share": laid.outside.share, "factor": laid.outside.factor},
         "scale_error": round(found.error, 5),
         "wrap": list(asked.wrap),
         "interpolation": asked.interpolation,

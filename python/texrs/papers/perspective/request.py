@@ -15,8 +15,11 @@ from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
 from texrs.materials import Material
 from texrs.papers.perspective.sizes import Sizes, check_sizes
+from texrs.papers.perspective.targets import PREFIX, Surface, as_surface, as_target, find_size, is_map, read_plane
+from texrs.planes import FOV, Plane
 from texrs.planes._choose import measure_scale
 from texrs.scale_maps import Measuring
+from texrs.scale_maps._jacobians import measure_sizes
 from texrs.scale_maps._kinds import AREAS, Kind, as_kind, find_kind
 from texrs.scale_maps._maps import as_map
 
@@ -42,6 +45,14 @@ class Request:
         How large those of the output are to be.
     kinds : (kind, kind)
         What the two maps hold; None where nobody says.
+    plane : texrs.Plane, optional
+        That the exemplar shows, where it is given.
+    surface : (rows, columns, 2, 2) float64, optional
+        That the output is to show; the target holds the sizes that it makes.
+    turn : (rows, columns, 2, 2) float64, optional
+        Rotations of what is copied.
+    fov : float
+        Degrees that the longer side of the exemplar spans.
     method : {None, "paper"}
         Which algorithm.
     strength : float
@@ -61,6 +72,10 @@ class Request:
     scale: Floats
     target: Floats
     kinds: tuple[Kind | None, Kind | None]
+    plane: Plane | None
+    surface: Surface | None
+    turn: Surface | None
+    fov: float
     method: Method
     strength: float
     sizes: Sizes
@@ -72,11 +87,12 @@ class Request:
     def check(
         cls,
         exemplar: Array | Exemplar | Material,
-        scale_map: Array | str,
+        scale_map: Array | Plane | str,
         size: int | Sequence[int] | None,
         *,
-        target: Array | None,
+        target: Array | Plane | str | None,
         kind: Kind | None,
+        fov: float | None,
         measuring: Measuring | None,
         method: Method,
         scale_weight: float,
@@ -94,23 +110,43 @@ class Request:
         check_sizes(augment_scales)
         closed, number = as_wrap(wrap), as_seed(seed)
         said = None if kind is None else as_kind(kind)
-        asked = None if target is None else as_map(target, "target")
+        angle = FOV if fov is None else as_float(fov, "fov", 1, 170)
+        asked = as_target(target)
         if size is None:
-            size = [2 * n for n in known.shape] if asked is None else asked.shape
+            size = find_size(asked) or [2 * n for n in known.shape]
         sides = as_size(size)
         shape = (sides[0], sides[1])
-        if isinstance(scale_map, str):
-            as_choice(scale_map, "scale_map", ("auto",))
-            scale = find_scale(known, measuring)
-        elif measuring is not None:
-            raise InvalidInput("measuring: a scale map is given, so that nothing is measured; leave out one of them")
-        else:
-            scale = scale_map
+        surface = None if asked is None or is_map(asked) else as_surface(asked, shape)
+        if method == "paper" and surface is not None:
+            raise InvalidInput(
+                "method: the paper's knows no surfaces; give a scale map as target, or leave out the method"
+            )
+        plane, scale = find_scale(known, scale_map, measuring)
         mine = as_map(scale, "scale_map", known.shape)
         kinds = find_kind(scale) or said, find_kind(scale if target is None else target) or said
-        wanted = scale_maps.resample(mine if asked is None else asked, shape)
-        check_wrap(wanted, closed, asked is None)
-        return cls(known, mine, wanted, kinds, method, strength, augment_scales, closed, number, interpolation)
+        if surface is None:
+            wanted = scale_maps.resample(mine if asked is None else asked, shape)
+            check_wrap(np.log(wanted), wanted, closed, asked is None)
+        else:
+            sizes = measure_sizes(surface)
+            wanted, kinds = sizes.astype(np.float32), (kinds[0], "area")
+            check_wrap(surface * sizes[..., np.newaxis, np.newaxis], wanted, closed, False)
+        return cls(
+            known,
+            mine,
+            wanted,
+            kinds,
+            plane,
+            surface,
+            None,
+            angle,
+            method,
+            strength,
+            augment_scales,
+            closed,
+            number,
+            interpolation,
+        )
 
     def match_kinds(self, power: float) -> Request:
         """Return the request with a target that holds what the exemplar's map does: a power of it holds widths."""
@@ -118,27 +154,43 @@ class Request:
         return self if theirs == power else replace(self, target=power_single(self.target, theirs / power))
 
 
-def find_scale(exemplar: Exemplar, measuring: Measuring | None) -> Floats:
-    """Return how large elements are in an exemplar of which nothing is said, or only how that is measured."""
+def find_scale(
+    exemplar: Exemplar, scale_map: Array | Plane | str, measuring: Measuring | None
+) -> tuple[Plane | None, Array]:
+    """Return the plane that an exemplar shows, if it is given, and how large its elements are: given, or measured."""
+    if measuring is not None and not (isinstance(scale_map, str) and scale_map == "auto"):
+        raise InvalidInput("measuring: a scale map is given, so that nothing is measured; leave out one of them")
+    if isinstance(scale_map, str) and scale_map.startswith(PREFIX):
+        scale_map = read_plane(scale_map, exemplar.shape, "scale_map")
+    if isinstance(scale_map, Plane):
+        if scale_map.shape != exemplar.shape:
+            raise InvalidInput(
+                f"scale_map: needs a plane in a picture of {exemplar.shape}, as the exemplar is, got {scale_map.shape}"
+            )
+        return scale_map, scale_map.scale_map()
+    if not isinstance(scale_map, str):
+        return None, scale_map
+    if as_choice(scale_map, "scale_map", ("auto", "front")) == "front":
+        return Plane((exemplar.shape[0], exemplar.shape[1]), 0.0), np.ones(exemplar.shape, np.float32)
     if measuring is None:
-        return measure_scale(exemplar.image, np.ones(exemplar.shape, np.bool_))
+        return None, measure_scale(exemplar.image, np.ones(exemplar.shape, np.bool_))
     if not isinstance(measuring, Measuring):
         raise InvalidInput(f"measuring: needs a texrs.scale_maps.Measuring, got {measuring!r}")
-    return measuring.measure(exemplar.image)
+    return None, measuring.measure(exemplar.image)
 
 
-def check_wrap(target: Floats, wrap: Sequence[bool], stretched: bool) -> None:
-    """Refuse a target whose ends do not meet where the output is to repeat."""
+def check_wrap(values: Array, target: Floats, wrap: Sequence[bool], stretched: bool) -> None:
+    """Refuse a target whose ends do not meet where the output is to repeat, by values that must not jump there."""
     for axis, closed in enumerate(wrap):
         if not closed:
             continue
-        logs = np.log(target)
-        inner = float(np.abs(np.diff(logs, axis=axis)).max(initial=0.0))
-        across = float(np.abs(np.take(logs, 0, axis) - np.take(logs, -1, axis)).max())
+        inner = float(np.abs(np.diff(values, axis=axis)).max(initial=0.0))
+        across = float(np.abs(np.take(values, 0, axis) - np.take(values, -1, axis)).max())
         if across > 2 * inner + 0.02:
+            ratio = np.exp(np.abs(np.log(np.take(target, 0, axis)) - np.log(np.take(target, -1, axis))).max())
             name = ("rows", "columns")[axis]
             way = "give a target that repeats" if stretched else "make it repeat"
             raise InvalidInput(
-                f"wrap: the target's first and last {name} differ by a factor of {np.exp(across):.2f}, so the result "
+                f"wrap: the target's first and last {name} differ by a factor of {ratio:.2f}, so the result "
                 f"cannot repeat along {name}; {way}, or leave wrap off along {name}"
             )

@@ -1,0 +1,73 @@
+"""A sheet of what is seen from the front, everywhere in one size: curved surfaces are covered with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Floats
+from texrs.exemplar.adjacency import Adjacency, measure_adjacency
+from texrs.exemplar.atlas import pack, resize
+from texrs.exemplar.instances import Instances, find_instances
+from texrs.exemplar.sheet import FINE, FLAT, MOST, OPEN, Copies, measure_seen, round_frames
+
+__all__ = ["Frontal"]
+
+SMALLEST = 32
+"""Samples of the shorter side that are always there, if the exemplar has them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frontal(Copies):
+    """An exemplar that is seen from the front, as it is or smaller: its patches are bent to any size, and in any way.
+
+    Attributes
+    ----------
+    size : float
+        Of its elements.
+
+    """
+
+    size: float
+
+    weight, guide, excess, heal = 0.0, 0.0, 256, True
+
+    @classmethod
+    def over(cls, colours: Floats, size: float, target: Floats) -> Frontal:
+        """Lay an exemplar out as finely as a target needs."""
+        shape = (colours.shape[0], colours.shape[1])
+        finest = float(np.sqrt(np.prod(np.quantile(target, [FINE, 1 - FINE])))) / size
+        factor = min(1.0, max(finest, SMALLEST / min(shape)), float(np.sqrt(MOST / np.prod(shape))))
+        (copy,) = pack([(factor, (0, shape[0], 0, shape[1]))], 1)
+        return cls(
+            shape,
+            resize(colours, copy),
+            np.zeros(copy.shape, np.float32),
+            np.ones(copy.shape, np.bool_),
+            (copy,),
+            np.zeros(copy.shape, np.uint16),
+            size,
+        )
+
+    def analyse(self) -> tuple[Instances | None, Adjacency]:
+        """Analyse it in the size in which it is laid out."""
+        return find_instances(self.colours, OPEN), measure_adjacency(self.colours, OPEN)
+
+    def describe(self) -> dict[str, Any]:
+        """Return its resolution."""
+        return {"kind": "front", "resolution": round(float(np.sqrt(np.prod(self.copies[0].factor))), 5)}
+
+    def side(self, target: Floats) -> float:
+        """Return a share of what there is: patches bend with the surface."""
+        return FLAT * float(np.sqrt(self.free.size))
+
+    def bend(self, jacobians: NDArray[np.float64], target: Floats) -> NDArray[np.int16]:
+        """Return the Jacobians, in samples."""
+        return round_frames(jacobians * (self.size * np.array(self.copies[0].factor)[:, np.newaxis]))
+
+    def measure_error(self, places: NDArray[np.int32], target: Floats, frames: NDArray[np.int16]) -> float:
+        """Return the median, by the area of the exemplar that each pixel shows."""
+        return measure_seen(places, frames)

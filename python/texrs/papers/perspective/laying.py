@@ -1,0 +1,108 @@
+"""What patches are cut from, and how they are to be seen: the exemplar laid out for an output (see the verb's departures)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import atan, cos
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import power_single
+from texrs._typing import Floats
+from texrs.exemplar.atlas import LARGEST, SMALLEST
+from texrs.exemplar.frontal import Frontal
+from texrs.exemplar.sheet import Copies, Flattened, Sheet, find_plane
+from texrs.papers.perspective.request import Request
+from texrs.papers.perspective.sizes import Outside, bring_within, choose_sizes
+from texrs.planes._projective import find_focal
+from texrs.scale_maps._plane import LEVEL, Plane
+
+__all__ = ["Laid", "lay_out"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Laid:
+    """An exemplar laid out.
+
+    Attributes
+    ----------
+    sheet : Sheet
+        What patches are cut from.
+    target : (rows, columns) float32
+        How large elements are to be, in the measure of the sheet.
+    wanted : (rows, columns) float32
+        The same as it was asked for, as far as there is any.
+    frames : (points, 2, 2) int16, optional
+        How the sheet is to be seen; None where the target says all of it.
+    outside : Outside
+        What was asked for and is not there.
+    sizes : sequence of float
+        Of the copies, or those that a plane can be seen in.
+
+    """
+
+    sheet: Sheet
+    target: Floats
+    wanted: Floats
+    frames: NDArray[np.int16] | None
+    outside: Outside
+    sizes: tuple[float, ...]
+
+
+def lay_out(asked: Request) -> Laid:
+    """Lay an exemplar out for the output that is asked for."""
+    colours = asked.exemplar.guidance
+    plane = find_slope(asked, colours)
+    if asked.surface is not None:
+        return lay_under(asked, asked.surface, colours, plane)
+    if plane is not None:
+        asked = asked.match_kinds(plane.power)
+    sizes = choose_sizes(asked.scale, asked.target, asked.sizes, plane)
+    wanted, outside = bring_within(asked.scale, asked.target, sizes)
+    if plane is None:
+        sheet: Sheet = Copies.of(colours, asked.scale, sizes, wanted)
+        return Laid(sheet, wanted, wanted, None, outside, sizes)
+    # From here on scales are widths.
+    target = power_single(wanted, plane.power)
+    return Laid(Flattened.of(colours, plane, target), target, wanted, None, outside, sizes)
+
+
+def lay_under(asked: Request, surface: NDArray[np.float64], colours: Floats, plane: Plane | None) -> Laid:
+    """Lay an exemplar out under a surface: the plane that it shows flattened, as it is from the front, or in copies."""
+    areas = asked.target.astype(np.float64)
+    free = asked.strength > 0 and asked.sizes in (True, "auto")
+    front = plane is None and free and float(asked.scale.max()) < LEVEL * float(asked.scale.min())
+    scale, target, power = asked.scale, asked.target, 1.0
+    if plane is not None:
+        # Of a plane elements of a width have an area: the width that has the wanted one is asked for.
+        scale, power = power_single(scale, plane.power), 1.5
+        target = np.cbrt(areas * areas * (plane.scale / plane.lean)).astype(np.float32)
+    sizes = (1.0, SMALLEST, LARGEST) if front else choose_sizes(scale, target, asked.sizes, plane)
+    held, outside = bring_within(scale, target, sizes)
+    # Where there is nothing so small, or so large, the surface is shown nearer or farther away.
+    share = np.power(target.astype(np.float64) / held, power)[..., np.newaxis, np.newaxis]
+    shown = np.where(share == 1, surface, surface * share)
+    wanted = (areas / share[..., 0, 0]).astype(np.float32)
+    sheet: Sheet
+    if plane is not None:
+        sheet = Flattened.of(colours, plane, held)
+    elif front:
+        sheet = Frontal.over(colours, float(np.median(scale)), held)
+    else:
+        sheet = Copies.of(colours, scale, sizes, held)
+    return Laid(sheet, held, wanted, sheet.bend(shown, held), outside, sizes)
+
+
+def find_slope(asked: Request, colours: Floats) -> Plane | None:
+    """Return the plane that an exemplar shows: the one that was given, or the one that its scale map is of."""
+    if asked.strength == 0 or asked.sizes not in (True, "auto"):
+        return None
+    if asked.plane is not None:
+        return asked.plane.as_slope()
+    found = find_plane(colours, asked.scale, asked.kinds[0])
+    if found is None:
+        return None
+    # A map of widths does not say how long things are, but the angle of view does.
+    lean = cos(atan(found.slope / found.scale * find_focal(asked.exemplar.shape, asked.fov)))
+    return replace(found, lean=lean)

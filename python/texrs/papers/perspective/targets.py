@@ -1,0 +1,108 @@
+"""What an output is to show (section 4): how large elements are at each pixel, or a surface that the texture lies on.
+
+The paper knows a scale map. A surface says more: along one direction elements are foreshortened more than along another. It
+is given as another plane, by its normals, by its texture coordinates, or by Jacobians; in the end it is always those: for each
+pixel the step on the texture that a step in the picture is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias, TypeGuard
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_float
+from texrs._typing import Array, Floats
+from texrs.errors import InvalidInput
+from texrs.planes import Plane
+from texrs.scale_maps import jacobians_of_coordinates, jacobians_of_normals
+from texrs.scale_maps._jacobians import as_jacobians
+from texrs.scale_maps._maps import as_map
+from texrs.scale_maps._resample import stretch
+
+__all__ = ["PREFIX", "Surface", "as_surface", "as_target", "find_size", "is_map", "read_plane"]
+
+PREFIX = "plane:"
+"""Before the words that say how a plane lies."""
+WORDS = ("slant", "tilt", "fov", "turn")
+NEAREST = 0.02
+"""Of the middle's scale: nearer to its horizon nothing of a plane is shown."""
+
+Surface: TypeAlias = NDArray[np.float64]
+"""Jacobians (rows, columns, 2, 2)."""
+
+
+def as_target(target: object) -> Plane | str | Floats | Surface | None:
+    """Check a target before its size is known: a plane, its words, a scale map, or Jacobians."""
+    if target is None or isinstance(target, Plane):
+        return target
+    if isinstance(target, str):
+        read_plane(target, (1, 1), "target")
+        return target
+    given = np.asarray(target)
+    if given.ndim == 4:
+        return as_jacobians(given, "target")
+    if given.ndim == 3 and given.shape[2] in (2, 3):
+        if given.shape[2] == 2 and given.dtype.kind != "f":
+            raise InvalidInput(f"target: coordinates (rows, columns, 2) need floats, got {given.dtype}")
+        try:
+            made = jacobians_of_coordinates(given) if given.shape[2] == 2 else jacobians_of_normals(given)
+        except InvalidInput as error:
+            raise InvalidInput(f"target: {error}") from None
+        return as_jacobians(made, "target")
+    return as_map(target, "target")
+
+
+def find_size(target: Plane | str | Array | None) -> tuple[int, int] | None:
+    """Return the size that a target has of its own."""
+    if target is None or isinstance(target, str):
+        return None
+    return target.shape[0], target.shape[1]
+
+
+def is_map(target: Plane | str | Floats | Surface) -> TypeGuard[Floats]:
+    """Return whether a target is a scale map."""
+    return not isinstance(target, Plane | str) and target.ndim == 2
+
+
+def as_surface(target: Plane | str | Floats | Surface, size: tuple[int, int]) -> Surface:
+    """Return the Jacobians of a surface in a picture of a size: planes are seen by a finer camera, others are stretched."""
+    if isinstance(target, str):
+        target = read_plane(target, size, "target")
+    if not isinstance(target, Plane):
+        bent = np.asarray(target, np.float64)
+        return bent if bent.shape[:2] == size else as_jacobians(stretch(bent, size), "target")
+    seen = Plane(size, target.slant, target.tilt, target.fov, target.turn)
+    rows, columns = size[0] - 1, size[1] - 1
+    near = float(seen.width([[0, 0], [0, columns], [rows, 0], [rows, columns]]).min())
+    if near < NEAREST:
+        raise InvalidInput(
+            f"target: the horizon of a plane at {seen.slant:g} degrees lies inside a picture that spans {seen.fov:g} degrees; "
+            "a smaller slant or fov has none in it"
+        )
+    return seen.jacobians()
+
+
+def read_plane(words: str, shape: Sequence[int], name: str) -> Plane:
+    """Return the plane that words describe: ``plane:slant=50,tilt=90,fov=60``."""
+    form = f"{name}: needs plane:slant=DEGREES and, if they are known, tilt=, fov= and turn=, with commas between them"
+    if not words.startswith(PREFIX):
+        raise InvalidInput(f"{form}; got {words!r}")
+    values: dict[str, float] = {}
+    for part in words.removeprefix(PREFIX).split(","):
+        word, _, text = (p.strip() for p in part.partition("="))
+        try:
+            number = float(text)
+        except ValueError:
+            number = np.nan
+        if word not in WORDS or word in values or not np.isfinite(number):
+            raise InvalidInput(f"{form}; got {words!r}")
+        values[word] = as_float(number, f"{name}: {word}", -1e6, 1e6)
+    if "slant" not in values:
+        raise InvalidInput(f"{form}; got {words!r}")
+    try:
+        return Plane((shape[0], shape[1]), **values)
+    except InvalidInput as error:
+        raise InvalidInput(f"{name}: {error}") from None
