@@ -12,10 +12,12 @@ PACKAGE = ROOT / "python" / "texrs"
 
 LAYERS = (
     ("_rust", "errors", "_typing"),
-    ("_arrays", "_cache", "_digits", "_progress", "_version"),
+    ("_cache", "_checks", "_digits", "_progress", "_version"),
+    ("io",),
+    ("_conversion",),
+    ("_arrays",),
     ("_threads", "kernels"),
     ("_engine",),
-    ("io",),
     ("source_map",),
     ("blending",),
     ("materials",),

@@ -1,24 +1,67 @@
-"""Checks and conversions of arrays, shared by everything that takes an image from a user."""
+"""Checks and conversions of arrays, shared by everything that takes an image from a user.
+
+The checks of what is no array (`texrs._checks`) are at hand here too, for whoever takes both.
+"""
 
 from __future__ import annotations
 
-import math
-import numbers
-import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike
 
+from texrs._checks import (
+    MAX_PIXELS,
+    as_bool,
+    as_choice,
+    as_float,
+    as_int,
+    as_items,
+    as_list,
+    as_method,
+    as_progress,
+    as_seed,
+    as_size,
+    as_tuple,
+    as_wrap,
+    check_memory,
+)
+from texrs._conversion import as_ndarray
 from texrs._typing import Array, Bools, Floats
-from texrs.errors import InvalidInput, LimitExceeded
+from texrs.errors import InvalidInput
 
-MAX_PIXELS = 2**28
-"""Pixels or voxels that an array made by texrs may have, unless a limit is given."""
+__all__ = [
+    "MAX_PIXELS",
+    "as_array",
+    "as_bool",
+    "as_choice",
+    "as_float",
+    "as_image",
+    "as_int",
+    "as_items",
+    "as_list",
+    "as_mask",
+    "as_method",
+    "as_ndarray",
+    "as_progress",
+    "as_rgb",
+    "as_seed",
+    "as_size",
+    "as_tuple",
+    "as_wrap",
+    "check_finite",
+    "check_memory",
+    "exp_single",
+    "guidance",
+    "log_single",
+    "power_single",
+    "to_unit",
+    "try_array",
+]
 
-_KINDS = (np.uint8, np.int8, np.uint16, np.int16, np.int32, np.uint32, np.float32, np.float64)
+FEW = 4
+"""Channels that pictures have, at most, as far as their order is guessed."""
 
 
 def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int = 2) -> Array:
@@ -26,9 +69,9 @@ def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int 
 
     Parameters
     ----------
-    value : array_like
-        Shape (H, W) or (H, W, C); with ``axes=3`` (D, H, W) or (D, H, W, C). Integers of 8, 16 or 32 bit, floats of
-        16, 32 or 64 bit, or bool. Floats must be finite.
+    value : array_like, path_like or PIL.Image.Image
+        Shape (H, W) or (H, W, C); with ``axes=3`` (D, H, W) or (D, H, W, C). Integers, floats of 16, 32 or 64 bit, or bool.
+        Floats must be finite. `as_ndarray` says what else is taken.
     name : str
         The argument's name, for messages.
     minimum : int
@@ -45,18 +88,19 @@ def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int 
     Raises
     ------
     InvalidInput
-        Not numbers, not finite, too small, or with the wrong number of axes.
+        Not numbers, not finite, masked, too small, with the wrong number of axes, or with the channels first.
+    FileError
+        A path that cannot be read.
     LimitExceeded
         A copy is needed, and would take more bytes than the machine has.
 
     """
-    array = _as_ndarray(value, name)
+    array = as_ndarray(value, name, axes=axes)
     if array.dtype.kind not in "buif":
-        raise InvalidInput(f"{name}: needs numbers (8, 16 or 32 bit integers, floats or bool), got dtype {array.dtype}")
-    if array.dtype.kind in "ui" and array.dtype.itemsize == 8:
-        raise InvalidInput(f"{name}: 64-bit integers are not image data; convert {array.dtype} to a smaller dtype")
+        raise InvalidInput(f"{name}: needs numbers (integers, floats or bool), got dtype {array.dtype}")
     if array.dtype.kind == "f" and array.dtype.itemsize not in (2, 4, 8):
         raise InvalidInput(f"{name}: floats of 16, 32 or 64 bit are allowed, got {array.dtype}")
+    _check_order(array.shape, name, axes)
     if array.ndim not in (axes, axes + 1):
         shapes = ("(rows, columns)", "(planes, rows, columns)")[axes - 2]
         hint = "; a volume is not an image" if array.ndim == 4 and axes == 2 else ""
@@ -75,6 +119,23 @@ def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int 
     array = _make_contiguous(array, name, array.dtype.newbyteorder("="))
     check_finite(array, name)
     return array
+
+
+def _check_order(shape: tuple[int, ...], name: str, axes: int) -> None:
+    """Refuse what has its channels first, or is a batch: few samples along the first axis, and many along all others."""
+    first = len(shape) - axes - 1
+    if first not in (0, 1) or not 0 < shape[first] <= FEW or min(shape[first + 1 :]) < 2 * FEW:
+        return
+    if first == 0:
+        raise InvalidInput(
+            f"{name}: shape {shape} has its {shape[0]} channels first, they must come last: "
+            f"numpy.moveaxis({name}, 0, -1), or of a tensor {name}.permute{(*range(1, axes + 1), 0)}"
+        )
+    if axes == 2:
+        raise InvalidInput(
+            f"{name}: shape {shape} is a batch of {shape[0]} with channels first; give one picture at a time, channels last: "
+            f"numpy.moveaxis({name}[0], 0, -1)"
+        )
 
 
 def as_array(value: object, name: str, dtype: DTypeLike, shape: Sequence[int | str] | None = None) -> Array:
@@ -115,7 +176,7 @@ def as_array(value: object, name: str, dtype: DTypeLike, shape: Sequence[int | s
     texrs.errors.InvalidInput: flow: needs shape (rows, columns, 3), got (1, 2)
 
     """
-    array, wanted = _as_ndarray(value, name), np.dtype(dtype)
+    array, wanted = as_ndarray(value, name), np.dtype(dtype)
     if array.dtype.kind not in ("buif" if wanted.kind == "f" else "bui"):
         allowed = "real numbers" if wanted.kind == "f" else "bool or integers"
         raise InvalidInput(f"{name}: needs {allowed}, got dtype {array.dtype}")
@@ -141,15 +202,6 @@ def try_array(value: object, dtype: DTypeLike | None = None) -> Array:
         return np.asarray(value, dtype)
     except (ValueError, TypeError):
         return np.empty(0, np.object_ if dtype is None else dtype)
-
-
-def _as_ndarray(value: object, name: str) -> Array:
-    try:
-        return np.asarray(value)
-    except (ValueError, TypeError) as error:
-        raise InvalidInput(f"{name}: not an array of numbers ({error})") from None
-    except MemoryError:
-        raise LimitExceeded(f"{name}: needs more memory than there is") from None
 
 
 def _make_contiguous(array: Array, name: str, dtype: np.dtype[Any]) -> Array:
@@ -180,14 +232,14 @@ def check_finite(array: Array, name: str) -> None:
 def to_unit(array: Array) -> Floats:
     """Bring an image to [0, 1] in float32, so that thresholds mean the same for every dtype.
 
-    Integers are divided by the largest value of their dtype; floats beyond [0, 1] are brought to it by their own
-    range. ``v`` as uint8 and ``257 v`` as uint16 give the same result.
+    Integers of 8 or 16 bit are divided by the largest value of their dtype; wider ones, and floats beyond [0, 1], are brought
+    to it by their own range. ``v`` as uint8 and ``257 v`` as uint16 give the same result.
     """
     if array.dtype == np.bool_:
         return array.astype(np.float32)
-    if array.dtype.kind in "ui":
+    if array.dtype.kind in "ui" and array.itemsize <= 2:
         info = np.iinfo(array.dtype)
-        if array.dtype.kind == "u" and array.itemsize <= 2:
+        if array.dtype.kind == "u":
             # Exact in float32, so that one rounding gives what float64 does.
             return np.divide(array, np.float32(info.max), dtype=np.float32)
         return ((array.astype(np.float64) - min(info.min, 0)) / (float(info.max) - min(info.min, 0))).astype(np.float32)
@@ -195,7 +247,7 @@ def to_unit(array: Array) -> Floats:
     if low >= 0 and high <= 1:
         return array.astype(np.float32)
     low = min(low, 0.0)
-    return ((array.astype(np.float64) - low) / (high - low)).astype(np.float32)
+    return ((array.astype(np.float64) - low) / (high - low or 1.0)).astype(np.float32)
 
 
 def guidance(pixels: Array) -> Floats:
@@ -212,141 +264,16 @@ def as_rgb(unit: Floats) -> Floats:
     return unit[..., :3] if unit.shape[-1] >= 3 else np.repeat(unit[..., :1], 3, axis=-1)
 
 
-def as_list(value: object) -> list[Any]:
-    """Return several things as a list, and a single one as a list of it."""
-    return list(value) if isinstance(value, list | tuple) else [value]
-
-
-def as_size(
-    value: object, name: str = "size", *, axes: int = 2, minimum: int = 1, limit: int = MAX_PIXELS
-) -> tuple[int, ...]:
-    """Check a size: an int for a square, or one int an axis (rows, columns).
-
-    Raises
-    ------
-    InvalidInput
-        Not integers, too few or too many, or below ``minimum``.
-    LimitExceeded
-        More than ``limit`` pixels.
-
-    """
-    order = ("(rows, columns)", "(planes, rows, columns)")[axes - 2]
-    if isinstance(value, numbers.Integral):
-        sides: tuple[Any, ...] = (value,) * axes
-    else:
-        sides = as_tuple(value, name, axes, f"{order} as integers")
-    if not all(isinstance(s, numbers.Integral) and not isinstance(s, bool) for s in sides):
-        raise InvalidInput(f"{name}: needs {order} as integers, got {value!r}")
-    result = tuple(int(s) for s in sides)
-    if min(result) < minimum:
-        raise InvalidInput(f"{name}: each side must be at least {minimum}, got {result}")
-    pixels = math.prod(result)
-    if pixels > limit:
-        raise LimitExceeded(f"{name}: {result} has {pixels} pixels, more than the limit of {limit}")
-    return result
-
-
-def check_memory(needed: int, name: str = "size") -> None:
-    """Refuse what needs more bytes than the machine has.
-
-    Raises
-    ------
-    LimitExceeded
-        More bytes than the machine has, where it tells.
-
-    """
-    try:
-        there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):
-        return
-    if needed > there > 0:
-        raise LimitExceeded(f"{name}: needs {needed / 1e9:.1f} GB of memory, this machine has {there / 1e9:.1f} GB")
-
-
-def as_tuple(value: object, name: str, length: int, what: str) -> tuple[Any, ...]:
-    """Check a sequence of so many entries; its length is looked at first, for it may be anything."""
-    if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
-        try:
-            if len(value) == length:
-                return tuple(value)
-        except (TypeError, OverflowError):  # An array without axes, a range beyond what fits in memory.
-            pass
-    raise InvalidInput(f"{name}: needs {what}, got {value!r}")
-
-
-def as_items(value: object, name: str) -> Iterator[Any]:
-    """Check something to go through; its items are not looked at before they are asked for."""
-    if isinstance(value, Iterable) and not isinstance(value, str | bytes):
-        with suppress(TypeError):  # An array without axes.
-            return iter(value)
-    raise InvalidInput(f"{name}: needs a sequence, got {value!r}")
-
-
-def as_wrap(value: object, name: str = "wrap", *, axes: int = 2) -> tuple[bool, ...]:
-    """Check a choice of cyclic axes: one bool for all, or one an axis."""
-    if isinstance(value, bool | np.bool_):
-        return (bool(value),) * axes
-    what = f"True, False or {axes} of them, one an axis"
-    sides = as_tuple(value, name, axes, what)
-    if not all(isinstance(side, bool | np.bool_) for side in sides):
-        raise InvalidInput(f"{name}: needs {what}; got {value!r}")
-    return tuple(map(bool, sides))
-
-
-def as_bool(value: object, name: str) -> bool:
-    """Check a choice of two."""
-    if not isinstance(value, bool | np.bool_):
-        raise InvalidInput(f"{name}: needs True or False, got {value!r}")
-    return bool(value)
-
-
-def as_choice(value: object, name: str, allowed: Sequence[str]) -> str:
-    """Check a choice by name."""
-    if not isinstance(value, str) or value not in allowed:
-        raise InvalidInput(f"{name}: allowed are {', '.join(allowed[:-1])} and {allowed[-1]}; got {value!r}")
-    return value
-
-
-def as_method(value: object, *allowed: str | None) -> None:
-    """Check the name of an algorithm; None is the usual one."""
-    if value not in allowed:
-        names = [repr(name) for name in allowed]
-        raise InvalidInput(f"method: allowed are {', '.join(names[:-1])} and {names[-1]}, got {value!r}")
-
-
-def as_progress(value: object, name: str = "progress") -> Callable[..., object] | None:
-    """Check what is called while work goes on."""
-    if value is not None and not callable(value):
-        raise InvalidInput(f"{name}: needs a function to call, or None; got {value!r}")
-    return value
-
-
-def as_int(value: object, name: str, low: int, high: int) -> int:
-    """Check an integer in [low, high]."""
-    if isinstance(value, bool) or not isinstance(value, numbers.Integral) or not low <= int(value) <= high:
-        raise InvalidInput(f"{name}: needs an integer from {low} to {high}, got {value!r}")
-    return int(value)
-
-
-def as_float(value: object, name: str, low: float, high: float) -> float:
-    """Check a number in [low, high]."""
-    number = math.nan
-    if not isinstance(value, bool) and isinstance(value, numbers.Real):
-        with suppress(OverflowError):
-            number = float(value)
-    if not low <= number <= high:
-        raise InvalidInput(f"{name}: needs a number from {low} to {high}, got {value!r}")
-    return number
-
-
-def as_seed(value: object, name: str = "seed") -> int:
-    """Check a seed: an integer from 0 to 2^64 - 1."""
-    return as_int(value, name, 0, 2**64 - 1)
-
-
 def as_mask(value: object, name: str, shape: Sequence[int | str]) -> Bools:
-    """Check a mask, bool or integers of which zero means False, and return a copy (see `as_array`)."""
-    return np.array(as_array(value, name, np.bool_, shape))
+    """Check a mask, bool or integers of which zero means False, and return a copy (see `as_array`).
+
+    Of a picture in colours, a file or one of PIL, any colour but black is marked, whatever its alpha channel says.
+    """
+    given = as_ndarray(value, name, axes=len(shape))
+    if given.ndim == len(shape) + 1 and not isinstance(value, np.ndarray):
+        colours = given[..., :-1] if given.shape[-1] in (2, 4) else given
+        given = np.asarray((colours != 0).any(axis=-1))
+    return np.array(as_array(given, name, np.bool_, shape))
 
 
 # Of single precision NumPy works out functions in other ways on other processors, which differ in the last bit; rounded from

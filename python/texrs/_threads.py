@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from texrs import _rust
-from texrs._arrays import as_int
+from texrs._checks import as_int
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from texrs._arrays import as_float, as_image, as_int, as_seed, as_size, check_memory
+from texrs._arrays import as_float, as_image, as_int, as_ndarray, as_seed, as_size, check_memory
 from texrs._typing import Array, Progress
 from texrs._verbs import takes_materials
 from texrs.blending import apply
@@ -94,6 +94,7 @@ def extend(
     ((128, 192, 3), True)
 
     """
+    image = as_ndarray(image, "image")
     pixels = as_image(image, minimum=64)
     rows, columns = pixels.shape[:2]
     added = {
@@ -150,7 +151,7 @@ def extend(
     result = apply(source, pixels, progress=progress)
     watch("done", 1.0)
     stages = made.show(canvas, hole) | {"composite": source.render(pixels, antialias=True)}
-    if np.asarray(image).ndim == 2:
+    if image.ndim == 2:
         result = result.reshape(size)
         stages |= {name: stages[name].reshape(size) for name in ("known", "composite")}
     report: dict[str, Any] = {

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float, as_image, as_seed, as_size, as_wrap, check_memory, guidance
+from texrs._arrays import as_float, as_image, as_ndarray, as_seed, as_size, as_wrap, check_memory, guidance
 from texrs._typing import Array, Bools, Interpolation, Progress
 from texrs._verbs import takes_materials
 from texrs.blending import apply
@@ -106,6 +106,7 @@ def rectify(
     (((192, 192),), 50.0)
 
     """
+    image = as_ndarray(image, "image")
     pixels = as_image(image, minimum=64)
     watch = progress or (lambda stage, share: None)
     cyclic, number = as_wrap(wrap), as_seed(seed)
@@ -134,7 +135,7 @@ def rectify(
     source = laid.compose(known).finished(cyclic, interpolation=interpolation, antialias=True, **rest)
     as_it_is = source.shape == known.shape and not any(cyclic)
     composite = texture if as_it_is else source.render(pixels, interpolation=interpolation, antialias=True)
-    squeeze = np.asarray(image).ndim == 2
+    squeeze = image.ndim == 2
     shown = apply(source, pixels, progress=watch) if rest.get("screening") else composite
     stages = {
         "flat": sheet.source.render(pixels, interpolation="linear"),

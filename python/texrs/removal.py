@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from texrs._arrays import as_float, as_image, as_int, as_mask, as_seed
+from texrs._arrays import as_float, as_image, as_int, as_mask, as_ndarray, as_seed
 from texrs._typing import Array, Bools, Progress
 from texrs._verbs import takes_materials
 from texrs.blending import apply
@@ -105,6 +105,7 @@ def remove(
     True
 
     """
+    image = as_ndarray(image, "image")
     pixels = as_image(image, minimum=64)
     shape = pixels.shape[0], pixels.shape[1]
     marked = as_mask(mask, "mask", shape)
@@ -146,7 +147,7 @@ def remove(
         "ground": [round(float(ground.mean()), 4) for ground in grounds],
         "beyond": round(float((hole & (made.owner >= len(grounds))).mean()), 6),
     }
-    if np.asarray(image).ndim == 2:
+    if image.ndim == 2:
         result = result.reshape(shape)
         stages |= {name: stages[name].reshape(shape) for name in ("known", "composite")}
     return Synthesis(result, source, stages, report)

@@ -17,7 +17,18 @@ from typing import Any, Literal
 
 import numpy as np
 
-from texrs._arrays import as_array, as_bool, as_choice, as_float, as_image, as_int, as_list, as_mask, as_wrap
+from texrs._arrays import (
+    as_array,
+    as_bool,
+    as_choice,
+    as_float,
+    as_image,
+    as_int,
+    as_list,
+    as_mask,
+    as_ndarray,
+    as_wrap,
+)
 from texrs._typing import Array, Floats, Interpolation, Progress
 from texrs.blending._correction import divide_strips, solve_correction
 from texrs.blending._seams import Look, Seam, take_rows
@@ -145,8 +156,8 @@ def blend(
     width = None if band is None else as_int(band, "band", 1, 2**31)
     inside = None if within is None else as_mask(within, "within", source.shape)
     apart = None if parts is None else as_array(parts, "parts", np.uint16, source.shape)
-    result = source.render(exemplars, interpolation=interpolation, antialias=antialias, kind=kind, green=green)
-    several = as_list(exemplars)
+    several = [as_ndarray(e, "exemplars") for e in as_list(exemplars)]
+    result = source.render(several, interpolation=interpolation, antialias=antialias, kind=kind, green=green)
     shown = None if known is None else as_known(known, source.shapes)
     samples = Samples.scale([as_image(e) for e in several], kind)
     if samples is None or interpolation == "nearest":

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_bool, as_float, as_image, as_int, as_mask, as_method, as_seed, as_wrap
+from texrs._arrays import as_bool, as_float, as_image, as_int, as_mask, as_method, as_ndarray, as_seed, as_wrap
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs._verbs import takes_materials
 from texrs.blending import apply
@@ -35,7 +35,7 @@ __all__ = ["complete"]
 @takes_materials("image", "exemplar")
 def complete(
     image: Array | Exemplar | Material,
-    hole: Array | str,
+    hole: Array | str | None = None,
     *,
     exemplar: Array | Exemplar | Material | None = None,
     allowed: Array | None = None,
@@ -56,7 +56,7 @@ def complete(
     ----------
     image : (H, W) or (H, W, C) array, or Exemplar
         The picture, any real dtype, at least 4 pixels a side. What it holds in the hole does not matter; it may be NaN.
-    hole : (H, W) bool or integers, or "alpha"
+    hole : (H, W) bool or integers, or "alpha", optional
         True, or not zero, where the picture is to be filled; "alpha": where its last channel of two or four is 0.
     exemplar : (h, w) or (h, w, C) array, or Exemplar, optional
         Another picture to copy from, of the same dtype and channels; by default what is known of ``image``.
@@ -113,6 +113,10 @@ def complete(
         A hole or ``allowed`` of another shape; an exemplar of another dtype or other channels; nothing to copy from; a
         patch larger than the pictures, with no place for it outside the hole, or given to "optimise".
 
+    Notes
+    -----
+    What is masked in a `numpy.ma.MaskedArray` is a hole: it is filled too, and then ``hole`` may be left out.
+
     References
     ----------
     .. [1] J. Shen, X. Jin, X. Mao, J. Feng, "Completion-based texture design using deformation", The Visual Computer
@@ -138,9 +142,9 @@ def complete(
     if mirror is not None or scale_map is not None:
         mirror = False if mirror is None else as_bool(mirror, "mirror")
     screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
-    picture = image.image if isinstance(image, Exemplar) else image
+    picture, masked = take_masked(image.image if isinstance(image, Exemplar) else image)
     asked = mark_transparent(picture) if isinstance(hole, str) and hole == "alpha" else hole
-    pictures, open_ = check_pictures(picture, asked, exemplar)
+    pictures, open_ = check_pictures(picture, join_holes(asked, masked), exemplar)
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
     usable = check_allowed(allowed, open_, exemplar is None and method == "patch")
     cyclic, seed = as_wrap(wrap), as_seed(seed)
@@ -216,9 +220,25 @@ def complete(
     return Synthesis(result, places, stages, report)
 
 
-def mark_transparent(image: object) -> Bools:
+def take_masked(image: object) -> tuple[Array, Bools | None]:
+    """Return a picture, and where it is masked, in whichever channel; None where nothing is."""
+    if not isinstance(image, np.ma.MaskedArray) or not np.ma.is_masked(image):
+        return as_ndarray(image, "image"), None
+    mask = np.ma.getmaskarray(image)
+    return np.asarray(image.data), np.asarray(mask.any(axis=-1) if image.ndim > 2 else mask)
+
+
+def join_holes(hole: object, masked: Bools | None) -> object:
+    """Return the hole that is said, and what is masked."""
+    if hole is None and masked is None:
+        raise InvalidInput("hole: needs a mask, 'alpha', or an image that is a masked array")
+    if hole is None or masked is None:
+        return masked if hole is None else hole
+    return as_mask(hole, "hole", masked.shape) | masked
+
+
+def mark_transparent(pixels: Array) -> Bools:
     """Return what is wholly transparent in a picture as its hole."""
-    pixels = np.asarray(image)
     if pixels.ndim != 3 or pixels.shape[2] not in (2, 4):
         raise InvalidInput(
             f"hole: 'alpha' needs an image with an alpha channel, got shape {pixels.shape}; or give a mask"
@@ -251,9 +271,8 @@ def recover_scales(pictures: Sequence[Array], open_: Bools, own: object, of_exem
     return [scale, np.ones(shape, np.float32) if other is None else other]
 
 
-def check_pictures(image: object, hole: object, exemplar: object | None) -> tuple[list[Array], Bools]:
+def check_pictures(array: Array, hole: object, exemplar: object | None) -> tuple[list[Array], Bools]:
     """Return the picture with its hole painted over, the one to copy from if there is one, and the hole."""
-    array = np.asarray(image)
     mask = None
     if array.ndim in (2, 3) and array.dtype.kind in "buif" and array.size:
         mask = as_mask(hole, "hole", array.shape[:2])

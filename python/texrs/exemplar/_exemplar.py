@@ -9,7 +9,7 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from texrs._arrays import as_image, as_int, as_wrap, guidance, to_unit
+from texrs._arrays import as_image, as_int, as_ndarray, as_wrap, guidance, to_unit
 from texrs._cache import Cache, content_hash
 from texrs._engine.coherence import Similarity, find_similar
 from texrs._engine.stitcher import Stitcher
@@ -47,8 +47,9 @@ class Exemplar:
 
     Parameters
     ----------
-    image : (H, W), (H, W, C), (D, H, W) or (D, H, W, C) array
-        The pixels: integers of 8, 16 or 32 bit, floats of 16, 32 or 64 bit, or bool. They are copied.
+    image : (H, W), (H, W, C), (D, H, W) or (D, H, W, C) array_like, path_like or PIL.Image.Image
+        The pixels: integers, floats of 16, 32 or 64 bit, or bool, channels last. Anything that makes itself an array is taken
+        (tensors, labelled arrays, DLPack), and a file is read. They are copied.
     axes : int
         2 for a picture, 3 for a volume.
     labels : bool, optional
@@ -60,7 +61,8 @@ class Exemplar:
     Raises
     ------
     InvalidInput
-        Not an image or not a volume, values that are not finite, labels of several channels, or a wrong option.
+        Not an image or not a volume, channels first, values that are masked or not finite, labels of several channels, or a
+            wrong option.
 
     See Also
     --------
@@ -80,7 +82,8 @@ class Exemplar:
         self, image: Array, *, axes: int = 2, labels: bool | None = None, repeat: bool | Sequence[bool] | None = None
     ) -> None:
         self._axes = as_int(axes, "axes", 2, 3)
-        checked = as_image(image, "image", axes=self._axes)
+        given = as_ndarray(image, "image", axes=self._axes)
+        checked = as_image(given, "image", axes=self._axes)
         if labels is not None:
             are_labels(checked, labels)
         self._labels = labels
@@ -88,7 +91,7 @@ class Exemplar:
         # A copy: facts that are kept by content must not come to be of another one.
         self._pixels = checked.copy()
         self._pixels.flags.writeable = False
-        self._image = self._pixels if np.ndim(image) > self._axes else self._pixels[..., 0]
+        self._image = self._pixels if given.ndim > self._axes else self._pixels[..., 0]
         self._facts: dict[Hashable, object] = {}
 
     def __repr__(self) -> str:
@@ -383,8 +386,8 @@ def as_exemplar(value: object, name: str = "exemplar", *, axes: int = 2, minimum
 
     Parameters
     ----------
-    value : Exemplar or array_like
-        What the user gave.
+    value : Exemplar, array_like, path_like or PIL.Image.Image
+        What the user gave: an exemplar, or whatever `Exemplar` takes.
     name : str
         The argument's name, for messages.
     axes : int
@@ -396,6 +399,8 @@ def as_exemplar(value: object, name: str = "exemplar", *, axes: int = 2, minimum
     ------
     InvalidInput
         An exemplar of other axes, not an array, or too small.
+    FileError
+        A path that cannot be read.
 
     """
     if isinstance(value, Exemplar):
@@ -403,8 +408,9 @@ def as_exemplar(value: object, name: str = "exemplar", *, axes: int = 2, minimum
             raise InvalidInput(f"{name}: needs an Exemplar with axes={axes}, got one with axes={value.axes}")
         _check_sides(value.shape, name, minimum)
         return value
-    as_image(value, name, axes=axes, minimum=minimum)
-    return Exemplar(cast(Array, value), axes=axes)
+    given = as_ndarray(value, name, axes=axes)
+    as_image(given, name, axes=axes, minimum=minimum)
+    return Exemplar(given, axes=axes)
 
 
 def _check_sides(shape: tuple[int, ...], name: str, minimum: int) -> None:

@@ -44,7 +44,7 @@ from pathlib import Path
 
 import numpy as np
 
-from texrs._arrays import MAX_PIXELS, as_int
+from texrs._checks import MAX_PIXELS, as_int
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from texrs._arrays import as_float, as_tuple
+from texrs._checks import as_float, as_tuple
 from texrs._typing import Array
 from texrs.errors import FileError, InvalidInput
 from texrs.io import _files, _npy, _volumes

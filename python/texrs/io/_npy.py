@@ -12,7 +12,7 @@ from typing import BinaryIO, cast
 
 import numpy as np
 
-from texrs._arrays import MAX_PIXELS
+from texrs._checks import MAX_PIXELS
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, LimitExceeded

@@ -7,11 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from texrs import _rust
-from texrs._arrays import as_array, as_choice, as_image, as_list, as_wrap
-from texrs._typing import Array, Interpolation
+from texrs._arrays import as_array, as_choice, as_image, as_list, as_ndarray, as_wrap
+from texrs._typing import Array, Floats, Interpolation
 from texrs.errors import InvalidInput
 
 __all__ = ["gather"]
+
+EXACT = 2**53
+"""Up to this float64 holds all integers."""
 
 
 def __dir__() -> list[str]:
@@ -34,14 +37,15 @@ def gather(
     Parameters
     ----------
     exemplars : (h, w[, C]) or (d, h, w[, C]) array_like, or a list or tuple of them
-        Bool, integers of 8, 16 or 32 bit, floats of 16, 32 or 64 bit, finite; several must agree in dtype and channels,
+        Bool, integers, floats of 16, 32 or 64 bit, finite; several must agree in dtype and channels,
         not in size.
     coordinates : (..., 2) or (..., 3) array_like
         (row, column) or (plane, row, column), in samples, as float32; sample centres are at the integers. Finite.
     which : (...) array_like of int, optional
         The exemplar of each pixel, counted from 0; by default the first for all.
     interpolation : {"nearest", "linear", "cubic"}
-        How values between samples are made. Integers are rounded to the nearest.
+        How values between samples are made. Integers are rounded to the nearest; among integers beyond 2^53 nothing is made,
+        the nearest sample is taken.
     wrap : bool or one an axis
         Axes along which the exemplars are cyclic; along the others the edge repeats.
 
@@ -71,7 +75,7 @@ def gather(
     axes = points.shape[-1] if points.ndim else 0
     if axes not in (2, 3):
         raise InvalidInput(f"coordinates: needs shape (..., 2) or (..., 3), got {points.shape}")
-    several = as_list(exemplars)
+    several = [as_ndarray(e, "exemplars", axes=axes) for e in as_list(exemplars)]
     if not several:
         raise InvalidInput("exemplars: at least one is needed, got none")
     images = [as_image(e, "exemplars", axes=axes) for e in several]
@@ -85,24 +89,31 @@ def gather(
         index = as_array(which, "which", np.uint16, shape)
         if index.size and index.max() >= len(images):
             raise InvalidInput(f"which: allowed are 0 to {len(images) - 1}, got {index.min()} to {index.max()}")
-    out = _rust.gather(
-        [_to_kernel(e) for e in images],
-        as_wrap(wrap, axes=axes),
-        index.reshape(-1),
-        points.reshape(-1, axes),
-        as_choice(interpolation, "interpolation", ("nearest", "linear", "cubic")),
-    )
+    how = as_choice(interpolation, "interpolation", ("nearest", "linear", "cubic"))
     dtype = images[0].dtype
-    if dtype == np.bool_:
-        out = out.view(np.bool_)
+    if dtype.kind in "ui" and dtype.itemsize == 8:
+        how = _find_exact(how, images, points)
+    out = _rust.gather(
+        [_to_kernel(e, how) for e in images], as_wrap(wrap, axes=axes), index.reshape(-1), points.reshape(-1, axes), how
+    )
+    if dtype == np.bool_ or out.dtype == np.uint32:
+        out = out.view(dtype)
     elif dtype != out.dtype:
-        out = out.astype(dtype)
-    had_channels = np.asarray(several[0]).ndim > axes
+        out = (np.rint(out) if dtype.kind in "ui" else out).astype(dtype)
+    had_channels = several[0].ndim > axes
     return out.reshape((*shape, images[0].shape[-1]) if had_channels else shape)
 
 
-def _to_kernel(array: Array) -> Array:
-    """Return the values in a dtype that the kernel takes: bool as uint8, float16 as float32."""
+def _find_exact(interpolation: str, images: Sequence[Array], points: Floats) -> str:
+    """Return how 64-bit integers are looked up: by the nearest sample if float64 cannot hold them: they are names."""
+    large = any(int(e.min()) < -EXACT or int(e.max()) > EXACT for e in images)
+    return "nearest" if large or (points == np.rint(points)).all() else interpolation
+
+
+def _to_kernel(array: Array, interpolation: str) -> Array:
+    """Return the values in a dtype that the kernel takes: bool as uint8, float16 as float32, 64-bit integers as halves."""
     if array.dtype == np.bool_:
         return array.view(np.uint8)
+    if array.dtype.kind in "ui" and array.itemsize == 8:
+        return array.view(np.uint32) if interpolation == "nearest" else array.astype(np.float64)
     return array.astype(np.float32) if array.dtype == np.float16 else array

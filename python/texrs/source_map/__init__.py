@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_image, as_list, power_single
+from texrs._arrays import as_image, as_list, as_ndarray, power_single
 from texrs._typing import Array, Bools, Frames, Interpolation, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.kernels.gather import gather
@@ -303,7 +303,7 @@ class SourceMap:
         True
 
         """
-        several = as_list(exemplars)
+        several = [as_ndarray(e, "exemplars", axes=self.axes) for e in as_list(exemplars)]
         if len(several) != len(self.shapes):
             raise InvalidInput(f"exemplars: the map was made from {len(self.shapes)}, got {len(several)}")
         images = [as_image(e, "exemplars", axes=self.axes) for e in several]

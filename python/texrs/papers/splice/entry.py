@@ -9,7 +9,7 @@ from typing import Any, Concatenate, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
 
-from texrs._arrays import as_image, as_wrap
+from texrs._arrays import as_image, as_ndarray, as_wrap
 from texrs._cache import Cache, content_hash
 from texrs._typing import Progress
 from texrs.elements import Elements, analyse
@@ -31,11 +31,12 @@ CACHES: list[Cache[bytes, Any]] = []
 def as_elements(value: object, name: str, progress: Progress) -> Elements:
     """Check an entry, or analyse a picture."""
     if not isinstance(value, Elements):
-        as_image(value, name, minimum=SHORTEST)
+        given = as_ndarray(value, name)
+        as_image(given, name, minimum=SHORTEST)
         try:
-            found = analyse(value, progress=progress)
+            found = analyse(given, progress=progress)
             # In the shape that it came in.
-            return check_entry(replace(found, image=np.asarray(value)), name)
+            return check_entry(replace(found, image=given), name)
         except InvalidInput as error:
             raise InvalidInput(f"{name}: {error}; texrs.elements.analyse takes a box, points and a mask") from None
     return check_entry(value, name)

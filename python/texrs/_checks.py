@@ -1,0 +1,149 @@
+"""Checks of arguments that are no arrays: numbers, sizes, choices."""
+
+from __future__ import annotations
+
+import math
+import numbers
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+
+from texrs.errors import InvalidInput, LimitExceeded
+
+MAX_PIXELS = 2**28
+"""Pixels or voxels that an array made by texrs may have, unless a limit is given."""
+
+
+def as_list(value: object) -> list[Any]:
+    """Return several things as a list, and a single one as a list of it."""
+    return list(value) if isinstance(value, list | tuple) else [value]
+
+
+def as_size(
+    value: object, name: str = "size", *, axes: int = 2, minimum: int = 1, limit: int = MAX_PIXELS
+) -> tuple[int, ...]:
+    """Check a size: an int for a square, or one int an axis (rows, columns).
+
+    Raises
+    ------
+    InvalidInput
+        Not integers, too few or too many, or below ``minimum``.
+    LimitExceeded
+        More than ``limit`` pixels.
+
+    """
+    order = ("(rows, columns)", "(planes, rows, columns)")[axes - 2]
+    if isinstance(value, numbers.Integral):
+        sides: tuple[Any, ...] = (value,) * axes
+    else:
+        sides = as_tuple(value, name, axes, f"{order} as integers")
+    if not all(isinstance(s, numbers.Integral) and not isinstance(s, bool) for s in sides):
+        raise InvalidInput(f"{name}: needs {order} as integers, got {value!r}")
+    result = tuple(int(s) for s in sides)
+    if min(result) < minimum:
+        raise InvalidInput(f"{name}: each side must be at least {minimum}, got {result}")
+    pixels = math.prod(result)
+    if pixels > limit:
+        raise LimitExceeded(f"{name}: {result} has {pixels} pixels, more than the limit of {limit}")
+    return result
+
+
+def check_memory(needed: int, name: str = "size") -> None:
+    """Refuse what needs more bytes than the machine has.
+
+    Raises
+    ------
+    LimitExceeded
+        More bytes than the machine has, where it tells.
+
+    """
+    try:
+        there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return
+    if needed > there > 0:
+        raise LimitExceeded(f"{name}: needs {needed / 1e9:.1f} GB of memory, this machine has {there / 1e9:.1f} GB")
+
+
+def as_tuple(value: object, name: str, length: int, what: str) -> tuple[Any, ...]:
+    """Check a sequence of so many entries; its length is looked at first, for it may be anything."""
+    if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
+        try:
+            if len(value) == length:
+                return tuple(value)
+        except (TypeError, OverflowError):  # An array without axes, a range beyond what fits in memory.
+            pass
+    raise InvalidInput(f"{name}: needs {what}, got {value!r}")
+
+
+def as_items(value: object, name: str) -> Iterator[Any]:
+    """Check something to go through; its items are not looked at before they are asked for."""
+    if isinstance(value, Iterable) and not isinstance(value, str | bytes):
+        with suppress(TypeError):  # An array without axes.
+            return iter(value)
+    raise InvalidInput(f"{name}: needs a sequence, got {value!r}")
+
+
+def as_wrap(value: object, name: str = "wrap", *, axes: int = 2) -> tuple[bool, ...]:
+    """Check a choice of cyclic axes: one bool for all, or one an axis."""
+    if isinstance(value, bool | np.bool_):
+        return (bool(value),) * axes
+    what = f"True, False or {axes} of them, one an axis"
+    sides = as_tuple(value, name, axes, what)
+    if not all(isinstance(side, bool | np.bool_) for side in sides):
+        raise InvalidInput(f"{name}: needs {what}; got {value!r}")
+    return tuple(map(bool, sides))
+
+
+def as_bool(value: object, name: str) -> bool:
+    """Check a choice of two."""
+    if not isinstance(value, bool | np.bool_):
+        raise InvalidInput(f"{name}: needs True or False, got {value!r}")
+    return bool(value)
+
+
+def as_choice(value: object, name: str, allowed: Sequence[str]) -> str:
+    """Check a choice by name."""
+    if not isinstance(value, str) or value not in allowed:
+        raise InvalidInput(f"{name}: allowed are {', '.join(allowed[:-1])} and {allowed[-1]}; got {value!r}")
+    return value
+
+
+def as_method(value: object, *allowed: str | None) -> None:
+    """Check the name of an algorithm; None is the usual one."""
+    if value not in allowed:
+        names = [repr(name) for name in allowed]
+        raise InvalidInput(f"method: allowed are {', '.join(names[:-1])} and {names[-1]}, got {value!r}")
+
+
+def as_progress(value: object, name: str = "progress") -> Callable[..., object] | None:
+    """Check what is called while work goes on."""
+    if value is not None and not callable(value):
+        raise InvalidInput(f"{name}: needs a function to call, or None; got {value!r}")
+    return value
+
+
+def as_int(value: object, name: str, low: int, high: int) -> int:
+    """Check an integer in [low, high]."""
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral) or not low <= int(value) <= high:
+        raise InvalidInput(f"{name}: needs an integer from {low} to {high}, got {value!r}")
+    return int(value)
+
+
+def as_float(value: object, name: str, low: float, high: float) -> float:
+    """Check a number in [low, high]."""
+    number = math.nan
+    if not isinstance(value, bool) and isinstance(value, numbers.Real):
+        with suppress(OverflowError):
+            number = float(value)
+    if not low <= number <= high:
+        raise InvalidInput(f"{name}: needs a number from {low} to {high}, got {value!r}")
+    return number
+
+
+def as_seed(value: object, name: str = "seed") -> int:
+    """Check a seed: an integer from 0 to 2^64 - 1."""
+    return as_int(value, name, 0, 2**64 - 1)

@@ -1,0 +1,120 @@
+"""What people keep pictures in, as arrays: files, PIL pictures, tensors, labelled and masked arrays."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+
+from texrs._typing import Array
+from texrs.errors import FileError, InvalidInput, LimitExceeded
+
+COLOURED = {"P": "RGB", "PA": "RGBA", "RGBX": "RGB", "RGBa": "RGBA", "La": "LA", "YCbCr": "RGB", "HSV": "RGB"}
+"""Modes of PIL pictures whose numbers are no colours yet, and what they are converted to."""
+WITH_ALPHA = {"L": "LA", "RGB": "RGBA"}
+"""What a mode is converted to where one of its colours stands for transparency."""
+KEPT = ("1", "L", "LA", "I", "F", "RGB", "RGBA")
+"""Modes whose numbers are taken as they are, as are those of I;16."""
+
+
+def as_ndarray(value: object, name: str, *, axes: int = 2) -> Array:
+    """Return whatever somebody keeps a picture in as an array: the one place that knows what that may be.
+
+    Parameters
+    ----------
+    value : array_like, path_like or PIL.Image.Image
+        An array, or what makes itself one (``__array__``, ``__array_interface__``, the buffer protocol, DLPack): tensors,
+        labelled arrays, nested lists. A path is read. Of a PIL picture the palette is applied, and what stands for
+        transparency becomes alpha.
+    name : str
+        The argument's name, for messages.
+    axes : int
+        Of a file's array without the channels: 3 reads a volume.
+
+    Returns
+    -------
+    ndarray
+        Of whatever dtype and shape; no copy where there need not be one.
+
+    Raises
+    ------
+    InvalidInput
+        Nothing that can be made an array, masked values, or a PIL picture in inks or in CIELAB.
+    FileError
+        A path that cannot be read.
+    LimitExceeded
+        More than there is memory for.
+
+    Examples
+    --------
+    >>> from PIL import Image
+    >>> picture = Image.new("P", (3, 2), 7)
+    >>> picture.putpalette([0, 0, 0] * 7 + [250, 120, 0])
+    >>> as_ndarray(picture, "image")[0, 0]
+    array([250, 120,   0], dtype=uint8)
+
+    """
+    if type(value) is np.ndarray:
+        return value
+    if isinstance(value, str | os.PathLike):
+        return _read(value, name, axes)
+    if isinstance(value, np.ma.MaskedArray):
+        return _take_whole(value, name)
+    try:
+        if _is_pillow(value):
+            return np.asarray(_take_colours(value, name))
+        if hasattr(value, "__dlpack__") and not hasattr(value, "__array__"):
+            return np.from_dlpack(value)
+        return np.asarray(value)
+    except MemoryError:
+        raise LimitExceeded(f"{name}: needs more memory than there is") from None
+    except InvalidInput:
+        raise
+    except Exception as error:  # Whatever a library says of what it cannot hand over, as a tensor on another device.
+        text = " ".join(str(error).split())
+        raise InvalidInput(f"{name}: not an array of numbers ({text or type(error).__name__})") from None
+
+
+def _read(path: str | os.PathLike[str], name: str, axes: int) -> Array:
+    from texrs import io
+
+    try:
+        return io.read_volume(path) if axes == 3 else io.read(path)
+    except LimitExceeded as error:
+        raise LimitExceeded(f"{name}: {error}") from None
+    except FileError as error:
+        raise FileError(f"{name}: {error}") from None
+
+
+def _take_whole(value: Any, name: str) -> Array:
+    """Return the values of a masked array in which nothing is masked."""
+    count = int(np.ma.getmaskarray(value).sum())
+    if count:
+        raise InvalidInput(
+            f"{name}: {count} of {value.size} values are masked, which is a hole: texrs.complete fills it, "
+            "or value.filled(...) says what stands there"
+        )
+    return np.asarray(value.data)
+
+
+def _is_pillow(value: object) -> bool:
+    # Without an import of PIL, which takes a while.
+    return any(c.__module__ == "PIL.Image" and c.__name__ == "Image" for c in type(value).__mro__)
+
+
+def _take_colours(picture: Any, name: str) -> Any:
+    """Return a PIL picture in a mode whose numbers are colours."""
+    mode = str(picture.mode)
+    seen_through = picture.info.get("transparency") is not None
+    if mode == "P":
+        clear = seen_through or (picture.palette is not None and picture.palette.mode == "RGBA")
+        return picture.convert("RGBA" if clear else "RGB")
+    if mode in COLOURED:
+        return picture.convert(COLOURED[mode])
+    if seen_through and mode in WITH_ALPHA:
+        return picture.convert(WITH_ALPHA[mode])
+    if mode in KEPT or mode.startswith("I;16"):
+        return picture
+    way = "PIL.ImageCms.profileToProfile" if mode == "LAB" else 'image.convert("RGB")'
+    raise InvalidInput(f"{name}: a PIL picture of mode {mode} holds no colours that texrs knows; convert it: {way}")
