@@ -22,6 +22,7 @@ VERBS: dict[str, tuple[Callable[[], Synthesis], np.ndarray]] = {
     "design without blending": (lambda: texrs.design(PEBBLES, 64, blend=None), PEBBLES),
     "design as printed": (lambda: texrs.design(PEBBLES, 64, method="paper"), PEBBLES),
     "tile": (lambda: texrs.tile(PEBBLES), PEBBLES),
+    "tile and blend": (lambda: texrs.tile(PEBBLES, blend=0.1), PEBBLES),
     "complete": (lambda: texrs.complete(PEBBLES, HOLE), PEBBLES),
     "complete and blend": (lambda: texrs.complete(PEBBLES, HOLE, blend=0.1), PEBBLES),
     "synthesize": (lambda: texrs.synthesize(PEBBLES, 64), PEBBLES),

@@ -379,3 +379,13 @@ def test_same_bytes_for_any_number_of_threads():
 def test_an_exemplar_is_tiled_as_its_array():
     image = picture("pebbles", 96)
     np.testing.assert_array_equal(texrs.tile(texrs.Exemplar(image)).image, texrs.tile(image).image)
+
+
+def test_seams_can_be_blended():
+    pebbles = samples.pebbles((96, 96)).image
+    plain, blended = texrs.tile(pebbles, overlap=12), texrs.tile(pebbles, overlap=12, blend=0.05)
+    assert (blended.stages["composite"] == plain.image).all()
+    assert (blended.image != plain.image).any()
+    assert blended.report["blend"] == 0.05
+    with pytest.raises(InvalidInput, match="blend"):
+        texrs.tile(pebbles, blend=-1)

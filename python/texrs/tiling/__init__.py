@@ -26,9 +26,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_int, as_size, as_wrap
+from texrs._arrays import as_float, as_int, as_size, as_wrap
 from texrs._typing import Array, Floats, Progress
 from texrs._verbs import takes_materials
+from texrs.blending import apply
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
 from texrs.materials import Material
@@ -55,6 +56,7 @@ def tile(
     wrap: bool | Sequence[bool] = (True, True),
     size: int | Sequence[int] | None = None,
     overlap: int | Sequence[int] | None = None,
+    blend: float | None = None,
     progress: Progress | None = None,
 ) -> Synthesis:
     """Make a picture cyclic: copies of the result side by side have no edge between them.
@@ -72,6 +74,9 @@ def tile(
     overlap : int or (rows, columns), optional
         How many pixels of two opposite edges are laid over each other, 1 to half the side, instead of a size. By
         default what shows least.
+    blend : float, optional
+        Weight of the values, 0 to 1e6, when colours are corrected so that seams disappear: the smaller, the wider the
+        correction. None or 0: no correction, so that each pixel is one of the picture. See `texrs.blend`.
     progress : callable, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
 
@@ -79,10 +84,10 @@ def tile(
     -------
     Synthesis
         The image, in the dtype and with the channels of the picture; an axis that does not wrap keeps its length, or that
-        much of its middle that was asked for. Each pixel is one of the picture. The stages are ``"swapped"`` (the halves
+        much of its middle that was asked for. The stages are ``"swapped"`` (the halves
         exchanged, nothing cut yet), ``"pieces"`` (which part of the picture each pixel is from) and ``"composite"``, the
-        result. The report names for each axis the overlap, 0 where the ends are covered, how many joints were tried, and the
-        cost of the cuts.
+        result before ``blend``. The report names for each axis the overlap, 0 where the ends are covered, how many joints were
+        tried, and the cost of the cuts.
 
     Raises
     ------
@@ -108,7 +113,7 @@ def tile(
     """
     exemplar, cyclic = as_exemplar(image, "image"), as_wrap(wrap)
     shape = (exemplar.shape[0], exemplar.shape[1])
-    wanted = as_sides(size, shape, cyclic)
+    wanted, weight = as_sides(size, shape, cyclic), as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
     choices = as_choices(overlap, size is None, shape, wanted, cyclic)
     watch = progress or (lambda stage, share: None)
     watch("segment", 0.0)
@@ -117,18 +122,20 @@ def tile(
         source, firsts = extend(exemplar.guidance, wanted, cyclic, watch), (0, 0)
     else:
         source, found, firsts = join_ends(exemplar.guidance, wanted, choices, cyclic, watch)
-    source = source.finished(cyclic)
-    result = source.render(exemplar.image)
+    source = source.finished(cyclic, screening=weight or None)
+    composite = source.render(exemplar.image)
+    result = apply(source, exemplar.image, progress=progress) if weight else composite
     watch("done", 1.0)
     stages = {
         "swapped": np.roll(exemplar.image, [-first for first in firsts], (0, 1)),
         "pieces": (source.label * 85 % 256).astype(np.uint8),
-        "composite": result,
+        "composite": composite,
     }
     report = {
         "method": "tile" if found or source.shape == shape else "quilt",
         "size": list(source.shape),
         "wrap": list(cyclic),
+        "blend": weight,
         "overlap": [found[a].joint.width if a in found and not found[a].joint.cover else 0 for a in range(2)],
         "joints": {AXES[a]: describe(joined, firsts[a]) for a, joined in found.items()},
     }
