@@ -3,10 +3,10 @@
     [TEXRS_TEXTURES=FOLDER] python benches/planes_table.py [--rounds 4] [--pictures DIR]
 
 Floors are flat samples seen by a pinhole camera: slants of 20 to 65 degrees, tilts all round, four angles of view, with noise
-and without. FOLDER holds pictures and ``ground-truth.json``, which tells slant, tilt and focal length of some. With
-`--pictures` each is drawn beside its flat texture. After the errors of each texture it says how often planes were right
-that were said to be sure, how well the ground is found beside skies, walls and things, and what each verb takes at 1024 x
-1024.
+and without, half of them as JPEG files. FOLDER holds pictures and ``ground-truth.json``, which tells slant, tilt, focal length
+and a scale map of some. With `--pictures` each is drawn beside its flat texture. After the errors of each texture it says how
+often planes were right that were said to be sure, how well automatic scale maps fit those of the folder, how well the ground is
+found beside skies, walls and things, and what each verb takes at 1024 x 1024.
 """
 
 from __future__ import annotations
@@ -27,9 +27,10 @@ import texrs
 from texrs import Plane, io, planes
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
-from plane_checks import dress, look, turn_between
+from plane_checks import dress, look, squeeze, turn_between
+from texrs.planes._choose import measure_scale
 
-NAMES = ("bricks", "pebbles", "dots", "weave", "beans", "scales")
+NAMES = ("bricks", "setts", "pebbles", "dots", "weave", "beans", "scales")
 SIZE = (256, 320)
 RIGHT = (8.0, 15.0)
 """Errors in slant and in tilt, in degrees, up to which a plane counts as found."""
@@ -45,7 +46,9 @@ def floors(rounds: int) -> Iterator[tuple[str, Plane, np.ndarray]]:
                 plane = Plane(SIZE, rng.uniform(20, 65), rng.uniform(0, 360), float(rng.choice([40, 50, 60, 70])))
                 if plane.width(np.argwhere(np.ones(SIZE))).min() > 0.12:
                     break
-            yield name, plane, look(name, plane, seed=number, noise=float(rng.choice([0, 6])))
+            picture = look(name, plane, seed=number, noise=float(rng.choice([0, 6])))
+            quality = int(rng.choice([0, 0, 60, 85]))
+            yield name, plane, squeeze(picture, quality) if quality else picture
 
 
 def told(folder: str | None) -> Iterator[tuple[str, Plane, np.ndarray]]:
@@ -56,6 +59,16 @@ def told(folder: str | None) -> Iterator[tuple[str, Plane, np.ndarray]]:
                 image = io.read(path.parent / name)
                 fov = 2 * degrees(atan(max(image.shape[:2]) / 2 / truth["focal_px"]))
                 yield Path(name).stem, Plane(image.shape[:2], truth["slant_deg"], truth["tilt_deg"], fov), image
+
+
+def print_maps(folder: str | None) -> None:
+    """Print how the automatic scale maps of a folder's pictures go with those that its ground truth tells."""
+    print("\n| picture | correlation of the scale map |\n|---|---|")
+    for path in sorted(Path(folder).rglob("*-scale.npy")) if folder else ():
+        image = io.read(path.with_name(path.name.replace("-scale.npy", ".png")))
+        truth = np.log(np.load(path).astype(np.float64))
+        mine = np.log(measure_scale(image, np.ones(image.shape[:2], np.bool_))[::2, ::2])
+        print(f"| {path.stem} | {np.corrcoef(mine.ravel(), truth.ravel())[0, 1]:.4f} |")
 
 
 SCENES = {"nothing": {}, "sky": {"above": "sky"}, "things": {"things": 3}, "sky, things": {"above": "sky", "things": 3}}
@@ -106,6 +119,7 @@ def main() -> None:
     for low, high in pairwise(BINS):
         right = [good for sure, good in stated if low <= sure < high or sure == high == 1]
         print(f"| {low} to {high} | {len(right)} | {np.mean(right) if right else float('nan'):.2f} |")
+    print_maps(os.environ.get("TEXRS_TEXTURES"))
     print_grounds()
     plane = Plane((1024, 1024), 45, 90, 55)
     picture = look("pebbles", plane)

@@ -1,9 +1,11 @@
 """Floors whose planes are known: flat samples, seen by a pinhole camera."""
 
 from functools import cache
+from io import BytesIO
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 from scipy.ndimage import gaussian_filter
 
 from texrs import Plane, SourceMap, samples
@@ -15,7 +17,34 @@ SIDE, OVER = 512, 2
 @cache
 def load(name: str) -> NDArray[np.uint8]:
     """Return a flat texture."""
+    if name == "setts":
+        return lay_setts(SIDE)
     return samples.load(name, size=(SIDE, SIDE)).image
+
+
+def lay_setts(side: int, *, number: int = 16, seed: int = 0) -> NDArray[np.uint8]:
+    """Return square stones in rows and columns, as roads are laid."""
+    rng = np.random.default_rng(seed)
+    cell = side // number
+    rows, columns = np.indices((side, side))
+    which = rows // cell % number, columns // cell % number
+    half, middle = rng.uniform(0.38, 0.46, (2, number, number)), rng.uniform(-0.04, 0.04, (2, number, number))
+    colour = np.array([128, 122, 115]) + rng.normal(0, 14, (number, number, 1)) + rng.normal(0, 4, (number, number, 3))
+    off = [
+        np.abs((at % cell + 0.5) / cell - 0.5 - m[which]) / h[which]
+        for at, h, m in zip((rows, columns), half, middle, strict=True)
+    ]
+    inside = 1 / (1 + np.exp(25 * ((off[0] ** 5 + off[1] ** 5) ** 0.2 - 1)))[..., np.newaxis]
+    grain = gaussian_filter(rng.normal(0, 1, (side, side)), 1.2, mode="wrap")[..., np.newaxis]
+    shown = colour[which] * inside + np.array([62, 58, 50]) * (1 - inside) + (8 * inside + 4) * grain / grain.std()
+    return np.asarray(np.clip(np.rint(shown), 0, 255), np.uint8)
+
+
+def squeeze(picture: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
+    """Return a picture as it comes back from a JPEG file."""
+    file = BytesIO()
+    Image.fromarray(picture).save(file, "JPEG", quality=quality)
+    return np.asarray(Image.open(file))
 
 
 def look(

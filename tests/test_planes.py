@@ -8,6 +8,7 @@ import pytest
 from plane_checks import look, look_twice, turn_between
 from texrs import Plane, planes, samples, scale_maps
 from texrs.errors import InvalidInput
+from texrs.planes._lines import Lines, find_lines, lean
 
 FLOOR = Plane((240, 320), slant=50, tilt=70, fov=55)
 TURNED = Plane((240, 320), slant=50, tilt=70, fov=55, turn=20)
@@ -95,6 +96,45 @@ def test_planes_are_found(name: str, slant: float, tilt: float, noise: float) ->
     steep, aside = turn_between(found, plane)
     assert steep <= 8
     assert aside <= 15
+
+
+@pytest.mark.parametrize(
+    ("name", "slant", "tilt", "seed"), [("bricks", 48, 323, 0), ("bricks", 50, 110, 6), ("setts", 57, 237, 7)]
+)
+def test_straight_lines_tell(name: str, slant: float, tilt: float, seed: int) -> None:
+    plane = Plane((256, 320), slant, tilt, fov=55)
+    steep, aside = turn_between(planes.find(look(name, plane, seed=seed, noise=6), fov=55), plane)
+    assert steep <= 6
+    assert aside <= 12
+
+
+def test_lines_lean_towards_their_horizon() -> None:
+    side, rng = 320, np.random.default_rng(0)
+    middles = rng.uniform(-120, 120, (400, 2))
+    rise = np.array([0.4, -0.7])
+    # Three of four run in one of two directions of the plane, but for an error.
+    angles = np.where(rng.uniform(0, 1, 400) < 0.75, rng.choice([0.3, 1.6], 400), rng.uniform(0, np.pi, 400))
+    way = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    seen = way + middles / side * (way @ rise)[:, np.newaxis]
+    turn = np.arctan2(seen[:, 1], seen[:, 0]) + rng.normal(0, 0.02, 400)
+    ways = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    lines = Lines(middles, ways, rng.uniform(15, 50, 400))
+    told = lean(lines, side, np.array([0.1, -0.3]), 0.5, 0.9)
+    assert np.abs(told.rise - rise).max() < 0.05
+    assert np.degrees(told.spreads).max() < 3
+    # What runs anyhow says nothing.
+    anyhow = rng.uniform(0, np.pi, 400)
+    loose = Lines(middles, np.stack([np.cos(anyhow), np.sin(anyhow)], axis=-1), lines.lengths)
+    assert np.abs(lean(loose, side, np.zeros(2), 0.1, 0.9).rise).max() < 0.1
+
+
+def test_lines_of_a_board_are_found() -> None:
+    board = np.kron(np.indices((6, 8)).sum(axis=0) % 2, np.ones((40, 40))).astype(np.float32)
+    lines = find_lines(board, np.ones(board.shape, np.bool_))
+    # Each side of a square, along rows or columns, where two colours meet.
+    assert len(lines.lengths) >= 5 * 8 + 6 * 7
+    assert np.abs(np.abs(lines.ways).max(axis=1) - 1).max() < 1e-3
+    assert np.median(lines.lengths) == pytest.approx(40, abs=5)
 
 
 def test_what_is_seen_from_the_front_is_no_slope() -> None:

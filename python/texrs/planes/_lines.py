@@ -1,0 +1,307 @@
+"""Straight lines of a picture, and how the plane lies on which they run in one direction, or in two.
+
+Lines of one direction of a plane meet in one point of its horizon. Where borders of what a picture shows are straight and
+most of them run in one direction, or two, that tells more of the horizon than any patch of texture does.
+
+Borders are taken as Burns et al. do: pixels beside each other whose slopes have about the same direction are one border, and
+its principal axis is a line. The rest is a mixture: a line runs in one of the two directions, but for an error, or anyhow.
+
+J. B. Burns, A. R. Hanson and E. M. Riseman, "Extracting straight lines", IEEE Transactions on Pattern Analysis and Machine
+Intelligence 8, 1986.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Bools, Floats
+
+__all__ = ["Lean", "Lines", "find_lines", "lean"]
+
+Reals = NDArray[np.float64]
+
+SMOOTH = 1.0
+"""Standard deviation of the Gaussian under which slopes are taken, in pixels."""
+STEEP = 0.5
+"""A border is at least so steep, of the root mean square of the slopes around it."""
+AROUND = 0.06
+"""Standard deviation of the windows of that, as a share of the longer side."""
+SHORTEST = 12.0
+"""Length of a line, in pixels."""
+THIN = 0.6
+"""Standard deviation across a line, in pixels, up to which it is straight."""
+TANGENT = 0.4142135623730951
+"""Of an eighth of a half turn."""
+ASKEW = 0.12
+"""Sine of the angle, at most, between a line and what lies across its slopes."""
+MOST = 1500
+"""The longest lines are enough."""
+COUNTED, TOLD = 60.0, 300.0
+"""A line counts by its length, in pixels, up to the first. So much length tells one thing: lines beside each other are not
+independent."""
+FINEST, BROADEST = np.radians(0.7), np.radians(12.0)
+"""Standard deviation of the angle between a line and its direction: the least, and the largest that is looked for."""
+STRAIGHT, CURVED = np.radians(3.0), np.radians(6.0)
+"""Up to the first, directions tell all that they can; from the second on, nothing: borders are curved."""
+LOOSE = 0.05
+"""Share of lines, at least, that run anyhow."""
+BINS, BETWEEN = 90, 12
+"""Bins of half a turn in which directions are looked for, and how many lie between two of them at least."""
+ROUNDS = 30
+"""Steps of expectation and maximisation."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lines:
+    """Straight lines of a picture: middles (n, 2) in pixels from its middle, directions (n, 2), and lengths (n,)."""
+
+    middles: Reals
+    ways: Reals
+    lengths: Reals
+
+
+@dataclass(frozen=True, slots=True)
+class Lean:
+    """What lines tell of a horizon.
+
+    Attributes
+    ----------
+    rise : (2,) array
+        Of the width a longer side of the picture, as lines and what was known before have it.
+    told : (2, 2) array
+        Inverse of the covariance of the rise, by lines alone.
+    spreads, shares : (2,) arrays
+        Standard deviation, in radians, of the angle between lines and each of two directions, and the share of lines in it.
+
+    """
+
+    rise: Reals
+    told: Reals
+    spreads: Reals
+    shares: Reals
+
+
+def find_lines(grey: Floats, known: Bools) -> Lines:
+    """Return the straight borders of what a picture, (H, W), shows where it is known."""
+    from scipy.ndimage import binary_erosion, gaussian_filter, label
+
+    smooth = gaussian_filter(grey.astype(np.float64), SMOOTH, mode="nearest")
+    down, right = np.gradient(smooth)
+    steep = np.hypot(down, right)
+    inner = binary_erosion(known, iterations=3)
+    share = gaussian_filter(inner.astype(np.float64), AROUND * max(grey.shape))
+    usual = gaussian_filter(np.where(inner, steep**2, 0.0), AROUND * max(grey.shape)) / np.maximum(share, 1e-6)
+    border = inner & (steep > STEEP * np.sqrt(usual)) & (steep > 1e-4)
+    crests, away = _mark_crests(steep, down, right)
+    border &= crests
+    # Eighths of a turn, by comparisons alone, in two ways: a line at the limit of two lies in the midst of one of the other.
+    labels = []
+    for k in range(2):
+        turn = np.pi / 8 * k
+        y, x = down * np.cos(turn) - right * np.sin(turn), down * np.sin(turn) + right * np.cos(turn)
+        octant = (y > 0) * 4 + (x > 0) * 2 + (np.abs(y) > np.abs(x))
+        parts = np.zeros(grey.shape, np.intp)
+        number = 0
+        for which in range(8):
+            part, count = label(border & (octant == which), np.ones((3, 3)))
+            parts[part > 0] = part[part > 0] + number
+            number += count
+        labels.append((parts, number))
+    sizes = [np.bincount(parts.ravel(), minlength=number + 1) for parts, number in labels]
+    counts = [size[parts] for size, (parts, _) in zip(sizes, labels, strict=True)]
+    wins = [counts[0] >= counts[1], counts[0] < counts[1]]
+    found = []
+    for (parts, number), size, won in zip(labels, sizes, wins, strict=True):
+        votes = np.bincount(parts.ravel(), won.ravel(), minlength=number + 1)
+        chosen = votes >= 0.5 * size
+        chosen[0] = False
+        chosen &= size >= SHORTEST
+        found.append(_measure(parts, number, chosen, steep, away, down, right))
+    middles, ways, lengths = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    order = np.argsort(-lengths, kind="stable")[:MOST]
+    centre = (np.array(grey.shape) - 1) / 2
+    return Lines(middles[order] - centre, ways[order], lengths[order])
+
+
+def _mark_crests(steep: Reals, down: Reals, right: Reals) -> tuple[Bools, Reals]:
+    """Mark the pixels that are no less steep than both beside them, across the border, and how far from each it is steepest."""
+    padded = np.pad(steep, 1)
+    rows, columns = steep.shape
+
+    def shift(y: int, x: int) -> Reals:
+        return padded[1 + y : 1 + y + rows, 1 + x : 1 + x + columns]
+
+    flat, upright = np.abs(down) > TANGENT * np.abs(right), np.abs(right) > TANGENT * np.abs(down)
+    crests, away = np.zeros(steep.shape, np.bool_), np.zeros((*steep.shape, 2))
+    same = down * right > 0
+    for way, where in (
+        ((0, 1), ~flat),
+        ((1, 0), ~upright),
+        ((1, 1), flat & upright & same),
+        ((1, -1), flat & upright & ~same),
+    ):
+        after, before = shift(*way), shift(-way[0], -way[1])
+        here = where & (steep >= after) & (steep > before)
+        crests |= here
+        bend = 2 * steep - after - before
+        away[here] = (0.5 * (after - before)[here] / np.maximum(bend[here], 1e-12))[:, np.newaxis] * way
+    return crests, away
+
+
+def _measure(
+    parts: NDArray[np.intp], number: int, chosen: Bools, steep: Reals, away: Reals, down: Reals, right: Reals
+) -> tuple[Reals, Reals, Reals]:
+    """Return middle, direction and length of each chosen part that is straight."""
+    rows, columns = np.nonzero(chosen[parts])
+    which = parts[rows, columns]
+    weight = steep[rows, columns]
+
+    def add_up(values: Reals) -> Reals:
+        return np.asarray(np.bincount(which, values, minlength=number + 1), np.float64)
+
+    total = np.maximum(add_up(weight), 1e-12)
+    places = np.stack([rows, columns], -1) + away[rows, columns]
+    y, x = add_up(weight * places[:, 0]) / total, add_up(weight * places[:, 1]) / total
+    off = places[:, 0] - y[which], places[:, 1] - x[which]
+    yy, yx, xx = (add_up(weight * a * b) / total for a, b in ((off[0], off[0]), (off[0], off[1]), (off[1], off[1])))
+    middle, half = (yy + xx) / 2, np.hypot((yy - xx) / 2, yx)
+    length, across = np.sqrt(12 * (middle + half)), np.sqrt(np.maximum(middle - half, 0))
+    angle = 0.5 * np.arctan2(2 * yx, yy - xx)
+    ways = np.stack([np.cos(angle), np.sin(angle)], -1)
+    # Where slopes do not lie across it, it is a row of other borders.
+    slopes = np.stack([add_up(down[rows, columns]), add_up(right[rows, columns])], -1)
+    askew = np.abs((ways * slopes).sum(axis=-1)) / np.maximum(np.hypot(*slopes.T), 1e-12)
+    good = chosen & (length >= SHORTEST) & (across <= THIN + 0.01 * length) & (askew <= ASKEW)
+    return np.stack([y, x], -1)[good], ways[good], length[good]
+
+
+def lean(lines: Lines, side: int, before: Reals, sure: float, focal: float) -> Lean:
+    """Return what lines tell of a horizon.
+
+    Parameters
+    ----------
+    lines : Lines
+        Of a picture.
+    side : int
+        The longer one of the picture.
+    before : (2,) array
+        Rise of the width a side as it is known.
+    sure : float
+        Standard deviation of that.
+    focal : float
+        Focal length over the side: of lines that run anyhow on the plane, it tells how they run in the picture.
+    """
+    mixture = _Mixture(lines, side, before, focal)
+    known = np.eye(2) / sure**2
+    for _ in range(ROUNDS):
+        told, pull = mixture.step()
+        if not mixture.move(told, pull, known, before):
+            break
+    told, _ = mixture.step()
+    return Lean(mixture.rise, mixture.free(told), mixture.spreads, mixture.shares[:2])
+
+
+class _Mixture:
+    """Lines of two directions of a plane, and lines that run anyhow on it."""
+
+    def __init__(self, lines: Lines, side: int, rise: Reals, focal: float) -> None:
+        self.places, self.ways, self.focal = lines.middles / side, lines.ways, focal
+        self.weights = np.minimum(lines.lengths, COUNTED) / TOLD
+        self.errors = (1 / lines.lengths) ** 2
+        self.rise = rise
+        self.spreads, self.shares = np.radians([4.0, 4.0]), np.array([0.25, 0.25, 0.5])
+        self.angles = self._start()
+
+    def _flatten(self, ways: Reals) -> Reals:
+        """Return the directions on the plane that are seen as some in the picture."""
+        width = 1 + self.places[:, 0] * self.rise[0] + self.places[:, 1] * self.rise[1]
+        along = ways[:, 0] * self.rise[0] + ways[:, 1] * self.rise[1]
+        flat = ways * width[:, np.newaxis] - self.places * along[:, np.newaxis]
+        steep = max(float(np.hypot(*self.rise)), 1e-12)
+        down = self.rise / steep
+        stretch = np.sqrt(1 + (steep * self.focal) ** 2) - 1
+        return np.asarray(flat + stretch * (flat[:, 0] * down[0] + flat[:, 1] * down[1])[:, np.newaxis] * down)
+
+    def _start(self) -> Reals:
+        """Return two directions in which most lines run, as angles on the plane before it is stretched along its slope."""
+        from scipy.ndimage import gaussian_filter1d
+
+        flat = self._flatten(self.ways)
+        # No usual direction, as that of a row, lies at the limit of two bins.
+        turns = np.arctan2(flat[:, 1], flat[:, 0]) / np.pi + 0.3 / BINS
+        bins = np.floor(turns * BINS).astype(np.intp) % BINS
+        count = gaussian_filter1d(np.bincount(bins, self.weights, minlength=BINS), 1.5, mode="wrap")
+        first = int(count.argmax())
+        away = np.abs((np.arange(BINS) - first + BINS // 2) % BINS - BINS // 2)
+        second = int(np.where(away >= BETWEEN, count, -1.0).argmax())
+        angles = (np.array([first, second]) + 0.2) * np.pi / BINS
+        ways = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+        steep = max(float(np.hypot(*self.rise)), 1e-12)
+        down = self.rise / steep
+        squeeze = 1 / np.sqrt(1 + (steep * self.focal) ** 2) - 1
+        ways = ways + squeeze * (ways[:, 0] * down[0] + ways[:, 1] * down[1])[:, np.newaxis] * down
+        return np.asarray(np.arctan2(ways[:, 1], ways[:, 0]))
+
+    def step(self) -> tuple[Reals, Reals]:
+        """Share lines out among directions; return the matrix and the right side of the change of rise and of angles."""
+        # How densely what runs anyhow on the plane is seen to run as each line does.
+        flat = self._flatten(self.ways)
+        aside = self._flatten(np.stack([-self.ways[:, 1], self.ways[:, 0]], axis=-1))
+        turned = np.abs(flat[:, 0] * aside[:, 1] - flat[:, 1] * aside[:, 0])
+        loose = self.shares[2] / np.pi * turned / np.maximum((flat**2).sum(axis=-1), 1e-12)
+        off, slopes = zip(*(self._differ(k) for k in range(2)), strict=True)
+        variances = [spread**2 + self.errors for spread in self.spreads]
+        chances = [
+            share * np.exp(-0.5 * o * o / v) / np.sqrt(2 * np.pi * v)
+            for share, o, v in zip(self.shares, off, variances, strict=False)
+        ]
+        total = np.maximum(chances[0] + chances[1] + loose, 1e-30)
+        matrix, pull = np.zeros((4, 4)), np.zeros(4)
+        whole = max(float(self.weights.sum()), 1e-12)
+        spreads, shares = self.spreads.copy(), self.shares.copy()
+        for k in range(2):
+            part = self.weights * chances[k] / total
+            heavy = part / variances[k] * np.clip((CURVED - self.spreads[k]) / (CURVED - STRAIGHT), 1e-3, 1)
+            matrix += np.einsum("n,ni,nj->ij", heavy, slopes[k], slopes[k])
+            pull -= np.einsum("n,n,ni->i", heavy, off[k], slopes[k])
+            shares[k] = float(part.sum()) / whole
+            spread = float((part * (off[k] ** 2 - self.errors)).sum()) / max(float(part.sum()), 1e-12)
+            spreads[k] = np.sqrt(np.clip(spread, FINEST**2, BROADEST**2))
+        shares[2] = max(LOOSE, 1 - shares[0] - shares[1])
+        self.spreads, self.shares = spreads, shares
+        return matrix, pull
+
+    def _differ(self, which: int) -> tuple[Reals, Reals]:
+        """Return by what angle lines differ from a direction, and how that changes with rise and angles, (n, 4)."""
+        turn = self.angles[which]
+        way, aside = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
+        towards = way + self.places * float((self.rise * way).sum())
+        square = np.maximum((towards**2).sum(axis=-1), 1e-12)
+
+        def turn_by(moved: Reals) -> Reals:
+            return np.asarray((towards[:, 1] * moved[:, 0] - towards[:, 0] * moved[:, 1]) / square, np.float64)
+
+        off = np.arctan2(
+            towards[:, 0] * self.ways[:, 1] - towards[:, 1] * self.ways[:, 0], (towards * self.ways).sum(axis=-1)
+        )
+        slopes = np.zeros((len(off), 4))
+        slopes[:, 0], slopes[:, 1] = turn_by(self.places * way[0]), turn_by(self.places * way[1])
+        slopes[:, 2 + which] = turn_by(aside + self.places * float((self.rise * aside).sum()))
+        return (off + np.pi / 2) % np.pi - np.pi / 2, slopes
+
+    def move(self, matrix: Reals, pull: Reals, known: Reals, before: Reals) -> bool:
+        """Change rise and angles; return whether it was by much."""
+        whole, right = matrix + 1e-6 * np.eye(4), pull.copy()
+        whole[:2, :2] += known
+        right[:2] += np.einsum("ij,j->i", known, before - self.rise)
+        change = np.linalg.solve(whole, right)
+        self.rise, self.angles = self.rise + change[:2], self.angles + change[2:]
+        return float(np.abs(change).max()) > 1e-5
+
+    def free(self, matrix: Reals) -> Reals:
+        """Return what is told of the rise where nothing is known of the angles."""
+        least = matrix[2:, 2:] + 1e-6 * np.eye(2)
+        return np.asarray(matrix[:2, :2] - matrix[:2, 2:] @ np.linalg.solve(least, matrix[2:, :2]))

@@ -1,0 +1,260 @@
+"""How patterns differ over a picture, and the plane on which they do not.
+
+Of a texture that is the same everywhere, seen aslant, local patterns differ only by how they are seen. What is measured of
+one is the covariance C of its autocorrelation, from mean products of slopes over the variance, N = C^-1: its size, its shape
+and its direction at once, with no mask of elements, whatever the contrast. The plane is that on which C is the same
+everywhere. Only its horizon can be told so: a linear change of such a texture is such a texture.
+
+Each round flattens the picture by the horizon found so far, measures there, and corrects it: what measuring does to large and
+small patterns is the same where all are of one size. What the camera blurs is known, in pixels, and taken off: C = N^-1 - B.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Bools, Floats
+from texrs.kernels.gather import gather
+
+__all__ = ["follow"]
+
+Reals = NDArray[np.float64]
+
+SPREAD = 0.1
+"""Standard deviation of the windows that are measured, as a share of the side of what is flattened."""
+FULL = 0.55
+"""Share of a window that must be known."""
+CAMERA = 0.55
+"""Standard deviation of what a pixel sees, in pixels."""
+FAR, COARSE = 0.35, 0.1
+"""Nearer to the horizon than this share of the middle's scale nothing is looked at. The flattened picture has the resolution
+of this quantile of scales: what is finer would be blurred where it is farther."""
+LEVELS = 4
+"""Blurred versions of the picture, each for twice the step."""
+ROUNDS, STEPS = 8, 10
+"""How often the picture is flattened anew, and steps of each fit."""
+LONGEST = 4.0
+"""Times what a fit says that a round may change the horizon, where changes are seen to go on."""
+STEP, PARTS = 1e-3, 2.0**15
+"""Differences that a fit takes its slopes from, and to which it is rounded: its last bits hang on the processor."""
+LEAST = 0.03
+"""Standard deviation of what is measured, in natural logarithms, that is always allowed for."""
+TILTED = 0.95
+"""The horizon stays so far outside: scales fall at most by this share from the middle to a corner."""
+FARTHEST = 0.3
+"""Change of the horizon, over the longer side, that a step of a fit may make."""
+DEVIATES = 1.4826
+"""Standard deviation over the median of absolute values."""
+FEWEST = 8
+"""Windows that say something about a plane."""
+CELLS = 4
+"""Cells to a standard deviation of a window, in which what is measured is summed up first."""
+
+
+def blur_levels(grey: Floats) -> list[Floats]:
+    """Return a picture and its blurred versions."""
+    from scipy.ndimage import gaussian_filter
+
+    return [grey, *(gaussian_filter(grey, 0.5 * (4.0**k - 1) ** 0.5) for k in range(1, LEVELS))]
+
+
+def follow(levels: list[Floats], known: Bools, sigma: float) -> tuple[Reals, float]:
+    """Return the rise of the width a pixel, (2,), and by how much what is measured deviates from that.
+
+    A fit says too little where patterns are blurred, so rounds go on for long in one direction; from two of them it is told
+    how far (Anderson's mixing).
+    """
+    side = max(known.shape)
+    rise, off = np.zeros(2), float("nan")
+    last: tuple[Reals, Reals] | None = None
+    for _ in range(ROUNDS):
+        points, slopes = _Flat(levels, known, rise).measure(sigma)
+        if len(points) < FEWEST:
+            break
+        change, off = _fit(points, slopes, side)
+        step = change if last is None else _hasten(change, rise - last[0], change - last[1])
+        last = rise, change
+        rise = rise + step
+        # The farthest corner lies before the horizon.
+        fall = float(abs(rise[0]) * known.shape[0] + abs(rise[1]) * known.shape[1]) / 2
+        rise = rise * min(1.0, TILTED / max(fall, 1e-12))
+        if float(np.abs(step).max()) * side < 0.01:
+            break
+    return rise, off
+
+
+def _hasten(change: Reals, moved: Reals, differs: Reals) -> Reals:
+    """Return the step after which a fit would say no change, if fits go on as they did from the last place to this."""
+    share = float((change * differs).sum() / max(float((differs * differs).sum()), 1e-18))
+    step = change - share * (moved + differs)
+    most = LONGEST * float(np.sqrt((change * change).sum()))
+    step = step * min(1.0, most / max(float(np.sqrt((step * step).sum())), 1e-18))
+    return np.asarray(step if float((step * change).sum()) > 0 else change, np.float64)
+
+
+class _Flat:
+    """A picture flattened by a horizon: its samples lie at (low + index) / resolution, in pixels of its middle."""
+
+    def __init__(self, levels: list[Floats], known: Bools, rise: Reals) -> None:
+        middle = [(n - 1) / 2 for n in known.shape]
+        rows, columns = (np.arange(n) - m for n, m in zip(known.shape, middle, strict=True))
+        width = 1 + (rows * rise[0])[:, np.newaxis] + columns * rise[1]
+        open_ = known & (width > FAR)
+        seen = np.nonzero(open_)
+        scales = width[seen]
+        spread = [along[at] / scales for along, at in zip((rows, columns), seen, strict=True)]
+        self.rise, self.low = rise, np.array([v.min() for v in spread])
+        self.resolution = float(np.quantile(scales, COARSE))
+        sides = [int((v.max() - low) * self.resolution) + 1 for v, low in zip(spread, self.low, strict=True)]
+        down, right = (low + np.arange(n) / self.resolution for low, n in zip(self.low, sides, strict=True))
+        near = 1 - (down * rise[0])[:, np.newaxis] - right * rise[1]
+        wide = 1 / np.maximum(near, 1e-3)
+        at = down[:, np.newaxis] * wide + middle[0], right * wide + middle[1]
+        inside = (near > 0) & (wide > FAR)
+        for along, n in zip(at, known.shape, strict=True):
+            inside &= (along >= 0) & (along <= n - 1)
+        places = np.stack([along[inside] for along in at], axis=-1).astype(np.float32)
+        nearest = np.rint(places).astype(np.intp)
+        there = known[nearest[:, 0], nearest[:, 1]]
+        self.known = inside
+        self.known[inside] = there
+        places, wide = places[there], wide[self.known]
+        octave = np.clip(np.log2(np.maximum(wide / self.resolution, 1)), 0, len(levels) - 1)
+        values = np.zeros(len(places))
+        for k, level in enumerate(levels):
+            part = np.maximum(0, 1 - np.abs(octave - k))
+            some = np.nonzero(part)[0]
+            if len(some):
+                shown = gather(level[..., np.newaxis], places[some][np.newaxis], interpolation="linear")
+                values[some] += part[some] * shown[0, :, 0]
+        self.picture = np.zeros(sides)
+        self.picture[self.known] = values
+
+    def measure(self, sigma: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return points of the plane, (n, 2), and N around each, (n, 2, 2)."""
+        from scipy.ndimage import gaussian_filter
+
+        def blur(values: NDArray[Any], by: float) -> NDArray[np.float64]:
+            return np.asarray(gaussian_filter(values, by, mode="constant"), np.float64)
+
+        seen = self.known.astype(np.float64)
+        share = blur(seen, sigma)
+        picture = blur(self.picture * seen, sigma) / np.maximum(share, 1e-6)
+        rows, columns = (np.asarray(slope, np.float64) for slope in np.gradient(picture))
+        inner = share > 0.98
+        inner[[0, -1]] = inner[:, [0, -1]] = False
+        weight = inner.astype(np.float64)
+        spread = SPREAD * float(np.sqrt(self.known.sum()))
+        cell = max(1, int(spread / CELLS))
+
+        def sum_up(values: NDArray[Any]) -> NDArray[np.float64]:
+            rows, columns = (n // cell for n in values.shape)
+            cells = values[: rows * cell, : columns * cell].reshape(rows, cell, columns, cell).mean(axis=(1, 3))
+            return blur(cells, spread / cell)[lattice]
+
+        lattice = (slice(CELLS // 2, None, CELLS),) * 2
+        total = sum_up(weight)
+        at = np.nonzero(total > FULL)
+
+        def mean(values: NDArray[Any]) -> NDArray[np.float64]:
+            return np.asarray(sum_up(values * weight)[at] / total[at], np.float64)
+
+        value = mean(picture)
+        variance = np.maximum(mean(picture * picture) - value**2, 1e-8)
+        products = [mean(v) / variance for v in (rows * rows, rows * columns, columns * columns)]
+        slopes = np.stack([products[0], products[1], products[1], products[2]], axis=-1).reshape(-1, 2, 2)
+        # What a window says holds at the middle of what it sees.
+        middles = [mean(v) for v in np.indices(self.known.shape, np.float64)]
+        points = self.low + np.stack(middles, axis=-1) / self.resolution
+        return points, self._sharpen(points, slopes + 1e-9 * np.eye(2))
+
+    def _sharpen(self, points: NDArray[np.float64], slopes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Take off what the camera, and the levels, have blurred."""
+        width = 1 / (1 - points @ self.rise)
+        step = (np.eye(2) - points[:, :, np.newaxis] * self.rise) * (self.resolution / width)[:, np.newaxis, np.newaxis]
+        blurred = CAMERA**2 + 0.25 * (np.maximum(width / self.resolution, 1) ** 2 - 1)
+        covariance = np.linalg.inv(slopes)
+        values, vectors = np.linalg.eigh(
+            covariance - blurred[:, np.newaxis, np.newaxis] * step @ step.transpose(0, 2, 1)
+        )
+        values = np.maximum(values, 0.3 * np.linalg.eigvalsh(covariance)[:, :1])
+        return np.asarray((vectors / values[:, np.newaxis]) @ vectors.transpose(0, 2, 1), np.float64)
+
+
+def _fit(points: Reals, slopes: Reals, side: int) -> tuple[Reals, float]:
+    """Return the change of the rise after which all of N is alike, and how far it is from that still."""
+    change, spread = np.zeros(2), np.ones(3)
+    for _ in range(2):
+        change = _minimise(change, spread, points * (1 / side), slopes)
+        spread = np.maximum(DEVIATES * _middle(np.abs(_compare(change, points * (1 / side), slopes))), LEAST)
+    return change / side, float(np.sqrt(np.mean(spread**2)))
+
+
+def _minimise(start: Reals, spread: Reals, points: Reals, slopes: Reals) -> Reals:
+    """Return the change with the least sum of sqrt(1 + z^2), z in standard deviations, by Gauss and Newton's steps."""
+
+    def differ(change: Reals) -> tuple[Reals, float]:
+        rest = _compare(change, points, slopes) / spread
+        return rest, float(np.sqrt(1 + rest * rest).sum())
+
+    found, (rest, cost) = start, differ(start)
+    for _ in range(STEPS):
+        weight = 1 / np.sqrt(1 + rest * rest)
+        ways = [(differ(found + STEP * way)[0] - rest) / STEP for way in np.eye(2)]
+        pull = [float((weight * way * rest).sum()) for way in ways]
+        (a, b), (_, d) = ([float((weight * one * other).sum()) for other in ways] for one in ways)
+        least = a * d - b * b + 1e-9 * (a + d) ** 2 + 1e-30
+        step = -np.array([d * pull[0] - b * pull[1], a * pull[1] - b * pull[0]]) / least
+        step *= min(1.0, FARTHEST / max(float(np.abs(step).max()), 1e-12))
+        for _ in range(4):
+            after = differ(found + step)
+            if after[1] < cost:
+                break
+            step = step / 2
+        else:
+            break
+        found, (rest, cost) = found + step, after
+        if float(np.abs(step).max()) < 0.3 / PARTS:
+            break
+    return np.asarray(np.rint(found * PARTS) / PARTS, np.float64)
+
+
+def _compare(change: Reals, points: Reals, slopes: Reals) -> Reals:
+    """Return how N differs from the usual one after a change of the horizon: logarithm of size, and two of shape, (n, 3)."""
+    y, x = points[:, 0], points[:, 1]
+    width = 1 + y * change[0] + x * change[1]
+    if float(width.min()) < 0.05:
+        return np.full((len(points), 3), 10.0)
+    # The map there is (I w - p c') / w^2; its inverse is w times this.
+    a, b, c, d = width - x * change[1], y * change[1], x * change[0], width - y * change[0]
+    p, q, r = slopes[:, 0, 0], slopes[:, 0, 1], slopes[:, 1, 1]
+    grown = width * width
+    scaled = (
+        (a * a * p + 2 * a * c * q + c * c * r) * grown,
+        (a * b * p + (a * d + b * c) * q + c * d * r) * grown,
+        (b * b * p + 2 * b * d * q + d * d * r) * grown,
+    )
+    e, f, g = (float(_middle(s)) for s in scaled)
+    # By the usual one's root, of Cholesky: any does, up to a turn of the two of shape.
+    top = max(e, 1e-30) ** 0.5
+    low = f / top
+    last = max(g - low * low, 1e-9 * g, 1e-30) ** 0.5
+    one = scaled[0] / (top * top)
+    two = (scaled[1] / top - scaled[0] * (low / (top * top))) / last
+    three = (scaled[2] - 2 * low / top * scaled[1] + (low / top) ** 2 * scaled[0]) / (last * last)
+    middle, apart = (one + three) / 2, (one - three) / 2
+    half = np.hypot(apart, two)
+    ratio = np.minimum(half / np.maximum(middle, 1e-30), 1 - 1e-9)
+    shape = np.arctanh(ratio) / np.maximum(half, 1e-30)
+    size = 0.5 * np.log(np.maximum(middle * middle - half * half, 1e-30))
+    parts = np.stack([size, shape * apart, shape * two], axis=-1)
+    return np.asarray(parts - _middle(parts), np.float64)
+
+
+def _middle(values: Reals) -> Reals:
+    """Return the median along the first axis: of few numbers, sorted."""
+    order, count = np.sort(values, axis=0), len(values)
+    return np.asarray((order[(count - 1) // 2] + order[count // 2]) / 2)
