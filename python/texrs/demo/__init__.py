@@ -22,7 +22,7 @@ from texrs.demo._workshop import Section, Workshop
 
 __all__ = ["SECTIONS", "Section", "Workshop", "page"]
 
-SECTIONS: tuple[Section, ...] = (RESULTS, STAGES, MAPS, SEEDS, TILE, COMPLETE, SPLICE, PERSPECTIVE, SOLID, SAMPLES)
+SECTIONS: tuple[Section, ...] = (MAPS, RESULTS, STAGES, SEEDS, TILE, COMPLETE, SPLICE, PERSPECTIVE, SOLID, SAMPLES)
 
 
 def page(sections: Sequence[Section] = SECTIONS, *, progress: Progress | None = None) -> str:

@@ -1,50 +1,71 @@
-"""One source map for every map: heights, normals and labels follow the colours."""
+"""Materials: heights, normals and labels follow the colours."""
 
 from __future__ import annotations
+
+from html import escape
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 
-from texrs._typing import Array, Floats, Labels
-from texrs.demo._design import SHOWN
-from texrs.demo._html import code, figure, grid
-from texrs.demo._workshop import Section, Workshop
+from texrs._typing import Array, Labels
+from texrs.demo._html import code, figure, grid, pair, row
+from texrs.demo._workshop import Section, Workshop, load_sample
+from texrs.materials import Material
+from texrs.papers.design import design
 from texrs.volume import paint
 
 RELIEF = 12.0
 """Height of the relief, in pixels."""
 
 
+SIZE = 320
+"""Side of what is designed."""
+
+
 def _maps(workshop: Workshop) -> str:
-    name, _, options = SHOWN[0]
-    made = workshop.design(name, **options)
-    picture, labels, source = made.sample.image, made.sample.labels, made.result.source
-    assert labels is not None
-    height = guess_height(labels, picture)
-    normals = derive_normals(height)
-    there = source.render(normals, kind="normal")
-    examples = [
-        figure(picture, "Colours", note="uint8"),
-        figure(height, "Height", note="uint16"),
-        figure(normals, "Normals", note="uint8, y up"),
-        figure(light_up(normals), "Lit from the upper left"),
-        figure(paint(labels), "Labels", note="int32", exact=True),
-    ]
-    results = [
-        figure(source.render(picture), "Colours"),
-        figure(source.render(height), "Height"),
-        figure(there, "Normals", note="turned with the stones"),
-        figure(light_up(there), "Lit from the upper left"),
-        figure(paint(source.render(labels, interpolation="nearest")), "Labels", note="nearest", exact=True),
-    ]
-    return (
-        code(
-            "texrs design example.png -o result.png --map map.npz\n"
-            "texrs apply map.npz height.tif -o result-height.tif\n"
-            "texrs apply map.npz normals.png -o result-normals.png --kind normal"
+    rows = []
+    for i, (name, caption) in enumerate(MATERIALS):
+        workshop.watch(i / len(MATERIALS))
+        example = make_material(name, SIZE // 2)
+        result = design(example, SIZE, seed=7)
+        assert result.material is not None
+        rows.append(
+            f"<h3>{escape(caption)}</h3>"
+            + row(
+                figure(example.preview(tiles=(1, 1)), "The example, lit"),
+                pair(result.material.preview(tiles=(1, 1)), "The result, lit", "Tiled 2 x 2"),
+            )
+            + grid([*show(example), *show(result.material)], least=120)
         )
-        + f"<h3>The example</h3>{grid(examples, least=180)}<h3>The result</h3>{grid(results, least=180)}"
-    )
+    return code(
+        "texrs design STONES -o NEW --size 2048x2048 --preview lit.png   # a folder of maps, and a folder of maps\n"
+        "texrs design albedo.png -o new.png --map map.npz                # or one by one,\n"
+        "texrs apply map.npz normals.png -o new-normals.png --kind normal # finished as the first was"
+    ) + "".join(rows)
+
+
+def make_material(name: str, side: int) -> Material:
+    """Return the maps of a sample: its colours and labels, and a relief and normals that are guessed from them."""
+    sample = load_sample(name, side)
+    assert sample.labels is not None
+    height = guess_height(sample.labels, sample.image)
+    rough = np.rint(255 * (0.85 - 0.35 * height / 65535)).astype(np.uint8)
+    maps = {"albedo": sample.image, "normal": derive_normals(height), "height": height, "roughness": rough}
+    return Material({**maps, "labels": sample.labels})
+
+
+def show(material: Material) -> list[str]:
+    """Return the pictures of maps."""
+    notes = {"normal": "y up, turned", "labels": "never mixed"}
+    return [
+        figure(
+            paint(each.pixels) if each.role.labelled else each.pixels,
+            name.capitalize(),
+            note=f"{each.pixels.dtype}{', ' if name in notes else ''}{notes.get(name, '')}",
+            exact=each.role.labelled,
+        )
+        for name, each in material.items()
+    ]
 
 
 def guess_height(labels: Labels, picture: Array) -> Array:
@@ -70,19 +91,14 @@ def derive_normals(height: Array) -> Array:
     return np.rint(127.5 * (normals + 1)).astype(np.uint8)
 
 
-def light_up(normals: Array) -> Floats:
-    """Light a relief from the upper left."""
-    light = np.array([-1.0, 1.0, 1.2]) / np.linalg.norm([-1.0, 1.0, 1.2])
-    shade = (normals / 127.5 - 1) @ light
-    grey: Floats = np.clip(0.08 + 0.92 * shade, 0, 1).astype(np.float32)
-    return grey
-
+MATERIALS = (("pebbles", "Stones"), ("leaves_and_flowers", "Flowers on leaves"))
+"""Samples that are shown, and what they are."""
 
 MAPS = Section(
     "maps",
-    "One source map for every map",
-    "A result is a source map: where in the example each pixel comes from, and in which frame. Whatever is in register "
-    "with the example is looked up in the same way, in its own dtype; normals turn with what they belong to, so that "
-    "the light stays where it is.",
+    "Materials",
+    "A result is a source map: where in the example each pixel comes from, and in which frame. So a whole material comes of "
+    "one: decisions are made on what all its maps tell, and each map is looked up in its own dtype, blended by its role; "
+    "normals turn with what they belong to, so that the light stays where it is.",
     _maps,
 )
