@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping
+from pathlib import Path as FilePath
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._typing import Path
 from texrs.errors import InvalidInput
 from texrs.materials._map import Map
 
@@ -64,6 +67,51 @@ class Exports(Mapping[str, Map]):
         self._check_flat()
         return render_preview(self, tiles, light, side)
 
+    def save_exr(self, path: Path, *, depth: Literal[16, 32] | None = None) -> FilePath:
+        """Write all maps to one EXR file, a layer each, that `Material.read` reads again.
+
+        The channels of ``albedo`` are ``albedo.R``, ``albedo.G`` and ``albedo.B``, those of normals end in X, Y and Z, others
+        in Y. As everywhere in EXR, colours are linear light: sRGB is decoded. The header keeps roles, spaces and dtypes, so
+        that integers of up to 16 bit, labels and linear floats come back to the bit. Needs ``pip install texrs[materials]``.
+
+        Parameters
+        ----------
+        path : path_like
+            With the suffix .exr.
+        depth : {16, 32}, optional
+            Bits of the floats that are written, and then come back as such; by default those that hold what is there. Labels
+            are always whole numbers.
+
+        Returns
+        -------
+        pathlib.Path
+            The file.
+
+        Raises
+        ------
+        FileError
+            Another suffix, the file cannot be written, or OpenEXR is not installed. What was there is as it was.
+        InvalidInput
+            A volume, another depth, or values that EXR cannot hold whole.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import texrs
+        >>> pebbles = texrs.samples.pebbles((64, 64)).image
+        >>> stones = texrs.Material({"albedo": pebbles, "height": pebbles[..., 1].astype("uint16")})
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     texrs.Material.read(stones.save_exr(f"{folder}/stones.exr"))
+        <Material of 64 x 64: albedo (colour, uint8), height (height, uint16)>
+
+        """
+        from texrs.materials._exr import write_exr
+
+        self._check_flat()
+        if depth not in (None, 16, 32):
+            raise InvalidInput(f"depth: allowed are 16 and 32, got {depth!r}")
+        return write_exr(self, path, depth)
+
     def _check_flat(self) -> None:
         if self.axes != 2:
-            raise InvalidInput("material: is a volume; pictures are shown, such as a slice of it")
+            raise InvalidInput("material: is a volume; this is for pictures, such as slices of it")

@@ -113,33 +113,34 @@ class Material(Exports):
 
     @classmethod
     def read(cls, path: Path, *, roles: Mapping[str, Role | str] | None = None, axes: int = 2) -> Material:
-        """Return the material whose maps are the files of a folder, by the usual names.
+        """Return the material whose maps are the files of a folder, or the layers of a file, by the usual names.
 
         Parameters
         ----------
         path : path_like
             A folder, or an EXR file of several layers.
         roles : mapping of str to Role or str, optional
-            What files are for, by their names, with or without the suffix.
+            What files are for, by their names, with or without the suffix; what layers are for, by theirs.
         axes : int
             2 for pictures, 3 for volumes.
 
         Returns
         -------
         Material
-            Its maps have the names of the files, without what all of them begin with (``rock_albedo``, ``rock_normal``).
+            Its maps have the names of the files or layers, without what all of them begin with (``rock_albedo``,
+            ``rock_normal``).
 
         Raises
         ------
         FileError
-            Not a folder, none of its files is a map, or one cannot be read.
+            Neither a folder nor such a file, nothing in it is a map, or something cannot be read.
         InvalidInput
-            Maps of several sizes, or a role of a file that is not there.
+            Maps of several sizes, or a role of a file or a layer that is not there.
 
         Warns
         -----
         UserWarning
-            Pictures are left out, for their names do not say what they are for.
+            Pictures or layers are left out, for their names do not say what they are for.
 
         Examples
         --------
@@ -153,8 +154,14 @@ class Material(Exports):
         <Material of 64 x 64: albedo (colour, uint8), height (height, uint8)>
 
         """
+        from texrs.materials._exr import read_exr
         from texrs.materials._files import read_maps
 
+        if FilePath(path).suffix.lower() == ".exr" and not FilePath(path).is_dir():
+            if axes != 2:
+                raise InvalidInput(f"axes: the layers of {path} are pictures, got {axes}")
+            layers, found = read_exr(path, dict(roles or {}))
+            return cls(layers, roles=found)
         maps, found = read_maps(path, dict(roles or {}), axes)
         return cls(maps, roles=found, axes=axes)
 

@@ -1,0 +1,180 @@
+"""A material in one EXR file, a layer a map.
+
+================ ================================ =========================================================
+Role             Channels of the layer            Values
+================ ================================ =========================================================
+colours, others  R G B, R G B A, Y, Y A           linear light; integers as shares of their range
+normals, vectors X Y, X Y Z, X Y Z A              integers as -1 to 1, y as the role says
+labels           Y                                whole numbers of 32 bit
+more than 4      0, 1, 2, ...                     as above
+================ ================================ =========================================================
+
+Linear floats are kept as they are. Roles, spaces and dtypes stand in the header, so that integers come back to the bit:
+those of 8 bit are half floats in the file, those of 16 bit floats. Files of other programs are read by the names of layers.
+"""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Mapping
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from texrs._typing import Array, Path
+from texrs.errors import FileError, InvalidInput
+from texrs.io._layers import read_layers, write_layers
+from texrs.materials._files import shorten
+from texrs.materials._light import encode_srgb, to_light
+from texrs.materials._map import Map
+from texrs.materials._roles import Role, as_role, guess_role
+
+__all__ = ["read_exr", "write_exr"]
+
+NAMES = ("Y", "YA", "RGB", "RGBA")
+VECTORS = ("X", "XY", "XYZ", "XYZA")
+ORDER = "RGBXYZUVWA"
+"""In which letters of channels follow each other."""
+PICTURE = "colour"
+"""The map whose channels belong to no layer."""
+
+
+def write_exr(maps: Mapping[str, Map], path: Path, depth: int | None) -> FilePath:
+    """Write each map as a layer."""
+    target = FilePath(path)
+    if target.suffix.lower() != ".exr":
+        raise FileError(f"{path}: layers are written to .exr, not to {target.suffix!r}")
+    channels: dict[str, Array] = {}
+    said: dict[str, dict[str, object]] = {}
+    for name, each in maps.items():
+        pixels = each.pixels if each.pixels.ndim > 2 else each.pixels[..., np.newaxis]
+        stored = store(name, pixels, each, depth)
+        said[name] = {
+            "role": each.role.value,
+            "space": each.space if depth is None else "linear",
+            "dtype": str(each.pixels.dtype if depth is None or stored.dtype == np.uint32 else stored.dtype),
+            "channels": 0 if each.pixels.ndim == 2 else each.pixels.shape[-1],
+        }
+        for number, letter in enumerate(name_channels(each.role, pixels.shape[-1])):
+            channels[f"{name}.{letter}"] = stored[..., number]
+    write_layers(target, channels, json.dumps({"maps": said}))
+    return target
+
+
+def name_channels(role: Role, count: int) -> list[str]:
+    """Return what the channels of a map are called."""
+    if count > 4:
+        return [str(k) for k in range(count)]
+    letters = VECTORS if count > 1 and (role.normal or role is Role.VECTOR) else NAMES
+    return list(letters[count - 1])
+
+
+def store(name: str, pixels: Array, each: Map, depth: int | None) -> Array:
+    """Return values as a layer holds them: float16, float32, or uint32 for labels."""
+    kind, size = pixels.dtype.kind, pixels.dtype.itemsize
+    if kind != "f" and (each.role is Role.LABELS or (each.role is Role.MASK and size == 4)):
+        return pixels.astype(np.int32 if kind == "i" else np.uint32).view(np.uint32)
+    if depth is None and (size == 8 or (kind in "ui" and size == 4)):
+        raise InvalidInput(f"{name}: {pixels.dtype} does not go into EXR whole; depth=32 rounds it to 32-bit floats")
+    usual = np.float16 if kind == "b" or size == 1 or (kind == "f" and size == 2) else np.float32
+    wanted = usual if depth is None else (np.float16 if depth == 16 else np.float32)
+    if (each.role.normal or each.role is Role.VECTOR) and kind in "ui":
+        largest = np.float64(np.iinfo(pixels.dtype).max)
+        return (pixels / largest * (2 if kind == "u" else 1) - (1 if kind == "u" else 0)).astype(wanted)
+    light = to_light(pixels, each.space)
+    if each.space == "srgb" and pixels.shape[-1] in (2, 4):
+        # Transparency is a share, whatever colours are encoded in.
+        light[..., -1:] = to_light(pixels[..., -1:], "linear")
+    return light.astype(wanted)
+
+
+def restore(stored: Array, role: Role, space: str, dtype: np.dtype[Any]) -> Array:
+    """Return the values that a layer was made of."""
+    if stored.dtype == np.uint32:
+        return stored.view(np.int32).astype(dtype) if dtype.kind == "i" else stored.astype(dtype)
+    if dtype == stored.dtype and space == "linear":
+        return stored
+    values: Array = stored.astype(np.float32)
+    if space == "srgb":
+        shown = encode_srgb(values)
+        if values.shape[-1] in (2, 4):
+            shown[..., -1] = values[..., -1]
+        values = shown
+    if dtype.kind == "f":
+        return values.astype(dtype)
+    if dtype == np.bool_:
+        return values > 0.5
+    info = np.iinfo(dtype)
+    exact = values.astype(np.float64)
+    if role.normal or role is Role.VECTOR:
+        exact = exact if dtype.kind == "i" else (exact + 1) / 2
+        exact = exact * info.max
+    else:
+        # As `to_unit` spreads the range of integers, of signed ones too.
+        exact = exact * (info.max - min(info.min, 0)) + min(info.min, 0)
+    return np.clip(np.rint(exact), info.min, info.max).astype(dtype)
+
+
+def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map], dict[str, Role]]:
+    """Return the maps of a file, a layer each, and the roles that were said of them."""
+    channels, words = read_layers(path)
+    layers: dict[str, dict[str, Array]] = {}
+    for full, pixels in channels.items():
+        layer, _, letter = full.rpartition(".")
+        layers.setdefault(layer or PICTURE, {})[letter] = pixels
+    known = parse(words)
+    short = layers if known else dict(zip(shorten(list(layers)), layers.values(), strict=True))
+    said = {name: as_role(role, f"roles[{name!r}]") for name, role in roles.items()}
+    if unknown := said.keys() - short.keys():
+        raise InvalidInput(f"roles: there is no layer {sorted(unknown)[0]!r} in {path}; there are {', '.join(short)}")
+    maps: dict[str, Map] = {}
+    for name, letters in short.items():
+        stored = join(str(path), name, letters)
+        told = known.get(name, {})
+        role = said.get(name) or (as_role(told["role"], name) if told else guess_role(name))
+        if role is None:
+            continue
+        if told:
+            first = as_role(told["role"], name)
+            pixels = restore(stored, first, told["space"], np.dtype(told["dtype"]))
+            maps[name] = Map(pixels if told["channels"] else pixels[..., 0], role, told["space"])
+        else:
+            maps[name] = Map(stored if stored.shape[-1] > 1 else stored[..., 0], role, "linear")
+    left = [name for name in short if name not in maps]
+    if not maps:
+        raise FileError(f"{path}: no layer has a name that says what it is for: {', '.join(short)}; say it by roles")
+    if left:
+        warnings.warn(f"{path}: left out {', '.join(left)}, whose names do not say what they are for", stacklevel=3)
+    return maps, {name: each.role for name, each in maps.items()}
+
+
+def join(path: str, name: str, letters: Mapping[str, Array]) -> Array:
+    """Return the channels of a layer as one array, in the order of their letters or numbers."""
+
+    def rank(letter: str) -> tuple[int, int, str]:
+        if letter.isdigit():
+            return 1, int(letter), ""
+        return (0, ORDER.index(letter.upper()), "") if letter.upper() in ORDER and len(letter) == 1 else (2, 0, letter)
+
+    parts = [letters[letter] for letter in sorted(letters, key=rank)]
+    if len({p.dtype for p in parts}) > 1:
+        if any(p.dtype.kind == "u" for p in parts):
+            raise FileError(f"{path}: the layer {name} mixes whole numbers with others")
+        parts = [p.astype(np.float32) for p in parts]
+    return np.stack(parts, axis=-1)
+
+
+def parse(words: str | None) -> dict[str, dict[str, Any]]:
+    """Return what the header says of maps; nothing where it says something else."""
+    try:
+        maps = json.loads(words or "{}").get("maps", {})
+        for each in maps.values():
+            as_role(each["role"], "role")
+            if np.dtype(each["dtype"]).kind not in "buif" or each["space"] not in ("srgb", "linear"):
+                return {}
+            each["channels"] = int(each["channels"])
+    except (ValueError, TypeError, KeyError, AttributeError):
+        return {}
+    return dict(maps)

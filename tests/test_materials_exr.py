@@ -1,0 +1,195 @@
+"""Materials in one EXR file: what comes back, what other programs find in it, and what theirs are read as."""
+
+import builtins
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+import pytest
+
+from texrs import Material
+from texrs._typing import Array
+from texrs.errors import FileError, InvalidInput, LimitExceeded
+from texrs.io._layers import read_layers
+from texrs.materials import Role
+from texrs.materials._light import decode_srgb
+
+RANDOM = np.random.default_rng(7)
+SHAPE = (21, 34)
+
+
+def draw(dtype: str, *channels: int) -> Array:
+    kind = np.dtype(dtype)
+    if kind.kind == "f":
+        return RANDOM.normal(0.3, 1, (*SHAPE, *channels)).astype(kind)
+    info = np.iinfo(kind)
+    return RANDOM.integers(info.min, info.max, (*SHAPE, *channels), kind, endpoint=True)
+
+
+EVERY = Material(
+    {
+        "albedo": draw("uint8", 4),
+        "basecolor": draw("uint16", 3),
+        "diffuse": draw("float32", 3),
+        "grey": draw("uint8", 2),
+        "normal": draw("uint8", 3),
+        "normal_dx": draw("uint16", 3),
+        "nor": draw("float16", 4),
+        "height": draw("uint16"),
+        "disp": draw("float32", 1),
+        "ao": draw("int16"),
+        "rough.fine": draw("int8"),
+        "arm": draw("uint8", 3),
+        "opacity": draw("uint8") > 100,
+        "mask": draw("int32"),
+        "labels": draw("int32"),
+        "id": draw("uint8", 1),
+        "ids": draw("uint32"),
+        "flow": draw("int8", 2),
+        "many": draw("float16", 12),
+    },
+    roles={"grey": "colour", "many": "other"},
+)
+
+
+def test_every_dtype_comes_back_to_the_bit(tmp_path: Path) -> None:
+    path = EVERY.save_exr(tmp_path / "all.exr")
+    back = Material.read(path)
+    assert set(back) == set(EVERY)
+    for name, each in EVERY.items():
+        again = back[name]
+        assert (again.role, again.space) == (each.role, each.space), name
+        assert (again.pixels.dtype, again.pixels.shape) == (each.pixels.dtype, each.pixels.shape), name
+        assert (again.pixels == each.pixels).all(), name
+    assert path.read_bytes() == EVERY.save_exr(tmp_path / "again.exr").read_bytes()
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "uint16"])
+def test_every_value_of_srgb_comes_back(dtype: str, tmp_path: Path) -> None:
+    values = np.arange(np.iinfo(dtype).max + 1).astype(dtype).reshape(16, -1)
+    for space in ("srgb", "linear"):
+        material = Material({"albedo": values}, spaces={"albedo": space})  # type: ignore[dict-item]
+        assert (Material.read(material.save_exr(tmp_path / "a.exr"))["albedo"].pixels == values).all()
+
+
+def test_other_programs_find_linear_light_by_the_usual_names(tmp_path: Path) -> None:
+    path = EVERY.save_exr(tmp_path / "all.exr")
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        channels = {name: channel.pixels for name, channel in file.channels().items()}
+    names = {name.rpartition(".")[0]: set() for name in channels}
+    for name in channels:
+        names[name.rpartition(".")[0]].add(name.rpartition(".")[2])
+    assert names["albedo"] == set("RGBA")
+    assert names["normal_dx"] == set("XYZ")
+    assert names["height"] == names["labels"] == {"Y"}
+    assert names["many"] == {str(k) for k in range(12)}
+    assert (channels["albedo.G"].dtype, channels["height.Y"].dtype) == (np.float16, np.float32)
+    assert channels["labels.Y"].dtype == np.uint32
+    red = EVERY["basecolor"].pixels[..., 0]
+    np.testing.assert_allclose(channels["basecolor.R"], decode_srgb(red / np.float32(65535)), atol=1e-6)
+    np.testing.assert_allclose(channels["albedo.A"], EVERY["albedo"].pixels[..., 3] / 255, atol=3e-4)
+    np.testing.assert_allclose(channels["normal.X"], EVERY["normal"].pixels[..., 0] / 127.5 - 1, atol=5e-4)
+
+
+def test_a_depth_that_is_asked_for(tmp_path: Path) -> None:
+    stones = Material({"albedo": draw("uint8", 3), "height": draw("float64"), "labels": draw("int32")})
+    with pytest.raises(InvalidInput, match="height: float64 does not go into EXR whole; depth=32"):
+        stones.save_exr(tmp_path / "a.exr")
+    assert not list(tmp_path.iterdir())
+    for depth, dtype in ((16, np.float16), (32, np.float32)):
+        back = Material.read(stones.save_exr(tmp_path / "a.exr", depth=depth))  # type: ignore[arg-type]
+        assert back["albedo"].pixels.dtype == back["height"].pixels.dtype == dtype
+        assert back["albedo"].space == "linear"
+        assert (back["labels"].pixels == stones["labels"].pixels).all()
+        linear = decode_srgb(stones["albedo"].pixels / np.float32(255))
+        np.testing.assert_allclose(back["albedo"].pixels, linear, atol=1e-3)
+    with pytest.raises(InvalidInput, match="depth: allowed are 16 and 32, got 8"):
+        stones.save_exr(tmp_path / "a.exr", depth=8)  # type: ignore[arg-type]
+
+
+def write(path: Path, parts: list[tuple[dict[str, Any], dict[str, Array]]]) -> Path:
+    head = {"type": OpenEXR.scanlineimage}
+    if len(parts) == 1:
+        OpenEXR.File(head | parts[0][0], parts[0][1]).write(str(path))
+    else:
+        OpenEXR.File([OpenEXR.Part(head | h, c, h["name"]) for h, c in parts]).write(str(path))
+    return path
+
+
+def test_files_of_other_programs_are_read_by_names(tmp_path: Path) -> None:
+    one = draw("float32")
+    colours = {"R": one, "G": one + 1, "B": one + 2, "A": one * 0 + 1}
+    normals = {f"Stone.Normal.{letter}": one + k for k, letter in enumerate("XYZ")}
+    path = write(tmp_path / "a.exr", [({}, {**{f"Stone.Color.{k}": v for k, v in colours.items()}, **normals})])
+    back = Material.read(path)
+    assert {name: each.role for name, each in back.items()} == {"Color": Role.COLOUR, "Normal": Role.NORMAL}
+    assert (back["Color"].pixels == np.stack(list(colours.values()), axis=-1)).all()
+    assert (back["Normal"].pixels[..., 2] == one + 2).all()
+    # Without a layer it is a picture; parts are layers.
+    parts = [({"name": "colour"}, colours), ({"name": "height"}, {"Z": one.astype(np.float16)})]
+    back = Material.read(write(tmp_path / "b.exr", parts))
+    assert back["height"].pixels.dtype == np.float16
+    assert back["height"].pixels.ndim == 2
+    plain = Material.read(write(tmp_path / "c.exr", [({}, {**colours, "depth.V": one})]), roles={"depth": "height"})
+    assert {name: each.role for name, each in plain.items()} == {"colour": Role.COLOUR, "depth": Role.HEIGHT}
+    with pytest.warns(UserWarning, match="left out depth"):
+        assert list(Material.read(tmp_path / "c.exr")) == ["colour"]
+    with pytest.raises(InvalidInput, match="there is no layer 'deep'"):
+        Material.read(tmp_path / "c.exr", roles={"deep": "height"})
+    with pytest.raises(FileError, match="no layer has a name"):
+        Material.read(write(tmp_path / "d.exr", [({}, {"beauty.V": one, "glory.V": one})]))
+
+
+def test_the_picture_is_the_display_window(tmp_path: Path) -> None:
+    one = draw("float32")
+    rows, columns = SHAPE
+    for (top, left), (height, width) in (((2, 3), (30, 50)), ((-2, -3), (10, 12)), ((-2, 5), (40, 12))):
+        windows = {
+            "dataWindow": (np.array([left, top], "i4"), np.array([left + columns - 1, top + rows - 1], "i4")),
+            "displayWindow": (np.array([0, 0], "i4"), np.array([width - 1, height - 1], "i4")),
+        }
+        found, words = read_layers(write(tmp_path / "a.exr", [(windows, {"height.Y": one})]))
+        expected = np.zeros((height, width), np.float32)
+        for row in range(rows):
+            for column in range(columns):
+                if 0 <= row + top < height and 0 <= column + left < width:
+                    expected[row + top, column + left] = one[row, column]
+        assert words is None
+        assert (found["height.Y"] == expected).all()
+
+
+def test_bad_files_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = EVERY.save_exr(tmp_path / "a.exr")
+    whole = path.read_bytes()
+    for cut in (5, 200, 5000, len(whole) - 40):
+        (tmp_path / "cut.exr").write_bytes(whole[:cut])
+        with pytest.raises(FileError, match=r"cut\.exr"):
+            Material.read(tmp_path / "cut.exr")
+    with pytest.raises(FileError, match="there is no such file"):
+        Material.read(tmp_path / "none.exr")
+    with pytest.raises(FileError, match="layers are written to .exr"):
+        EVERY.save_exr(tmp_path / "a.png")
+    with pytest.raises(LimitExceeded, match="more than the limit of 100"):
+        read_layers(path, limit=100)
+    with pytest.raises(InvalidInput, match="axes: the layers"):
+        Material.read(path, axes=3)
+    with pytest.raises(InvalidInput, match="is a volume"):
+        Material({"albedo": np.zeros((4, 4, 4), np.uint8)}, axes=3).save_exr(tmp_path / "b.exr")
+    # What the header says may be nonsense.
+    one = draw("float32")
+    for words in ("{", "[]", '{"maps": {"height": {"role": "height", "space": "srgb", "dtype": "O", "channels": 0}}}'):
+        write(tmp_path / "words.exr", [({"texrs": words}, {"height.Y": one})])
+        assert (Material.read(tmp_path / "words.exr")["height"].pixels == one).all()
+    real = builtins.__import__
+
+    def missing(name: str, *args: Any, **options: Any) -> Any:
+        if name == "OpenEXR":
+            raise ImportError(name)
+        return real(name, *args, **options)
+
+    monkeypatch.setattr(builtins, "__import__", missing)
+    with pytest.raises(FileError, match=r"pip install texrs\[materials\]"):
+        Material.read(path)
+    with pytest.raises(FileError, match=r"pip install texrs\[materials\]"):
+        EVERY.save_exr(tmp_path / "b.exr")
