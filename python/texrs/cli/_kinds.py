@@ -302,6 +302,16 @@ def read_field(text: str, size: tuple[int, ...]) -> Any:
     return field
 
 
+def read_direction(text: str, about: About) -> Any:
+    """Read degrees, one number or a picture of them, or a field: its words, or frames in a file."""
+    try:
+        return float(text)
+    except ValueError:
+        pass
+    suffix = Path(text).suffix.lower()
+    return io.read(text) if suffix and suffix != ".npz" and "=" not in text else read_field(text, about.size)
+
+
 def read_entry(text: str, about: About) -> Any:
     """Read analysed elements, or a picture, which is analysed by whoever takes it."""
     from texrs import elements
@@ -403,6 +413,12 @@ TARGET = Kind(
     "FILE|plane:...",
     lambda text, about: read_target(text),
     "A file that texrs scale-map wrote, a normal map, or coordinates or Jacobians (.npy).",
+    file=True,
+)
+DIRECTION = Kind(
+    "DEGREES|WORDS|FILE",
+    read_direction,
+    "Or a file of degrees (.npy, .tif), or a field: words such as circular, or frames (.npz).",
     file=True,
 )
 MAP_OR_AUTO = replace(MAP, metavar="FILE|auto", words=("auto",))

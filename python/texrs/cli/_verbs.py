@@ -19,6 +19,7 @@ from texrs.cli import _outputs
 from texrs.cli._console import note, show_progress
 from texrs.cli._kinds import (
     CORNERS,
+    DIRECTION,
     EACH,
     ENTRIES,
     ENTRY,
@@ -177,7 +178,7 @@ def make_verb(name: str) -> Verb:
             options = Options(
                 perspective,
                 arguments={"exemplar": PICTURE},
-                kinds={"scale_map": SEEN, "target": TARGET},
+                kinds={"scale_map": SEEN, "target": TARGET, "direction": DIRECTION},
                 names={"kind": "scale-kind"},
             )
             return Verb(options, times=2, shape="target", knows=read_exemplar_camera)

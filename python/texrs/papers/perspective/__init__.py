@@ -26,6 +26,8 @@ Departures, with their reasons:
 - What is found are coordinates, so that the last word is a copy, not a weighted mean: nothing blurs.
 - A target may be a surface: another plane, normals, texture coordinates, Jacobians (`targets`). Patches are bent to it, so that
   elements are foreshortened as the surface is; its sizes stand in for S_o.
+- Directions of elements, which section 6 leaves to the future: fields turn what is copied, on the surface that it lies on
+  (`directions`).
 - In place of the histograms of Eq. 8, places are charged for what has been shown often, and for classes of colour in excess.
 
 ``method="paper"`` leaves the departures out (`texrs.papers.perspective.literal`).
@@ -43,6 +45,7 @@ from texrs._engine.pyramid import Region
 from texrs._typing import Array, Interpolation, Progress
 from texrs._verbs import takes_materials
 from texrs.exemplar import Exemplar
+from texrs.fields import Field
 from texrs.growth import FromSheet, stitch_sheet
 from texrs.materials import Material
 from texrs.papers.perspective.laying import Laid, lay_out
@@ -67,6 +70,7 @@ def perspective(
     target: Array | Plane | str | None = None,
     kind: Kind | None = None,
     fov: float | None = None,
+    direction: float | Array | Field | str | None = None,
     measuring: Measuring | None = None,
     method: Method = None,
     scale_weight: float = 1.0,
@@ -102,6 +106,10 @@ def perspective(
     fov : float, optional
         Degrees that the longer side of the exemplar spans, 1 to 170; `texrs.planes.FOV` by default. How much a plane is
         foreshortened besides what a scale map says; a ``target`` that is a surface, and ``direction``, need it.
+    direction : float, (rows, columns) array or Field, optional
+        By how many degrees, counter-clockwise, what is copied is turned: everywhere, or at each pixel; an array of another size
+        is stretched. Of a `texrs.fields.Field` of two axes, or its words, as ``"circular"`` or ``"zigzag:period=64,angle=30"``,
+        how it turns. On a plane or another surface it turns there.
     measuring : Measuring, optional
         How the ``scale_map`` "auto" is measured in a mask of features (`texrs.scale_maps.Measuring`), rather than by a plane.
     method : {None, "paper"}
@@ -174,6 +182,7 @@ def perspective(
         target=target,
         kind=kind,
         fov=fov,
+        direction=direction,
         measuring=measuring,
         method=method,
         scale_weight=scale_weight,
@@ -213,6 +222,7 @@ def describe(asked: Request, laid: Laid, found: FromSheet) -> dict[str, Any]:
         "scale_weight": asked.strength,
         "sheet": laid.sheet.describe(),
         "surface": asked.surface is not None,
+        "turned": asked.turn is not None,
         "outside": {"share": laid.outside.share, "factor": laid.outside.factor},
         "scale_error": round(found.error, 5),
         "wrap": list(asked.wrap),

@@ -12,7 +12,7 @@ from texrs._arrays import power_single
 from texrs._typing import Floats
 from texrs.exemplar.atlas import LARGEST, SMALLEST
 from texrs.exemplar.frontal import Frontal
-from texrs.exemplar.sheet import Copies, Flattened, Sheet, find_plane
+from texrs.exemplar.sheet import Copies, Flattened, Sheet, find_plane, multiply
 from texrs.papers.perspective.request import Request
 from texrs.papers.perspective.sizes import Outside, bring_within, choose_sizes
 from texrs.planes._projective import find_focal
@@ -55,24 +55,29 @@ def lay_out(asked: Request) -> Laid:
     colours = asked.exemplar.guidance
     plane = find_slope(asked, colours)
     if asked.surface is not None:
-        return lay_under(asked, asked.surface, colours, plane)
+        return lay_under(asked, turned(asked, asked.surface), colours, plane)
+    if asked.turn is not None and plane is None and is_frontal(asked):
+        large = asked.target.astype(np.float64)[..., np.newaxis, np.newaxis]
+        return lay_under(asked, asked.turn / large, colours, None)
     if plane is not None:
         asked = asked.match_kinds(plane.power)
     sizes = choose_sizes(asked.scale, asked.target, asked.sizes, plane)
     wanted, outside = bring_within(asked.scale, asked.target, sizes)
+    sheet: Sheet
     if plane is None:
-        sheet: Sheet = Copies.of(colours, asked.scale, sizes, wanted)
-        return Laid(sheet, wanted, wanted, None, outside, sizes)
-    # From here on scales are widths.
-    target = power_single(wanted, plane.power)
-    return Laid(Flattened.of(colours, plane, target), target, wanted, None, outside, sizes)
+        target, sheet = wanted, Copies.of(colours, asked.scale, sizes, wanted)
+    else:
+        # From here on scales are widths.
+        target = power_single(wanted, plane.power)
+        sheet = Flattened.of(colours, plane, target)
+    frames = None if asked.turn is None else sheet.frames(target, asked.wrap, asked.turn)
+    return Laid(sheet, target, wanted, frames, outside, sizes)
 
 
 def lay_under(asked: Request, surface: NDArray[np.float64], colours: Floats, plane: Plane | None) -> Laid:
     """Lay an exemplar out under a surface: the plane that it shows flattened, as it is from the front, or in copies."""
     areas = asked.target.astype(np.float64)
-    free = asked.strength > 0 and asked.sizes in (True, "auto")
-    front = plane is None and free and float(asked.scale.max()) < LEVEL * float(asked.scale.min())
+    front = plane is None and is_frontal(asked)
     scale, target, power = asked.scale, asked.target, 1.0
     if plane is not None:
         # Of a plane elements of a width have an area: the width that has the wanted one is asked for.
@@ -92,6 +97,17 @@ def lay_under(asked: Request, surface: NDArray[np.float64], colours: Floats, pla
     else:
         sheet = Copies.of(colours, scale, sizes, held)
     return Laid(sheet, held, wanted, sheet.bend(shown, held), outside, sizes)
+
+
+def turned(asked: Request, surface: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a surface with a texture that is turned on it."""
+    return surface if asked.turn is None else multiply(asked.turn, surface)
+
+
+def is_frontal(asked: Request) -> bool:
+    """Return whether an exemplar may be resized, and has elements of one size."""
+    free = asked.strength > 0 and asked.sizes in (True, "auto")
+    return free and float(asked.scale.max()) < LEVEL * float(asked.scale.min())
 
 
 def find_slope(asked: Request, colours: Floats) -> Plane | None:

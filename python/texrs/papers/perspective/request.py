@@ -14,6 +14,7 @@ from texrs._typing import Array, Floats, Interpolation
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
 from texrs.materials import Material
+from texrs.papers.perspective.directions import as_turn
 from texrs.papers.perspective.sizes import Sizes, check_sizes
 from texrs.papers.perspective.targets import PREFIX, Surface, as_surface, as_target, find_size, is_map, read_plane
 from texrs.planes import FOV, Plane
@@ -93,6 +94,7 @@ class Request:
         target: Array | Plane | str | None,
         kind: Kind | None,
         fov: float | None,
+        direction: object,
         measuring: Measuring | None,
         method: Method,
         scale_weight: float,
@@ -117,9 +119,10 @@ class Request:
         sides = as_size(size)
         shape = (sides[0], sides[1])
         surface = None if asked is None or is_map(asked) else as_surface(asked, shape)
-        if method == "paper" and surface is not None:
+        turn = None if direction is None else as_turn(direction, shape, closed)
+        if method == "paper" and (surface is not None or turn is not None):
             raise InvalidInput(
-                "method: the paper's knows no surfaces; give a scale map as target, or leave out the method"
+                "method: the paper's knows no surfaces and no directions; give a scale map as target, or leave out the method"
             )
         plane, scale = find_scale(known, scale_map, measuring)
         mine = as_map(scale, "scale_map", known.shape)
@@ -138,7 +141,7 @@ class Request:
             kinds,
             plane,
             surface,
-            None,
+            turn,
             angle,
             method,
             strength,

@@ -1,0 +1,76 @@
+"""Directions of elements, which the paper leaves to the future (section 6): by how much what is copied is turned."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from numbers import Real
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_float
+from texrs.errors import InvalidInput
+from texrs.fields import Field, parse
+from texrs.papers.perspective.targets import Surface
+from texrs.scale_maps._resample import stretch
+
+__all__ = ["as_turn"]
+
+FARTHEST = 1e6
+"""Degrees."""
+
+
+def as_turn(direction: object, size: tuple[int, int], wrap: Sequence[bool]) -> Surface:
+    """Return rotations (rows, columns, 2, 2), by which elements are turned counter-clockwise as they are seen."""
+    if isinstance(direction, str):
+        direction = parse(direction, 2, size)
+    if isinstance(direction, Field):
+        cosine, sine = follow_field(direction, size)
+    else:
+        cosine, sine = follow_angles(direction, size)
+    turn = np.stack([np.stack([cosine, sine], axis=-1), np.stack([-sine, cosine], axis=-1)], axis=-2)
+    for axis, closed in enumerate(wrap):
+        across = float(np.abs(np.take(turn, 0, axis) - np.take(turn, -1, axis)).max())
+        if closed and across > 2 * float(np.abs(np.diff(turn, axis=axis)).max(initial=0.0)) + 0.02:
+            name = ("rows", "columns")[axis]
+            raise InvalidInput(
+                f"wrap: directions of the first and last {name} differ, so the result cannot repeat along {name}; make them "
+                f"alike, or leave wrap off along {name}"
+            )
+    return turn
+
+
+def follow_angles(direction: object, size: tuple[int, int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return cosines and sines of one angle, or of angles stretched to a size."""
+    if isinstance(direction, Real | np.floating):
+        direction = np.full((1, 1), as_float(direction, "direction", -FARTHEST, FARTHEST))
+    given = np.asarray(direction)
+    if given.ndim != 2 or given.dtype.kind not in "iuf" or given.size == 0:
+        raise InvalidInput(
+            f"direction: needs degrees, one number or (rows, columns), or a field; got {given.dtype} of {given.shape}"
+        )
+    angles = given.astype(np.float64)
+    if not (np.abs(angles) <= FARTHEST).all():
+        raise InvalidInput(f"direction: needs finite degrees within {FARTHEST:g}")
+    # Whole turns first: those of large angles would be rounded.
+    angles = np.radians(angles % 360)
+    parts = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    return normalise(*np.moveaxis(parts if angles.shape == size else stretch(parts, size), -1, 0))
+
+
+def follow_field(field: Field, size: tuple[int, int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return cosines and sines of the rotations that are nearest to the frames of a field."""
+    if field.axes != 2:
+        raise InvalidInput(f"direction: needs a field of 2 axes, got one of {field.axes}")
+    j = field.over(size).lattice(size).astype(np.float64)
+    return normalise(j[..., 0, 0] + j[..., 1, 1], j[..., 0, 1] - j[..., 1, 0])
+
+
+def normalise(
+    cosine: NDArray[np.float64], sine: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return both divided by their length; where they have none, no turn."""
+    length = np.sqrt(cosine * cosine + sine * sine)
+    there = length > 1e-6
+    safe = np.where(there, length, 1.0)
+    return np.where(there, cosine / safe, 1.0), np.where(there, sine / safe, 0.0)
