@@ -103,7 +103,7 @@ def blend(
     antialias : bool
         As in `SourceMap.render`.
     kind, green
-        As in `SourceMap.render`; normals are brought back to unit length.
+        As in `SourceMap.render`; of normals the slopes are corrected, and they are brought back to unit length.
     progress : callable, optional
         Called as ``progress("blend", share)``, with the share that is done; raising stops the work.
 
@@ -162,6 +162,7 @@ def blend(
     samples = Samples.scale([as_image(e) for e in several], kind)
     if samples is None or interpolation == "nearest":
         return result
+    turned: Literal["colour", "vector", "slope"] = "slope" if kind == "normal" else kind
     # Seen with a channel axis; what is written to it is written to the result.
     pixels = result.reshape((*source.shape, -1))
     strips = list(divide_strips(source.shape, cyclic[0], weight))
@@ -172,7 +173,8 @@ def blend(
         closed = (part.cyclic, cyclic[1])
         if channels == groups[0]:
             own = None if apart is None else apart[part.rows]
-            look = Look(samples, shown, take_rows(source, part.rows), across, own, outlines, interpolation, kind, green)
+            rows = take_rows(source, part.rows)
+            look = Look(samples, shown, rows, across, own, outlines, interpolation, turned, green)
             seen = [look.find_seams(axis, closed[axis]) for axis in range(2)]
         if any(len(seam.lack) for seam in seen):
             report = None if progress is None else _scale_progress(progress, number, len(steps))

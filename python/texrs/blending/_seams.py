@@ -33,7 +33,7 @@ class Look:
     outlines: bool
     """Whether outlines of things keep their step."""
     interpolation: Interpolation
-    kind: Literal["colour", "normal", "vector"]
+    kind: Literal["colour", "vector", "slope"]
     green: Literal["up", "down"]
 
     def look_beside(self, at: tuple[Array, ...], axis: int, step: int) -> tuple[Floats, Bools]:

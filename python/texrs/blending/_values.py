@@ -13,6 +13,10 @@ from texrs.errors import InvalidInput
 
 STRIP = 2**22
 """Pixels that are solved at once; up to four times as many where corrections reach far."""
+STEEPEST = 4.0
+"""Slope beyond which steeper ones count no more: 76 degrees."""
+FLATTEST = 0.2
+"""Least height of a normal that a slope is taken of."""
 BAND = 64
 """Rows whose values are converted at once."""
 
@@ -39,6 +43,10 @@ class Samples:
             top, channels = float(np.iinfo(dtype).max) if dtype.kind in "ui" else 1.0, 3 if kind == "normal" else 2
             low = -top if dtype.kind != "u" and min(float(e[..., :channels].min()) for e in exemplars) < 0 else 0.0
             high = top
+            if kind == "normal":
+                # Slopes add up where heights do; normals do not.
+                shown = [_scale_slopes(e[..., :3], low, high) for e in exemplars]
+                return cls(shown, low, high - low, 2, np.full(3, low), np.full(3, high))
         else:
             if dtype.kind in "bi":
                 return None
@@ -68,15 +76,33 @@ class Samples:
         """Add a correction to channels of pixels in the exemplar's own values, in place."""
         exact = np.dtype("f4" if pixels.dtype.itemsize <= 2 else "f8")
         for rows in divide_rows(len(pixels)):
-            mine = pixels[rows, :, channels]
-            value = mine.astype(exact) + correction[rows].astype(exact) * self.span
+            change = correction[rows].astype(exact)
             if kind == "normal":
-                vector = 2 * (value - self.low) / self.span - 1
-                vector /= np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), 1e-12)
-                value = (vector + 1) / 2 * self.span + self.low
+                mine = pixels[rows, :, :3]
+                value = self._tilt(mine.astype(exact), change)
             else:
-                value = np.clip(value, self.least[channels], self.most[channels])
+                mine = pixels[rows, :, channels]
+                value = np.clip(mine.astype(exact) + change * self.span, self.least[channels], self.most[channels])
             mine[...] = np.rint(value) if pixels.dtype.kind in "ui" else value
+
+    def _tilt(self, values: Array, change: Array) -> Array:
+        """Return normals whose slopes are changed; those of no change are as they were."""
+        vector = 2 * (values - self.low) / self.span - 1
+        slope = vector[..., :2] / np.maximum(vector[..., 2:], FLATTEST) + change * (2 * STEEPEST)
+        tilted = np.concatenate([slope, np.ones_like(slope[..., :1])], axis=-1)
+        tilted /= np.linalg.norm(tilted, axis=-1, keepdims=True)
+        changed = (change != 0).any(axis=-1, keepdims=True)
+        return np.asarray(np.where(changed, (tilted + 1) / 2 * self.span + self.low, values))
+
+
+def _scale_slopes(normals: Array, low: float, high: float) -> Floats:
+    """Return the slopes of normals, (rows, columns, 2): the steepest that count are 0 and 1, none is half way."""
+    result = np.empty((*normals.shape[:2], 2), np.float32)
+    for rows in divide_rows(len(normals)):
+        vector = 2 * (normals[rows].astype(np.float64) - low) / (high - low) - 1
+        slope = vector[..., :2] / np.maximum(vector[..., 2:], FLATTEST)
+        result[rows] = 0.5 + np.clip(slope, -STEEPEST, STEEPEST) / (2 * STEEPEST)
+    return result
 
 
 def _scale(image: Array, low: float, high: float) -> Floats:

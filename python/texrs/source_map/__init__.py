@@ -264,7 +264,7 @@ class SourceMap:
         *,
         interpolation: Interpolation = "cubic",
         antialias: bool = False,
-        kind: Literal["colour", "normal", "vector"] = "colour",
+        kind: Literal["colour", "normal", "vector", "slope"] = "colour",
         green: Literal["up", "down"] = "up",
     ) -> Array:
         """Return what a map that is in register with the exemplar looks like through this source map.
@@ -277,10 +277,11 @@ class SourceMap:
             Between samples; use "nearest" for labels. Samples at whole coordinates are copied bit for bit.
         antialias : bool
             Whether the exemplar is smoothed where the frames say that it is shrunk. Not for labels, nor with "nearest".
-        kind : {"colour", "normal", "vector"}
+        kind : {"colour", "normal", "vector", "slope"}
             "normal": a tangent-space normal map (channels x, y, z; unsigned values mean 2 v - 1). Its vectors turn
             with the local frame. "vector": directions on the surface (channels x, y, and what does not turn), such as those
-            of flow or of brushed metal; they turn and keep their length.
+            of flow or of brushed metal; they turn and keep their length. "slope": how much heights grow to the right and
+            along y.
         green : {"up", "down"}
             Whether the y of normals and vectors grows up (OpenGL) or down (DirectX).
 
@@ -315,9 +316,9 @@ class SourceMap:
             out = gather_smoothed(out, several, self.coordinates, self.exemplar, self._shrunk(), interpolation)
         if kind == "colour":
             return out
-        if kind not in ("normal", "vector") or green not in ("up", "down"):
+        if kind not in ("normal", "vector", "slope") or green not in ("up", "down"):
             raise InvalidInput(
-                f"kind, green: allowed are colour, normal or vector, up or down; got {kind!r}, {green!r}"
+                f"kind, green: allowed are colour, normal, vector or slope, up or down; got {kind!r}, {green!r}"
             )
         # Asked of the exemplars, for a part of them that a picture shows may have no negative value.
         channels = 3 if kind == "normal" else 2

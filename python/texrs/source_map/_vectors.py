@@ -13,8 +13,8 @@ __all__ = ["turn_vectors"]
 def turn_vectors(vectors: Array, frames: NDArray[np.float64], kind: str, *, down: bool, signed: bool) -> Array:
     """Return vectors (rows, columns, C) as they are seen through frames (rows, columns, 2, 2), in their own dtype.
 
-    A surface h(S(p)) has the slope J^T grad h, so normals turn with the transposed frame and are brought to unit length; of a
-    step v of the exemplar J^-1 v is seen, whose length is kept.
+    A surface h(S(p)) has the slope J^T grad h, so slopes turn with the transposed frame, and so do normals, which are brought
+    to unit length; of a step v of the exemplar J^-1 v is seen, whose length is kept.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def turn_vectors(vectors: Array, frames: NDArray[np.float64], kind: str, *, down
         Channels x, y and, of normals, z.
     frames : float64 array
         J, (row, column).
-    kind : {"normal", "vector"}
+    kind : {"normal", "vector", "slope"}
         What they are.
     down : bool
         Whether y grows down.
@@ -37,7 +37,7 @@ def turn_vectors(vectors: Array, frames: NDArray[np.float64], kind: str, *, down
     v = vectors[..., :count].astype(np.float64) * scale - offset
     side = 1.0 if down else -1.0
     flat = np.stack([v[..., 1] * side, v[..., 0]], axis=-1)
-    if kind == "normal":
+    if kind != "vector":
         turned, length = np.einsum("...ji,...j->...i", frames, flat), np.float64(1.0)
     else:
         # The inverse but for its determinant, whose sign says which way.
@@ -46,7 +46,8 @@ def turn_vectors(vectors: Array, frames: NDArray[np.float64], kind: str, *, down
         turned *= np.where(a * d < b * c, -1.0, 1.0)[..., np.newaxis]
         length = np.linalg.norm(flat, axis=-1, keepdims=True)
     v = np.concatenate([turned[..., 1:], turned[..., :1] * side, v[..., 2:]], axis=-1)
-    v *= length / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-12)
+    if kind != "slope":
+        v *= length / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-12)
     value = (v + offset) / scale
     out = vectors.copy()
     out[..., :count] = np.rint(value) if integers else value
