@@ -1,10 +1,20 @@
-"""Stages of long work, as kernels report them."""
+"""Stages of long work: as kernels report them, and as they are shown."""
 
 from __future__ import annotations
 
+import sys
+import time
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
-from texrs._typing import Progress
+from texrs.errors import InvalidInput
+
+if TYPE_CHECKING:
+    # Numpy would come with it.
+    from texrs._typing import Progress
+
+PAUSE = 5.0
+"""Least seconds between two lines of one stage."""
 
 
 def stage(progress: Progress | None, name: str) -> Callable[[float], object] | None:
@@ -13,3 +23,63 @@ def stage(progress: Progress | None, name: str) -> Callable[[float], object] | N
         return None
     progress(name, 0.0)  # Short work may be done before it is asked how far it is.
     return lambda share: progress(name, share)
+
+
+def listen(progress: Progress | bool | None) -> Progress | None:
+    """Return who listens to a verb: what the caller gave; a bar, for True; or nobody.
+
+    Parameters
+    ----------
+    progress : callable, bool or None
+        What a verb was given. True shows a bar of tqdm on stderr, or in the notebook, which goes when the verb ends; where tqdm
+        is not installed, a line a stage, and one each five seconds with the share that is done.
+
+    Raises
+    ------
+    InvalidInput
+        Neither a function nor True, False or None.
+
+    """
+    if progress is None or progress is False:
+        return None
+    if progress is True:
+        return _make_bar() or show_lines(lambda line: print(line, file=sys.stderr, flush=True))
+    if not callable(progress):
+        raise InvalidInput(f"progress: needs True, a function to call, or None; got {progress!r}")
+    return progress
+
+
+def show_lines(write: Callable[[str], object]) -> Progress:
+    """Return a callback that writes a line where a stage begins, and one now and then with the share that is done."""
+    last, since = "", 0.0
+
+    def show(stage: str, share: float) -> None:
+        nonlocal last, since
+        now = time.monotonic()
+        if share < 1 and (stage != last or now - since >= PAUSE):
+            write(stage if stage != last else f"{stage} {share:.0%}")
+            last, since = stage, now
+
+    return show
+
+
+def _make_bar() -> Progress | None:
+    """Return a callback that moves a bar, which is closed when nobody calls it any more; None where there is no tqdm."""
+    try:
+        from tqdm.auto import tqdm
+    except ImportError:
+        return None
+    bar: Any = tqdm(total=1.0, bar_format="{desc}: {percentage:3.0f} %|{bar}| {elapsed}", leave=False)
+    last = ""
+
+    def show(stage: str, share: float) -> None:
+        nonlocal last
+        if stage != last:
+            last = stage
+            bar.set_description_str(stage, refresh=False)
+            bar.n = share
+            bar.refresh()
+        else:
+            bar.update(share - bar.n)
+
+    return show

@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar, cast
 
+from texrs._progress import listen
 from texrs._typing import Progress
 from texrs.errors import InvalidInput
 from texrs.materials._material import Material, apply_materials, guide_materials
@@ -64,7 +65,7 @@ def takes_materials(*names: str, beside: tuple[str, ...] = ()) -> Callable[[Call
                 given.arguments[name] = (
                     [next(guides) for _ in value] if isinstance(value, list | tuple) else next(guides)
                 )
-            watch = given.arguments.get("progress")
+            watch = given.arguments["progress"] = listen(given.arguments.get("progress"))
             made: Any = verb(*given.args, **given.kwargs)
             if isinstance(made, Synthesis):
                 return cast(T, finish(made, materials, watch))

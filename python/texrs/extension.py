@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from texrs._arrays import as_float, as_image, as_int, as_ndarray, as_seed, as_size, check_memory
+from texrs._progress import listen
 from texrs._typing import Array, Progress
 from texrs._verbs import takes_materials
 from texrs.blending import apply
@@ -42,7 +43,7 @@ def extend(
     boundary: int = 0,
     blend: float | None = 0.1,
     seed: int = 0,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Synthesis:
     """Make a photograph of a plane larger, on any side, in the same perspective.
 
@@ -65,8 +66,9 @@ def extend(
         Weight of the values when the colours of what is added are corrected, as in `texrs.complete`; None or 0: no correction.
     seed : int
         Chooses among what fits.
-    progress : callable, optional
+    progress : callable or True, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
+        True shows a bar.
 
     Returns
     -------
@@ -94,6 +96,7 @@ def extend(
     ((128, 192, 3), True)
 
     """
+    progress = listen(progress)
     image = as_ndarray(image, "image")
     pixels = as_image(image, minimum=64)
     rows, columns = pixels.shape[:2]

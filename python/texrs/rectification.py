@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_image, as_ndarray, as_seed, as_size, as_wrap, check_memory, guidance
+from texrs._progress import listen
 from texrs._typing import Array, Bools, Interpolation, Progress
 from texrs._verbs import takes_materials
 from texrs.blending import apply
@@ -55,7 +56,7 @@ def rectify(
     wrap: bool | Sequence[bool] = False,
     seed: int = 0,
     interpolation: Interpolation = "cubic",
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Synthesis:
     """Make the flat texture of a plane that was photographed aslant.
 
@@ -77,8 +78,9 @@ def rectify(
         Chooses what is grown.
     interpolation : {"cubic", "linear", "nearest"}
         Between pixels of the photograph.
-    progress : callable, optional
+    progress : callable or True, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
+        True shows a bar.
 
     Returns
     -------
@@ -106,6 +108,7 @@ def rectify(
     (((192, 192),), 50.0)
 
     """
+    progress = listen(progress)
     image = as_ndarray(image, "image")
     pixels = as_image(image, minimum=64)
     watch = progress or (lambda stage, share: None)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from texrs._arrays import as_float, as_image, as_int, as_mask, as_ndarray, as_seed
+from texrs._progress import listen
 from texrs._typing import Array, Bools, Progress
 from texrs._verbs import takes_materials
 from texrs.blending import apply
@@ -46,7 +47,7 @@ def remove(
     patch: int | None = None,
     blend: float | None = 0.1,
     seed: int = 0,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Synthesis:
     """Take something out of a photograph.
 
@@ -72,8 +73,9 @@ def remove(
         correction.
     seed : int
         Chooses among what fits.
-    progress : callable, optional
+    progress : callable or True, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
+        True shows a bar.
 
     Returns
     -------
@@ -105,6 +107,7 @@ def remove(
     True
 
     """
+    progress = listen(progress)
     image = as_ndarray(image, "image")
     pixels = as_image(image, minimum=64)
     shape = pixels.shape[0], pixels.shape[1]

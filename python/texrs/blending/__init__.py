@@ -29,6 +29,7 @@ from texrs._arrays import (
     as_ndarray,
     as_wrap,
 )
+from texrs._progress import listen
 from texrs._typing import Array, Floats, Interpolation, Progress
 from texrs.blending._correction import divide_strips, solve_correction
 from texrs.blending._seams import Look, Seam, take_rows
@@ -60,7 +61,7 @@ def blend(
     antialias: bool = False,
     kind: Literal["colour", "normal", "vector"] = "colour",
     green: Literal["up", "down"] = "up",
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Array:
     """Render a map of the exemplar through a source map, and correct its values so that seams disappear.
 
@@ -104,8 +105,8 @@ def blend(
         As in `SourceMap.render`.
     kind, green
         As in `SourceMap.render`; of normals the slopes are corrected, and they are brought back to unit length.
-    progress : callable, optional
-        Called as ``progress("blend", share)``, with the share that is done; raising stops the work.
+    progress : callable or True, optional
+        Called as ``progress("blend", share)``, with the share that is done; raising stops the work. True shows a bar.
 
     Returns
     -------
@@ -149,6 +150,7 @@ def blend(
     10
 
     """
+    progress = listen(progress)
     if source.axes != 2:
         raise InvalidInput("source: a picture is needed, got the source map of a volume")
     cyclic, across, outlines = as_wrap(wrap), as_bool(across, "across"), as_bool(outlines, "outlines")
@@ -193,7 +195,7 @@ def apply(
     kind: Literal["colour", "normal", "vector", "label"] = "colour",
     green: Literal["up", "down"] = "up",
     finish: Finish | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Array:
     """Look a map of the exemplar up through a source map, and finish it as the verb that made it finished its picture.
 
@@ -214,8 +216,8 @@ def apply(
         Whether the y of normals and vectors grows up (OpenGL) or down (DirectX).
     finish : Finish, optional
         Another finish than that of the map.
-    progress : callable, optional
-        Called as ``progress("blend", share)`` where seams are corrected; raising stops the work.
+    progress : callable or True, optional
+        Called as ``progress("blend", share)`` where seams are corrected; raising stops the work. True shows a bar.
 
     Returns
     -------
@@ -244,6 +246,7 @@ def apply(
     dtype('float32')
 
     """
+    progress = listen(progress)
     as_choice(kind, "kind", ("colour", "normal", "vector", "label"))
     if kind == "label":
         return source.render(exemplars, interpolation="nearest")

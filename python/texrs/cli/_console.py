@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, cast
 
 import typer
 
+from texrs._progress import show_lines
 from texrs.errors import TexrsError
 
 if TYPE_CHECKING:
@@ -27,8 +28,6 @@ DONE, INTERNAL, BAD_INPUT = 0, 1, 2
 """Exit codes; a command that a signal ends has 128 plus the signal's number, so 130 for Ctrl-C."""
 TRACEBACK = "TEXRS_TRACEBACK"
 """Environment variable that asks for the traceback of an internal error."""
-PAUSE = 5.0
-"""Least seconds between two lines of progress of one stage."""
 PIPE = int(getattr(signal, "SIGPIPE", 13))
 """Windows knows no such signal, but pipes that break."""
 GRACE = 1.0
@@ -152,7 +151,7 @@ def show_progress(*, quiet: bool) -> Iterator[Progress]:
         with _show_bar() as progress:
             yield progress
     else:
-        yield _show_lines()
+        yield show_lines(complain)
 
 
 @contextmanager
@@ -169,19 +168,6 @@ def _show_bar() -> Iterator[Progress]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=1.0)
         yield lambda stage, share: bar.update(task, description=stage, completed=share)
-
-
-def _show_lines() -> Progress:
-    last, since = "", 0.0
-
-    def show(stage: str, share: float) -> None:
-        nonlocal last, since
-        now = time.monotonic()
-        if share < 1 and (stage != last or now - since >= PAUSE):
-            complain(stage if stage != last else f"{stage} {share:.0%}")
-            last, since = stage, now
-
-    return show
 
 
 def _end_stopped(number: int) -> int:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_bool, as_float, as_image, as_int, as_mask, as_method, as_ndarray, as_seed, as_wrap
+from texrs._progress import listen
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs._verbs import takes_materials
 from texrs.blending import apply
@@ -48,7 +49,7 @@ def complete(
     blend: float | None = None,
     wrap: bool | Sequence[bool] = False,
     seed: int = 0,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Synthesis:
     """Fill a hole in a picture by example.
 
@@ -96,8 +97,9 @@ def complete(
         Axes along which the picture is cyclic, so that a hole at its border is also filled from across.
     seed : int
         Chooses patches where nothing is known around.
-    progress : callable, optional
+    progress : callable or True, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
+        True shows a bar.
 
     Returns
     -------
@@ -136,6 +138,7 @@ def complete(
     True
 
     """
+    progress = listen(progress)
     as_method(method, "patch", "optimise")
     if exemplar_scale_map is not None and (exemplar is None or scale_map is None):
         raise InvalidInput("exemplar_scale_map: needs an exemplar, and a scale_map whose units it shares")

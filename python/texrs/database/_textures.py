@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from texrs import io
 from texrs._arrays import as_image, as_int
 from texrs._cache import Cache
+from texrs._progress import listen
 from texrs._typing import Array, Path, Progress
 from texrs.database._folder import NAME, Folder, Record, check_free, restore_option
 from texrs.database._sheet import Sheet
@@ -140,7 +141,7 @@ class TextureDatabase:
         *,
         replace: bool = False,
         similarity: bool = False,
-        progress: Progress | None = None,
+        progress: Progress | bool | None = None,
         **options: Unpack[AnalyseOptions],
     ) -> Elements:
         """Analyse a texture and keep it.
@@ -155,8 +156,8 @@ class TextureDatabase:
             Whether another texture of that name may be replaced.
         similarity : bool
             Whether the similarity sets are made now and kept too: refinements then need not make them.
-        progress : callable, optional
-            Called as ``progress(stage, share)``; raising stops the work.
+        progress : callable or True, optional
+            Called as ``progress(stage, share)``; raising stops the work. True shows a bar.
         **options
             What `texrs.elements.analyse` takes: ``box`` (row, column, height, width) around one element; ``mask`` (H, W) bool,
             the foreground; ``background``, points or (H, W) bool between the elements; ``layout`` ("disjoint", "connected"
@@ -176,6 +177,7 @@ class TextureDatabase:
             The file cannot be read, or the entry not written.
 
         """
+        progress = listen(progress)
         unknown = sorted(set(options) - AnalyseOptions.__annotations__.keys())
         if unknown:
             raise InvalidInput(
@@ -239,7 +241,7 @@ class TextureDatabase:
             # Another process was quicker.
             self._find_record(name)
 
-    def analyse(self, name: str, *, progress: Progress | None = None) -> Elements:
+    def analyse(self, name: str, *, progress: Progress | bool | None = None) -> Elements:
         """Return an entry, made anew if its image or the version is another one, or if it is damaged.
 
         Raises
@@ -250,6 +252,7 @@ class TextureDatabase:
             The entry cannot be made anew either, because its image is gone.
 
         """
+        progress = listen(progress)
         record = self._find_record(name)
         entry: Elements | None = None
         reason = ""
@@ -279,7 +282,7 @@ class TextureDatabase:
         b: str,
         size: Sequence[int] | None = None,
         *,
-        progress: Progress | None = None,
+        progress: Progress | bool | None = None,
         **options: Unpack[SpliceOptions],
     ) -> Synthesis:
         """Return the elements of one texture in the arrangement of another.
@@ -290,8 +293,8 @@ class TextureDatabase:
             Names of the texture whose elements are shown, and of that whose layout they take.
         size : (rows, columns), optional
             Of the result, in pixels; that of ``a`` by default.
-        progress : callable, optional
-            Called as ``progress(stage, share)``; raising stops the work.
+        progress : callable or True, optional
+            Called as ``progress(stage, share)``; raising stops the work. True shows a bar.
         **options
             What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``strength``,
             ``align``, ``snap_rows``, ``cells``, ``nets``, ``turns``, ``refine``, ``blend``.
@@ -306,6 +309,7 @@ class TextureDatabase:
             There is no such texture, or what `texrs.splice` refuses.
 
         """
+        progress = listen(progress)
         return splice(self.analyse(a), self.analyse(b), size, progress=progress, **options)
 
     def matrix(
@@ -316,7 +320,7 @@ class TextureDatabase:
         size: Sequence[int] | None = None,
         cell: int = 160,
         each: Callable[[str, str, Synthesis], object] | None = None,
-        progress: Progress | None = None,
+        progress: Progress | bool | None = None,
         **options: Unpack[SpliceOptions],
     ) -> Matrix:
         """Splice textures with each other, as figure 8 of the paper shows it.
@@ -332,8 +336,8 @@ class TextureDatabase:
         each : callable, optional
             Called as ``each(a, b, result)`` with each splice when it is made, to write it, say: then none is kept, and memory
             is that of one and of about 256 MB of entries, however many there are.
-        progress : callable, optional
-            Called as ``progress("matrix", share)``; raising stops the work.
+        progress : callable or True, optional
+            Called as ``progress("matrix", share)``; raising stops the work. True shows a bar.
         **options
             What `texrs.splice` takes: ``seed``, ``method`` (None, "paper" or "preview"), ``strength``,
             ``align``, ``snap_rows``, ``cells``, ``nets``, ``turns``, ``refine``, ``blend``.
@@ -344,6 +348,7 @@ class TextureDatabase:
             What could not be spliced is named with the reason, and grey on the sheet.
 
         """
+        progress = listen(progress)
         side = as_int(cell, "cell", 16, 1024)
         down, across = (self._choose(names, which) for names, which in ((rows, "rows"), (columns, "columns")))
         kept: Cache[str, Elements] = Cache(KEPT, count_bytes)

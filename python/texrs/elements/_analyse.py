@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_image, check_memory, guidance
+from texrs._progress import listen
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.elements import _mask
 from texrs.elements._arguments import Arguments, Box, check_consistency, choose_usual_box, find_contradiction
@@ -51,7 +52,7 @@ def analyse(
     wrap: bool | Sequence[bool] = False,
     seed: int = 0,
     corrections: Sequence[Mapping[str, object]] | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Elements:
     """Find the elements of a texture, what belongs to them and how they are connected [1]_.
 
@@ -84,8 +85,8 @@ def analyse(
         Chooses the samples of the mixtures.
     corrections : sequence of dict, optional
         What is put right in the end, as `texrs.elements.correct` does.
-    progress : callable, optional
-        Called as ``progress(stage, share)``; raising stops the work.
+    progress : callable or True, optional
+        Called as ``progress(stage, share)``; raising stops the work. True shows a bar.
 
     Returns
     -------
@@ -112,6 +113,7 @@ def analyse(
     True
 
     """
+    progress = listen(progress)
     pixels, steps = as_image(image, "image", minimum=SHORTEST), read_steps(() if corrections is None else corrections)
     size = (pixels.shape[0], pixels.shape[1])
     check_memory(BYTES * size[0] * size[1], "image")

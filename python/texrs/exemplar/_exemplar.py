@@ -13,6 +13,7 @@ from texrs._arrays import as_image, as_int, as_ndarray, as_wrap, guidance, to_un
 from texrs._cache import Cache, content_hash
 from texrs._engine.coherence import Similarity, find_similar
 from texrs._engine.stitcher import Stitcher
+from texrs._progress import listen
 from texrs._typing import Array, Floats, Path, Progress
 from texrs.errors import FileError, InvalidInput
 from texrs.exemplar.analysis import (
@@ -267,15 +268,17 @@ class Exemplar:
         planes = (np.take(self.guidance, n // 2, axis) for axis, n in enumerate(self.shape))
         return self.remember("directedness", lambda: max(measure_direction(plane) for plane in planes))
 
-    def segment(self, options: ElementOptions = ElementOptions(), *, progress: Progress | None = None) -> Segmentation:
+    def segment(
+        self, options: ElementOptions = ElementOptions(), *, progress: Progress | bool | None = None
+    ) -> Segmentation:
         """Return the background and the elements of a picture, and the lattice that they may lie on.
 
         Parameters
         ----------
         options : ElementOptions
             How elements are found.
-        progress : callable, optional
-            Called as ``progress("segment", share)`` along the way; raising stops the work.
+        progress : callable or True, optional
+            Called as ``progress("segment", share)`` along the way; raising stops the work. True shows a bar.
 
         Returns
         -------
@@ -294,6 +297,7 @@ class Exemplar:
         18
 
         """
+        progress = listen(progress)
         return self.remember(
             ("segmentation", options.key), lambda: segment(self._pixels, options, progress=progress).freeze()
         )

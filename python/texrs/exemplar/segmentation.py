@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_choice, as_image, as_int, as_list, as_rgb, to_unit
 from texrs._cache import content_hash
 from texrs._engine.noise import uniform
+from texrs._progress import listen
 from texrs._typing import Array, Floats, Labels, Progress
 from texrs.errors import InvalidInput
 from texrs.exemplar.backgrounds import USUAL_LAYERS, find_foreground
@@ -147,7 +148,7 @@ class Segmentation:
 
 
 def segment(
-    image: Array, options: ElementOptions = ElementOptions(), *, progress: Progress | None = None
+    image: Array, options: ElementOptions = ElementOptions(), *, progress: Progress | bool | None = None
 ) -> Segmentation:
     """Segment an exemplar into a background and elements.
 
@@ -157,8 +158,9 @@ def segment(
         The exemplar, any dtype; the first three channels count, or the first one when there are two.
     options : ElementOptions
         How elements are found.
-    progress : callable, optional
-        Called as ``progress("segment", share)`` along the way, with a rising share; raising stops the work. The longest
+    progress : callable or True, optional
+        Called as ``progress("segment", share)`` along the way, with a rising share; raising stops the work.
+        True shows a bar. The longest
         step between two calls is scikit-image's merge of regions: 0.7 s for 1024 x 1024 pixels, growing with these.
 
     Returns
@@ -181,6 +183,7 @@ def segment(
     18
 
     """
+    progress = listen(progress)
     pixels = as_image(image)
     height, width = pixels.shape[:2]
     if options.labels is not None:

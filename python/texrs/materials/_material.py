@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from texrs._arrays import as_choice, as_float, as_image, as_int
+from texrs._progress import listen
 from texrs._typing import Array, Floats, Path, Progress
 from texrs.blending import apply
 from texrs.errors import InvalidInput
@@ -313,15 +314,15 @@ class Material(Exports):
                 found.append(np.float32(weight) * take_features(each.pixels, each.role, each.space, self._axes))
         return found
 
-    def apply(self, source: SourceMap, *, progress: Progress | None = None) -> Material:
+    def apply(self, source: SourceMap, *, progress: Progress | bool | None = None) -> Material:
         """Return the material that a source map makes of this one, finished as the verb that made the map does.
 
         Parameters
         ----------
         source : SourceMap
             Which looks into one exemplar, of the size of the maps.
-        progress : callable, optional
-            Called as ``progress(stage, share)``; raising stops the work.
+        progress : callable or True, optional
+            Called as ``progress(stage, share)``; raising stops the work. True shows a bar.
 
         Returns
         -------
@@ -342,6 +343,7 @@ class Material(Exports):
         True
 
         """
+        progress = listen(progress)
         return apply_materials([self], source, progress)
 
 

@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_int, as_size, as_wrap
+from texrs._progress import listen
 from texrs._typing import Array, Floats, Progress
 from texrs._verbs import takes_materials
 from texrs.blending import apply
@@ -57,7 +58,7 @@ def tile(
     size: int | Sequence[int] | None = None,
     overlap: int | Sequence[int] | None = None,
     blend: float | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Synthesis:
     """Make a picture cyclic: copies of the result side by side have no edge between them.
 
@@ -77,8 +78,9 @@ def tile(
     blend : float, optional
         Weight of the values, 0 to 1e6, when colours are corrected so that seams disappear: the smaller, the wider the
         correction. None or 0: no correction, so that each pixel is one of the picture. See `texrs.blend`.
-    progress : callable, optional
+    progress : callable or True, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
+        True shows a bar.
 
     Returns
     -------
@@ -111,6 +113,7 @@ def tile(
     True
 
     """
+    progress = listen(progress)
     exemplar, cyclic = as_exemplar(image, "image"), as_wrap(wrap)
     shape = (exemplar.shape[0], exemplar.shape[1])
     wanted, weight = as_sides(size, shape, cyclic), as_float(0.0 if blend is None else blend, "blend", 0, 1e6)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from texrs._arrays import as_float, as_image, as_int, as_size, guidance, try_array
+from texrs._progress import listen
 from texrs._typing import Array, Floats, Interpolation, Path, Progress
 from texrs.errors import FileError, InvalidInput, LimitExceeded
 from texrs.io import atomic
@@ -215,7 +216,7 @@ def turntable(
     background: Sequence[int] = (255, 255, 255),
     interpolation: Interpolation = "linear",
     overwrite: bool = True,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> None:
     """Write an animated GIF of a volume that turns once, without end.
 
@@ -239,8 +240,8 @@ def turntable(
         Between voxels; "nearest" shows each as a square.
     overwrite : bool
         Whether a file that exists may be replaced.
-    progress : callable, optional
-        Called with the name of the stage and the share that is done; raising stops the work.
+    progress : callable or True, optional
+        Called with the name of the stage and the share that is done; raising stops the work. True shows a bar.
 
     Raises
     ------
@@ -262,6 +263,7 @@ def turntable(
     b'GIF89a'
 
     """
+    progress = listen(progress)
     from PIL import Image
 
     count, side = as_int(frames, "frames", 2, 360), as_int(size, "size", 16, 1024)

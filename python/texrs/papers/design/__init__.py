@@ -57,6 +57,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
+from texrs._progress import listen
 from texrs._typing import Progress
 from texrs._verbs import takes_materials
 from texrs.blending import SCREENING
@@ -89,7 +90,7 @@ def design(
     patch: int | None = None,
     blend: float | None = SCREENING,
     method: Method = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Synthesis:
     """Design a large texture from one example.
 
@@ -134,8 +135,9 @@ def design(
         by the printed generator, once each or as ``operations`` says, and stitched at the plain cost; holes take the best
         match; colours are corrected without weight on the values. The ``kind`` of elements and ``translate``, ``rotate``
         and ``mirror`` of their deformation play no part, nor does the amount of ``blend``.
-    progress : callable, optional
+    progress : callable or True, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
+        True shows a bar.
 
     Returns
     -------
@@ -182,6 +184,7 @@ def design(
     >>> still = texrs.design(pebbles, 128, deformation=texrs.DeformationOptions(rotate=0, mirror=False))
 
     """
+    progress = listen(progress)
     variants = design_variants(
         exemplar,
         1,
@@ -219,7 +222,7 @@ def design_variants(
     patch: int | None = None,
     blend: float | None = SCREENING,
     method: Method = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Iterator[Synthesis]:
     """Design several different textures from one example, which is analysed once.
 
@@ -269,8 +272,9 @@ def design_variants(
         by the printed generator, once each or as ``operations`` says, and stitched at the plain cost; holes take the best
         match; colours are corrected without weight on the values. The ``kind`` of elements and ``translate``, ``rotate``
         and ``mirror`` of their deformation play no part, nor does the amount of ``blend``.
-    progress : callable, optional
+    progress : callable or True, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
+        True shows a bar.
 
     Returns
     -------
@@ -293,6 +297,7 @@ def design_variants(
     True
 
     """
+    progress = listen(progress)
     arguments = check_arguments(
         exemplar,
         count,

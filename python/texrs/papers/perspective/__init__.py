@@ -42,6 +42,7 @@ from typing import Any
 import numpy as np
 
 from texrs._engine.pyramid import Region
+from texrs._progress import listen
 from texrs._typing import Array, Interpolation, Progress
 from texrs._verbs import takes_materials
 from texrs.exemplar import Exemplar
@@ -78,7 +79,7 @@ def perspective(
     wrap: bool | Sequence[bool] = False,
     seed: int = 0,
     interpolation: Interpolation = "cubic",
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Synthesis:
     """Grow a picture whose elements are as large as a map says.
 
@@ -129,8 +130,9 @@ def perspective(
         Chooses the texture, 0 to 2^64 - 1; the same seed gives the same bytes.
     interpolation : {"nearest", "linear", "cubic"}
         Between the exemplar's samples, where it is resized.
-    progress : callable, optional
+    progress : callable or True, optional
         Called as ``progress(stage, share)`` with the stage and the share of it that is done; raising stops the work.
+        True shows a bar.
 
     Returns
     -------
@@ -175,6 +177,7 @@ def perspective(
     ((96, 96, 3), True)
 
     """
+    progress = listen(progress)
     asked = Request.check(
         exemplar,
         scale_map,

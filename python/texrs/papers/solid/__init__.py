@@ -57,7 +57,7 @@ from typing import Any
 import numpy as np
 
 from texrs._engine.pyramid import ONE, Region, to_fixed
-from texrs._progress import stage
+from texrs._progress import listen, stage
 from texrs._typing import Array, Interpolation, Progress
 from texrs._verbs import takes_materials
 from texrs.exemplar import Exemplar
@@ -90,7 +90,7 @@ def solid(
     guide: Guide | None = None,
     interpolation: Interpolation | None = None,
     memory_limit: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Synthesis:
     """Grow a volume from a volume, under a frame field.
 
@@ -127,8 +127,9 @@ def solid(
         sample whatever it says.
     memory_limit : int, optional
         Bytes that the work may take; None is 8 GiB.
-    progress : callable, optional
+    progress : callable or True, optional
         Called as ``progress(stage, share)`` with the stage and the share of it that is done; raising stops the work.
+        True shows a bar.
 
     Returns
     -------
@@ -166,6 +167,7 @@ def solid(
     ((40, 40, 40, 3), dtype('uint8'))
 
     """
+    progress = listen(progress)
     request = Request.check(
         exemplar,
         size,
@@ -200,7 +202,7 @@ def synthesize(
     guide: Guide | None = None,
     interpolation: Interpolation | None = None,
     memory_limit: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Synthesis:
     """Grow a picture from a picture, under a frame field.
 
@@ -241,8 +243,9 @@ def synthesize(
         sample whatever it says.
     memory_limit : int, optional
         Bytes that the work may take; None is 8 GiB.
-    progress : callable, optional
+    progress : callable or True, optional
         Called as ``progress(stage, share)`` with the stage and the share of it that is done; raising stops the work.
+        True shows a bar.
 
     Returns
     -------
@@ -279,6 +282,7 @@ def synthesize(
     (96, 128, 3)
 
     """
+    progress = listen(progress)
     request = Request.check(
         exemplar,
         size,

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from texrs._arrays import as_int, as_seed, as_size
 from texrs._engine.pyramid import ONE, Region
+from texrs._progress import listen
 from texrs._typing import Array, Interpolation, Progress
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
@@ -103,7 +104,7 @@ class _Texture:
         return image[tuple(0 if s else slice(None) for s in single)]
 
     def window(
-        self, origin: int | Sequence[int], size: int | Sequence[int], *, progress: Progress | None = None
+        self, origin: int | Sequence[int], size: int | Sequence[int], *, progress: Progress | bool | None = None
     ) -> Synthesis:
         """Return a part with its source map.
 
@@ -113,8 +114,8 @@ class _Texture:
             First voxel, of the world; any integers within 10^9.
         size : int, or one an axis
             Voxels along each axis.
-        progress : callable, optional
-            Called with the stage and the share of it that is done; raising stops the work.
+        progress : callable or True, optional
+            Called with the stage and the share of it that is done; raising stops the work. True shows a bar.
 
         Returns
         -------
@@ -132,6 +133,7 @@ class _Texture:
             The work was stopped.
 
         """
+        progress = listen(progress)
         start = self._as_origin(origin)
         region = Region(as_size(size, axes=self.axes), start, (False,) * self.axes)
         self._check(region)
@@ -318,7 +320,7 @@ class SolidTexture(_Texture):
         *,
         axes: ArrayLike | None = None,
         size: int | Sequence[int],
-        progress: Progress | None = None,
+        progress: Progress | bool | None = None,
     ) -> Array:
         """Cut the texture along any plane.
 
@@ -335,8 +337,8 @@ class SolidTexture(_Texture):
             Instead of ``normal``: the steps of the picture's rows and of its columns, in voxels.
         size : int or (rows, columns)
             Of the picture.
-        progress : callable, optional
-            Called with the stage and the share of it that is done; raising stops the work.
+        progress : callable or True, optional
+            Called with the stage and the share of it that is done; raising stops the work. True shows a bar.
 
         Returns
         -------
@@ -351,6 +353,7 @@ class SolidTexture(_Texture):
             The work was stopped.
 
         """
+        progress = listen(progress)
         middle, steps = as_direction(point, "point"), as_steps(normal, axes)
         sides = as_size(size)
         reach = np.abs(middle) + np.abs(steps).T @ np.array(sides)

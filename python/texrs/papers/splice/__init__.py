@@ -58,6 +58,7 @@ from dataclasses import replace
 from typing import Any, Literal, TypeAlias
 
 from texrs._arrays import as_bool, as_float, as_method, as_seed, as_size
+from texrs._progress import listen
 from texrs._typing import Array, Progress
 from texrs._verbs import takes_materials
 from texrs.elements import Elements, Layout
@@ -117,7 +118,7 @@ def splice(
     turns: bool | None = None,
     refine: bool = True,
     blend: float | None = SCREENING,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Synthesis:
     """Arrange the elements of one texture as those of another are.
 
@@ -161,8 +162,9 @@ def splice(
         does not change where they meet, see `texrs.blend`; where the texture has a lit side the result has it too, and things
         do not bring the light of their old places. None or 0: no correction, and the picture is the texture looked up through
         the source map. All else is not corrected.
-    progress : callable, optional
+    progress : callable or True, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
+        True shows a bar.
 
     Returns
     -------
@@ -194,6 +196,7 @@ def splice(
     ((128, 128, 3), True)
 
     """
+    progress = listen(progress)
     as_method(method, None, "paper", "preview")
     number, part, screening = as_seed(seed), as_float(strength, "strength", 0, 1), _as_screening(blend)
     enlarged = None if layout_scale is None else as_float(layout_scale, "layout_scale", 0.01, 100)
@@ -274,7 +277,7 @@ def self_splice(
     method: Method = None,
     refine: bool = True,
     blend: float | None = SCREENING,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Synthesis:
     """Edit the layout of a texture's own elements (Figure 9).
 
@@ -306,8 +309,9 @@ def self_splice(
         Of separate elements on their ground: weight of the values, 0 to 1e6, when the colours of what changed are corrected
         so that the light does not change where things meet, as in `splice`. All else keeps its values. None or 0: no
         correction.
-    progress : callable, optional
+    progress : callable or True, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
+        True shows a bar.
 
     Returns
     -------
@@ -339,6 +343,7 @@ def self_splice(
     (128, 160, 3)
 
     """
+    progress = listen(progress)
     as_method(method, None, "paper", "preview")
     asked, number = None if size is None else as_size(size, minimum=16), as_seed(seed)
     steps, screening = as_steps(() if edit is None else edit, number), _as_screening(blend)
