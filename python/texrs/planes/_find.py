@@ -31,6 +31,8 @@ LARGEST = 520
 """A longer side is shrunk to so many pixels: slopes of patterns finer than that tell little."""
 FINE = 1.0, 1.6
 """Standard deviations of the Gaussians under which slopes are taken, in samples: each should find the same plane."""
+HALVED, FIRST = 400, 4
+"""Pixels of the longer side from which on the first rounds, and so many at most, look at half the resolution."""
 APART, ROUGH = 0.15, 0.25
 """Difference of what two bands find, and deviation of what is measured from the plane, at which the confidence is 1 / e."""
 SMALL = 256
@@ -88,29 +90,42 @@ def find(image: object, *, fov: float | None = None, known: object = None) -> Pl
         )
     if float(colours[there].std(axis=0).max()) < 1e-4:
         raise InvalidInput("image: has one colour, so no plane can be found in it; give its corners, or angles")
-    grey, there, step = _shrink(take_grey(colours, there), there)
+    grey, there, step = prepare(colours, there)
     rise, confidence = look(grey, there, find_focal(grey.shape, angle) / max(grey.shape))
     # What a fit says beyond these digits hangs on the processor.
     rounded = [float(f"{r / step / max(grey.shape):.6g}") for r in rise]
     return Plane._of_line(size, np.array([*rounded, 1.0]), "image", angle, float(f"{confidence:.3g}"))
 
 
-def _shrink(grey: Floats, known: Bools) -> tuple[Floats, Bools, int]:
-    """Return a picture of at most `LARGEST` pixels a side, by means of squares, and the side of those."""
-    step = max(1, ceil(max(grey.shape) / LARGEST))
+def prepare(colours: Floats, known: Bools) -> tuple[Floats, Bools, int]:
+    """Return a picture of one channel of at most `LARGEST` pixels a side, what of it is known, and how many pixels each is."""
+    step = max(1, ceil(max(known.shape) / LARGEST))
+    small, there = _shrink(colours, known, step)
+    return take_grey(small, there), there, step
+
+
+def _shrink(colours: Floats, known: Bools, step: int) -> tuple[Floats, Bools]:
+    """Return the means of squares of so many pixels a side, and whether all of each is known."""
     if step == 1:
-        return grey, known, 1
-    rows, columns = (n // step * step for n in grey.shape)
-    parts = (a[:rows, :columns].reshape(rows // step, step, columns // step, step) for a in (grey, known))
-    values, seen = parts
-    return values.mean(axis=(1, 3), dtype=np.float32), np.asarray(seen.all(axis=(1, 3))), step
+        return colours, known
+    rows, columns = (n // step * step for n in known.shape)
+    parts = [colours[i:rows:step, j:columns:step] for i in range(step) for j in range(step)]
+    whole = known[:rows, :columns].reshape(rows // step, step, columns // step, step).all(axis=(1, 3))
+    return np.asarray(sum(parts[1:], parts[0]) * np.float32(1 / step**2), np.float32), np.asarray(whole)
 
 
 def look(grey: Floats, known: Bools, focal: float) -> tuple[Reals, float]:
     """Return the rise of the width over the longer side, (2,), and how sure it is; the focal length is over that side too."""
     side = max(grey.shape)
+    starts = [np.zeros(2) for _ in FINE]
+    if side >= HALVED:
+        # Each band for itself: one that starts where another ended agrees with it too soon.
+        small, whole = _shrink(grey[..., np.newaxis], known, 2)
+        levels = blur_levels(small[..., 0])
+        starts = [follow(levels, whole, sigma, at, FIRST)[0] / 2 for sigma, at in zip(FINE, starts, strict=True)]
     levels = blur_levels(grey)
-    told = [(rise * side, off) for rise, off in (follow(levels, known, sigma) for sigma in FINE) if np.isfinite(off)]
+    found = [follow(levels, known, sigma, at) for sigma, at in zip(FINE, starts, strict=True)]
+    told = [(rise * side, off) for rise, off in found if np.isfinite(off)]
     if not told:
         return np.zeros(2), 0.0
     bands, offs = [rise for rise, _ in told], [off for _, off in told]

@@ -86,44 +86,75 @@ class Lean:
 
 def find_lines(grey: Floats, known: Bools) -> Lines:
     """Return the straight borders of what a picture, (H, W), shows where it is known."""
-    from scipy.ndimage import binary_erosion, gaussian_filter, label
+    from scipy.ndimage import binary_erosion, gaussian_filter
 
     smooth = gaussian_filter(grey.astype(np.float64), SMOOTH, mode="nearest")
     down, right = np.gradient(smooth)
     steep = np.hypot(down, right)
-    inner = binary_erosion(known, iterations=3)
-    share = gaussian_filter(inner.astype(np.float64), AROUND * max(grey.shape))
-    usual = gaussian_filter(np.where(inner, steep**2, 0.0), AROUND * max(grey.shape)) / np.maximum(share, 1e-6)
-    border = inner & (steep > STEEP * np.sqrt(usual)) & (steep > 1e-4)
+    inner = known.copy()
+    inner[[0, 1, 2, -3, -2, -1]] = inner[:, [0, 1, 2, -3, -2, -1]] = False
+    if not known.all():
+        inner &= binary_erosion(known, iterations=3)
+    border = inner & (steep > STEEP * np.sqrt(_look_around(steep**2, inner))) & (steep > 1e-4)
     crests, away = _mark_crests(steep, down, right)
     border &= crests
+    rows, columns = np.nonzero(border)
+    number = np.full(grey.shape, -1, np.intp)
+    number[rows, columns] = np.arange(len(rows))
+    pairs = [
+        (number[1:], number[:-1]),
+        (number[:, 1:], number[:, :-1]),
+        (number[1:, 1:], number[:-1, :-1]),
+        (number[1:, :-1], number[:-1, 1:]),
+    ]
+    beside = np.concatenate([np.stack([a, b], axis=-1)[(a >= 0) & (b >= 0)] for a, b in pairs])
+    slopes = np.stack([down[rows, columns], right[rows, columns]], axis=-1)
     # Eighths of a turn, by comparisons alone, in two ways: a line at the limit of two lies in the midst of one of the other.
-    labels = []
-    for k in range(2):
-        turn = np.pi / 8 * k
-        y, x = down * np.cos(turn) - right * np.sin(turn), down * np.sin(turn) + right * np.cos(turn)
-        octant = (y > 0) * 4 + (x > 0) * 2 + (np.abs(y) > np.abs(x))
-        parts = np.zeros(grey.shape, np.intp)
-        number = 0
-        for which in range(8):
-            part, count = label(border & (octant == which), np.ones((3, 3)))
-            parts[part > 0] = part[part > 0] + number
-            number += count
-        labels.append((parts, number))
-    sizes = [np.bincount(parts.ravel(), minlength=number + 1) for parts, number in labels]
-    counts = [size[parts] for size, (parts, _) in zip(sizes, labels, strict=True)]
-    wins = [counts[0] >= counts[1], counts[0] < counts[1]]
+    parts = [_join(_tell_eighths(slopes, turn), beside) for turn in (0.0, np.pi / 8)]
+    sizes = [np.bincount(part) if len(part) else np.zeros(1, np.intp) for part in parts]
+    first = sizes[0][parts[0]] >= sizes[1][parts[1]]
+    places = np.stack([rows, columns], axis=-1) + away[rows, columns]
     found = []
-    for (parts, number), size, won in zip(labels, sizes, wins, strict=True):
-        votes = np.bincount(parts.ravel(), won.ravel(), minlength=number + 1)
-        chosen = votes >= 0.5 * size
-        chosen[0] = False
-        chosen &= size >= SHORTEST
-        found.append(_measure(parts, number, chosen, steep, away, down, right))
-    middles, ways, lengths = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    for part, size, won in zip(parts, sizes, (first, ~first), strict=True):
+        votes = np.bincount(part, won, minlength=len(size))
+        chosen = (votes >= 0.5 * size) & (size >= SHORTEST)
+        found.append(_measure(part, chosen, places, steep[rows, columns], slopes))
+    middles, ways, lengths = (np.concatenate(each) for each in zip(*found, strict=True))
     order = np.argsort(-lengths, kind="stable")[:MOST]
     centre = (np.array(grey.shape) - 1) / 2
     return Lines(middles[order] - centre, ways[order], lengths[order])
+
+
+def _look_around(values: Reals, known: Bools) -> Reals:
+    """Return the means of values in the windows around each pixel, by cells."""
+    from scipy.ndimage import gaussian_filter
+
+    sigma = AROUND * max(values.shape)
+    cell = max(1, int(sigma / 4))
+    starts = [np.arange(0, n, cell) for n in values.shape]
+    total, count = (
+        gaussian_filter(np.add.reduceat(np.add.reduceat(v, starts[0], axis=0), starts[1], axis=1), sigma / cell)
+        for v in (np.where(known, values, 0.0), known.astype(np.float64))
+    )
+    means = total / np.maximum(count, 1e-6)
+    return np.asarray(means.repeat(cell, axis=0).repeat(cell, axis=1)[: values.shape[0], : values.shape[1]])
+
+
+def _tell_eighths(slopes: Reals, turn: float) -> NDArray[np.intp]:
+    """Return in which eighth of a turn each slope lies."""
+    y = slopes[:, 0] * np.cos(turn) - slopes[:, 1] * np.sin(turn)
+    x = slopes[:, 0] * np.sin(turn) + slopes[:, 1] * np.cos(turn)
+    return np.asarray((y > 0) * 4 + (x > 0) * 2 + (np.abs(y) > np.abs(x)), np.intp)
+
+
+def _join(kinds: NDArray[np.intp], beside: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the numbers of the parts of pixels of one kind that lie beside each other."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    same = beside[kinds[beside[:, 0]] == kinds[beside[:, 1]]]
+    graph = coo_matrix((np.ones(len(same), np.bool_), (same[:, 0], same[:, 1])), shape=(len(kinds), len(kinds)))
+    return np.asarray(connected_components(graph, directed=False)[1], np.intp)
 
 
 def _mark_crests(steep: Reals, down: Reals, right: Reals) -> tuple[Bools, Reals]:
@@ -152,18 +183,16 @@ def _mark_crests(steep: Reals, down: Reals, right: Reals) -> tuple[Bools, Reals]
 
 
 def _measure(
-    parts: NDArray[np.intp], number: int, chosen: Bools, steep: Reals, away: Reals, down: Reals, right: Reals
+    part: NDArray[np.intp], chosen: Bools, places: Reals, steep: Reals, slopes: Reals
 ) -> tuple[Reals, Reals, Reals]:
     """Return middle, direction and length of each chosen part that is straight."""
-    rows, columns = np.nonzero(chosen[parts])
-    which = parts[rows, columns]
-    weight = steep[rows, columns]
+    some = chosen[part]
+    which, places, weight, slopes = part[some], places[some], steep[some], slopes[some]
 
     def add_up(values: Reals) -> Reals:
-        return np.asarray(np.bincount(which, values, minlength=number + 1), np.float64)
+        return np.asarray(np.bincount(which, values, minlength=len(chosen)), np.float64)
 
     total = np.maximum(add_up(weight), 1e-12)
-    places = np.stack([rows, columns], -1) + away[rows, columns]
     y, x = add_up(weight * places[:, 0]) / total, add_up(weight * places[:, 1]) / total
     off = places[:, 0] - y[which], places[:, 1] - x[which]
     yy, yx, xx = (add_up(weight * a * b) / total for a, b in ((off[0], off[0]), (off[0], off[1]), (off[1], off[1])))
@@ -172,8 +201,8 @@ def _measure(
     angle = 0.5 * np.arctan2(2 * yx, yy - xx)
     ways = np.stack([np.cos(angle), np.sin(angle)], -1)
     # Where slopes do not lie across it, it is a row of other borders.
-    slopes = np.stack([add_up(down[rows, columns]), add_up(right[rows, columns])], -1)
-    askew = np.abs((ways * slopes).sum(axis=-1)) / np.maximum(np.hypot(*slopes.T), 1e-12)
+    mean = np.stack([add_up(slopes[:, 0]), add_up(slopes[:, 1])], -1)
+    askew = np.abs((ways * mean).sum(axis=-1)) / np.maximum(np.hypot(*mean.T), 1e-12)
     good = chosen & (length >= SHORTEST) & (across <= THIN + 0.01 * length) & (askew <= ASKEW)
     return np.stack([y, x], -1)[good], ways[good], length[good]
 

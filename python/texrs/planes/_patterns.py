@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from texrs._typing import Bools, Floats
 from texrs.kernels.gather import gather
 
-__all__ = ["follow"]
+__all__ = ["blur_levels", "follow", "measure_windows"]
 
 Reals = NDArray[np.float64]
 
@@ -36,6 +36,8 @@ LEVELS = 4
 """Blurred versions of the picture, each for twice the step."""
 ROUNDS, STEPS = 8, 10
 """How often the picture is flattened anew, and steps of each fit."""
+SETTLED = 0.015
+"""Change of the horizon, over the longer side, below which it is found."""
 LONGEST = 4.0
 """Times what a fit says that a round may change the horizon, where changes are seen to go on."""
 STEP, PARTS = 1e-3, 2.0**15
@@ -50,6 +52,8 @@ DEVIATES = 1.4826
 """Standard deviation over the median of absolute values."""
 FEWEST = 8
 """Windows that say something about a plane."""
+LATTICE = 120
+"""Pixels of the shorter side, about, that say how large the flattened picture is."""
 CELLS = 4
 """Cells to a standard deviation of a window, in which what is measured is summed up first."""
 
@@ -61,17 +65,17 @@ def blur_levels(grey: Floats) -> list[Floats]:
     return [grey, *(gaussian_filter(grey, 0.5 * (4.0**k - 1) ** 0.5) for k in range(1, LEVELS))]
 
 
-def follow(levels: list[Floats], known: Bools, sigma: float) -> tuple[Reals, float]:
-    """Return the rise of the width a pixel, (2,), and by how much what is measured deviates from that.
+def follow(levels: list[Floats], known: Bools, sigma: float, start: Reals, rounds: int = ROUNDS) -> tuple[Reals, float]:
+    """Return the rise of the width a pixel, (2,), from a first guess on, and by how much what is measured deviates from it.
 
     A fit says too little where patterns are blurred, so rounds go on for long in one direction; from two of them it is told
     how far (Anderson's mixing).
     """
     side = max(known.shape)
-    rise, off = np.zeros(2), float("nan")
+    rise, off = start, float("nan")
     last: tuple[Reals, Reals] | None = None
-    for _ in range(ROUNDS):
-        points, slopes = _Flat(levels, known, rise).measure(sigma)
+    for _ in range(rounds):
+        points, slopes = measure_windows(levels, known, rise, sigma)
         if len(points) < FEWEST:
             break
         change, off = _fit(points, slopes, side)
@@ -81,9 +85,14 @@ def follow(levels: list[Floats], known: Bools, sigma: float) -> tuple[Reals, flo
         # The farthest corner lies before the horizon.
         fall = float(abs(rise[0]) * known.shape[0] + abs(rise[1]) * known.shape[1]) / 2
         rise = rise * min(1.0, TILTED / max(fall, 1e-12))
-        if float(np.abs(step).max()) * side < 0.01:
+        if float(np.abs(step).max()) * side < SETTLED:
             break
     return rise, off
+
+
+def measure_windows(levels: list[Floats], known: Bools, rise: Reals, sigma: float) -> tuple[Reals, Reals]:
+    """Return points of the plane of a horizon, (n, 2), in pixels from the picture's middle, and N around each, (n, 2, 2)."""
+    return _Flat(levels, known, rise).measure(sigma)
 
 
 def _hasten(change: Reals, moved: Reals, differs: Reals) -> Reals:
@@ -100,10 +109,11 @@ class _Flat:
 
     def __init__(self, levels: list[Floats], known: Bools, rise: Reals) -> None:
         middle = [(n - 1) / 2 for n in known.shape]
-        rows, columns = (np.arange(n) - m for n, m in zip(known.shape, middle, strict=True))
+        # A lattice of the picture says how far the flat one reaches.
+        step = max(1, min(known.shape) // LATTICE)
+        rows, columns = (np.arange(0, n, step) - m for n, m in zip(known.shape, middle, strict=True))
         width = 1 + (rows * rise[0])[:, np.newaxis] + columns * rise[1]
-        open_ = known & (width > FAR)
-        seen = np.nonzero(open_)
+        seen = np.nonzero(known[::step, ::step] & (width > FAR))
         scales = width[seen]
         spread = [along[at] / scales for along, at in zip((rows, columns), seen, strict=True)]
         self.rise, self.low = rise, np.array([v.min() for v in spread])
@@ -117,15 +127,22 @@ class _Flat:
         for along, n in zip(at, known.shape, strict=True):
             inside &= (along >= 0) & (along <= n - 1)
         places = np.stack([along[inside] for along in at], axis=-1).astype(np.float32)
-        nearest = np.rint(places).astype(np.intp)
-        there = known[nearest[:, 0], nearest[:, 1]]
+        scale = wide[inside] * (1 / self.resolution)
         self.known = inside
-        self.known[inside] = there
-        places, wide = places[there], wide[self.known]
-        octave = np.clip(np.log2(np.maximum(wide / self.resolution, 1)), 0, len(levels) - 1)
+        if not known.all():
+            nearest = np.rint(places).astype(np.intp)
+            there = known[nearest[:, 0], nearest[:, 1]]
+            self.known[inside] = there
+            places, scale = places[there], scale[there]
         values = np.zeros(len(places))
         for k, level in enumerate(levels):
-            part = np.maximum(0, 1 - np.abs(octave - k))
+            # From half the step to the whole, and from there to twice of it.
+            part = np.minimum(scale / 2 ** (k - 1) - 1, 2 - scale / 2**k)
+            if k == 0:
+                part = np.minimum(2 - scale, 1)
+            elif k == len(levels) - 1:
+                part = scale / 2 ** (k - 1) - 1
+            part = np.clip(part, 0, 1)
             some = np.nonzero(part)[0]
             if len(some):
                 shown = gather(level[..., np.newaxis], places[some][np.newaxis], interpolation="linear")
@@ -143,31 +160,37 @@ class _Flat:
         seen = self.known.astype(np.float64)
         share = blur(seen, sigma)
         picture = blur(self.picture * seen, sigma) / np.maximum(share, 1e-6)
-        rows, columns = (np.asarray(slope, np.float64) for slope in np.gradient(picture))
+        rows, columns = np.gradient(picture)
         inner = share > 0.98
         inner[[0, -1]] = inner[:, [0, -1]] = False
-        weight = inner.astype(np.float64)
+        rows, columns, picture = (np.where(inner, v, 0) for v in (rows, columns, picture))
         spread = SPREAD * float(np.sqrt(self.known.sum()))
         cell = max(1, int(spread / CELLS))
+        counts = [n // cell for n in inner.shape]
+        lattice = (slice(CELLS // 2, None, CELLS),) * 2
 
-        def sum_up(values: NDArray[Any]) -> NDArray[np.float64]:
-            rows, columns = (n // cell for n in values.shape)
-            cells = values[: rows * cell, : columns * cell].reshape(rows, cell, columns, cell).mean(axis=(1, 3))
+        def add_up(values: NDArray[Any]) -> Reals:
+            """Return the sums of cells: along rows first, where they lie beside each other."""
+            whole = values[: counts[0] * cell, : counts[1] * cell]
+            along = whole.reshape(-1, counts[1], cell).sum(axis=-1, dtype=np.float64)
+            return np.asarray(along.reshape(counts[0], cell, counts[1]).sum(axis=1))
+
+        def spread_out(cells: Reals) -> Reals:
             return blur(cells, spread / cell)[lattice]
 
-        lattice = (slice(CELLS // 2, None, CELLS),) * 2
-        total = sum_up(weight)
-        at = np.nonzero(total > FULL)
+        weight = add_up(inner)
+        total = spread_out(weight)
+        at = np.nonzero(total > FULL * cell**2)
 
-        def mean(values: NDArray[Any]) -> NDArray[np.float64]:
-            return np.asarray(sum_up(values * weight)[at] / total[at], np.float64)
+        def mean(cells: Reals) -> Reals:
+            return np.asarray(spread_out(cells)[at] / total[at], np.float64)
 
-        value = mean(picture)
-        variance = np.maximum(mean(picture * picture) - value**2, 1e-8)
-        products = [mean(v) / variance for v in (rows * rows, rows * columns, columns * columns)]
+        value = mean(add_up(picture))
+        variance = np.maximum(mean(add_up(picture * picture)) - value**2, 1e-8)
+        products = [mean(add_up(v)) / variance for v in (rows * rows, rows * columns, columns * columns)]
         slopes = np.stack([products[0], products[1], products[1], products[2]], axis=-1).reshape(-1, 2, 2)
         # What a window says holds at the middle of what it sees.
-        middles = [mean(v) for v in np.indices(self.known.shape, np.float64)]
+        middles = [mean(weight * (cell * v + (cell - 1) / 2)) for v in np.indices(weight.shape)]
         points = self.low + np.stack(middles, axis=-1) / self.resolution
         return points, self._sharpen(points, slopes + 1e-9 * np.eye(2))
 
