@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Literal
 
@@ -111,6 +111,61 @@ class Exports(Mapping[str, Map]):
         if depth not in (None, 16, 32):
             raise InvalidInput(f"depth: allowed are 16 and 32, got {depth!r}")
         return write_exr(self, path, depth)
+
+    def save_gltf(
+        self,
+        path: Path,
+        *,
+        shapes: Sequence[Literal["plane", "sphere"]] = ("plane", "sphere"),
+        repeat: int = 2,
+        depth: Literal[8, 16] = 8,
+    ) -> list[FilePath]:
+        """Write a glTF 2.0 scene that shows the material on a plane and on a sphere.
+
+        The material is that of the standard: base colours with opacity as alpha, occlusion, roughness and metal packed as red,
+        green and blue, normals with y up (those of DirectX are turned; heights give them where there are none), emission,
+        also brighter than white. It repeats without a step where it wraps.
+
+        Parameters
+        ----------
+        path : path_like
+            With the suffix .glb, one file; or .gltf, with a .bin and the pictures beside it (``stones_basecolor.png``, ...).
+        shapes : sequence of {"plane", "sphere"}
+            What it is shown on, from the left to the right.
+        repeat : int
+            How often along each side of the plane and from pole to pole, 1 to 64.
+        depth : {8, 16}
+            Bits of the pictures. Some viewers read 8 alone.
+
+        Returns
+        -------
+        list of pathlib.Path
+            The files, the scene first.
+
+        Raises
+        ------
+        FileError
+            Another suffix, or a file cannot be written. What was there is as it was.
+        InvalidInput
+            A volume, or another shape, number or depth.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import texrs
+        >>> pebbles = texrs.samples.pebbles((64, 64)).image
+        >>> stones = texrs.Material({"albedo": pebbles, "height": pebbles[..., 1]})
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     [path.name for path in stones.save_gltf(f"{folder}/stones.gltf")]
+        ['stones.gltf', 'stones.bin', 'stones_normal.png', 'stones_basecolor.png']
+
+        """
+        from texrs.materials._gltf import write_gltf
+
+        self._check_flat()
+        if depth not in (8, 16):
+            raise InvalidInput(f"depth: allowed are 8 and 16, got {depth!r}")
+        return write_gltf(self, path, shapes, repeat, depth)
 
     def _check_flat(self) -> None:
         if self.axes != 2:

@@ -13,25 +13,20 @@ from math import ceil, cos, pi, radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float, as_int, as_tuple, exp_single, to_unit
+from texrs._arrays import as_float, as_int, as_tuple, exp_single
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
-from texrs.materials._light import decode_normals, encode_srgb, find_map, shrink, to_light, to_share
+from texrs.materials._light import encode_srgb, find_map, shrink
 from texrs.materials._map import Map
 from texrs.materials._roles import Role
+from texrs.materials._surface import find_opacity, list_signed, measure_slopes, take_colour, take_normals, take_surface
 
 __all__ = ["render_preview"]
 
 AMBIENT = 0.3
 """Light from everywhere, where 1 shows a flat, dull surface in its own colours."""
-GREY = 0.5
-"""Linear light that a surface without colours throws back."""
-ROUGH, METAL = 0.6, 0.0
-"""Of surfaces whose maps do not say it."""
 MIRROR = 0.04
 """Share of light from straight above that what is not metal mirrors."""
-STEEPNESS = 0.4
-"""Root mean square slope that heights are shown with, for nothing says in what units they are."""
 SHOULDER = 0.8
 """Linear light above which highlights are rolled off."""
 STRIP = 1 << 19
@@ -58,7 +53,7 @@ def render_preview(
     toward = as_vector(azimuth, elevation)
     shown = np.empty((rows, shape[1], 3), np.float32)
     step = max(1, STRIP // columns)
-    signed = {name: each.pixels.dtype.kind == "f" and bool(each.pixels.min() < 0) for name, each in maps.items()}
+    signed = list_signed(maps)
     for start in range(0, rows, step):
         part = slice(start, min(start + step, rows))
         cut = {name: Map(each.pixels[part], each.role, each.space) for name, each in maps.items()}
@@ -131,80 +126,6 @@ def reflect_surroundings(base: Floats, rough: Floats, facing: Floats) -> Floats:
     mixed = np.minimum(one * one, grazing) * one + two
     reflected: Floats = base * (np.float32(-1.04) * mixed + three) + (np.float32(1.04) * mixed + four)
     return np.maximum(reflected, 0)
-
-
-def take_colour(each: Map | None, shape: tuple[int, ...]) -> Floats:
-    """Return linear colours (..., 3), without transparency; grey where there are none."""
-    if each is None:
-        return np.full((*shape, 3), GREY, np.float32)
-    pixels = each.pixels[..., np.newaxis] if each.pixels.ndim == 2 else each.pixels
-    light = np.maximum(to_light(pixels[..., : 3 if pixels.shape[-1] > 2 else 1], each.space), 0)
-    return np.broadcast_to(light, (*shape, 3)) if light.shape[-1] == 1 else light
-
-
-def take_surface(cut: Mapping[str, Map]) -> tuple[Floats, Floats, Floats]:
-    """Return roughness, metal and how open to the light places are, each (..., 1) in [0, 1], or a number for all."""
-    packed = find_map(cut, Role.ORM)
-    found = []
-    for role, channel, usual in ((Role.ROUGHNESS, 1, ROUGH), (Role.METALLIC, 2, METAL), (Role.OCCLUSION, 0, 1.0)):
-        each = find_map(cut, role)
-        if each is not None:
-            pixels = each.pixels if each.pixels.ndim > 2 else each.pixels[..., np.newaxis]
-            found.append(to_share(pixels[..., :1]))
-        elif packed is not None:
-            found.append(to_share(packed.pixels[..., channel : channel + 1]))
-        else:
-            found.append(np.full((1, 1, 1), usual, np.float32))
-    rough, metal, open_ = found
-    return rough, metal, open_
-
-
-def take_normals(
-    cut: Mapping[str, Map], signed: Mapping[str, bool], slopes: Floats | None, shape: tuple[int, ...]
-) -> Floats:
-    """Return normals of unit length, y up: those of the map, else those of the heights, else straight up."""
-    name = next((n for role in (Role.NORMAL, Role.NORMAL_DX) for n, m in cut.items() if m.role is role), None)
-    if name is not None:
-        return decode_normals(cut[name].pixels, cut[name].role, signed=signed[name])
-    if slopes is None:
-        return np.broadcast_to(np.array([0, 0, 1], np.float32), (*shape, 3))
-    normal = np.concatenate([-slopes, np.ones_like(slopes[..., :1])], axis=-1)
-    normal /= np.sqrt((normal * normal).sum(axis=-1, keepdims=True))
-    return normal
-
-
-def measure_slopes(maps: Mapping[str, Map], wrap: tuple[bool, bool]) -> Floats | None:
-    """Return how heights grow to the right and upwards, where they are what tells how the surface lies."""
-    height = find_map(maps, Role.HEIGHT)
-    if height is None or find_map(maps, Role.NORMAL, Role.NORMAL_DX) is not None:
-        return None
-    pixels = height.pixels if height.pixels.ndim == 2 else height.pixels[..., 0]
-    values = to_unit(pixels) if pixels.dtype.kind in "bui" else pixels.astype(np.float32)
-    found = np.stack([differ(values, 1, wrap[1]), -differ(values, 0, wrap[0])], axis=-1)
-    steep = float(np.sqrt(np.mean(np.square(found, dtype=np.float64))))
-    return found * np.float32(STEEPNESS / steep) if steep > 0 else found
-
-
-def differ(values: Floats, axis: int, wrap: bool) -> Floats:
-    """Return central differences along an axis; one-sided at borders that do not meet."""
-    if values.shape[axis] == 1:
-        return np.zeros_like(values)
-    found: Floats = (np.roll(values, -1, axis) - np.roll(values, 1, axis)) * np.float32(0.5)
-    if not wrap:
-        moved, ends = np.moveaxis(found, axis, 0), np.moveaxis(values, axis, 0)
-        moved[0], moved[-1] = ends[1] - ends[0], ends[-1] - ends[-2]
-    return found
-
-
-def find_opacity(cut: Mapping[str, Map]) -> Floats | None:
-    """Return how much of a surface is there, (..., 1): by its opacity, else by the transparency of its colours."""
-    each = find_map(cut, Role.OPACITY)
-    if each is not None:
-        return to_share(each.pixels if each.pixels.ndim > 2 else each.pixels[..., np.newaxis])[..., :1]
-    colour = find_map(cut, Role.COLOUR)
-    if colour is not None and colour.channels in (2, 4):
-        return to_share(colour.pixels[..., -1:])
-    return None
 
 
 def lay_checks(part: slice, rows: int, columns: int) -> Floats:

@@ -1,0 +1,221 @@
+"""A material as glTF 2.0 that viewers open: on a plane and on a sphere, in one .glb, or with its pictures beside it.
+
+As the standard has it (sections 3.9 and 3.7.2): base colours in sRGB with opacity as their alpha; occlusion, roughness and
+metal as red, green and blue of one picture; normals with y up; tangents whose w is 1, for nothing is mirrored.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path as FilePath
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs import io
+from texrs._checks import as_choice, as_int, as_items
+from texrs._typing import Array, Floats, Path
+from texrs._version import __version__
+from texrs.errors import FileError, InvalidInput
+from texrs.io._image_io import encode
+from texrs.materials._light import encode_srgb, find_map
+from texrs.materials._map import Map
+from texrs.materials._meshes import Mesh, make_plane, make_sphere
+from texrs.materials._roles import Role
+from texrs.materials._surface import (
+    GREY,
+    METAL,
+    ROUGH,
+    find_opacity,
+    list_signed,
+    measure_slopes,
+    take_colour,
+    take_normals,
+    take_surface,
+)
+
+__all__ = ["make_pictures", "write_gltf"]
+
+FLOAT, SHORT = 5126, 5123
+VERTICES, INDICES = 34962, 34963
+LINEAR, MIPMAPS, REPEAT = 9729, 9987, 10497
+BEAM = "KHR_materials_emissive_strength"
+APART = 1.15
+"""From the middle to the middle of each shape, where there are two."""
+WORDS = {"VEC2": 2, "VEC3": 3, "VEC4": 4, "SCALAR": 1}
+
+
+def write_gltf(maps: Mapping[str, Map], path: Path, shapes: Sequence[str], repeat: int, depth: int) -> list[FilePath]:
+    """Write a material on shapes, and return the files."""
+    target = FilePath(path)
+    suffix = target.suffix.lower()
+    if suffix not in (".gltf", ".glb"):
+        raise FileError(f"{path}: the suffix {target.suffix!r} is not one of glTF: .gltf, .glb")
+    wanted = [as_choice(s, "shapes", ("plane", "sphere")) for s in as_items(shapes, "shapes")]
+    if not wanted or len(set(wanted)) < len(wanted):
+        raise InvalidInput(f"shapes: needs plane, sphere or both, got {shapes!r}")
+    times = as_int(repeat, "repeat", 1, 64)
+    size = next(iter(maps.values())).pixels.shape[:2]
+    makers = {"plane": make_plane, "sphere": make_sphere}
+    pictures, material = make_pictures(maps, depth)
+    document, data = lay_out([(s, makers[s](size, times)) for s in wanted], material, target.stem)
+    files: dict[FilePath, bytes] = {}
+    for number, (name, picture) in enumerate(pictures.items()):
+        coded = encode(name, picture, "png")
+        if suffix == ".gltf":
+            beside = target.with_name(f"{target.stem}_{name}.png")
+            files[beside] = coded
+            image: dict[str, object] = {"uri": quote(beside.name)}
+        else:
+            image = {"bufferView": len(document["bufferViews"]), "mimeType": "image/png"}
+            document["bufferViews"].append({"buffer": 0, "byteOffset": len(data), "byteLength": len(coded)})
+            data += pad(coded, b"\0")
+        document["images"].append({"name": name, **image})
+        document["textures"].append({"sampler": 0, "source": number, "name": name})
+    if not pictures:
+        for key in ("images", "textures", "samplers"):
+            del document[key]
+    document["buffers"] = [{"byteLength": len(data)}]
+    if suffix == ".gltf":
+        buffer = target.with_name(f"{target.stem}.bin")
+        document["buffers"][0]["uri"] = quote(buffer.name)
+        files[buffer] = data
+        files[target] = json.dumps(document, indent=1).encode()
+    else:
+        files[target] = pack(json.dumps(document, separators=(",", ":")).encode(), data)
+    # What is opened first takes its name last: the document, when all that it names is there.
+    order = list(files)[::-1]
+    with ExitStack() as stack:
+        for file in order:
+            stack.enter_context(io.atomic(file)).write_bytes(files[file])
+    return order
+
+
+def make_pictures(maps: Mapping[str, Map], depth: int) -> tuple[dict[str, Array], dict[str, Any]]:
+    """Return the pictures of a material by name, and the material whose textures are these, by number."""
+    pictures: dict[str, Array] = {}
+    rough: dict[str, Any] = {"baseColorFactor": [1.0, 1.0, 1.0, 1.0], "metallicFactor": METAL, "roughnessFactor": ROUGH}
+    material: dict[str, Any] = {"pbrMetallicRoughness": rough}
+
+    def add(name: str, picture: Array) -> dict[str, Any]:
+        pictures[name] = picture
+        return {"index": len(pictures) - 1}
+
+    colour, opacity = find_map(maps, Role.COLOUR), find_opacity(maps)
+    see_through = opacity is not None and bool((opacity < 1).any())
+    shape = next(iter(maps.values())).pixels.shape[:2]
+    if colour is not None or see_through:
+        shown = to_depth(encode_srgb(take_colour(colour, shape)), depth)
+        if see_through and opacity is not None:
+            shown = np.concatenate([shown, to_depth(opacity, depth)], axis=-1)
+            sharp = bool(((opacity == 0) | (opacity == 1)).all())
+            material |= {"alphaMode": "MASK", "alphaCutoff": 0.5} if sharp else {"alphaMode": "BLEND"}
+            material["doubleSided"] = True
+        rough["baseColorTexture"] = add("basecolor", shown)
+    else:
+        rough["baseColorFactor"] = [GREY, GREY, GREY, 1.0]
+    packed = find_map(maps, Role.ORM) is not None
+    open_ = packed or find_map(maps, Role.OCCLUSION) is not None
+    surface = packed or find_map(maps, Role.ROUGHNESS, Role.METALLIC) is not None
+    if open_ or surface:
+        found, metal, occlusion = take_surface(maps)
+        bands = [np.broadcast_to(each, (*shape, 1)) for each in (occlusion, found, metal)]
+        texture = add("orm" if open_ else "roughness_metallic", to_depth(np.concatenate(bands, axis=-1), depth))
+        if surface:
+            rough |= {"metallicRoughnessTexture": texture, "metallicFactor": 1.0, "roughnessFactor": 1.0}
+        if open_:
+            material["occlusionTexture"] = texture
+    slopes = measure_slopes(maps, (True, True))
+    if slopes is not None or find_map(maps, Role.NORMAL, Role.NORMAL_DX) is not None:
+        normals = take_normals(maps, list_signed(maps), slopes, shape)
+        material["normalTexture"] = add("normal", to_depth((normals + 1) * np.float32(0.5), depth))
+    emission = find_map(maps, Role.EMISSION)
+    if emission is not None:
+        light = take_colour(emission, shape)
+        strength = max(1.0, float(light.max()))
+        material["emissiveTexture"] = add("emission", to_depth(encode_srgb(light / np.float32(strength)), depth))
+        material["emissiveFactor"] = [1.0, 1.0, 1.0]
+        if strength > 1:
+            material["extensions"] = {BEAM: {"emissiveStrength": strength}}
+    return pictures, material
+
+
+def to_depth(values: Floats, depth: int) -> Array:
+    """Return shares as integers of so many bits."""
+    kind = np.dtype(f"u{depth // 8}")
+    return np.rint(np.clip(values, 0, 1) * np.float64(np.iinfo(kind).max)).astype(kind)
+
+
+def lay_out(shapes: Sequence[tuple[str, Mesh]], material: dict[str, Any], name: str) -> tuple[dict[str, Any], bytes]:
+    """Return a document of the shapes, side by side, and the buffer of their vertices."""
+    document: dict[str, Any] = {
+        "asset": {"version": "2.0", "generator": f"texrs {__version__}"},
+        "scene": 0,
+        "scenes": [{"nodes": list(range(len(shapes)))}],
+        "nodes": [],
+        "meshes": [],
+        "materials": [{"name": name, **material}],
+        "textures": [],
+        "images": [],
+        "samplers": [{"magFilter": LINEAR, "minFilter": MIPMAPS, "wrapS": REPEAT, "wrapT": REPEAT}],
+        "accessors": [],
+        "bufferViews": [],
+    }
+    if "extensions" in material:
+        document["extensionsUsed"] = list(material["extensions"])
+    data = b""
+    for number, (shape, mesh) in enumerate(shapes):
+        numbers: dict[str, int] = {}
+        for key, kind, array in (
+            ("POSITION", "VEC3", mesh.positions),
+            ("NORMAL", "VEC3", mesh.normals),
+            ("TANGENT", "VEC4", mesh.tangents),
+            ("TEXCOORD_0", "VEC2", mesh.places),
+            ("indices", "SCALAR", mesh.faces),
+        ):
+            numbers[key] = len(document["accessors"])
+            document["accessors"].append(describe(array, kind, len(document["bufferViews"]), key == "POSITION"))
+            coded = array.tobytes()
+            view = {"buffer": 0, "byteOffset": len(data), "byteLength": len(coded)}
+            document["bufferViews"].append(view | {"target": INDICES if kind == "SCALAR" else VERTICES})
+            data += pad(coded, b"\0")
+        indices = numbers.pop("indices")
+        primitive = {"attributes": numbers, "indices": indices, "material": 0}
+        document["meshes"].append({"name": shape, "primitives": [primitive]})
+        node: dict[str, Any] = {"name": shape, "mesh": number}
+        if len(shapes) > 1:
+            node["translation"] = [APART * (2 * number - 1), 0.0, 0.0]
+        document["nodes"].append(node)
+    return document, data
+
+
+def describe(array: NDArray[Any], kind: str, view: int, bounds: bool) -> dict[str, Any]:
+    """Return an accessor of all of a view."""
+    count = array.size // WORDS[kind]
+    found: dict[str, Any] = {
+        "bufferView": view,
+        "componentType": SHORT if array.dtype == np.uint16 else FLOAT,
+        "count": count,
+        "type": kind,
+    }
+    if bounds:
+        found |= {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()}
+    return found
+
+
+def pad(data: bytes, by: bytes) -> bytes:
+    """Return bytes up to a multiple of four."""
+    return data + by * (-len(data) % 4)
+
+
+def pack(document: bytes, data: bytes) -> bytes:
+    """Return a .glb of a document and its buffer."""
+    parts = b""
+    for kind, content in ((b"JSON", pad(document, b" ")), (b"BIN\0", pad(data, b"\0"))):
+        parts += struct.pack("<I", len(content)) + kind + content
+    return b"glTF" + struct.pack("<II", 2, 12 + len(parts)) + parts

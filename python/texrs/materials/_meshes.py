@@ -1,0 +1,80 @@
+"""Shapes that materials are shown on: a plane and a sphere, with normals, tangents and places in the picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Floats
+
+__all__ = ["Mesh", "make_plane", "make_sphere"]
+
+RINGS = 64
+"""Of a sphere, from pole to pole; around there are twice as many."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mesh:
+    """A surface of triangles, counter-clockwise as seen from outside; y grows up, z out of the picture.
+
+    Attributes
+    ----------
+    positions, normals : (N, 3) float32 array
+        Corners, and which way is out.
+    tangents : (N, 4) float32 array
+        Which way the picture's columns grow, and 1: its rows grow against the product of normal and tangent.
+    places : (N, 2) float32 array
+        Where in the picture: columns and rows, a whole picture from one integer to the next.
+    faces : (M, 3) uint16 array
+        Three corners each.
+
+    """
+
+    positions: Floats
+    normals: Floats
+    tangents: Floats
+    places: Floats
+    faces: NDArray[np.uint16]
+
+
+def make_plane(shape: Sequence[int], repeat: int) -> Mesh:
+    """Return a plane that faces the viewer and shows a picture so often along each side, with sides like the picture's."""
+    rows, columns = shape
+    half = np.array([columns, rows], np.float64) / max(rows, columns)
+    signs = np.array([(-1, 1), (1, 1), (1, -1), (-1, -1)], np.float64)
+    flat = np.zeros((4, 1))
+    return Mesh(
+        positions=np.concatenate([signs * half, flat], axis=1).astype(np.float32),
+        normals=np.tile(np.array([0, 0, 1], np.float32), (4, 1)),
+        tangents=np.tile(np.array([1, 0, 0, 1], np.float32), (4, 1)),
+        places=((signs * (1, -1) + 1) / 2 * repeat).astype(np.float32),
+        faces=np.array([(0, 3, 2), (0, 2, 1)], np.uint16),
+    )
+
+
+def make_sphere(shape: Sequence[int], repeat: int) -> Mesh:
+    """Return a sphere that shows a picture so often from pole to pole, and as often around as keeps its sides' ratio."""
+    rows, columns = shape
+    around = max(1, round(2 * repeat * rows / columns))
+    down, right = np.meshgrid(np.linspace(0, 1, RINGS + 1), np.linspace(0, 1, 2 * RINGS + 1), indexing="ij")
+    theta, phi = np.pi * down, 2 * np.pi * (right - 0.5)
+    out = np.stack([np.sin(theta) * np.sin(phi), np.cos(theta), np.sin(theta) * np.cos(phi)], axis=-1)
+    # The seam is at one place from both sides.
+    out = np.round(out, 12)
+    tangent = np.stack([np.cos(phi), np.zeros_like(phi), -np.sin(phi), np.ones_like(phi)], axis=-1)
+    first = np.arange(RINGS * (2 * RINGS + 1)).reshape(RINGS, -1)[:, :-1]
+    below = first + 2 * RINGS + 1
+    # At the poles one of each two triangles has no area.
+    upper = np.stack([first, below, first + 1], axis=-1)[1:]
+    lower = np.stack([first + 1, below, below + 1], axis=-1)[:-1]
+    faces = np.concatenate([upper.reshape(-1, 3), lower.reshape(-1, 3)])
+    return Mesh(
+        positions=out.reshape(-1, 3).astype(np.float32),
+        normals=out.reshape(-1, 3).astype(np.float32),
+        tangents=tangent.reshape(-1, 4).astype(np.float32),
+        places=np.stack([right * around, down * repeat], axis=-1).reshape(-1, 2).astype(np.float32),
+        faces=faces.astype(np.uint16),
+    )
