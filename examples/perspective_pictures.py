@@ -1,8 +1,8 @@
-"""Make the picture of textures in perspective that the README shows: docs/pictures/perspective.jpg.
+"""Make the pictures of textures in perspective that the README shows: docs/pictures/perspective.jpg and surfaces.jpg.
 
     python examples/perspective_pictures.py [IMAGE SCALE.npy ...]
 
-Without arguments a generated floor; with them, each image beside its scale map.
+Without arguments a generated floor, and generated textures on surfaces; with them, each image beside its scale map.
 """
 
 import sys
@@ -43,8 +43,43 @@ def rows_of(image: np.ndarray, scale: np.ndarray) -> list[np.ndarray]:
     return [beside(grown), beside(filled)]
 
 
+def surfaces() -> list[np.ndarray]:
+    """Return bricks around a column and a ball, on another plane and in circles; and other textures turned by fields."""
+    bricks = samples.load("bricks").image
+    y, x = np.mgrid[:SIZE, :SIZE] / ((SIZE - 1) / 2) - 1
+    across = 0.97 * x
+    column = np.stack([across, 0 * x, np.sqrt(1 - across**2)], axis=-1)
+    inside = x**2 + y**2 < 0.97
+    ball = np.where(inside[..., None], np.stack([x, -y, np.sqrt(np.maximum(1 - x**2 - y**2, 0))], axis=-1), 0)
+    around = np.degrees(np.arctan2(-y, x))
+    wave = 35 * np.sin(np.pi * x)
+
+    def lay(name: str, scale: object = "front", **options: object) -> np.ndarray:
+        return texrs.perspective(samples.load(name).image, scale, SIZE, seed=1, **options).image
+
+    rolled = lay("bricks", target=ball)
+    floor = samples.tilted_discs((SIZE, SIZE)).image
+    seen = texrs.planes.find(floor, fov=37)
+    laid = [
+        bricks,
+        lay("bricks", target=column),
+        np.where(inside[..., None], rolled, 255).astype(np.uint8),
+        lay("bricks", target="plane:slant=45,tilt=30,fov=50"),
+        lay("bricks", direction=around - 90),
+    ]
+    larger = (0.4 + 0.6 * np.hypot(x, y)).astype(np.float32)
+    turned = [
+        lay("scales", direction=around + 90, target=larger),
+        lay("weave", direction=wave),
+        lay("bark", direction=wave),
+        floor,
+        texrs.perspective(floor, seen, SIZE, target="plane:slant=40,tilt=20,fov=50", direction=30.0, seed=1).image,
+    ]
+    return [beside(laid), beside(turned)]
+
+
 def main() -> None:
-    """Write the picture."""
+    """Write the pictures."""
     named = sys.argv[1:]
     rows = []
     if named:
@@ -56,6 +91,8 @@ def main() -> None:
         rows += rows_of(floor.image, np.asarray(floor.scale_map, np.float32))
     FOLDER.mkdir(parents=True, exist_ok=True)
     io.write(FOLDER / "perspective.jpg", below(rows))
+    if not named:
+        io.write(FOLDER / "surfaces.jpg", below(surfaces()))
 
 
 if __name__ == "__main__":

@@ -47,6 +47,25 @@ def perspective_from_copies_of_given_sizes() -> Parts:
 
 
 @case
+def perspective_on_a_column() -> Parts:
+    x = np.linspace(-0.95, 0.95, 96)[np.newaxis].repeat(80, axis=0)
+    column = np.stack([x, 0 * x, np.sqrt(1 - x * x)], axis=-1)
+    waves = 30 * np.sin(np.pi * np.arange(96) / 48)[np.newaxis]
+    result = texrs.perspective(colour("weave", 96, 96), "front", target=column, direction=waves, seed=3)
+    return parts_of(result, report=SCALED, stages=("target",))
+
+
+@case
+def perspective_on_another_plane() -> Parts:
+    exemplar = colour("tilted_discs", 96, 96)
+    plane = texrs.Plane((96, 96), 50, 85, 37)
+    result = texrs.perspective(
+        exemplar, plane, (80, 96), target="plane:slant=45,tilt=30,fov=50", direction=20.0, seed=2
+    )
+    return parts_of(result, report=SCALED, stages=("target",))
+
+
+@case
 def perspective_as_printed() -> Parts:
     floor = sample("tilted_discs", 56, 56)
     result = texrs.perspective(floor.image, floor.scale_map, (48, 48), method="paper", seed=2)

@@ -30,6 +30,26 @@ def _draw_targets(scale: Floats) -> dict[str, Floats]:
     }
 
 
+def _lay_on_surfaces() -> list[str]:
+    """Return bricks on a column, on a ball, on a floor and in circles."""
+    bricks = samples.bricks((SIDE, SIDE)).image
+    y, x = np.mgrid[:SIZE, :SIZE] / ((SIZE - 1) / 2) - 1
+    across = 0.97 * x
+    column = np.stack([across, 0 * x, np.sqrt(1 - across**2)], axis=-1)
+    inside = (x**2 + y**2 < 0.97)[..., np.newaxis]
+    ball = np.where(inside, np.stack([x, -y, np.sqrt(np.maximum(1 - x**2 - y**2, 0))], axis=-1), 0)
+    rolled = perspective(bricks, "front", target=ball, seed=3).image
+    slanted = perspective(bricks, "front", SIZE, target="plane:slant=45,tilt=30,fov=50", seed=3).image
+    around = np.degrees(np.arctan2(-y, x)) - 90
+    return [
+        figure(bricks, "Example", share=SIDE / SIZE),
+        figure(perspective(bricks, "front", target=column, seed=3).image, "Around a column", note="by its normals"),
+        figure(np.where(inside, rolled, 255).astype(np.uint8), "Around a ball", note="by its normals"),
+        figure(slanted, "Another plane", note="--target plane:slant=45,tilt=30,fov=50"),
+        figure(perspective(bricks, "front", SIZE, direction=around, seed=3).image, "In circles", note="--direction"),
+    ]
+
+
 def _perspective(workshop: Workshop) -> str:
     floor = samples.tilted_discs((SIDE, SIDE))
     scale = np.asarray(floor.scale_map, np.float32)
@@ -73,6 +93,8 @@ def _perspective(workshop: Workshop) -> str:
             "texrs perspective floor.png --scale-map scale.npy --target pattern.npy -o result.png --size 224 --seed 3"
         )
         + grid(grown, least=200)
+        + code("texrs perspective bricks.png --scale-map front --target column-normal.png -o column.png --seed 3")
+        + grid(_lay_on_surfaces(), least=200)
         + code("texrs complete floor.png hole.png -o filled.png --scale-map scale.npy")
         + grid(mended, least=200)
         + code("texrs rectify floor.png -o flat.png --wrap xy --seed 3")
@@ -86,6 +108,6 @@ PERSPECTIVE = Section(
     "perspective",
     "Elements of the right size",
     "A picture taken at an angle has elements of every size. A scale map says which; textures are grown, and holes filled, "
-    "with elements as large as it, or any other map, asks for; and the plane itself is made flat.",
+    "with elements as large as it, or any other map, asks for, or as a surface shows them; and the plane itself is made flat.",
     _perspective,
 )
