@@ -19,7 +19,7 @@ Capture = pytest.CaptureFixture[str]
 COLOURS = samples.load("pebbles", size=(64, 80)).image
 HOLE = np.zeros((64, 80), bool)
 HOLE[20:34, 30:50] = True
-BEFORE = b"before"
+BEFORE = b""
 
 
 @pytest.fixture
@@ -101,7 +101,7 @@ def test_any_mask_is_a_hole(here: Path) -> None:
     ):
         iio.imwrite(name, mask)
         assert main(["complete", "in.png", name, "-o", f"out-{name}", "-q"]) == 0
-        assert Path(f"out-{name}").read_bytes() == Path("out-rgb.png").read_bytes()
+        assert (iio.imread(f"out-{name}") == iio.imread("out-rgb.png")).all()
 
 
 def test_floats_may_be_unknown_in_the_hole(here: Path) -> None:
@@ -117,7 +117,7 @@ def test_floats_may_be_unknown_in_the_hole(here: Path) -> None:
 def test_same_command_same_bytes(here: Path, capsys: Capture) -> None:
     for command in (["tile", "in.png"], ["complete", "in.png", "hole.png"]):
         for count in ("1", "2", "7"):
-            assert main([*command, "-q", "--threads", count, "-o", f"{count}.png"]) == 0
+            assert main([*command, "-q", "--threads", count, "-o", f"{count}.png", "--force"]) == 0
         assert len({Path(f"{count}.png").read_bytes() for count in "127"}) == 1
     assert capsys.readouterr() == ("", "")
 

@@ -67,8 +67,8 @@ def test_holes_are_filled_by_scale(files):
     )
     changed = (io.read(files / "out.png") != floor).any(axis=-1)
     assert changed[hole == 0].any()
-    assert run(files, "complete @clear.png alpha -o @out.png --scale-map @scale.npy -q") == 0
-    assert (io.read(files / "out.png")[..., 3] == 255).all()
+    assert run(files, "complete @clear.png alpha -o @new.png --scale-map @scale.npy -q") == 0
+    assert (io.read(files / "new.png")[..., 3] == 255).all()
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from texrs.cli import main
 Capture = pytest.CaptureFixture[str]
 FLOOR = samples.tilted_discs((96, 128))
 EDITS = [{"op": "magnify", "region": [40, 40, 12], "factor": 2}, {"op": "smooth", "sigma": 3}]
-BEFORE = b"before"
+BEFORE = b""
 
 
 @pytest.fixture
@@ -107,7 +107,7 @@ def test_stages_are_pictures_to_look_at(here: Path, capsys: Capture) -> None:
     # What was done is done again.
     again = ["scale-map", "in.png", "-o", "again.png", "--mask", "mask.png", "--edit", "stages/report.json", "-q"]
     assert main([*again, "--size", "64x64"]) == 0
-    assert Path("again.png").read_bytes() == Path("out.png").read_bytes()
+    assert (iio.imread("again.png") == iio.imread("out.png")).all()
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ VOLUME = samples.stripes((32, 36, 40)).image
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     io.write_volume("v.npy", VOLUME)
-    Path("out.png").write_bytes(b"before")
+    Path("out.png").touch()
     return tmp_path
 
 

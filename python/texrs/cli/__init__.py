@@ -1,14 +1,15 @@
 """The command ``texrs``.
 
 Results go to files and, where they are text, to stdout; progress and errors go to stderr. Exit codes: 0 done,
-1 internal error, 2 bad input or usage, 130 stopped by Ctrl-C. What can be checked is checked before the work begins,
-and files are written whole or not at all, so that a failure leaves what was there.
+1 internal error, 2 bad input or usage, 3 some of a batch failed, 130 stopped by Ctrl-C. What can be checked is checked before
+the work begins, and files are written whole or not at all, so that a failure leaves what was there.
 
 A command is made when it is asked for, so that no other's libraries are loaded.
 """
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any
 
@@ -23,15 +24,17 @@ __all__ = ["main"]
 COMMANDS = {
     "analyse": "Find the elements of a texture, and what belongs to them.",
     "apply": "Make the heights, normals or labels of a result, through its source map.",
+    "batch": "Do a command for many pictures, seeds and presets, and what is not done yet alone.",
     "complete": "Fill a hole in a picture with patches of what is known of it, or of another picture.",
     "database": "Keep analysed textures in a folder: add, list, or splice all with all.",
     "demo": "Write a page that shows what texrs makes, on built-in examples.",
     "design": "Design a texture of any size from one example.",
     "extend": "Make a photograph of a plane larger, on any side, in the same perspective.",
-    "info": "Say what an image or a source map holds.",
+    "info": "Say what a file holds, and how texrs made it.",
     "perspective": "Grow a picture whose elements are as large as a scale map says.",
     "rectify": "Make the flat texture of a plane that was photographed aslant.",
     "remove": "Take something out of a photograph, and fill in the plane behind it in its perspective.",
+    "rerun": "Make a file that texrs wrote again, from the same inputs, and compare.",
     "samples": "List the built-in examples, or write them to a folder.",
     "scale-map": "Make a scale map: how large the elements of a picture are at each place.",
     "self-splice": "Edit the layout of a texture's own elements.",
@@ -58,10 +61,18 @@ def load(name: str) -> Callable[..., None]:
             from texrs.cli import _slices
 
             return _slices.COMMAND
-        case "apply" | "info":
+        case "batch":
+            from texrs.cli import _batch
+
+            return _batch.COMMAND
+        case "apply":
             from texrs.cli import _maps
 
-            return _maps.COMMANDS[name]
+            return _maps.COMMAND
+        case "info" | "rerun":
+            from texrs.cli import _rerun
+
+            return _rerun.COMMANDS[name]
         case "demo" | "samples":
             from texrs.cli import _examples
 
@@ -69,6 +80,25 @@ def load(name: str) -> Callable[..., None]:
     from texrs.cli import _verbs
 
     return _verbs.make_verb(name).make_command()
+
+
+def make_command(name: str) -> Any:
+    """Return a command; one that writes can also be told to replace whatever is there."""
+    from texrs.cli._options import as_command, make_parameter
+    from texrs.cli._outputs import OUTPUTS, Command, Force
+
+    function = work = load(name)
+    parameters = list(inspect.signature(work, eval_str=True).parameters.values())
+    if any(p.name in OUTPUTS for p in parameters):
+
+        def forced(*, force: bool, **given: Any) -> None:
+            # The command itself sees to it, before the work.
+            work(**given)
+
+        function = as_command(forced, [*parameters, make_parameter("force", Force, False)])
+    alone = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+    alone.command(name, cls=Command, help=COMMANDS[name])(function)
+    return typer.main.get_command(alone)
 
 
 class Group(TyperGroup):
@@ -80,13 +110,7 @@ class Group(TyperGroup):
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Make a command; None where there is none of this name."""
-        if cmd_name not in COMMANDS:
-            return None
-        from texrs.cli._outputs import Command
-
-        alone = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-        alone.command(cmd_name, cls=Command, help=COMMANDS[cmd_name])(load(cmd_name))
-        return typer.main.get_command(alone)
+        return make_command(cmd_name) if cmd_name in COMMANDS else None
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """List the commands without making them."""

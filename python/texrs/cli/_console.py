@@ -12,6 +12,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from types import FrameType
 from typing import TYPE_CHECKING, cast
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     # Numpy would come with it.
     from texrs._typing import Progress
 
-DONE, INTERNAL, BAD_INPUT = 0, 1, 2
+DONE, INTERNAL, BAD_INPUT, PARTLY = 0, 1, 2, 3
 """Exit codes; a command that a signal ends has 128 plus the signal's number, so 130 for Ctrl-C."""
 TRACEBACK = "TEXRS_TRACEBACK"
 """Environment variable that asks for the traceback of an internal error."""
@@ -37,6 +38,11 @@ GRACE = 1.0
 UsageFailure = cast(type[Exception], next(c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException"))
 
 
+_HUSHED: ContextVar[bool] = ContextVar("hushed", default=False)
+KEPT: list[str] = []
+"""Files of a batch that are done, which stay when the rest fails."""
+
+
 class Stopped(BaseException):
     """A signal ended the work. No KeyboardInterrupt, from which typer makes an exit of its own."""
 
@@ -46,7 +52,21 @@ class Stopped(BaseException):
 
 
 def run(work: Callable[[], object]) -> int:
-    """Do the work of a command and return its exit code; say on one line of stderr what went wrong."""
+    """Do the work of a command and return its exit code; say on one line of stderr what went wrong, and on one what is done."""
+    KEPT.clear()
+    code = _run(work)
+    if code not in (DONE, PARTLY) and KEPT:
+        names = ", ".join(KEPT[:8]) + (f" and {len(KEPT) - 8} more" if len(KEPT) > 8 else "")
+        complain(f"what was done is kept: {names}")
+    return code
+
+
+def keep(path: str) -> None:
+    """Tell that a file of a batch is done."""
+    KEPT.append(path)
+
+
+def _run(work: Callable[[], object]) -> int:
     try:
         with raise_on_signals(), silence_warnings():
             code = work()
@@ -92,9 +112,19 @@ def say(line: str) -> None:
         raise Stopped(PIPE) from None
 
 
+@contextmanager
+def hush() -> Iterator[None]:
+    """Let commands within not say what they did: they work for another."""
+    token = _HUSHED.set(True)
+    try:
+        yield
+    finally:
+        _HUSHED.reset(token)
+
+
 def note(line: str, *, quiet: bool) -> None:
     """Print what was done, unless nobody wants to know."""
-    if not quiet:
+    if not quiet and not _HUSHED.get():
         complain(line)
 
 

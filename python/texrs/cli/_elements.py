@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
+import shutil
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 from texrs import io
 from texrs._threads import threads
-from texrs.cli import _outputs
-from texrs.cli._console import complain, note, say, show_progress
+from texrs.cli import _outputs, _provenance
+from texrs.cli._console import complain, keep, note, say, show_progress
 from texrs.cli._kinds import PICTURE, PLACE, Kind, read_picture
 from texrs.cli._options import Option, Options, check_needed, take_options
 from texrs.cli._outputs import SAMPLE, Quiet, Threads, make_argument, make_option, name_arguments, to_write
+from texrs.cli._provenance import RUNNING, check_free
 from texrs.database import TextureDatabase
 from texrs.elements import analyse, pictures
 from texrs.elements import page as draw_page
@@ -57,23 +62,24 @@ def analyse_command(
     _outputs.check_suffix("out", out)
     _outputs.check_output(out)
     if stages is not None:
-        _outputs.check_folder(stages)
+        _outputs.check_stages(stages)
     if page is not None:
         _outputs.check_outputs({"out": out, "page": page})
-        _outputs.check_output(page)
+        _outputs.check_output(page, option="page")
     options |= PICTURED.read(given, which=lambda o: o.file)
     names = {o.path[-1]: o.flag for o in PICTURED} | {"image": given["image"], "count": "--threads"}
     with name_arguments(**names), threads(count), show_progress(quiet=quiet) as progress:
         entry = analyse(**PICTURED.call(options), progress=progress)
         if given["similarity"]:
             entry = entry.with_similarity()
-    entry.save(out)
+    with _outputs.write_output(out) as temporary:
+        entry.save(temporary)
     if stages is not None:
-        os.makedirs(stages, exist_ok=True)
-        for name, picture in pictures(entry).items():
-            io.write(os.path.join(stages, f"{name}.png"), picture)
+        with _outputs.write_folder(stages, "stages") as pictured:
+            for name, picture in pictures(entry).items():
+                io.write(pictured / f"{name}.png", picture)
     if page is not None:
-        with _outputs.write_output(page) as temporary:
+        with _outputs.write_output(page, "page") as temporary:
             temporary.write_text(draw_page(entry, Path(given["image"]).name), encoding="utf-8")
     explain(entry, quiet=quiet)
     note(f"wrote {out}: {len(entry.points)} elements, {entry.layout}, in {time.monotonic() - start:.1f} s", quiet=quiet)
@@ -140,25 +146,43 @@ def write_splices(
         raise InvalidInput(f"--out: {action} needs the name of an image file")
     if action == "splice" and len(names) != 2:
         raise InvalidInput(f"NAME: splice needs two names, of elements and of a layout; got {len(names)}")
+    records = {record.name: record for record in textures.list()}
+    files = {name: os.path.join(textures.path, record.file) for name, record in records.items()}
+    # What is named is in the folder, whatever else has that name.
+    running = RUNNING.get()
+    if running is not None:
+        running.files = {}
+    _provenance.add_inputs(*(files[n] for n in (names or sorted(files)) if n in files))
     kept = [os.path.join(textures.path, file) for record in textures.list() for file in (record.file, record.image)]
     _outputs.check_apart(kept, {"out": out})
     _outputs.check_output(out)
+    options = SPLICED.call(SPLICED.read(given))
+    chosen = {"rows": names or None, "columns": names or None} | MATRIX.call(MATRIX.read(given))
+    several = dict.fromkeys(("--rows", "--columns", "--cell"))
+
+    def alone(a: str, b: str) -> _provenance.Record | None:
+        """Return how one of all is made."""
+        known = [files[n] for n in (a, b) if n in files]
+        return _provenance.narrow([str(textures.path), "splice", a, b], several, files=known)
+
     if each is not None:
         _outputs.check_folder(each)
         os.makedirs(each, exist_ok=True)
-    options = SPLICED.call(SPLICED.read(given))
+        for a, b in itertools.product(chosen["rows"] or files, chosen["columns"] or files):
+            with _provenance.record(alone(a, b)):
+                check_free(os.path.join(each, f"{a}-on-{b}.png"), "each")
     with name_arguments(name="NAME", count="--threads"), threads(count), show_progress(quiet=quiet) as progress:
         if action == "splice":
             _outputs.deliver(textures.splice(names[0], names[1], **options, progress=progress), {"out": out})
             note(f"wrote {out}: {names[0]} on {names[1]}", quiet=quiet)
             return
-        chosen = {"rows": names or None, "columns": names or None} | MATRIX.call(MATRIX.read(given))
 
         def write(a: str, b: str, result: Synthesis) -> None:
             if each is not None:
                 place = os.path.join(each, f"{a}-on-{b}.png")
                 _outputs.check_apart(kept, {"each": place})
-                _outputs.deliver(result, {"out": place})
+                _outputs.deliver(result, {"out": place}, made=alone(a, b))
+                keep(place)
 
         made = textures.matrix(**chosen, **options, each=write, progress=progress)
     for (a, b), reason in made.failed.items():
@@ -189,8 +213,21 @@ def add(folder: str, items: Sequence[str], given: dict[str, Any], count: int | N
         name = given["name"] or (image.removeprefix(SAMPLE) if sample else None)
         with name_arguments(image=image, count="--threads"), threads(count), show_progress(quiet=quiet) as progress:
             entry = textures.add(read_picture(image) if sample else image, name, **options, progress=progress)
+        with suppress(FileError):
+            sign(os.path.join(folder, f"{name or Path(image).stem}.npz"), image)
+        keep(image)
         explain(entry, quiet=quiet)
         note(f"added {image}: {len(entry.points)} elements, {entry.layout}", quiet=quiet)
+
+
+def sign(path: str, image: str) -> None:
+    """Let an entry of a database say how it was made."""
+    made = _provenance.narrow([None, "add", image], {"--name": Path(path).stem, "--replace": None})
+    with (
+        _provenance.record(made and replace(made, force=True)),
+        _outputs.write_output(path, "DIR", inside=True) as place,
+    ):
+        shutil.copyfile(path, place)
 
 
 def explain(entry: Any, *, quiet: bool) -> None:

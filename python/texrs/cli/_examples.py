@@ -6,15 +6,17 @@ import os
 import re
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 from texrs import io, samples
 from texrs._threads import threads
-from texrs.cli import _outputs
+from texrs.cli import _outputs, _provenance
 from texrs.cli._console import note, say, show_progress
 from texrs.cli._kinds import parse_size
 from texrs.cli._outputs import Quiet, Threads, describe, make_argument, make_option, name_arguments, to_write
+from texrs.cli._provenance import check_free
 from texrs.errors import InvalidInput
 
 
@@ -33,7 +35,7 @@ def demo_command(
     with name_arguments(count="--threads"), threads(count), show_progress(quiet=quiet) as progress:
         text = page(progress=progress)
     Path(out).mkdir(parents=True, exist_ok=True)
-    with _outputs.write_output(index) as temporary:
+    with _outputs.write_output(index, inside=True) as temporary:
         temporary.write_text(text, encoding="utf-8")
     note(f"wrote {index}, in {time.monotonic() - start:.1f} s", quiet=quiet)
 
@@ -56,6 +58,11 @@ def samples_command(
             say(name)
         return
     _outputs.check_folder(out)
+    records = {name: replace(record, files={}) if (record := _provenance.narrow([name])) else None for name in chosen}
+    for name in chosen:
+        with _provenance.record(records[name]):
+            check_free(os.path.join(out, f"{name}.png"))
+            check_free(os.path.join(out, f"{name}.tif"))
     made = {}
     for name in chosen:
         options: dict[str, Any] = {} if seed is None else {"seed": seed}
@@ -67,7 +74,8 @@ def samples_command(
     for name, image in made.items():
         volume = image.ndim == 4
         path = os.path.join(out, f"{name}.{'tif' if volume else 'png'}")
-        (io.write_volume if volume else io.write)(path, image)
+        with _outputs.write_output(path, inside=True, made=records[name]) as temporary:
+            (io.write_volume if volume else io.write)(temporary, image)
         note(f"wrote {path}: {describe(image, 3 if volume else 2)}", quiet=quiet)
 
 

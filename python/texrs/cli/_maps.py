@@ -1,9 +1,9 @@
-"""Commands about source maps: ``texrs apply`` and ``texrs info``."""
+"""The command that makes other maps of a result: ``texrs apply``."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -13,11 +13,12 @@ from texrs import io
 from texrs._arrays import as_float
 from texrs._threads import threads
 from texrs.blending import apply
-from texrs.cli import _outputs
-from texrs.cli._console import note, say
+from texrs.cli import _outputs, _provenance
+from texrs.cli._console import note
 from texrs.cli._options import Options, take_options
 from texrs.cli._outputs import Quiet, Threads, describe, make_argument, name_arguments, to_write
-from texrs.errors import FileError, InvalidInput
+from texrs.cli._provenance import check_free
+from texrs.errors import InvalidInput
 from texrs.source_map import Finish, SourceMap
 
 APPLIED = Options(
@@ -51,15 +52,21 @@ def apply_command(
         raise InvalidInput("--blend: is for pictures; the source map is that of a volume")
     groups = group(maps, len(places.shapes))
     targets = name_targets(groups, out, [source, *maps])
+    records = [_provenance.narrow([source, *paths]) for paths in groups]
+    for target, made in zip(targets, records, strict=True):
+        with _provenance.record(made):
+            check_free(target)
     read = io.read if places.axes == 2 else io.read_volume
     write = io.write if places.axes == 2 else io.write_volume
     finish = change_finish(places, values | APPLIED.read(given, which=lambda o: o.file))
     # All results or none take their names, at the end.
     with ExitStack() as stack, threads(count):
-        for paths, target in zip(groups, targets, strict=True):
+        for paths, target, made in zip(groups, targets, records, strict=True):
             images = [read(path) for path in paths]
             _outputs.check_output(target, images[0], places.shape)
-            temporary = stack.enter_context(_outputs.write_output(target))
+            channels = images[0].shape[places.axes] if images[0].ndim > places.axes else 1
+            like = replace(io.read_notes(paths[0]).fit(channels), made=None)
+            temporary = stack.enter_context(_outputs.write_output(target, like=like, made=made))
             with name_arguments(**APPLIED.name_values(given), exemplars=" and ".join(paths)):
                 image = apply(
                     places, images, finish=finish, **{path[0]: v for path, v in values.items() if len(path) == 1}
@@ -75,21 +82,6 @@ def change_finish(places: SourceMap, values: Mapping[tuple[str, ...], Any]) -> F
     if "screening" in fields:
         fields["screening"] = as_float(fields["screening"], "--blend", 0, 1e6) or None
     return replace(known, **fields)
-
-
-def info_command(file: Annotated[str, make_argument("FILE", "An image or a source map.")]) -> None:
-    """Print what an image or a source map holds."""
-    try:
-        places = SourceMap.load(file)
-    except FileError:
-        image = io.read(file)
-        say(f"image: {describe(image, 2)}, {image.min()} to {image.max()}")
-        return
-    reuse = places.reuse()
-    shapes = " and ".join(" x ".join(map(str, shape)) for shape in places.shapes)
-    say(f"source map: {' x '.join(map(str, places.shape))}, made from {shapes}")
-    say(f"copied unchanged: {reuse.verbatim:.1%} of the pixels, in {reuse.regions} regions")
-    say(f"largest region: {reuse.largest:.1%} of the example")
 
 
 def group(maps: Sequence[str], count: int) -> list[list[str]]:
@@ -115,4 +107,4 @@ def name_targets(groups: Sequence[Sequence[str]], out: str, inputs: Sequence[str
     return targets
 
 
-COMMANDS: dict[str, Callable[..., None]] = {"apply": apply_command, "info": info_command}
+COMMAND = apply_command

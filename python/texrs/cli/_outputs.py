@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import re
-import stat
+import shutil
+import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,7 +19,10 @@ from typer.core import TyperCommand
 from texrs import io
 from texrs._arrays import as_list
 from texrs._typing import Array
+from texrs.cli import _provenance
+from texrs.cli._provenance import RUNNING, check_free, read_status
 from texrs.errors import FileError, InvalidInput, TexrsError
+from texrs.io._annotation import name_sidecar, needs_sidecar
 from texrs.synthesis import Synthesis
 
 SAMPLE = "sample:"
@@ -31,6 +36,7 @@ OUTPUTS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "out": (("--out", "-o"), "OUT", "File to write; its name says the format."),
     "map": (("--map",), "OUT.npz", "File for the source map, for texrs apply."),
     "stages": (("--stages",), "DIR", "Folder for pictures of the stages and report.json."),
+    "sheet": (("--sheet",), "OUT.png", "Contact sheet of all results."),
     "page": (("--page",), "OUT.html", "Page that shows what was found, to be corrected by clicking."),
 }
 """All options that say what is written: what the shell calls them, what they are, and what they are for."""
@@ -38,6 +44,12 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no progress.")
 Threads = Annotated[
     int | None,
     typer.Option("--threads", metavar="N", help="Threads, 1 to 1024; same bytes with any.", show_default="all cores"),
+]
+
+
+Force = Annotated[
+    bool,
+    typer.Option("--force", help="Replace files even if another command, other arguments or somebody else made them."),
 ]
 
 
@@ -61,12 +73,14 @@ class Command(TyperCommand):
     """A command that never writes over what it reads: whatever names a file and is no output may be read."""
 
     def invoke(self, ctx: Any) -> Any:
-        """Do the command, if no output is an input."""
+        """Do the command, if no output is an input; what it writes says how it was made."""
         outputs = {p.name for p in self.params if p.name in OUTPUTS and p.param_type_name == "option"}
+        force = ctx.params.get("force", False)
         given = ctx.params.items()
         inputs = [text for name, value in given if name not in outputs for text in find_texts(value)]
         check_apart(inputs, {name: value for name, value in given if name in outputs})
-        return super().invoke(ctx)
+        with _provenance.record(_provenance.make_record(self, ctx.params, force=force) if outputs else None):
+            return super().invoke(ctx)
 
 
 def find_texts(value: object) -> list[str]:
@@ -87,9 +101,9 @@ def check_outputs(paths: Mapping[str, str | None]) -> None:
                 raise InvalidInput(f"--{option}: {path} is already the file of --{other}")
     if (source := paths.get("map")) is not None:
         check_suffix("map", source)
-        check_output(source)
+        check_output(source, option="map")
     if (stages := paths.get("stages")) is not None:
-        check_folder(stages)
+        check_stages(stages)
 
 
 def check_suffix(option: str, path: str) -> None:
@@ -111,43 +125,46 @@ def check_folder(path: str) -> None:
         raise FileError(f"{path}: the folder {there} cannot be written to")
 
 
+def check_stages(folder: str) -> None:
+    """Check that pictures of the stages can be written to a folder, and take the place of none but their like."""
+    check_folder(folder)
+    for file in list_stages(folder):
+        check_free(file, "stages")
+
+
+def list_stages(folder: str) -> list[str]:
+    """Return what pictures of the stages may replace in a folder."""
+    there = sorted(os.listdir(folder)) if os.path.isdir(folder) else []
+    return [os.path.join(folder, name) for name in there if STAGE.fullmatch(name)]
+
+
 def check_apart(inputs: Iterable[str], outputs: Mapping[str, str | None]) -> None:
     """Check that no output is an input, under whatever name, nor what the pictures of the stages would replace."""
-    found = [(name, status) for name in inputs if (status := _read_status(name)) is not None]
+    found = [(name, status) for name in inputs if (status := read_status(name)) is not None]
     for option, path in outputs.items():
         if path is None:
             continue
-        files = [path]
-        if option == "stages":
-            there = sorted(os.listdir(path)) if os.path.isdir(path) else []
-            files = [os.path.join(path, name) for name in there if STAGE.fullmatch(name)]
+        files = list_stages(path) if option == "stages" else [path]
+        if option != "stages" and path and "\0" not in path and needs_sidecar(real := Path(os.path.realpath(path))):
+            files.append(str(name_sidecar(real)))
         for file in files:
-            old = _read_status(file)
+            old = read_status(file)
             for name, status in found:
                 if old is not None and os.path.samestat(old, status):
                     known = "" if name == file else f" as {name}"
                     raise InvalidInput(f"--{option}: {file} is read{known}, and would be lost; write to another file")
 
 
-def _read_status(path: str) -> os.stat_result | None:
-    """Return the status of the regular file that a path leads to, if there is one."""
-    with suppress(OSError, ValueError):
-        status = os.stat(path)
-        if stat.S_ISREG(status.st_mode):
-            return status
-    return None
-
-
 class _Enough(Exception):
     """What there was to try out worked."""
 
 
-def check_output(path: str, like: Array | None = None, size: tuple[int, ...] = (1, 1)) -> None:
+def check_output(path: str, like: Array | None = None, size: tuple[int, ...] = (1, 1), *, option: str = "out") -> None:
     """Try whether an image of the dtype and channels of ``like`` can be written; leave no trace of it.
 
-    Without ``like``, only whether a file can be.
+    Without ``like``, only whether a file can be. What is there must be the command's own, unless all may be replaced.
     """
-    with suppress(_Enough), write_output(path) as temporary:
+    with suppress(_Enough), write_output(path, option) as temporary:
         if like is None:
             temporary.touch()
         else:
@@ -165,16 +182,52 @@ def check_output(path: str, like: Array | None = None, size: tuple[int, ...] = (
 
 
 @contextmanager
-def write_output(path: str) -> Iterator[Path]:
-    """Return a temporary name that takes the place of ``path`` at the end; errors speak of ``path``."""
+def write_output(
+    path: str,
+    option: str = "out",
+    *,
+    inside: bool = False,
+    like: io.Notes | None = None,
+    suffix: str = "",
+    made: _provenance.Record | None = None,
+) -> Iterator[Path]:
+    """Return a temporary name that takes the place of ``path`` at the end; errors speak of ``path``.
+
+    The file says how it was made: as the command was asked for, or as ``made`` has it. ``inside`` tells that the option names
+    its folder. ``like`` is what the picture that it was made from says of its colours.
+    """
     with io.atomic(path) as temporary:
+        check_free(path, option)
         try:
             yield temporary
+            running = made or RUNNING.get()
+            notes = like or io.Notes()
+            if running is not None:
+                notes = replace(notes, made=running.tell(path, output=option, inside=inside, suffix=suffix))
+            io.annotate(temporary, notes, os.path.realpath(path))
         except TexrsError as error:
             message = str(error).replace(str(temporary), path)
             if message.startswith("array:"):
                 message = path + message.removeprefix("array")
             raise type(error)(message) from None
+
+
+@contextmanager
+def write_folder(path: str, option: str, *, suffix: str = "", made: _provenance.Record | None = None) -> Iterator[Path]:
+    """Return a temporary folder whose files go to the folder ``path`` at the end; each says how it was made."""
+    os.makedirs(path, exist_ok=True)
+    temporary = Path(tempfile.mkdtemp(prefix=".texrs-", dir=path))
+    try:
+        yield temporary
+        running = made or RUNNING.get()
+        for file in sorted(temporary.iterdir()):
+            target = os.path.join(path, file.name)
+            check_free(target, option)
+            if running is not None:
+                io.annotate(file, io.Notes(made=running.tell(target, output=option, inside=True, suffix=suffix)))
+            os.replace(file, target)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
 
 
 @contextmanager
@@ -192,15 +245,28 @@ def name_arguments(**names: str) -> Iterator[None]:
         raise type(error)(f"{names.get(argument, '--' + argument.replace('_', '-'))}:{rest}") from None
 
 
-def deliver(result: Synthesis, paths: Mapping[str, str | None]) -> None:
-    """Write a result and what was asked for beside it."""
+def deliver(
+    result: Synthesis,
+    paths: Mapping[str, str | None],
+    *,
+    like: io.Notes | None = None,
+    made: _provenance.Record | None = None,
+    option: str = "out",
+) -> None:
+    """Write a result and what was asked for beside it; its colours are those of a picture that says ``like`` of them."""
+    out = paths["out"] or ""
+    image, axes = np.asarray(result.image), result.source.axes
+    suffix = Path(out).suffix
+    known = None if like is None else like.fit(image.shape[axes] if image.ndim > axes else 1)
     # The result takes its name last, when all else is written.
-    with write_output(paths["out"] or "") as temporary:
-        (io.write if result.source.axes == 2 else io.write_volume)(temporary, result.image)
+    with write_output(out, option, inside=option != "out", like=known, made=made) as temporary:
+        (io.write if axes == 2 else io.write_volume)(temporary, result.image)
         if (source := paths.get("map")) is not None:
-            result.source.save(source)
+            with write_output(source, "map", suffix=suffix, made=made) as place:
+                result.source.save(place)
         if (stages := paths.get("stages")) is not None:
-            result.save_stages(stages)
+            with write_folder(stages, "stages", suffix=suffix, made=made) as folder:
+                result.save_stages(folder)
 
 
 def name_variants(seed: int, paths: Mapping[str, str | None]) -> dict[str, str | None]:

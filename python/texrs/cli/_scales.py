@@ -74,7 +74,7 @@ def scale_map_command(
         for key, value in each.read(given).items()
     }
     if stages is not None:
-        _outputs.check_folder(stages)
+        _outputs.check_stages(stages)
     pixels = read_picture(image)
     encoding = given["encoding"]
     levels: Any = encoding or ("log2" if Path(out).suffix.lower() not in FLOATS else None)
@@ -116,7 +116,8 @@ def scale_map_command(
             report = said | {name: value for name, value in inputs.items() if value is not None}
             report |= {"edit": asked["steps",]} if ("steps",) in asked else {}
             report |= {} if kind is None else {"kind": kind}
-            save(shown, {**report, "size": made.shape, "least": least, "largest": largest}, stages)
+            with _outputs.write_folder(stages, "stages", suffix=Path(out).suffix) as folder:
+                save(shown, {**report, "size": made.shape, "least": least, "largest": largest}, folder)
     extent, seconds = " x ".join(map(str, made.shape)), time.monotonic() - start
     what = {None: "scales", "width": "widths", "area": "roots of areas"}[kind]
     if narrow:
@@ -138,9 +139,8 @@ def check_same_size(mask: Array, pixels: Array, option: str) -> Array:
     return mask
 
 
-def save(shown: dict[str, Array], report: dict[str, Any], folder: str) -> None:
+def save(shown: dict[str, Array], report: dict[str, Any], folder: Path) -> None:
     """Write the pictures of the stages, and a report."""
-    Path(folder).mkdir(parents=True, exist_ok=True)
     for number, (name, picture) in enumerate(shown.items(), start=1):
         io.write(os.path.join(folder, f"{number:02d}-{name}.png"), preview(picture))
     with io.atomic(os.path.join(folder, "report.json")) as temporary:

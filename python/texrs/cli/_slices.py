@@ -105,8 +105,8 @@ def slice_command(
         _outputs.check_output(out, voxels[0])
     with name_arguments(volume=volume, point="--oblique", normal="--oblique", count="--threads"), threads(count):
         if as_turntable:
-            with show_progress(quiet=quiet) as progress:
-                turntable(voxels, out, **options, progress=progress)
+            with show_progress(quiet=quiet) as progress, _outputs.write_output(out) as temporary:
+                turntable(voxels, temporary, **options, progress=progress)
             note(f"wrote {out}: {given['frames']} pictures, in {time.monotonic() - start:.1f} s", quiet=quiet)
             return
         picture = draw(voxels, used, options)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -15,8 +16,8 @@ from texrs import io
 from texrs._arrays import as_int
 from texrs._threads import threads
 from texrs._typing import Array
-from texrs.cli import _outputs
-from texrs.cli._console import note, show_progress
+from texrs.cli import _outputs, _provenance
+from texrs.cli._console import keep, note, show_progress
 from texrs.cli._kinds import (
     CORNERS,
     DIRECTION,
@@ -39,6 +40,7 @@ from texrs.cli._kinds import (
 )
 from texrs.cli._options import Options, as_command, make_parameter
 from texrs.cli._outputs import Quiet, Threads, describe, name_arguments, to_write
+from texrs.cli._provenance import check_free
 from texrs.errors import InvalidInput
 from texrs.synthesis import Synthesis
 
@@ -60,6 +62,8 @@ class Verb:
     """The function that makes ``count`` of them."""
     says: Callable[[Synthesis], str] = lambda result: ""
     """What else is to be said of the result."""
+    scaled: bool = True
+    """Whether a pixel of the result is as large as one of the first input."""
     knows: Callable[[Mapping[str, Any]], Mapping[tuple[str, ...], Any]] = lambda given: {}
     """Values that the texts of the options tell, where they are not given."""
 
@@ -81,15 +85,17 @@ class Verb:
         paths: dict[str, str | None] = {name: given.pop(name, None) for name in _outputs.OUTPUTS}
         out = paths["out"] or ""
         values = options.read(given, which=lambda o: not o.file)
-        _outputs.check_outputs(paths)
         places = [paths]
         if variants is not None:
             first, texts = given["seed"], [text for value in given.values() for text in _outputs.find_texts(value)]
             places = [_outputs.name_variants(first + k, paths) for k in range(as_int(variants, "--variants", 1, 4096))]
             for each in places:
                 _outputs.check_apart(texts, each)
+                check_free(each["out"] or "")
+        for each in places:
+            _outputs.check_outputs(each)
         values |= options.read(given, which=lambda o: o.file and (o.argument or o.name == self.shape))
-        example = self.find_example(values)
+        example, like = self.find_example(values), self.read_colours(given)
         size = self.find_size(values, example)
         _outputs.check_output(out, example, size)
         about = About(axes=options.axes, size=size, like=example)
@@ -107,16 +113,19 @@ class Verb:
                 call["size"] = size
             if variants is None or self.several is None:
                 made = options.function(**call, progress=progress)
-                _outputs.deliver(made, paths)
+                _outputs.deliver(made, paths, like=like)
             else:
-                for each, made in zip(places, self.several(count=variants, **call, progress=progress), strict=True):
-                    _outputs.deliver(made, each)
+                several = self.several(count=variants, **call, progress=progress)
+                for seed, each, made in zip(itertools.count(given["seed"]), places, several, strict=False):
+                    alone = {"--variants": None, "--seed": str(seed) if seed else None}
+                    _outputs.deliver(made, each, like=like, made=_provenance.narrow(options=alone, seed=seed))
+                    keep(each["out"] or "")
                     small.append(_outputs.shrink(made.image))
         for warning in said:
             if issubclass(warning.category, UserWarning):
                 note(str(warning.message), quiet=quiet)
         if small:
-            with _outputs.write_output(out) as temporary:
+            with _outputs.write_output(out, like=like) as temporary:
                 io.write(temporary, _outputs.make_contact_sheet(small))
         assert made is not None
         many = f"{len(small)} textures and their contact sheet, each " if small else ""
@@ -129,6 +138,13 @@ class Verb:
         first = first[0] if isinstance(first, list) else first
         # Analysed elements hold theirs.
         return np.asarray(getattr(first, "image", first))
+
+    def read_colours(self, given: Mapping[str, Any]) -> io.Notes:
+        """Return what the first input says of its colours, which are those of the result, and of its pixels."""
+        first = given[next(o.name for o in self.options if o.argument)]
+        name = first[0] if isinstance(first, list) else first
+        notes = io.Notes() if name.startswith(_outputs.SAMPLE) else io.read_notes(name)
+        return replace(notes, made=None, density=notes.density if self.scaled else None)
 
     def find_size(self, values: Mapping[tuple[str, ...], Any], example: Array) -> tuple[int, ...]:
         """Return about how large the result will be."""
@@ -185,7 +201,7 @@ def make_verb(name: str) -> Verb:
         case "rectify":
             from texrs.rectification import rectify
 
-            return _see(rectify)
+            return replace(_see(rectify), scaled=False)
         case "extend":
             from texrs.extension import extend
 

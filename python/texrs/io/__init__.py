@@ -14,12 +14,12 @@ Suffix                dtypes                                      Channels   Los
 ``.nrrd`` [2]_        bool, (u)int8/16/32/64, float32/64          1 to 64    nothing
 ``.nii`` [2]_         bool, (u)int8/16/32/64, float32/64          1 to 64    nothing
 ``.nii.gz`` [2]_      the same                                    1 to 64    nothing
-``.vti`` [3]_         bool, (u)int8/16/32/64, float32/64          1 to 64    not read
+``.vti`` [3]_         bool, (u)int8/16/32/64, float32/64          1 to 64    nothing
 ===================== =========================================== ========== ====================
 
 .. [1] of the largest channel of each pixel, with which the three share an exponent.
 .. [2] volumes alone; needs the extra: ``pip install texrs[vol]``.
-.. [3] volumes alone, for ParaView.
+.. [3] volumes alone, for ParaView; read as it is written here.
 
 Volumes are written to ``.tif``, ``.tiff``, ``.npy``, ``.npz`` and to the last four, which also keep
 the distances between voxels. What is (plane, row, column) here is z, y, x there, and x runs fastest
@@ -30,7 +30,8 @@ channel is read without a channel axis (from ``.npy`` and ``.npz`` as it was wri
 files have the key ``image``.
 
 Files are recognised by their content when read and by their suffix when written. Headers are
-compared with the limit before memory is used. All files are written to a temporary name and
+compared with the limit before memory is used. What a file says beside its values, as ICC profiles, densities and
+how texrs made it, is read by `read_notes` and written by `annotate`. All files are written to a temporary name and
 renamed. What goes wrong is a `texrs.errors.FileError`, `~texrs.errors.LimitExceeded` or
 `~texrs.errors.InvalidInput`.
 """
@@ -49,16 +50,21 @@ from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput
 from texrs.io import _descriptions, _files, _image_io, _npy, _pillow, _slabs, _tiff, _volumes
+from texrs.io._annotation import annotate, read_notes
 from texrs.io._files import atomic
 from texrs.io._formats import FORMATS, VOLUMES, as_spacing, check, detect_kind
+from texrs.io._notes import Notes
 from texrs.io._npy import read_arrays
 
 __all__ = [
+    "Notes",
+    "annotate",
     "atomic",
     "read",
     "read_arrays",
     "read_description",
     "read_fov",
+    "read_notes",
     "read_volume",
     "write",
     "write_slabs",
@@ -194,8 +200,8 @@ def read_volume(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
     Parameters
     ----------
     path : path_like
-        A TIFF stack (a single image is a volume of one plane), .npy, .npz, NRRD or NIfTI (with the extra ``vol``),
-        whichever its content says it is. A NIfTI file that scales its samples gives float32.
+        A TIFF stack (a single image is a volume of one plane), .npy, .npz, .vti, NRRD or NIfTI (these with the extra
+        ``vol``), whichever its content says it is. A NIfTI file that scales its samples gives float32.
     limit : int
         Voxels that the volume may have, and a sixteenth of the bytes.
 
@@ -229,11 +235,13 @@ def read_volume(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
         return _tiff.take_volume(name, planes, orientation)
     if kind == "nrrd":
         return _volumes.read_nrrd(name, limit)
+    if kind == "vti":
+        return _volumes.read_vti(name, limit)
     if kind in ("nii", "nii.gz"):
         return _volumes.read_nifti(name, limit, compressed=kind == "nii.gz")
     if kind not in ("npy", "npz"):
         raise FileError(
-            f"{name}: is a {kind} file, which holds one image; volumes are read from TIFF, .npy, .npz, NRRD and NIfTI"
+            f"{name}: is a {kind} file, which holds one image; volumes are read from TIFF, .npy, .npz, .vti, NRRD and NIfTI"
         )
     return _read_numpy(name, kind, limit, 3)
 

@@ -30,13 +30,14 @@ MAGIC = (
     (b"PK\x03\x04", "npz"),
     (_volumes.NRRD_MAGIC, "nrrd"),
     (_volumes.GZIP_MAGIC, "nii.gz"),
+    (_volumes.VTI_MAGIC, "vti"),
     *((magic, "nii") for magic in _volumes.NIFTI_MAGIC),
 )
 
 _NUMBERS = frozenset(np.dtype(kind) for kind in ("?", "u1", "i1", "u2", "i2", "u4", "i4", "f2", "f4", "f8"))
 _SMALL = frozenset({np.dtype(np.bool_), np.dtype(np.uint8)})
 _MOST_CHANNELS = 64
-VOLUMES = ("nrrd", "nii", "nii.gz")
+VOLUMES = ("nrrd", "nii", "nii.gz", "vti")
 UNIT = (1.0, 1.0, 1.0)
 
 
@@ -83,14 +84,14 @@ def detect_kind(path: Path) -> str:
     """Return which format a file has, by its content."""
     _files.check_file(path)
     with _files.translate_errors(path, "reading"), path.open("rb") as file:
-        start = file.read(16)
+        start = file.read(40)
     for magic, kind in MAGIC:
         if start.startswith(magic):
             return kind
     if start.startswith(b"RIFF") and start[8:12] == b"WEBP":
         return "webp"
     raise FileError(
-        f"{path}: its content is none of PNG, TIFF, EXR, HDR, WebP, JPEG, GIF, BMP, .npy, .npz, NRRD, NIfTI"
+        f"{path}: its content is none of PNG, TIFF, EXR, HDR, WebP, JPEG, GIF, BMP, .npy, .npz, NRRD, NIfTI, .vti"
     )
 
 

@@ -17,6 +17,7 @@ from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, LimitExceeded
 from texrs.io._files import BYTES_PER_PIXEL, as_path, check_file, describe_error, translate_errors
+from texrs.io._texts import MEMBER
 
 MAGIC = b"\x93NUMPY"
 
@@ -86,6 +87,8 @@ def read_arrays(path: PathLike, *, limit: int = MAX_PIXELS) -> dict[str, Array]:
         with zipfile.ZipFile(file) as archive:
             arrays = {}
             for member in archive.infolist():
+                if member.filename == MEMBER:
+                    continue
                 with archive.open(member) as stream:
                     array = _read_array(place, cast(BinaryIO, stream), member.file_size, limit)
                     arrays[member.filename.removesuffix(".npy")] = array

@@ -11,6 +11,7 @@ from __future__ import annotations
 import base64
 import gzip
 import io
+import re
 import warnings
 import zlib
 from collections.abc import Sequence
@@ -25,6 +26,7 @@ from texrs._typing import Array
 from texrs.errors import FileError
 from texrs.io._files import check_file, check_size, translate_errors
 
+VTI_MAGIC = b'<?xml version="1.0"?>\n<VTKFile'
 NRRD_MAGIC = b"NRRD000"
 GZIP_MAGIC = b"\x1f\x8b"
 NIFTI_MAGIC = (b"\x5c\x01\0\0", b"\0\0\x01\x5c", b"\x1c\x02\0\0", b"\0\0\x02\x1c")
@@ -51,6 +53,13 @@ _NRRD_TYPES = {
     for name in names.split(", ")
 }
 _VTI_TYPES = {"u": "UInt", "i": "Int", "f": "Float"}
+_VTI_KINDS = {"UInt": "u", "Int": "i", "Float": "f"}
+_VTI = re.compile(
+    r'byte_order="LittleEndian" header_type="UInt64">\s*<ImageData WholeExtent="(?P<extent>0 \d{1,9} 0 \d{1,9} 0 \d{1,9})"'
+    r'.*<DataArray type="(?P<kind>UInt|Int|Float)(?P<bits>8|16|32|64)"[^>]* NumberOfComponents="(?P<channels>\d{1,5})" '
+    r'format="appended" offset="0"/>',
+    re.DOTALL,
+)
 _FIRST = 3 * 2**20 - 8
 _STL_TITLE = b"texrs".ljust(80)
 
@@ -229,6 +238,35 @@ def write_vti(path: Path, volume: Array, spacing: Sequence[float]) -> None:
         for start in range(_FIRST, len(data), 3 * 2**20):
             file.write(base64.b64encode(data[start : start + 3 * 2**20]))
         file.write(b"\n</AppendedData>\n</VTKFile>\n")
+
+
+def read_vti(path: Path, limit: int) -> Array:
+    """Read the image data that `write_vti` writes: one array of points, in base64 at the end."""
+    length = check_file(path)
+    with translate_errors(path, "reading"), path.open("rb") as file:
+        start = file.read(_LONGEST_HEADER)
+        mark = b'<AppendedData encoding="base64">\n_'
+        end = start.find(mark)
+        found = _VTI.search(start[:end].decode("latin-1")) if end >= 0 else None
+        if found is None:
+            raise FileError(f"{path}: is no image data with one array of points in base64, as texrs writes it")
+        sizes = [int(n) + 1 for n in found["extent"].split()[1::2]]
+        channels = int(found["channels"])
+        dtype = np.dtype(f"<{_VTI_KINDS[found['kind']]}{int(found['bits']) // 8}")
+        _check_sides(path, [*sizes, channels])
+        check_size(path, tuple(sizes[::-1]), channels, dtype.itemsize, limit)
+        size = prod(sizes) * channels * dtype.itemsize
+        file.seek(end + len(mark))
+        if length - file.tell() < (size + 8) * 4 // 3:
+            raise FileError(f"{path}: is cut off; not all of its samples are there")
+        out, filled = bytearray(size + 8), 0
+        while filled < size + 8:
+            part = base64.b64decode(file.read(min(2**22, -(-(size + 8 - filled) // 3) * 4)), validate=True)
+            out[filled : filled + len(part)] = part
+            filled += len(part)
+        if int.from_bytes(out[:8], "little") != size:
+            raise FileError(f"{path}: says that its samples are of another length than its extent")
+    return _tidy(np.frombuffer(out, dtype, offset=8).reshape(*sizes[::-1], channels))
 
 
 def write_stl(path: Path, vertices: NDArray[np.float32], faces: NDArray[np.int64]) -> None:

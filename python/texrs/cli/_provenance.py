@@ -1,0 +1,230 @@
+"""How what a command writes was made: known while it runs, said by each file, and asked before one is replaced.
+
+What is recorded is what the result depends on: the version, the verb, its arguments, the options that are not the default, the
+seed, and the SHA-256 of every file that was read. Names are relative to the folder of the file that says so, so that a folder
+can be moved with all that is in it. What does not change the result (threads, progress, the names of outputs) is left
+out, and so are dates: the same gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import stat
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from texrs import io
+from texrs._version import __version__
+from texrs.errors import InvalidInput
+from texrs.io._annotation import BLANK, hash_file, is_unchanged, name_sidecar, needs_sidecar
+
+LEFT = ("count", "quiet", "force", "each", "out", "map", "stages", "page", "sheet")
+"""Parameters of commands that change nothing in a result, or name one."""
+CHANGED = "changed while it was read"
+"""In place of the SHA-256 of such a file."""
+
+
+@dataclass(slots=True)
+class Record:
+    """What a command was asked for."""
+
+    verb: str
+    arguments: list[str | None]
+    """None stands for the folder that is written to."""
+    options: dict[str, Any]
+    """By flag: a text, a list of them, or True."""
+    seed: int | None
+    files: dict[str, os.stat_result]
+    """What is read, as it was at the start."""
+    places: dict[str, str]
+    """Where that lies, and the folder: names may be seen from another folder later."""
+    folder: str | None = None
+    """What is read may lie in it: a database."""
+    force: bool = False
+    """Whether any file may be replaced."""
+    original: Mapping[str, str] = field(default_factory=dict)
+    """Names that stand for files elsewhere, when something is made again."""
+    checked: set[str] = field(default_factory=set)
+    """Outputs that may be written."""
+    hashes: dict[str, str] = field(default_factory=dict)
+
+    def find_hash(self, name: str) -> str:
+        """Return the SHA-256 of a file that is read."""
+        if name not in self.hashes:
+            # Only now: what is refused needs none.
+            place = self.places[name]
+            self.hashes[name] = hash_file(place)
+            now, then = os.stat(place), self.files[name]
+            if (now.st_size, now.st_mtime_ns, now.st_ino) != (then.st_size, then.st_mtime_ns, then.st_ino):
+                self.hashes[name] = CHANGED
+        return self.hashes[name]
+
+    def rename(self, text: Any, folder: str) -> Any:
+        """Return the name of a file as it is seen from a folder; any other text as it is."""
+        if isinstance(text, list):
+            return [self.rename(t, folder) for t in text]
+        if not isinstance(text, str) or not (text in self.files or text == self.folder):
+            return text
+        if text in self.original:
+            return self.original[text]
+        real = self.places[text]
+        try:
+            return Path(os.path.relpath(real, folder)).as_posix()
+        except ValueError:  # On another drive of Windows.
+            return Path(real).as_posix()
+
+    def tell(self, target: str, *, output: str = "out", inside: bool = False, suffix: str = "") -> str:
+        """Return as JSON how the file ``target`` is made: by which option, and whether that names the folder of it."""
+        folder = os.path.dirname(os.path.realpath(target))
+        said: dict[str, Any] = {
+            "texrs": __version__,
+            "verb": self.verb,
+            "arguments": self.rename(self.arguments, folder),
+            "options": {flag: self.rename(value, folder) for flag, value in self.options.items()},
+        }
+        if self.seed is not None:
+            said["seed"] = self.seed
+        used = self._find_used()
+        said["inputs"] = {self.rename(name, folder): self.find_hash(name) for name in self.files if name in used}
+        said["output"] = f"--{output}"
+        if inside:
+            said["file"] = os.path.basename(target)
+        if suffix:
+            # What stands in a report or a map may depend on the format of the result.
+            said["suffix"] = suffix
+        return json.dumps(said)[:-1] + f", {BLANK}}}"
+
+    def _find_used(self) -> set[str]:
+        """Return the names that this record speaks of; of a folder all that is known to be read in it."""
+        texts = [*self.arguments, *(t for v in self.options.values() for t in (v if isinstance(v, list) else [v]))]
+        inside = {n for n in self.files if self.folder is not None and Path(n).parent == Path(self.folder)}
+        return {t for t in texts if isinstance(t, str)} | inside
+
+
+RUNNING: ContextVar[Record | None] = ContextVar("record", default=None)
+"""Of the command that runs."""
+ORIGINAL: ContextVar[Mapping[str, str] | None] = ContextVar("original", default=None)
+"""What files are to be called that are read again."""
+
+
+def read_status(path: str) -> os.stat_result | None:
+    """Return the status of the regular file that a path leads to, if there is one."""
+    with suppress(OSError, ValueError):
+        status = os.stat(path)
+        if stat.S_ISREG(status.st_mode):
+            return status
+    return None
+
+
+def make_record(command: Any, given: Mapping[str, Any], *, force: bool) -> Record:
+    """Return what a command was asked for, of the values of its parameters."""
+    arguments: list[str | None] = []
+    options: dict[str, Any] = {}
+    names: list[str] = []
+    for p in command.params:
+        value = given.get(p.name)
+        if p.name in LEFT or value in (None, [], ()):
+            continue
+        texts = [str(v) for v in value] if isinstance(value, list | tuple) else [str(value)]
+        if p.param_type_name == "argument":
+            arguments += texts
+            names += texts
+        elif value != p.default:
+            flag = max(p.opts, key=len)
+            if isinstance(value, bool):
+                options[flag if value else max(p.secondary_opts, key=len)] = True
+            else:
+                options[flag] = texts if isinstance(value, list | tuple) else texts[0]
+                # A word, as the x of --wrap, is no file even if there is one of that name.
+                names += texts if re.search("FILE|csv", p.metavar or "") else []
+    files = {name: status for name in names if (status := read_status(name)) is not None}
+    folder = arguments[0] if command.name == "database" else given.get("folder")
+    seed = given.get("seed")
+    places = {name: os.path.realpath(name) for name in (*files, *([folder] if folder is not None else []))}
+    return Record(command.name, arguments, options, seed, files, places, folder, force, ORIGINAL.get() or {})
+
+
+@contextmanager
+def record(one: Record | None) -> Iterator[None]:
+    """Let what is written within say that it was made so."""
+    token = RUNNING.set(one)
+    try:
+        yield
+    finally:
+        RUNNING.reset(token)
+
+
+def narrow(
+    arguments: Sequence[str | None] | None = None,
+    options: Mapping[str, Any] | None = None,
+    seed: int | None = None,
+    files: Sequence[str] | None = None,
+) -> Record | None:
+    """Return the record of a part of what runs: with other arguments, and options that differ (None: not given)."""
+    whole = RUNNING.get()
+    if whole is None:
+        return None
+    changed = {f: v for f, v in {**whole.options, **(options or {})}.items() if v is not None}
+    kept = whole.arguments if arguments is None else list(arguments)
+    read = whole.files if files is None else {n: s for n, s in whole.files.items() if n in files}
+    return replace(whole, arguments=kept, options=changed, seed=whole.seed if seed is None else seed, files=read)
+
+
+def add_inputs(*names: str) -> None:
+    """Let what is written say that these files were read too."""
+    running = RUNNING.get()
+    if running is not None:
+        found = {name: status for name in names if (status := read_status(name)) is not None}
+        running.files |= found
+        running.places |= {name: os.path.realpath(name) for name in found}
+
+
+# --- what may be replaced --------------------------------------------------------------------------------------------
+
+
+def check_free(path: str, option: str = "out", *, inside: bool = False) -> None:
+    """Check that nothing is lost when a file is written: what is there was made by the same verb from the same arguments."""
+    running = RUNNING.get()
+    if running is None or running.force:
+        return
+    real = os.path.realpath(path)
+    if real in running.checked:
+        return
+    status = read_status(path)
+    if status is not None and status.st_size > 0:
+        reason = _find_other(running, path)
+        if reason:
+            raise InvalidInput(f"--{option}: {path} {reason}; --force replaces it, or write to another file")
+    beside = str(name_sidecar(Path(real)))
+    if (
+        needs_sidecar(Path(real))
+        and status is None
+        and read_status(beside) is not None
+        and io.read_notes(beside).made is None
+    ):
+        raise InvalidInput(
+            f"--{option}: {beside}, which is to say how {path} was made, is there already; --force replaces it"
+        )
+    running.checked.add(real)
+
+
+def _find_other(running: Record, path: str) -> str:
+    """Return why a file that is there is not this command's own."""
+    made = io.read_notes(path).made
+    if made is None:
+        return "is there already, and no texrs command says that it made it"
+    if not is_unchanged(path, made):
+        return "was changed since texrs made it"
+    said = json.loads(made)
+    folder = os.path.dirname(os.path.realpath(path))
+    if said.get("verb") != running.verb:
+        return f"was made by texrs {said.get('verb')}"
+    if said.get("arguments") != running.rename(running.arguments, folder):
+        return f"was made from {' '.join(str(a) for a in said.get('arguments', ()) if a is not None)}"
+    return ""

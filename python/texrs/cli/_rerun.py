@@ -1,0 +1,267 @@
+"""Commands about files that are there: ``texrs info`` says what one holds, ``texrs rerun`` makes it again."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import shutil
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from texrs import io
+from texrs._version import __version__
+from texrs.cli._console import hush, note, say
+from texrs.cli._outputs import Quiet, Threads, describe, make_argument, to_write
+from texrs.cli._provenance import CHANGED, ORIGINAL, RUNNING
+from texrs.errors import FileError, InvalidInput
+from texrs.io._annotation import hash_file, is_unchanged, name_sidecar, needs_sidecar
+from texrs.source_map import SourceMap
+
+SHORT = 16
+"""Digits of a SHA-256 that are shown."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """How a file says that it was made."""
+
+    path: str
+    text: str
+    """The JSON."""
+    version: str
+    verb: str
+    arguments: list[str | None]
+    options: dict[str, Any]
+    inputs: dict[str, str]
+    """SHA-256 by name, as seen from the folder of the file."""
+    output: str
+    file: str | None
+    """Its name in the folder that is written, where it is a folder."""
+    suffix: str
+
+    @classmethod
+    def read(cls, path: str) -> Recipe | None:
+        """Return what a file says; None where it says nothing."""
+        text = io.read_notes(path).made
+        if text is None:
+            return None
+        said = json.loads(text)
+        try:
+            one = cls(
+                path,
+                text,
+                str(said["texrs"]),
+                str(said["verb"]),
+                [a if a is None else str(a) for a in said["arguments"]],
+                dict(said["options"]),
+                {str(name): str(sha) for name, sha in said["inputs"].items()},
+                str(said["output"]),
+                said.get("file"),
+                str(said.get("suffix", "")),
+            )
+        except (KeyError, TypeError, AttributeError, ValueError):
+            raise FileError(f"{path}: what it says of how it was made is damaged") from None
+        if one.file is not None and os.path.basename(str(one.file)) != one.file:
+            raise FileError(f"{path}: what it says of how it was made is damaged")
+        return one
+
+    def make_command(self, names: Mapping[str, str], folder: str) -> list[str]:
+        """Return the command that makes the file in a folder, of files that are called otherwise now."""
+        target = folder if self.file is not None else os.path.join(folder, os.path.basename(self.path))
+        words = [self.verb, *(target if a is None else names.get(a, a) for a in self.arguments)]
+        for flag, value in self.options.items():
+            for text in value if isinstance(value, list) else [value]:
+                words += [flag] if text is True else [flag, names.get(text, str(text))]
+        if None in self.arguments:
+            return words
+        if self.output not in ("--out", "--sheet"):
+            # The command writes its result too.
+            words += ["--out", os.path.join(folder, f"result{self.suffix or '.npz'}")]
+        return [*words, self.output, target]
+
+    def show(self) -> str:
+        """Return the command as one types it."""
+        words = ["texrs", self.verb, *("FOLDER" if a is None else a for a in self.arguments)]
+        for flag, value in self.options.items():
+            for text in value if isinstance(value, list) else [value]:
+                words += [flag] if text is True else [flag, str(text)]
+        return shlex.join(words)
+
+    def find_inputs(self) -> dict[str, str]:
+        """Return where each file lies now that was read; say all that is missing or has changed."""
+        folder = os.path.dirname(os.path.realpath(self.path))
+        found, wrong = {}, []
+        for name, sha in self.inputs.items():
+            # Beside the result, as it was; where the command is given; in the same folder.
+            places = (os.path.join(folder, name), name, os.path.join(folder, os.path.basename(name)))
+            there = [os.path.normpath(p) for p in places if os.path.isfile(p)]
+            same = next((p for p in there if hash_file(p) == sha), None)
+            if sha == CHANGED:
+                wrong.append(f"{name} {CHANGED}")
+            elif same is not None:
+                found[name] = same
+            elif there:
+                now = hash_file(there[0])[:SHORT]
+                wrong.append(f"{name} has changed since (SHA-256 {sha[:SHORT]}... then, {now}... in {there[0]})")
+            else:
+                wrong.append(f"{name} is missing (SHA-256 {sha[:SHORT]}...)")
+        if wrong:
+            raise InvalidInput(f"{self.path}: cannot be made again: {'; '.join(wrong)}")
+        if self.verb == "database" and self.arguments[0] is not None:
+            first = self.arguments[0]
+            found[first] = os.path.normpath(os.path.join(folder, first))
+        return found
+
+
+def rerun_command(
+    context: typer.Context,
+    output: Annotated[str, make_argument("OUTPUT", "A file that texrs wrote.")],
+    out: Annotated[str | None, to_write("out", text="Where to write it; by default it is only compared.")] = None,
+    count: Threads = None,
+    quiet: Quiet = False,
+) -> None:
+    """Make a file that texrs wrote again, from the same inputs, and compare."""
+    recipe = Recipe.read(output)
+    if recipe is None:
+        raise InvalidInput(
+            f"{output}: does not say how it was made" if os.path.exists(output) else f"{output}: is not there"
+        )
+    running = RUNNING.get()
+    if out is not None and not (running and running.force):
+        check_same(out, recipe)
+    command = context.find_root().command.get_command(context, recipe.verb)  # type: ignore[attr-defined]
+    if command is None:
+        raise InvalidInput(f"{output}: was made by texrs {recipe.verb}, which this version does not know")
+    names = recipe.find_inputs()
+    beside = os.path.dirname(os.path.dirname(os.path.realpath(output))) if None in recipe.arguments else None
+    folder = tempfile.mkdtemp(prefix=".texrs-", dir=beside)
+    token = ORIGINAL.set({place: name for name, place in names.items()})
+    try:
+        with hush():
+            words = recipe.make_command(names, folder) + ([] if count is None else ["--threads", str(count)])
+            command.main(words[1:] + ["--quiet"] * quiet, prog_name=recipe.verb, standalone_mode=False, parent=context)
+        made = os.path.join(folder, recipe.file or os.path.basename(output))
+        compare(recipe, made)
+        if out is not None:
+            with io.atomic(out) as temporary:
+                shutil.copyfile(made, temporary)
+            if needs_sidecar(Path(made)):
+                with io.atomic(name_sidecar(Path(os.path.realpath(out)))) as temporary:
+                    shutil.copyfile(name_sidecar(Path(made)), temporary)
+            note(f"wrote {out}", quiet=quiet)
+    finally:
+        ORIGINAL.reset(token)
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def check_same(path: str, recipe: Recipe) -> None:
+    """Check that nothing is lost when a file is written to ``path``."""
+    if os.path.lexists(path) and not (os.path.isfile(path) and os.path.getsize(path) == 0):
+        made = io.read_notes(path).made if os.path.isfile(path) else None
+        if made is None or json.loads(made) != json.loads(recipe.text) or not is_unchanged(path, made):
+            raise InvalidInput(f"--out: {path} is there already, and is something else; --force replaces it")
+
+
+def compare(recipe: Recipe, made: str) -> None:
+    """Say whether the file that was made is the one that is there."""
+    now, then = hash_file(made), hash_file(recipe.path)
+    again = io.read_notes(made).made
+    if now == then and again is not None and json.loads(again) == json.loads(recipe.text):
+        say(f"{recipe.path}: the same bytes, SHA-256 {now}")
+        return
+    if is_unchanged(made, recipe.text):
+        say(f"{recipe.path}: was changed since it was made; its inputs still make what it was, SHA-256 {now}")
+        return
+    why = f"; it was made by texrs {recipe.version}, this is {__version__}" if recipe.version != __version__ else ""
+    raise InvalidInput(f"{recipe.path}: its inputs make other bytes now (SHA-256 {now}, it has {then}){why}")
+
+
+# --- what a file holds -----------------------------------------------------------------------------------------------
+
+
+def info_command(file: Annotated[str, make_argument("FILE", "Any file that texrs reads or writes.")]) -> None:
+    """Print what a file holds, and how texrs made it."""
+    recipe = Recipe.read(file)
+    for line in describe_file(file, recipe):
+        say(line)
+    notes = io.read_notes(file)
+    if notes.profile is not None:
+        say(f"colours: ICC profile of {len(notes.profile)} bytes")
+    elif notes.srgb or notes.gamma is not None:
+        say(f"colours: {'sRGB' if notes.srgb else f'gamma {notes.gamma:g}'}")
+    if notes.density is not None:
+        down, across = (d * 0.0254 for d in notes.density)
+        say(f"density: {across:.4g} x {down:.4g} pixels an inch")
+    if recipe is None:
+        return
+    say(f"made by texrs {recipe.version}: {recipe.show()}")
+    for name, sha in recipe.inputs.items():
+        say(f"from {name}, SHA-256 {sha}")
+    if not is_unchanged(file, recipe.text):
+        say("changed since it was made")
+
+
+def describe_file(file: str, recipe: Recipe | None) -> list[str]:
+    """Return lines about what a file holds, whatever it is."""
+    if not os.path.isfile(file):
+        io.read(file)
+    suffix = Path(file).suffix.lower()
+    if suffix in (".html", ".json") and recipe is not None:
+        return [f"{'page' if suffix == '.html' else 'report'}: {os.path.getsize(file)} bytes"]
+    if suffix == ".stl":
+        count = int.from_bytes(Path(file).read_bytes()[80:84], "little")
+        return [f"surface: {count} triangles"]
+    if suffix == ".npz":
+        for read in (describe_map, describe_elements, describe_arrays):
+            try:
+                return read(file)
+            except FileError:
+                continue
+    volume = recipe is not None and recipe.verb == "solid" and recipe.output == "--out"
+    try:
+        image, axes = (io.read_volume(file), 3) if volume else (io.read(file), 2)
+    except FileError as error:
+        try:
+            image, axes = io.read_volume(file), 3
+        except FileError:
+            raise error from None
+    what = "scale map" if recipe is not None and recipe.verb == "scale-map" else ("image", "volume")[axes - 2]
+    return [f"{what}: {describe(image, axes)}, {image.min()} to {image.max()}"]
+
+
+def describe_map(file: str) -> list[str]:
+    """Return lines about a source map."""
+    places = SourceMap.load(file)
+    reuse = places.reuse()
+    shapes = " and ".join(" x ".join(map(str, shape)) for shape in places.shapes)
+    what = "pixels" if places.axes == 2 else "voxels"
+    return [
+        f"source map: {' x '.join(map(str, places.shape))}, made from {shapes}",
+        f"copied unchanged: {reuse.verbatim:.1%} of the {what}, in {reuse.regions} regions",
+        f"largest region: {reuse.largest:.1%} of the example",
+    ]
+
+
+def describe_elements(file: str) -> list[str]:
+    """Return lines about analysed elements."""
+    from texrs import elements
+
+    entry = elements.load(file)
+    return [f"elements: {len(entry.points)}, {entry.layout}, of an image of {describe(entry.image, 2)}"]
+
+
+def describe_arrays(file: str) -> list[str]:
+    """Return a line an array; a single one with two axes, or with three, is a picture."""
+    arrays = io.read_arrays(file)
+    if len(arrays) == 1 or "image" in arrays:
+        raise FileError(f"{file}: holds one array")
+    return [f"{name}: {' x '.join(map(str, array.shape))}, {array.dtype}" for name, array in arrays.items()]
+
+
+COMMANDS: dict[str, Callable[..., None]] = {"info": info_command, "rerun": rerun_command}

@@ -1,0 +1,40 @@
+"""What a file says beside its values: how its colours and its pixels are to be understood, and how it was made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Notes:
+    """What a file says beside its values.
+
+    Attributes
+    ----------
+    profile : bytes, optional
+        The ICC profile of the colours.
+    density : (down, across) of float, optional
+        Pixels a metre, of the picture as `read` returns it.
+    srgb : bool
+        Whether the file says that its colours are sRGB.
+    gamma : float, optional
+        Exponent that gives samples of light: 1 for linear ones, 1 / 2.2 for most others.
+    primaries : tuple of 8 float, optional
+        Chromaticities x and y of white, red, green and blue.
+    made : str, optional
+        JSON: how texrs made the file.
+
+    """
+
+    profile: bytes | None = None
+    density: tuple[float, float] | None = None
+    srgb: bool = False
+    gamma: float | None = None
+    primaries: tuple[float, ...] | None = None
+    made: str | None = None
+
+    def fit(self, channels: int) -> Notes:
+        """Return what is true of a picture of so many channels: a profile is of grey or of colours."""
+        space = b"RGB " if channels in (3, 4) else b"GRAY" if channels in (1, 2) else b""
+        fits = self.profile is not None and self.profile[16:20] == space
+        return replace(self, profile=self.profile if fits else None)

@@ -1,0 +1,211 @@
+"""Batches: recipes and patterns, what is done stays and is not done again, and failures stop nothing else."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from texrs import io, samples
+from texrs.cli import main
+
+Capture = pytest.CaptureFixture[str]
+RECIPE = """
+verb = "design"
+inputs = ["stones/*.png"]
+out = "made/{name}-{preset}-{seed}.png"
+seeds = "3:5"
+options = { size = 48, tiles = 1, map = "maps/{name}-{preset}-{seed}.npz" }
+sheet = "made/sheet.png"
+
+[presets.still]
+plan = "still"
+[presets.turned]
+rotate = 180.0
+mirror = false
+"""
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    Path("stones").mkdir()
+    Path("maps").mkdir()
+    for name in ("dots", "weave"):
+        io.write(f"stones/{name}.png", samples.load(name, size=(48, 48)).image)
+    Path("all.toml").write_text(RECIPE)
+    return tmp_path
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+def said(path: str | Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(io.read_notes(path).made or "{}")
+    return found
+
+
+def test_a_recipe_is_done_once(here: Path, capsys: Capture) -> None:
+    before = files(here)
+    assert main(["batch", "all.toml"]) == 0
+    names = [f"{n}-{p}-{s}" for n in ("dots", "weave") for p in ("still", "turned") for s in (3, 4)]
+    made = set(files(here)) - set(before)
+    assert made == {f"made/{n}.png" for n in names} | {f"maps/{n}.npz" for n in names} | {"made/sheet.png"}
+    err = capsys.readouterr().err.splitlines()
+    assert err[0] == "texrs: 1 of 8: wrote made/dots-still-3.png"
+    assert err[-1].startswith("texrs: 8 of 8 results are there, 0 failed, in ")
+    assert io.read("made/sheet.png").shape == (768, 768, 3)
+    assert said("made/sheet.png")["verb"] == "batch"
+    one = said("made/dots-turned-4.png")
+    assert one["arguments"] == ["../stones/dots.png"]
+    assert one["options"] == {"--size": "48", "--rotate": "180.0", "--no-mirror": True, "--tiles": "1", "--seed": "4"}
+    # As the command alone makes it, from anywhere.
+    alone = [
+        "design",
+        "stones/dots.png",
+        "--size",
+        "48",
+        "--tiles",
+        "1",
+        "--rotate",
+        "180",
+        "--no-mirror",
+        "--seed",
+        "4",
+    ]
+    assert main([*alone, "-o", "made/alone.png", "-q"]) == 0
+    assert Path("made/alone.png").read_bytes() == Path("made/dots-turned-4.png").read_bytes()
+    Path("made/alone.png").unlink()
+    whole = files(here)
+    times = {n: os.stat(n).st_mtime_ns for n in whole}
+    os.chdir("maps")
+    assert main(["batch", "../all.toml"]) == 0
+    os.chdir("..")
+    err = capsys.readouterr().err.splitlines()
+    assert sum("is there" in line for line in err) == 8
+    assert files(here) == whole
+    assert {n for n in whole if os.stat(n).st_mtime_ns != times[n]} == {"made/sheet.png"}
+    # What is missing, was changed, or is made otherwise now is made again.
+    Path("maps/dots-still-3.npz").unlink()
+    io.write("made/weave-still-3.png", np.zeros((48, 48, 3), np.uint8))
+    io.annotate("made/weave-still-3.png", io.Notes(made=io.read_notes("made/weave-turned-3.png").made))
+    assert main(["batch", "all.toml", "--force"]) == 0
+    err = capsys.readouterr().err.splitlines()
+    assert [line for line in err if "wrote" in line] == [
+        "texrs: 1 of 8: wrote made/dots-still-3.png",
+        "texrs: 5 of 8: wrote made/weave-still-3.png",
+        "texrs: wrote made/sheet.png",
+    ]
+    assert files(here) == whole
+    capsys.readouterr()
+    assert main(["rerun", "made/sheet.png", "-q"]) == 0
+    assert "the same bytes" in capsys.readouterr().out
+    assert main(["batch", "all.toml", "--set", "size=40", "--seeds", "3", "-q"]) == 0
+    assert io.read("made/dots-still-3.png").shape == (40, 40, 3)
+    assert Path("made/dots-still-4.png").read_bytes() == whole["made/dots-still-4.png"]
+
+
+def test_one_that_fails_stops_no_other(here: Path, capsys: Capture) -> None:
+    Path("stones/broken.png").write_bytes(Path("stones/dots.png").read_bytes()[:200])
+    io.write("stones/small.png", np.zeros((1, 1, 3), np.uint8))
+    Path("out").mkdir()
+    Path("out/weave.png").write_bytes(b"dear")
+    command = ["batch", "tile", "stones", "-o", "out", "--sheet", "sheet.png"]
+    assert main(command) == 3
+    err = capsys.readouterr().err.splitlines()
+    assert "texrs: 2 of 4: wrote out/dots.png" in err
+    failed = [line for line in err if line.startswith("texrs: failed: ")]
+    assert [line.split()[2] for line in failed] == ["stones/broken.png", "stones/small.png", "stones/weave.png"]
+    assert "cut off" in failed[0]
+    assert "--force" in failed[2]
+    assert err[-1].startswith("texrs: 1 of 4 results are there, 3 failed")
+    assert Path("out/weave.png").read_bytes() == b"dear"
+    assert io.read("sheet.png").shape == (512, 512, 3)
+    assert main([*command, "-q"]) == 3
+    assert len(capsys.readouterr().err.splitlines()) == 4
+
+
+def test_patterns_folders_and_places(here: Path, capsys: Capture) -> None:
+    assert main(["batch", "tile", "stones/*.png", "-o", "stones", "--set", "wrap=x", "-q"]) == 2
+    assert "is read" in capsys.readouterr().err
+    assert main(["batch", "tile", "stones/*.png", "-o", "stones/{name}-{verb}.png", "--set", "wrap=x", "-q"]) == 0
+    before = files(here)
+    assert sorted(n for n in before if "tile" in n) == ["stones/dots-tile.png", "stones/weave-tile.png"]
+    # Results that lie among the inputs are none.
+    assert main(["batch", "tile", "stones/*.png", "-o", "stones/{name}-{verb}.png", "--set", "wrap=x", "-q"]) == 0
+    assert files(here) == before
+    Path("masks").mkdir()
+    for name in ("dots", "weave"):
+        io.write(f"masks/{name}.png", np.pad(np.full((6, 6), 255, np.uint8), 21))
+    recipe = 'verb = "complete"\ninputs = ["stones/dots.png", "stones/weave.png"]\nout = "whole"\n'
+    Path("holes.toml").write_text(recipe + 'arguments = ["{input}", "masks/{name}.png"]\n')
+    assert main(["batch", "holes.toml", "-q"]) == 0
+    assert said("whole/weave.png")["arguments"] == ["../stones/weave.png", "../masks/weave.png"]
+    assert main(["batch", "tile", "sample:weave", "-o", "s", "-q"]) == 0
+    assert Path("s/weave.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("recipe", "words"),
+    [
+        ("", "needs verb"),
+        ('verb = "design"', "needs inputs"),
+        ('verb = "design"\ninputs = "stones"', "needs out"),
+        ('verb = "design"\ninputs = "stones"\nout = "o"\nseed = 3', "has 'seed'; allowed are verb, inputs"),
+        ('verb = "desing"\ninputs = "stones"\nout = "o"', "got 'desing'"),
+        ('verb = "batch"\ninputs = "stones"\nout = "o"', "got 'batch'"),
+        ('verb = "design"\ninputs = "no/*.png"\nout = "o"', "nothing is found for 'no/*.png'"),
+        ('verb = "design"\ninputs = [1]\nout = "o"', "inputs: needs a text or a list of texts, got [1]"),
+        ('verb = "design"\ninputs = "stones"\nout = "o"\nseeds = "5:5"', "seeds: needs A:B as in 0:32"),
+        ('verb = "design"\ninputs = "stones"\nout = "o"\nseeds = [1.5]', "seeds: needs A:B as in 0:32"),
+        ('verb = "design"\ninputs = "stones"\nout = "o.png"', "several results have the name o.png"),
+        ('verb = "design"\ninputs = "stones"\nout = "{name}.png"\nseeds = "0:2"', "several results have the name"),
+        ('verb = "design"\ninputs = "stones"\nout = "o"\noptions = {sise = 3}', "No such option: --sise"),
+        ('verb = "design"\ninputs = "stones"\nout = "o"\noptions = {size = {a = 3}}', "size needs a text, a number"),
+        ('verb = "design"\ninputs = "stones"\nout = "o"\noptions = 3', "options needs to be a table"),
+        ('verb = "design"\ninputs = "stones"\nout = "o"\npresets = {a = 3}', "presets needs to be tables"),
+        ('verb = "tile"\ninputs = "stones"\nout = "o"\nsheet = "stones/dots.png"', "is read"),
+        ("verb = ", "is not TOML"),
+    ],
+)
+def test_bad_recipes_are_refused_before_the_work(here: Path, capsys: Capture, recipe: str, words: str) -> None:
+    Path("bad.toml").write_text(recipe)
+    before = files(here)
+    assert main(["batch", "bad.toml"]) == 2
+    assert words in capsys.readouterr().err
+    assert files(here) == before
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_a_batch_that_was_stopped_goes_on(here: Path, capsys: Capture, number: int) -> None:
+    command = ["batch", "all.toml"]
+
+    def heed() -> None:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    with subprocess.Popen(
+        [sys.executable, "-m", "texrs", *command], stderr=subprocess.PIPE, preexec_fn=heed
+    ) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline() == b"texrs: 1 of 8: wrote made/dots-still-3.png\n"
+        assert process.stderr.readline() == b"texrs: 2 of 8: wrote made/dots-still-4.png\n"
+        time.sleep(0.02)
+        process.send_signal(number)
+        rest = process.stderr.read().decode().splitlines()
+    assert process.returncode == (130 if number == signal.SIGINT else -9)
+    if number == signal.SIGINT:
+        assert any("the same command goes on from there" in line for line in rest)
+        assert "what was done is kept: made/dots-still-3.png, made/dots-still-4.png" in rest[-1]
+    done = {n: (here / n).stat().st_mtime_ns for n in files(here) if n.startswith("made/dots-still")}
+    assert len(done) >= 2
+    assert main(command) == 0
+    assert {n: (here / n).stat().st_mtime_ns for n in done} == done
+    assert len(list(here.glob("made/*-*-*.png"))) == 8
