@@ -109,7 +109,7 @@ def test_other_readers_find_the_notes(tmp_path: Path) -> None:
             if name.endswith("png"):
                 assert picture.info["texrs"].startswith('{"texrs"')
     with tifffile.TiffFile(tmp_path / "f.tif") as tif:
-        assert tif.pages[0].tags["ImageDescription"].value.startswith('{"texrs"')
+        assert tif.pages[0].tags["Software"].value.startswith('{"texrs"')
         assert (tif.asarray() == KINDS["f.tif"]).all()
 
 

@@ -154,10 +154,15 @@ def annotate(path: PathLike, notes: Notes, beside: PathLike | None = None) -> Pa
     name = _files.as_path(path)
     kind = _SUFFIXES.get(name.suffix.lower(), "")
     made = notes.made
-    apart = kind in _SIDECAR or (kind == "jpeg" and len((made or "").encode()) > MOST_JPEG)
+    apart = (
+        kind in _SIDECAR
+        or (kind == "exr" and not _tags.takes_exr(name))
+        or (kind == "jpeg" and len((made or "").encode()) > MOST_JPEG)
+    )
     with _files.translate_errors(name, "writing what it says of itself"):
         # Of a table of tags what is said moves what lies around it, so it is said first, and filled in.
-        first = notes if kind in _IN_PLACE else replace(notes, made=None)
+        first = notes if kind in _IN_PLACE and not apart else replace(notes, made=None)
+        kind = "" if apart and kind == "exr" else kind
         if kind in _WRITERS and first != Notes():
             _WRITERS[kind](name, first)
         if made is None:

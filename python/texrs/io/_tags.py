@@ -11,11 +11,15 @@ from texrs.errors import FileError
 from texrs.io._notes import Notes
 
 INCH = 0.0254
-DESCRIPTION, ORIENTATION, ACROSS, DOWN, UNIT, EXIF, PROFILE, SPACE = 270, 274, 282, 283, 296, 0x8769, 34675, 0xA001
+SOFTWARE, ORIENTATION, ACROSS, DOWN, UNIT, EXIF, PROFILE, SPACE = 305, 274, 282, 283, 296, 0x8769, 34675, 0xA001
 _SIZES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 8, 6: 1, 7: 1, 8: 2, 9: 4, 10: 8, 11: 4, 12: 8, 13: 4, 16: 8, 17: 8, 18: 8}
 """Bytes of a value, by the type of a tag."""
 _MOST_TAGS, _MOST = 4096, 2**24
-_EXR_START, _EXR_MARK = b"v/1\x01", b"texrs\0string\0"
+_EXR_START, _EXR_MADE = b"v/1\x01", b"texrsMade"
+_EXR_LINES = {0: 1, 1: 1, 2: 1, 3: 16, 4: 32, 5: 16, 6: 32, 7: 32, 8: 32, 9: 256}
+"""Rows that are compressed together, by the kind of compression."""
+_EXR_OTHER = 0x1A00
+"""Bits of the version that tell of tiles, deep pictures and several parts."""
 
 
 # --- TIFF ------------------------------------------------------------------------------------------------------------
@@ -103,7 +107,7 @@ def read_tiff(path: Path) -> dict[str, Any]:
             found["density"] = found["density"][::-1]
         if profile := tags.read(PROFILE):
             found["profile"] = profile
-        text = tags.read(DESCRIPTION)
+        text = tags.read(SOFTWARE)
         if text and text.startswith(b'{"texrs"'):
             found["made"] = text.rstrip(b"\0").decode("utf-8")
     return found
@@ -129,13 +133,13 @@ def write_tiff(path: Path, notes: Notes) -> None:
         tags = _Directory(file)
         if notes.made is not None:
             text = notes.made.encode() + b"\0"
-            found = tags.locate(DESCRIPTION)
+            found = tags.locate(SOFTWARE)
             if found is not None and found[1] == len(text) and found[2] >= 0:
                 # It was said already, in as many letters.
                 file.seek(found[2])
                 file.write(text)
             else:
-                new.append((DESCRIPTION, 2, text))
+                new.append((SOFTWARE, 2, text))
         if notes.profile is not None:
             new.append((PROFILE, 7, notes.profile))
         if notes.density is not None:
@@ -175,7 +179,7 @@ def find_tiff(path: Path) -> tuple[int, int] | None:
     """Return where the words lie that say how the file was made."""
     with path.open("rb") as file:
         tags = _Directory(file)
-        text, found = tags.read(DESCRIPTION), tags.locate(DESCRIPTION)
+        text, found = tags.read(SOFTWARE), tags.locate(SOFTWARE)
     if found is None or text is None or not text.startswith(b'{"texrs"'):
         return None
     return found[2], found[2] + found[1]
@@ -201,8 +205,8 @@ def read_exr(path: Path) -> dict[str, Any]:
     data = path.read_bytes()
     attributes, _ = _walk_exr(data)
     found: dict[str, Any] = {}
-    if b"texrs" in attributes:
-        _, start, end = attributes[b"texrs"]
+    if _EXR_MADE in attributes:
+        _, start, end = attributes[_EXR_MADE]
         found["made"] = data[start:end].decode("utf-8")
     if b"chromaticities" in attributes:
         numbers = struct.unpack_from("<8f", data, attributes[b"chromaticities"][1])
@@ -219,9 +223,6 @@ def write_exr(path: Path, notes: Notes) -> None:
     """Put attributes at the end of the header, and let the table of places know."""
     data = path.read_bytes()
     attributes, end = _walk_exr(data)
-    count = attributes.get(b"chunkCount")
-    if not data.startswith(_EXR_START) or count is None:
-        raise FileError("it is no OpenEXR file that texrs wrote")
     new = []
     if notes.primaries is not None:
         new.append(
@@ -234,8 +235,8 @@ def write_exr(path: Path, notes: Notes) -> None:
             place = attributes[b"pixelAspectRatio"][1]
             data = data[:place] + struct.pack("<f", down / across) + data[place + 4 :]
     if notes.made is not None:
-        new.append((b"texrs", b"string", notes.made.encode()))
-    head, table = data[:end], struct.unpack_from("<i", data, count[1])[0]
+        new.append((_EXR_MADE, b"string", notes.made.encode()))
+    head, table = data[:end], _count_blocks(data, attributes)
     for name, _, _ in new:
         if name in attributes:
             # Where several are there, those before keep their places: the last is taken first.
@@ -250,7 +251,20 @@ def write_exr(path: Path, notes: Notes) -> None:
     path.write_bytes(head + b"\0" + moved + data[end + 1 + 8 * table :])
 
 
+def takes_exr(path: Path) -> bool:
+    """Return whether a file is of one part, in rows: of others the tables of places are not known here."""
+    with path.open("rb") as file:
+        start = file.read(8)
+    return start.startswith(_EXR_START) and not int.from_bytes(start[4:8], "little") & _EXR_OTHER
+
+
+def _count_blocks(data: bytes, attributes: dict[bytes, tuple[bytes, int, int]]) -> int:
+    """Return how many blocks of rows there are."""
+    _, top, _, bottom = struct.unpack_from("<4i", data, attributes[b"dataWindow"][1])
+    return int(-(-(bottom - top + 1) // _EXR_LINES[data[attributes[b"compression"][1]]]))
+
+
 def find_exr(path: Path) -> tuple[int, int] | None:
     """Return where the words lie that say how the file was made."""
-    found = _walk_exr(path.read_bytes())[0].get(b"texrs")
+    found = _walk_exr(path.read_bytes())[0].get(_EXR_MADE)
     return None if found is None else found[1:]
