@@ -16,7 +16,7 @@ LAYERS = (
     ("io",),
     ("_conversion",),
     ("_arrays",),
-    ("_threads", "kernels"),
+    ("_show", "_threads", "kernels"),
     ("_engine",),
     ("source_map",),
     ("blending",),

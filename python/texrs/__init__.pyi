@@ -33,7 +33,7 @@ from .planes import Plane, View
 from .rectification import rectify
 from .removal import remove
 from .source_map import Finish, Reuse, SourceMap
-from .synthesis import Synthesis
+from .synthesis import Gallery, Synthesis
 from .tiling import tile
 
 __all__ = [
@@ -43,6 +43,7 @@ __all__ = [
     "Elements",
     "Exemplar",
     "Finish",
+    "Gallery",
     "Guide",
     "Material",
     "Plane",

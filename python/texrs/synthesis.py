@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import json
 import re
+from base64 import b64encode
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Any
 
-import numpy as np
-
-from texrs._arrays import to_unit
+from texrs._arrays import as_image
+from texrs._show import as_png, measure, preview, spell_list
 from texrs._typing import Array, Path
 from texrs.materials._material import Material
 from texrs.source_map import SourceMap
 
-__all__ = ["Synthesis"]
+__all__ = ["Gallery", "Synthesis"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,6 +44,11 @@ class Synthesis:
     stages: Mapping[str, Array] = field(default_factory=dict)
     report: Mapping[str, Any] = field(default_factory=dict)
     material: Material | None = None
+
+    def __repr__(self) -> str:
+        """Return the size, the channels and the dtype."""
+        maps = "" if self.material is None else f", maps {', '.join(self.material)}"
+        return f"<Synthesis of {measure(self.image, self.source.axes)}{maps}>"
 
     def save_stages(self, folder: Path) -> list[FilePath]:
         """Write each stage as a numbered PNG, and the report as ``report.json``.
@@ -90,9 +95,7 @@ class Synthesis:
 
     def _repr_png_(self) -> bytes:
         """Show the image, or slices of a volume, in a notebook."""
-        from texrs.io._image_io import encode
-
-        return encode("image", preview(self._flatten(self.image)), "png")
+        return as_png(self._flatten(self.image))
 
     def _flatten(self, stage: Array) -> Array:
         """Return slices of what is as large as a volume; anything else is a picture already."""
@@ -103,11 +106,39 @@ class Synthesis:
         return slices(stage)
 
 
-def preview(image: Array) -> Array:
-    """Return an 8-bit grey, RGB or RGBA version of an image, to look at."""
-    if image.dtype == np.bool_:
-        return image.astype(np.uint8) * np.uint8(255)
-    seen = image if image.ndim == 2 or image.shape[-1] in (3, 4) else image[..., 0]
-    if seen.dtype == np.uint8:
-        return seen
-    return np.rint(to_unit(seen) * 255).astype(np.uint8)
+class Gallery(list[Any]):
+    """A list of results that shows itself side by side in a notebook.
+
+    Parameters
+    ----------
+    results : iterable of Synthesis, Exemplar, Elements, SourceMap, Field or array
+        What shows itself, or arrays of pictures.
+
+    Raises
+    ------
+    InvalidInput
+        When it is shown: something that has no picture.
+
+    Examples
+    --------
+    >>> import texrs
+    >>> dots = texrs.samples.dots((64, 64)).image
+    >>> texrs.Gallery(texrs.synthesize(dots, 64, seed=seed) for seed in range(2))
+    Gallery([<Synthesis of 64 x 64, 3 channels of uint8>, <Synthesis of 64 x 64, 3 channels of uint8>])
+
+    """
+
+    def __repr__(self) -> str:
+        """Return the list of its results."""
+        return f"Gallery({spell_list(self)})"
+
+    def _repr_html_(self) -> str:
+        """Show all that there is, side by side."""
+        return "".join(f'<img src="data:image/png;base64,{b64encode(_draw(each)).decode()}">\n' for each in self)
+
+
+def _draw(thing: object) -> bytes:
+    if hasattr(thing, "_repr_png_"):
+        return bytes(thing._repr_png_())
+    pixels = as_image(thing, "results")
+    return as_png(pixels[..., 0] if pixels.shape[-1] == 1 else pixels)

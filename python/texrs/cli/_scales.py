@@ -12,6 +12,7 @@ import numpy as np
 import typer
 
 from texrs import io, scale_maps
+from texrs._show import preview
 from texrs._threads import threads
 from texrs._typing import Array
 from texrs.cli import _outputs
@@ -21,7 +22,6 @@ from texrs.cli._options import Options, check_needed, make_choice, take_options
 from texrs.cli._outputs import Quiet, Threads, make_argument, make_option, name_arguments, to_write
 from texrs.errors import InvalidInput
 from texrs.scale_maps._kinds import describe_kind, find_kind
-from texrs.synthesis import preview
 
 FLOATS = (".npy", ".npz", ".tif", ".tiff", ".exr")
 """Formats that keep the scales themselves; pictures of 8 bits keep them encoded."""

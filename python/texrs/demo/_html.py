@@ -8,9 +8,9 @@ from html import escape
 
 import imageio.v3 as iio
 
+from texrs._show import preview
 from texrs._typing import Array
 from texrs._version import __version__
-from texrs.synthesis import preview
 
 QUALITY = 90
 """Of the JPEG pictures."""

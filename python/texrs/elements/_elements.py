@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_image, as_wrap
 from texrs._engine.coherence import Similarity
+from texrs._show import as_png
 from texrs._typing import Array, Labels, Path
 from texrs.elements._arrangement import Arrangement, describe_arrangement
+from texrs.elements._drawing import draw_plain, mark_points
 from texrs.elements._instances import Instance, Labelled, cut_instances, label_elements, rate_closure
 from texrs.elements._known import as_element_labels, extend_points, measure_box, measure_centres
 from texrs.elements._layout import Layout, LayoutName
@@ -85,6 +87,10 @@ class Elements:
     def __repr__(self) -> str:
         rows, columns = self.image.shape[:2]
         return f"Elements({len(self.points)} of box {self.box} in {rows} x {columns}, {self.layout})"
+
+    def _repr_png_(self) -> bytes:
+        """Show in a notebook the picture, with a cross on each element."""
+        return as_png(mark_points(draw_plain(self.image), self.points, self.box))
 
     @classmethod
     def of_sample(cls, sample: Sample, *, wrap: tuple[bool, bool] = (False, False)) -> Elements:

@@ -9,9 +9,10 @@ from html import escape
 import imageio.v3 as iio
 
 from texrs._version import __version__
+from texrs.elements._drawing import Picture, draw_plain
 from texrs.elements._elements import Elements
 from texrs.elements._layout import Layout
-from texrs.elements._pictures import Picture, draw_plain, pictures
+from texrs.elements._pictures import pictures
 from texrs.elements._proposal import ADVICE, DOUBTFUL
 
 __all__ = ["page"]
@@ -71,7 +72,7 @@ def page(entry: Elements, title: str = "elements") -> str:
 <p>Click an element to drop it, and any other place to add one. Elements: <label>layout <select id="layout">{options}</select>
 </label></p>
 <svg id="view" viewBox="-0.5 -0.5 {width} {height}" role="img" aria-label="Elements, each with its number">
-<image href="{_to_uri(draw_plain(entry))}" x="-0.5" y="-0.5" width="{width}" height="{height}"/><g id="marks"></g></svg>
+<image href="{_to_uri(draw_plain(entry.image))}" x="-0.5" y="-0.5" width="{width}" height="{height}"/><g id="marks"></g></svg>
 <figure><img src="{_to_uri(drawn["mask"])}" alt="Mask" width="{width}"><figcaption>What is not foreground lies under blue.
 </figcaption></figure>
 <label for="list">Corrections, for <code>--corrections FILE.json</code>:</label>

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from texrs._arrays import as_image, as_rgb, guidance
 from texrs._digits import write_number
+from texrs.elements._drawing import Picture, draw_dot, draw_plain, mark_points
 from texrs.elements._elements import Elements
 
-Picture = NDArray[np.uint8]
-
-CROSS, BOX, GROUND, NUMBER = (255, 40, 40), (0, 230, 255), np.array((30, 30, 190), np.float64), (255, 235, 90)
-"""Colours of points, of the chosen box, of what is not foreground, and of numbers."""
+BOX, GROUND, NUMBER = (0, 230, 255), np.array((30, 30, 190), np.float64), (255, 235, 90)
+"""Colours of the chosen box, of what is not foreground, and of numbers."""
 DIM = 0.65
 """How much of the ground's colour is that."""
 
@@ -34,29 +31,19 @@ def pictures(entry: Elements) -> dict[str, Picture]:
     ['mask', 'numbers', 'points']
 
     """
-    plain = draw_plain(entry)
+    plain = draw_plain(entry.image)
     dimmed = np.where(entry.mask[..., np.newaxis], plain, (1 - DIM) * plain + DIM * GROUND)
-    drawn = plain.copy()
-    arm = max(2, min(entry.box) // 10)
-    for row, column in np.floor(entry.points + 0.5).astype(int).tolist():
-        for step in range(-arm, arm + 1):
-            _draw_dot(drawn, row + step, column + step, CROSS)
-            _draw_dot(drawn, row + step, column - step, CROSS)
+    drawn = mark_points(plain, entry.points, entry.box)
     chosen = entry.report.get("box")
     if chosen:
         row, column, height, width = (int(n) for n in chosen)
         for r in (row - height // 2, row + height // 2):
             for c in range(column - width // 2, column + width // 2 + 1):
-                _draw_dot(drawn, r, c, BOX)
+                draw_dot(drawn, r, c, BOX)
         for c in (column - width // 2, column + width // 2):
             for r in range(row - height // 2, row + height // 2 + 1):
-                _draw_dot(drawn, r, c, BOX)
+                draw_dot(drawn, r, c, BOX)
     return {"points": drawn, "mask": dimmed.astype(np.uint8), "numbers": _draw_numbers(plain, entry)}
-
-
-def draw_plain(entry: Elements) -> Picture:
-    """Draw the texture alone."""
-    return np.rint(np.clip(as_rgb(guidance(as_image(entry.image))), 0, 1) * 255).astype(np.uint8)
 
 
 def _draw_numbers(plain: Picture, entry: Elements) -> Picture:
@@ -72,8 +59,3 @@ def _draw_numbers(plain: Picture, entry: Elements) -> Picture:
         plate[:] = 0
         write_number(large, text, top, left, np.array(NUMBER, np.uint8), dot)
     return large
-
-
-def _draw_dot(picture: Picture, row: int, column: int, colour: tuple[int, int, int]) -> None:
-    if 0 <= row < picture.shape[0] and 0 <= column < picture.shape[1]:
-        picture[row, column] = colour

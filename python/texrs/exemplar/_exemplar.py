@@ -14,6 +14,7 @@ from texrs._cache import Cache, content_hash
 from texrs._engine.coherence import Similarity, find_similar
 from texrs._engine.stitcher import Stitcher
 from texrs._progress import listen
+from texrs._show import as_png, measure
 from texrs._typing import Array, Floats, Path, Progress
 from texrs.errors import FileError, InvalidInput
 from texrs.exemplar.analysis import (
@@ -97,9 +98,11 @@ class Exemplar:
 
     def __repr__(self) -> str:
         """Return the size, the channels and the dtype."""
-        count = self._pixels.shape[-1]
-        channels = f"{count} channel{'s' * (count > 1)} of {self._pixels.dtype}"
-        return f"<Exemplar of {' x '.join(map(str, self.shape))}, {channels}>"
+        return f"<Exemplar of {measure(self._pixels, self._axes)}>"
+
+    def _repr_png_(self) -> bytes:
+        """Show the picture in a notebook; of a volume the middle plane."""
+        return as_png(self._image if self._axes == 2 else self._image[self.shape[0] // 2])
 
     # --- pixels ------------------------------------------------------------------------------------------------------
 

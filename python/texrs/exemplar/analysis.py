@@ -11,6 +11,7 @@ import numpy as np
 from texrs._arrays import as_image, to_unit
 from texrs._engine.appearance import Appearance
 from texrs._engine.pyramid import halve
+from texrs._show import brief
 from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput
 
@@ -34,6 +35,8 @@ class Analysis:
     """
 
     levels: tuple[Appearance, ...]
+
+    __repr__ = brief
 
     @property
     def shape(self) -> tuple[int, ...]:

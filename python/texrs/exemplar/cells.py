@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_image, as_rgb, guidance
+from texrs._show import brief
 from texrs._typing import Array, Bools, Floats, Labels, Progress
 from texrs.errors import InvalidInput
 from texrs.exemplar.contours import measure_moments, trace
@@ -93,6 +94,8 @@ class Cells:
     joints: Floats
     confidence: float
     polarity: int
+
+    __repr__ = brief
 
     @property
     def count(self) -> int:

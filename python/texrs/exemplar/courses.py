@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._show import brief
 from texrs._typing import Floats
 from texrs.exemplar.regularity import FRACTIONS, WINDOW, Lattice, bend, correlate, crop_light
 from texrs.kernels.gather import gather
@@ -55,6 +56,8 @@ class Courses:
     axis: int
     slope: float
     joints: tuple[float, ...]
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         least, most = self.heights.min(), self.heights.max()

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._show import brief
 from texrs._typing import Array, Bools, Floats
 from texrs.exemplar.adjacency import classify
 
@@ -48,6 +49,8 @@ class Instances:
 
     labels: NDArray[np.uint32]
     depth: Floats
+
+    __repr__ = brief
 
     @property
     def count(self) -> int:

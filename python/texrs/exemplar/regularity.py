@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._show import brief
 from texrs._typing import Floats
 from texrs.source_map import SourceMap
 
@@ -60,6 +61,8 @@ class Lattice:
     """Mean over the lattice of the correlation of the image with itself, shifted."""
     exact: tuple[tuple[float, float], tuple[float, float]] | None = None
     """The two vectors to parts of a pixel, from how far their multiples go."""
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         return f"a lattice of periods {self.a} and {self.b} (correlation {self.correlation:.2f})"

@@ -18,6 +18,7 @@ from texrs._arrays import as_choice, as_image, as_int, as_list, as_rgb, to_unit
 from texrs._cache import content_hash
 from texrs._engine.noise import uniform
 from texrs._progress import listen
+from texrs._show import brief
 from texrs._typing import Array, Floats, Labels, Progress
 from texrs.errors import InvalidInput
 from texrs.exemplar.backgrounds import USUAL_LAYERS, find_foreground
@@ -62,13 +63,15 @@ class ElementOptions:
     Examples
     --------
     >>> ElementOptions(layers=3)
-    ElementOptions(layers=3, kind='auto', labels=None)
+    ElementOptions(layers=3)
 
     """
 
     layers: int | None = None
     kind: Kind = "auto"
     labels: Marks | Sequence[Marks] | None = None
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         if self.layers is not None:
@@ -119,6 +122,8 @@ class Segmentation:
     reason: str
     lattice: Lattice | None = None
     courses: Courses | None = None
+
+    __repr__ = brief
 
     @property
     def count(self) -> int:

@@ -14,9 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from texrs._arrays import as_float, as_size, try_array
 from texrs._cache import content_hash
+from texrs._show import as_png
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.fields._matrices import Matrices, find_flat, inverses, transpose_each
+from texrs.fields._picture import SIDE, choose_places, draw_arrows
 
 LEAST_DETERMINANT = 1e-3
 """Frames of a smaller determinant are refused: they are flat, and have no inverse worth the name."""
@@ -101,6 +103,11 @@ class Field(ABC):
 
     def __repr__(self) -> str:
         return f"<{self.axes}-D field: {self.describe()}>"
+
+    def _repr_png_(self) -> bytes:
+        """Show in a notebook where the exemplar's rows (red) and columns (blue) go; of a volume, in its middle plane."""
+        places = choose_places(self.axes)
+        return as_png(draw_arrows(places, self.over((SIDE,) * self.axes).frames(places)))
 
     def frames(self, points: ArrayLike) -> Floats:
         """Return the frames F.

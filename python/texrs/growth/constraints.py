@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from texrs._arrays import as_float, as_mask, try_array
 from texrs._engine.appearance import Demand
 from texrs._engine.pyramid import ONE, Region
+from texrs._show import brief
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.kernels.gather import gather
@@ -66,6 +67,8 @@ class Constraints:
     values: Array | None = None
     coordinates: Array | None = None
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         """Refuse what does not say what the points are to show."""
         if (self.values is None) == (self.coordinates is None):
@@ -108,6 +111,8 @@ class Guide:
     exemplar: ArrayLike
     output: ArrayLike
     weight: float = 1.0
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         """Check what can be checked without a size."""

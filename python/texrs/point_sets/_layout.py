@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._show import brief
 from texrs.point_sets._lattice import continue_on_lattice
 from texrs.point_sets._measures import Points, mark_inner, nearest_distances, spacing
 
@@ -38,6 +39,8 @@ class Fold:
     low: float
     high: float
     wrap: bool
+
+    __repr__ = brief
 
     def apply(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Return what coordinates stand for, between the lines, and whether they are mirrored.
@@ -153,6 +156,8 @@ class PointLayout:
     points: Points
     folds: tuple[Fold, Fold]
     scale: float
+
+    __repr__ = brief
 
     @classmethod
     def of(cls, points: Points, shape: Sequence[int], wrap: Sequence[bool], *, beyond: bool) -> PointLayout:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_image, as_list, as_ndarray, power_single
+from texrs._show import as_png
 from texrs._typing import Array, Bools, Frames, Interpolation, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.kernels.gather import gather
@@ -112,6 +113,24 @@ class SourceMap:
             raise InvalidInput(f"shapes: each needs {axes} sides, got {self.shapes}")
         if self.exemplar.size and int(self.exemplar.max()) >= len(self.shapes):
             raise InvalidInput(f"exemplar: reaches {int(self.exemplar.max())}, but there are {len(self.shapes)} shapes")
+
+    def __repr__(self) -> str:
+        """Return its size, and those of the exemplars."""
+        into = ", ".join(" x ".join(map(str, s)) for s in self.shapes[:4]) + ", ..." * (len(self.shapes) > 4)
+        frames = "" if self.frame is None else ", with frames"
+        return f"<SourceMap of {' x '.join(map(str, self.shape))} into {into}{frames}>"
+
+    def _repr_png_(self) -> bytes:
+        """Show in a notebook where each pixel comes from, of a volume in its middle plane.
+
+        Down the exemplar red grows, to the right green; blue tells exemplars apart.
+        """
+        cut = () if self.axes == 2 else self.shape[0] // 2
+        which = self.exemplar[cut]
+        most = np.array(self.shapes)[which][..., -2:] - 1
+        share = np.clip(self.coordinates[cut][..., -2:] / np.maximum(most, 1), 0, 1)
+        blue = 0.25 + 0.75 * which[..., np.newaxis] / max(len(self.shapes) - 1, 1)
+        return as_png(np.rint(255 * np.concatenate([share, blue], axis=-1)).astype(np.uint8))
 
     @classmethod
     def identity(cls, shape: tuple[int, ...]) -> SourceMap:

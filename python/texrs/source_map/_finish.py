@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_bool, as_choice, as_float, as_int
+from texrs._show import brief
 from texrs._typing import Array, Bools, Interpolation
 from texrs.errors import InvalidInput
 
@@ -61,6 +62,8 @@ class Finish:
     within: Bools | None = None
     known: tuple[Bools, ...] | None = None
     parts: NDArray[np.uint16] | None = None
+
+    __repr__ = brief
 
     def arrays(self) -> dict[str, Array]:
         """Return what is written to a file: the words as the bytes of a JSON text, and the masks."""

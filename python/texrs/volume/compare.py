@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from texrs._arrays import as_image, as_int
+from texrs._show import brief
 from texrs._typing import Array
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar
@@ -73,6 +74,8 @@ class Comparison:
     turned: float | None
     reuse: CellReuse | None
     integrity: Integrity | None
+
+    __repr__ = brief
 
     @property
     def relative_shares(self) -> NDArray[np.float64]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._show import brief
 from texrs._typing import Array, Floats
 from texrs.exemplar import Exemplar, as_exemplar
 from texrs.exemplar.instances import Instances, label_components
@@ -53,6 +54,8 @@ class Integrity:
     density: tuple[float, float]
     torn: float
     crumbs: float
+
+    __repr__ = brief
 
 
 def integrity(exemplar: Array | Exemplar, source: SourceMap, *, axes: int = 3) -> Integrity | None:

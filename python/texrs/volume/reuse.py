@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from texrs._arrays import as_int
+from texrs._show import brief
 from texrs._typing import Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.fields import Field
@@ -42,6 +43,8 @@ class CellReuse:
     largest: float
     most_used: float
     unused: float
+
+    __repr__ = brief
 
 
 def coherence(source: SourceMap, axis: int, field: Field | None = None) -> Bools:

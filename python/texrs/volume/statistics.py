@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from texrs._arrays import as_int
+from texrs._show import brief
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.volume._values import as_colours, as_region, correlate, drop_first, drop_last
@@ -35,6 +36,8 @@ class Classes:
     """
 
     centres: Floats
+
+    __repr__ = brief
 
     def of(self, image: ArrayLike, *, axes: int | None = None) -> NDArray[np.uint8]:
         """Return the class of each pixel or voxel: the nearest centre; the lower one of two as near.
@@ -135,6 +138,8 @@ class Particles:
     mean: float
     median: float
     deciles: tuple[float, ...]
+
+    __repr__ = brief
 
 
 def lightness(image: ArrayLike, *, axes: int | None = None) -> Floats:

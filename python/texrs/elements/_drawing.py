@@ -1,0 +1,36 @@
+"""What pictures of elements are drawn with."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_image, as_rgb, guidance
+from texrs._typing import Array
+
+Picture = NDArray[np.uint8]
+
+CROSS = (255, 40, 40)
+"""Colour of points."""
+
+
+def draw_plain(image: Array) -> Picture:
+    """Draw a texture alone."""
+    return np.rint(np.clip(as_rgb(guidance(as_image(image))), 0, 1) * 255).astype(np.uint8)
+
+
+def mark_points(plain: Picture, points: NDArray[np.float64], box: tuple[int, int]) -> Picture:
+    """Return a picture with a cross on each element, as large as its box asks for."""
+    drawn = plain.copy()
+    arm = max(2, min(box) // 10)
+    for row, column in np.floor(points + 0.5).astype(int).tolist():
+        for step in range(-arm, arm + 1):
+            draw_dot(drawn, row + step, column + step, CROSS)
+            draw_dot(drawn, row + step, column - step, CROSS)
+    return drawn
+
+
+def draw_dot(picture: Picture, row: int, column: int, colour: tuple[int, int, int]) -> None:
+    """Colour a pixel, where there is one."""
+    if 0 <= row < picture.shape[0] and 0 <= column < picture.shape[1]:
+        picture[row, column] = colour

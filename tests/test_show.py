@@ -1,0 +1,102 @@
+"""How things show themselves: on one line, and as pictures in notebooks."""
+
+import io
+from base64 import b64decode
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import texrs
+from texrs.errors import InvalidInput
+
+PEBBLES = texrs.samples.pebbles((64, 64)).image
+DOTS = texrs.samples.load("dots", size=(96, 96))
+MADE = texrs.tile(PEBBLES)
+VOLUME = texrs.samples.stripes((32, 36, 40)).image
+THINGS = {
+    "Synthesis": MADE,
+    "SourceMap": MADE.source,
+    "Finish": MADE.source.finish,
+    "Exemplar": texrs.Exemplar(PEBBLES),
+    "Elements": texrs.elements.Elements.of_sample(DOTS),
+    "layout": texrs.layouts.points([(20, 20), (40, 40), (20, 50)], 64),
+    "Plane": texrs.Plane((64, 64), 45),
+    "View": texrs.View(slant=45, ground=np.ones((64, 64), bool)),
+    "Field": texrs.fields.circular(axes=2),
+    "field of frames": texrs.fields.from_array(np.tile(np.eye(2), (8, 8, 1, 1))),
+    "Segmentation": texrs.exemplar.segment(PEBBLES),
+    "Analysis": texrs.Exemplar(PEBBLES).analyse(),
+    "Constraints": texrs.Constraints(mask=DOTS.mask, values=DOTS.image),
+    "Guide": texrs.Guide(exemplar=PEBBLES[..., 0], output=PEBBLES[..., 1]),
+    "ElementOptions": texrs.ElementOptions(labels=DOTS.labels),
+    "Comparison": texrs.volume.compare(VOLUME, VOLUME),
+    "Particles": texrs.volume.particles(VOLUME[..., 0] > 100),
+    "list": [MADE] * 3,
+    "Gallery": texrs.Gallery([MADE] * 3),
+    "long Gallery": texrs.Gallery([MADE] * 30),
+}
+
+
+@pytest.mark.parametrize("name", THINGS)
+def test_everything_says_what_it_is_on_one_short_line(name: str):
+    text = repr(THINGS[name])
+    assert "\n" not in text
+    assert len(text) < 420
+    assert "array(" not in text
+
+
+def test_what_is_as_by_default_is_not_said():
+    assert repr(texrs.ElementOptions(kind="grid")) == "ElementOptions(kind='grid')"
+    assert repr(MADE) == f"<Synthesis of {MADE.image.shape[0]} x {MADE.image.shape[1]}, 3 channels of uint8>"
+    assert repr(texrs.Gallery([MADE] * 30)).endswith("... 30 in all])")
+
+
+def open_png(data: bytes) -> Any:
+    return np.asarray(Image.open(io.BytesIO(data)))
+
+
+@pytest.mark.parametrize(
+    ("thing", "shape"),
+    [
+        (MADE, MADE.image.shape),
+        (MADE.source, MADE.image.shape),
+        (texrs.SourceMap.identity((5, 6, 7)), (6, 7, 3)),
+        (THINGS["Exemplar"], (64, 64, 3)),
+        (texrs.Exemplar(VOLUME, axes=3), (36, 40, 3)),
+        (THINGS["Elements"], (96, 96, 3)),
+        (THINGS["layout"], (64, 64, 3)),
+        (THINGS["Field"], (240, 240, 3)),
+        (texrs.fields.circular(), (240, 240, 3)),
+        (THINGS["field of frames"], (240, 240, 3)),
+    ],
+    ids=lambda value: repr(value)[:24],
+)
+def test_a_notebook_shows_a_picture(thing: Any, shape: tuple[int, ...]):
+    picture = open_png(thing._repr_png_())
+    assert picture.shape == shape
+    assert picture.std() > 1
+
+
+def test_a_source_map_is_shown_by_where_it_looks():
+    shown = open_png(texrs.SourceMap.identity((11, 21))._repr_png_())
+    assert shown[0, 0, :2].tolist() == [0, 0]
+    assert shown[10, 20, :2].tolist() == [255, 255]
+    assert shown[5, 0, :2].tolist() == [128, 0]
+
+
+def test_arrows_go_where_the_axes_go():
+    straight = open_png(texrs.fields.identity()._repr_png_())
+    red = (straight == (200, 40, 40)).all(axis=-1)
+    # The exemplar's rows go down: of each red arrow the shaft is a column.
+    assert red.sum(axis=0).max() > 5 * np.median(red.sum(axis=1)[red.any(axis=1)]) / 2
+
+
+def test_a_gallery_shows_all_that_it_holds():
+    gallery = texrs.Gallery(each for each in (MADE, PEBBLES, PEBBLES[..., 0], MADE.source))
+    pictures = [open_png(b64decode(part.split('"')[0])) for part in gallery._repr_html_().split("base64,")[1:]]
+    assert [p.shape[:2] for p in pictures] == [MADE.image.shape[:2], (64, 64), (64, 64), MADE.image.shape[:2]]
+    assert np.array_equal(pictures[0], MADE.image)
+    with pytest.raises(InvalidInput, match="results: "):
+        texrs.Gallery([{"no": "picture"}])._repr_html_()
