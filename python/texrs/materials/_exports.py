@@ -167,6 +167,50 @@ class Exports(Mapping[str, Map]):
             raise InvalidInput(f"depth: allowed are 8 and 16, got {depth!r}")
         return write_gltf(self, path, shapes, repeat, depth)
 
+    def save_materialx(self, path: Path, *, depth: Literal[8, 16, 32] | None = None) -> list[FilePath]:
+        """Write a MaterialX document: a standard surface whose inputs are the maps, in files beside it.
+
+        Normals have y up (those of DirectX are turned; heights give them where there are none); heights displace the surface
+        as far as fits the normals, on a surface as wide as the picture is shown once. Occlusion, which renderers work out
+        themselves, and what a surface has no input for, are left out.
+
+        Parameters
+        ----------
+        path : path_like
+            With the suffix .mtlx. Maps are named after it and after themselves: ``stones.mtlx``, ``stones_albedo.png``.
+        depth : {8, 16, 32}, optional
+            Bits of each sample of the maps: integers of 8 or 16, floats of 32. By default those of each map.
+
+        Returns
+        -------
+        list of pathlib.Path
+            The files, the document first.
+
+        Raises
+        ------
+        FileError
+            Another suffix, or a file cannot be written. What was there is as it was.
+        InvalidInput
+            A volume, another depth, or no map that a surface has.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import texrs
+        >>> pebbles = texrs.samples.pebbles((64, 64)).image
+        >>> stones = texrs.Material({"albedo": pebbles, "roughness": pebbles[..., 1]})
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     [path.name for path in stones.save_materialx(f"{folder}/stones.mtlx")]
+        ['stones.mtlx', 'stones_albedo.png', 'stones_roughness.png']
+
+        """
+        from texrs.materials._materialx import write_materialx
+
+        self._check_flat()
+        if depth not in (None, 8, 16, 32):
+            raise InvalidInput(f"depth: allowed are 8, 16 and 32, got {depth!r}")
+        return write_materialx(self, path, depth)
+
     def _check_flat(self) -> None:
         if self.axes != 2:
             raise InvalidInput("material: is a volume; this is for pictures, such as slices of it")

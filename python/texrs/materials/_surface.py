@@ -12,7 +12,15 @@ from texrs.materials._light import decode_normals, find_map, to_light, to_share
 from texrs.materials._map import Map
 from texrs.materials._roles import Role
 
-__all__ = ["find_opacity", "list_signed", "measure_slopes", "take_colour", "take_normals", "take_surface"]
+__all__ = [
+    "find_opacity",
+    "list_signed",
+    "measure_relief",
+    "measure_slopes",
+    "take_colour",
+    "take_normals",
+    "take_surface",
+]
 
 GREY = 0.5
 """Linear light that a surface without colours throws back."""
@@ -72,11 +80,16 @@ def measure_slopes(maps: Mapping[str, Map], wrap: tuple[bool, bool]) -> Floats |
     height = find_map(maps, Role.HEIGHT)
     if height is None or find_map(maps, Role.NORMAL, Role.NORMAL_DX) is not None:
         return None
-    pixels = height.pixels if height.pixels.ndim == 2 else height.pixels[..., 0]
-    values = to_unit(pixels) if pixels.dtype.kind in "bui" else pixels.astype(np.float32)
-    found = np.stack([differ(values, 1, wrap[1]), -differ(values, 0, wrap[0])], axis=-1)
+    found = slope(height, wrap)
     steep = float(np.sqrt(np.mean(np.square(found, dtype=np.float64))))
     return found * np.float32(STEEPNESS / steep) if steep > 0 else found
+
+
+def slope(height: Map, wrap: tuple[bool, bool]) -> Floats:
+    """Return how heights grow from pixel to pixel, to the right and upwards; integers are shares of their range."""
+    pixels = height.pixels if height.pixels.ndim == 2 else height.pixels[..., 0]
+    values = to_unit(pixels) if pixels.dtype.kind in "bui" else pixels.astype(np.float32)
+    return np.stack([differ(values, 1, wrap[1]), -differ(values, 0, wrap[0])], axis=-1)
 
 
 def differ(values: Floats, axis: int, wrap: bool) -> Floats:
@@ -99,3 +112,25 @@ def find_opacity(cut: Mapping[str, Map]) -> Floats | None:
     if colour is not None and colour.channels in (2, 4):
         return to_share(colour.pixels[..., -1:])
     return None
+
+
+def measure_relief(maps: Mapping[str, Map]) -> float | None:
+    """Return how high heights of 1 rise, in widths of the picture: as the normals say, or as is usual where there are none."""
+    height = find_map(maps, Role.HEIGHT)
+    if height is None:
+        return None
+    grown = slope(height, (True, True))
+    square = float(np.square(grown, dtype=np.float64).sum())
+    if square == 0:
+        return None
+    steep = STEEPNESS * float(np.sqrt(grown.size / square))
+    columns = height.pixels.shape[1]
+    name = next((n for role in (Role.NORMAL, Role.NORMAL_DX) for n, m in maps.items() if m.role is role), None)
+    if name is not None:
+        normal = take_normals({name: maps[name]}, list_signed({name: maps[name]}), None, grown.shape[:2])
+        seen = -normal[..., :2] / np.maximum(normal[..., 2:], np.float32(0.1))
+        # The heights that fit the normals best.
+        fitting = float((seen * grown).sum(dtype=np.float64)) / square
+        steep = fitting if fitting > 0 else steep
+    relief: float = steep / columns
+    return relief

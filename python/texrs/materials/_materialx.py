@@ -1,0 +1,199 @@
+"""A material as a MaterialX 1.38 document: a standard surface, whose inputs are its maps, in files beside it.
+
+What a standard surface has no input for is left out: occlusion, which renderers work out, and masks, labels and directions.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path as FilePath
+from xml.etree import ElementTree
+
+import numpy as np
+
+from texrs import io
+from texrs._typing import Array, Path
+from texrs.errors import FileError, InvalidInput
+from texrs.materials._files import choose_suffix, convert, write_maps
+from texrs.materials._light import find_map
+from texrs.materials._map import Map
+from texrs.materials._roles import Role
+from texrs.materials._surface import GREY, METAL, ROUGH, list_signed, measure_relief, measure_slopes, take_normals
+
+__all__ = ["write_materialx"]
+
+VERSION = "1.38"
+INTEGERS = (np.dtype(np.uint8), np.dtype(np.uint16))
+FLOATS = (np.dtype(np.float16), np.dtype(np.float32))
+SPACES = {"srgb": "srgb_texture", "linear": "lin_rec709"}
+USED = (
+    Role.COLOUR,
+    Role.NORMAL,
+    Role.NORMAL_DX,
+    Role.HEIGHT,
+    Role.ORM,
+    Role.ROUGHNESS,
+    Role.METALLIC,
+    Role.EMISSION,
+    Role.OPACITY,
+)
+
+
+def write_materialx(maps: Mapping[str, Map], path: Path, depth: int | None) -> list[FilePath]:
+    """Write a document and the maps that it names, and return the files."""
+    target = FilePath(path)
+    if target.suffix.lower() != ".mtlx":
+        raise FileError(f"{path}: the suffix {target.suffix!r} is not that of MaterialX: .mtlx")
+    chosen = {role: name for role in USED for name, each in maps.items() if each is find_map(maps, role)}
+    if Role.NORMAL in chosen:
+        chosen.pop(Role.NORMAL_DX, None)
+    if not chosen:
+        raise InvalidInput(f"material: none of {', '.join(maps)} is a map that a surface has")
+    stored = {f"{target.stem}_{name}": prepare(maps[name], maps, depth) for name in chosen.values()}
+    if Role.HEIGHT in chosen and (slopes := measure_slopes(maps, (True, True))) is not None:
+        normals = take_normals(maps, {}, slopes, slopes.shape[:2])
+        packed = convert((normals + 1) * np.float32(0.5), depth or 16)
+        chosen[Role.NORMAL] = "normal"
+        stored[f"{target.stem}_normal"] = Map(packed, Role.NORMAL, "linear")
+    files = {role: f"{target.stem}_{name}" for role, name in chosen.items()}
+    document = compose(
+        re.sub(r"\W", "_", target.stem, flags=re.ASCII),
+        {role: name + choose_suffix(stored[name], None) for role, name in files.items()},
+        {role: stored[name] for role, name in files.items()},
+        measure_relief(maps),
+    )
+    ElementTree.indent(document)
+    text = ElementTree.tostring(document, encoding="utf-8", xml_declaration=True)
+    with io.atomic(target) as temporary:
+        temporary.write_bytes(text + b"\n")
+        written = write_maps(stored, target.parent, axes=2, depth=None, suffix=None)
+    return [target, *written]
+
+
+def prepare(each: Map, maps: Mapping[str, Map], depth: int | None) -> Map:
+    """Return a map as files of renderers hold it: colours of three or four channels, normals with y up, one number else."""
+    pixels = each.pixels if each.pixels.ndim > 2 else each.pixels[..., np.newaxis]
+    if each.role.coloured:
+        pixels = spread_grey(pixels)
+    elif each.role.normal:
+        if pixels.dtype in INTEGERS:
+            pixels = turn_green(pixels) if each.role is Role.NORMAL_DX else pixels
+        else:
+            name = next(n for n, m in maps.items() if m is each)
+            pixels = (take_normals({name: each}, list_signed(maps), None, pixels.shape[:2]) + 1) * np.float32(0.5)
+        pixels = pixels[..., :3]
+    elif each.role is Role.ORM:
+        pixels = pixels[..., :3]
+    else:
+        pixels = pixels[..., 0]
+    if depth is not None:
+        pixels = convert(pixels, depth)
+    elif pixels.dtype.kind == "f":
+        pixels = pixels if pixels.dtype in FLOATS else pixels.astype(np.float32)
+    elif pixels.dtype not in (*INTEGERS, np.dtype(np.bool_)):
+        pixels = convert(pixels, 16)
+    role = Role.NORMAL if each.role.normal else each.role
+    return Map(pixels, role, each.space)
+
+
+def spread_grey(pixels: Array) -> Array:
+    """Return colours of three channels, or of four with transparency."""
+    channels = pixels.shape[-1]
+    if channels > 2:
+        return pixels[..., :4]
+    return np.concatenate([np.repeat(pixels[..., :1], 3, axis=-1), pixels[..., 1:]], axis=-1)
+
+
+def turn_green(pixels: Array) -> Array:
+    """Return normals whose y grows the other way."""
+    turned = pixels.copy()
+    turned[..., 1] = np.iinfo(pixels.dtype).max - turned[..., 1]
+    return turned
+
+
+def compose(
+    name: str, files: Mapping[Role, str], maps: Mapping[Role, Map], relief: float | None
+) -> ElementTree.Element:
+    """Return the document: images in a graph, the surface that they feed, and the material."""
+    root = ElementTree.Element("materialx", version=VERSION, colorspace=SPACES["linear"])
+    graph = ElementTree.SubElement(root, "nodegraph", name=f"NG_{name}")
+    surface = ElementTree.Element("standard_surface", name=f"SR_{name}", type="surfaceshader")
+    outputs: list[ElementTree.Element] = []
+
+    def node(kind: str, title: str, type_: str, **inputs: tuple[str, str]) -> str:
+        made = ElementTree.SubElement(graph, kind, name=title, type=type_)
+        for key, (their, value) in inputs.items():
+            by = "nodename" if their.startswith(">") else "value"
+            ElementTree.SubElement(made, "input", {"name": key, "type": their.lstrip(">"), by: value})
+        return title
+
+    def image(role: Role, title: str, type_: str) -> str:
+        made = node("image", title, type_, file=("filename", files[role]))
+        if role.coloured:
+            graph[-1][0].set("colorspace", SPACES[maps[role].space])
+        return made
+
+    def feed(key: str, type_: str, source: str | None, value: str = "") -> None:
+        taken = ElementTree.SubElement(surface, "input", name=key, type=type_)
+        if source is None:
+            taken.set("value", value)
+            return
+        outputs.append(ElementTree.Element("output", name=f"{key}_out", type=type_, nodename=source))
+        taken.attrib |= {"nodegraph": graph.attrib["name"], "output": f"{key}_out"}
+
+    opacity = image(Role.OPACITY, "opacity_image", "float") if Role.OPACITY in files else None
+    feed("base", "float", None, "1.0")
+    if Role.COLOUR not in files:
+        feed("base_color", "color3", None, f"{GREY}, {GREY}, {GREY}")
+    elif maps[Role.COLOUR].channels == 3:
+        feed("base_color", "color3", image(Role.COLOUR, "colour_image", "color3"))
+    else:
+        both = image(Role.COLOUR, "colour_image", "color4")
+        feed("base_color", "color3", node("convert", "colour", "color3", **{"in": (">color4", both)}))
+        if opacity is None:
+            index = ("integer", "3")
+            opacity = node("extract", "opacity_channel", "float", **{"in": (">color4", both), "index": index})
+    if opacity is not None:
+        feed("opacity", "color3", node("convert", "opacity", "color3", **{"in": (">float", opacity)}))
+    packed = image(Role.ORM, "orm_image", "vector3") if Role.ORM in files else None
+    for role, key, channel, usual in (
+        (Role.ROUGHNESS, "specular_roughness", 1, ROUGH),
+        (Role.METALLIC, "metalness", 2, METAL),
+    ):
+        if role in files:
+            feed(key, "float", image(role, f"{role.value}_image", "float"))
+        elif packed is not None:
+            index = ("integer", str(channel))
+            feed(key, "float", node("extract", role.value, "float", **{"in": (">vector3", packed), "index": index}))
+        else:
+            feed(key, "float", None, str(usual))
+    if Role.EMISSION in files:
+        feed("emission", "float", None, "1.0")
+        kind = "color3" if maps[Role.EMISSION].channels == 3 else "color4"
+        light = image(Role.EMISSION, "emission_image", kind)
+        if kind == "color4":
+            light = node("convert", "emission", "color3", **{"in": (">color4", light)})
+        feed("emission_color", "color3", light)
+    normal = next((role for role in (Role.NORMAL, Role.NORMAL_DX) if role in files), None)
+    if normal is not None:
+        bent = image(normal, "normal_image", "vector3")
+        feed("normal", "vector3", node("normalmap", "normal", "vector3", **{"in": (">vector3", bent)}))
+    root.append(surface)
+    material = ElementTree.Element("surfacematerial", name=name if name[:1].isalpha() else f"M_{name}", type="material")
+    reference = {"name": "surfaceshader", "type": "surfaceshader", "nodename": f"SR_{name}"}
+    ElementTree.SubElement(material, "input", reference)
+    if Role.HEIGHT in files and relief is not None:
+        rise = image(Role.HEIGHT, "height_image", "float")
+        outputs.append(ElementTree.Element("output", name="displacement_out", type="float", nodename=rise))
+        lift = ElementTree.SubElement(root, "displacement", name=f"DP_{name}", type="displacementshader")
+        graphed = {"nodegraph": graph.attrib["name"], "output": "displacement_out"}
+        ElementTree.SubElement(lift, "input", {"name": "displacement", "type": "float", **graphed})
+        ElementTree.SubElement(lift, "input", {"name": "scale", "type": "float", "value": f"{relief:.6g}"})
+        reference = {"name": "displacementshader", "type": "displacementshader", "nodename": f"DP_{name}"}
+        ElementTree.SubElement(material, "input", reference)
+    root.append(material)
+    graph.extend(outputs)
+    if not len(graph):
+        root.remove(graph)
+    return root
