@@ -38,7 +38,7 @@ $(VENV)/.built: $(VENV)/.tools $(RUST)
 	@touch $@
 
 demo: $(VENV)/.built
-	$(BIN)/texrs demo -o demo
+	$(BIN)/texrs demo -o demo --force
 	@echo "Open demo/index.html in a browser."
 
 # All Rust tests are in the library: to build it once more for others would take a minute. Workers share the processors: were

@@ -338,7 +338,6 @@ ARGUMENTS: dict[str, str] = {
     "unknown option": "design in.png --colour red",
     "examples that do not agree": "design in.png sample:grass",
     "no example": "design",
-    "no command": "",
     "unknown command": "desing in.png",
     "apply to no map": "apply in.png",
     "apply no source": "apply in.png in.png",

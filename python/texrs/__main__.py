@@ -1,8 +1,19 @@
 """``python -m texrs`` is the command ``texrs``."""
 
 import sys
+from collections.abc import Sequence
 
-from texrs.cli import main
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code; Ctrl-C ends it without a traceback while it still loads, too."""
+    try:
+        from texrs.cli import main as run
+
+        return run(arguments)
+    except KeyboardInterrupt:
+        print("texrs: stopped; nothing was left half-written", file=sys.stderr)
+        return 130
+
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -17,33 +17,44 @@ import typer
 from typer.core import TyperGroup
 
 from texrs.cli._console import run, say
-from texrs.errors import InvalidInput
 
 __all__ = ["main"]
 
-COMMANDS = {
-    "analyse": "Find the elements of a texture, and what belongs to them.",
-    "apply": "Make the heights, normals or labels of a result, through its source map.",
-    "batch": "Do a command for many pictures, seeds and presets, and what is not done yet alone.",
-    "complete": "Fill a hole in a picture with patches of what is known of it, or of another picture.",
-    "database": "Keep analysed textures in a folder: add, list, or splice all with all.",
-    "demo": "Write a page that shows what texrs makes, on built-in examples.",
-    "design": "Design a texture of any size from one example.",
-    "extend": "Make a photograph of a plane larger, on any side, in the same perspective.",
-    "info": "Say what a file holds, and how texrs made it.",
-    "perspective": "Grow a picture whose elements are as large as a scale map says.",
-    "rectify": "Make the flat texture of a plane that was photographed aslant.",
-    "remove": "Take something out of a photograph, and fill in the plane behind it in its perspective.",
-    "rerun": "Make a file that texrs wrote again, from the same inputs, and compare.",
-    "samples": "List the built-in examples, or write them to a folder.",
-    "scale-map": "Make a scale map: how large the elements of a picture are at each place.",
-    "self-splice": "Edit the layout of a texture's own elements.",
-    "slice": "Show a volume: slices along its axes, a cut in any direction, a cube or a turntable.",
-    "solid": "Grow a volume from a volume, under a frame field.",
-    "splice": "Arrange the elements of one texture as those of another are.",
-    "synthesize": "Grow a picture from a picture, under a frame field.",
-    "tile": "Make a picture cyclic, so that copies side by side have no edge between them.",
+GROUPS: dict[str, dict[str, str]] = {
+    "The four systems": {
+        "design": "Design a texture of any size from one example.",
+        "splice": "Arrange the elements of one texture as those of another are.",
+        "self-splice": "Edit the layout of a texture's own elements.",
+        "perspective": "Grow a picture whose elements are as large as a scale map says.",
+        "solid": "Grow a volume from a volume, under a frame field.",
+        "synthesize": "Grow a picture from a picture, under a frame field.",
+    },
+    "Pictures": {
+        "tile": "Make a picture cyclic, so that copies side by side have no edge between them.",
+        "complete": "Fill a hole in a picture with patches of what is known of it, or of another picture.",
+        "extend": "Make a photograph of a plane larger, on any side, in the same perspective.",
+        "rectify": "Make the flat texture of a plane that was photographed aslant.",
+        "remove": "Take something out of a photograph, and fill in the plane behind it in its perspective.",
+    },
+    "What texrs knows of a picture": {
+        "analyse": "Find the elements of a texture, and what belongs to them.",
+        "database": "Keep analysed textures in a folder: add, list, or splice all with all.",
+        "scale-map": "Make a scale map: how large the elements of a picture are at each place.",
+    },
+    "Results": {
+        "apply": "Make the heights, normals or labels of a result, through its source map.",
+        "slice": "Show a volume: slices along its axes, a cut in any direction, a cube or a turntable.",
+        "info": "Say what a file holds, and how texrs made it.",
+        "rerun": "Make a file that texrs wrote again, from the same inputs, and compare.",
+        "batch": "Do a command for many pictures, seeds and presets, and what is not done yet alone.",
+    },
+    "Examples": {
+        "samples": "List the built-in examples, or write them to a folder.",
+        "demo": "Write a page that shows what texrs makes, on built-in examples.",
+    },
 }
+"""All commands, and what they are for, as the help shows them."""
+COMMANDS = {name: text for group in GROUPS.values() for name, text in group.items()}
 
 
 def load(name: str) -> Callable[..., None]:
@@ -114,14 +125,15 @@ class Group(TyperGroup):
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """List the commands without making them."""
-        with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
+        for title, group in GROUPS.items():
+            with formatter.section(title):
+                formatter.write_dl(list(group.items()))
 
 
 app = typer.Typer(
     cls=Group,
     help="Make new textures from one example.",
-    add_completion=False,
+    add_completion=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -165,4 +177,4 @@ def texrs(
 ) -> None:
     """Make new textures from one example."""
     if context.invoked_subcommand is None:
-        raise InvalidInput(f"a command is missing: one of {', '.join(COMMANDS)} (texrs --help describes them)")
+        say(context.get_help())

@@ -202,6 +202,18 @@ def read_picture(text: str, *, finite: bool = True) -> Array:
     return image
 
 
+def match_alpha(image: Array, like: Array | None) -> Array:
+    """Return a picture with an alpha channel, all of it there, if that is all that it lacks; without one that says nothing."""
+    colours = [1 if a.ndim == 2 else a.shape[2] for a in (image, image if like is None else like)]
+    whole = 1 if image.dtype.kind == "f" else np.iinfo(image.dtype).max if image.dtype.kind in "ui" else True
+    if colours in ([3, 4], [1, 2]):
+        pixels = image[..., np.newaxis] if image.ndim == 2 else image
+        return np.concatenate([pixels, np.full_like(pixels[..., :1], whole)], axis=2)
+    if colours in ([4, 3], [2, 1]) and (image[..., -1] == whole).all():
+        return np.ascontiguousarray(image[..., :-1] if colours[1] > 1 else image[..., 0])
+    return image
+
+
 def read_volume(text: str) -> Array:
     """Read a volume, or make the built-in one that ``sample:NAME`` names; all of it must be finite."""
     if text.startswith(SAMPLE):
@@ -367,6 +379,8 @@ def read_points(path: str, about: About) -> list[list[float]]:
 # --- the kinds -------------------------------------------------------------------------------------------------------
 
 PICTURE = Kind("FILE", lambda text, about: read_picture(text), "A file, or sample:NAME.", file=True)
+SOURCE = replace(PICTURE, read=lambda text, about: match_alpha(read_picture(text), about.like))
+"""A picture of the same things as the first, which may have an alpha channel that this one lacks."""
 UNKNOWN = replace(PICTURE, read=lambda text, about: read_picture(text, finite=False))
 """A picture in which some is not known, and may be anything."""
 VOLUME = replace(PICTURE, read=lambda text, about: read_volume(text))

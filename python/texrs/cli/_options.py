@@ -214,7 +214,8 @@ class Options:
         else:
             both = f"{flag}/--no-{flag.removeprefix('--')}" if type_ is bool else flag
             metavar = kind.pick(kind.metavar, self.axes) if kind else None
-            info = typer.Option(both, metavar=metavar, help=help_, show_default=shown)
+            panel = path[0].replace("_", " ").capitalize() if len(path) == 2 else None
+            info = typer.Option(both, metavar=metavar, help=help_, show_default=shown, rich_help_panel=panel)
         return Option(path, flag, type_, kind, default, required, info)
 
     def _find_kind(self, path: Path, parameter: inspect.Parameter) -> tuple[Kind | None, Any]:

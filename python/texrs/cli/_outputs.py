@@ -32,6 +32,11 @@ LONGEST_PROBE = 2**17
 STAGE = re.compile(r"[0-9]{2,}-.*\.png|(points|mask|numbers)\.png|report\.json")
 """Names of what is written to a folder of stages."""
 
+MAIN, MORE, FILES, WORK = "Options", "More options", "Other files to write", "How it is done"
+"""Groups of options in the help."""
+MATTER = ("out", "folder", "size", "to", "seed", "seeds", "options", "field", "wrap", "slant", "at")
+"""Options that matter most, the first three of which come first in the help of a command."""
+
 OUTPUTS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "out": (("--out", "-o"), "OUT", "File to write; its name says the format."),
     "map": (("--map",), "OUT.npz", "File for the source map, for texrs apply."),
@@ -71,6 +76,33 @@ def to_write(name: str, metavar: str | None = None, text: str | None = None) -> 
 
 class Command(TyperCommand):
     """A command that never writes over what it reads: whatever names a file and is no output may be read."""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """List the options in groups: what matters most, the rest, what belongs to one thing, other files, and the work."""
+        sections: dict[str, list[tuple[str, str]]] = {title: [] for title in ("Arguments", MAIN, MORE)}
+        last: dict[str, list[tuple[str, str]]] = {title: [] for title in (FILES, WORK)}
+        options = [p for p in self.get_params(ctx) if p.param_type_name == "option"]
+        main = [name for name in MATTER if name in {p.name for p in options}][:3]
+        rank = {name: place for place, name in enumerate(main)}
+        for p in sorted(self.get_params(ctx), key=lambda p: rank.get(p.name, len(rank))):
+            entry = p.get_help_record(ctx)
+            if entry is None:
+                continue
+            if p.param_type_name != "option":
+                title = "Arguments"
+            elif p.name in main:
+                title = MAIN
+            elif p.name in OUTPUTS or p.name == "each":
+                title = FILES
+            elif p.name in ("count", "quiet", "force", "help"):
+                title = WORK
+            else:
+                title = getattr(p, "rich_help_panel", None) or MORE
+            (last if title in last else sections).setdefault(title, []).append(entry)
+        for title, entries in (sections | last).items():
+            if entries:
+                with formatter.section(title):
+                    formatter.write_dl(entries)
 
     def invoke(self, ctx: Any) -> Any:
         """Do the command, if no output is an input; what it writes says how it was made."""

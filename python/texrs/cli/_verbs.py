@@ -32,6 +32,7 @@ from texrs.cli._kinds import (
     NUMBERS,
     PICTURE,
     SEEN,
+    SOURCE,
     TARGET,
     UNKNOWN,
     VOLUME,
@@ -180,7 +181,7 @@ def make_verb(name: str) -> Verb:
         case "complete":
             from texrs.completion import complete
 
-            kinds = {"exemplar": PICTURE, "scale_map": MAP_OR_AUTO, "exemplar_scale_map": MAP_OR_AUTO}
+            kinds = {"exemplar": SOURCE, "scale_map": MAP_OR_AUTO, "exemplar_scale_map": MAP_OR_AUTO}
             names = {"exemplar": "from", "exemplar_scale_map": "from-scale-map"}
             return Verb(Options(complete, arguments={"image": UNKNOWN, "hole": HOLE}, kinds=kinds, names=names))
         case "design":
