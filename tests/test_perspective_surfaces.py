@@ -272,12 +272,32 @@ def test_a_column_that_repeats(weave):
         ({"scale_map": "above"}, "scale_map: allowed are auto and front"),
         ({"scale_map": Plane((9, 9), 20)}, "scale_map: needs a plane in a picture of"),
         ({"fov": 400}, "fov: needs a number from 1 to 170"),
+        ({"scale_map": "plane:slant=30", "fov": 40}, "fov: the plane has one already"),
+        ({"scale_map": Plane((128, 128), 30), "fov": 40}, "fov: the plane has one already"),
     ],
 )
 def test_bad_input_is_named(weave, given, words):
     call = {"scale_map": "front", **given}
     with pytest.raises(InvalidInput, match=words):
         texrs.perspective(weave, size=32, **call)
+
+
+def test_the_angle_of_view_of_a_photograph_is_used(tmp_path, monkeypatch):
+    from PIL import Image
+
+    monkeypatch.chdir(tmp_path)
+    floor = samples.tilted_discs((128, 128)).image
+    exif = Image.Exif()
+    exif.get_ifd(0x8769)[0xA405] = 54
+    Image.fromarray(floor).save("floor.webp", exif=exif, lossless=True)
+    line = "perspective floor.webp -o out.png --target plane:slant=30 --size 64 --seed 1 -q"
+    assert main(line.split()) == 0
+    stated = texrs.perspective(floor, size=64, target="plane:slant=30", fov=io.read_fov("floor.webp"), seed=1)
+    np.testing.assert_array_equal(io.read("out.png"), stated.image)
+    unknown = texrs.perspective(floor, size=64, target="plane:slant=30", seed=1)
+    assert (unknown.image != stated.image).any()
+    # A plane that is said has its own.
+    assert main([*line.split(), "--scale-map", "plane:slant=50,fov=37"]) == 0
 
 
 def test_on_the_command_line(tmp_path, monkeypatch, capsys, weave):

@@ -31,6 +31,7 @@ from texrs.cli._kinds import (
     MASK,
     NUMBERS,
     PICTURE,
+    PLANE,
     SEEN,
     SOURCE,
     TARGET,
@@ -240,7 +241,8 @@ def count_moved(result: Synthesis) -> str:
 
 def read_exemplar_camera(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
     """Return the angle of view that an exemplar states."""
-    fovs = list(read_camera({"image": given["exemplar"]}).values())
+    said = (given["scale_map"] or "").startswith(PLANE)
+    fovs = [] if said else list(read_camera({"image": given["exemplar"]}).values())
     return {("fov",): fovs[0]} if fovs else {}
 
 

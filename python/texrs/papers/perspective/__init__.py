@@ -106,7 +106,8 @@ def perspective(
         square roots of areas. None: what the scale map fits best, as a map of a plane; the target holds the same.
     fov : float, optional
         Degrees that the longer side of the exemplar spans, 1 to 170; `texrs.planes.FOV` by default. How much a plane is
-        foreshortened besides what a scale map says; a ``target`` that is a surface, and ``direction``, need it.
+        foreshortened besides what a scale map says; a ``target`` that is a surface, and ``direction``, need it. Not of a
+        ``scale_map`` that is a plane, which has its own.
     direction : float, (rows, columns) array or Field, optional
         By how many degrees, counter-clockwise, what is copied is turned: everywhere, or at each pixel; an array of another size
         is stretched. Of a `texrs.fields.Field` of two axes, or its words, as ``"circular"`` or ``"zigzag:period=64,angle=30"``,

@@ -16,7 +16,7 @@ from texrs.exemplar import Exemplar, as_exemplar
 from texrs.materials import Material
 from texrs.papers.perspective.directions import as_turn
 from texrs.papers.perspective.sizes import Sizes, check_sizes
-from texrs.papers.perspective.targets import PREFIX, Surface, as_surface, as_target, find_size, is_map, read_plane
+from texrs.papers.perspective.targets import Surface, as_surface, as_target, find_size, is_map, is_words, read_plane
 from texrs.planes import FOV, Plane
 from texrs.planes._choose import measure_scale
 from texrs.scale_maps import Measuring
@@ -113,6 +113,8 @@ class Request:
         closed, number = as_wrap(wrap), as_seed(seed)
         said = None if kind is None else as_kind(kind)
         angle = FOV if fov is None else as_float(fov, "fov", 1, 170)
+        if fov is not None and (isinstance(scale_map, Plane) or is_words(scale_map)):
+            raise InvalidInput("fov: the plane has one already")
         asked = as_target(target)
         if size is None:
             size = find_size(asked) or [2 * n for n in known.shape]
@@ -163,7 +165,7 @@ def find_scale(
     """Return the plane that an exemplar shows, if it is given, and how large its elements are: given, or measured."""
     if measuring is not None and not (isinstance(scale_map, str) and scale_map == "auto"):
         raise InvalidInput("measuring: a scale map is given, so that nothing is measured; leave out one of them")
-    if isinstance(scale_map, str) and scale_map.startswith(PREFIX):
+    if is_words(scale_map):
         scale_map = read_plane(scale_map, exemplar.shape, "scale_map")
     if isinstance(scale_map, Plane):
         if scale_map.shape != exemplar.shape:

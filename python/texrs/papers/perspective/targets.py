@@ -22,7 +22,7 @@ from texrs.scale_maps._jacobians import as_jacobians
 from texrs.scale_maps._maps import as_map
 from texrs.scale_maps._resample import stretch
 
-__all__ = ["PREFIX", "Surface", "as_surface", "as_target", "find_size", "is_map", "read_plane"]
+__all__ = ["Surface", "as_surface", "as_target", "find_size", "is_map", "is_words", "read_plane"]
 
 PREFIX = "plane:"
 """Before the words that say how a plane lies."""
@@ -65,6 +65,11 @@ def find_size(target: Plane | str | Array | None) -> tuple[int, int] | None:
 def is_map(target: Plane | str | Floats | Surface) -> TypeGuard[Floats]:
     """Return whether a target is a scale map."""
     return not isinstance(target, Plane | str) and target.ndim == 2
+
+
+def is_words(value: object) -> TypeGuard[str]:
+    """Return whether a value is a text that says how a plane lies."""
+    return isinstance(value, str) and value.startswith(PREFIX)
 
 
 def as_surface(target: Plane | str | Floats | Surface, size: tuple[int, int]) -> Surface:
