@@ -16,7 +16,7 @@ LAYERS = (
     ("io",),
     ("_conversion",),
     ("_arrays",),
-    ("_show", "_threads", "kernels"),
+    ("_light", "_show", "_threads", "kernels"),
     ("_engine",),
     ("source_map",),
     ("blending",),

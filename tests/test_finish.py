@@ -1,5 +1,6 @@
 """Source maps say how their pictures were finished: other maps are finished in the same way."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,6 +16,7 @@ PEBBLES = samples.pebbles((64, 80)).image
 HOLE = np.zeros((64, 80), np.bool_)
 HOLE[20:40, 30:50] = True
 FLOOR = samples.load("tilted_discs", size=(96, 112)).image
+WORDS = json.loads(Finish((True, True)).arrays()["finish"].tobytes())
 ROOM, LOW, LOWER, UPPER = look_at_room((96, 112))
 
 VERBS: dict[str, tuple[Callable[[], Synthesis], np.ndarray]] = {
@@ -91,10 +93,11 @@ def test_another_finish_may_be_asked_for() -> None:
         {"finish": np.zeros(3, np.uint8)},
         {"finish": np.frombuffer(b"{}", np.uint8)},
         {"finish/within": np.zeros((3, 3), np.bool_)},
+        {"finish": np.frombuffer(json.dumps({**WORDS, "light": 3}).encode(), np.uint8)},
         {"finish/parts": np.zeros((3, 3), np.uint16)},
         {"finish/known/0": np.zeros((3, 3), np.bool_)},
     ],
-    ids=["no text", "other words", "another hole", "other parts", "another example"],
+    ids=["no text", "other words", "another hole", "no place of light", "other parts", "another example"],
 )
 def test_a_damaged_finish_is_said(change: dict[str, np.ndarray], tmp_path: Path) -> None:
     texrs.complete(PEBBLES, HOLE, blend=0.1).source.save(tmp_path / "map.npz")

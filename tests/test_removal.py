@@ -52,6 +52,40 @@ def test_ground_is_told_from_sky_and_things(name: str) -> None:
     assert (known & there).sum() / (known | there).sum() >= 0.9
 
 
+@pytest.mark.parametrize("name", ["pebbles", "dots", "weave"])
+def test_strong_light_is_no_other_ground(name: str) -> None:
+    picture, *_ = see(name)
+    assert planes.find_ground(shine(picture)).all()
+
+
+def shine(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return a picture in the light of a window on the right."""
+    y, x = (np.indices(SIZE) + 0.5) / np.array(SIZE).reshape(2, 1, 1)
+    light = np.exp(0.9 * (x - 0.5) - 0.5 * ((x - 0.5) ** 2 + (y - 0.4) ** 2))
+    return np.clip(np.rint(picture * light[..., np.newaxis]), 0, 255).astype(np.uint8)
+
+
+def test_light_is_followed() -> None:
+    lit = shine(look("bricks", PLANE))
+    marked = np.zeros(SIZE, bool)
+    marked[60:125, 150:225] = True
+    seen = np.where(marked[..., np.newaxis], np.uint8(90), lit)
+    off = {}
+    for light in (False, True):
+        made = texrs.remove(seen, marked, view=View(plane=PLANE, ground=~marked), light=light, seed=1)
+        sides = [
+            np.log(picture[60:125, 150:225].reshape(65, 3, 25, 3).mean(axis=(0, 2, 3))) for picture in (made.image, lit)
+        ]
+        off[light] = np.abs(sides[0] - sides[1]).mean()
+        np.testing.assert_array_equal(texrs.apply(made.source, seen), made.image)
+        kept = made.source.label == 0
+        np.testing.assert_array_equal(made.image[kept], seen[kept])
+    assert off[True] < 0.6 * off[False]
+    # In even light there is nothing to follow.
+    even = [texrs.remove(FLOOR, MARKED, view=PLANE, light=light, seed=1).image for light in (False, True)]
+    np.testing.assert_array_equal(*even)
+
+
 def test_a_large_tile_is_no_thing() -> None:
     squares = np.kron((np.indices((8, 8)).sum(axis=0) % 2), np.ones((24, 24)))
     rng = np.random.default_rng(0)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from texrs._arrays import as_float, as_image, as_int, as_ndarray, as_seed, as_size, check_memory
+from texrs._arrays import as_bool, as_float, as_image, as_int, as_ndarray, as_seed, as_size, check_memory
 from texrs._progress import listen
 from texrs._typing import Array, Progress
 from texrs._verbs import takes_materials
@@ -42,6 +42,7 @@ def extend(
     view: View | Plane | Sequence[View | Plane] | None = None,
     boundary: int = 0,
     blend: float | None = 0.1,
+    light: bool = True,
     seed: int = 0,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
@@ -64,6 +65,8 @@ def extend(
         How many known pixels at the border may change, 0 to 64, which hides it better; by default none.
     blend : float, optional
         Weight of the values when the colours of what is added are corrected, as in `texrs.complete`; None or 0: no correction.
+    light : bool
+        Whether slow changes of light, as towards a window, are followed; beyond the photograph it stays as it is at the border.
     seed : int
         Chooses among what fits.
     progress : callable or True, optional
@@ -115,7 +118,7 @@ def extend(
         raise InvalidInput("top, bottom, left, right: all are 0, so there is nothing to add")
     check_memory(size[0] * size[1] * (64 + pixels.shape[2] * pixels.itemsize), "top, bottom, left, right")
     screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
-    rim, number = as_int(boundary, "boundary", 0, 64), as_seed(seed)
+    rim, number, follow = as_int(boundary, "boundary", 0, 64), as_seed(seed), as_bool(light, "light")
     watch = progress or (lambda stage, share: None)
     views = as_views(view)
     settled = [v.settle((rows, columns)) for v in views]
@@ -145,12 +148,13 @@ def extend(
         raise InvalidInput(
             "top, bottom, left, right: the picture would reach the plane's horizon; add fewer pixels, or say how the plane lies"
         )
-    made = fill_parts(canvas, hole, parts, boundary=rim, seed=number, progress=progress)
+    made = fill_parts(canvas, hole, parts, boundary=rim, light=follow, seed=number, progress=progress)
+    lit = (-added["top"], -added["left"]) if follow else None
     # It copies nothing from beyond the photograph's borders.
     places = np.moveaxis(np.indices(size), 0, -1) - first
     inside = np.clip(places, 0, [rows - 1, columns - 1]).astype(np.float32)
     source = made.source.compose(SourceMap.from_coordinates(inside, (rows, columns)))
-    source = source.finished((False, False), antialias=True, **made.even_out(screening))
+    source = source.finished((False, False), antialias=True, **made.finish(screening, lit))
     result = apply(source, pixels, progress=progress)
     watch("done", 1.0)
     stages = made.show(canvas, hole) | {"composite": source.render(pixels, antialias=True)}
@@ -163,6 +167,7 @@ def extend(
         "replaced_outside": int(np.count_nonzero(made.replaced & ~hole)),
         "boundary": rim,
         "blend": screening,
+        "light": follow,
         "seed": number,
         "planes": [{"plane": each.plane.as_dict(), "found": each.found} for each in seen],
         "ground": [round(float(each.ground.mean()), 4) for each in seen],

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from texrs._arrays import as_float, as_image, as_int, as_mask, as_ndarray, as_seed
+from texrs._arrays import as_bool, as_float, as_image, as_int, as_mask, as_ndarray, as_seed
 from texrs._progress import listen
 from texrs._typing import Array, Bools, Progress
 from texrs._verbs import takes_materials
@@ -46,6 +46,7 @@ def remove(
     boundary: int | None = None,
     patch: int | None = None,
     blend: float | None = 0.1,
+    light: bool = True,
     seed: int = 0,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
@@ -71,6 +72,9 @@ def remove(
     blend : float, optional
         Weight of the values when the colours of what is filled in are corrected, as in `texrs.complete`; None or 0: no
         correction.
+    light : bool
+        Whether slow changes of light, as towards a window, are followed: they are divided out of what is copied, and those of
+        where it goes multiplied on.
     seed : int
         Chooses among what fits.
     progress : callable or True, optional
@@ -117,7 +121,7 @@ def remove(
     wide = max(1, round(MARGIN * min(shape))) if margin is None else as_int(margin, "margin", 0, 64)
     rim = round(RIM * min(shape)) if boundary is None else as_int(boundary, "boundary", 0, 64)
     screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
-    number = as_seed(seed)
+    number, follow = as_seed(seed), as_bool(light, "light")
     watch = progress or (lambda stage, share: None)
     side = None if patch is None else as_int(patch, "patch", 4, min(shape))
     views = as_views(view)
@@ -132,9 +136,9 @@ def remove(
     ]
     watch("plane", 1.0)
     parts = add_rest([Part.of(g, plane) for g, (plane, _) in zip(grounds, planes, strict=True)], hole)
-    made = fill_parts(pixels, hole, parts, boundary=rim, patch=side, seed=number, progress=progress)
-    evened = made.even_out(screening)
-    source = made.source.finished((False, False), **evened, **({"known": (~hole,)} if evened else {}))
+    made = fill_parts(pixels, hole, parts, boundary=rim, light=follow, patch=side, seed=number, progress=progress)
+    how = made.finish(screening, (0, 0) if follow else None)
+    source = made.source.finished((False, False), **how, **({"known": (~hole,)} if how else {}))
     result = apply(source, pixels, progress=progress)
     watch("done", 1.0)
     stages = made.show(pixels, hole) | {"composite": source.render(pixels)}
@@ -145,6 +149,7 @@ def remove(
         "margin": wide,
         "boundary": rim,
         "blend": screening,
+        "light": follow,
         "seed": number,
         "planes": [{"plane": None if plane is None else plane.as_dict(), "found": found} for plane, found in planes],
         "ground": [round(float(ground.mean()), 4) for ground in grounds],

@@ -29,6 +29,7 @@ from texrs._arrays import (
     as_ndarray,
     as_wrap,
 )
+from texrs._light import divide_out, measure_lights
 from texrs._progress import listen
 from texrs._typing import Array, Floats, Interpolation, Progress
 from texrs.blending._correction import divide_strips, solve_correction
@@ -251,6 +252,21 @@ def apply(
     if kind == "label":
         return source.render(exemplars, interpolation="nearest")
     how = finish or source.finish
+    several = as_list(exemplars)
+    if how is not None and how.light is not None and how.within is not None and kind == "colour" and len(several) == 1:
+        return _follow_light(source, several[0], how, progress)
+    return _even_out(source, exemplars, how, kind, green, progress)
+
+
+def _even_out(
+    source: SourceMap,
+    exemplars: Array | Sequence[Array],
+    how: Finish | None,
+    kind: Literal["colour", "normal", "vector"],
+    green: Literal["up", "down"],
+    progress: Progress | None,
+) -> Array:
+    """Look a map up, and correct its seams if they are to be."""
     if how is None or how.screening is None:
         rest: dict[str, Any] = {} if how is None else {"interpolation": how.interpolation, "antialias": how.antialias}
         return source.render(exemplars, kind=kind, green=green, **rest)
@@ -271,6 +287,35 @@ def apply(
         green=green,
         progress=progress,
     )
+
+
+def _follow_light(source: SourceMap, exemplar: Array, how: Finish, progress: Progress | None) -> Array:
+    """Look a map up in even light, and give what is new the light of where it is shown."""
+    assert how.light is not None
+    assert how.within is not None
+    pixels = as_image(exemplar)
+    rows, columns = pixels.shape[:2]
+    owner = np.zeros(source.shape, np.uint16) if how.parts is None else how.parts
+    y, x = (np.arange(n) - o for n, o in zip((rows, columns), how.light, strict=True))
+    own = owner[np.ix_(np.clip(y, 0, source.shape[0] - 1), np.clip(x, 0, source.shape[1] - 1))]
+    known = np.ones((rows, columns), np.bool_) if how.known is None else how.known[0]
+    parts = [(own == number) & known for number in range(int(owner.max()) + 1)]
+    lights = measure_lights(pixels, parts)
+    if all(light is None for light in lights):
+        return _even_out(source, exemplar, how, "colour", "up", progress)
+    even = _even_out(source, divide_out(pixels, lights, parts), how, "colour", "up", progress)
+    result = source.render(exemplar, interpolation=how.interpolation, antialias=how.antialias)
+    shown = result.reshape((*source.shape, -1))
+    count = shown.shape[-1] - (shown.shape[-1] in (2, 4))
+    for number, light in enumerate(lights):
+        at = np.nonzero(how.within & (owner == number))
+        lit = even[at]
+        if light is not None:
+            lit[:, :count] *= light.at(at[0] + how.light[0], at[1] + how.light[1])[:, np.newaxis]
+        if result.dtype.kind == "u":
+            lit = np.clip(np.rint(lit), 0, np.iinfo(result.dtype).max)
+        shown[at] = lit
+    return result
 
 
 def _scale_progress(progress: Progress, number: int, steps: int) -> Callable[[float], object]:

@@ -29,6 +29,7 @@ APPLIED = Options(
         "exemplars": "they are arguments, as many as wanted",
         "finish.known": "one an exemplar, and no map is of them",
         "finish.parts": "the verb knows them",
+        "finish.light": "the verb knows where its pixels lie",
     },
     optional=dict.fromkeys(
         ("wrap", "interpolation", "antialias", "screening", "across", "outlines"), "as the map says"

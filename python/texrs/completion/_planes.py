@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._light import divide_out, measure_lights
 from texrs._typing import Array, Bools, Progress
 from texrs.completion._fill import fill
 from texrs.completion._holes import paint_over, widen
@@ -106,12 +107,16 @@ class Mended:
     shades: NDArray[np.uint8]
     """(H, W): where each part was seen, the lighter the earlier; 0 in the holes, and of what is none of them."""
 
-    def even_out(self, screening: float) -> dict[str, Any]:
-        """Return how its seams are evened out, for a `Finish`; not where two parts meet, for one would stain the other."""
-        if not screening:
+    def finish(self, screening: float, first: tuple[int, int] | None) -> dict[str, Any]:
+        """Return how the picture is finished, for a `Finish`.
+
+        Seams are evened out, but not where two parts meet, for one would stain the other; and light is followed where it is
+        said at which place in what is known the first pixel lies.
+        """
+        if not screening and first is None:
             return {}
         apart = self.owner if len(self.counts) > 1 else None
-        return {"screening": screening, "within": self.replaced, "parts": apart}
+        return {"screening": screening or None, "within": self.replaced, "parts": apart, "light": first}
 
     def show(self, pixels: Array, hole: Bools) -> dict[str, Array]:
         """Return the stages: what is known, what each part shows, and the patches, each in a shade of its own."""
@@ -128,6 +133,7 @@ def fill_parts(
     parts: Sequence[Part],
     *,
     boundary: int = 0,
+    light: bool = False,
     patch: int | None = None,
     seed: int = 0,
     progress: Progress | None = None,
@@ -144,6 +150,8 @@ def fill_parts(
         What goes on there.
     boundary : int
         Pixels around the holes that may change too.
+    light : bool
+        Whether what is copied is compared, and goes on, as it would look in even light.
     patch : int, optional
         Side of the patches in pixels.
     seed : int
@@ -155,7 +163,14 @@ def fill_parts(
     everywhere = np.ones_like(hole)
     seen = [p.shown if p.large is None else p.large for p in parts]
     owner = share_out(hole, seen, [everywhere if p.reach is None else p.reach for p in parts])
-    known = paint_over(pixels, hole)
+    shades = np.zeros(hole.shape, np.uint8)
+    belongs = owner.copy()
+    for number, part in enumerate(parts):
+        belongs[(belongs < 0) & part.shown] = number
+        if part.large is None:
+            shades[part.shown] = 255 - 40 * min(number, 5)
+    belongs[belongs < 0] = len(parts) - 1
+    known = even_light(pixels, hole, [(belongs == n) & ~hole for n in range(len(parts))] if light else [])
     identity = SourceMap.identity(hole.shape)
     coordinates, label = identity.coordinates, identity.label
     frames = np.broadcast_to(np.eye(2, dtype=np.float32), (*hole.shape, 2, 2)).copy()
@@ -188,17 +203,22 @@ def fill_parts(
         frames[new] = made.source.frames()[new]
         label[new] = made.source.label[new] + sum(counts)
         counts.append(made.count)
-        owner[new] = number
-    shades = np.zeros(hole.shape, np.uint8)
-    for number, part in enumerate(parts):
-        owner[(owner < 0) & part.shown] = number
-        if part.large is None:
-            shades[part.shown] = 255 - 40 * min(number, 5)
-    owner[owner < 0] = len(parts) - 1
+        belongs[new] = number
     return Mended(
         SourceMap(coordinates, identity.exemplar, label, frames, (hole.shape,)),
-        owner.astype(np.uint16),
+        belongs.astype(np.uint16),
         label > 0,
         tuple(counts),
         shades,
     )
+
+
+def even_light(pixels: Array, hole: Bools, parts: Sequence[Bools]) -> Array:
+    """Return a picture with its holes painted over, and the light of its parts divided out where it is uneven."""
+    lights = measure_lights(pixels, parts)
+    if all(light is None for light in lights):
+        return paint_over(pixels, hole)
+    even = divide_out(pixels, lights, parts)
+    if pixels.dtype.kind == "u":
+        even = np.clip(even / np.float32(np.iinfo(pixels.dtype).max), 0, 1)
+    return paint_over(even, hole)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_image, as_mask, guidance
+from texrs._light import Light
 from texrs._typing import Bools, Floats
 from texrs.errors import InvalidInput
 
@@ -50,6 +51,8 @@ colours must reach."""
 LEAST, THING = 0.004, 0.02
 """Share of a picture below which a part of it is no part of its own, of the ground and of what is not: one button among many is
 no thing that stands on a floor."""
+LIT = 0.13
+"""Share of the variance of brightness that even light must leave at most: walls and skies leave more."""
 FEWEST = 0.03
 """Where less than this share of a picture does not follow the ground all of it is ground."""
 
@@ -97,6 +100,8 @@ def find_ground(image: object, *, known: object = None) -> Bools:
     if min(size) < TELLING:
         return there
     colours, seen = shrink(guidance(pixels), there)
+    if is_evenly_covered(colours, seen):
+        return there
     follows = find_windows(colours, seen)
     if np.count_nonzero(seen & ~follows) < FEWEST * np.count_nonzero(seen):
         return there
@@ -108,6 +113,22 @@ def find_ground(image: object, *, known: object = None) -> Bools:
     ground = ground[tuple(nearest)]
     rows, columns = (np.minimum(np.arange(n) * m // n, m - 1) for n, m in zip(size, ground.shape, strict=True))
     return np.asarray(ground[np.ix_(rows, columns)] & there, np.bool_)
+
+
+def is_evenly_covered(colours: NDArray[np.float64], known: Bools) -> bool:
+    """Return whether all of a picture follows one ground once uneven light is divided out."""
+    light = Light.of(colours, known)
+    if light is None:
+        return False
+    rows, columns = (np.asarray(p, np.intp) for p in np.indices(known.shape))
+    factor = light.at(rows, columns)[..., np.newaxis]
+    means = blur(colours.mean(axis=-1, keepdims=True), known, 2 * NARROWEST)
+    seen, off = (np.log(m[known] + COLOUR) for m in (means, means / factor))
+    if off.var() > LIT * seen.var():
+        # A wall above a floor is no light.
+        return False
+    even = colours / factor
+    return bool(np.count_nonzero(known & ~find_windows(even, known)) < PART * np.count_nonzero(known))
 
 
 def shrink(colours: Floats, known: Bools) -> tuple[NDArray[np.float64], Bools]:

@@ -17,7 +17,7 @@ from texrs.errors import InvalidInput
 
 __all__ = ["Finish"]
 
-PLAIN = ("wrap", "interpolation", "antialias", "screening", "band", "across", "outlines")
+PLAIN = ("wrap", "interpolation", "antialias", "screening", "band", "across", "outlines", "light")
 """What is said in words; the rest are masks."""
 
 
@@ -49,6 +49,10 @@ class Finish:
         What of each exemplar may be looked at beyond a seam. None: everything.
     parts : (rows, columns) uint16, optional
         What each pixel belongs to; nothing is corrected where two of these meet. None: everywhere.
+    light : (int, int), optional
+        Of a picture that goes on beyond its exemplar, or in holes of it: the place (row, column) in the exemplar that its first
+        pixel lies at. Slow light of each part is divided out of what is looked up, and that of where it is shown multiplied on.
+        None: it brings its own light along.
 
     """
 
@@ -62,6 +66,7 @@ class Finish:
     within: Bools | None = None
     known: tuple[Bools, ...] | None = None
     parts: NDArray[np.uint16] | None = None
+    light: tuple[int, int] | None = None
 
     __repr__ = brief
 
@@ -104,6 +109,9 @@ class Finish:
             raise InvalidInput(f"finish: parts needs uint16 of shape {shape}")
         if within is not None and within.shape != shape:
             raise InvalidInput(f"finish: within needs a mask of shape {shape}")
+        light = words["light"]
+        if light is not None and not (isinstance(light, list) and len(light) == 2):
+            raise InvalidInput("finish: light needs a row and a column")
         screening, band = words["screening"], words["band"]
         return cls(
             tuple(as_bool(w, "wrap") for w in words["wrap"]),
@@ -116,4 +124,7 @@ class Finish:
             None if within is None else within.astype(np.bool_),
             tuple(m.astype(np.bool_) for m in masks) if masks else None,
             apart,
+            None
+            if light is None
+            else (as_int(light[0], "light", -(2**31), 2**31), as_int(light[1], "light", -(2**31), 2**31)),
         )

@@ -1,0 +1,122 @@
+"""Light that changes slowly over what is copied: divided out before, and multiplied on afterwards.
+
+What is looked up elsewhere brings the light of that place along: a patch of the sunny end of a floor is too light at the
+other end. The light is what the logarithms of a map's means follow, by a polynomial of the second degree in the place, where
+that says clearly more than one of a lower degree. It hangs on the map alone, and on where it is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import exp_single
+from texrs._typing import Array, Bools, Floats
+
+BLOCKS = 32
+"""The means are those of squares, so many along the shorter side."""
+FULL = 0.25
+"""Share of a square that must be known."""
+FEWEST = 24
+"""Squares that tell enough."""
+BETTER = 0.75
+"""Share of the squares of what is off that a higher degree must leave at most."""
+ROUNDS, FAR = 6, 4.0
+"""Steps of the robust fit; standard deviations from which on a square is something else."""
+DIGITS = 8
+"""Of the polynomial, after the point: the last bits of a fit hang on the processor."""
+MOST = 1.1
+"""Natural logarithm by which light is followed at most."""
+TERMS = (1, 3, 6)
+"""Of polynomials of degree 0, 1 and 2."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Light:
+    """How bright a map is at each place, as a factor of its mean."""
+
+    shape: tuple[int, int]
+    polynomial: tuple[float, ...]
+    """Of (row, column) from the middle, in halves of the longer side."""
+
+    @classmethod
+    def of(cls, image: Array, where: Bools) -> Light | None:
+        """Return the light of what is marked of a map (H, W, C) of values from 0 on; None where it is even."""
+        shape = where.shape[0], where.shape[1]
+        step = max(4, min(shape) // BLOCKS)
+        rows, columns = (n // step for n in shape)
+        part = (slice(0, rows * step), slice(0, columns * step))
+        values = np.where(where, image.mean(axis=-1, dtype=np.float64), 0)[part]
+        share = where[part].reshape(rows, step, columns, step).mean(axis=(1, 3))
+        sums = values.reshape(rows, step, columns, step).mean(axis=(1, 3))
+        told = (share >= FULL) & (sums > 0)
+        if np.count_nonzero(told) < FEWEST:
+            return None
+        logs = np.log(sums[told] / share[told])
+        places = (np.argwhere(told) + 0.5) * step - 0.5
+        terms = _list_terms(places[:, 0], places[:, 1], shape)
+        found = [_fit(terms[:, :count], logs) for count in TERMS]
+        best = 0
+        for degree in (1, 2):
+            if found[degree][1] < BETTER ** (degree - best) * found[best][1]:
+                best = degree
+        if best == 0:
+            return None
+        polynomial = found[best][0]
+        mean = float(np.einsum("nk,k->n", terms[:, : len(polynomial)], polynomial).mean())
+        polynomial[0] -= mean
+        return cls(shape, tuple(round(float(c), DIGITS) for c in polynomial))
+
+    def at(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Floats:
+        """Return the factor at places; beyond the map that of the nearest in it."""
+        y, x = (np.clip(p, 0, n - 1).astype(np.float64) for p, n in zip((rows, columns), self.shape, strict=True))
+        terms = _list_terms(y, x, self.shape)
+        total = np.zeros(terms.shape[:-1])
+        for number, factor in enumerate(self.polynomial):
+            total += factor * terms[..., number]
+        return exp_single(np.clip(total, -MOST, MOST))
+
+
+def measure_lights(image: Array, parts: Sequence[Bools]) -> list[Light | None]:
+    """Return the light of each part of a map (H, W, C); none of maps in which light is nothing."""
+    # The last of two or of four channels is transparency.
+    colours = image[..., :-1] if image.shape[-1] in (2, 4) else image
+    if image.dtype.kind not in "uf" or (image.dtype.kind == "f" and not (colours >= 0).all()):
+        return [None] * len(parts)
+    return [Light.of(colours, part) for part in parts]
+
+
+def divide_out(image: Array, lights: Sequence[Light | None], parts: Sequence[Bools]) -> Floats:
+    """Return a map (H, W, C) as it would be in even light."""
+    even = image.astype(np.float32)
+    count = image.shape[-1] - (image.shape[-1] in (2, 4))
+    for light, part in zip(lights, parts, strict=True):
+        if light is not None:
+            at = np.nonzero(part)
+            even[..., :count][at] /= light.at(*at)[:, np.newaxis]
+    return even
+
+
+def _list_terms(rows: NDArray[np.float64], columns: NDArray[np.float64], shape: tuple[int, int]) -> NDArray[np.float64]:
+    half = max(shape) / 2
+    y, x = (rows - (shape[0] - 1) / 2) / half, (columns - (shape[1] - 1) / 2) / half
+    return np.stack([np.ones(np.shape(y)), y, x, y * y, x * y, x * x], axis=-1)
+
+
+def _fit(terms: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    """Return the coefficients that most values follow, and the sum of squares of what is off, at most `FAR` each."""
+    weight = np.ones(len(values))
+    spread = 1.0
+    coefficients = np.zeros(terms.shape[1])
+    for _ in range(ROUNDS):
+        normal = np.einsum("ni,n,nj->ij", terms, weight, terms) + 1e-9 * np.eye(terms.shape[1])
+        coefficients = np.linalg.solve(normal, np.einsum("ni,n,n->i", terms, weight, values))
+        coefficients = np.round(coefficients, DIGITS)
+        off = values - np.einsum("nk,k->n", terms, coefficients)
+        spread = max(1.4826 * float(np.median(np.abs(off))), 1e-6)
+        # Tukey's biweight.
+        weight = np.square(np.maximum(0, 1 - np.square(off / (FAR * spread))))
+    return coefficients, float(np.einsum("n,n,n->", weight, off, off) / max(float(weight.sum()), 1e-9))
