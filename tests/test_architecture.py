@@ -33,7 +33,7 @@ LAYERS = (
     ("tiling",),
     ("completion",),
     ("papers",),
-    ("database", "extension", "rectification", "removal"),
+    ("database", "extension", "rectification", "removal", "transforms"),
     ("demo",),
     ("cli",),
 )

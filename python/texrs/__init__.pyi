@@ -12,6 +12,7 @@ from . import (
     planes,
     samples,
     scale_maps,
+    transforms,
     volume,
 )
 from ._threads import threads
@@ -82,5 +83,6 @@ __all__ = [
     "synthesize",
     "threads",
     "tile",
+    "transforms",
     "volume",
 ]

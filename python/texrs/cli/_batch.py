@@ -24,6 +24,7 @@ import numpy as np
 import typer
 
 from texrs import io
+from texrs._show import preview
 from texrs._typing import Array
 from texrs.cli import _outputs, _provenance
 from texrs.cli._console import PARTLY, Stopped, UsageFailure, complain, hush, keep, note
@@ -31,7 +32,6 @@ from texrs.cli._outputs import SAMPLE, Quiet, Threads, make_argument, make_optio
 from texrs.cli._provenance import check_free, read_status
 from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.io._annotation import is_unchanged
-from texrs.synthesis import preview
 
 PICTURES = (".png", ".tif", ".tiff", ".exr", ".hdr", ".webp", ".jpg", ".jpeg", ".bmp", ".gif", ".npy", ".npz")
 VOLUMES = (".tif", ".tiff", ".npy", ".npz", ".nrrd", ".nii", ".gz", ".vti")

@@ -1,0 +1,117 @@
+"""Other pictures of the same texture, with their labels and boxes."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_float, as_image, as_ndarray, as_seed
+from texrs._typing import Array
+from texrs.errors import InvalidInput
+from texrs.exemplar import Exemplar, as_exemplar
+from texrs.papers.design import design
+from texrs.source_map import SourceMap
+from texrs.transforms._boxes import follow_boxes
+
+SHORTEST = 16
+"""Least side of a picture."""
+
+
+class Augmented(NamedTuple):
+    """What `TextureAugment` returns."""
+
+    image: Array
+    """In the shape and dtype of the picture."""
+    mask: Array | None
+    """Looked up at the nearest pixel: no label that was not there."""
+    boxes: NDArray[np.float64] | None
+    """Those that survive, see `follow_boxes`."""
+    which: NDArray[np.intp] | None
+    """Which of the boxes that were given each follows from."""
+    source: SourceMap
+    """Where each pixel comes from: whatever else is in register follows with ``source.render``."""
+
+
+class TextureAugment:
+    """Lay a picture anew from pieces of itself, joined along minimum cuts; labels and boxes follow.
+
+    For pictures of textures: surfaces, materials, tissue, fields, defects on them. What is far apart in a picture comes to lie
+    side by side, seams avoid what would show them, and things stay whole where they can (`texrs.design` with ``plan="still"``).
+    No pixel is made up, and none is interpolated.
+
+    The same picture and seed give the same result in any process and with any number of threads. The interpreter lock is
+    released while the kernels work, so that threads serve as well as processes, and forked and spawned workers are alike. In a
+    loader with a worker a core, `texrs.threads` or the environment variable ``RAYON_NUM_THREADS=1`` keeps workers out of each
+    other's way. What is known of a picture is kept for a while, so that its second result takes a fraction of the first's
+    time.
+
+    Parameters
+    ----------
+    visible : float
+        Share of a box's area that must be seen in one piece for a box to survive, 0 to 1; see `follow_boxes`.
+
+    Raises
+    ------
+    InvalidInput
+        A share out of range.
+
+    See Also
+    --------
+    texrs.transforms.albumentations, texrs.transforms.torchvision : The same for pipelines of these libraries.
+
+    Examples
+    --------
+    >>> import texrs
+    >>> sample = texrs.samples.dots((96, 96))
+    >>> augment = texrs.transforms.TextureAugment()
+    >>> made = augment(sample.image, sample.labels, [[10, 12, 30, 32, 1]], seed=7)
+    >>> made.image.shape, made.mask.dtype, made.boxes.shape[1]
+    ((96, 96, 3), dtype('int32'), 5)
+
+    """
+
+    def __init__(self, visible: float = 0.5) -> None:
+        self.visible = as_float(visible, "visible", 0, 1)
+
+    def __repr__(self) -> str:
+        """Return the options."""
+        return f"TextureAugment(visible={self.visible})"
+
+    def __call__(
+        self, image: Array | Exemplar, mask: Array | None = None, boxes: Array | None = None, seed: int = 0
+    ) -> Augmented:
+        """Return another picture of the same size, with its labels and its boxes.
+
+        Parameters
+        ----------
+        image : (H, W) or (H, W, C) array, or Exemplar
+            Any real dtype, each side at least 16; whatever `texrs.Exemplar` takes.
+        mask : (H, W) or (H, W, C) array, optional
+            Labels in register, any dtype.
+        boxes : (n, 4 or more) array_like, optional
+            left, top, right, bottom in pixels; what stands behind stays with the box.
+        seed : int
+            Of the sample: the same seed, the same result.
+
+        Returns
+        -------
+        Augmented
+            A named tuple of image, mask, boxes, which and source.
+
+        Raises
+        ------
+        InvalidInput
+            Not a picture, a mask of another size, or no boxes but something else.
+
+        """
+        known, number = as_exemplar(image, "image", minimum=SHORTEST), as_seed(seed)
+        labels = None if mask is None else as_ndarray(mask, "mask")
+        if labels is not None and as_image(labels, "mask").shape[:2] != known.shape:
+            raise InvalidInput(f"mask: needs the size of the image, {known.shape}, got {labels.shape[:2]}")
+        source = design(known, known.shape, seed=number, wrap=False, plan="still").source
+        shown = source.render(known.image, interpolation="nearest")
+        followed = None if labels is None else source.render(labels, interpolation="nearest")
+        kept, index = (None, None) if boxes is None else follow_boxes(source, boxes, self.visible)
+        return Augmented(shown, followed, kept, index, source)

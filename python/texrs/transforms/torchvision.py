@@ -1,0 +1,105 @@
+"""`texrs.transforms.TextureAugment` as a transform of torchvision (v2), which is to be installed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+from torch.utils._pytree import tree_flatten, tree_unflatten
+from torchvision import tv_tensors
+from torchvision.transforms import v2
+from torchvision.transforms.v2 import functional
+
+from texrs.errors import InvalidInput
+from texrs.transforms._augment import TextureAugment as Augment
+from texrs.transforms._boxes import follow_boxes
+
+__all__ = ["TextureAugment"]
+
+
+def __dir__() -> list[str]:
+    return __all__
+
+
+class TextureAugment(v2.Transform):  # type: ignore[misc]
+    """Lay pictures anew from pieces of themselves, in a pipeline of torchvision: images, masks and boxes.
+
+    Seeds are drawn from torch's generator, so that `torch.manual_seed`, and the seed that a loader gives each worker, say what
+    comes. A plain tensor ``"labels"`` in a dictionary, as long as the boxes, follows them.
+
+    Parameters
+    ----------
+    visible : float
+        See `texrs.transforms.follow_boxes`.
+
+    """
+
+    def __init__(self, visible: float = 0.5) -> None:
+        super().__init__()
+        self.visible = visible
+        self._augment = Augment(visible)
+
+    def make_params(self, flat_inputs: list[Any]) -> dict[str, Any]:
+        """Return the source map of this sample, and which boxes survive."""
+        pictures = [each for each in flat_inputs if not isinstance(each, tv_tensors.Mask | tv_tensors.BoundingBoxes)]
+        if not pictures:
+            raise InvalidInput("inputs: needs a picture, got none")
+        seed = int(torch.randint(2**62, ()).item())
+        source = self._augment(to_array(pictures[0]), seed=seed).source
+        params: dict[str, Any] = {"source": source, "boxes": None, "index": None}
+        for each in flat_inputs:
+            if isinstance(each, tv_tensors.BoundingBoxes):
+                corners = functional.convert_bounding_box_format(each, new_format=tv_tensors.BoundingBoxFormat.XYXY)
+                params["boxes"], params["index"] = follow_boxes(source, corners.numpy(), self.visible)
+        return params
+
+    def transform(self, inpt: Any, params: dict[str, Any]) -> Any:
+        """Return a picture, a mask or boxes as they follow."""
+        if isinstance(inpt, tv_tensors.BoundingBoxes):
+            corners = tv_tensors.BoundingBoxes(
+                torch.from_numpy(params["boxes"]).to(inpt.dtype),
+                format=tv_tensors.BoundingBoxFormat.XYXY,
+                canvas_size=inpt.canvas_size,
+            )
+            return functional.convert_bounding_box_format(corners, new_format=inpt.format)
+        shown = params["source"].render(to_array(inpt), interpolation="nearest")
+        if not isinstance(inpt, torch.Tensor):
+            return type(inpt).fromarray(shown) if hasattr(type(inpt), "fromarray") else functional.to_pil_image(shown)
+        made = torch.from_numpy(shown if inpt.ndim == 2 else np.ascontiguousarray(np.moveaxis(shown, -1, 0)))
+        return tv_tensors.wrap(made, like=inpt) if isinstance(inpt, tv_tensors.TVTensor) else made
+
+    def forward(self, *inputs: Any) -> Any:
+        """Transform all that is in a sample by one map, and let labels follow the boxes."""
+        given = inputs if len(inputs) > 1 else inputs[0]
+        flat, spec = tree_flatten(given)
+        wanted = self._needs_transform_list(flat)
+        params = self.make_params([each for each, need in zip(flat, wanted, strict=True) if need])
+        made = [self.transform(each, params) if need else each for each, need in zip(flat, wanted, strict=True)]
+        return follow_labels(tree_unflatten(made, spec), params["index"])
+
+
+def to_array(picture: Any) -> Any:
+    """Return a tensor as an array with its channels last; anything else as it is."""
+    if not isinstance(picture, torch.Tensor):
+        return picture
+    if picture.ndim not in (2, 3):
+        raise InvalidInput(f"inputs: needs one picture (C, H, W) at a time, got shape {tuple(picture.shape)}")
+    array = picture.detach().cpu().as_subclass(torch.Tensor).numpy()
+    return array if picture.ndim == 2 else np.moveaxis(array, 0, -1)
+
+
+def follow_labels(sample: Any, index: Any) -> Any:
+    """Return a sample whose labels are those of the boxes that survive."""
+    if index is None:
+        return sample
+    if isinstance(sample, dict):
+        return {
+            key: value[torch.from_numpy(index)]
+            if key == "labels" and isinstance(value, torch.Tensor)
+            else follow_labels(value, index)
+            for key, value in sample.items()
+        }
+    if isinstance(sample, list | tuple):
+        return type(sample)(follow_labels(each, index) for each in sample)
+    return sample
