@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._checks import as_bool
 from texrs._typing import Path
 from texrs.errors import InvalidInput
 from texrs.materials._map import Map
@@ -66,6 +67,69 @@ class Exports(Mapping[str, Map]):
 
         self._check_flat()
         return render_preview(self, tiles, light, side)
+
+    def save(
+        self,
+        folder: Path,
+        *,
+        depth: Literal[8, 16, 32] | None = None,
+        suffix: str | None = None,
+        pack: Literal["orm", "none"] | None = None,
+        mipmaps: bool = False,
+    ) -> list[FilePath]:
+        """Write each map to a file of its name, all or none.
+
+        Parameters
+        ----------
+        folder : path_like
+            Made where it is missing; files of these names are replaced.
+        depth : {8, 16, 32}, optional
+            Bits of each sample: integers of 8 or 16, floats of 32. By default those of each map.
+        suffix : str, optional
+            Of all files, such as ``".tif"``, which says the format; by default PNG, or TIFF and EXR for what it cannot hold.
+        pack : {"orm", "none"}, optional
+            "orm" writes occlusion, roughness and metal, as far as there are any, to one file ``orm`` as red, green and blue;
+            "none" writes what is packed to three. By default maps stay as they are.
+        mipmaps : bool
+            Whether each map is also written in half, a quarter, ... of its size, until each side is 1, to the folder
+            ``mipmaps``: ``albedo.1.png``, ``albedo.2.png``, ... Colours are averaged as light, normals keep their length,
+            labels and masks are not mixed.
+
+        Returns
+        -------
+        list of pathlib.Path
+            The files, in the order of the maps, and then their mipmaps.
+
+        Raises
+        ------
+        FileError
+            A file cannot be written. What was there is as it was.
+        InvalidInput
+            Another depth or way to pack, or values that the format cannot hold.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import numpy as np
+        >>> import texrs
+        >>> stones = texrs.Material({"albedo": np.zeros((8, 8, 3), np.uint8), "height": np.zeros((8, 8), np.float32)})
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     [path.name for path in stones.save(folder)], texrs.Material.read(folder)["height"].depth
+        (['albedo.png', 'height.exr'], 32)
+
+        """
+        from texrs.materials._files import write_maps
+        from texrs.materials._packing import pack_maps, unpack_maps
+
+        if depth not in (None, 8, 16, 32):
+            raise InvalidInput(f"depth: allowed are 8, 16 and 32, got {depth!r}")
+        if pack not in (None, "orm", "none"):
+            raise InvalidInput(f"pack: allowed are 'orm' and 'none', got {pack!r}")
+        as_bool(mipmaps, "mipmaps")
+        maps: Mapping[str, Map] = self
+        if pack is not None:
+            maps = pack_maps(self, self.axes) if pack == "orm" else unpack_maps(self)
+        return write_maps(maps, folder, axes=self.axes, depth=depth, suffix=suffix, mipmaps=mipmaps)
 
     def save_exr(self, path: Path, *, depth: Literal[16, 32] | None = None) -> FilePath:
         """Write all maps to one EXR file, a layer each, that `Material.read` reads again.

@@ -27,7 +27,7 @@ from texrs._typing import Array, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.io._layers import read_layers, write_layers
 from texrs.materials._files import shorten
-from texrs.materials._light import encode_srgb, to_light
+from texrs.materials._light import encode_srgb, to_light, to_pixels
 from texrs.materials._map import Map
 from texrs.materials._roles import Role, as_role, guess_role
 
@@ -102,19 +102,11 @@ def restore(stored: Array, role: Role, space: str, dtype: np.dtype[Any]) -> Arra
         if values.shape[-1] in (2, 4):
             shown[..., -1] = values[..., -1]
         values = shown
-    if dtype.kind == "f":
-        return values.astype(dtype)
-    if dtype == np.bool_:
-        return values > 0.5
-    info = np.iinfo(dtype)
-    exact = values.astype(np.float64)
-    if role.normal or role is Role.VECTOR:
-        exact = exact if dtype.kind == "i" else (exact + 1) / 2
-        exact = exact * info.max
-    else:
-        # As `to_unit` spreads the range of integers, of signed ones too.
-        exact = exact * (info.max - min(info.min, 0)) + min(info.min, 0)
-    return np.clip(np.rint(exact), info.min, info.max).astype(dtype)
+    if (role.normal or role is Role.VECTOR) and dtype.kind in "ui":
+        exact = values.astype(np.float64)
+        exact = exact * np.iinfo(dtype).max if dtype.kind == "i" else (exact + 1) / 2 * np.iinfo(dtype).max
+        return np.clip(np.rint(exact), np.iinfo(dtype).min, np.iinfo(dtype).max).astype(dtype)
+    return to_pixels(values, dtype)
 
 
 def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map], dict[str, Role]]:

@@ -14,6 +14,7 @@ from texrs._arrays import to_unit
 from texrs._typing import Array, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.materials._map import Map
+from texrs.materials._mipmaps import halve
 from texrs.materials._roles import Role, as_role, guess_role
 
 __all__ = ["read_maps", "write_maps"]
@@ -37,6 +38,8 @@ SUFFIXES = (
 """Of files that may be maps."""
 MOST = 64
 """Maps that a material may have."""
+SMALLER = "mipmaps"
+"""Folder of what is not a map of the material itself, so that reading finds maps of one size."""
 
 
 def read_maps(path: Path, roles: dict[str, Role | str], axes: int) -> tuple[dict[str, Array], dict[str, Role]]:
@@ -95,19 +98,33 @@ def shorten(names: list[str]) -> list[str]:
 
 
 def write_maps(
-    maps: Mapping[str, Map], folder: Path, *, axes: int, depth: int | None, suffix: str | None
+    maps: Mapping[str, Map],
+    folder: Path,
+    *,
+    axes: int = 2,
+    depth: int | None = None,
+    suffix: str | None = None,
+    mipmaps: bool = False,
 ) -> list[FilePath]:
     """Write each map under its name; all files take their names when all are written."""
     place = FilePath(folder)
-    if place.exists() and not place.is_dir():
-        raise FileError(f"{folder}: is not a folder")
-    files = {name: place / f"{name}{suffix or choose_suffix(each, depth)}" for name, each in maps.items()}
+    smaller = place / SMALLER
+    for needed in (place, smaller) if mipmaps else (place,):
+        if needed.exists() and not needed.is_dir():
+            raise FileError(f"{needed}: is not a folder")
+    endings = {name: suffix or choose_suffix(each, depth) for name, each in maps.items()}
     write = io.write if axes == 2 else io.write_volume
-    place.mkdir(parents=True, exist_ok=True)
+    files: list[FilePath] = []
+    small: list[FilePath] = []
+    (smaller if mipmaps else place).mkdir(parents=True, exist_ok=True)
     with ExitStack() as stack:
         for name, each in maps.items():
-            write(stack.enter_context(io.atomic(files[name])), convert(each.pixels, depth))
-    return list(files.values())
+            files.append(place / f"{name}{endings[name]}")
+            write(stack.enter_context(io.atomic(files[-1])), convert(each.pixels, depth))
+            for level, less in enumerate(halve(each, axes) if mipmaps else (), 1):
+                small.append(smaller / f"{name}.{level}{endings[name]}")
+                write(stack.enter_context(io.atomic(small[-1])), convert(less.pixels, depth))
+    return files + small
 
 
 def choose_suffix(each: Map, depth: int | None) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from texrs._typing import Array, Floats
 from texrs.materials._map import Map, Space
 from texrs.materials._roles import Role
 
-__all__ = ["decode_normals", "decode_srgb", "encode_srgb", "find_map", "shrink", "to_light", "to_share"]
+__all__ = ["decode_normals", "decode_srgb", "encode_srgb", "find_map", "shrink", "to_light", "to_pixels", "to_share"]
 
 ONE = np.float32(1)
 
@@ -52,6 +53,18 @@ def to_share(pixels: Array) -> Floats:
     return to_unit(pixels) if pixels.dtype.kind in "bui" else np.clip(pixels, 0, 1).astype(np.float32)
 
 
+def to_pixels(values: Array, dtype: np.dtype[Any]) -> Array:
+    """Return values in a dtype: of integers shares of their range, of which `to_share` is the way back."""
+    if dtype.kind == "f":
+        return values.astype(dtype)
+    if dtype == np.bool_:
+        return values >= 0.5
+    info = np.iinfo(dtype)
+    low = min(info.min, 0)
+    spread = np.clip(values, 0, 1) * (np.float64(info.max) - low) + low
+    return np.rint(spread, out=spread).astype(dtype)
+
+
 def decode_normals(pixels: Array, role: Role, *, signed: bool) -> Floats:
     """Return normals (..., 3) of unit length, x to the right, y up and z out of the picture.
 
@@ -71,19 +84,19 @@ def decode_normals(pixels: Array, role: Role, *, signed: bool) -> Floats:
     return np.where(length > np.float32(1e-6), vector / np.maximum(length, np.float32(1e-6)), flat)
 
 
-def shrink(values: Floats, shape: Sequence[int]) -> Floats:
-    """Return values of fewer samples along the first axes: each the mean of the area that it covers, in float32."""
+def shrink(values: Array, shape: Sequence[int]) -> Array:
+    """Return floats of fewer samples along the first axes: each the mean of the area that it covers."""
     for axis, wanted in enumerate(shape):
         given = values.shape[axis]
         if given == wanted:
             continue
         edges = np.arange(wanted + 1) * (given / wanted)
-        total = np.zeros((*values.shape[:axis], wanted, *values.shape[axis + 1 :]), np.float32)
+        total = np.zeros((*values.shape[:axis], wanted, *values.shape[axis + 1 :]), values.dtype)
         first = np.floor(edges[:-1]).astype(np.intp)
         for step in range(-(-given // wanted) + 1):
             at = first + step
             weight = np.minimum(at + 1, edges[1:]) - np.maximum(at, edges[:-1])
-            weight = (np.clip(weight, 0, None) * (wanted / given)).astype(np.float32)
+            weight = (np.clip(weight, 0, None) * (wanted / given)).astype(values.dtype)
             sides = [1] * values.ndim
             sides[axis] = wanted
             total += np.take(values, np.minimum(at, given - 1), axis=axis) * weight.reshape(sides)

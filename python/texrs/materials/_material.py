@@ -166,49 +166,6 @@ class Material(Exports):
         maps, found = read_maps(path, dict(roles or {}), axes)
         return cls(maps, roles=found, axes=axes)
 
-    def save(
-        self, folder: Path, *, depth: Literal[8, 16, 32] | None = None, suffix: str | None = None
-    ) -> list[FilePath]:
-        """Write each map to a file of its name, all or none.
-
-        Parameters
-        ----------
-        folder : path_like
-            Made where it is missing; files of these names are replaced.
-        depth : {8, 16, 32}, optional
-            Bits of each sample: integers of 8 or 16, floats of 32. By default those of each map.
-        suffix : str, optional
-            Of all files, such as ``".tif"``, which says the format; by default PNG, or TIFF and EXR for what it cannot hold.
-
-        Returns
-        -------
-        list of pathlib.Path
-            The files, in the order of the maps.
-
-        Raises
-        ------
-        FileError
-            A file cannot be written. What was there is as it was.
-        InvalidInput
-            Another depth, or values that the format cannot hold.
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> import numpy as np
-        >>> import texrs
-        >>> stones = texrs.Material({"albedo": np.zeros((8, 8, 3), np.uint8), "height": np.zeros((8, 8), np.float32)})
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     [path.name for path in stones.save(folder)], texrs.Material.read(folder)["height"].depth
-        (['albedo.png', 'height.exr'], 32)
-
-        """
-        from texrs.materials._files import write_maps
-
-        if depth not in (None, 8, 16, 32):
-            raise InvalidInput(f"depth: allowed are 8, 16 and 32, got {depth!r}")
-        return write_maps(self, folder, axes=self.axes, depth=depth, suffix=suffix)
-
     # --- the maps ----------------------------------------------------------------------------------------------------
 
     def __getitem__(self, name: str) -> Map:

@@ -67,7 +67,7 @@ def write_materialx(maps: Mapping[str, Map], path: Path, depth: int | None) -> l
     text = ElementTree.tostring(document, encoding="utf-8", xml_declaration=True)
     with io.atomic(target) as temporary:
         temporary.write_bytes(text + b"\n")
-        written = write_maps(stored, target.parent, axes=2, depth=None, suffix=None)
+        written = write_maps(stored, target.parent)
     return [target, *written]
 
 
