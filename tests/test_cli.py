@@ -75,7 +75,7 @@ def test_design_writes_what_the_function_makes(here: Path, capsys: Capture) -> N
     more = (
         "--start 0.3 --growth-rate 1.9 --patch 12 --tiles 2 --operations 1 --stages stages --map source.npz -o out.png"
     )
-    assert main(["design", "in.png", "--size", "40x56", *options.split(), *more.split()]) == 0
+    assert main(["design", "in.png", "--size", "56x40", *options.split(), *more.split()]) == 0
     expected = texrs.design(
         COLOURS,
         (40, 56),
@@ -103,7 +103,7 @@ def test_design_writes_what_the_function_makes(here: Path, capsys: Capture) -> N
     lines = err.splitlines()
     assert lines[0] == "texrs: segment"
     assert "texrs: stitch" in lines
-    assert re.fullmatch(r"texrs: wrote out.png: 40 x 56, 3 channels, uint8, in [0-9.]+ s", lines[-1])
+    assert re.fullmatch(r"texrs: wrote out.png: 56 x 40, 3 channels, uint8, in [0-9.]+ s", lines[-1])
 
 
 def test_same_command_same_bytes(here: Path, capsys: Capture) -> None:
@@ -392,7 +392,7 @@ def test_outputs_are_checked_before_the_work(
     replace_design(monkeypatch, None)  # Would be an internal error.
     assert main(["design", "in.png", "-o", name]) == 2
     assert NAMES[name] in complaint(capsys)
-    assert main(["design", "in.png", "-o", "out.jpg", "--size", "65501x16"]) == 2
+    assert main(["design", "in.png", "-o", "out.jpg", "--size", "16x65501"]) == 2
     assert "65500" in complaint(capsys)
     assert main(["design", "in.png", "-o", "s.npz", "--map", "./s.npz"]) == 2
     assert "--out" in complaint(capsys)
@@ -651,7 +651,7 @@ def test_version_help_and_names(capsys: Capture) -> None:
 
 
 def test_samples_are_written(here: Path, capsys: Capture) -> None:
-    assert main(["samples", "weave", "-o", "new/folder", "--size", "40x48", "--seed", "2"]) == 0
+    assert main(["samples", "weave", "-o", "new/folder", "--size", "48x40", "--seed", "2"]) == 0
     assert (iio.imread("new/folder/weave.png") == samples.weave((40, 48), seed=2).image).all()
     assert capsys.readouterr().err.startswith("texrs: wrote new/folder/weave.png")
     assert main(["samples", "stripes", "-o", ".", "--size", "32x32x32", "-q"]) == 0
@@ -666,7 +666,7 @@ def test_info(here: Path, capsys: Capture) -> None:
     SourceMap.identity((20, 30)).save("s.npz")
     assert main(["info", "s.npz"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "source map: 20 x 30, made from 20 x 30"
+    assert lines[0] == "source map: 30 x 20, made from 30 x 20"
     assert lines[1] == "copied unchanged: 100.0% of the pixels, in 1 regions"
 
 

@@ -96,3 +96,14 @@ def test_a_hole_in_alpha_is_filled_from_a_picture_without(tmp_path: Path, monkey
         assert (made[..., -1] == (1 if suffix == "exr" else np.iinfo(pixels.dtype).max)).all()
         assert (made[:16] == pixels[:16]).all()
         assert np.isin(made[17:25, 19:29, 0], other if other.ndim == 2 else other[..., 0]).all()
+
+
+@pytest.mark.parametrize("text", ["64,48", "64:48", "64 48", "64*48", "64x", "x48", "64x48x3", "64.0x48", ""])
+def test_sizes_cannot_be_mistaken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture, text: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    io.write("in.png", np.arange(48 * 48, dtype=np.uint8).reshape(48, 48))
+    assert main(["tile", "in.png", "-o", "out.png", "--size", text]) == 2
+    assert "--size: needs WIDTHxHEIGHT, as in 1024x512, or one number" in capsys.readouterr().err
+    assert main(["tile", "in.png", "-o", "out.png", "--size", "64x56"]) == 0
+    assert io.read("out.png").shape == (56, 64)
+    assert "wrote out.png: 64 x 56, 1 channel" in capsys.readouterr().err

@@ -170,10 +170,10 @@ def test_types_and_names_say_how_an_option_is_read() -> None:
         "--mirror": (True, None),
         "--knob-width": (None, None),
         "--knob-kind": ("default", "default|near|far"),
-        "--size": (None, "ROWSxCOLS"),
+        "--size": (None, "WIDTHxHEIGHT"),
     }
     assert OPTIONS.call(OPTIONS.read(GIVEN)) == {}
-    given = GIVEN | {"colour": "R", "size": "3x4", "knobs_width": 3, "knobs_kind": "far", "mirror": False}
+    given = GIVEN | {"colour": "R", "size": "4x3", "knobs_width": 3, "knobs_kind": "far", "mirror": False}
     knobs = Knobs(width=3, kind="far")
     expected = {"colour": Colour.RED, "size": (3, 4), "mirror": False, "knobs": knobs}
     assert OPTIONS.call(OPTIONS.read(given)) == expected

@@ -45,9 +45,9 @@ def files(folder: Path) -> dict[str, bytes]:
     [
         ("", {}),
         ("--wrap x --overlap 12", {"wrap": (False, True), "overlap": 12}),
-        ("--wrap y --overlap 10x30 --threads 1", {"wrap": (True, False), "overlap": (10, 30)}),
+        ("--wrap y --overlap 30x10 --threads 1", {"wrap": (True, False), "overlap": (10, 30)}),
         ("--wrap none", {"wrap": False}),
-        ("--size 48x60", {"size": (48, 60)}),
+        ("--size 60x48", {"size": (48, 60)}),
     ],
 )
 def test_tile_writes_what_the_function_makes(here: Path, capsys: Capture, arguments: str, options: dict) -> None:
@@ -65,7 +65,7 @@ def test_tile_writes_what_the_function_makes(here: Path, capsys: Capture, argume
     rows, columns = expected.image.shape[:2]
     out, err = capsys.readouterr()
     assert out == ""
-    last = rf"texrs: wrote out.png: {rows} x {columns}, 3 channels, uint8, in [0-9.]+ s"
+    last = rf"texrs: wrote out.png: {columns} x {rows}, 3 channels, uint8, in [0-9.]+ s"
     assert re.fullmatch(last, err.splitlines()[-1])
 
 
@@ -134,8 +134,8 @@ REFUSED = {
     "tile in.png --wrap z": "--wrap: allowed are",
     "tile in.png --overlap 0": "--overlap: each side must be at least 1",
     "tile in.png --overlap 33": "--overlap: needs an integer from 1 to 32, got 33: at most half of the 64 rows",
-    "tile in.png --overlap 10x41": "from 1 to 40, got 41: at most half of the 80 columns",
-    "tile in.png --overlap a": "--overlap: needs ROWSxCOLS",
+    "tile in.png --overlap 41x10": "from 1 to 40, got 41: at most half of the 80 columns",
+    "tile in.png --overlap a": "--overlap: needs WIDTHxHEIGHT",
     "tile in.png --map s.png": "--map: needs a name that ends in .npz",
     "tile in.png --stages in.png": "in.png: is not a folder",
     "tile in.png --stages out.png": "--stages: out.png is already the file of --out",

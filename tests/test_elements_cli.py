@@ -79,10 +79,10 @@ def test_database(here: Path, capsys: Capture) -> None:
     assert main(["database", "db", "matrix", "dots", "-o", "one.png", "--cell", "32", "-q"]) == 0
     assert "dots: made anew" in capsys.readouterr().err
     assert iio.imread("one.png").shape == (72, 72, 3)
-    assert main(["database", "db", "splice", "dots", "leaves_and_flowers", "-o", "s.png", "--size", "40x44", "-q"]) == 0
+    assert main(["database", "db", "splice", "dots", "leaves_and_flowers", "-o", "s.png", "--size", "44x40", "-q"]) == 0
     assert iio.imread("s.png").shape == (40, 44, 3)
     rows = (
-        "matrix -q -o two.png --cell 32 --size 40x44 --seed 0 --each all --rows dots --columns leaves_and_flowers,dots"
+        "matrix -q -o two.png --cell 32 --size 44x40 --seed 0 --each all --rows dots --columns leaves_and_flowers,dots"
     )
     assert main(["database", "db", *rows.split()]) == 0
     assert iio.imread("two.png").shape == (72, 108, 3)

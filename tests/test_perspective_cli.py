@@ -27,7 +27,7 @@ def run(folder, text):
 
 
 def test_a_picture_is_grown(files):
-    assert run(files, "perspective @floor.png --scale-map @scale.npy -o @out.png --size 48x80 --map @map.npz -q") == 0
+    assert run(files, "perspective @floor.png --scale-map @scale.npy -o @out.png --size 80x48 --map @map.npz -q") == 0
     assert io.read(files / "out.png").shape == (48, 80, 3)
     assert SourceMap.load(files / "map.npz").shape == (48, 80)
 
@@ -51,7 +51,7 @@ def test_a_mask_is_measured_as_is_said(files):
 
 def test_a_target_is_stretched_to_the_size(files):
     io.write(files / "target.npy", np.full((8, 10), 0.6, np.float32))
-    line = "perspective @floor.png --scale-map @scale.npy --target @target.npy -o @out.png --size 40x64 -q"
+    line = "perspective @floor.png --scale-map @scale.npy --target @target.npy -o @out.png --size 64x40 -q"
     assert run(files, line) == 0
     assert io.read(files / "out.png").shape == (40, 64, 3)
 
@@ -108,7 +108,7 @@ def test_bad_input_is_named(files, capsys, line, words):
 def test_a_picture_is_enough(files, capsys):
     """The plane is found; what is no photograph of one is said to be doubtful."""
     io.write(files / "discs.png", texrs.samples.tilted_discs((128, 128)).image)
-    assert run(files, "perspective @discs.png -o @out.png --size 96x160 --seed 1") == 0
+    assert run(files, "perspective @discs.png -o @out.png --size 160x96 --seed 1") == 0
     assert "no plane" not in capsys.readouterr().err
     discs = texrs.samples.tilted_discs((128, 128)).image
     made = texrs.perspective(discs, texrs.planes.find(discs).scale_map(), (96, 160), seed=1)

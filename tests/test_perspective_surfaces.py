@@ -308,7 +308,7 @@ def test_on_the_command_line(tmp_path, monkeypatch, capsys, weave):
     np.save("places.npy", Plane((48, 48), 30).flatten(np.moveaxis(np.indices((48, 48)), 0, -1)))
     io.write("map.npy", np.full((48, 48), 0.8, np.float32))
     for target, shape in (
-        ("plane:slant=40,tilt=60,fov=50 --size 40x50", (40, 50)),
+        ("plane:slant=40,tilt=60,fov=50 --size 50x40", (40, 50)),
         ("column.png", (48, 48)),
         ("bent.npy", (48, 48)),
         ("places.npy", (48, 48)),

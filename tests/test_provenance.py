@@ -194,7 +194,7 @@ def test_colours_and_density_go_through(here: Path) -> None:
     exif = picture.getexif()
     exif[274] = 6
     picture.save("turned.jpg", exif=exif, dpi=(100, 200))
-    assert main(["tile", "turned.jpg", "-o", "upright.png", "-q", "--size", "40x60"]) == 0
+    assert main(["tile", "turned.jpg", "-o", "upright.png", "-q", "--size", "60x40"]) == 0
     with Image.open("upright.png") as made:
         assert made.getexif().get(274, 1) == 1
         assert [round(d) for d in made.info["dpi"]] == [200, 100]
@@ -250,7 +250,7 @@ AGAIN = {
     "analyse": "analyse in.png --mask mask.png --layout disjoint -o r.npz --stages st --page r.html",
     "complete": "complete in.png hole.png -o r.jpg --map r.npz",
     "database": "database db matrix -o r.png --each each --cell 32",
-    "design": "design in.png --size 48x64 --tiles 1 --seed 3 --element-labels mask.png -o r.exr --map r.npz --stages st",
+    "design": "design in.png --size 64x48 --tiles 1 --seed 3 --element-labels mask.png -o r.exr --map r.npz --stages st",
     "sample": "tile sample:weave -o r.webp --wrap x",
     "scale-map": "scale-map in.png --slant 40 --tilt 80 -o r.png --stages st",
     "scale-map npy": "scale-map in.png --slant 30 -o r.npy",

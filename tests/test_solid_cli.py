@@ -37,7 +37,7 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def test_solid_writes_what_the_function_makes(here: Path, capsys: Capture) -> None:
-    options = "--size 20x24x18 --field zigzag:period=16 --seed 3 --quality fast --wrap zx --interpolation cubic"
+    options = "--size 18x24x20 --field zigzag:period=16 --seed 3 --quality fast --wrap zx --interpolation cubic"
     more = "--no-labels --memory-limit 1G --threads 1 --stages stages --map map.npz"
     assert main(["solid", "v.npy", "-o", "out.tif", *options.split(), *more.split()]) == 0
     expected = texrs.solid(
@@ -59,18 +59,18 @@ def test_solid_writes_what_the_function_makes(here: Path, capsys: Capture) -> No
     said = capsys.readouterr()
     assert said.out == ""
     assert "blocks" in said.err
-    assert re.search(r"wrote out.tif: 20 x 24 x 18, 3 channels, uint8, in [0-9.]+ s\n$", said.err)
+    assert re.search(r"wrote out.tif: 18 x 24 x 20, 3 channels, uint8, in [0-9.]+ s\n$", said.err)
     assert not list(here.glob(".texrs*"))
     # Another map of the example goes the same way.
     io.write_volume("height.npy", VOLUME[..., 0].astype(np.float32))
     assert main(["apply", "map.npz", "height.npy", "-o", "height.tif", "--interpolation", "cubic", "-q"]) == 0
     assert io.read_volume("height.tif").shape == (20, 24, 18)
     assert main(["info", "map.npz"]) == 0
-    assert "20 x 24 x 18, made from 32 x 32 x 32" in capsys.readouterr().out
+    assert "18 x 24 x 20, made from 32 x 32 x 32" in capsys.readouterr().out
 
 
 def test_synthesize_writes_what_the_function_makes(here: Path, capsys: Capture) -> None:
-    arguments = "--size 40x56 --field spiral:angle=15 --seed 9 --wrap y --quality fast --map s.npz --quiet"
+    arguments = "--size 56x40 --field spiral:angle=15 --seed 9 --wrap y --quality fast --map s.npz --quiet"
     assert main(["synthesize", "in.png", "-o", "out.png", *arguments.split()]) == 0
     spiral = fields.spiral(15, axes=2)
     expected = texrs.synthesize(PICTURE, (40, 56), field=spiral, seed=9, wrap=(True, False), quality="fast")
@@ -108,7 +108,7 @@ def test_maps_to_follow_come_from_files(here: Path, capsys: Capture) -> None:
     ramp = np.linspace(0, 1, 64, dtype=np.float32)[:, np.newaxis].repeat(64, 1)
     io.write("mine.tif", ramp)
     io.write("theirs.tif", ramp[::-1, :48])
-    arguments = "--size 64x48 --guide-exemplar mine.tif --guide-output theirs.tif --guide-weight 2 --quality fast -q"
+    arguments = "--size 48x64 --guide-exemplar mine.tif --guide-output theirs.tif --guide-weight 2 --quality fast -q"
     assert main(["synthesize", "in.png", "-o", "out.png", *arguments.split()]) == 0
     expected = texrs.synthesize(
         PICTURE, (64, 48), guide=texrs.Guide(exemplar=ramp, output=ramp[::-1, :48], weight=2), quality="fast"
@@ -130,7 +130,7 @@ def test_frames_come_from_a_file_and_sizes_from_the_example(here: Path) -> None:
 
 
 WRONG = [
-    ("solid v.npy -o out.tif --size 20x20", "--size: needs PLANESxROWSxCOLS, as in 64x96x128, or one number"),
+    ("solid v.npy -o out.tif --size 20x20", "--size: needs WIDTHxHEIGHTxDEPTH, as in 128x96x64, or one number"),
     ("solid v.npy -o out.tif --size 0", "--size: each side must be at least 1"),
     ("solid v.npy -o out.tif --size 10000", "--size: (10000, 10000, 10000) has 1000000000000 pixels"),
     ("solid v.npy -o out.tif --size 64 --memory-limit 9M", "--size: (64, 64, 64) would take"),
@@ -160,7 +160,7 @@ WRONG = [
     ("solid sample:dotz -o out.tif", "name must be a generated sample"),
     ("solid v.npy", "Missing option"),
     ("synthesize v.npy -o out.png", "v.npy"),
-    ("synthesize in.png -o out.png --size 9x9x9", "--size: needs ROWSxCOLS"),
+    ("synthesize in.png -o out.png --size 9x9x9", "--size: needs WIDTHxHEIGHT"),
     ("synthesize in.png -o out.png --wrap z", "--wrap: allowed are xy, x, y and none"),
     ("synthesize in.png -o out.png --field slant_3d", "--field: slant_3d is for volumes"),
     ("synthesize in.png -o out.exr", "out.exr: .exr cannot hold"),

@@ -75,7 +75,7 @@ def test_self_splice_and_its_replay(tmp_path: Path) -> None:
 def test_self_splice_in_another_size(tmp_path: Path) -> None:
     out = tmp_path / "a.png"
     for options in ([], ["--edit", "randomise"]):
-        assert main(["self-splice", "dots.png", "-q", "-o", str(out), "--size", "144x160", *options]) == 0
+        assert main(["self-splice", "dots.png", "-q", "-o", str(out), "--size", "160x144", *options]) == 0
         assert io.read(out).shape[:2] == (144, 160)
 
 

@@ -43,7 +43,7 @@ def demo_command(
 def samples_command(
     names: Annotated[list[str] | None, make_argument("NAME", "Which; all by default.")] = None,
     out: Annotated[str | None, to_write("out", "DIR", "Folder to write them to, as .png and .tif.")] = None,
-    size: Annotated[str | None, make_option("SIZE", "Of those that are generated: 256, 192x256, 64x64x64.")] = None,
+    size: Annotated[str | None, make_option("SIZE", "Of those that are generated: 256, 256x192, 64x64x64.")] = None,
     seed: Annotated[int | None, make_option(None, "Of those that are generated.")] = None,
     quiet: Quiet = False,
 ) -> None:

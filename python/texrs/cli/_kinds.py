@@ -70,12 +70,15 @@ class Kind:
 
 
 def parse_size(text: str, option: str = "--size", *, axes: int = 2) -> tuple[int, ...]:
-    """Return the sides: of ``512x384`` rows and columns, of ``512`` a square; with three axes planes come first."""
+    """Return (rows, columns) of ``1024x512``, which is the width and the height, or of ``512`` a square.
+
+    With three axes the depth comes last in the text, and the planes first in what is returned.
+    """
     parts = re.split(r"[x×]", text.strip().lower())
     if len(parts) not in (1, axes) or not all(re.fullmatch(r"\s*-?[0-9]{1,18}\s*", p) for p in parts):
-        wanted = ("ROWSxCOLS, as in 512x384", "PLANESxROWSxCOLS, as in 64x96x128")[axes - 2]
+        wanted = ("WIDTHxHEIGHT, as in 1024x512", "WIDTHxHEIGHTxDEPTH, as in 128x96x64")[axes - 2]
         raise InvalidInput(f"{option}: needs {wanted}, or one number; got {text!r}")
-    sides = [int(p) for p in parts]
+    sides = [int(p) for p in reversed(parts)]
     return as_size(sides if len(sides) > 1 else sides[0], option, axes=axes)
 
 
@@ -447,7 +450,9 @@ AXES = Kind(
     show_axes,
 )
 SIZE = Kind(
-    ("ROWSxCOLS", "PLANESxROWSxCOLS"), lambda text, about: parse_size(text, about.option, axes=about.axes), show=str
+    ("WIDTHxHEIGHT", "WIDTHxHEIGHTxDEPTH"),
+    lambda text, about: parse_size(text, about.option, axes=about.axes),
+    show=str,
 )
 SHARES = Kind("A:B:...", lambda text, about: parse_numbers(text, about.option, "numbers such as 2:1:1"))
 

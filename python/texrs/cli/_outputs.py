@@ -329,7 +329,11 @@ def shrink(image: Array, side: int = 256) -> Array:
 
 
 def describe(image: Array, axes: int) -> str:
-    """Return the size, the channels and the dtype of an image."""
+    """Return the width and the height, the channels and the dtype of an image; of a volume the depth too."""
     channels = image.shape[axes] if image.ndim > axes else 1
-    sides = " x ".join(map(str, image.shape[:axes]))
-    return f"{sides}, {channels} channel{'s'[: channels != 1]}, {image.dtype}"
+    return f"{show_sides(image.shape[:axes])}, {channels} channel{'s'[: channels != 1]}, {image.dtype}"
+
+
+def show_sides(shape: Sequence[int]) -> str:
+    """Return sides as options take them: the width first."""
+    return " x ".join(map(str, reversed(shape)))

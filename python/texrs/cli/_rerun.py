@@ -17,7 +17,7 @@ import typer
 from texrs import io
 from texrs._version import __version__
 from texrs.cli._console import hush, note, say
-from texrs.cli._outputs import Quiet, Threads, describe, make_argument, to_write
+from texrs.cli._outputs import Quiet, Threads, describe, make_argument, show_sides, to_write
 from texrs.cli._provenance import CHANGED, ORIGINAL, RUNNING
 from texrs.errors import FileError, InvalidInput
 from texrs.io._annotation import hash_file, is_unchanged, name_sidecar, needs_sidecar
@@ -239,10 +239,10 @@ def describe_map(file: str) -> list[str]:
     """Return lines about a source map."""
     places = SourceMap.load(file)
     reuse = places.reuse()
-    shapes = " and ".join(" x ".join(map(str, shape)) for shape in places.shapes)
+    shapes = " and ".join(show_sides(shape) for shape in places.shapes)
     what = "pixels" if places.axes == 2 else "voxels"
     return [
-        f"source map: {' x '.join(map(str, places.shape))}, made from {shapes}",
+        f"source map: {show_sides(places.shape)}, made from {shapes}",
         f"copied unchanged: {reuse.verbatim:.1%} of the {what}, in {reuse.regions} regions",
         f"largest region: {reuse.largest:.1%} of the example",
     ]

@@ -118,7 +118,7 @@ def scale_map_command(
             report |= {} if kind is None else {"kind": kind}
             with _outputs.write_folder(stages, "stages", suffix=Path(out).suffix) as folder:
                 save(shown, {**report, "size": made.shape, "least": least, "largest": largest}, folder)
-    extent, seconds = " x ".join(map(str, made.shape)), time.monotonic() - start
+    extent, seconds = _outputs.show_sides(made.shape), time.monotonic() - start
     what = {None: "scales", "width": "widths", "area": "roots of areas"}[kind]
     if narrow:
         note("without --fov sizes vary less than a camera shows them, by up to a factor of two", quiet=quiet)
@@ -134,7 +134,7 @@ def find_fov(image: str) -> dict[str, float]:
 def check_same_size(mask: Array, pixels: Array, option: str) -> Array:
     """Return the mask, if it is as large as the picture."""
     if mask.shape[:2] != pixels.shape[:2]:
-        sizes = (" x ".join(map(str, a.shape[:2])) for a in (pixels, mask))
+        sizes = (_outputs.show_sides(a.shape[:2]) for a in (pixels, mask))
         raise InvalidInput("{}: needs the size of the image, {}; got {}".format(option, *sizes))
     return mask
 
