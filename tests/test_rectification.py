@@ -57,6 +57,36 @@ def test_pixels_are_the_photograph_s() -> None:
     np.testing.assert_allclose(down, result.source.frames()[:-1, :, :, 0], atol=0.05)
 
 
+def test_normals_turn_with_the_plane() -> None:
+    """What leans to the right in the photograph leans up in a texture that is turned by a quarter, counter-clockwise."""
+    right = np.empty((*PLANE.shape, 3), np.uint8)
+    right[...] = np.rint((np.array([0.6, 0.0, 0.8]) + 1) * 127.5)
+    for turn, leans in ((0, (0.6, 0.0)), (90, (0.0, 0.6)), (180, (-0.6, 0.0))):
+        source = texrs.rectify(FLOOR, view=Plane(PLANE.shape, 0, 90, turn=turn)).source
+        found = texrs.apply(source, right, kind="normal") / 127.5 - 1
+        np.testing.assert_allclose(found.reshape(-1, 3).mean(axis=0), (*leans, 0.8), atol=0.02)
+        # Heights are numbers, and only move.
+        np.testing.assert_array_equal(texrs.apply(source, right[..., 0]), right[0, 0, 0])
+
+
+@pytest.mark.parametrize("size", [None, 96, (80, 128)])
+def test_materials_become_flat_and_cyclic(size: int | tuple[int, int] | None) -> None:
+    normals = np.empty((*PLANE.shape, 3), np.uint8)
+    normals[...] = (128, 128, 255)
+    maps = {"albedo": FLOOR, "height": FLOOR[..., :1].astype(np.uint16) * 257, "normal": normals}
+    made = texrs.rectify(texrs.Material(maps), view=PLANE, wrap=True, size=size)
+    assert made.material is not None
+    shapes = {name: each.pixels.shape[:2] for name, each in made.material.items()}
+    assert len(set(shapes.values())) == 1
+    if size is not None:
+        assert set(shapes.values()) == {(96, 96) if size == 96 else size}
+    assert made.material["height"].pixels.dtype == np.uint16
+    edge = made.image.astype(float)
+    for axis in (0, 1):
+        inside = np.abs(np.diff(edge, axis=axis)).mean()
+        assert np.abs(np.take(edge, 0, axis) - np.take(edge, -1, axis)).mean() < 2 * inside
+
+
 @pytest.mark.parametrize("dtype", [np.uint16, np.float32])
 def test_dtypes_and_channels_stay(dtype: type) -> None:
     grey = FLOOR[..., 0].astype(dtype)
