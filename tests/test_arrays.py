@@ -12,6 +12,8 @@ import texrs
 from texrs._arrays import as_image, as_mask, as_ndarray, to_unit
 from texrs.errors import FileError, InvalidInput
 from texrs.kernels.gather import gather
+from texrs.kernels.mean_shift import mean_shift
+from texrs.kernels.poisson import solve
 
 PEBBLES = texrs.samples.pebbles((64, 64)).image
 DISCS = texrs.samples.tilted_discs((96, 96)).image
@@ -85,6 +87,9 @@ VERBS = {
     "segment": (PEBBLES, lambda image: texrs.exemplar.segment(image).elements),
     "find": (DISCS, lambda image: texrs.planes.find(image).slant),
     "auto_mask": (DISCS, lambda image: texrs.scale_maps.auto_mask(image)),
+    "mean_shift": (PEBBLES, lambda image: mean_shift(image, 2, 0.1)),
+    "solve": (PEBBLES, lambda image: solve(image, np.zeros((64, 64, 3)), np.zeros((64, 64, 3)))),
+    "compare": (PEBBLES, lambda image: repr(texrs.volume.compare(image, image, axes=2))),
     "gather": (PEBBLES, lambda image: gather(image, [[1.5, 2.5]])),
 }
 SLOW = ("splice", "analyse", "find")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from texrs import _rust
-from texrs._arrays import as_float, as_image, as_int, as_progress, as_wrap
+from texrs._arrays import as_float, as_image, as_int, as_ndarray, as_progress, as_wrap
 from texrs._progress import stage
 from texrs._typing import Array, Progress
 from texrs.errors import InvalidInput
@@ -86,6 +86,7 @@ def mean_shift(
     True
 
     """
+    image = as_ndarray(image, "image")
     given = as_image(image)
     if given.dtype.kind == "f" and float(max(given.max(), -given.min())) > _MOST:
         raise InvalidInput(f"image: values up to {_MOST:g} are allowed, got {np.abs(given).max()}")
@@ -102,4 +103,4 @@ def mean_shift(
     )
     if given.dtype.kind in "bui":
         found = np.rint(found)
-    return found.astype(given.dtype, copy=False).reshape(np.asarray(image).shape)
+    return found.astype(given.dtype, copy=False).reshape(image.shape)

@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from texrs import _rust
-from texrs._arrays import as_array, as_bool, as_float, as_image, as_mask, as_progress, as_wrap, check_finite
+from texrs._arrays import as_array, as_bool, as_float, as_image, as_mask, as_ndarray, as_progress, as_wrap, check_finite
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 
@@ -95,6 +95,7 @@ def solve(
     True
 
     """
+    image = as_ndarray(image, "image")
     values = _as_floats(as_image(image), "image")
     rows = _as_gradient(gradient_rows, "gradient_rows", values)
     columns = _as_gradient(gradient_columns, "gradient_columns", values)
@@ -106,7 +107,7 @@ def solve(
         None if mask is None else as_mask(mask, "mask", values.shape[:2]),
         as_progress(progress),
     )
-    return _check_finite(solved).reshape(np.asarray(image).shape)
+    return _check_finite(solved).reshape(image.shape)
 
 
 def spread(
@@ -219,10 +220,11 @@ def blend(
     True
 
     """
+    target, source = as_ndarray(target, "target"), as_ndarray(source, "source")
     onto, taken, both = as_image(target, "target"), as_image(source, "source"), as_bool(mixed, "mixed")
-    shape = np.asarray(target).shape
-    if np.asarray(source).shape != shape:
-        raise InvalidInput(f"source: needs the target's shape {shape}, got {np.asarray(source).shape}")
+    shape = target.shape
+    if source.shape != shape:
+        raise InvalidInput(f"source: needs the target's shape {shape}, got {source.shape}")
     inside, weight = as_mask(mask, "mask", onto.shape[:2]), _as_weight(screening)
     values, other = (_as_numbers(a, n) for a, n in ((onto, "target"), (taken, "source")))
     # With v = source + c no difference is wanted of c, but where the target shows through.

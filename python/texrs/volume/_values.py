@@ -7,7 +7,7 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_array, as_image, check_finite, guidance, try_array
+from texrs._arrays import as_array, as_image, as_ndarray, check_finite, guidance, try_array
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.fields import Field
@@ -50,7 +50,8 @@ def as_colours(image: ArrayLike, name: str, axes: int | None) -> Floats:
     """Return the colours of a picture or a volume in [0, 1], channels last."""
     if axes is None:
         with suppress(ValueError, TypeError):  # Of what is no array `as_image` tells.
-            axes = guess_axes(np.asarray(image))
+            image = as_ndarray(image, name, axes=3)
+            axes = guess_axes(image)
     count = 3 if axes is None else axes
     if count not in (2, 3):
         raise InvalidInput(f"axes: needs 2 or 3, got {axes!r}")
