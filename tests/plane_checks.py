@@ -1,5 +1,6 @@
 """Floors whose planes are known: flat samples, seen by a pinhole camera."""
 
+from collections.abc import Callable
 from functools import cache
 from io import BytesIO
 
@@ -10,6 +11,7 @@ from scipy.ndimage import gaussian_filter
 
 from texrs import Plane, SourceMap, samples
 
+Points = NDArray[np.float64]
 SIDE, OVER = 512, 2
 """Of the flat texture, in pixels of the picture's middle; samples a pixel along each axis, as a camera has them."""
 
@@ -64,6 +66,38 @@ def look(
     )
     seen = shown.reshape(rows, OVER, columns, OVER, -1).mean(axis=(1, 3)) + rng.normal(0, noise, (rows, columns, 1))
     return np.clip(np.rint(seen), 0, 255).astype(np.uint8)
+
+
+def bend(
+    name: str, shape: tuple[int, int], flatten: Callable[[Points], Points], *, seed: int = 0, noise: float = 3.0
+) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+    """Return a picture of what is no plane, by where each point of it lies on a flat sample, and roots of areas in it."""
+    rows, columns = shape
+    middle = (np.array(shape) - 1) / 2
+
+    def differ(points: Points) -> Points:
+        ways = [(flatten(points + 0.05 * way) - flatten(points - 0.05 * way)) / 0.1 for way in np.eye(2)]
+        return np.stack(ways, axis=-1)
+
+    grid = np.moveaxis(np.indices((rows * OVER, columns * OVER)), 0, -1) / OVER + (1 / OVER - 1) / 2 - middle
+    rng = np.random.default_rng(seed)
+    places = np.clip((flatten(grid) + rng.uniform(0, SIDE, 2)) % SIDE, 0, SIDE - 1).astype(np.float32)
+    shown = SourceMap.from_coordinates(places, (SIDE, SIDE), frame=(differ(grid) / OVER).astype(np.float32)).render(
+        load(name), interpolation="linear", antialias=True
+    )
+    seen = shown.reshape(rows, OVER, columns, OVER, -1).mean(axis=(1, 3)) + rng.normal(0, noise, (rows, columns, 1))
+    areas = np.abs(np.linalg.det(differ(np.moveaxis(np.indices(shape), 0, -1) - middle)))
+    return np.clip(np.rint(seen), 0, 255).astype(np.uint8), 1 / np.sqrt(areas)
+
+
+def roll(points: Points) -> Points:
+    """Return where points lie on a column of 178 pixels' radius, seen from far away."""
+    return np.stack([points[..., 0], 178 * np.arcsin(points[..., 1] / 178)], axis=-1)
+
+
+def bulge(points: Points) -> Points:
+    """Return where points lie on something that comes nearer in the middle."""
+    return np.asarray(points * (1 + 0.6 * (points**2).sum(axis=-1, keepdims=True) / 200**2), np.float64)
 
 
 def dress(

@@ -67,7 +67,7 @@ def complete(
     scale_map : {None, "auto"} or (H, W) float array, optional
         For pictures taken at an angle: how large the elements are at each pixel (`texrs.scale_maps`), so that the hole is
         filled with elements of the size that belongs there [2]_. "auto" measures it: that of the plane
-        which is found (`texrs.planes.find`), or where none is surely, of a mask of features, with a warning. In the hole it may
+        which is found (`texrs.planes.find`), or else measured (`texrs.planes.measure`). In the hole it may
         be NaN; it is continued.
     exemplar_scale_map : {None, "auto"} or (h, w) float array, optional
         How large they are in ``exemplar``, in the units of ``scale_map``. None: 1 everywhere, as in a picture taken from the

@@ -8,16 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from texrs import scale_maps
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.planes._find import find
 from texrs.planes._ground import find_ground
 from texrs.planes._plane import Plane
+from texrs.planes._sizes import SURE, measure
 from texrs.planes._view import View
 
-SURE = 0.4
-"""Confidence below which it is said that a plane that was found may be wrong."""
+__all__ = ["SURE", "Seen", "as_views", "find_grounds", "measure_scale", "see", "see_in"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,18 +97,15 @@ def find_grounds(
 
 
 def measure_scale(pixels: Array, known: Bools) -> Floats:
-    """Return how large things are at each pixel of a picture: by the plane that is found in it, or by a mask of features."""
-    try:
-        found = find(pixels, known=known)
-    except InvalidInput:
-        # Too small, or too little of it is known; a mask may still be found.
-        found = None
-    if found is not None and found.confidence >= SURE:
-        return found.scale_map()
-    if found is not None:
+    """Return how large things are at each pixel of a picture, with a warning where that is not sure."""
+    found = measure(pixels, known=known)
+    if found.confidence < SURE:
+        why = "what was measured in several ways has little in common, so all things are taken to be equally large"
+        if found.shape != "even":
+            why = "there is too little to measure in more than one way, so sizes are those of what is lighter than around it"
         warnings.warn(
-            f"scale_map: no plane was found surely (confidence {found.confidence:.2f} of 1), so sizes are measured in what is "
-            "lighter than its surroundings; where the result does not look right give a map",
+            f"scale_map: no plane was found surely, and {why} (confidence {found.confidence:.2f} of 1); where the result does "
+            "not look right give a map",
             stacklevel=3,
         )
-    return scale_maps.from_mask(scale_maps.auto_mask(pixels, known=known), trend="plane", known=known)
+    return found.scale

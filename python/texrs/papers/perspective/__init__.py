@@ -90,7 +90,7 @@ def perspective(
     scale_map : (H, W) float array, Plane, "auto" or "front"
         How large the exemplar's elements are at each pixel, positive; only ratios count (`texrs.scale_maps`). A `texrs.Plane`,
         or its words ``"plane:slant=50,tilt=90,fov=60"``: those of a plane. "auto": those of the plane that is found in it
-        (`texrs.planes.find`), or where none is surely, of a mask of features, with a warning. "front": all alike.
+        (`texrs.planes.find`), or else measured (`texrs.planes.measure`). "front": all alike.
     size : int or (int, int), optional
         Rows and columns of the result: by default those of the ``target``, else twice the exemplar's.
     target : array or Plane, optional

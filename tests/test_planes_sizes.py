@@ -1,0 +1,83 @@
+"""How large things are where there is a plane, where there is none, and where nobody can say."""
+
+import numpy as np
+import pytest
+
+from plane_checks import bend, bulge, look, look_twice, roll
+from texrs import Plane, planes, samples
+from texrs.errors import InvalidInput
+from texrs.planes._choose import measure_scale
+from texrs.planes._sizes import SURE, agree
+
+
+@pytest.mark.parametrize("name", ["weave", "dots", "pebbles"])
+def test_a_bulge_is_no_plane(name: str) -> None:
+    picture, truth = bend(name, (256, 320), bulge)
+    found = planes.measure(picture)
+    assert (found.shape, found.scale.kind) == ("curved", "area")
+    assert found.confidence >= SURE
+    off = np.log(found.scale) - np.log(truth)
+    assert np.corrcoef(np.log(found.scale).ravel(), np.log(truth).ravel())[0, 1] > 0.93
+    # The plane that is nearest is off by as much as the sizes range.
+    assert off.std() < 0.55 * np.log(truth).std()
+
+
+def test_a_column_is_no_plane() -> None:
+    picture, truth = bend("weave", (256, 320), roll)
+    found = planes.measure(picture)
+    assert found.shape == "curved"
+    assert np.corrcoef(np.log(found.scale).ravel(), np.log(truth).ravel())[0, 1] > 0.93
+    # What goes on along it is as large everywhere.
+    assert np.log(found.scale).mean(axis=1).std() < 0.03
+
+
+@pytest.mark.parametrize(("slant", "tilt"), [(0, 90), (30, 200), (55, 90)])
+def test_a_plane_is_one(slant: float, tilt: float) -> None:
+    found = planes.measure(look("weave", Plane((256, 320), slant, tilt)))
+    assert (found.shape, found.scale.kind) == ("plane", "width")
+    assert found.plane is not None
+    assert found.confidence == found.plane.confidence
+    np.testing.assert_array_equal(found.scale, found.plane.scale_map())
+
+
+def test_what_nobody_knows_is_even_and_said() -> None:
+    found = planes.measure(look_twice())
+    assert found.shape == "even"
+    assert found.confidence < SURE
+    assert found.scale.min() == found.scale.max() == 1
+    with pytest.warns(UserWarning, match="no plane was found surely.*little in common"):
+        measure_scale(look_twice(), np.ones((192, 224), np.bool_))
+
+
+def test_a_voice_the_other_way_round_is_outvoted() -> None:
+    slope = np.linspace(-0.5, 0.5, 200)
+    noise = np.random.default_rng(0).normal(0, 0.03, (4, 200))
+    agreed, sure = agree([slope + noise[0], -slope, slope + noise[1], 0.8 * slope + noise[2]])
+    assert agreed == [0, 2, 3]
+    assert sure > SURE
+    assert agree([slope, -slope, slope**2, 0.2 * np.sin(20 * slope)])[1] < SURE
+    assert agree([slope]) == ([0], 0.0)
+
+
+def test_small_pictures_are_doubtful() -> None:
+    floor = samples.tilted_discs((56, 56))
+    with pytest.warns(UserWarning, match="too little to measure in more than one way"):
+        scale = measure_scale(floor.image, np.ones((56, 56), np.bool_))
+    assert scale.shape == (56, 56)
+
+
+def test_what_is_not_known_does_not_count() -> None:
+    picture, _ = bend("weave", (256, 320), bulge)
+    known = np.ones((256, 320), np.bool_)
+    known[:, :70] = False
+    covered = picture.copy()
+    covered[:, :70] = np.random.default_rng(0).integers(0, 255, (256, 70, 3))
+    one, other = (planes.measure(p, known=known) for p in (picture, covered))
+    np.testing.assert_allclose(np.log(one.scale), np.log(other.scale), atol=0.02)
+
+
+def test_nothing_to_measure_gets_a_sentence() -> None:
+    with pytest.raises(InvalidInput, match="one colour"):
+        planes.measure(np.zeros((128, 128), np.uint8))
+    with pytest.raises(InvalidInput, match="known"):
+        planes.measure(samples.dots().image, known=np.zeros((3, 3), bool))
