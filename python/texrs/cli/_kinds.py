@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +37,8 @@ class About:
     """Of the result, once it is known."""
     like: Array | None = None
     """The exemplar, once it is read."""
+    roles: Mapping[str, str] = field(default_factory=dict)
+    """What maps of materials are for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,8 +207,10 @@ def read_picture(text: str, *, finite: bool = True) -> Array:
     return image
 
 
-def match_alpha(image: Array, like: Array | None) -> Array:
+def match_alpha(image: Any, like: Array | None) -> Any:
     """Return a picture with an alpha channel, all of it there, if that is all that it lacks; without one that says nothing."""
+    if not isinstance(image, np.ndarray):
+        return image
     colours = [1 if a.ndim == 2 else a.shape[2] for a in (image, image if like is None else like)]
     whole = 1 if image.dtype.kind == "f" else np.iinfo(image.dtype).max if image.dtype.kind in "ui" else True
     if colours in ([3, 4], [1, 2]):
@@ -215,6 +219,18 @@ def match_alpha(image: Array, like: Array | None) -> Array:
     if colours in ([4, 3], [2, 1]) and (image[..., -1] == whole).all():
         return np.ascontiguousarray(image[..., :-1] if colours[1] > 1 else image[..., 0])
     return image
+
+
+def read_example(text: str, about: About, *, finite: bool = True) -> Any:
+    """Read a picture, or a material: a folder of maps, or an EXR file of several layers."""
+    from texrs.cli._stacks import is_stack
+
+    if text.startswith(SAMPLE) or not is_stack(text):
+        return read_picture(text, finite=finite)
+    from texrs.materials import Material
+
+    with name_arguments(roles="--role", maps=text):
+        return Material.read(text, roles=about.roles)
 
 
 def read_volume(text: str) -> Array:
@@ -331,7 +347,7 @@ def read_entry(text: str, about: About) -> Any:
     """Read analysed elements, or a picture, which is analysed by whoever takes it."""
     from texrs import elements
 
-    return elements.load(text) if text.lower().endswith(".npz") else read_picture(text)
+    return elements.load(text) if text.lower().endswith(".npz") else read_example(text, about)
 
 
 def read_layout(text: str, about: About) -> Any:
@@ -382,12 +398,18 @@ def read_points(path: str, about: About) -> list[list[float]]:
 # --- the kinds -------------------------------------------------------------------------------------------------------
 
 PICTURE = Kind("FILE", lambda text, about: read_picture(text), "A file, or sample:NAME.", file=True)
-SOURCE = replace(PICTURE, read=lambda text, about: match_alpha(read_picture(text), about.like))
+EXAMPLE = Kind("FILE|FOLDER", read_example, "A file, a folder of the maps of a material, or sample:NAME.", file=True)
+SOURCE = replace(EXAMPLE, read=lambda text, about: match_alpha(read_example(text, about), about.like))
 """A picture of the same things as the first, which may have an alpha channel that this one lacks."""
-UNKNOWN = replace(PICTURE, read=lambda text, about: read_picture(text, finite=False))
+UNKNOWN = replace(EXAMPLE, read=lambda text, about: read_example(text, about, finite=False))
 """A picture in which some is not known, and may be anything."""
 VOLUME = replace(PICTURE, read=lambda text, about: read_volume(text))
-ENTRY = Kind("FILE", read_entry, "An image file, sample:NAME, or an entry that texrs analyse wrote (.npz).", file=True)
+ENTRY = Kind(
+    "FILE|FOLDER",
+    read_entry,
+    "An image file, a folder of the maps of a material, sample:NAME, or an entry that texrs analyse wrote (.npz).",
+    file=True,
+)
 LAYOUT = Kind(
     "FILE|JSON",
     read_layout,
@@ -397,7 +419,7 @@ LAYOUT = Kind(
 ENTRIES = replace(
     ENTRY,
     read=lambda texts, about: [read_entry(text, about) for text in texts],
-    note="Files, sample:NAME, or entries that texrs analyse wrote (.npz).",
+    note="Files, folders of the maps of a material, sample:NAME, or entries that texrs analyse wrote (.npz).",
     many=True,
 )
 MASK = Kind("FILE", lambda path, about: read_mask(path, about.axes), "What is not black is marked.", file=True)

@@ -42,6 +42,7 @@ OUTPUTS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "map": (("--map",), "OUT.npz", "File for the source map, for texrs apply."),
     "stages": (("--stages",), "DIR", "Folder for pictures of the stages and report.json."),
     "sheet": (("--sheet",), "OUT.png", "Contact sheet of all results."),
+    "preview": (("--preview",), "OUT.png", "Picture of a material under a light, tiled 2 x 2."),
     "page": (("--page",), "OUT.html", "Page that shows what was found, to be corrected by clicking."),
 }
 """All options that say what is written: what the shell calls them, what they are, and what they are for."""
@@ -110,9 +111,14 @@ class Command(TyperCommand):
         force = ctx.params.get("force", False)
         given = ctx.params.items()
         inputs = [text for name, value in given if name not in outputs for text in find_texts(value)]
-        check_apart(inputs, {name: value for name, value in given if name in outputs})
+        check_apart(list_files(inputs), {name: value for name, value in given if name in outputs})
         with _provenance.record(_provenance.make_record(self, ctx.params, force=force) if outputs else None):
             return super().invoke(ctx)
+
+
+def list_files(texts: Iterable[str]) -> list[str]:
+    """Return what names may stand for: of folders the files in them."""
+    return [file for text in texts for file in (_provenance.list_folder(text) or [text])]
 
 
 def find_texts(value: object) -> list[str]:
@@ -134,6 +140,8 @@ def check_outputs(paths: Mapping[str, str | None]) -> None:
     if (source := paths.get("map")) is not None:
         check_suffix("map", source)
         check_output(source, option="map")
+    if (shown := paths.get("preview")) is not None:
+        check_output(shown, np.zeros((1, 1, 3), np.uint8), option="preview")
     if (stages := paths.get("stages")) is not None:
         check_stages(stages)
 
@@ -293,12 +301,19 @@ def deliver(
     # The result takes its name last, when all else is written.
     with write_output(out, option, inside=option != "out", like=known, made=made) as temporary:
         (io.write if axes == 2 else io.write_volume)(temporary, result.image)
-        if (source := paths.get("map")) is not None:
-            with write_output(source, "map", suffix=suffix, made=made) as place:
-                result.source.save(place)
-        if (stages := paths.get("stages")) is not None:
-            with write_folder(stages, "stages", suffix=suffix, made=made) as folder:
-                result.save_stages(folder)
+        deliver_beside(result, paths, suffix, made)
+
+
+def deliver_beside(
+    result: Synthesis, paths: Mapping[str, str | None], suffix: str, made: _provenance.Record | None
+) -> None:
+    """Write what was asked for beside a result: its map, and pictures of its stages."""
+    if (source := paths.get("map")) is not None:
+        with write_output(source, "map", suffix=suffix, made=made) as place:
+            result.source.save(place)
+    if (stages := paths.get("stages")) is not None:
+        with write_folder(stages, "stages", suffix=suffix, made=made) as folder:
+            result.save_stages(folder)
 
 
 def name_variants(seed: int, paths: Mapping[str, str | None]) -> dict[str, str | None]:

@@ -24,7 +24,7 @@ from texrs._version import __version__
 from texrs.errors import InvalidInput
 from texrs.io._annotation import BLANK, hash_file, is_unchanged, name_sidecar, needs_sidecar
 
-LEFT = ("count", "quiet", "force", "each", "out", "map", "stages", "page", "sheet")
+LEFT = ("count", "quiet", "force", "each", "out", "map", "stages", "preview", "page", "sheet")
 """Parameters of commands that change nothing in a result, or name one."""
 CHANGED = "changed while it was read"
 """In place of the SHA-256 of such a file."""
@@ -46,6 +46,8 @@ class Record:
     """Where that lies, and the folder: names may be seen from another folder later."""
     folder: str | None = None
     """What is read may lie in it: a database."""
+    stacks: tuple[str, ...] = ()
+    """Folders of maps, of which all files are read."""
     force: bool = False
     """Whether any file may be replaced."""
     original: Mapping[str, str] = field(default_factory=dict)
@@ -69,7 +71,7 @@ class Record:
         """Return the name of a file as it is seen from a folder; any other text as it is."""
         if isinstance(text, list):
             return [self.rename(t, folder) for t in text]
-        if not isinstance(text, str) or not (text in self.files or text == self.folder):
+        if not isinstance(text, str) or not (text in self.files or text == self.folder or text in self.stacks):
             return text
         if text in self.original:
             return self.original[text]
@@ -103,7 +105,8 @@ class Record:
     def _find_used(self) -> set[str]:
         """Return the names that this record speaks of; of a folder all that is known to be read in it."""
         texts = [*self.arguments, *(t for v in self.options.values() for t in (v if isinstance(v, list) else [v]))]
-        inside = {n for n in self.files if self.folder is not None and Path(n).parent == Path(self.folder)}
+        folders = {Path(f) for f in (self.folder, *(s for s in self.stacks if s in texts)) if f is not None}
+        inside = {n for n in self.files if Path(n).parent in folders}
         return {t for t in texts if isinstance(t, str)} | inside
 
 
@@ -120,6 +123,13 @@ def read_status(path: str) -> os.stat_result | None:
         if stat.S_ISREG(status.st_mode):
             return status
     return None
+
+
+def list_folder(name: str) -> list[str]:
+    """Return the files in a folder; none where it is not one."""
+    if not name or "\0" in name or not os.path.isdir(name):
+        return []
+    return sorted(os.path.join(name, entry.name) for entry in os.scandir(name) if entry.is_file())
 
 
 def make_record(command: Any, given: Mapping[str, Any], *, force: bool) -> Record:
@@ -144,10 +154,12 @@ def make_record(command: Any, given: Mapping[str, Any], *, force: bool) -> Recor
                 # A word, as the x of --wrap, is no file even if there is one of that name.
                 names += texts if re.search("FILE|csv", p.metavar or "") else []
     files = {name: status for name in names if (status := read_status(name)) is not None}
+    stacks = tuple(dict.fromkeys(name for name in names if list_folder(name))) if command.name != "database" else ()
+    files |= {f: status for name in stacks for f in list_folder(name) if (status := read_status(f)) is not None}
     folder = arguments[0] if command.name == "database" else given.get("folder")
     seed = given.get("seed")
-    places = {name: os.path.realpath(name) for name in (*files, *([folder] if folder is not None else []))}
-    return Record(command.name, arguments, options, seed, files, places, folder, force, ORIGINAL.get() or {})
+    places = {name: os.path.realpath(name) for name in (*files, *stacks, *([folder] if folder is not None else []))}
+    return Record(command.name, arguments, options, seed, files, places, folder, stacks, force, ORIGINAL.get() or {})
 
 
 @contextmanager

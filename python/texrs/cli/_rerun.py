@@ -19,8 +19,10 @@ from texrs._version import __version__
 from texrs.cli._console import hush, note, say
 from texrs.cli._outputs import Quiet, Threads, describe, make_argument, show_sides, to_write
 from texrs.cli._provenance import CHANGED, ORIGINAL, RUNNING
+from texrs.cli._stacks import is_stack
 from texrs.errors import FileError, InvalidInput
 from texrs.io._annotation import hash_file, is_unchanged, name_sidecar, needs_sidecar
+from texrs.materials import Map, Material
 from texrs.source_map import SourceMap
 
 SHORT = 16
@@ -113,6 +115,11 @@ class Recipe:
                 wrong.append(f"{name} is missing (SHA-256 {sha[:SHORT]}...)")
         if wrong:
             raise InvalidInput(f"{self.path}: cannot be made again: {'; '.join(wrong)}")
+        for text in (*self.arguments, *(t for v in self.options.values() for t in (v if isinstance(v, list) else [v]))):
+            # Of a folder of maps all files are known.
+            inside = [found[name] for name in self.inputs if isinstance(text, str) and os.path.dirname(name) == text]
+            if inside and text not in found:
+                found[str(text)] = os.path.dirname(inside[0])
         if self.verb == "database" and self.arguments[0] is not None:
             first = self.arguments[0]
             found[first] = os.path.normpath(os.path.join(folder, first))
@@ -223,6 +230,11 @@ def describe_file(file: str, recipe: Recipe | None) -> list[str]:
                 return read(file)
             except FileError:
                 continue
+    if is_stack(file):
+        shown = Material.read(file)
+        return [
+            f"material: {' x '.join(map(str, shown.shape))}, layers {', '.join(map(describe_layer, shown.items()))}"
+        ]
     volume = recipe is not None and recipe.verb == "solid" and recipe.output == "--out"
     try:
         image, axes = (io.read_volume(file), 3) if volume else (io.read(file), 2)
@@ -233,6 +245,12 @@ def describe_file(file: str, recipe: Recipe | None) -> list[str]:
             raise error from None
     what = "scale map" if recipe is not None and recipe.verb == "scale-map" else ("image", "volume")[axes - 2]
     return [f"{what}: {describe(image, axes)}, {image.min()} to {image.max()}"]
+
+
+def describe_layer(each: tuple[str, Map]) -> str:
+    """Return the name of a map, and what it is."""
+    name, one = each
+    return f"{name} ({one.role.value}, {one.pixels.dtype})"
 
 
 def describe_map(file: str) -> list[str]:

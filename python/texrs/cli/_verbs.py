@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping
@@ -24,13 +25,13 @@ from texrs.cli._kinds import (
     EACH,
     ENTRIES,
     ENTRY,
+    EXAMPLE,
     GROUNDS,
     HOLE,
     LAYOUT,
     MAP_OR_AUTO,
     MASK,
     NUMBERS,
-    PICTURE,
     PLANE,
     SEEN,
     SOURCE,
@@ -43,7 +44,9 @@ from texrs.cli._kinds import (
 from texrs.cli._options import Options, as_command, make_parameter
 from texrs.cli._outputs import Quiet, Threads, describe, name_arguments, to_write
 from texrs.cli._provenance import check_free
+from texrs.cli._stacks import Depth, Format, Roles, Stack
 from texrs.errors import InvalidInput
+from texrs.materials import Material
 from texrs.synthesis import Synthesis
 
 VARIANTS = typer.Option(
@@ -78,12 +81,16 @@ class Verb:
             parameters.append(make_parameter("variants", Annotated[int | None, VARIANTS], None))
         for name in ("map", "stages"):
             parameters.append(make_parameter(name, Annotated[str | None, to_write(name)], None))
+        for name, annotation in (("role", Roles), ("depth", Depth), ("format", Format)):
+            parameters.append(make_parameter(name, annotation, None))
+        parameters.append(make_parameter("preview", Annotated[str | None, to_write("preview")], None))
         parameters += [make_parameter("count", Threads, None), make_parameter("quiet", Quiet, False)]
         return as_command(self.run, parameters)
 
     def run(self, *, count: int | None, quiet: bool, variants: int | None = None, **given: Any) -> None:
         """Do the command: what can be checked is checked before any file is read, and before the work."""
         start, options = time.monotonic(), self.options
+        stack = Stack.check(given.pop("role", None), given.pop("depth", None), given.pop("format", None))
         paths: dict[str, str | None] = {name: given.pop(name, None) for name in _outputs.OUTPUTS}
         out = paths["out"] or ""
         values = options.read(given, which=lambda o: not o.file)
@@ -92,15 +99,24 @@ class Verb:
             first, texts = given["seed"], [text for value in given.values() for text in _outputs.find_texts(value)]
             places = [_outputs.name_variants(first + k, paths) for k in range(as_int(variants, "--variants", 1, 4096))]
             for each in places:
-                _outputs.check_apart(texts, each)
+                _outputs.check_apart(_outputs.list_files(texts), each)
                 check_free(each["out"] or "")
         for each in places:
             _outputs.check_outputs(each)
-        values |= options.read(given, which=lambda o: o.file and (o.argument or o.name == self.shape))
+        about = About(axes=options.axes, roles=stack.roles)
+        values |= options.read(given, about, which=lambda o: o.file and (o.argument or o.name == self.shape))
         example, like = self.find_example(values), self.read_colours(given)
         size = self.find_size(values, example)
-        _outputs.check_output(out, example, size)
-        about = About(axes=options.axes, size=size, like=example)
+        material = self.find_material(values)
+        if material is None:
+            stack.refuse(paths)
+            _outputs.check_output(out, example, size)
+        else:
+            read = _outputs.list_files([text for value in given.values() for text in _outputs.find_texts(value)])
+            for each in places:
+                stack.check_outputs(material, each, read)
+        deliver = _outputs.deliver if material is None else stack.deliver
+        about = replace(about, size=size, like=example)
         small, made = [], None
         with (
             name_arguments(**options.name_values(given), count="--threads"),
@@ -115,37 +131,43 @@ class Verb:
                 call["size"] = size
             if variants is None or self.several is None:
                 made = options.function(**call, progress=progress)
-                _outputs.deliver(made, paths, like=like)
+                deliver(made, paths, like=like)
             else:
                 several = self.several(count=variants, **call, progress=progress)
                 for seed, each, made in zip(itertools.count(given["seed"]), places, several, strict=False):
                     alone = {"--variants": None, "--seed": str(seed) if seed else None}
-                    _outputs.deliver(made, each, like=like, made=_provenance.narrow(options=alone, seed=seed))
+                    deliver(made, each, like=like, made=_provenance.narrow(options=alone, seed=seed))
                     keep(each["out"] or "")
                     small.append(_outputs.shrink(made.image))
         for warning in said:
             if issubclass(warning.category, UserWarning):
                 note(str(warning.message), quiet=quiet)
-        if small:
+        if small and material is None:
             with _outputs.write_output(out, like=like) as temporary:
                 io.write(temporary, _outputs.make_contact_sheet(small))
         assert made is not None
-        many = f"{len(small)} textures and their contact sheet, each " if small else ""
+        sheet = " and their contact sheet" if material is None else ""
+        many = f"{len(small)} textures{sheet}, each " if small else ""
         what = f"{many}{describe(np.asarray(made.image), options.axes)}{self.says(made)}"
         note(f"wrote {out}: {what}, in {time.monotonic() - start:.1f} s", quiet=quiet)
+
+    def find_material(self, values: Mapping[tuple[str, ...], Any]) -> Material | None:
+        """Return the material that is read, if there is one."""
+        every = (each for value in values.values() for each in (value if isinstance(value, list) else [value]))
+        return next((each for each in every if isinstance(each, Material)), None)
 
     def find_example(self, values: Mapping[tuple[str, ...], Any]) -> Array:
         """Return the pixels of the first input."""
         first = values[next(o.path for o in self.options if o.argument)]
         first = first[0] if isinstance(first, list) else first
-        # Analysed elements hold theirs.
-        return np.asarray(getattr(first, "image", first))
+        # Analysed elements hold theirs, and materials have one that shows them.
+        return np.asarray(first.base if isinstance(first, Material) else getattr(first, "image", first))
 
     def read_colours(self, given: Mapping[str, Any]) -> io.Notes:
         """Return what the first input says of its colours, which are those of the result, and of its pixels."""
         first = given[next(o.name for o in self.options if o.argument)]
         name = first[0] if isinstance(first, list) else first
-        notes = io.Notes() if name.startswith(_outputs.SAMPLE) else io.read_notes(name)
+        notes = io.read_notes(name) if os.path.isfile(name) else io.Notes()
         return replace(notes, made=None, density=notes.density if self.scaled else None)
 
     def find_size(self, values: Mapping[tuple[str, ...], Any], example: Array) -> tuple[int, ...]:
@@ -195,7 +217,7 @@ def make_verb(name: str) -> Verb:
 
             options = Options(
                 perspective,
-                arguments={"exemplar": PICTURE},
+                arguments={"exemplar": EXAMPLE},
                 kinds={"scale_map": SEEN, "target": TARGET, "direction": DIRECTION},
                 names={"kind": "scale-kind"},
             )
@@ -219,7 +241,7 @@ def make_verb(name: str) -> Verb:
         case "synthesize":
             from texrs.papers.solid import synthesize
 
-            return _grow(synthesize, PICTURE, 2)
+            return _grow(synthesize, EXAMPLE, 2)
         case "splice":
             from texrs.papers.splice import splice
 
@@ -231,7 +253,7 @@ def make_verb(name: str) -> Verb:
         case _:
             from texrs.tiling import tile
 
-            return Verb(Options(tile, arguments={"image": PICTURE}))
+            return Verb(Options(tile, arguments={"image": EXAMPLE}))
 
 
 def count_moved(result: Synthesis) -> str:
@@ -294,7 +316,7 @@ def _see(verb: Callable[..., Synthesis], **more: Kind) -> Verb:
     kinds = {"ground": GROUNDS, "corners": CORNERS, "slant": EACH, "tilt": EACH, "fov": EACH}
     options = Options(
         verb,
-        arguments={"image": PICTURE, **more},
+        arguments={"image": EXAMPLE, **more},
         kinds={f"view.{name}": kind for name, kind in kinds.items()},
         leave=left,
         makers={"view": make_views},

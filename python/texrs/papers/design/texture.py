@@ -167,7 +167,7 @@ def say_finish(composite: SourceMap, arguments: Arguments) -> SourceMap:
     if not arguments.screening:
         return composite.finished(wrap)
     if literal:
-        return composite.finished((False, False), screening=0.0)
+        return composite.finished((False, False), screening=0.0, outlines=False)
     return composite.finished(wrap, screening=arguments.screening, across=False)
 
 

@@ -1,0 +1,148 @@
+"""Materials on the command line: folders of maps, or layers of an EXR file, that are read and written as a whole."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from texrs import io
+from texrs.cli import _outputs, _provenance
+from texrs.cli._provenance import check_free
+from texrs.errors import FileError, InvalidInput
+from texrs.materials import Material
+from texrs.materials._files import choose_suffix, convert
+from texrs.synthesis import Synthesis
+
+PANEL = "Materials"
+DEPTHS = (8, 16, 32)
+LAYERED = ".exr"
+
+Roles = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--role",
+        metavar="MAP=ROLE",
+        help="What a map is for whose name does not say it; the option may be repeated.",
+        show_default=False,
+        rich_help_panel=PANEL,
+    ),
+]
+Depth = Annotated[
+    int | None,
+    typer.Option(
+        "--depth",
+        metavar="8|16|32",
+        help="Bits of each map of a material: integers of 8 or 16, floats of 32.",
+        show_default="as each map has",
+        rich_help_panel=PANEL,
+    ),
+]
+Format = Annotated[
+    str | None,
+    typer.Option(
+        "--format",
+        metavar="png|tif|exr",
+        help="Of the maps of a material.",
+        show_default="png, or what holds the map",
+        rich_help_panel=PANEL,
+    ),
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Stack:
+    """How materials are read and written."""
+
+    roles: Mapping[str, str]
+    depth: int | None
+    suffix: str | None
+
+    @classmethod
+    def check(cls, roles: Sequence[str] | None, depth: int | None, suffix: str | None) -> Stack:
+        """Check the options."""
+        said = {}
+        for text in roles or ():
+            name, equals, role = text.partition("=")
+            if not (name and equals and role):
+                raise InvalidInput(f"--role: needs MAP=ROLE, as in rock.png=height; got {text!r}")
+            said[name] = role
+        if depth not in (None, *DEPTHS):
+            raise InvalidInput(f"--depth: allowed are 8, 16 and 32, got {depth}")
+        if suffix not in (None, "png", "tif", "exr"):
+            raise InvalidInput(f"--format: allowed are png, tif and exr, got {suffix!r}")
+        return cls(said, depth, None if suffix is None else f".{suffix}")
+
+    def refuse(self, paths: Mapping[str, str | None]) -> None:
+        """Refuse what only a material can have."""
+        given = {
+            "--role": self.roles,
+            "--depth": self.depth,
+            "--format": self.suffix,
+            "--preview": paths.get("preview"),
+        }
+        for flag, value in given.items():
+            if value:
+                raise InvalidInput(f"{flag}: is for materials, which are folders of maps or EXR files of layers")
+
+    def check_outputs(self, material: Material, paths: Mapping[str, str | None], read: Sequence[str]) -> None:
+        """Check before the work that all can be written, over nothing that is read or somebody else's."""
+        out = paths["out"] or ""
+        if Path(out).suffix.lower() == LAYERED:
+            if self.suffix or self.depth:
+                raise InvalidInput(
+                    "--out: a file of layers keeps each map as it is; give a folder for --depth and --format"
+                )
+            _outputs.check_output(out)
+            return
+        _outputs.check_folder(out)
+        there = Path(out)
+        while not there.exists():
+            there = there.parent
+        for name, each in material.items():
+            file = f"{name}{self.suffix or choose_suffix(each, self.depth)}"
+            _outputs.check_apart(read, {"out": os.path.join(out, file)})
+            check_free(os.path.join(out, file))
+            # Tried beside what is there, in the folder or where it will be made.
+            _outputs.check_output(str(there / f".texrs-{file}"), convert(each.pixels, self.depth), material.shape)
+
+    def deliver(
+        self,
+        result: Synthesis,
+        paths: Mapping[str, str | None],
+        *,
+        like: io.Notes | None = None,
+        made: _provenance.Record | None = None,
+        option: str = "out",
+    ) -> None:
+        """Write the maps, and what was asked for beside them."""
+        material, out = result.material, paths["out"] or ""
+        assert material is not None
+        _outputs.deliver_beside(result, paths, Path(out).suffix, made)
+        if Path(out).suffix.lower() == LAYERED:
+            with _outputs.write_output(out, option, inside=option != "out", made=made) as place:
+                material.save_exr(place)
+        else:
+            with _outputs.write_folder(out, option, made=made) as folder:
+                depth: Any = self.depth
+                material.save(folder, depth=depth, suffix=self.suffix)
+        if (shown := paths.get("preview")) is not None:
+            with _outputs.write_output(shown, "preview", made=made) as place:
+                io.write(place, material.preview())
+
+
+def is_stack(text: str) -> bool:
+    """Return whether a name is that of a folder, or of an EXR file whose channels are not those of one picture."""
+    if os.path.isdir(text):
+        return True
+    if Path(text).suffix.lower() != LAYERED:
+        return False
+    with suppress(FileError):
+        io.read(text)
+        return False
+    return os.path.isfile(text)
