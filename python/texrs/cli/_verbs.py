@@ -104,7 +104,9 @@ class Verb:
         for each in places:
             _outputs.check_outputs(each)
         about = About(axes=options.axes, roles=stack.roles)
-        values |= options.read(given, about, which=lambda o: o.file and (o.argument or o.name == self.shape))
+        with warnings.catch_warnings(record=True) as early:
+            warnings.simplefilter("always")
+            values |= options.read(given, about, which=lambda o: o.file and (o.argument or o.name == self.shape))
         example, like = self.find_example(values), self.read_colours(given)
         size = self.find_size(values, example)
         material = self.find_material(values)
@@ -139,7 +141,7 @@ class Verb:
                     deliver(made, each, like=like, made=_provenance.narrow(options=alone, seed=seed))
                     keep(each["out"] or "")
                     small.append(_outputs.shrink(made.image))
-        for warning in said:
+        for warning in (*early, *said):
             if issubclass(warning.category, UserWarning):
                 note(str(warning.message), quiet=quiet)
         if small and material is None:

@@ -1,0 +1,118 @@
+"""Materials on the command line: folders of maps in, folders of maps out, nothing lost."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import texrs
+from texrs import Material, io, samples
+from texrs.cli import main
+
+SIZE = ["--size", "64x64", "-q"]
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in a folder with a material of two maps and one that names do not tell."""
+    monkeypatch.chdir(tmp_path)
+    image = samples.pebbles((48, 64)).image
+    Path("rock").mkdir()
+    io.write("rock/rock_albedo.png", image)
+    io.write("rock/rock_height.png", image[..., 1].astype(np.uint16) * 257)
+    io.write("rock/rock_wet.png", image[..., 2])
+    return tmp_path
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def test_a_folder_is_designed_in_one_go(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["design", "rock", "-o", "new", *SIZE, "--seed", "3", "--preview", "lit.png", "--map", "map.npz"]
+    assert main([*words, "--role", "rock_wet.png=other"]) == 0
+    assert sorted(p.name for p in Path("new").iterdir()) == ["albedo.png", "height.png", "wet.png"]
+    material = Material.read("rock", roles={"rock_wet": "other"})
+    made = texrs.design(material, 64, seed=3).material
+    assert made is not None
+    for name, each in made.items():
+        assert (io.read(f"new/{name}.png") == each.pixels).all()
+    assert (io.read("lit.png") == made.preview()).all()
+    # What was made of one map is what apply makes of it, without options.
+    assert main(["apply", "map.npz", "rock/rock_height.png", "-o", "again.png", "-q"]) == 0
+    assert (io.read("again.png") == made["height"].pixels).all()
+    assert main(["rerun", "new/height.png", "-q"]) == 0
+    assert "the same bytes" in capsys.readouterr().out
+    assert main(["info", "new/albedo.png"]) == 0
+    said = capsys.readouterr().out
+    assert "rock/rock_wet.png" in said
+    assert "--role rock_wet.png=other" in said
+
+
+def test_what_names_do_not_tell_is_left_out_and_said(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["tile", "rock", "-o", "new"]) == 0
+    assert "left out rock_wet.png" in capsys.readouterr().err
+    assert sorted(p.name for p in Path("new").iterdir()) == ["albedo.png", "height.png"]
+
+
+def test_depth_and_format(here: Path) -> None:
+    assert main(["design", "rock", "-o", "new/deep", *SIZE, "--depth", "16", "--format", "tif"]) == 0
+    assert io.read("new/deep/albedo.tif").dtype == np.uint16
+    assert main(["design", "rock", "-o", "float", *SIZE, "--depth", "32"]) == 0
+    assert io.read("float/height.exr").dtype == np.float32
+
+
+def test_layers_of_a_file(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("OpenEXR", reason="layers of EXR files need the package")
+    assert main(["design", "rock", "-o", "new.exr", *SIZE]) == 0
+    assert main(["tile", "new.exr", "-o", "tiled", "-q"]) == 0
+    assert io.read("tiled/height.png").dtype == np.uint16
+    capsys.readouterr()
+    assert main(["info", "new.exr"]) == 0
+    assert "material: 64 x 64, layers albedo (colour, uint8), height (height, uint16)" in capsys.readouterr().out
+    assert main(["rerun", "new.exr", "-q"]) == 0
+    assert "the same bytes" in capsys.readouterr().out
+
+
+def test_variants_go_to_folders_of_their_own(here: Path) -> None:
+    assert main(["design", "rock", "-o", "new", *SIZE, "--variants", "2"]) == 0
+    assert sorted(files(here / "new-0")) == sorted(files(here / "new-1")) == ["albedo.png", "height.png"]
+    assert files(here / "new-0") != files(here / "new-1")
+    assert not Path("new").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("design rock -o rock --depth 12", "--depth: allowed are 8, 16 and 32, got 12"),
+        ("design rock -o new --format jpg", "--format: allowed are png, tif and exr, got 'jpg'"),
+        ("design rock -o new --role wet", "--role: needs MAP=ROLE"),
+        ("design rock -o new --role rock_wet=shiny", "allowed roles are"),
+        ("design rock -o new --role dry=mask", "there is no picture 'dry'"),
+        ("design rock -o new.exr --depth 16", "--out: a file of layers keeps each map as it is"),
+        ("design rock/rock_albedo.png -o new.png --depth 16", "--depth: is for materials"),
+        ("design rock/rock_albedo.png -o new.png --preview lit.png", "--preview: is for materials"),
+        ("design rock rock/rock_albedo.png -o new", "either all are materials or none is"),
+        ("design rock -o mine", "mine/albedo.png is there already"),
+        ("design same -o same", "same/albedo.png is read, and would be lost"),
+        ("design rock -o links", "is read as rock/rock_albedo.png, and would be lost"),
+        ("design rock -o new --preview rock/rock_wet.png", "--preview: rock/rock_wet.png is read"),
+        ("design empty -o new", "empty: no picture has a name that says what it is for"),
+    ],
+)
+def test_nothing_is_lost_and_nothing_half_written(
+    words: str, says: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("mine").mkdir()
+    Path("mine/albedo.png").write_bytes(b"somebody's")
+    Path("same").mkdir()
+    io.write("same/albedo.png", np.zeros((32, 32, 3), np.uint8))
+    Path("links").mkdir()
+    os.symlink("../rock/rock_albedo.png", "links/albedo.png")
+    Path("empty").mkdir()
+    before = files(here)
+    assert main([*words.split(), "-q"]) == 2
+    assert says in capsys.readouterr().err
+    assert files(here) == before
+    assert not Path("new").exists()
