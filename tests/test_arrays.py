@@ -89,7 +89,7 @@ VERBS = {
     "auto_mask": (DISCS, lambda image: texrs.scale_maps.auto_mask(image)),
     "mean_shift": (PEBBLES, lambda image: mean_shift(image, 2, 0.1)),
     "solve": (PEBBLES, lambda image: solve(image, np.zeros((64, 64, 3)), np.zeros((64, 64, 3)))),
-    "compare": (PEBBLES, lambda image: repr(texrs.volume.compare(image, image, axes=2))),
+    "compare": (PEBBLES, lambda image: texrs.volume.compare(image, image, axes=2).autocorrelation),
     "gather": (PEBBLES, lambda image: gather(image, [[1.5, 2.5]])),
 }
 SLOW = ("splice", "analyse", "find")

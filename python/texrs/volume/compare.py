@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_image, as_int
+from texrs._arrays import as_image, as_int, as_ndarray
 from texrs._show import brief
 from texrs._typing import Array
 from texrs.errors import InvalidInput
@@ -183,7 +183,8 @@ def compare(
     ((4,), '... exemplar  output  output/exemplar')
 
     """
-    first, second = np.asarray(exemplar), np.asarray(output)
+    known = 3 if axes is None else as_int(axes, "axes", 2, 3)
+    first, second = as_ndarray(exemplar, "exemplar", axes=known), as_ndarray(output, "output", axes=known)
     count = as_int(guess_axes(first) if axes is None else axes, "axes", 2, 3)
     first, second = (as_image(a, n, minimum=16, axes=count) for a, n in ((first, "exemplar"), (second, "output")))
     if (first.dtype, first.shape[-1]) != (second.dtype, second.shape[-1]):
