@@ -255,6 +255,49 @@ class Material(Exports):
         changed = {name: replace(each, pixels=maps[name]) if name in maps else each for name, each in self.items()}
         return Material(changed, weights=self._weights, axes=self._axes)
 
+    def flatten(
+        self, amount: float = 1.0, *, wrap: bool | tuple[bool, bool] = False, size: float | None = None
+    ) -> Material:
+        """Return the material with its colours in even light; other maps stay.
+
+        Parameters
+        ----------
+        amount : float
+            How much of the unevenness is taken out, 0 to 1.
+        wrap : bool or (bool, bool)
+            Along which axes the maps are cyclic, so that they stay so.
+        size : float, optional
+            Pixels: what is larger is evened (see `texrs.materials.flatten`).
+
+        Returns
+        -------
+        Material
+
+        Raises
+        ------
+        InvalidInput
+            A volume, or another amount or size.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import texrs
+        >>> ramp = np.tile(np.linspace(100, 180, 64).astype(np.uint8), (48, 1))
+        >>> lawn = texrs.Material({"albedo": ramp, "height": ramp}).flatten()
+        >>> int(np.ptp(lawn["albedo"].pixels)) <= 2, int(np.ptp(lawn["height"].pixels))
+        (True, 80)
+
+        """
+        from texrs.materials._flatten import flatten
+
+        self._check_flat()
+        even = {
+            name: flatten(each.pixels, amount, wrap=wrap, size=size, space=each.space)
+            for name, each in self.items()
+            if each.role is Role.COLOUR
+        }
+        return self.replace(**even)
+
     # --- what is decided on, and what is made --------------------------------------------------------------------------
 
     @property

@@ -1,0 +1,209 @@
+"""Uneven light taken out of colours: how bright they are over large parts of a picture, while all that is smaller stays."""
+
+from __future__ import annotations
+
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_image, exp_single, log_single
+from texrs._checks import as_choice, as_float, as_wrap
+from texrs._typing import Array, Floats
+from texrs.errors import InvalidInput
+from texrs.materials._light import decode_srgb, encode_srgb, shrink, to_light, to_pixels
+from texrs.materials._map import Space
+
+__all__ = ["flatten"]
+
+FINE, COARSE = 256, 96
+"""Samples along the longer side: of what things are told apart on, and of the light, which is smooth."""
+SHARE = 0.25
+"""Of the shorter side: what is larger is taken for light."""
+LEAST = 0.02
+"""Encoded brightness below which a place is too dark to say how it is lit."""
+STRONGEST = 1.4
+"""Logarithm of how much encoded values change at most: to a quarter, or four times."""
+TURNS = 3
+"""Of telling bright things from dark ones, and light from both."""
+UNSURE = 0.05
+"""Logarithm of brightness by which things that are alike differ."""
+BINS = 128
+STRIP = 1 << 20
+"""Pixels that are brought into even light at a time."""
+
+
+def flatten(
+    image: Array,
+    amount: float = 1.0,
+    *,
+    wrap: bool | tuple[bool, bool] = False,
+    size: float | None = None,
+    space: Space | None = None,
+) -> Array:
+    """Return a picture whose light is even: how bright it is over large parts is divided out; hues stay.
+
+    Bright things and dark ones, such as flowers and leaves, are told apart first, and light is what both vary by, after Wells
+    et al. 1996: a place is hardly in a better light because more flowers stand there. It is measured by local lines, for means
+    are off at borders.
+
+    Parameters
+    ----------
+    image : (H, W) or (H, W, C) array_like
+        Colours, in any dtype; the last of two or four channels is transparency, which stays.
+    amount : float
+        How much of the unevenness is taken out, 0 to 1.
+    wrap : bool or (bool, bool)
+        Along which axes the picture is cyclic, so that it stays so.
+    size : float, optional
+        Pixels, at least 4: what is larger is evened, elements are to be smaller. By default a quarter of the shorter side.
+    space : {"srgb", "linear"}, optional
+        How values encode light; by default integers are sRGB and floats linear.
+
+    Returns
+    -------
+    array
+        The same shape and dtype. Values of integers end at their largest.
+
+    Raises
+    ------
+    InvalidInput
+        Not a picture, or another amount, size or space.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs.materials import flatten
+    >>> ramp = np.tile(np.linspace(100, 180, 64).astype(np.uint8), (48, 1))
+    >>> even = flatten(ramp)
+    >>> int(np.ptp(ramp)), int(np.ptp(even)) <= 2
+    (80, True)
+
+    """
+    pixels = as_image(image, "image")
+    share = as_float(amount, "amount", 0, 1)
+    cyclic = as_wrap(wrap)
+    rows, columns, channels = pixels.shape
+    over = as_float(SHARE * min(rows, columns) if size is None else size, "size", 0 if size is None else 4, 1 << 30)
+    usual: Space = "srgb" if pixels.dtype.kind in "ui" else "linear"
+    if space is not None:
+        as_choice(space, "space", ("srgb", "linear"))
+    encoding = space or usual
+    if pixels.dtype == np.bool_:
+        raise InvalidInput("image: needs colours, got bool")
+    clear = channels in (2, 4)
+    colours = channels - clear
+    gains = measure(pixels, colours, encoding, over, (cyclic[0], cyclic[1])) * np.float32(share)
+    made = pixels.copy()
+    across = place(columns, gains.shape[1], cyclic[1])
+    for start in range(0, rows, max(1, STRIP // columns)):
+        part = slice(start, min(start + max(1, STRIP // columns), rows))
+        down = place(rows, gains.shape[0], cyclic[0])
+        gain = exp_single(mix(mix(gains, (down[0][part], down[1][part], down[2][part]), 0), across, 1))
+        values = encode_srgb(to_light(pixels[part][..., :colours], encoding)) * gain
+        shown = values if encoding == "srgb" else decode_srgb(values)
+        made[part, :, :colours] = to_pixels(shown, pixels.dtype)
+    result: Array = made.reshape(np.shape(image))
+    return result
+
+
+def measure(pixels: Array, colours: int, space: Space, over: float, wrap: tuple[bool, bool]) -> Floats:
+    """Return logarithms of how much brighter each part of a picture is to be, on a few samples."""
+    rows, columns = pixels.shape[:2]
+    step = max(1.0, max(rows, columns) / FINE)
+    shape = max(1, ceil(rows / step)), max(1, ceil(columns / step))
+    values = np.empty((rows, shape[1], 1), np.float32)
+    for start in range(0, rows, max(1, STRIP // columns)):
+        part = slice(start, min(start + max(1, STRIP // columns), rows))
+        seen = encode_srgb(to_light(pixels[part][..., :colours], space)).mean(axis=-1, keepdims=True)
+        if pixels.shape[-1] > colours:
+            # What is not there is as all the rest is.
+            there = to_light(pixels[part][..., -1:], "linear")
+            mean = (seen * there).sum(axis=(0, 1)) / np.maximum(there.sum(), np.float32(1e-6))
+            seen = seen * there + mean * (1 - there)
+        values[part] = np.swapaxes(shrink(np.swapaxes(seen, 0, 1), shape[1:]), 0, 1)
+    bright = log_single(np.maximum(shrink(values, shape), np.float32(LEAST))).astype(np.float64)
+    few = max(1, ceil(shape[0] * COARSE / max(shape))), max(1, ceil(shape[1] * COARSE / max(shape)))
+    few = min(few[0], shape[0]), min(few[1], shape[1])
+    lines, means = (
+        [smooth(few[k], over / 2 * few[k] / pixels.shape[k], wrap[k], straight) for k in (0, 1)]
+        for straight in (True, False)
+    )
+    back = [place(shape[k], few[k], wrap[k]) for k in (0, 1)]
+
+    def settle(what: NDArray[np.float64], by: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+        found: NDArray[np.float64] = np.einsum("kl,ilc->ikc", by[1], np.einsum("ij,jlc->ilc", by[0], shrink(what, few)))
+        return found
+
+    def spread(what: NDArray[np.float64]) -> NDArray[np.float64]:
+        return mix(mix(what, back[0], 0), back[1], 1).astype(np.float64)
+
+    low = settle(bright, lines)
+    for _ in range(TURNS):
+        even = bright - spread(low)
+        classes = divide(even[..., 0])
+        kinds = [even[classes == k] if (classes == k).any() else np.zeros(1) for k in (0, 1)]
+        left = bright - np.array([kind.mean() for kind in kinds])[classes][..., np.newaxis]
+        low = settle(left, lines)
+        # Twice (Tukey 1977), for once leaves a quarter of what is hardly larger than the size.
+        low += settle(left - spread(low), lines)
+        # What is alike everywhere else says most of the light.
+        sure = np.array([1 / (kind.var() + UNSURE**2) for kind in kinds])[classes][..., np.newaxis]
+        low += settle(sure * (left - spread(low)), means) / settle(sure, means)
+    low -= low.mean(axis=(0, 1))
+    return np.clip(-low, -STRONGEST, STRONGEST).astype(np.float32)
+
+
+def divide(values: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Return which values are of the brighter of two kinds that are told apart best (Otsu 1979)."""
+    low, high = float(values.min()), float(values.max())
+    if high - low < 1e-6:
+        return np.zeros(values.shape, np.intp)
+    bins = np.minimum(((values - low) * (BINS / (high - low))).astype(np.intp), BINS - 1)
+    counts = np.bincount(bins.ravel(), minlength=BINS).astype(np.float64)
+    below, sums = np.cumsum(counts)[:-1], np.cumsum(counts * np.arange(BINS))
+    above, total = counts.sum() - below, sums[-1]
+    between = np.square(sums[:-1] * above - (total - sums[:-1]) * below) / np.maximum(below * above, 1e-9)
+    return (bins > int(between.argmax())).astype(np.intp)
+
+
+def smooth(count: int, width: float, wrap: bool, straight: bool) -> NDArray[np.float64]:
+    """Return the matrix of means around each sample, weighted by a Gaussian of that width, or of straight lines fitted so."""
+    at = np.arange(count)
+    apart = (at - at[:, np.newaxis]).astype(np.float64)
+    if wrap:
+        apart = (apart + count / 2) % count - count / 2
+    # Rounded: of exponentials the last bits hang on the processor.
+    bell: Array = np.exp(-0.5 * np.square(apart / max(width, 0.25)))
+    weights: Array = np.round(bell, 9)
+    weights /= weights.sum(axis=1, keepdims=True)
+    if wrap or count < 3 or not straight:
+        return weights
+    first = (weights * apart).sum(axis=1, keepdims=True)
+    second = (weights * apart * apart).sum(axis=1, keepdims=True)
+    spread = second - first * first
+    lines: NDArray[np.float64] = weights * (second - first * apart) / np.maximum(spread, 1e-6)
+    fitted: NDArray[np.float64] = np.where(spread > 1e-6, lines, weights)
+    return fitted
+
+
+def place(count: int, samples: int, wrap: bool) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
+    """Return between which samples each pixel lies, and how far it is from the first."""
+    at = (np.arange(count) + 0.5) * (samples / count) - 0.5
+    if not wrap:
+        at = np.clip(at, 0, samples - 1)
+    first = np.floor(at).astype(np.intp)
+    share = (at - first).astype(np.float32)
+    if wrap:
+        return first % samples, (first + 1) % samples, share
+    return first, np.minimum(first + 1, samples - 1), share
+
+
+def mix(values: Array, between: tuple[Array, Array, Array], axis: int) -> Array:
+    """Return values between samples along an axis."""
+    first, second, share = between
+    sides = [1] * values.ndim
+    sides[axis] = len(share)
+    weight = share.reshape(sides)
+    mixed: Array = np.take(values, first, axis) * (1 - weight) + np.take(values, second, axis) * weight
+    return mixed

@@ -1,0 +1,117 @@
+"""Even light: what varies over large parts goes, what is smaller stays, and borders that meet still do."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import texrs
+from texrs import Material
+from texrs._typing import Array
+from texrs.errors import InvalidInput
+from texrs.materials import _flatten, flatten
+from texrs.materials._light import decode_srgb, encode_srgb
+
+ROWS, COLUMNS = 120, 160
+GRAIN = 100 + 25 * np.random.default_rng(4).random((ROWS, COLUMNS, 3))
+ROW, COLUMN = np.indices((ROWS, COLUMNS))
+RAMP = (0.7 + 0.6 * COLUMN / COLUMNS)[..., np.newaxis]
+BAND = (1 + 0.25 * np.sin(2 * np.pi * ROW / ROWS))[..., np.newaxis]
+
+
+def vary(image: Array, wrap: bool = False) -> float:
+    """Return by how much parts of a sixth of the sides differ, of the mean."""
+    blocks = image.astype(float).mean(axis=-1).reshape(6, ROWS // 6, 8, COLUMNS // 8).mean(axis=(1, 3))
+    return float(blocks.std() / blocks.mean())
+
+
+@pytest.mark.parametrize(("light", "wrap"), [(RAMP, False), (BAND, False), (BAND, True), (RAMP * BAND, False)])
+@pytest.mark.parametrize("dtype", ["uint8", "uint16", "float32", "float64"])
+def test_light_is_evened_and_the_rest_stays(light: Array, wrap: bool, dtype: str) -> None:
+    kind = np.dtype(dtype)
+    most = np.iinfo(kind).max / 255 if kind.kind == "u" else 1 / 255
+    lit = (GRAIN * light * most).astype(kind)
+    even = flatten(lit, wrap=wrap, space="srgb")
+    assert (even.dtype, even.shape) == (lit.dtype, lit.shape)
+    assert vary(lit) > 0.1
+    assert vary(even) < vary(lit) / 6
+    # Grain is as strong as it was, in even light.
+    assert 0.85 < even.std() / (GRAIN * most).std() < 1.2
+    half = vary(flatten(lit, 0.5, wrap=wrap, space="srgb"))
+    assert vary(even) + 0.02 < half < vary(lit) - 0.02
+    assert np.abs(flatten(lit, 0, wrap=wrap, space="srgb").astype(float) - lit).max() <= 0.01 * most
+
+
+def test_more_flowers_are_no_more_light() -> None:
+    """White spots stand closer on one side; all are as bright as before, and so is what lies between."""
+    picture = np.full((ROWS, COLUMNS, 3), (40, 70, 30), np.uint8)
+    for row in range(5, ROWS, 12):
+        for column in range(4, COLUMNS, 8 if row < ROWS // 2 else 32):
+            picture[row : row + 5, column : column + 4] = (230, 225, 220)
+    spots = picture[..., 0] > 100
+    even = flatten(picture).astype(float)
+    assert np.abs(even - picture).max() < 12
+    # In uneven light they become alike.
+    lit = (picture * (0.6 + 0.35 * COLUMN / COLUMNS)[..., np.newaxis]).astype(np.uint8)
+    better = flatten(lit).astype(float)
+    assert better[spots].std() / better[spots].mean() < 0.35 * lit[spots].std() / lit[spots].mean()
+
+
+def test_borders_that_meet_still_do() -> None:
+    lit = (GRAIN * (1 + 0.3 * np.sin(2 * np.pi * (ROW / ROWS + COLUMN / COLUMNS)))[..., np.newaxis]).astype(np.uint8)
+    even = flatten(lit, wrap=True)
+    for moved in ((30, 0), (0, 50), (60, 80)):
+        again = flatten(np.roll(lit, moved, (0, 1)), wrap=True)
+        assert np.abs(np.roll(even, moved, (0, 1)).astype(int) - again).max() <= 1
+    gain = even.mean(axis=-1) / lit.mean(axis=-1)
+    assert np.abs(gain[0] - gain[-1]).max() < 0.05
+
+
+def test_hues_and_transparency_stay() -> None:
+    lit = (np.array([1, 0.6, 0.3]) * GRAIN * RAMP).astype(np.uint8)
+    alpha = np.where(COLUMN > 80, 255, 20).astype(np.uint8)
+    even = flatten(np.dstack([lit, alpha]))
+    assert (even[..., 3] == alpha).all()
+    ratio = even[..., 0].astype(float) / even[..., 2] - lit[..., 0].astype(float) / lit[..., 2]
+    assert np.abs(ratio).max() < 0.25
+    assert flatten(np.full((9, 7), 80, np.uint8)).tolist() == np.full((9, 7), 80).tolist()
+    assert flatten(np.zeros((1, 1, 3), np.float32)).tolist() == [[[0, 0, 0]]]
+
+
+def test_linear_light_is_the_same_picture() -> None:
+    lit = np.clip(GRAIN * RAMP / 255, 0, 1).astype(np.float32)
+    encoded = flatten(lit, space="srgb")
+    np.testing.assert_allclose(encode_srgb(flatten(decode_srgb(lit))), encoded, atol=1e-4)
+
+
+def test_strips_are_not_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    lit = (GRAIN * RAMP).astype(np.uint8)
+    whole = flatten(lit)
+    monkeypatch.setattr(_flatten, "STRIP", 7 * COLUMNS)
+    assert (flatten(lit) == whole).all()
+
+
+def test_materials_are_flattened_by_their_roles() -> None:
+    lit = (GRAIN * RAMP).astype(np.uint8)
+    stones = Material({"albedo": lit, "height": lit[..., 0], "emission": lit})
+    even = stones.flatten()
+    assert (even["albedo"].pixels == flatten(lit)).all()
+    assert even["height"].pixels is stones["height"].pixels or (even["height"].pixels == lit[..., 0]).all()
+    assert (even["emission"].pixels == lit).all()
+    assert texrs.materials.flatten is flatten
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"amount": 2}, "amount: needs a number from 0 to 1"),
+        ({"size": 1}, "size: needs a number from 4"),
+        ({"space": "lab"}, "allowed are srgb and linear"),
+        ({"wrap": 3}, "wrap"),
+    ],
+)
+def test_bad_options_are_refused(options: dict[str, Any], words: str) -> None:
+    with pytest.raises(InvalidInput, match=words):
+        flatten(GRAIN.astype(np.uint8), **options)
+    with pytest.raises(InvalidInput, match="needs colours, got bool"):
+        flatten(np.ones((8, 8), np.bool_))
