@@ -75,6 +75,20 @@ def test_layers_of_a_file(here: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert "the same bytes" in capsys.readouterr().out
 
 
+def test_what_engines_load(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    io.write("rock/rock_rough.png", samples.pebbles((48, 64)).image[..., 0])
+    shown = ["--mipmaps", "small", "--gltf", "rock.glb", "--materialx", "mtlx", "--pack", "orm"]
+    assert main(["design", "rock", "-o", "new", *SIZE, *shown]) == 0
+    assert "orm.png" in {p.name for p in Path("new").iterdir()}
+    assert {"albedo.1.png", "albedo.6.png"} <= {p.name for p in Path("small").iterdir()}
+    assert io.read("small/albedo.1.png").shape == (32, 32, 3)
+    assert Path("rock.glb").read_bytes()[:4] == b"glTF"
+    assert "standard_surface" in Path("mtlx/material.mtlx").read_text()
+    for made in ("small/height.2.png", "rock.glb", "mtlx/material.mtlx"):
+        assert main(["rerun", made, "-q"]) == 0, made
+        assert "the same bytes" in capsys.readouterr().out
+
+
 def test_variants_go_to_folders_of_their_own(here: Path) -> None:
     assert main(["design", "rock", "-o", "new", *SIZE, "--variants", "2"]) == 0
     assert sorted(files(here / "new-0")) == sorted(files(here / "new-1")) == ["albedo.png", "height.png"]
@@ -87,6 +101,9 @@ def test_variants_go_to_folders_of_their_own(here: Path) -> None:
     [
         ("design rock -o rock --depth 12", "--depth: allowed are 8, 16 and 32, got 12"),
         ("design rock -o new --format jpg", "--format: allowed are png, tif and exr, got 'jpg'"),
+        ("design rock -o new --pack rgb", "--pack: allowed are orm and none, got 'rgb'"),
+        ("design rock -o new --gltf rock.gltf", "--gltf: needs a name that ends in .glb"),
+        ("design rock/rock_albedo.png -o new.png --mipmaps small", "--mipmaps: is for materials"),
         ("design rock -o new --role wet", "--role: needs MAP=ROLE"),
         ("design rock -o new --role rock_wet=shiny", "allowed roles are"),
         ("design rock -o new --role dry=mask", "there is no picture 'dry'"),

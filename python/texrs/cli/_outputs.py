@@ -43,6 +43,9 @@ OUTPUTS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "stages": (("--stages",), "DIR", "Folder for pictures of the stages and report.json."),
     "sheet": (("--sheet",), "OUT.png", "Contact sheet of all results."),
     "preview": (("--preview",), "OUT.png", "Picture of a material under a light, tiled 2 x 2."),
+    "mipmaps": (("--mipmaps",), "DIR", "Folder for the maps of a material in halves of their size."),
+    "gltf": (("--gltf",), "OUT.glb", "A material on a plane and on a sphere, as glTF 2.0 in one file."),
+    "materialx": (("--materialx",), "DIR", "Folder for a material as MaterialX: material.mtlx and its maps."),
     "page": (("--page",), "OUT.html", "Page that shows what was found, to be corrected by clicking."),
 }
 """All options that say what is written: what the shell calls them, what they are, and what they are for."""
@@ -142,14 +145,20 @@ def check_outputs(paths: Mapping[str, str | None]) -> None:
         check_output(source, option="map")
     if (shown := paths.get("preview")) is not None:
         check_output(shown, np.zeros((1, 1, 3), np.uint8), option="preview")
+    if (solid := paths.get("gltf")) is not None:
+        check_suffix("gltf", solid, ".glb")
+        check_output(solid, option="gltf")
+    for option in ("mipmaps", "materialx"):
+        if (folder := paths.get(option)) is not None:
+            check_folder(folder)
     if (stages := paths.get("stages")) is not None:
         check_stages(stages)
 
 
-def check_suffix(option: str, path: str) -> None:
-    """Check that the name of a file of arrays says so."""
-    if Path(path).suffix.lower() != ".npz":
-        raise InvalidInput(f"--{option}: needs a name that ends in .npz, got {path!r}")
+def check_suffix(option: str, path: str, suffix: str = ".npz") -> None:
+    """Check that the name of a file says what it is: by default, of arrays."""
+    if Path(path).suffix.lower() != suffix:
+        raise InvalidInput(f"--{option}: needs a name that ends in {suffix}, got {path!r}")
 
 
 def check_folder(path: str) -> None:
@@ -265,6 +274,8 @@ def write_folder(path: str, option: str, *, suffix: str = "", made: _provenance.
             check_free(target, option)
             if running is not None:
                 io.annotate(file, io.Notes(made=running.tell(target, output=option, inside=True, suffix=suffix)))
+            if (beside := name_sidecar(file)).exists():
+                os.replace(beside, name_sidecar(Path(target)))
             os.replace(file, target)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)

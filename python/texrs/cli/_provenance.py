@@ -24,7 +24,21 @@ from texrs._version import __version__
 from texrs.errors import InvalidInput
 from texrs.io._annotation import BLANK, hash_file, is_unchanged, name_sidecar, needs_sidecar
 
-LEFT = ("count", "quiet", "force", "each", "out", "map", "stages", "preview", "page", "sheet")
+LEFT = (
+    "count",
+    "quiet",
+    "force",
+    "each",
+    "out",
+    "map",
+    "stages",
+    "preview",
+    "mipmaps",
+    "gltf",
+    "materialx",
+    "page",
+    "sheet",
+)
 """Parameters of commands that change nothing in a result, or name one."""
 CHANGED = "changed while it was read"
 """In place of the SHA-256 of such a file."""

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 import typer
@@ -15,13 +17,16 @@ from texrs import io
 from texrs.cli import _outputs, _provenance
 from texrs.cli._provenance import check_free
 from texrs.errors import FileError, InvalidInput
-from texrs.materials import Material
-from texrs.materials._files import choose_suffix, convert
+from texrs.materials import Map, Material
+from texrs.materials._files import SMALLER, choose_suffix, convert
+from texrs.materials._packing import pack_maps, unpack_maps
 from texrs.synthesis import Synthesis
 
 PANEL = "Materials"
 DEPTHS = (8, 16, 32)
 LAYERED = ".exr"
+SHOWN = ("preview", "mipmaps", "gltf", "materialx")
+"""Outputs that only materials have."""
 
 Roles = Annotated[
     list[str] | None,
@@ -53,6 +58,16 @@ Format = Annotated[
         rich_help_panel=PANEL,
     ),
 ]
+Pack = Annotated[
+    str | None,
+    typer.Option(
+        "--pack",
+        metavar="orm|none",
+        help="Occlusion, roughness and metallic as one map, or as maps of their own.",
+        show_default="as they came",
+        rich_help_panel=PANEL,
+    ),
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,9 +77,10 @@ class Stack:
     roles: Mapping[str, str]
     depth: int | None
     suffix: str | None
+    pack: str | None
 
     @classmethod
-    def check(cls, roles: Sequence[str] | None, depth: int | None, suffix: str | None) -> Stack:
+    def check(cls, roles: Sequence[str] | None, depth: int | None, suffix: str | None, pack: str | None) -> Stack:
         """Check the options."""
         said = {}
         for text in roles or ():
@@ -76,16 +92,14 @@ class Stack:
             raise InvalidInput(f"--depth: allowed are 8, 16 and 32, got {depth}")
         if suffix not in (None, "png", "tif", "exr"):
             raise InvalidInput(f"--format: allowed are png, tif and exr, got {suffix!r}")
-        return cls(said, depth, None if suffix is None else f".{suffix}")
+        if pack not in (None, "orm", "none"):
+            raise InvalidInput(f"--pack: allowed are orm and none, got {pack!r}")
+        return cls(said, depth, None if suffix is None else f".{suffix}", pack)
 
     def refuse(self, paths: Mapping[str, str | None]) -> None:
         """Refuse what only a material can have."""
-        given = {
-            "--role": self.roles,
-            "--depth": self.depth,
-            "--format": self.suffix,
-            "--preview": paths.get("preview"),
-        }
+        given = {"--role": self.roles, "--depth": self.depth, "--format": self.suffix, "--pack": self.pack}
+        given |= {f"--{name}": paths.get(name) for name in SHOWN}
         for flag, value in given.items():
             if value:
                 raise InvalidInput(f"{flag}: is for materials, which are folders of maps or EXR files of layers")
@@ -94,7 +108,7 @@ class Stack:
         """Check before the work that all can be written, over nothing that is read or somebody else's."""
         out = paths["out"] or ""
         if Path(out).suffix.lower() == LAYERED:
-            if self.suffix or self.depth:
+            if self.suffix or self.depth or self.pack:
                 raise InvalidInput(
                     "--out: a file of layers keeps each map as it is; give a folder for --depth and --format"
                 )
@@ -104,12 +118,18 @@ class Stack:
         there = Path(out)
         while not there.exists():
             there = there.parent
-        for name, each in material.items():
+        for name, each in self.packed(material).items():
             file = f"{name}{self.suffix or choose_suffix(each, self.depth)}"
             _outputs.check_apart(read, {"out": os.path.join(out, file)})
             check_free(os.path.join(out, file))
             # Tried beside what is there, in the folder or where it will be made.
             _outputs.check_output(str(there / f".texrs-{file}"), convert(each.pixels, self.depth), material.shape)
+
+    def packed(self, material: Material) -> Mapping[str, Map]:
+        """Return the maps that are written."""
+        if self.pack is None:
+            return material
+        return pack_maps(material, material.axes) if self.pack == "orm" else unpack_maps(material)
 
     def deliver(
         self,
@@ -130,10 +150,32 @@ class Stack:
         else:
             with _outputs.write_folder(out, option, made=made) as folder:
                 depth: Any = self.depth
-                material.save(folder, depth=depth, suffix=self.suffix)
+                pack: Any = self.pack
+                material.save(folder, depth=depth, suffix=self.suffix, pack=pack)
         if (shown := paths.get("preview")) is not None:
             with _outputs.write_output(shown, "preview", made=made) as place:
                 io.write(place, material.preview())
+        if (solid := paths.get("gltf")) is not None:
+            # The material in it is called as the file, which a temporary name is not.
+            with _outputs.write_output(solid, "gltf", made=made) as place, TemporaryDirectory() as folder:
+                material.save_gltf(file := Path(folder, Path(solid).name))
+                shutil.copyfile(file, place)
+        if (described := paths.get("materialx")) is not None:
+            with _outputs.write_folder(described, "materialx", made=made) as folder:
+                material.save_materialx(folder / "material.mtlx")
+        if (smaller := paths.get("mipmaps")) is not None:
+            with _outputs.write_folder(smaller, "mipmaps", made=made) as folder:
+                self.save_smaller(material, folder)
+
+    def save_smaller(self, material: Material, folder: Path) -> None:
+        """Write the maps in halves of their size alone."""
+        depth: Any = self.depth
+        for file in material.save(folder, depth=depth, suffix=self.suffix, mipmaps=True):
+            if file.parent == folder:
+                file.unlink()
+            else:
+                file.rename(folder / file.name)
+        (folder / SMALLER).rmdir()
 
 
 def is_stack(text: str) -> bool:

@@ -44,7 +44,7 @@ from texrs.cli._kinds import (
 from texrs.cli._options import Options, as_command, make_parameter
 from texrs.cli._outputs import Quiet, Threads, describe, name_arguments, to_write
 from texrs.cli._provenance import check_free
-from texrs.cli._stacks import Depth, Format, Roles, Stack
+from texrs.cli._stacks import SHOWN, Depth, Format, Pack, Roles, Stack
 from texrs.errors import InvalidInput
 from texrs.materials import Material
 from texrs.synthesis import Synthesis
@@ -81,16 +81,17 @@ class Verb:
             parameters.append(make_parameter("variants", Annotated[int | None, VARIANTS], None))
         for name in ("map", "stages"):
             parameters.append(make_parameter(name, Annotated[str | None, to_write(name)], None))
-        for name, annotation in (("role", Roles), ("depth", Depth), ("format", Format)):
+        for name, annotation in (("role", Roles), ("depth", Depth), ("format", Format), ("pack", Pack)):
             parameters.append(make_parameter(name, annotation, None))
-        parameters.append(make_parameter("preview", Annotated[str | None, to_write("preview")], None))
+        for name in SHOWN:
+            parameters.append(make_parameter(name, Annotated[str | None, to_write(name)], None))
         parameters += [make_parameter("count", Threads, None), make_parameter("quiet", Quiet, False)]
         return as_command(self.run, parameters)
 
     def run(self, *, count: int | None, quiet: bool, variants: int | None = None, **given: Any) -> None:
         """Do the command: what can be checked is checked before any file is read, and before the work."""
         start, options = time.monotonic(), self.options
-        stack = Stack.check(given.pop("role", None), given.pop("depth", None), given.pop("format", None))
+        stack = Stack.check(*(given.pop(name, None) for name in ("role", "depth", "format", "pack")))
         paths: dict[str, str | None] = {name: given.pop(name, None) for name in _outputs.OUTPUTS}
         out = paths["out"] or ""
         values = options.read(given, which=lambda o: not o.file)
