@@ -20,7 +20,9 @@ __all__ = [
     "gather",
     "jitter",
     "mean_shift",
+    "outlines",
     "philox",
+    "place",
     "poisson",
     "poisson_spread",
     "seam_cut",
@@ -48,6 +50,30 @@ def gather(
     coordinates: NDArray[float32],
     interpolation: str,
 ) -> NDArray[Any]: ...
+def outlines(
+    labels: NDArray[int32], windows: Sequence[tuple[int, Sequence[int], Sequence[int]]]
+) -> list[NDArray[float32] | None]: ...
+def place(
+    distance: NDArray[float32],
+    origin: Sequence[float],
+    centre: Sequence[float],
+    matrix: Sequence[Sequence[float]],
+    shift: Sequence[float],
+    canvas: Sequence[int],
+    depth: float,
+) -> (
+    tuple[
+        list[int],
+        list[int],
+        NDArray[float32],
+        NDArray[float32],
+        NDArray[bool_],
+        NDArray[bool_],
+        int,
+        list[list[float]],
+    ]
+    | None
+): ...
 
 @final
 class Correlation:

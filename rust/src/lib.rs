@@ -21,7 +21,8 @@
 //! | [`patch_search`] | exact best matches of a masked patch |
 //! | [`complete`] | filling holes by example -> `seam`, `patch_search` |
 //! | [`poisson`] | images from their differences, near given values |
-//! | [`warp`] | where each pixel comes from, of pictures warped by moved points |
+//! | [`distance`] | signed distances to the outlines of labelled pieces |
+//! | [`warp`] | where each pixel comes from, of pictures warped by moved points, and of moved shapes -> `gather` |
 //! | [`gather`] | an exemplar of any type looked up through coordinates |
 //! | [`ncc`] | normalised cross-correlation of a template with each window of an image |
 //! | [`mean_shift`] | joint spatial and range filtering |
@@ -50,5 +51,6 @@ pub use engine::{appearance, blocks, coherence, guide, optimize, pyramid, stitch
 pub use foundation::error::{Error, Result};
 pub use foundation::{error, fixed, grid, hash, par, pca};
 pub use kernels::{
-    complete, gather, image_io, mean_shift, ncc, patch_search, poisson, seam, sparse, warp,
+    complete, distance, gather, image_io, mean_shift, ncc, patch_search, poisson, seam, sparse,
+    warp,
 };

@@ -5,10 +5,10 @@ use numpy::{
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
-use super::{grouped, run};
+use super::{grouped, run_small};
 use crate::foundation::grid::Grid;
 use crate::foundation::memory;
-use crate::kernels::gather::{Element, Exemplar, Interpolation};
+use crate::kernels::gather::{CHUNK, Element, Exemplar, Interpolation};
 use crate::{Error, Result};
 
 /// Exemplars (rows, columns, channels) or (planes, rows, columns, channels), one type; coordinates (pixels, axes).
@@ -81,7 +81,7 @@ fn axes<'py, T: Element + numpy::Element, const D: usize>(
     let points = grouped::<_, D>("coordinates", flat)?;
     let samples = memory::product("coordinates", &[points.len(), channels])?;
     let mut out = memory::filled("the output", T::default(), samples)?;
-    run(py, None, |monitor| {
+    run_small(py, points.len() <= CHUNK, |monitor| {
         crate::kernels::gather::gather(&exemplars, which, points, interpolation, &mut out, monitor)
     })?;
     Ok(PyArray1::from_vec(py, out)

@@ -4,6 +4,7 @@
 mod appearance;
 mod coherence;
 mod complete;
+mod distance;
 mod gather;
 mod hash;
 mod image_io;
@@ -73,6 +74,19 @@ fn run<R: Send>(
     })
 }
 
+/// Runs a kernel as [`run`] does; on the calling thread where it is so small that to wake another would take longer. It then
+/// must not share its work.
+fn run_small<R: Send>(
+    py: Python<'_>,
+    small: bool,
+    work: impl FnOnce(&Monitor) -> Result<R> + Send,
+) -> PyResult<R> {
+    if small {
+        return Ok(py.detach(|| work(&Monitor::default()))?);
+    }
+    run(py, None, work)
+}
+
 /// Values in groups of `N`, an error where some are left.
 fn grouped<'a, T, const N: usize>(argument: &'static str, values: &'a [T]) -> Result<&'a [[T; N]]> {
     match values.as_chunks() {
@@ -102,6 +116,8 @@ mod _rust {
     #[pymodule_export]
     use super::complete::complete;
     #[pymodule_export]
+    use super::distance::outlines;
+    #[pymodule_export]
     use super::gather::gather;
     #[pymodule_export]
     use super::hash::{philox, uniform};
@@ -124,7 +140,7 @@ mod _rust {
     #[pymodule_export]
     use super::stitcher::{PatchSamples, Stitcher};
     #[pymodule_export]
-    use super::warp::{warp_mesh, warp_points};
+    use super::warp::{place, warp_mesh, warp_points};
 
     #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");

@@ -1,12 +1,15 @@
 use numpy::{PyArray1, PyReadonlyArray3, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use super::{grouped, run};
+use super::{grouped, run, run_small};
 use crate::foundation::grid::Grid;
 use crate::foundation::par;
 use crate::kernels::seam::cost::Cost;
 use crate::kernels::seam::{labels, stitch, strip};
 use crate::{Error, Result};
+
+/// Points of a cut that needs no thread of its own.
+const SMALL: usize = 4096;
 
 /// The flat mask, the value and the number of edges.
 type Cut<'py> = (Bound<'py, PyArray1<bool>>, f64, usize);
@@ -114,7 +117,8 @@ impl<'py> Call<'py> {
                 mask_b,
             )
         };
-        let cut = run(py, None, |monitor| stitch::cut(&overlap, monitor))?;
+        let small = mask_a.len() <= SMALL;
+        let cut = run_small(py, small, |monitor| stitch::cut(&overlap, monitor))?;
         Ok((PyArray1::from_vec(py, cut.b), cut.value, cut.edges))
     }
 }

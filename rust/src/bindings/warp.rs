@@ -1,8 +1,12 @@
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
-use super::{grouped, run};
-use crate::kernels::warp::{self, Mesh, Warped};
+use super::{grouped, run, run_small};
+use crate::foundation::grid::Grid;
+use crate::kernels::gather::CHUNK;
+use crate::kernels::warp::{self, Mesh, Motion, Shape, Warped};
 
 /// Places (pixels, 2), triangle of each pixel, and how many were drawn, turned over, and heavy and turned over.
 type WarpedOut<'py> = (
@@ -57,4 +61,56 @@ pub(super) fn warp_points<'py>(
     let count = corners.len();
     let corners = PyArray1::from_vec(py, corners.into_flattened()).reshape([count, 3])?;
     Ok((out(py, warped)?, corners))
+}
+
+/// The window's first pixel and its shape, then flat: places (pixels, 2), distance, what is inside, what is deep; how many
+/// pixels are of the shape, and the linear part of the way back.
+type PlacedOut<'py> = (
+    [usize; 2],
+    [usize; 2],
+    Bound<'py, PyArray1<f32>>,
+    Bound<'py, PyArray1<f32>>,
+    Bound<'py, PyArray1<bool>>,
+    Bound<'py, PyArray1<bool>>,
+    usize,
+    [[f64; 2]; 2],
+);
+
+/// A shape (rows, columns) as the distance to its outline, moved about its centre over a canvas.
+#[pyfunction]
+#[allow(clippy::too_many_arguments)] // Python's wrapper names them
+pub(super) fn place<'py>(
+    py: Python<'py>,
+    distance: PyReadonlyArray2<'py, f32>,
+    origin: [f64; 2],
+    centre: [f64; 2],
+    matrix: [[f64; 2]; 2],
+    shift: [f64; 2],
+    canvas: [usize; 2],
+    depth: f32,
+) -> PyResult<Option<PlacedOut<'py>>> {
+    let grid = Grid::new([distance.shape()[0], distance.shape()[1]], [false; 2])?;
+    let shape = Shape {
+        distance: distance.as_slice()?,
+        grid,
+        origin,
+    };
+    let motion = Motion::new(centre, shift, matrix)?;
+    let Some(window) = motion.window(&shape, canvas) else {
+        return Ok(None);
+    };
+    let small = window.shape[0] * window.shape[1] <= CHUNK;
+    let placed = run_small(py, small, |monitor| {
+        motion.place(&shape, &window, canvas, depth, monitor)
+    })?;
+    Ok(Some((
+        window.low,
+        window.shape,
+        PyArray1::from_vec(py, placed.places.into_flattened()),
+        PyArray1::from_vec(py, placed.distance),
+        PyArray1::from_vec(py, placed.inside),
+        PyArray1::from_vec(py, placed.deep),
+        placed.count,
+        motion.inverse(),
+    )))
 }

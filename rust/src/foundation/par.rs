@@ -185,6 +185,13 @@ pub fn watch<R: Send, E: From<Error>>(
 
 /// Calls `f(i, chunk)` for each chunk of `size` items. Chunks are fixed by `size`, so results cannot depend on threads.
 pub fn chunks_mut<T: Send>(data: &mut [T], size: usize, f: impl Fn(usize, &mut [T]) + Sync + Send) {
+    if data.len() <= size {
+        // Nothing to share: other threads stay asleep, and the caller need not be in a pool.
+        if !data.is_empty() {
+            f(0, data);
+        }
+        return;
+    }
     data.par_chunks_mut(size.max(1))
         .enumerate()
         .for_each(|(i, chunk)| f(i, chunk));

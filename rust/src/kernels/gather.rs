@@ -9,8 +9,8 @@ use crate::foundation::grid::Grid;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
-/// Output pixels a task takes at a time.
-const CHUNK: usize = 4096;
+/// Output pixels a task takes at a time: so many need no pool.
+pub const CHUNK: usize = 4096;
 
 /// How values between samples are made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

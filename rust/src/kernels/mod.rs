@@ -1,6 +1,7 @@
 //! Nouns of the literature, each usable by itself; none knows a paper that uses it.
 
 pub mod complete;
+pub mod distance;
 pub mod gather;
 pub mod image_io;
 pub mod mean_shift;

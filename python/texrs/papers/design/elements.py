@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._engine.placing import measure_outlines, move_shape
 from texrs._typing import Bools, Floats, Labels
-from texrs.kernels.gather import gather
-from texrs.papers.design.operations import TRIES, Moves, Operation
+from texrs.papers.design.operations import TRIES, Moves, Operation, compose
 
 __all__ = ["CONTEXT", "INNER", "Element", "Placement", "fit", "measure_elements", "place"]
 
@@ -37,46 +37,69 @@ class Element:
     origin: NDArray[np.float64]
     distance: Floats
     """Signed distance to the element's outline in pixels, positive inside, over a box that starts at ``origin``."""
+    depth: float
+    """Depth in pixels at which the hard constraint begins: less in a thin element, so that it has one."""
     axes: NDArray[np.float64]
     """Standard deviation along the longest axis and across it, and the angle of that axis in degrees, as R turns."""
-
-    @property
-    def depth(self) -> float:
-        """Depth in pixels at which the hard constraint begins: less in a thin element, so that it has one."""
-        return min(INNER, 0.5 * float(self.distance.max()))
 
 
 def measure_elements(labels: Labels) -> list[Element]:
     """Measure the elements: those that the border cuts first, then by descending area."""
-    from scipy.ndimage import distance_transform_edt, find_objects
+    from scipy.ndimage import find_objects
 
     height, width = labels.shape
     pad = int(CONTEXT) + 3
-    extended = np.pad(labels, pad, mode="edge")
+    objects: list[Any] = find_objects(labels)
+    boxes = [(label, *box) for label, box in enumerate(objects, start=1) if box is not None]
+    sums = sum_up(labels)
+    outlines = measure_outlines(
+        labels,
+        [
+            (label, (r.start - pad, c.start - pad), (r.stop - r.start + 2 * pad, c.stop - c.start + 2 * pad))
+            for label, r, c in boxes
+        ],
+    )
     found = []
-    boxes: list[Any] = find_objects(labels)
-    for label, box in enumerate(boxes, start=1):
-        if box is None:
-            continue
-        rows, columns = box
-        near = extended[rows.start : rows.stop + 2 * pad, columns.start : columns.stop + 2 * pad] == label
-        distance = distance_transform_edt(near) - distance_transform_edt(~near)
+    for (label, rows, columns), outline in zip(boxes, outlines, strict=True):
+        count, *moments = sums[label]
+        distance = reach_beyond(rows, columns, pad) if outline is None else outline
         touches = (rows.start == 0 or rows.stop == height, columns.start == 0 or columns.stop == width)
-        mine = np.argwhere(labels[box] == label)
-        spread, turned = np.linalg.eigh(np.cov(mine.T, bias=True) + np.eye(2) / 12)
-        angle = math.degrees(math.atan2(turned[1, 1], turned[0, 1]))
-        found.append(
-            Element(
-                label,
-                len(mine),
-                mine.mean(axis=0) + np.array([rows.start, columns.start]),
-                touches,
-                np.array([rows.start - pad, columns.start - pad], np.float64),
-                distance.astype(np.float32),
-                np.array([*np.sqrt(spread[::-1]), angle]),
-            )
-        )
+        corner = (rows.start, columns.start)
+        centre = [(moments[a] - count * corner[a]) / count + corner[a] for a in range(2)]
+        origin = np.array([rows.start - pad, columns.start - pad], np.float64)
+        depth = min(INNER, 0.5 * float(distance.max()))
+        axes = np.array(find_axes(count, *moments))
+        found.append(Element(label, count, np.array(centre), touches, origin, distance, depth, axes))
     return sorted(found, key=lambda e: (not any(e.touches), -e.area, e.label))
+
+
+def sum_up(labels: Labels) -> list[list[int]]:
+    """Return of each label the sums over its pixels of 1, row, column, row^2, row column and column^2.
+
+    Exact ones, as whole numbers have, so that no library for matrices has a say in what is alike.
+    """
+    flat = labels.ravel().astype(np.intp)
+    row, column = (index.ravel() for index in np.indices(labels.shape))
+    products = (row, column, row * row, row * column, column * column)
+    sums = [np.bincount(flat), *(np.bincount(flat, product) for product in products)]
+    return [[int(value) for value in each] for each in np.stack(sums, axis=1).tolist()]
+
+
+def find_axes(count: int, row: int, column: int, rows: int, both: int, columns: int) -> tuple[float, float, float]:
+    """Return the standard deviations along the longest axis of pixels with these sums and across it, and its angle."""
+    area = count * count
+    down, aslant, across = (count * rows - row * row, count * both - row * column, count * columns - column * column)
+    a, b, c = down / area + 1 / 12, aslant / area, across / area + 1 / 12
+    middle, half = (a + c) / 2, math.hypot((a - c) / 2, b)
+    return math.sqrt(middle + half), math.sqrt(middle - half), math.degrees(math.atan2(2 * b, a - c) / 2)
+
+
+def reach_beyond(rows: slice, columns: slice, pad: int) -> Floats:
+    """Return distances inside of what has no outline, for it covers everything: to a corner beyond its window."""
+    shape = (rows.stop - rows.start + 2 * pad, columns.stop - columns.start + 2 * pad)
+    row, column = np.indices(shape)
+    distance: Floats = np.sqrt((row + 1) ** 2 + column**2).astype(np.float32)
+    return distance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,36 +122,15 @@ class Placement:
 
 def place(element: Element, operations: Sequence[Operation], shape: tuple[int, int]) -> Placement | None:
     """Move an element about its centroid; None when it leaves the canvas."""
-    matrix, shift = np.eye(2), np.zeros(2)
-    for operation in operations:
-        matrix, shift = operation.matrix() @ matrix, shift + operation.shift()
-    inverse = np.asarray(np.linalg.inv(matrix), np.float64)
-    extent = np.array(element.distance.shape) - 1
-    corners = element.origin + extent * np.array([[0, 0], [0, 1], [1, 0], [1, 1]])
-    moved = element.centre + shift + (corners - element.centre) @ matrix.T
-    low = np.maximum(np.floor(moved.min(axis=0)), 0).astype(int)
-    high = np.minimum(np.ceil(moved.max(axis=0)) + 1, shape).astype(int)
-    if (high <= low).any():
+    matrix, shift = compose(operations)
+    moved = move_shape(
+        element.distance, element.origin.tolist(), element.centre.tolist(), matrix, shift, shape, element.depth
+    )
+    if moved is None:
         return None
-    window = (slice(low[0], high[0]), slice(low[1], high[1]))
-    whole = not operations or (np.array_equal(matrix, np.round(matrix)) and np.array_equal(shift, np.round(shift)))
-    # Rows and columns apart: a grid of points, turned as a whole, takes several times as long.
-    away = [np.arange(low[axis], high[axis]) - element.centre[axis] - shift[axis] for axis in range(2)]
-    coordinates = np.empty((*(high - low), 2))
-    for axis in range(2):
-        coordinates[..., axis] = np.add.outer(inverse[axis, 0] * away[0], inverse[axis, 1] * away[1])
-    coordinates += element.centre
-    if whole:
-        # A translation by whole pixels copies samples; the centroid must not spoil it by rounding.
-        coordinates = np.round(coordinates)
-    at: Floats = coordinates.astype(np.float32)
-    distance: Floats = gather(element.distance, at - element.origin.astype(np.float32), interpolation="linear")
-    rows, columns = at[..., 0], at[..., 1]
-    inside: Bools = (rows >= 0) & (rows <= shape[0] - 1) & (columns >= 0) & (columns <= shape[1] - 1)
-    area = element.area * abs(float(np.linalg.det(matrix)))
-    kept = float(((distance > 0) & inside).sum()) / area
-    hard: Bools = (distance > element.depth) & inside
-    return Placement(window, at, distance, inside, hard, inverse, kept)
+    (a, b), (c, d) = matrix
+    kept = moved.pixels / (element.area * abs(a * d - b * c))
+    return Placement(moved.window, moved.coordinates, moved.distance, moved.inside, moved.deep, moved.inverse, kept)
 
 
 def fit(

@@ -20,10 +20,11 @@ pub(super) struct Energy<const D: usize> {
     columns: Vec<u32>,
     /// What it costs more to take than to keep.
     terminal: Vec<i32>,
-    /// What it costs that a block keeps and the next one along the axis takes. All else is in the terminals.
+    /// What it costs that a block keeps and the next one along the axis takes.
     forward: [Vec<i32>; D],
-    /// The other way round: nothing.
-    backward: Vec<i32>,
+    /// The other way round. Were it in the terminals, as it may be, it would have to flow from block to block: the cut is the
+    /// same, and took twice the time.
+    backward: [Vec<i32>; D],
 }
 
 impl<const D: usize> Energy<D> {
@@ -36,7 +37,7 @@ impl<const D: usize> Energy<D> {
             columns: Vec::new(),
             terminal: Vec::new(),
             forward: std::array::from_fn(|_| Vec::new()),
-            backward: Vec::new(),
+            backward: std::array::from_fn(|_| Vec::new()),
         };
         this.clear(grid, side)?;
         Ok(this)
@@ -51,8 +52,8 @@ impl<const D: usize> Energy<D> {
         self.columns
             .extend((0..grid.shape()[D - 1]).map(|x| (x / side) as u32));
         let n = self.blocks.len();
-        let planes = [&mut self.terminal, &mut self.backward];
-        for plane in planes.into_iter().chain(&mut self.forward) {
+        let pairs = self.forward.iter_mut().chain(&mut self.backward);
+        for plane in pairs.chain([&mut self.terminal]) {
             plane.clear();
             plane.resize(n, 0);
         }
@@ -104,7 +105,8 @@ impl<const D: usize> Energy<D> {
     /// Adds the costs of a run of pairs; those of points without a choice go to their neighbours.
     pub(super) fn add_pairs(&mut self, ties: &[Tie], run: &Run, costs: &Capacities) {
         let ((p_row, p_column), (q_row, q_column)) = (self.row(run.p), self.row(run.q));
-        let (terminal, forward) = (&mut self.terminal[..], &mut self.forward[run.axis][..]);
+        let terminal = &mut self.terminal[..];
+        let (forward, backward) = (&mut self.forward[run.axis], &mut self.backward[run.axis]);
         for k in 0..run.n {
             let p = p_row + self.columns[p_column + k] as usize;
             let q = q_row + self.columns[q_column + k] as usize;
@@ -114,9 +116,14 @@ impl<const D: usize> Energy<D> {
             match (ties[run.p + k], ties[run.q + k]) {
                 // A seam inside of a block goes with it: see `add_seams`.
                 (Tie::Either, Tie::Either) if p != q => {
-                    add(&mut terminal[p], new_old - kept);
-                    add(&mut terminal[q], -new_old);
-                    add(&mut forward[p], old_new + new_old - kept);
+                    // Half of the seam that goes is on either way, as far as there is as much.
+                    let both = old_new + new_old - kept;
+                    let ahead = (old_new - kept / 2).clamp(0, both);
+                    let back = both - ahead;
+                    add(&mut terminal[p], new_old - kept - back);
+                    add(&mut terminal[q], old_new - kept - ahead);
+                    add(&mut forward[p], ahead);
+                    add(&mut backward[p], back);
                 }
                 (Tie::Old, Tie::Either) => add(&mut terminal[q], old_new - kept),
                 (Tie::New, Tie::Either) => add(&mut terminal[q], -new_old),
@@ -151,7 +158,7 @@ impl<const D: usize> Energy<D> {
             grid: self.blocks,
             terminal: &self.terminal,
             forward: std::array::from_fn(|axis| &self.forward[axis][..]),
-            backward: [&self.backward[..]; D],
+            backward: std::array::from_fn(|axis| &self.backward[axis][..]),
         };
         let sink = solver.min_cut(&graph, monitor)?.sink;
         let mut take = Vec::with_capacity(ties.len());

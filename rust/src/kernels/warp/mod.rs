@@ -1,13 +1,15 @@
-//! Pictures warped by moved points: where each pixel of the output comes from.
+//! Pictures warped by moved points, and shapes moved as a whole: where each pixel of the output comes from.
 //!
 //! [`mesh`] carries a dense mesh, a vertex a pixel of the source; [`scattered`] triangulates scattered points. Both move
 //! triangles to where their corners go and rasterise them there: a pixel comes from the barycentric mix of the source
 //! corners. Of several triangles over a pixel the one whose corners weigh most is seen, one that is not turned over before
-//! one that is, then the first.
+//! one that is, then the first. A [`Motion`] moves one shape by an affine map, to be cut in among others.
 
+mod placed;
 mod raster;
 mod scattered;
 
+pub use placed::{Motion, Placed, Shape, Window};
 pub use raster::{Mesh, mesh};
 pub use scattered::scattered;
 
