@@ -276,7 +276,6 @@ INPUTS: dict[str, tuple[bytes | None, str]] = {
     "volume": (npy(np.zeros((20, 20, 70), np.uint8)), "bad.png"),
     "four axes": (npy(np.zeros((20, 20, 20, 3), np.uint8)), "bad.png"),
     "one axis": (npy(np.zeros(400, np.uint8)), "bad.png"),
-    "wide integers": (npy(GREY.astype(np.int64)), "64-bit"),
     "1 x 1": (npy(GREY[:1, :1]), "at least 16"),
     "7 x 3": (npy(GREY[:7, :3]), "at least 16"),
     "20000 x 1": (npy(np.ones((20000, 1), np.uint8)), "at least 16"),

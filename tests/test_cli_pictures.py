@@ -142,7 +142,7 @@ REFUSED = {
     "tile in.png --threads 0": "--threads: needs",
     "tile in.png hole.png": "--help",
     "tile": "--help",
-    "complete in.png": "--help",
+    "complete in.png": "HOLE: needs a mask",
     "complete in.png no.png": "no.png",
     "complete no.png hole.png": "no.png",
     "complete in.png other.png": "other.png: needs shape (64, 80), got (64, 64)",

@@ -199,7 +199,10 @@ def test_json_makes_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     (tmp_path / "panes.json").write_text(json.dumps({"layout": "cells", "labels": "panes.png"}))
     WALL.save("bricks.npz")
     for b in (json.dumps(said), "panes.json"):
-        assert main(["splice", "bricks.npz", b, "-o", "out.png", "--size", "96", "--layout-scale", "1", "-q"]) == 0
+        assert (
+            main(["splice", "bricks.npz", b, "-o", "out.png", "--size", "96", "--layout-scale", "1", "-q", "--force"])
+            == 0
+        )
         assert io.read("out.png").shape == (96, 96, 3)
 
 

@@ -8,7 +8,7 @@ from skimage import data
 import perspective_checks as checks
 import texrs
 from reference.look_up import view
-from texrs.errors import InvalidInput
+from texrs.errors import FileError, InvalidInput
 
 
 @pytest.fixture(scope="module")
@@ -128,7 +128,7 @@ def test_transparency_is_the_hole(floor):
     assert (result.image[..., 3] == 255).all()
     with pytest.raises(InvalidInput, match="hole: nothing in the image is wholly transparent"):
         texrs.complete(result.image, "alpha")
-    with pytest.raises(InvalidInput, match="hole: needs bool or integers"):
+    with pytest.raises(FileError, match="hole: beta: there is no such file"):
         texrs.complete(result.image, "beta")
 
 

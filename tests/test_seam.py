@@ -313,7 +313,7 @@ def test_no_overlap_and_no_b_only_pixel():
         ({"penalty": np.full((4, 4), -1.0)}, "penalty: -1"),
         ({"penalty": np.full((4, 4), np.nan)}, "penalty: NaN"),
         ({"penalty": np.full((4, 4), 3e38)}, "penalty: too large"),
-        ({"penalty": "much"}, "penalty: needs real numbers"),
+        ({"penalty": ["much"]}, "penalty: needs real numbers"),
         ({"cost": "l2"}, "cost: allowed are gradient and paper"),
         ({"wrap": "yes"}, "wrap: needs"),
         ({"old": seam.OldSeams([], [], [])}, r"old\.kept: needs 2 arrays"),
@@ -377,7 +377,7 @@ def test_bad_input_to_strips(strip, message):
         (np.zeros((3, 3, 2)), [np.zeros((2, 3)), 1.0], "pairwise: needs shape"),
         (np.full((3, 3, 2), np.inf), 1.0, "unary: "),
         (np.full((3, 3, 2), np.nan), 1.0, "unary: "),
-        ("none", 1.0, "unary: needs real numbers"),
+        (["none"], 1.0, "unary: needs real numbers"),
     ],
 )
 def test_bad_input_to_labels(unary, pairwise, message):

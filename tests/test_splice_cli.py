@@ -35,7 +35,7 @@ def test_splice(tmp_path: Path) -> None:
         "-o",
         str(out),
         "--size",
-        "96x112",
+        "112x96",
         "--seed",
         "2",
         "--blend",

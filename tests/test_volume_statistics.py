@@ -306,7 +306,7 @@ CUBE = np.zeros((16, 16, 16), np.uint8)
         (lambda: volume.compare(CUBE, CUBE, classes=None, chosen=()), "chosen"),
         (lambda: volume.compare(CUBE / 2, CUBE / 2, classes=None), "exemplar: labels"),
         (lambda: volume.compare(CUBE, CUBE, axes=5), "axes"),
-        (lambda: volume.classes("stone"), "image|exemplar"),
+        (lambda: volume.classes(["stone"]), "image|exemplar"),
         (lambda: volume.classes([[1, 2], [3]]), "exemplar: not an array"),
         (lambda: volume.classes(CUBE, 99), "count"),
         (lambda: volume.classes(CUBE).of(np.zeros((4, 4, 4, 3), np.uint8)), "needs 1 colour channels, got 3"),

@@ -106,7 +106,7 @@ def move_shape(
     >>> import numpy as np
     >>> disc = 2 - np.hypot(*np.mgrid[-3:4, -3:4]).astype(np.float32)
     >>> moved = move_shape(disc, (0, 0), (3, 3), ((1, 0), (0, 1)), (0, 4), (7, 16), 1)
-    >>> moved.window, moved.pixels == np.count_nonzero(disc > 0)
+    >>> moved.window, bool(moved.pixels == np.count_nonzero(disc > 0))
     ((slice(0, 7, None), slice(4, 11, None)), True)
 
     """
