@@ -80,7 +80,7 @@ def test_what_engines_load(here: Path, capsys: pytest.CaptureFixture[str]) -> No
     shown = ["--mipmaps", "small", "--gltf", "rock.glb", "--materialx", "mtlx", "--pack", "orm"]
     assert main(["design", "rock", "-o", "new", *SIZE, *shown]) == 0
     assert "orm.png" in {p.name for p in Path("new").iterdir()}
-    assert {"albedo.1.png", "albedo.6.png"} <= {p.name for p in Path("small").iterdir()}
+    assert {"albedo.1.png", "albedo.6.png", "orm.1.png"} <= {p.name for p in Path("small").iterdir()}
     assert io.read("small/albedo.1.png").shape == (32, 32, 3)
     assert Path("rock.glb").read_bytes()[:4] == b"glTF"
     assert "standard_surface" in Path("mtlx/material.mtlx").read_text()
@@ -104,6 +104,7 @@ def test_variants_go_to_folders_of_their_own(here: Path) -> None:
         ("design rock -o new --pack rgb", "--pack: allowed are orm and none, got 'rgb'"),
         ("design rock -o new --gltf rock.gltf", "--gltf: needs a name that ends in .glb"),
         ("design rock/rock_albedo.png -o new.png --mipmaps small", "--mipmaps: is for materials"),
+        ("solid sample:stripes -o new.tif --size 32x32x32 --depth 16", "No such option: --depth"),
         ("design rock -o new --role wet", "--role: needs MAP=ROLE"),
         ("design rock -o new --role rock_wet=shiny", "allowed roles are"),
         ("design rock -o new --role dry=mask", "there is no picture 'dry'"),

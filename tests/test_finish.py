@@ -77,6 +77,13 @@ def test_labels_are_never_mixed() -> None:
         texrs.apply(source, labels, kind="labels")  # type: ignore[arg-type]
 
 
+def test_labels_are_designed_as_labels() -> None:
+    labels = (PEBBLES[..., 0] // 64 * 50).astype(np.uint8)
+    result = texrs.design(labels, (72, 64), seed=1)
+    assert set(np.unique(result.image)) <= set(np.unique(labels))
+    assert (texrs.apply(result.source, labels) == result.image).all()
+
+
 def test_another_finish_may_be_asked_for() -> None:
     source = texrs.design(PEBBLES, 64).source
     plain = texrs.apply(source, PEBBLES, finish=Finish((True, True)))

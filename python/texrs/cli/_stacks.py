@@ -28,46 +28,38 @@ LAYERED = ".exr"
 SHOWN = ("preview", "mipmaps", "gltf", "materialx")
 """Outputs that only materials have."""
 
-Roles = Annotated[
-    list[str] | None,
-    typer.Option(
+
+def _option(type_: Any, flag: str, metavar: str, text: str, default: str | bool = False) -> Any:
+    """Return what typer reads of an option that only materials have."""
+    return Annotated[
+        type_ | None, typer.Option(flag, metavar=metavar, help=text, show_default=default, rich_help_panel=PANEL)
+    ]
+
+
+OPTIONS: dict[str, Any] = {
+    "role": _option(
+        list[str],
         "--role",
-        metavar="MAP=ROLE",
-        help="What a map is for whose name does not say it; the option may be repeated.",
-        show_default=False,
-        rich_help_panel=PANEL,
+        "MAP=ROLE",
+        "What a map is for whose name does not say it; the option may be repeated.",
     ),
-]
-Depth = Annotated[
-    int | None,
-    typer.Option(
+    "depth": _option(
+        int,
         "--depth",
-        metavar="8|16|32",
-        help="Bits of each map of a material: integers of 8 or 16, floats of 32.",
-        show_default="as each map has",
-        rich_help_panel=PANEL,
+        "8|16|32",
+        "Bits of each map of a material: integers of 8 or 16, floats of 32.",
+        "as each map has",
     ),
-]
-Format = Annotated[
-    str | None,
-    typer.Option(
-        "--format",
-        metavar="png|tif|exr",
-        help="Of the maps of a material.",
-        show_default="png, or what holds the map",
-        rich_help_panel=PANEL,
-    ),
-]
-Pack = Annotated[
-    str | None,
-    typer.Option(
+    "format": _option(str, "--format", "png|tif|exr", "Of the maps of a material.", "png, or what holds the map"),
+    "pack": _option(
+        str,
         "--pack",
-        metavar="orm|none",
-        help="Occlusion, roughness and metallic as one map, or as maps of their own.",
-        show_default="as they came",
-        rich_help_panel=PANEL,
+        "orm|none",
+        "Occlusion, roughness and metallic as one map, or as maps of their own.",
+        "as they came",
     ),
-]
+}
+"""How materials are read and written, as options of a command."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +72,9 @@ class Stack:
     pack: str | None
 
     @classmethod
-    def check(cls, roles: Sequence[str] | None, depth: int | None, suffix: str | None, pack: str | None) -> Stack:
-        """Check the options."""
+    def take(cls, given: dict[str, Any]) -> Stack:
+        """Take the options out of what a command was given, and check them."""
+        roles, depth, suffix, pack = (given.pop(name, None) for name in OPTIONS)
         said = {}
         for text in roles or ():
             name, equals, role = text.partition("=")
@@ -118,18 +111,33 @@ class Stack:
         there = Path(out)
         while not there.exists():
             there = there.parent
-        for name, each in self.packed(material).items():
+        for name, each in self.list_maps(material).items():
             file = f"{name}{self.suffix or choose_suffix(each, self.depth)}"
             _outputs.check_apart(read, {"out": os.path.join(out, file)})
             check_free(os.path.join(out, file))
             # Tried beside what is there, in the folder or where it will be made.
             _outputs.check_output(str(there / f".texrs-{file}"), convert(each.pixels, self.depth), material.shape)
 
-    def packed(self, material: Material) -> Mapping[str, Map]:
+    def list_maps(self, material: Material) -> Mapping[str, Map]:
         """Return the maps that are written."""
         if self.pack is None:
             return material
         return pack_maps(material, material.axes) if self.pack == "orm" else unpack_maps(material)
+
+    def save(self, material: Material, folder: Path, *, mipmaps: bool = False) -> list[Path]:
+        """Write the maps, or also those in halves of their size, to a folder."""
+        depth: Any = self.depth
+        pack: Any = self.pack
+        return material.save(folder, depth=depth, suffix=self.suffix, pack=pack, mipmaps=mipmaps)
+
+    def save_smaller(self, material: Material, folder: Path) -> None:
+        """Write the maps in halves of their size alone."""
+        for file in self.save(material, folder, mipmaps=True):
+            if file.parent == folder:
+                file.unlink()
+            else:
+                file.rename(folder / file.name)
+        (folder / SMALLER).rmdir()
 
     def deliver(
         self,
@@ -149,16 +157,14 @@ class Stack:
                 material.save_exr(place)
         else:
             with _outputs.write_folder(out, option, made=made) as folder:
-                depth: Any = self.depth
-                pack: Any = self.pack
-                material.save(folder, depth=depth, suffix=self.suffix, pack=pack)
+                self.save(material, folder)
         if (shown := paths.get("preview")) is not None:
             with _outputs.write_output(shown, "preview", made=made) as place:
                 io.write(place, material.preview())
         if (solid := paths.get("gltf")) is not None:
             # The material in it is called as the file, which a temporary name is not.
-            with _outputs.write_output(solid, "gltf", made=made) as place, TemporaryDirectory() as folder:
-                material.save_gltf(file := Path(folder, Path(solid).name))
+            with _outputs.write_output(solid, "gltf", made=made) as place, TemporaryDirectory() as beside:
+                material.save_gltf(file := Path(beside, Path(solid).name))
                 shutil.copyfile(file, place)
         if (described := paths.get("materialx")) is not None:
             with _outputs.write_folder(described, "materialx", made=made) as folder:
@@ -166,16 +172,6 @@ class Stack:
         if (smaller := paths.get("mipmaps")) is not None:
             with _outputs.write_folder(smaller, "mipmaps", made=made) as folder:
                 self.save_smaller(material, folder)
-
-    def save_smaller(self, material: Material, folder: Path) -> None:
-        """Write the maps in halves of their size alone."""
-        depth: Any = self.depth
-        for file in material.save(folder, depth=depth, suffix=self.suffix, mipmaps=True):
-            if file.parent == folder:
-                file.unlink()
-            else:
-                file.rename(folder / file.name)
-        (folder / SMALLER).rmdir()
 
 
 def is_stack(text: str) -> bool:

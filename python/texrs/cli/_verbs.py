@@ -44,7 +44,7 @@ from texrs.cli._kinds import (
 from texrs.cli._options import Options, as_command, make_parameter
 from texrs.cli._outputs import Quiet, Threads, describe, name_arguments, to_write
 from texrs.cli._provenance import check_free
-from texrs.cli._stacks import SHOWN, Depth, Format, Pack, Roles, Stack
+from texrs.cli._stacks import OPTIONS, SHOWN, Stack
 from texrs.errors import InvalidInput
 from texrs.materials import Material
 from texrs.synthesis import Synthesis
@@ -79,28 +79,28 @@ class Verb:
         parameters += [o.make_parameter() for o in self.options if not o.argument]
         if self.several is not None:
             parameters.append(make_parameter("variants", Annotated[int | None, VARIANTS], None))
-        for name in ("map", "stages"):
+        # Materials are pictures.
+        stacked = self.options.axes == 2
+        for name in ("map", "stages", *(SHOWN if stacked else ())):
             parameters.append(make_parameter(name, Annotated[str | None, to_write(name)], None))
-        for name, annotation in (("role", Roles), ("depth", Depth), ("format", Format), ("pack", Pack)):
-            parameters.append(make_parameter(name, annotation, None))
-        for name in SHOWN:
-            parameters.append(make_parameter(name, Annotated[str | None, to_write(name)], None))
+        parameters += [make_parameter(name, type_, None) for name, type_ in OPTIONS.items() if stacked]
         parameters += [make_parameter("count", Threads, None), make_parameter("quiet", Quiet, False)]
         return as_command(self.run, parameters)
 
     def run(self, *, count: int | None, quiet: bool, variants: int | None = None, **given: Any) -> None:
         """Do the command: what can be checked is checked before any file is read, and before the work."""
         start, options = time.monotonic(), self.options
-        stack = Stack.check(*(given.pop(name, None) for name in ("role", "depth", "format", "pack")))
+        stack = Stack.take(given)
         paths: dict[str, str | None] = {name: given.pop(name, None) for name in _outputs.OUTPUTS}
         out = paths["out"] or ""
         values = options.read(given, which=lambda o: not o.file)
+        read = _outputs.list_files(text for value in given.values() for text in _outputs.find_texts(value))
         places = [paths]
         if variants is not None:
-            first, texts = given["seed"], [text for value in given.values() for text in _outputs.find_texts(value)]
-            places = [_outputs.name_variants(first + k, paths) for k in range(as_int(variants, "--variants", 1, 4096))]
+            seeds = range(given["seed"], given["seed"] + as_int(variants, "--variants", 1, 4096))
+            places = [_outputs.name_variants(seed, paths) for seed in seeds]
             for each in places:
-                _outputs.check_apart(_outputs.list_files(texts), each)
+                _outputs.check_apart(read, each)
                 check_free(each["out"] or "")
         for each in places:
             _outputs.check_outputs(each)
@@ -114,11 +114,11 @@ class Verb:
         if material is None:
             stack.refuse(paths)
             _outputs.check_output(out, example, size)
+            deliver: Callable[..., None] = _outputs.deliver
         else:
-            read = _outputs.list_files([text for value in given.values() for text in _outputs.find_texts(value)])
             for each in places:
                 stack.check_outputs(material, each, read)
-        deliver = _outputs.deliver if material is None else stack.deliver
+            deliver = stack.deliver
         about = replace(about, size=size, like=example)
         small, made = [], None
         with (

@@ -67,7 +67,7 @@ from texrs.papers.design.arguments import Arguments, Choice, Density, Exemplars,
 from texrs.papers.design.options import DeformationOptions
 from texrs.papers.design.plan import Plan, make_plan
 from texrs.papers.design.report import describe, draw_stages
-from texrs.papers.design.texture import correct_colours
+from texrs.papers.design.texture import correct_colours, look_up
 from texrs.papers.design.trials import choose_plan, make_composite
 from texrs.synthesis import Synthesis
 
@@ -348,7 +348,7 @@ def segment(arguments: Arguments) -> list[Plan]:
 def make_texture(plans: Sequence[Plan], arguments: Arguments, seed: int) -> Synthesis:
     """Make one texture of analysed exemplars: steps 2 to 6."""
     tiles, composite = make_composite(plans, arguments, seed)
-    picture = composite.render(arguments.images)
+    picture = look_up(composite, arguments)
     image, seams = correct_colours(composite, picture, arguments)
     report = describe(plans, tiles, composite, seams, arguments, seed)
     return Synthesis(image, composite, draw_stages(plans[0], tiles[0], picture), report)

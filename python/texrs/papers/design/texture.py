@@ -23,7 +23,7 @@ from texrs.papers.design.tiles import Tile
 from texrs.quilting import Picture, quilt
 from texrs.source_map import SourceMap
 
-__all__ = ["correct_colours", "say_finish", "stitch_tiles"]
+__all__ = ["correct_colours", "look_up", "say_finish", "stitch_tiles"]
 
 PATCH, OVERLAP = 0.6, 0.25
 """Side of a patch and overlap of two, as shares of the exemplar's shorter side."""
@@ -164,11 +164,19 @@ def measure_depth(plan: Plan) -> Floats:
 def say_finish(composite: SourceMap, arguments: Arguments) -> SourceMap:
     """Say how the colours of a texture are corrected so that its seams disappear (section 3.6)."""
     wrap, literal = arguments.wrap, arguments.literal
+    if arguments.exemplars[0].labels:
+        return composite.finished(wrap, interpolation="nearest")
     if not arguments.screening:
         return composite.finished(wrap)
     if literal:
         return composite.finished((False, False), screening=0.0, outlines=False)
     return composite.finished(wrap, screening=arguments.screening, across=False)
+
+
+def look_up(composite: SourceMap, arguments: Arguments) -> Array:
+    """Return the picture of a texture before its colours are corrected; between labels there is nothing."""
+    labels = arguments.exemplars[0].labels
+    return composite.render(arguments.images, interpolation="nearest" if labels else "cubic")
 
 
 def correct_colours(composite: SourceMap, picture: Array, arguments: Arguments) -> tuple[Array, dict[str, Any]]:

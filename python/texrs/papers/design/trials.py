@@ -18,7 +18,7 @@ from texrs.papers.design.deformation import deform_elements
 from texrs.papers.design.literal import move_layers
 from texrs.papers.design.options import DeformationOptions
 from texrs.papers.design.plan import Plan
-from texrs.papers.design.texture import correct_colours, say_finish, stitch_tiles
+from texrs.papers.design.texture import correct_colours, look_up, say_finish, stitch_tiles
 from texrs.papers.design.tiles import Tile, fill_holes
 from texrs.source_map import SourceMap
 
@@ -91,5 +91,5 @@ def try_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, arguments
         watch=lambda stage, share: arguments.watch("try", 0.5 * plan.still),
     )
     _, composite = make_composite([plan], small, 0)
-    image, _ = correct_colours(composite, composite.render(small.images), small)
+    image, _ = correct_colours(composite, look_up(composite, small), small)
     return judge(exemplar, composite, image, elements=elements, wrap=True).report()
