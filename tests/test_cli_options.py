@@ -14,8 +14,8 @@ import typer
 
 import texrs
 from texrs.cli import COMMANDS, _elements, _maps, app
-from texrs.cli._kinds import About
 from texrs.cli._options import MISSING, Option, Options, describe
+from texrs.cli._texts import About
 from texrs.cli._verbs import NAMES, make_verb
 from texrs.errors import InvalidInput
 

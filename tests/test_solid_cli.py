@@ -13,7 +13,7 @@ import pytest
 import texrs
 from texrs import SourceMap, fields, io, samples
 from texrs.cli import main
-from texrs.cli._kinds import parse_axes, parse_bytes
+from texrs.cli._texts import parse_axes, parse_bytes
 from texrs.errors import InvalidInput
 
 Capture = pytest.CaptureFixture[str]

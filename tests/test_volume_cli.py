@@ -11,7 +11,7 @@ from PIL import Image
 
 from texrs import fields, io, samples, volume
 from texrs.cli import main
-from texrs.cli._kinds import read_field
+from texrs.cli._readers import read_field
 from texrs.errors import TexrsError
 
 VOLUME = samples.stripes((32, 36, 40)).image

@@ -17,10 +17,12 @@ from texrs import io
 from texrs._threads import threads
 from texrs.cli import _outputs, _provenance
 from texrs.cli._console import complain, keep, note, say, show_progress
-from texrs.cli._kinds import PICTURE, PLACE, Kind, read_picture
+from texrs.cli._kinds import PICTURE, Kind
 from texrs.cli._options import Option, Options, check_needed, take_options
 from texrs.cli._outputs import SAMPLE, Quiet, Threads, make_argument, make_option, name_arguments, to_write
 from texrs.cli._provenance import RUNNING, check_free
+from texrs.cli._readers import read_picture
+from texrs.cli._texts import PLACE
 from texrs.database import TextureDatabase
 from texrs.elements import analyse, pictures
 from texrs.elements import page as draw_page

@@ -14,9 +14,9 @@ from texrs import io, samples
 from texrs._threads import threads
 from texrs.cli import _outputs, _provenance
 from texrs.cli._console import note, say, show_progress
-from texrs.cli._kinds import parse_size
 from texrs.cli._outputs import Quiet, Threads, describe, make_argument, make_option, name_arguments, to_write
 from texrs.cli._provenance import check_free
+from texrs.cli._texts import parse_size
 from texrs.errors import InvalidInput
 
 

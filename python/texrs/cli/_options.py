@@ -16,7 +16,8 @@ from typing import Annotated, Any, Literal, TypeAlias, Union, get_args, get_orig
 
 import typer
 
-from texrs.cli._kinds import KINDS, About, Kind
+from texrs.cli._kinds import KINDS, Kind
+from texrs.cli._texts import About
 from texrs.errors import InvalidInput
 
 MISSING = inspect.Parameter.empty

@@ -17,9 +17,9 @@ from texrs._threads import threads
 from texrs._typing import Array
 from texrs.cli import _outputs
 from texrs.cli._console import note
-from texrs.cli._kinds import read_mask, read_picture, read_scale_map
 from texrs.cli._options import Options, check_needed, make_choice, take_options
 from texrs.cli._outputs import Quiet, Threads, make_argument, make_option, name_arguments, to_write
+from texrs.cli._readers import read_mask, read_picture, read_scale_map
 from texrs.errors import InvalidInput
 from texrs.scale_maps._kinds import describe_kind, find_kind
 

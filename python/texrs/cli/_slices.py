@@ -15,9 +15,11 @@ from texrs._threads import threads
 from texrs._typing import Array
 from texrs.cli import _outputs
 from texrs.cli._console import note, show_progress
-from texrs.cli._kinds import About, Kind, parse_numbers, read_volume
+from texrs.cli._kinds import Kind
 from texrs.cli._options import Options, check_needed, take_options
 from texrs.cli._outputs import Quiet, Threads, describe, make_argument, name_arguments, to_write
+from texrs.cli._readers import read_volume
+from texrs.cli._texts import About, parse_numbers
 from texrs.errors import InvalidInput
 from texrs.volume import cube, oblique, paint, slices, turntable
 

@@ -32,19 +32,18 @@ from texrs.cli._kinds import (
     MAP_OR_AUTO,
     MASK,
     NUMBERS,
-    PLANE,
     SEEN,
     SOURCE,
     TARGET,
     UNKNOWN,
     VOLUME,
-    About,
     Kind,
 )
 from texrs.cli._options import Options, as_command, make_parameter
 from texrs.cli._outputs import Quiet, Threads, describe, name_arguments, to_write
 from texrs.cli._provenance import check_free
 from texrs.cli._stacks import OPTIONS, SHOWN, Stack
+from texrs.cli._texts import PLANE, About
 from texrs.errors import InvalidInput
 from texrs.materials import Material
 from texrs.synthesis import Synthesis

@@ -1,0 +1,212 @@
+"""Values that stand in files, read as the option of the command line says."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from texrs import io, samples
+from texrs._arrays import as_image
+from texrs._typing import Array, Floats
+from texrs.cli._outputs import SAMPLE, name_arguments
+from texrs.cli._texts import PLANE, About, parse_numbers, read_json
+from texrs.errors import FileError, InvalidInput
+
+
+def read_picture(text: str, *, finite: bool = True) -> Array:
+    """Read an image file, or make the built-in exemplar that ``sample:NAME`` names."""
+    image: Array = samples.load(text.removeprefix(SAMPLE)).image if text.startswith(SAMPLE) else io.read(text)
+    if finite:
+        as_image(image, text)
+    return image
+
+
+def match_alpha(image: Any, like: Array | None) -> Any:
+    """Return a picture with an alpha channel, all of it there, if that is all that it lacks; without one that says nothing."""
+    if not isinstance(image, np.ndarray):
+        return image
+    colours = [1 if a.ndim == 2 else a.shape[2] for a in (image, image if like is None else like)]
+    whole = 1 if image.dtype.kind == "f" else np.iinfo(image.dtype).max if image.dtype.kind in "ui" else True
+    if colours in ([3, 4], [1, 2]):
+        pixels = image[..., np.newaxis] if image.ndim == 2 else image
+        return np.concatenate([pixels, np.full_like(pixels[..., :1], whole)], axis=2)
+    if colours in ([4, 3], [2, 1]) and (image[..., -1] == whole).all():
+        return np.ascontiguousarray(image[..., :-1] if colours[1] > 1 else image[..., 0])
+    return image
+
+
+def read_example(text: str, about: About, *, finite: bool = True) -> Any:
+    """Read a picture, or a material: a folder of maps, or an EXR file of several layers."""
+    from texrs.cli._stacks import is_stack
+
+    if text.startswith(SAMPLE) or not is_stack(text):
+        return read_picture(text, finite=finite)
+    from texrs.materials import Material
+
+    with name_arguments(roles="--role", maps=text):
+        return Material.read(text, roles=about.roles)
+
+
+def read_volume(text: str) -> Array:
+    """Read a volume, or make the built-in one that ``sample:NAME`` names; all of it must be finite."""
+    if text.startswith(SAMPLE):
+        volume: Array = samples.load(text.removeprefix(SAMPLE)).image
+        if volume.ndim != 4:
+            known = ", ".join(n for n in samples.names() if n.endswith("solid") or n in ("particles", "stripes"))
+            raise InvalidInput(f"{text}: is a picture; volumes are {known}")
+    else:
+        volume = io.read_volume(text)
+    as_image(volume, text, axes=3)
+    return volume
+
+
+def read_array(path: str, axes: int) -> Array:
+    """Read a picture or a volume, which may hold anything."""
+    array: Array = io.read_volume(path) if axes == 3 else io.read(path)
+    return array
+
+
+def read_values(path: str, about: About) -> Array:
+    """Read values like those of the exemplar: of one channel a file may keep the axis or not."""
+    given = read_array(path, about.axes)
+    return given[..., np.newaxis] if about.like is not None and given.ndim < about.like.ndim else given
+
+
+def read_numbers(path: str, about: About) -> Array:
+    """Read a number for each point: of several channels the mean."""
+    given = read_array(path, about.axes)
+    return given if given.ndim == about.axes else np.asarray(given.mean(axis=-1))
+
+
+def read_density(text: str, about: About) -> Any:
+    """Return numbers, or shares that a picture shows: all of an integer's range is 0 to 1."""
+    if re.fullmatch(r"[-+.:0-9eE]+", text.strip()):
+        return parse_numbers(text, about.option, "numbers such as 0.3 or 0.3:0.1, or a file")
+    given = np.asarray(read_array(text, about.axes))
+    most = 1.0 if given.dtype.kind == "f" else float(np.iinfo(given.dtype).max)
+    return np.asarray((given if given.ndim == about.axes else given.mean(axis=-1)) / most, np.float64)
+
+
+def read_mask(path: str, axes: int = 2) -> Array:
+    """Read a mask: any colour but black, or 0 in all channels, is marked, whatever an alpha channel of a picture says."""
+    mask = read_array(path, axes)
+    if mask.ndim == axes:
+        return mask
+    colours = mask[..., :-1] if axes == 2 and mask.shape[-1] in (2, 4) else mask
+    marked: Array = (colours != 0).any(axis=-1)
+    return marked
+
+
+def read_scale_map(path: str, encoding: str = "log2") -> Floats:
+    """Read a scale map, with its kind where the file says it: floats are scales, grey levels are decoded."""
+    from texrs import scale_maps
+    from texrs.scale_maps._kinds import keep_kind, parse_kind
+
+    values, kind = io.read(path), parse_kind(io.read_description(path))
+    if values.dtype.kind == "f":
+        scale = np.asarray(values if values.ndim == 2 else values[..., 0], np.float32)
+    else:
+        levels: Any = encoding
+        with name_arguments(image=path):
+            scale = scale_maps.decode(values, levels)
+    with name_arguments(scale=path):
+        return keep_kind(scale, kind)
+
+
+def read_target(text: str) -> Any:
+    """Read what an output is to show: a scale map, normals, texture coordinates, or Jacobians; of a plane the words stay."""
+    if text.lower().startswith(PLANE):
+        return text
+    try:
+        values = io.read(text)
+    except FileError:
+        if Path(text).suffix.lower() not in (".npy", ".npz"):
+            raise
+        # Jacobians have four axes.
+        return io.read_volume(text)
+    if values.ndim == 3 and values.shape[2] == 2:
+        return values
+    colours = values.ndim == 3 and values.shape[2] >= 3 and bool((values[..., :3] != values[..., :1]).any())
+    return values[..., :3] if colours else read_scale_map(text)
+
+
+def read_field(text: str, size: tuple[int, ...]) -> Any:
+    """Return the field that words describe, or that of the frames in an .npz file, over an output of a size."""
+    from texrs import fields
+
+    if Path(text).suffix.lower() != ".npz":
+        with name_arguments(field="--field"):
+            return fields.parse(text, len(size), size)
+    arrays = list(io.read_arrays(text).values())
+    if len(arrays) != 1:
+        raise FileError(f"{text}: needs a single array of frames, has {len(arrays)}")
+    with name_arguments(frames=text):
+        field = fields.from_array(arrays[0], size if arrays[0].ndim == len(size) + 2 else None)
+    if field.axes != len(size):
+        raise InvalidInput(f"{text}: holds frames of {field.axes} axes, {len(size)} are needed")
+    return field
+
+
+def read_direction(text: str, about: About) -> Any:
+    """Read degrees, one number or a picture of them, or a field: its words, or frames in a file."""
+    try:
+        return float(text)
+    except ValueError:
+        pass
+    suffix = Path(text).suffix.lower()
+    return io.read(text) if suffix and suffix != ".npz" and "=" not in text else read_field(text, about.size)
+
+
+def read_entry(text: str, about: About) -> Any:
+    """Read analysed elements, or a picture, which is analysed by whoever takes it."""
+    from texrs import elements
+
+    return elements.load(text) if text.lower().endswith(".npz") else read_example(text, about)
+
+
+def read_layout(text: str, about: About) -> Any:
+    """Read analysed elements or a picture, as `read_entry` does, or make a layout of JSON; its labels may be a picture."""
+    if not text.lower().endswith(".json") and not text.lstrip().startswith("{"):
+        return read_entry(text, about)
+    from texrs import layouts
+
+    said = read_json(text, about.option)
+    if isinstance(said, dict) and isinstance(said.get("labels"), str):
+        said = {**said, "labels": io.read(said["labels"])}
+    return layouts.make(said)
+
+
+def read_labels(path: str, about: About) -> Array:
+    """Read the labels of elements: a picture of them, or those of an entry."""
+    from texrs import elements
+
+    return elements.load(path).labels if path.lower().endswith(".npz") else io.read(path)
+
+
+def read_points(path: str, about: About) -> list[list[float]]:
+    """Read a list of points, row,column a line; a first line of words and empty lines are passed over."""
+    try:
+        lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "is no text"
+        raise FileError(f"{path}: cannot be read ({reason})") from None
+    found: list[list[float]] = []
+    for number, line in enumerate(lines, start=1):
+        parts = [p.strip() for p in re.split(r"[,;\t]", line.strip())]
+        if parts == [""]:
+            continue
+        try:
+            values = [float(p) for p in parts]
+        except ValueError:
+            if number == 1:
+                continue
+            values = []
+        if len(values) != 2:
+            raise InvalidInput(f"{path}: line {number} needs row,column, got {line.strip()[:60]!r}")
+        found.append(values)
+    if not found:
+        raise InvalidInput(f"{path}: holds no points")
+    return found

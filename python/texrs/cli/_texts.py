@@ -1,0 +1,162 @@
+"""Values that are written on the command line: sizes, axes, numbers, points, edits."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from texrs._arrays import as_size
+from texrs._typing import Array
+from texrs.errors import FileError, InvalidInput
+
+FOUND = "found"
+"""Stands for what is not said of a plane."""
+PLANE = "plane:"
+"""Before the words that say how a plane lies."""
+PLACE = r"\s*-?[0-9]+(\.[0-9]*)?\s*,\s*-?[0-9]+(\.[0-9]*)?\s*"
+"""A row and a column, as text."""
+
+
+@dataclass(frozen=True, slots=True)
+class About:
+    """What the text of an option may be understood by."""
+
+    option: str = ""
+    """What errors call it."""
+    axes: int = 2
+    size: tuple[int, ...] = ()
+    """Of the result, once it is known."""
+    like: Array | None = None
+    """The exemplar, once it is read."""
+    roles: Mapping[str, str] = field(default_factory=dict)
+    """What maps of materials are for."""
+
+
+def parse_size(text: str, option: str = "--size", *, axes: int = 2) -> tuple[int, ...]:
+    """Return (rows, columns) of ``1024x512``, which is the width and the height, or of ``512`` a square.
+
+    With three axes the depth comes last in the text, and the planes first in what is returned.
+    """
+    parts = re.split(r"[x×]", text.strip().lower())
+    if len(parts) not in (1, axes) or not all(re.fullmatch(r"\s*-?[0-9]{1,18}\s*", p) for p in parts):
+        wanted = ("WIDTHxHEIGHT, as in 1024x512", "WIDTHxHEIGHTxDEPTH, as in 128x96x64")[axes - 2]
+        raise InvalidInput(f"{option}: needs {wanted}, or one number; got {text!r}")
+    sides = [int(p) for p in reversed(parts)]
+    return as_size(sides if len(sides) > 1 else sides[0], option, axes=axes)
+
+
+def parse_axes(text: str, option: str = "--wrap", *, axes: int = 2) -> tuple[bool, ...]:
+    """Return whether each axis is among the letters: x for columns, y for rows, z for planes."""
+    known = "zyx"[-axes:]
+    letters = text.strip().lower()
+    if letters != "none" and (not letters or set(letters) - set(known) or len(set(letters)) < len(letters)):
+        wanted = "allowed are xy, x, y and none" if axes == 2 else "needs axes among x, y and z, each once, or none"
+        raise InvalidInput(f"{option}: {wanted}; got {text!r}")
+    return tuple(letters != "none" and letter in letters for letter in known)
+
+
+def show_axes(wrap: bool | Sequence[bool]) -> str:
+    """Return the letters of the axes."""
+    if isinstance(wrap, bool):
+        return "all" if wrap else "none"
+    return "".join(letter for letter, cyclic in zip("xyz", reversed(wrap), strict=False) if cyclic) or "none"
+
+
+def parse_numbers(
+    text: str, option: str, wanted: str, *, counts: Sequence[int] = (), between: str = ":"
+) -> list[float]:
+    """Return finite numbers with a sign between them."""
+    try:
+        numbers = [float(p) for p in text.split(between)]
+    except ValueError:
+        numbers = []
+    if not numbers or (counts and len(numbers) not in counts):
+        raise InvalidInput(f"{option}: needs {wanted}; got {text!r}")
+    return numbers
+
+
+def parse_range(text: str, about: About) -> tuple[float, float]:
+    """Return the least and the largest of ``0.8:1.2``; of ``1``, it for both."""
+    numbers = parse_numbers(text, about.option, "LEAST:LARGEST, as in 0.8:1.2", counts=(1, 2))
+    return numbers[0], numbers[-1]
+
+
+def parse_sizes(text: str, about: About) -> str | bool | list[float]:
+    """Return auto, or the answer of yes or no, or numbers."""
+    word = text.strip().lower()
+    if word in ("auto", "yes", "no"):
+        return "auto" if word == "auto" else word == "yes"
+    return parse_numbers(word, about.option, "auto, yes, no, or sizes as in 0.8:1.25")
+
+
+def parse_bytes(text: str, option: str = "--memory-limit") -> int:
+    """Return ``900M`` or ``16G`` as a number of bytes, in powers of 1024."""
+    found = re.fullmatch(r"([0-9]{1,18})([kmgt]?)(i?b)?", text.strip().lower())
+    if not found or int(found[1]) == 0:
+        raise InvalidInput(f"{option}: needs a number of bytes, as in 900M or 16G; got {text!r}")
+    return int(found[1]) << 10 * " kmgt".index(found[2] or " ")
+
+
+def parse_box(text: str, about: About) -> list[float]:
+    """Return the middle and the sides of a box."""
+    return _parse_finite(text, 4, about.option, "ROW,COL,HEIGHT,WIDTH, as in 96,92,50,50")
+
+
+def parse_each(texts: Sequence[str], about: About) -> list[float | None]:
+    """Return a number for each plane, or None for one that is to be found."""
+    found: list[float | None] = []
+    for text in texts:
+        word = text.strip().lower()
+        found.append(
+            None if word == FOUND else parse_numbers(word, about.option, f"a number, or {FOUND}", counts=(1,))[0]
+        )
+    return found
+
+
+def parse_places(texts: Sequence[str], about: About) -> list[list[float]]:
+    """Return the points of one text or of several."""
+    parts = [p for text in texts for p in re.split(r"[\s;]+", text.strip()) if p]
+    return [_parse_finite(p, 2, about.option, "ROW,COL, as in 125,60") for p in parts]
+
+
+def _parse_finite(text: str, count: int, option: str, wanted: str) -> list[float]:
+    numbers = parse_numbers(text, option, wanted, counts=(count,), between=",")
+    if not all(math.isfinite(n) for n in numbers):
+        raise InvalidInput(f"{option}: needs {wanted}; got {text!r}")
+    return numbers
+
+
+def read_steps(text: str, about: About) -> Any:
+    """Return an edit: names with commas between them, JSON, or a file of JSON."""
+    if not text.lower().endswith(".json") and not text.lstrip().startswith(("[", "{")):
+        return [word.strip() for word in text.split(",")]
+    found = read_json(text, about.option)
+    # A report holds its edit beside other things.
+    return found["edit"] if isinstance(found, dict) and "edit" in found else found
+
+
+def read_json(text: str, option: str) -> Any:
+    """Return what JSON says, or a file of it."""
+    where = option
+    if text.lower().endswith(".json"):
+        where = text
+        try:
+            text = Path(text).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise FileError(f"{where}: {error}") from None
+    try:
+        return json.loads(text)
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise InvalidInput(f"{where}: is not JSON ({error})") from None
+
+
+def read_corrections(text: str, about: About) -> Any:
+    """Return a list of corrections: JSON, or a file of it."""
+    if not (text.lower().endswith(".json") or text.lstrip().startswith("[")):
+        raise InvalidInput(f"{about.option}: needs a file of JSON, or a list of steps as JSON; got {text!r}")
+    return read_steps(text, about)
