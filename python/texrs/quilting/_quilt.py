@@ -13,7 +13,8 @@ from texrs._typing import Bools, Floats
 from texrs.kernels.patch_search import Match
 from texrs.quilting._finder import Finder
 from texrs.quilting._windows import Surroundings, Window
-from texrs.source_map import SourceMap, chain_pixels
+from texrs.source_map import SourceMap
+from texrs.source_map._pixels import Pixels
 
 POOL = (48, 96)
 """Matches that are looked at for what they repeat; more on a lattice, where many are out of step."""
@@ -69,7 +70,7 @@ class Quilt:
         self.label = np.zeros(size, np.uint32)
         self.seams = np.zeros((*size, 2), np.float32)
         self.pastes = 0
-        self.pixels = chain_pixels([p.source for p in pictures])
+        self.pixels = Pixels.chain([p.source for p in pictures])
         self.all_colours = np.concatenate([p.colours.reshape(-1, channels) for p in pictures])
         depth = np.concatenate([p.depth.ravel() for p in pictures])
         self.samples = Samples(self.all_colours, depth, (COLOUR, DEPTH))

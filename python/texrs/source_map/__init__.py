@@ -20,7 +20,7 @@ from texrs.errors import FileError, InvalidInput
 from texrs.kernels.gather import gather
 from texrs.source_map._antialias import gather_smoothed
 from texrs.source_map._finish import Finish
-from texrs.source_map._pixels import Pixels, divide_bands, label_pieces, number_pairs
+from texrs.source_map._pixels import Pixels, divide_bands, label_pieces
 from texrs.source_map._vectors import turn_vectors
 
 __all__ = ["Finish", "Reuse", "SourceMap"]
@@ -406,14 +406,15 @@ class SourceMap:
             raise InvalidInput(f"inner: needs outputs of sizes {self.shapes}, got {[m.shape for m in maps]}")
         if any(m.shapes != maps[0].shapes for m in maps):
             raise InvalidInput("inner: all maps must look into the same exemplars")
-        inners = chain_pixels(maps)
+        inners = Pixels.chain(maps)
         place = np.empty(self.shape, np.uint32 if inners.count < 2**32 else np.uint64)
         rest = np.zeros_like(self.coordinates)
         for band in divide_bands(self.shape):
             near = np.floor(self.coordinates[band] + np.float32(0.5)).astype(np.int64)
             place[band] = inners.places(near, self.exemplar[band])
             rest[band] = self.coordinates[band] - near.astype(np.float32)
-        return self._pick(inners, place, self.label, self.frame_array(), rest if rest.any() else None, maps[0].shapes)
+        parts = inners.pick(place, self.label, self.frame_array(), rest if rest.any() else None)
+        return SourceMap(*parts, maps[0].shapes)
 
     @classmethod
     def pick(
@@ -452,41 +453,7 @@ class SourceMap:
         [[[1.0, 2.0], [0.0, 0.0]]]
 
         """
-        return cls._pick(chain_pixels(maps), place, label, None, None, maps[0].shapes, label if overwrite else None)
-
-    @classmethod
-    def _pick(
-        cls,
-        inners: Pixels,
-        place: NDArray[np.unsignedinteger],
-        outer: NDArray[np.uint32],
-        frame: NDArray[np.float32] | None,
-        rest: NDArray[np.float32] | None,
-        shapes: tuple[tuple[int, ...], ...],
-        out: NDArray[np.uint32] | None = None,
-    ) -> SourceMap:
-        """Put pixels together: S(p) = inner(q) + J_inner rest, J = J_inner frame; ``out`` for labels may be ``outer``."""
-        axes = place.ndim
-        exemplar = np.empty(place.shape, np.uint16)
-        coordinates = np.empty((*place.shape, axes), np.float32)
-        label = np.empty(place.shape, np.uint32) if out is None else out
-        each = inners.framed or (frame is not None and frame.ndim > 3)
-        frames = np.empty((*place.shape, axes, axes), np.float32) if each else None
-        for band in divide_bands(place.shape):
-            at = place[band]
-            coordinates[band], exemplar[band] = inners.coordinates[at], inners.exemplar[at]
-            if rest is not None:
-                coordinates[band] += np.einsum("...ij,...j->...i", inners.frames(at), rest[band])
-            if frames is not None:
-                frames[band] = inners.frames(at)
-                if frame is not None:
-                    frames[band] @= frame[band] if frame.ndim > 3 else frame[outer[band]]
-        keys = number_pairs(outer, inners, place, label)
-        if frames is None and (frame is not None or inners.table is not None):
-            outer_of, inner_of = np.divmod(keys, np.uint64(max(1, inners.labels)))
-            frames = inners.frames_of(inner_of)
-            frames = np.asarray(frames if frame is None else frames @ frame[outer_of], np.float32)
-        return cls(coordinates, exemplar, label, frames, shapes)
+        return cls(*Pixels.chain(maps).pick(place, label, out=label if overwrite else None), maps[0].shapes)
 
     def continues(self, axis: int, *, wrap: bool = False) -> Bools:
         """Return where a pixel and the next one along ``axis`` come from one piece of the exemplar.
@@ -635,32 +602,3 @@ class SourceMap:
             return replace(made, finish=Finish.from_arrays(parts, made.shape, shapes))
         except (InvalidInput, TypeError, ValueError) as error:
             raise FileError(f"{path}: is damaged ({error})") from None
-
-
-def chain_pixels(maps: Sequence[SourceMap]) -> Pixels:
-    """Return the pixels of maps, one map after the other."""
-    axes = maps[0].axes
-    counts = [int(m.label.max()) + 1 if m.label.size else 0 for m in maps]
-    offsets = np.cumsum([0, *counts]).astype(np.uint64)
-    table = pixels = None
-    arrays = [m.frame_array() for m in maps]
-    if any(f is not None and f.ndim > 3 for f in arrays):
-        pixels = np.concatenate([m.frames().reshape(-1, axes, axes) for m in maps])
-    elif any(f is not None for f in arrays):
-        eye = np.eye(axes, dtype=np.float32)
-        table = np.concatenate(
-            [
-                np.broadcast_to(eye, (n, axes, axes)) if frame is None else frame[:n]
-                for frame, n in zip(arrays, counts, strict=True)
-            ]
-        )
-    return Pixels(
-        np.array([m.shape for m in maps]),
-        np.cumsum([0, *(m.label.size for m in maps[:-1])]),
-        np.concatenate([m.coordinates.reshape(-1, axes) for m in maps]),
-        np.concatenate([m.exemplar.ravel() for m in maps]),
-        np.concatenate([m.label.ravel() + o for m, o in zip(maps, offsets[:-1], strict=True)]),
-        int(offsets[-1]),
-        table,
-        pixels,
-    )

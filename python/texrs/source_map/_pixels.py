@@ -5,11 +5,38 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Bools
+
+
+class Mapped(Protocol):
+    """What a `texrs.SourceMap` says of its pixels."""
+
+    @property
+    def coordinates(self) -> NDArray[np.float32]:
+        """Where each comes from."""
+
+    @property
+    def exemplar(self) -> NDArray[np.uint16]:
+        """From which exemplar."""
+
+    @property
+    def label(self) -> NDArray[np.uint32]:
+        """Of which patch it is."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Sides of the picture."""
+
+    def frame_array(self) -> NDArray[np.float32] | None:
+        """Return the Jacobians: none, by label, or dense."""
+
+    def frames(self) -> NDArray[np.float32]:
+        """Return that of each pixel."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,6 +55,35 @@ class Pixels:
     """Frame of each label; none where all are the identity or some map has a frame for each pixel."""
     pixels: NDArray[np.float32] | None
     """Frame of each pixel, where some map has one."""
+
+    @classmethod
+    def chain(cls, maps: Sequence[Mapped]) -> Pixels:
+        """Return the pixels of maps, one map after the other."""
+        axes = maps[0].coordinates.shape[-1]
+        counts = [int(m.label.max()) + 1 if m.label.size else 0 for m in maps]
+        offsets = np.cumsum([0, *counts]).astype(np.uint64)
+        table = pixels = None
+        arrays = [m.frame_array() for m in maps]
+        if any(f is not None and f.ndim > 3 for f in arrays):
+            pixels = np.concatenate([m.frames().reshape(-1, axes, axes) for m in maps])
+        elif any(f is not None for f in arrays):
+            eye = np.eye(axes, dtype=np.float32)
+            table = np.concatenate(
+                [
+                    np.broadcast_to(eye, (n, axes, axes)) if frame is None else frame[:n]
+                    for frame, n in zip(arrays, counts, strict=True)
+                ]
+            )
+        return cls(
+            np.array([m.shape for m in maps]),
+            np.cumsum([0, *(m.label.size for m in maps[:-1])]),
+            np.concatenate([m.coordinates.reshape(-1, axes) for m in maps]),
+            np.concatenate([m.exemplar.ravel() for m in maps]),
+            np.concatenate([m.label.ravel() + o for m, o in zip(maps, offsets[:-1], strict=True)]),
+            int(offsets[-1]),
+            table,
+            pixels,
+        )
 
     @property
     def count(self) -> int:
@@ -58,6 +114,40 @@ class Pixels:
         if self.table is None:
             return np.broadcast_to(np.eye(axes, dtype=np.float32), (*label.shape, axes, axes))
         return np.asarray(self.table[label], np.float32)
+
+    def pick(
+        self,
+        place: NDArray[np.unsignedinteger],
+        outer: NDArray[np.uint32],
+        frame: NDArray[np.float32] | None = None,
+        rest: NDArray[np.float32] | None = None,
+        out: NDArray[np.uint32] | None = None,
+    ) -> tuple[NDArray[np.float32], NDArray[np.uint16], NDArray[np.uint32], NDArray[np.float32] | None]:
+        """Put pixels together: S(p) = inner(q) + J_inner rest, J = J_inner frame; ``out`` for labels may be ``outer``.
+
+        Returns the coordinates, exemplars, labels and frames of a source map.
+        """
+        axes = place.ndim
+        exemplar = np.empty(place.shape, np.uint16)
+        coordinates = np.empty((*place.shape, axes), np.float32)
+        label = np.empty(place.shape, np.uint32) if out is None else out
+        each = self.framed or (frame is not None and frame.ndim > 3)
+        frames = np.empty((*place.shape, axes, axes), np.float32) if each else None
+        for band in divide_bands(place.shape):
+            at = place[band]
+            coordinates[band], exemplar[band] = self.coordinates[at], self.exemplar[at]
+            if rest is not None:
+                coordinates[band] += np.einsum("...ij,...j->...i", self.frames(at), rest[band])
+            if frames is not None:
+                frames[band] = self.frames(at)
+                if frame is not None:
+                    frames[band] @= frame[band] if frame.ndim > 3 else frame[outer[band]]
+        keys = number_pairs(outer, self, place, label)
+        if frames is None and (frame is not None or self.table is not None):
+            outer_of, inner_of = np.divmod(keys, np.uint64(max(1, self.labels)))
+            frames = self.frames_of(inner_of)
+            frames = np.asarray(frames if frame is None else frames @ frame[outer_of], np.float32)
+        return coordinates, exemplar, label, frames
 
 
 BAND = 1 << 18
