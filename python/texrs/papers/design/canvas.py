@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._typing import Bools, Floats, Labels
+from texrs._typing import Array, Bools, Floats, Labels
 from texrs.exemplar.symmetry import Flip
 from texrs.kernels.gather import gather
 from texrs.kernels.seam import cut
 from texrs.papers.design.elements import CONTEXT, INNER, Element, Placement
 from texrs.source_map import SourceMap
 
-__all__ = ["Canvas", "Draft"]
+__all__ = ["Canvas", "Draft", "Tile"]
 
 AGREEMENT = 0.6
 """Largest mean difference between the surroundings of an element and those that it comes to, in standard deviations."""
@@ -36,6 +36,21 @@ class Draft:
     """The mirror image of the exemplar that it was made from."""
     log: list[dict[str, Any]]
     """What was done to each element."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tile:
+    """A deformed and completed texture of the exemplar's size."""
+
+    source: SourceMap
+    colours: Floats
+    holes: float
+    """Share of it that was open."""
+    mirror: Flip
+    """The mirror image of the exemplar that it was made from."""
+    log: list[dict[str, Any]]
+    """What was done to each element."""
+    stages: dict[str, Array]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,6 +13,7 @@ from texrs.exemplar.patches import choose_usual_side, index_patches, mark_corner
 from texrs.exemplar.segmentation import Segmentation
 from texrs.exemplar.symmetry import ALL, NONE, Flip
 from texrs.kernels.patch_search import PatchIndex
+from texrs.papers.design.canvas import Tile
 from texrs.papers.design.operations import Moves
 from texrs.papers.design.options import DeformationOptions
 
@@ -45,6 +46,8 @@ class Plan:
     """Whether elements stay where they are, so that variety comes from the patches alone."""
     tried: Mapping[str, Mapping[str, float]] | None = None
     """How each plan was judged that was tried, if any."""
+    tiles: Sequence[Tile] = ()
+    """The first tiles of the trial's seed, if they were just made."""
 
 
 def make_plan(

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from texrs._arrays import as_rgb
 from texrs._typing import Array
 from texrs.papers.design.arguments import Arguments
+from texrs.papers.design.canvas import Tile
 from texrs.papers.design.deformation import classify
 from texrs.papers.design.plan import Plan
-from texrs.papers.design.tiles import Tile
 from texrs.source_map import SourceMap
 from texrs.volume import paint
 

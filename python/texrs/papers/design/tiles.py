@@ -2,42 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._typing import Array, Bools, Floats
+from texrs._typing import Bools
 from texrs.exemplar.patches import place_patches
-from texrs.exemplar.symmetry import Flip, flip, flip_coordinates, flip_frame
+from texrs.exemplar.symmetry import flip, flip_coordinates, flip_frame
 from texrs.kernels.complete import complete
 from texrs.kernels.gather import gather
-from texrs.papers.design.canvas import Draft
+from texrs.papers.design.canvas import Draft, Tile
 from texrs.papers.design.plan import Plan
 from texrs.source_map import SourceMap
 
-__all__ = ["Tile", "fill_holes"]
+__all__ = ["fill_holes"]
 
 CANDIDATES = 5
 """Matches of a hole that are cut in; the cheapest is kept."""
 KEPT = 2.0
 """Depth in pixels from which on elements are not cut when holes are filled: seams may follow their outlines."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Tile:
-    """A deformed and completed texture of the exemplar's size."""
-
-    source: SourceMap
-    colours: Floats
-    holes: float
-    """Share of it that was open."""
-    mirror: Flip
-    """The mirror image of the exemplar that it was made from."""
-    log: list[dict[str, Any]]
-    """What was done to each element."""
-    stages: dict[str, Array]
 
 
 def fill_holes(draft: Draft, plan: Plan, shapes: tuple[tuple[int, ...], ...], which: int, seed: int) -> Tile:

@@ -14,12 +14,13 @@ import numpy as np
 from texrs.exemplar import ElementOptions, Exemplar
 from texrs.judging import judge
 from texrs.papers.design.arguments import Arguments
+from texrs.papers.design.canvas import Tile
 from texrs.papers.design.deformation import deform_elements
 from texrs.papers.design.literal import move_layers
 from texrs.papers.design.options import DeformationOptions
 from texrs.papers.design.plan import Plan
 from texrs.papers.design.texture import correct_colours, look_up, say_finish, stitch_tiles
-from texrs.papers.design.tiles import Tile, fill_holes
+from texrs.papers.design.tiles import fill_holes
 from texrs.source_map import SourceMap
 
 __all__ = ["choose_plan", "make_composite"]
@@ -30,6 +31,8 @@ LEAST, SHARE = 192, 0.75
 """Least side of a trial in pixels, and its side as a share of the exemplar's shorter one."""
 TILES = 2
 """Deformed copies of the exemplar that a trial is stitched from, at most."""
+TRIAL = 0
+"""The seed of all trials, whose copies serve the texture of that seed too."""
 
 
 def make_composite(plans: Sequence[Plan], arguments: Arguments, seed: int) -> tuple[list[Tile], SourceMap]:
@@ -41,6 +44,9 @@ def make_composite(plans: Sequence[Plan], arguments: Arguments, seed: int) -> tu
         tile, which = divmod(number, len(plans))
         plan = plans[which]
         if (plan.still and tile >= len(plan.mirrors)) or (which and arguments.density is not None):
+            continue
+        if seed == TRIAL and len(plans) == 1 and tile < len(plan.tiles):
+            tiles.append(plan.tiles[tile])
             continue
         draft = move_layers(plan, seed, which, tile) if plan.literal else deform_elements(plan, seed, tile)
         tiles.append(fill_holes(draft, plan, arguments.shapes, which, (seed + tile) % 2**64))
@@ -69,15 +75,23 @@ def choose_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, argume
         return still if arguments.plan == "still" and not plan.literal else plan
     ways = {"move": plan, "still": still}
     key = ("design trials", elements.key, arguments.side, min(TILES, arguments.tiles), arguments.screening)
-    tried = exemplar.remember(
-        key, lambda: {name: try_plan(p, exemplar, elements, arguments) for name, p in ways.items()}
-    )
-    better = tried["still"]["score"] < CLEARLY * tried["move"]["score"]
-    return replace(still if better else plan, tried=tried)
+    made: dict[str, list[Tile]] = {}
+
+    def judge_each() -> Mapping[str, Mapping[str, float]]:
+        figures = {}
+        for name, way in ways.items():
+            made[name], figures[name] = try_plan(way, exemplar, elements, arguments)
+        return figures
+
+    tried = exemplar.remember(key, judge_each)
+    best = "still" if tried["still"]["score"] < CLEARLY * tried["move"]["score"] else "move"
+    return replace(ways[best], tried=tried, tiles=made.get(best, ()))
 
 
-def try_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, arguments: Arguments) -> Mapping[str, float]:
-    """Make a small texture by a plan, and judge it."""
+def try_plan(
+    plan: Plan, exemplar: Exemplar, elements: ElementOptions, arguments: Arguments
+) -> tuple[list[Tile], Mapping[str, float]]:
+    """Make a small texture by a plan, and judge it; return its tiles, too."""
     side = max(LEAST, round(SHARE * min(exemplar.shape)))
     small = replace(
         arguments,
@@ -90,6 +104,6 @@ def try_plan(plan: Plan, exemplar: Exemplar, elements: ElementOptions, arguments
         tiles=min(TILES, arguments.tiles),
         watch=lambda stage, share: arguments.watch("try", 0.5 * plan.still),
     )
-    _, composite = make_composite([plan], small, 0)
+    tiles, composite = make_composite([plan], small, TRIAL)
     image, _ = correct_colours(composite, look_up(composite, small), small)
-    return judge(exemplar, composite, image, elements=elements, wrap=True).report()
+    return tiles, judge(exemplar, composite, image, elements=elements, wrap=True).report()
