@@ -1,10 +1,15 @@
 """How large things are where there is a plane, where there is none, and where nobody can say."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import texrs
 from plane_checks import bend, bulge, look, look_twice, roll
-from texrs import Plane, planes, samples
+from texrs import Plane, io, planes, samples
+from texrs.cli import main
 from texrs.errors import InvalidInput
 from texrs.planes._choose import measure_scale
 from texrs.planes._sizes import SURE, agree
@@ -49,6 +54,32 @@ def test_what_nobody_knows_is_even_and_said() -> None:
         measure_scale(look_twice(), np.ones((192, 224), np.bool_))
 
 
+def test_verbs_say_what_was_measured_and_how_surely(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    floor = samples.tilted_discs((128, 128)).image
+    hole = np.zeros((128, 128), np.bool_)
+    hole[60:80, 50:70] = True
+    found = planes.measure(floor)
+    grown = texrs.perspective(floor, size=64)
+    assert grown.report["measured"] == found.as_dict() == json.loads(json.dumps(grown.report["measured"]))
+    assert (found.as_dict()["shape"], found.as_dict()["kind"]) == ("plane", "width")
+    assert texrs.perspective(floor, "front", 64).report["measured"] is None
+    report = texrs.complete(floor, hole, scale_map="auto").report
+    assert report["measured"]["shape"] == "plane"
+    assert report["measured"]["confidence"] >= SURE
+    assert report["exemplar_measured"] is None
+    report = texrs.complete(
+        floor, hole, exemplar=floor, scale_map=found.scale, exemplar_scale_map="auto", method="optimise"
+    ).report
+    assert (report["measured"], report["exemplar_measured"]) == (None, found.as_dict())
+    io.write(tmp_path / "floor.png", floor)
+    assert main(["perspective", str(tmp_path / "floor.png"), "-o", str(tmp_path / "out.png"), "--size", "64"]) == 0
+    assert found.plane is not None
+    says = (
+        f"sizes measured on a plane (slant {found.plane.slant:.0f}, tilt {found.plane.tilt:.0f}) with a confidence of"
+    )
+    assert says in capsys.readouterr().err
+
+
 def test_a_voice_the_other_way_round_is_outvoted() -> None:
     slope = np.linspace(-0.5, 0.5, 200)
     noise = np.random.default_rng(0).normal(0, 0.03, (4, 200))
@@ -62,7 +93,7 @@ def test_a_voice_the_other_way_round_is_outvoted() -> None:
 def test_small_pictures_are_doubtful() -> None:
     floor = samples.tilted_discs((56, 56))
     with pytest.warns(UserWarning, match="too little to measure in more than one way"):
-        scale = measure_scale(floor.image, np.ones((56, 56), np.bool_))
+        scale = measure_scale(floor.image, np.ones((56, 56), np.bool_)).scale
     assert scale.shape == (56, 56)
 
 

@@ -129,6 +129,34 @@ def test_files_keep_the_kind(tmp_path, monkeypatch, capsys, name):
     assert "--scale-kind: allowed are" in capsys.readouterr().err
 
 
+def test_holes_are_filled_by_maps_of_either_kind(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    floor = samples.tilted_discs((96, 96))
+    hole = np.zeros((96, 96), np.bool_)
+    hole[50:70, 40:60] = True
+    plane = texrs.planes.find(floor.image)
+    wide, areas = plane.scale_map(), plane.scale_map("area")
+    by_widths = texrs.complete(floor.image, hole, scale_map=wide)
+    # Arrays that do not say what they hold.
+    one, other = np.array(wide), np.array(areas)
+    said = texrs.complete(floor.image, hole, scale_map=one, kind="width")
+    np.testing.assert_array_equal(said.image, by_widths.image)
+    by_areas = texrs.complete(floor.image, hole, scale_map=areas)
+    np.testing.assert_array_equal(texrs.complete(floor.image, hole, scale_map=other, kind="area").image, by_areas.image)
+    assert (by_areas.image != texrs.complete(floor.image, hole, scale_map=other, kind="width").image).any()
+    with pytest.raises(InvalidInput, match="kind: allowed are width and area"):
+        texrs.complete(floor.image, hole, scale_map=one, kind="length")
+    with pytest.raises(InvalidInput, match="kind: says what a scale map holds"):
+        texrs.complete(floor.image, hole, kind="width")
+    for name, values in (("floor.png", floor.image), ("hole.png", hole), ("map.npy", other)):
+        io.write(name, values)
+    command = ["complete", "floor.png", "hole.png", "-o", "out.png", "--scale-map", "map.npy", "--scale-kind"]
+    assert main([*command, "area", "-q"]) == 0
+    np.testing.assert_array_equal(io.read("out.png"), by_areas.image)
+    assert main([*command, "length"]) == 2
+    assert "--scale-kind: allowed are" in capsys.readouterr().err
+
+
 def test_descriptions_come_back(tmp_path):
     for name in ("a.png", "a.tif", "a.npy"):
         io.write(tmp_path / name, np.zeros((4, 5), np.uint8), description="plain words")

@@ -207,8 +207,9 @@ def make_verb(name: str) -> Verb:
             from texrs.completion import complete
 
             kinds = {"exemplar": SOURCE, "scale_map": MAP_OR_AUTO, "exemplar_scale_map": MAP_OR_AUTO}
-            names = {"exemplar": "from", "exemplar_scale_map": "from-scale-map"}
-            return Verb(Options(complete, arguments={"image": UNKNOWN, "hole": HOLE}, kinds=kinds, names=names))
+            names = {"exemplar": "from", "exemplar_scale_map": "from-scale-map", "kind": "scale-kind"}
+            options = Options(complete, arguments={"image": UNKNOWN, "hole": HOLE}, kinds=kinds, names=names)
+            return Verb(options, says=tell_sizes)
         case "design":
             from texrs.papers.design import design, design_variants
 
@@ -223,7 +224,7 @@ def make_verb(name: str) -> Verb:
                 kinds={"scale_map": SEEN, "target": TARGET, "direction": DIRECTION},
                 names={"kind": "scale-kind"},
             )
-            return Verb(options, times=2, shape="target", knows=read_exemplar_camera)
+            return Verb(options, times=2, shape="target", says=tell_sizes, knows=read_exemplar_camera)
         case "rectify":
             from texrs.rectification import rectify
 
@@ -261,6 +262,19 @@ def make_verb(name: str) -> Verb:
 def count_moved(result: Synthesis) -> str:
     """Return how many elements moved."""
     return f", {len(result.report['matches'])} elements moved"
+
+
+def tell_sizes(result: Synthesis) -> str:
+    """Return of what sizes were measured, and how surely."""
+    found = result.report["measured"]
+    if found is None:
+        return ""
+    where = {"curved": "on a curved surface", "free": "place by place", "even": "nowhere"}.get(
+        found["shape"], "on a plane"
+    )
+    if found["plane"] is not None:
+        where += f" (slant {found['plane']['slant']:.0f}, tilt {found['plane']['tilt']:.0f})"
+    return f", sizes measured {where} with a confidence of {found['confidence']:.2f}"
 
 
 def read_exemplar_camera(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:

@@ -28,6 +28,8 @@ from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
 from texrs.exemplar.symmetry import NONE
 from texrs.materials import Material
+from texrs.planes import Sizes
+from texrs.scale_maps._kinds import Kind, as_kind
 from texrs.synthesis import Synthesis
 
 __all__ = ["complete"]
@@ -42,6 +44,7 @@ def complete(
     allowed: Array | None = None,
     scale_map: Array | str | None = None,
     exemplar_scale_map: Array | str | None = None,
+    kind: Kind | None = None,
     method: Literal["patch", "optimise"] = "patch",
     patch: int | None = None,
     boundary: int = 0,
@@ -72,6 +75,9 @@ def complete(
     exemplar_scale_map : {None, "auto"} or (h, w) float array, optional
         How large they are in ``exemplar``, in the units of ``scale_map``. None: 1 everywhere, as in a picture taken from the
         front; measured maps have a geometric mean of 1.
+    kind : {"width", "area"}, optional
+        What the maps hold that do not say so themselves (`texrs.scale_maps.ScaleMap`): "width", widths across the slope;
+        "area", square roots of areas. None: what each fits best, as a map of a plane.
     method : {"patch", "optimise"}
         How: "patch", patches that fit what is around, cut in [1]_; where the scale map is that of a plane, and there is no
         ``exemplar``, patches of the plane, seen as they are seen in the hole. "optimise", windows corrected until each is
@@ -107,7 +113,9 @@ def complete(
         The filled image, in the dtype and with the channels of the picture. Its source map looks into the picture, or
         into ``[image, exemplar]``; pixels that are kept map to themselves, and none maps into the hole. To render a
         picture that is NaN in the hole through it, put any number there. The stages are ``"known"``, ``"patches"``
-        (each in a shade of its own) and ``"composite"``, the result before ``blend``.
+        (each in a shade of its own) and ``"composite"``, the result before ``blend``. In the report ``"measured"`` tells of
+        a ``scale_map`` "auto" what it is of, as `texrs.planes.Sizes` has it, and how sure that is; ``"exemplar_measured"``
+        the same of the exemplar's.
 
     Raises
     ------
@@ -142,6 +150,9 @@ def complete(
     as_method(method, "patch", "optimise")
     if exemplar_scale_map is not None and (exemplar is None or scale_map is None):
         raise InvalidInput("exemplar_scale_map: needs an exemplar, and a scale_map whose units it shares")
+    if kind is not None and scale_map is None:
+        raise InvalidInput("kind: says what a scale map holds, and there is none; give one, or leave it out")
+    said = None if kind is None else as_kind(kind)
     if mirror is not None or scale_map is not None:
         mirror = False if mirror is None else as_bool(mirror, "mirror")
     screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
@@ -159,7 +170,10 @@ def complete(
 
     watch("complete", 0.0)
     made = Filling(map_untouched(shapes), 0.0, 0, [], True)
-    scales = recover_scales(pictures, ~usable, scale_map, exemplar_scale_map) if open_.any() else None
+    scales: list[Floats] | None = None
+    measured: list[Sizes | None] = [None, None]
+    if open_.any():
+        scales, measured = recover_scales(pictures, ~usable, scale_map, exemplar_scale_map, said)
     levels: list[dict[str, object]] = []
     wide = widen(open_, width, cyclic)
     mirrors = choose_mirrors(pictures, open_, mirror) if open_.any() and method == "patch" else (NONE,)
@@ -210,6 +224,8 @@ def complete(
         "seed": seed,
         "hole": float(open_.mean()),
         "scaled": scale_map is not None,
+        "measured": None if measured[0] is None else measured[0].as_dict(),
+        "exemplar_measured": None if measured[1] is None else measured[1].as_dict(),
         "replaced_outside": int(np.count_nonzero(~open_[new])),
         "patch": round(made.side, 3),
         "tried": [[s, round(shown, 3)] for s, shown in made.tried],
@@ -264,14 +280,16 @@ def check_allowed(allowed: object, open_: Bools, fits: bool) -> Bools:
     return usable
 
 
-def recover_scales(pictures: Sequence[Array], open_: Bools, own: object, of_exemplar: object) -> list[Floats] | None:
-    """Return the scale maps of the picture and of the one to copy from, if scales count."""
-    scale = recover_scale(pictures[0], open_, own)
+def recover_scales(
+    pictures: Sequence[Array], open_: Bools, own: object, of_exemplar: object, kind: Kind | None
+) -> tuple[list[Floats] | None, list[Sizes | None]]:
+    """Return the scale maps of the picture and of the one to copy from, if scales count, and how each was measured."""
+    scale, measured = recover_scale(pictures[0], open_, own, kind=kind)
     if scale is None or len(pictures) == 1:
-        return None if scale is None else [scale]
+        return None if scale is None else [scale], [measured, None]
     shape = (pictures[1].shape[0], pictures[1].shape[1])
-    other = recover_scale(pictures[1], np.zeros(shape, bool), of_exemplar, "exemplar_scale_map")
-    return [scale, np.ones(shape, np.float32) if other is None else other]
+    other, beside = recover_scale(pictures[1], np.zeros(shape, bool), of_exemplar, "exemplar_scale_map", kind)
+    return [scale, np.ones(shape, np.float32) if other is None else other], [measured, beside]
 
 
 def check_pictures(array: Array, hole: object, exemplar: object | None) -> tuple[list[Array], Bools]:

@@ -18,8 +18,9 @@ from texrs.errors import InvalidInput
 from texrs.exemplar.analysis import count_levels
 from texrs.exemplar.atlas import RADIUS, Atlas, extend_sizes
 from texrs.growth import FROM_ATLAS, Surroundings, grow_from_atlas
+from texrs.planes import Sizes
 from texrs.planes._choose import measure_scale
-from texrs.scale_maps._kinds import find_kind, keep_kind
+from texrs.scale_maps._kinds import Kind, find_kind, keep_kind
 from texrs.scale_maps._maps import as_map
 from texrs.source_map import SourceMap
 
@@ -37,25 +38,28 @@ NOWHERE = 1e6
 """Scale of what is not to be copied: none that is ever wanted."""
 
 
-def recover_scale(picture: Array, open_: Bools, given: object, name: str = "scale_map") -> Floats | None:
-    """Return the scale map of a picture with holes: measured, or given, and continued into the holes where it is not."""
+def recover_scale(
+    picture: Array, open_: Bools, given: object, name: str = "scale_map", kind: Kind | None = None
+) -> tuple[Floats | None, Sizes | None]:
+    """Return the scale map of a picture with holes: given, and continued into them, or measured, and how that was."""
     if given is None:
-        return None
+        return None, None
     known = ~open_
     if isinstance(given, str):
         if given != "auto":
             raise InvalidInput(f"{name}: allowed are 'auto', a map or None; got {given!r}")
         if not known.any():
             raise InvalidInput(f"{name}: 'auto' measures what is known, and the hole covers everything; give a map")
-        return measure_scale(picture, known)
-    scale, kind = np.asarray(given), find_kind(given)
+        found = measure_scale(picture, known)
+        return found.scale, found
+    scale, holds = np.asarray(given), find_kind(given) or kind
     if scale.shape == open_.shape and scale.dtype.kind == "f":
         # Where there is a hole, a map may have one too.
         with np.errstate(invalid="ignore"):
             bad = open_ & ~(np.isfinite(scale) & (scale > 0))
         if bad.any() and not bad.all():
-            return scale_maps.extend(keep_kind(np.where(bad, 1, scale), kind), ~bad)
-    return keep_kind(as_map(scale, name, open_.shape), kind)
+            return scale_maps.extend(keep_kind(np.where(bad, 1, scale), holds), ~bad), None
+    return keep_kind(as_map(scale, name, open_.shape), holds), None
 
 
 def optimise(

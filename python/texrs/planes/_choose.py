@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from texrs._typing import Array, Bools, Floats
+from texrs._typing import Array, Bools
 from texrs.errors import InvalidInput
 from texrs.planes._find import find
 from texrs.planes._ground import find_ground
 from texrs.planes._plane import Plane
-from texrs.planes._sizes import SURE, measure
+from texrs.planes._sizes import SURE, Sizes, measure
 from texrs.planes._view import View
 
 __all__ = ["SURE", "Seen", "as_views", "find_grounds", "measure_scale", "see", "see_in"]
@@ -96,7 +96,7 @@ def find_grounds(
     return found
 
 
-def measure_scale(pixels: Array, known: Bools) -> Floats:
+def measure_scale(pixels: Array, known: Bools) -> Sizes:
     """Return how large things are at each pixel of a picture, with a warning where that is not sure."""
     found = measure(pixels, known=known)
     if found.confidence < SURE:
@@ -108,4 +108,4 @@ def measure_scale(pixels: Array, known: Bools) -> Floats:
             "not look right give a map",
             stacklevel=3,
         )
-    return found.scale
+    return found

@@ -9,7 +9,7 @@ each way has a voice, and what most of them say counts. Where they say nothing i
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +74,11 @@ class Sizes:
     shape: Shape
     plane: Plane | None
     confidence: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what is known beside the map, as JSON types: shape, what the map holds, confidence, and the plane or None."""
+        plane = None if self.plane is None else self.plane.as_dict()
+        return {"shape": self.shape, "kind": self.scale.kind, "confidence": self.confidence, "plane": plane}
 
 
 def measure(image: object, *, known: object = None) -> Sizes:

@@ -140,7 +140,8 @@ def perspective(
     Synthesis
         The picture; its source map, whose labels tell the patches and whose frames how the exemplar is seen at each pixel:
         ``source.render(map, antialias=True)`` brings any map in register along; the stages, of which ``"sheet"`` is what
-        patches are cut from and ``"target"`` the scale map that was followed; and a report.
+        patches are cut from and ``"target"`` the scale map that was followed; and a report, in which ``"measured"`` tells
+        of a ``scale_map`` "auto" what it is of, as `texrs.planes.Sizes` has it, and how sure that is.
 
     Raises
     ------
@@ -224,6 +225,7 @@ def describe(asked: Request, laid: Laid, found: FromSheet) -> dict[str, Any]:
         "method": "default",
         "seed": asked.seed,
         "scale_weight": asked.strength,
+        "measured": asked.describe_measured(),
         "sheet": laid.sheet.describe(),
         "surface": asked.surface is not None,
         "turned": asked.turn is not None,

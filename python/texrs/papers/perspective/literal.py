@@ -53,7 +53,13 @@ def average_windows(asked: Request, progress: Progress | None) -> Synthesis:
     )
     source = SourceMap.from_coordinates(coordinates, image.shape[:2])
     composite = source.render(asked.exemplar.image, interpolation="nearest")
-    report = {"method": "paper", "seed": asked.seed, "scale_weight": asked.strength, "energies": energies}
+    report = {
+        "method": "paper",
+        "seed": asked.seed,
+        "scale_weight": asked.strength,
+        "measured": asked.describe_measured(),
+        "energies": energies,
+    }
     return Synthesis(made.reshape(composite.shape), source, {"target": target, "composite": composite}, report)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from texrs.papers.perspective.directions import as_turn
 from texrs.papers.perspective.sizes import Sizes, check_sizes
 from texrs.papers.perspective.targets import Surface, as_surface, as_target, find_size, is_map, is_words, read_plane
 from texrs.planes import FOV, Plane
+from texrs.planes import Sizes as Measured
 from texrs.planes._choose import measure_scale
 from texrs.scale_maps import Measuring
 from texrs.scale_maps._jacobians import measure_sizes
@@ -46,6 +47,8 @@ class Request:
         How large those of the output are to be.
     kinds : (kind, kind)
         What the two maps hold; None where nobody says.
+    measured : texrs.planes.Sizes, optional
+        How large its elements are as that was measured in the picture alone, and how sure that is.
     plane : texrs.Plane, optional
         That the exemplar shows, where it is given.
     surface : (rows, columns, 2, 2) float64, optional
@@ -73,6 +76,7 @@ class Request:
     scale: Floats
     target: Floats
     kinds: tuple[Kind | None, Kind | None]
+    measured: Measured | None
     plane: Plane | None
     surface: Surface | None
     turn: Surface | None
@@ -126,7 +130,7 @@ class Request:
             raise InvalidInput(
                 "method: the paper's knows no surfaces and no directions; give a scale map as target, or leave out the method"
             )
-        plane, scale = find_scale(known, scale_map, measuring)
+        plane, scale, measured = find_scale(known, scale_map, measuring)
         mine = as_map(scale, "scale_map", known.shape)
         kinds = find_kind(scale) or said, find_kind(scale if target is None else target) or said
         if surface is None:
@@ -141,6 +145,7 @@ class Request:
             mine,
             wanted,
             kinds,
+            measured,
             plane,
             surface,
             turn,
@@ -153,6 +158,10 @@ class Request:
             interpolation,
         )
 
+    def describe_measured(self) -> dict[str, Any] | None:
+        """Return how the exemplar's sizes were measured, as JSON types, or None where they were said."""
+        return None if self.measured is None else self.measured.as_dict()
+
     def match_kinds(self, power: float) -> Request:
         """Return the request with a target that holds what the exemplar's map does: a power of it holds widths."""
         theirs = {None: power, "width": 1.0, "area": AREAS}[self.kinds[1]]
@@ -161,8 +170,8 @@ class Request:
 
 def find_scale(
     exemplar: Exemplar, scale_map: Array | Plane | str, measuring: Measuring | None
-) -> tuple[Plane | None, Array]:
-    """Return the plane that an exemplar shows, if it is given, and how large its elements are: given, or measured."""
+) -> tuple[Plane | None, Array, Measured | None]:
+    """Return the plane that an exemplar shows, if it is given, how large its elements are, and how that was measured."""
     if measuring is not None and not (isinstance(scale_map, str) and scale_map == "auto"):
         raise InvalidInput("measuring: a scale map is given, so that nothing is measured; leave out one of them")
     if is_words(scale_map):
@@ -172,16 +181,17 @@ def find_scale(
             raise InvalidInput(
                 f"scale_map: needs a plane in a picture of {exemplar.shape}, as the exemplar is, got {scale_map.shape}"
             )
-        return scale_map, scale_map.scale_map()
+        return scale_map, scale_map.scale_map(), None
     if not isinstance(scale_map, str):
-        return None, scale_map
+        return None, scale_map, None
     if as_choice(scale_map, "scale_map", ("auto", "front")) == "front":
-        return Plane((exemplar.shape[0], exemplar.shape[1]), 0.0), np.ones(exemplar.shape, np.float32)
+        return Plane((exemplar.shape[0], exemplar.shape[1]), 0.0), np.ones(exemplar.shape, np.float32), None
     if measuring is None:
-        return None, measure_scale(exemplar.image, np.ones(exemplar.shape, np.bool_))
+        found = measure_scale(exemplar.image, np.ones(exemplar.shape, np.bool_))
+        return None, found.scale, found
     if not isinstance(measuring, Measuring):
         raise InvalidInput(f"measuring: needs a texrs.scale_maps.Measuring, got {measuring!r}")
-    return None, measuring.measure(exemplar.image)
+    return None, measuring.measure(exemplar.image), None
 
 
 def check_wrap(values: Array, target: Floats, wrap: Sequence[bool], stretched: bool) -> None:
