@@ -178,6 +178,10 @@ class Appearance:
             raise InvalidInput(f"analysis: its arrays do not belong together ({error})") from None
         return made
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Travel as plain arrays."""
+        return Appearance.from_arrays, (self.arrays(),)
+
     def blocks(
         self,
         region: Region,

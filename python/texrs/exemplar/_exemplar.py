@@ -45,7 +45,8 @@ class Exemplar:
 
     Every verb that grows from an example takes an array or an `Exemplar`. What a verb finds out about it, as its
     pyramid of windows, is worked out once: it stays with the exemplar, and is kept for a while for any array of the
-    same content.
+    same content. It travels to other processes as its pixels, what was said of them and the small facts; the others (the
+    pyramid, the elements) are worked out again where they are asked for, once a process, for they would be 20 times as large.
 
     Parameters
     ----------
@@ -305,6 +306,11 @@ class Exemplar:
             ("segmentation", options.key), lambda: segment(self._pixels, options, progress=progress).freeze()
         )
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Travel without large facts: they are worked out again, and kept by content."""
+        small = {fact: value for fact, value in self._facts.items() if isinstance(value, bool | float | tuple)}
+        return _restore, (self._image, self._axes, self._labels, self._repeat, small)
+
     # --- what is kept ------------------------------------------------------------------------------------------------
 
     @cached_property
@@ -386,6 +392,15 @@ class Exemplar:
 
     def _measure(self, levels: int) -> tuple[bool, ...]:
         return measure_repeat(self.colours, axes=self._axes, levels=levels) if self._repeat is None else self._repeat
+
+
+def _restore(
+    image: Array, axes: int, labels: bool | None, repeat: tuple[bool, ...] | None, facts: dict[Hashable, object]
+) -> Exemplar:
+    """Return an exemplar that has travelled."""
+    made = Exemplar(image, axes=axes, labels=labels, repeat=repeat)
+    made._facts.update(facts)
+    return made
 
 
 def as_exemplar(value: object, name: str = "exemplar", *, axes: int = 2, minimum: int = 1) -> Exemplar:

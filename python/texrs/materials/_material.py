@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path as FilePath
 from typing import Literal
 
 import numpy as np
 
 from texrs._arrays import as_choice, as_float, as_image, as_int
+from texrs._cache import content_hash
 from texrs._progress import listen
 from texrs._typing import Array, Floats, Path, Progress
 from texrs.blending import apply
@@ -198,7 +200,18 @@ class Material(Exports):
     @property
     def base(self) -> Array:
         """The map that shows the material: its colours, or the first where it has none."""
-        return next((m for m in self.values() if m.role is Role.COLOUR), next(iter(self.values()))).pixels
+        return self[self.base_name].pixels
+
+    @property
+    def base_name(self) -> str:
+        """The name of that map."""
+        return self.find(Role.COLOUR) or next(iter(self))
+
+    @cached_property
+    def key(self) -> str:
+        """Digest of all maps, their roles and weights."""
+        parts = [(name, each.role.value, each.space) for name, each in self.items()]
+        return content_hash(self._axes, parts, sorted(self._weights.items()), *(m.pixels for m in self.values())).hex()
 
     def find(self, role: Role | str) -> str | None:
         """Return the name of the first map of a role, if there is one.

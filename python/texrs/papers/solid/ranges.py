@@ -1,0 +1,71 @@
+"""What stands between the brackets of a texture without borders."""
+
+from __future__ import annotations
+
+import numbers
+from collections.abc import Sequence
+
+import numpy as np
+
+from texrs._arrays import as_size
+from texrs._engine.pyramid import Region
+from texrs.errors import InvalidInput
+
+__all__ = ["FAR", "as_origin", "as_region"]
+
+FAR = 10**9
+"""Coordinates of the world are within so many voxels."""
+_ORDER = {2: "[y0:y1, x0:x1]", 3: "[z0:z1, y0:y1, x0:x1]"}
+
+
+def as_origin(origin: object, axes: int) -> tuple[int, ...]:
+    """Check the first voxel of a window: one number, or one an axis."""
+    values = [origin] * axes if isinstance(origin, numbers.Integral) else origin
+    if isinstance(values, Sequence | np.ndarray) and len(values) == axes:
+        ends = [_as_end(v) for v in values]
+        if None not in ends:
+            return tuple(int(v) for v in values)
+    raise InvalidInput(f"origin: needs {axes} integers within {FAR}, got {origin!r}")
+
+
+def as_region(index: object, axes: int) -> tuple[Region, list[bool]]:
+    """Return the region of an index, and which of its axes a single number takes away."""
+    parts = index if isinstance(index, tuple) else (index,)
+    if len(parts) != axes:
+        raise InvalidInput(f"texture: needs {axes} ranges, {_ORDER[axes]}; got {len(parts)}")
+    origin, shape, single = [], [], []
+    for part in parts:
+        one = isinstance(part, numbers.Integral) and not isinstance(part, bool)
+        if isinstance(part, slice):
+            if part.start is None or part.stop is None:
+                raise InvalidInput(f"texture: has no end, so a range needs both: start:stop; got {_spell(part)}")
+            if part.step is not None:
+                raise InvalidInput(f"texture: ranges have no step; got {_spell(part)}")
+            start, stop = _as_end(part.start), _as_end(part.stop)
+        elif one:
+            start = _as_end(part)
+            stop = None if start is None else start + 1
+        else:
+            raise InvalidInput(f"texture: takes integers and ranges, {_ORDER[axes]}; got {part!r}")
+        if start is None or stop is None:
+            raise InvalidInput(f"texture: a range needs integers within {FAR}, got {_spell(part)}")
+        if stop <= start:
+            raise InvalidInput(f"texture: the range {_spell(part)} is empty")
+        origin.append(start)
+        shape.append(stop - start)
+        single.append(one)
+    return Region(as_size(tuple(shape), axes=axes), tuple(origin), (False,) * axes), single
+
+
+def _as_end(value: object) -> int | None:
+    """Return an integer of the world; none where it is not one."""
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral) or not -FAR <= int(value) <= FAR:
+        return None
+    return int(value)
+
+
+def _spell(part: object) -> str:
+    if not isinstance(part, slice):
+        return repr(part)
+    ends = ["" if x is None else str(x) for x in (part.start, part.stop)]
+    return ":".join(ends if part.step is None else [*ends, str(part.step)])

@@ -1,0 +1,363 @@
+"""What textures without borders have in common: any part, any point, when it is asked for, in any process."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from texrs._arrays import as_int, as_seed, as_size
+from texrs._cache import Cache, content_hash
+from texrs._engine.pyramid import ONE, Region
+from texrs._progress import listen
+from texrs._typing import Array, Interpolation, Progress
+from texrs._verbs import finish
+from texrs.errors import InvalidInput
+from texrs.exemplar import Exemplar, as_exemplar
+from texrs.exemplar.analysis import COARSEST
+from texrs.fields import Field
+from texrs.fields._field import as_points
+from texrs.growth import Windows
+from texrs.growth.engine import Places
+from texrs.kernels.gather import gather
+from texrs.materials import Material
+from texrs.materials._material import apply_materials
+from texrs.papers.solid.layers import WORK, Layers
+from texrs.papers.solid.limits import check_memory
+from texrs.papers.solid.ranges import FAR, as_origin, as_region
+from texrs.papers.solid.request import as_field, as_interpolation
+from texrs.papers.solid.settings import CANDIDATES, ON_DEMAND, Quality, as_quality
+from texrs.papers.solid.translated import Translated
+from texrs.papers.solid.world import World
+from texrs.source_map import SourceMap
+from texrs.synthesis import Synthesis
+
+__all__ = ["Texture"]
+
+ARRIVED = 4
+"""Textures that came from another process and are kept: work in parts brings the same one with every part."""
+_BAND = 1 << 20
+
+
+class Texture:
+    """What pictures and volumes without borders have in common."""
+
+    axes: ClassVar[int]
+
+    def __init__(
+        self,
+        exemplar: Array | Exemplar | Material,
+        *,
+        field: Field | None = None,
+        seed: int = 0,
+        quality: Quality = "preserve",
+        interpolation: Interpolation | None = None,
+        cache_bytes: int = 256 << 20,
+        memory_limit: int | None = None,
+    ) -> None:
+        self._material = exemplar if isinstance(exemplar, Material) else None
+        shown = exemplar.guide if isinstance(exemplar, Material) else exemplar
+        known = as_exemplar(shown, axes=self.axes, minimum=COARSEST)
+        self._exemplar, self._how = known, as_interpolation(interpolation, known, "cubic")
+        self._field, self._seed, self._quality = as_field(field, self.axes), as_seed(seed), as_quality(quality)
+        limit = as_int(cache_bytes, "cache_bytes", 0, 1 << 48)
+        self._memory_limit, self._cache_bytes = memory_limit, limit
+        self._check(Region.whole((1,) * self.axes))
+        self._world: World | Layers
+        if self._quality == "fast":
+            levels = known.analyse(ON_DEMAND.radii).levels
+            self._world = World(Windows(levels, ON_DEMAND, self._seed, self._field), limit)
+        else:
+            tried = CANDIDATES[self._quality]
+            self._world = Layers(known, self._field, self._seed, candidates=tried, cache_bytes=limit)
+
+    @property
+    def exemplar(self) -> Exemplar:
+        """What it is made from, and what is known of that."""
+        return self._exemplar
+
+    @property
+    def material(self) -> Material | None:
+        """The material that it is made from, if it is one."""
+        return self._material
+
+    @property
+    def field(self) -> Field | None:
+        """The field; none where it leaves everything in place."""
+        return self._field
+
+    @property
+    def cached(self) -> int:
+        """Bytes of finished places that are kept: never more than ``cache_bytes``."""
+        return self._world.cached
+
+    def clear(self) -> None:
+        """Forget what is kept."""
+        self._world.clear()
+
+    def __repr__(self) -> str:
+        """Say what the texture is."""
+        shape = " x ".join(map(str, self._exemplar.shape))
+        how = "" if self._field is None else f", {self._field.describe()}"
+        return f"<unbounded texture from {shape}, seed {self._seed}{how}>"
+
+    @cached_property
+    def key(self) -> str | None:
+        """Digest of all that decides the texture: the same key, the same bytes. None if its field calls a function."""
+        if self._field is not None and self._field.key is None:
+            return None
+        field = None if self._field is None else self._field.key
+        maps = None if self._material is None else self._material.key
+        said = (type(self).__name__, self._exemplar.key, maps, field, self._seed, self._quality, self._how)
+        return content_hash(*said).hex()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Travel as the exemplar's pixels and the options; see `Exemplar` for what is worked out where it arrives."""
+        options = (self._field, self._seed, self._quality, self._how, self._cache_bytes, self._memory_limit)
+        return _restore, (type(self), self._material or self._exemplar, options, self.key)
+
+    def __getitem__(self, index: Any) -> Array:
+        """Return a part: ``texture[z0:z1, y0:y1, x0:x1]``, of any integers; a single one takes its axis away."""
+        region, single = as_region(index, self.axes)
+        self._check(region)
+        if self._material is None:
+            image = self._show(self._world.read(region))
+        else:
+            image = self.window(region.origin, region.shape).image
+        return image[tuple(0 if s else slice(None) for s in single)]
+
+    def window(
+        self, origin: int | Sequence[int], size: int | Sequence[int], *, progress: Progress | bool | None = None
+    ) -> Synthesis:
+        """Return a part with its source map.
+
+        Parameters
+        ----------
+        origin : int, or one an axis
+            First voxel, of the world; any integers within 10^9.
+        size : int, or one an axis
+            Voxels along each axis.
+        progress : callable or True, optional
+            Called with the stage and the share of it that is done; raising stops the work. True shows a bar.
+
+        Returns
+        -------
+        Synthesis
+            The image, and of a material all maps; its source map, whose labels are the patches of the window, counted within
+            it, and whose frames are those of rigid patches, else the field as it lies over the window; and a report.
+
+        Raises
+        ------
+        InvalidInput
+            Not such an origin or size, or a field that is singular in sight of the window.
+        LimitExceeded
+            The window would take more memory than allowed.
+        Cancelled
+            The work was stopped.
+
+        """
+        progress = listen(progress)
+        start = as_origin(origin, self.axes)
+        region = Region(as_size(size, axes=self.axes), start, (False,) * self.axes)
+        self._check(region)
+        places, source = self._look(region, progress)
+        source = source.finished(region.wrap, interpolation=self._how)
+        image = self._show(places)
+        report = {
+            "quality": self._quality,
+            "seed": self._seed,
+            "origin": list(start),
+            "field": None if self._field is None else self._field.describe(),
+            "repeats": list(self._exemplar.repeat),
+            "interpolation": self._how,
+        }
+        made = Synthesis(image, source, {"composite": image}, report)
+        return made if self._material is None else finish(made, [self._material], progress)
+
+    def sample(
+        self,
+        points: ArrayLike,
+        *,
+        interpolation: Interpolation | None = None,
+        progress: Progress | bool | None = None,
+    ) -> Array:
+        """Return the texture at any points, such as those of a mesh, of a path or of a ray.
+
+        Between voxels it is places that are carried on, not colours that are mixed: a point q looks up
+        S(p) + J(p) (q - p), where p is the voxel nearest to it. At whole coordinates it is the pixel of any window.
+
+        Parameters
+        ----------
+        points : (..., 2) or (..., 3) array_like
+            (row, column) or (plane, row, column), in voxels of the world with centres at the integers; within 10^9.
+        interpolation : {"nearest", "linear", "cubic"}, optional
+            Between the exemplar's samples; None is the texture's own. Labels are looked up at the nearest sample
+            whatever it says.
+        progress : callable or True, optional
+            Called with the stage and the share of it that is done; raising stops the work. True shows a bar.
+
+        Returns
+        -------
+        (...[, C]) array
+            In the exemplar's dtype; of a material the map that shows it.
+
+        Raises
+        ------
+        InvalidInput
+            Not such points, or a field that is singular at one of them.
+        Cancelled
+            The work was stopped.
+
+        See Also
+        --------
+        sample_maps : All maps of a material.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import texrs
+        >>> plane = texrs.PlaneTexture(texrs.samples.weave((64, 64)).image, seed=2)
+        >>> plane.sample([[0.5, 0.25], [1e6, -7.125], [3, 4]]).shape
+        (3, 3)
+        >>> bool((plane.sample([3, 4]) == plane[3, 4]).all())
+        True
+
+        """
+        at, how = as_points(points, self.axes), self._as_how(interpolation)
+        if self._material is not None:
+            return next(iter(self._sample_maps(at, how, listen(progress), only_base=True).values()))
+        places = self._carry_on(at.reshape(-1, self.axes), listen(progress))[0]
+        image = self._exemplar.image
+        return gather(image, places, interpolation=how).reshape(*at.shape[:-1], *image.shape[self.axes :])
+
+    def sample_maps(
+        self,
+        points: ArrayLike,
+        *,
+        interpolation: Interpolation | None = None,
+        progress: Progress | bool | None = None,
+    ) -> dict[str, Array]:
+        """Return every map of a material at any points, as `sample` does; vectors are turned with the texture.
+
+        Parameters
+        ----------
+        points : (..., 2) or (..., 3) array_like
+            As for `sample`.
+        interpolation : {"nearest", "linear", "cubic"}, optional
+            As for `sample`; labels are never interpolated.
+        progress : callable or True, optional
+            Called with the stage and the share of it that is done; raising stops the work. True shows a bar.
+
+        Returns
+        -------
+        dict of str to (...[, C]) array
+            By the names of the maps.
+
+        Raises
+        ------
+        InvalidInput
+            The texture is not made from a material, or as for `sample`.
+        Cancelled
+            The work was stopped.
+
+        Examples
+        --------
+        >>> import texrs
+        >>> stones = texrs.samples.pebbles((64, 64)).image
+        >>> texture = texrs.PlaneTexture(texrs.Material({"albedo": stones, "height": stones[..., 1]}))
+        >>> {name: values.shape for name, values in texture.sample_maps([[0, 0.5], [9, 70]]).items()}
+        {'albedo': (2, 3), 'height': (2,)}
+
+        """
+        if self._material is None:
+            raise InvalidInput("texture: is made from one array, not from a material; its values are those of sample()")
+        return self._sample_maps(as_points(points, self.axes), self._as_how(interpolation), listen(progress))
+
+    def _sample_maps(
+        self,
+        at: NDArray[np.float64],
+        how: Interpolation,
+        progress: Progress | None,
+        *,
+        only_base: bool = False,
+    ) -> dict[str, Array]:
+        """Return maps at points, as those of a picture of one row."""
+        assert self._material is not None
+        places, frames = self._carry_on(at.reshape(-1, self.axes), progress)
+        row = (*(1,) * (self.axes - 1), len(places))
+        frame = None if frames is None else frames.reshape(*row, self.axes, self.axes)
+        source = SourceMap.from_coordinates(places.reshape(*row, self.axes), self._exemplar.shape, frame=frame)
+        name, whole = self._material.base_name, self._material
+        used = Material({name: whole[name]}, axes=self.axes) if only_base else whole
+        made = apply_materials([used], source.finished((False,) * self.axes, interpolation=how), progress)
+        return {n: m.pixels.reshape(*at.shape[:-1], *m.pixels.shape[self.axes :]) for n, m in made.items()}
+
+    def _carry_on(
+        self, at: NDArray[np.float64], progress: Progress | None
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+        """Return the places of points between voxels, S(p) + J(p) (q - p), and the Jacobians; none where J is one."""
+        if len(at) and np.abs(at).max() > FAR:
+            raise InvalidInput(f"points: need to lie within {FAR} of the origin, got {np.abs(at).max():g}")
+        places = np.empty(at.shape, np.float32)
+        frames = None if self._field is None else np.empty((*at.shape, self.axes), np.float32)
+        voxel = np.floor(at + 0.5).astype(np.int64)
+        found = self._world.pick(voxel, progress) if len(at) else np.empty(at.shape, np.int32)
+        for start in range(0, len(at), _BAND):
+            part = slice(start, start + _BAND)
+            rest = (at[part] - voxel[part]).astype(np.float32)
+            if self._field is not None and frames is not None:
+                frames[part] = self._field.jacobians(voxel[part])
+                rest = np.einsum("...ij,...j->...i", frames[part], rest)
+            places[part] = found[part] / np.float32(ONE) + rest
+        return places, frames
+
+    def _as_how(self, interpolation: Interpolation | None) -> Interpolation:
+        return self._how if interpolation is None else as_interpolation(interpolation, self._exemplar, "cubic")
+
+    def _look(self, region: Region, progress: Progress | None) -> tuple[Places, SourceMap]:
+        """Return the places of a window, and its source map: its frames are those of rigid patches, else the field's."""
+        field, start = self._field, region.origin
+        varies = field is not None and field.constant is None
+        if field is not None and varies and any(start):
+            field = Translated(field, start)
+        if isinstance(self._world, World):
+            places = self._world.read(region, progress)
+            coordinates = (places / np.float32(ONE)).astype(np.float32, copy=False)
+            return places, SourceMap.from_coordinates(coordinates, self._exemplar.shape, frame=field)
+        places, labels, frames = self._world.look(region, progress)
+        coordinates = (places / np.float32(ONE)).astype(np.float32, copy=False)
+        frame = frames if varies and not self._world.bent else field
+        return places, SourceMap.from_coordinates(coordinates, self._exemplar.shape, label=labels, frame=frame)
+
+    def _check(self, region: Region) -> None:
+        beside = 0 if self._quality == "fast" else WORK
+        check_memory(self._exemplar.pixels, region, self._field, self._memory_limit, beside)
+
+    def _show(self, places: Places) -> Array:
+        """Look the exemplar up, a band of points at a time."""
+        image = self._exemplar.image
+        channels = image.shape[self.axes :]
+        out = np.empty((*places.shape[:-1], *channels), image.dtype)
+        flat, shown = places.reshape(-1, self.axes), out.reshape(-1, *channels)
+        for start in range(0, len(flat), _BAND):
+            part = slice(start, start + _BAND)
+            at = flat[part] / np.float32(ONE)
+            shown[part] = gather(image, at.astype(np.float32, copy=False), interpolation=self._how)
+        return out
+
+
+def _restore(kind: type[Texture], exemplar: Exemplar | Material, options: tuple[Any, ...], key: str | None) -> Texture:
+    """Return a texture that has travelled: the one that came here before, with what it keeps, where there is one."""
+    names = ("field", "seed", "quality", "interpolation", "cache_bytes", "memory_limit")
+    given = dict(zip(names, options, strict=True))
+
+    def make() -> Texture:
+        return kind(exemplar, **given)
+
+    return make() if key is None else _ARRIVED.get_or_make((key, *options[-2:]), make)
+
+
+_ARRIVED: Cache[tuple[Any, ...], Texture] = Cache(ARRIVED)
