@@ -50,6 +50,20 @@ def test_a_folder_is_designed_in_one_go(here: Path, capsys: pytest.CaptureFixtur
     assert "--role rock_wet.png=other" in said
 
 
+def test_colours_are_brought_into_even_light_and_heights_are_not(here: Path) -> None:
+    lit = (io.read("rock/rock_albedo.png") * np.linspace(0.4, 1, 64)[:, np.newaxis]).astype(np.uint8)
+    io.write("rock/rock_albedo.png", lit)
+    assert main(["tile", "rock", "-o", "new", "--flatten", "--map", "map.npz", "-q"]) == 0
+    source = texrs.SourceMap.load("map.npz")
+    for name in ("albedo", "height"):
+        assert main(["apply", "map.npz", f"rock/rock_{name}.png", "-o", f"{name}.png", "-q"]) == 0
+        assert (io.read(f"{name}.png") == io.read(f"new/{name}.png")).all()
+    assert (io.read("new/height.png") == source.render(io.read("rock/rock_height.png"))).all()
+    assert main(["apply", "map.npz", "rock/rock_albedo.png", "-o", "lit.png", "--no-flatten", "-q"]) == 0
+    assert (io.read("lit.png") == source.render(lit)).all()
+    assert (io.read("albedo.png") != io.read("lit.png")).any()
+
+
 def test_what_names_do_not_tell_is_left_out_and_said(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["tile", "rock", "-o", "new"]) == 0
     assert "left out rock_wet.png" in capsys.readouterr().err

@@ -13,6 +13,7 @@ from texrs import Finish, SourceMap, Synthesis, View, samples
 from texrs.errors import FileError, InvalidInput
 
 PEBBLES = samples.pebbles((64, 80)).image
+LIT = (PEBBLES * np.linspace(0.5, 1, 80)[:, np.newaxis]).astype(np.uint8)
 HOLE = np.zeros((64, 80), np.bool_)
 HOLE[20:40, 30:50] = True
 FLOOR = samples.load("tilted_discs", size=(96, 112)).image
@@ -25,6 +26,8 @@ VERBS: dict[str, tuple[Callable[[], Synthesis], np.ndarray]] = {
     "design as printed": (lambda: texrs.design(PEBBLES, 64, method="paper"), PEBBLES),
     "tile": (lambda: texrs.tile(PEBBLES), PEBBLES),
     "tile and blend": (lambda: texrs.tile(PEBBLES, blend=0.1), PEBBLES),
+    "tile in even light": (lambda: texrs.tile(LIT, flatten=True), LIT),
+    "tile in even light and blend": (lambda: texrs.tile(LIT, flatten=True, blend=0.1), LIT),
     "complete": (lambda: texrs.complete(PEBBLES, HOLE), PEBBLES),
     "complete and blend": (lambda: texrs.complete(PEBBLES, HOLE, blend=0.1), PEBBLES),
     "synthesize": (lambda: texrs.synthesize(PEBBLES, 64), PEBBLES),

@@ -9,11 +9,11 @@ import OpenEXR
 import pytest
 
 from texrs import Material
+from texrs._colours import decode_srgb
 from texrs._typing import Array
 from texrs.errors import FileError, InvalidInput, LimitExceeded
 from texrs.io._layers import read_layers
 from texrs.materials import Role
-from texrs.materials._light import decode_srgb
 
 RANDOM = np.random.default_rng(7)
 SHAPE = (21, 34)

@@ -1,16 +1,17 @@
 """Even light: what varies over large parts goes, what is smaller stays, and borders that meet still do."""
 
+import dataclasses
 from typing import Any
 
 import numpy as np
 import pytest
 
 import texrs
-from texrs import Material
+from texrs import Material, _evening
+from texrs._colours import decode_srgb, encode_srgb
 from texrs._typing import Array
 from texrs.errors import InvalidInput
-from texrs.materials import _flatten, flatten
-from texrs.materials._light import decode_srgb, encode_srgb
+from texrs.materials import flatten
 
 ROWS, COLUMNS = 120, 160
 GRAIN = 100 + 25 * np.random.default_rng(4).random((ROWS, COLUMNS, 3))
@@ -57,6 +58,36 @@ def test_more_flowers_are_no_more_light() -> None:
     assert better[spots].std() / better[spots].mean() < 0.35 * lit[spots].std() / lit[spots].mean()
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_what_differs_by_chance_alone_stays(seed: int) -> None:
+    """Flowers are scattered, so that there are more of them here and there; nothing says that it is light."""
+    meadow = texrs.samples.leaves_and_flowers((256, 256), seed=seed).image
+    assert (flatten(meadow) == meadow).all()
+    # Of what they are lit by, most goes.
+    light = np.exp(0.8 * (np.arange(256) / 256 - 1))[:, np.newaxis]
+    lit = np.maximum(meadow * light / 255, 1e-3)
+    left = np.log(flatten(lit, space="srgb") / lit) + np.log(light)
+    assert left.mean(axis=(0, 2)).std() < 0.3 * np.log(light).std()
+
+
+def test_a_tile_is_in_even_light() -> None:
+    """Copies of what is lighter at one end show bands; those of a tile in even light do not."""
+    lit = (GRAIN * RAMP).astype(np.uint8)
+    as_it_is, even = texrs.tile(lit, size=(ROWS, COLUMNS)), texrs.tile(lit, size=(ROWS, COLUMNS), flatten=True)
+    assert vary(as_it_is.image) > 4 * vary(even.image)
+    assert even.report["flatten"] is True
+    source = even.source
+    assert source.finish is not None
+    assert (texrs.apply(source, lit) == even.image).all()
+    assert (
+        texrs.apply(source, lit, finish=dataclasses.replace(source.finish, flatten=False)) == source.render(lit)
+    ).all()
+    stones = texrs.tile(Material({"albedo": lit, "height": lit[..., 0]}), flatten=True)
+    assert stones.material is not None
+    assert (stones.material["albedo"].pixels == texrs.apply(stones.source, lit)).all()
+    assert (stones.material["height"].pixels == stones.source.render(lit[..., 0])).all()
+
+
 def test_borders_that_meet_still_do() -> None:
     lit = (GRAIN * (1 + 0.3 * np.sin(2 * np.pi * (ROW / ROWS + COLUMN / COLUMNS)))[..., np.newaxis]).astype(np.uint8)
     even = flatten(lit, wrap=True)
@@ -87,7 +118,7 @@ def test_linear_light_is_the_same_picture() -> None:
 def test_strips_are_not_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     lit = (GRAIN * RAMP).astype(np.uint8)
     whole = flatten(lit)
-    monkeypatch.setattr(_flatten, "STRIP", 7 * COLUMNS)
+    monkeypatch.setattr(_evening, "STRIP", 7 * COLUMNS)
     assert (flatten(lit) == whole).all()
 
 

@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from texrs import Material
+from texrs import Material, _colours
 from texrs._typing import Array
 from texrs.errors import InvalidInput
-from texrs.materials import _light, _preview
+from texrs.materials import _preview
 
 ROWS, COLUMNS = 48, 64
 COLOURS = np.random.default_rng(3).integers(20, 200, (ROWS, COLUMNS, 3), dtype=np.uint8)
@@ -70,7 +70,7 @@ def test_both_kinds_of_green_mean_the_same_surface() -> None:
 
 
 def test_linear_colours_look_like_the_srgb_ones_they_are() -> None:
-    linear = _light.decode_srgb(COLOURS / np.float32(255))
+    linear = _colours.decode_srgb(COLOURS / np.float32(255))
     deep = (COLOURS.astype(np.uint16)) * 257
     shown = shine({"albedo": COLOURS})
     for same in (linear, deep):
@@ -80,8 +80,8 @@ def test_linear_colours_look_like_the_srgb_ones_they_are() -> None:
 def test_srgb_is_that_of_the_standard() -> None:
     values = np.array([0, 0.02, 0.04045, 0.2, 0.5, 1], np.float32)
     expected = [0, 0.02 / 12.92, 0.0031308, 0.0331048, 0.2140411, 1]
-    np.testing.assert_allclose(_light.decode_srgb(values), expected, atol=2e-7)
-    np.testing.assert_allclose(_light.encode_srgb(_light.decode_srgb(values)), values, atol=1e-6)
+    np.testing.assert_allclose(_colours.decode_srgb(values), expected, atol=2e-7)
+    np.testing.assert_allclose(_colours.encode_srgb(_colours.decode_srgb(values)), values, atol=1e-6)
 
 
 def test_every_map_counts() -> None:
@@ -149,8 +149,8 @@ def test_shrunk_values_are_means_of_areas() -> None:
     values = np.random.default_rng(0).random((13, 10, 2)).astype(np.float32)
     fine = np.repeat(np.repeat(values.astype(np.float64), 5, axis=0), 4, axis=1)
     expected = fine.reshape(5, 13, 4, 10, 2).mean(axis=(1, 3))
-    np.testing.assert_allclose(_light.shrink(values, (5, 4)), expected, atol=1e-6)
-    assert _light.shrink(values, (13, 10)) is values
+    np.testing.assert_allclose(_colours.shrink(values, (5, 4)), expected, atol=1e-6)
+    assert _colours.shrink(values, (13, 10)) is values
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,10 @@ import pytest
 
 import texrs
 from texrs import Material, io
+from texrs._colours import decode_srgb
 from texrs._typing import Array
 from texrs.errors import FileError, InvalidInput
 from texrs.materials import Map, Role
-from texrs.materials._light import decode_srgb
 from texrs.materials._mipmaps import halve
 
 STONES = texrs.samples.pebbles((40, 52)).image

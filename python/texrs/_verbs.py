@@ -12,6 +12,7 @@ from texrs._progress import listen
 from texrs._typing import Progress
 from texrs.errors import InvalidInput
 from texrs.materials._material import Material, apply_materials, guide_materials
+from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
 __all__ = ["takes_materials"]
@@ -59,14 +60,20 @@ def takes_materials(*names: str, beside: tuple[str, ...] = ()) -> Callable[[Call
             if not any(isinstance(m, Material) for m in several):
                 return verb(*given.args, **given.kwargs)
             materials = _check(several, used)
-            guides = iter(guide_materials(materials))
+            lit = given.arguments.get("flatten")
+            guides = iter(guide_materials([m.flatten() for m in materials] if lit is True else materials))
             for name in used:
                 value = given.arguments[name]
                 given.arguments[name] = (
                     [next(guides) for _ in value] if isinstance(value, list | tuple) else next(guides)
                 )
             watch = given.arguments["progress"] = listen(given.arguments.get("progress"))
+            if lit is True:
+                # What is decided on is in even light already.
+                given.arguments["flatten"] = False
             made: Any = verb(*given.args, **given.kwargs)
+            if lit is True:
+                made = replace(made, source=_flattened(made.source), report={**made.report, "flatten": True})
             if isinstance(made, Synthesis):
                 return cast(T, finish(made, materials, watch))
             return cast(T, (finish(one, materials, watch) for one in made))
@@ -88,6 +95,12 @@ def finish(made: Synthesis, materials: list[Material], progress: Progress | None
         report={**made.report, "maps": maps},
         material=material,
     )
+
+
+def _flattened(source: SourceMap) -> SourceMap:
+    """Return the source map of something whose light is to be evened."""
+    assert source.finish is not None
+    return replace(source, finish=replace(source.finish, flatten=True))
 
 
 def _as_list(value: object) -> list[object]:

@@ -29,6 +29,7 @@ from texrs._arrays import (
     as_ndarray,
     as_wrap,
 )
+from texrs._evening import flatten
 from texrs._light import divide_out, measure_lights
 from texrs._progress import listen
 from texrs._typing import Array, Floats, Interpolation, Progress
@@ -211,6 +212,7 @@ def apply(
     exemplars : array, or a sequence of one an exemplar
         Any map of the exemplar's height and width (and depth), any dtype and channels.
     kind : {"colour", "normal", "vector", "label"}
+        "colour": also heights and whatever else may be mixed; where the finish takes uneven light out, it does so of them too.
         "normal", "vector": tangent-space normals, directions on the surface, as in `SourceMap.render`. "label": values that
         have no meaning between them; the nearest sample is taken, and nothing corrected.
     green : {"up", "down"}
@@ -252,10 +254,12 @@ def apply(
     if kind == "label":
         return source.render(exemplars, interpolation="nearest")
     how = finish or source.finish
-    several = as_list(exemplars)
+    several: Sequence[Array] = as_list(exemplars)
+    if how is not None and how.flatten and kind == "colour":
+        several = [flatten(as_ndarray(each, "exemplars")) for each in several]
     if how is not None and how.light is not None and how.within is not None and kind == "colour" and len(several) == 1:
         return _follow_light(source, several[0], how, progress)
-    return _even_out(source, exemplars, how, kind, green, progress)
+    return _even_out(source, several, how, kind, green, progress)
 
 
 def _even_out(

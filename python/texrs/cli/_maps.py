@@ -19,6 +19,7 @@ from texrs.cli._options import Options, take_options
 from texrs.cli._outputs import Quiet, Threads, describe, make_argument, name_arguments, to_write
 from texrs.cli._provenance import check_free
 from texrs.errors import InvalidInput
+from texrs.materials import Role, guess_role
 from texrs.source_map import Finish, SourceMap
 
 APPLIED = Options(
@@ -32,7 +33,7 @@ APPLIED = Options(
         "finish.light": "the verb knows where its pixels lie",
     },
     optional=dict.fromkeys(
-        ("wrap", "interpolation", "antialias", "screening", "across", "outlines"), "as the map says"
+        ("wrap", "interpolation", "antialias", "screening", "across", "outlines", "flatten"), "as the map says"
     ),
 )
 
@@ -69,9 +70,8 @@ def apply_command(
             like = replace(io.read_notes(paths[0]).fit(channels), made=None)
             temporary = stack.enter_context(_outputs.write_output(target, like=like, made=made))
             with name_arguments(**APPLIED.name_values(given), exemplars=" and ".join(paths)):
-                image = apply(
-                    places, images, finish=finish, **{path[0]: v for path, v in values.items() if len(path) == 1}
-                )
+                plain = {path[0]: v for path, v in values.items() if len(path) == 1}
+                image = apply(places, images, finish=fit(finish, paths, given), **plain)
             write(temporary, image)
             note(f"{paths[0]} gives {target}: {describe(image, places.axes)}", quiet=quiet)
 
@@ -83,6 +83,13 @@ def change_finish(places: SourceMap, values: Mapping[tuple[str, ...], Any]) -> F
     if "screening" in fields:
         fields["screening"] = as_float(fields["screening"], "--blend", 0, 1e6) or None
     return replace(known, **fields)
+
+
+def fit(finish: Finish, paths: Sequence[str], given: Mapping[str, Any]) -> Finish:
+    """Return how maps are finished whose names may say that they are no colours, which alone are lit."""
+    role = guess_role(Path(paths[0]).stem)
+    lit = given["finish_flatten"] is not None or role in (None, Role.COLOUR)
+    return finish if lit else replace(finish, flatten=False)
 
 
 def group(maps: Sequence[str], count: int) -> list[list[str]]:

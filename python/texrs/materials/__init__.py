@@ -1,6 +1,6 @@
 """Materials: maps of one surface in register, which every verb takes for an example and gives back as a whole."""
 
-from texrs.materials._flatten import flatten
+from texrs._evening import flatten
 from texrs.materials._map import Map, Space
 from texrs.materials._material import Material
 from texrs.materials._roles import Role, guess_role

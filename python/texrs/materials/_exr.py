@@ -23,11 +23,11 @@ from typing import Any
 
 import numpy as np
 
+from texrs._colours import encode_srgb, to_light, to_pixels
 from texrs._typing import Array, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.io._layers import read_layers, write_layers
 from texrs.materials._files import shorten
-from texrs.materials._light import encode_srgb, to_light, to_pixels
 from texrs.materials._map import Map
 from texrs.materials._roles import Role, as_role, guess_role
 

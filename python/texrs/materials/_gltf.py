@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 
 from texrs import io
 from texrs._checks import as_choice, as_int, as_items
+from texrs._colours import encode_srgb
 from texrs._typing import Array, Floats, Path
 from texrs._version import __version__
 from texrs.errors import FileError, InvalidInput
 from texrs.io._image_io import encode
-from texrs.materials._light import encode_srgb, find_map
+from texrs.materials._light import find_map
 from texrs.materials._map import Map
 from texrs.materials._meshes import Mesh, make_plane, make_sphere
 from texrs.materials._roles import Role

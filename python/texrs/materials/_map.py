@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
+from texrs._colours import Space
 from texrs._typing import Array
 from texrs.materials._roles import Role
 
 __all__ = ["Map", "Space"]
-
-Space = Literal["srgb", "linear"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -297,11 +297,11 @@ class Material(Exports):
         >>> import texrs
         >>> ramp = np.tile(np.linspace(100, 180, 64).astype(np.uint8), (48, 1))
         >>> lawn = texrs.Material({"albedo": ramp, "height": ramp}).flatten()
-        >>> int(np.ptp(lawn["albedo"].pixels)) <= 2, int(np.ptp(lawn["height"].pixels))
+        >>> int(np.ptp(lawn["albedo"].pixels)) <= 4, int(np.ptp(lawn["height"].pixels))
         (True, 80)
 
         """
-        from texrs.materials._flatten import flatten
+        from texrs._evening import flatten
 
         self._check_flat()
         even = {
@@ -377,6 +377,10 @@ def apply_materials(materials: Sequence[Material], source: SourceMap, progress: 
     """Return the material that a source map makes of several with the same maps."""
     check_alike(materials)
     first, made = materials[0], {}
+    finish = source.finish
+    if finish is not None and finish.flatten:
+        # Colours alone are lit, and each map says how it encodes light.
+        materials, finish = [m.flatten() for m in materials], replace(finish, flatten=False)
     for number, (name, each) in enumerate(first.items()):
 
         def watch(stage: str, share: float, number: int = number, name: str = name) -> None:
@@ -386,14 +390,14 @@ def apply_materials(materials: Sequence[Material], source: SourceMap, progress: 
         watch("", 0.0)
         images = [m[name].pixels for m in materials]
         if each.role.labelled:
-            pixels = apply(source, images, kind="label", progress=watch)
+            pixels = apply(source, images, kind="label", finish=finish, progress=watch)
         elif each.role.normal:
             green: Literal["up", "down"] = "up" if each.role is Role.NORMAL else "down"
-            pixels = apply(source, images, kind="normal", green=green, progress=watch)
+            pixels = apply(source, images, kind="normal", green=green, finish=finish, progress=watch)
         elif each.role is Role.VECTOR:
-            pixels = apply(source, images, kind="vector", progress=watch)
+            pixels = apply(source, images, kind="vector", finish=finish, progress=watch)
         else:
-            pixels = apply(source, images, progress=watch)
+            pixels = apply(source, images, finish=finish, progress=watch)
         made[name] = replace(each, pixels=pixels)
     return Material(made, weights=first._weights, axes=first.axes)
 

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from texrs._arrays import to_unit
+from texrs._colours import encode_srgb, shrink, to_light, to_pixels
 from texrs._typing import Array
-from texrs.materials._light import encode_srgb, shrink, to_light, to_pixels
 from texrs.materials._map import Map
 
 __all__ = ["halve"]

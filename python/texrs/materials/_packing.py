@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from texrs.materials._light import find_map, to_pixels, to_share
+from texrs._colours import to_pixels, to_share
+from texrs.materials._light import find_map
 from texrs.materials._map import Map
 from texrs.materials._roles import Role
 from texrs.materials._surface import METAL, ROUGH

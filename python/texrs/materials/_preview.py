@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_int, as_tuple, exp_single
+from texrs._colours import encode_srgb, shrink
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
-from texrs.materials._light import encode_srgb, find_map, shrink
+from texrs.materials._light import find_map
 from texrs.materials._map import Map
 from texrs.materials._roles import Role
 from texrs.materials._surface import find_opacity, list_signed, measure_slopes, take_colour, take_normals, take_surface

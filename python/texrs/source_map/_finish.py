@@ -17,7 +17,7 @@ from texrs.errors import InvalidInput
 
 __all__ = ["Finish"]
 
-PLAIN = ("wrap", "interpolation", "antialias", "screening", "band", "across", "outlines", "light")
+PLAIN = ("wrap", "interpolation", "antialias", "screening", "band", "across", "outlines", "flatten", "light")
 """What is said in words; the rest are masks."""
 
 
@@ -43,6 +43,8 @@ class Finish:
         Whether values are corrected also where two exemplars meet.
     outlines : bool
         Whether the step across a seam stays where it is the outline of a thing.
+    flatten : bool
+        Whether uneven light is taken out of colours before they are looked up, see `texrs.materials.flatten`.
     within : (rows, columns) bool, optional
         Correct only pixels that are True; all else keeps its values. None: everything.
     known : tuple of (h, w) bool, optional
@@ -63,6 +65,7 @@ class Finish:
     band: int | None = None
     across: bool = True
     outlines: bool = True
+    flatten: bool = False
     within: Bools | None = None
     known: tuple[Bools, ...] | None = None
     parts: NDArray[np.uint16] | None = None
@@ -96,7 +99,8 @@ class Finish:
 
         """
         words: dict[str, Any] = json.loads(parts["finish"].tobytes())
-        if not isinstance(words, dict) or words.keys() != set(PLAIN):
+        # Files of before there was flattening say nothing of it.
+        if not isinstance(words, dict) or {"flatten", *words} != set(PLAIN):
             raise InvalidInput(f"finish: needs {', '.join(PLAIN)}")
         if not isinstance(words["wrap"], list) or len(words["wrap"]) != len(shape):
             raise InvalidInput(f"finish: wrap needs {len(shape)} values")
@@ -121,6 +125,7 @@ class Finish:
             None if band is None else as_int(band, "band", 1, 2**31),
             as_bool(words["across"], "across"),
             as_bool(words["outlines"], "outlines"),
+            as_bool(words.get("flatten", False), "flatten"),
             None if within is None else within.astype(np.bool_),
             tuple(m.astype(np.bool_) for m in masks) if masks else None,
             apart,

@@ -22,11 +22,13 @@ Departures, with their reasons:
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float, as_int, as_size, as_wrap
+from texrs._arrays import as_bool, as_float, as_int, as_size, as_wrap
+from texrs._evening import flatten as even_light
 from texrs._progress import listen
 from texrs._typing import Array, Floats, Progress
 from texrs._verbs import takes_materials
@@ -58,6 +60,7 @@ def tile(
     size: int | Sequence[int] | None = None,
     overlap: int | Sequence[int] | None = None,
     blend: float | None = None,
+    flatten: bool = False,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
     """Make a picture cyclic: copies of the result side by side have no edge between them.
@@ -78,6 +81,9 @@ def tile(
     blend : float, optional
         Weight of the values, 0 to 1e6, when colours are corrected so that seams disappear: the smaller, the wider the
         correction. None or 0: no correction, so that each pixel is one of the picture. See `texrs.blend`.
+    flatten : bool
+        Whether uneven light is taken out first, as far as there is evidence of it: copies of a lawn that is lighter at one end
+        show bands. Of a material colours are flattened. See `texrs.materials.flatten`.
     progress : callable or True, optional
         Called as ``progress(stage, share)``, with the share of the stage that is done; raising stops the work.
         True shows a bar.
@@ -115,6 +121,9 @@ def tile(
     """
     progress = listen(progress)
     exemplar, cyclic = as_exemplar(image, "image"), as_wrap(wrap)
+    evened = as_bool(flatten, "flatten")
+    if evened:
+        exemplar = as_exemplar(even_light(exemplar.image))
     shape = (exemplar.shape[0], exemplar.shape[1])
     wanted, weight = as_sides(size, shape, cyclic), as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
     choices = as_choices(overlap, size is None, shape, wanted, cyclic)
@@ -125,9 +134,11 @@ def tile(
         source, firsts = extend(exemplar.guidance, wanted, cyclic, watch), (0, 0)
     else:
         source, found, firsts = join_ends(exemplar.guidance, wanted, choices, cyclic, watch)
-    source = source.finished(cyclic, screening=weight or None)
+    source = source.finished(cyclic, screening=weight or None, flatten=evened)
     composite = source.render(exemplar.image)
-    result = apply(source, exemplar.image, progress=progress) if weight else composite
+    # The picture is in even light already.
+    finish = None if source.finish is None else replace(source.finish, flatten=False)
+    result = apply(source, exemplar.image, finish=finish, progress=progress) if weight else composite
     watch("done", 1.0)
     stages = {
         "swapped": np.roll(exemplar.image, [-first for first in firsts], (0, 1)),
@@ -139,6 +150,7 @@ def tile(
         "size": list(source.shape),
         "wrap": list(cyclic),
         "blend": weight,
+        "flatten": evened,
         "overlap": [found[a].joint.width if a in found and not found[a].joint.cover else 0 for a in range(2)],
         "joints": {AXES[a]: describe(joined, firsts[a]) for a, joined in found.items()},
     }

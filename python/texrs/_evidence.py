@@ -1,0 +1,125 @@
+"""Slow light of a picture, as far as there is evidence of it.
+
+Where things lie closer by chance a picture is brighter too, and that is no light. Light goes over the whole picture: it is a
+polynomial of the place, or waves where the picture is cyclic, of as few terms as say clearly more than fewer. What is left of
+single squares then tells how much chance there is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._colours import shrink
+from texrs._typing import Array
+
+SQUARES = 32
+"""Means are compared of so many squares along the longer side."""
+MOST = 8
+"""Degree of polynomials, and twice the number of waves, at most."""
+BETTER = 0.75
+"""Share of the variance of what is off that each higher degree must leave at most, of squares as they mostly are."""
+CHANCE = 2.0
+"""What each term more must say, in shares of what one of all squares does that say something by themselves."""
+ROUNDS, FAR = 6, 4.0
+"""Steps of the robust fit; standard deviations from which on a square is something else."""
+DIGITS = 8
+"""Of the fit, after the point: its last bits hang on the processor."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Slow:
+    """Something that changes slowly over a picture."""
+
+    factors: tuple[float, ...]
+    """Of terms of `list_terms`; none where it is the same everywhere."""
+    waves: tuple[int, int]
+    wrap: tuple[bool, bool]
+
+    @classmethod
+    def of(cls, values: NDArray[np.float64], waves: tuple[int, int], wrap: tuple[bool, bool]) -> Slow:
+        """Return what values (rows, columns) follow, with at most so many bends along each axis."""
+        rows, columns = (max(1, round(n * SQUARES / max(values.shape))) for n in values.shape)
+        means = shrink(values, (min(rows, values.shape[0]), min(columns, values.shape[1])))
+        degrees, terms = list_terms((means.shape[0], means.shape[1]), waves, wrap)
+        best, factors, least = 0, np.zeros(0), _fit(terms[degrees == 0], means)[1]
+        told = _fit(terms, means)[2]
+        for degree in np.unique(degrees)[1:].tolist():
+            used = degrees <= degree
+            found, left, _ = _fit(terms[used], means)
+            # What so many terms more follow by chance is no evidence.
+            chance = 1 + CHANCE * (np.count_nonzero(used) - np.count_nonzero(degrees <= best)) / told
+            if left * chance < BETTER ** (degree - best) * least:
+                best, factors, least = degree, found, left
+        return cls(tuple(factors.tolist()), waves, wrap)
+
+    def at(self, shape: tuple[int, int]) -> NDArray[np.float64]:
+        """Return it on so many samples, without its mean."""
+        if not self.factors:
+            return np.zeros(shape)
+        _, terms = list_terms(shape, self.waves, self.wrap)
+        found: Array = np.zeros(shape)
+        for factor, term in zip(self.factors, terms, strict=False):
+            found += factor * term.reshape(shape)
+        even: NDArray[np.float64] = found - found.mean()
+        return even
+
+
+def list_terms(
+    shape: tuple[int, int], waves: Sequence[int], wrap: Sequence[bool]
+) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Return the degrees of terms (n,), lowest first, and their values on samples, (n, rows * columns)."""
+    (down, own), (across, other) = (_list_bends(n, w, c) for n, w, c in zip(shape, waves, wrap, strict=True))
+    # Along a shorter side there are as many bends a length, not as many in all.
+    degrees = np.ceil(max(waves) * (own[:, np.newaxis] / waves[0] + other / waves[1]) - 1e-9).astype(np.intp)
+    order = np.argsort(degrees, axis=None, kind="stable")
+    order = order[degrees.ravel()[order] <= max(waves)]
+    rows, columns = np.divmod(order, len(other))
+    terms: NDArray[np.float64] = down[rows][:, :, np.newaxis] * across[columns][:, np.newaxis]
+    return degrees.ravel()[order], terms.reshape(len(order), -1)
+
+
+def _list_bends(count: int, most: int, wrap: bool) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Return functions of the place along an axis (n, count), and their degrees (n,)."""
+    at = (2 * np.arange(count) + 1) / count - 1
+    bends: list[Array] = [np.ones(count)]
+    degrees = [0]
+    if wrap:
+        for wave in range(1, (most + 1) // 2 + 1):
+            # Rounded: of sines the last bits hang on the processor.
+            bends += [np.round(np.sin(np.pi * wave * at), 9), np.round(np.cos(np.pi * wave * at), 9)]
+            degrees += [2 * wave - 1] * 2
+    else:
+        before: Array = np.zeros(count)
+        for degree in range(1, most + 1):
+            # Bonnet's recursion of Legendre's polynomials.
+            bends.append(((2 * degree - 1) * at * bends[-1] - (degree - 1) * before) / degree)
+            before = bends[-2]
+            degrees.append(degree)
+    return np.stack(bends), np.array(degrees)
+
+
+def _fit(terms: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray[np.float64], float, float]:
+    """Return the factors of terms (n, rows * columns) that most values (rows, columns) follow; how it is off.
+
+    That is the variance of what is off, and how many values say as much as all that are there, for neighbours are alike.
+    """
+    seen, weight = values.ravel(), np.ones(values.size)
+    factors: Array = np.zeros(len(terms))
+    for _ in range(ROUNDS):
+        normal: Array = np.einsum("im,m,jm->ij", terms, weight, terms) + 1e-9 * np.eye(len(terms))
+        factors = np.round(np.linalg.solve(normal, np.einsum("im,m,m->i", terms, weight, seen)), DIGITS)
+        off = seen - np.einsum("i,im->m", factors, terms)
+        spread = max(1.4826 * float(np.median(np.abs(off))), 1e-6)
+        # Tukey's biweight.
+        weight = np.square(np.maximum(0, 1 - np.square(off / (FAR * spread))))
+    shown = np.clip(off, -FAR * spread, FAR * spread).reshape(values.shape)
+    told = float(values.size)
+    for axis, count in enumerate(values.shape):
+        ahead, behind = shown.take(range(1, count), axis), shown.take(range(count - 1), axis)
+        alike = float((ahead * behind).sum()) / max(float(np.square(shown).sum()), 1e-12)
+        told *= (1 - alike) / (1 + alike) if alike > 0 else 1
+    return factors, spread * spread, max(told, 1.0)
