@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -65,6 +66,14 @@ def test_defaults_are_those_of_the_functions(command: str) -> None:
                 assert default is None
                 continue
             assert understood(option, default, options.axes) == theirs or alike(option, default, theirs), option.name
+
+
+@pytest.mark.parametrize("command", NAMES)
+def test_wrap_has_one_default_in_all_verbs(command: str) -> None:
+    """It says itself what it means: textures that are laid out anew repeat, and what follows something does not."""
+    for each in (p for p in GROUP.get_command(None, command).params if p.name == "wrap"):
+        assert each.default == "default"
+        assert re.search(r"default: (both|neither|none of them)", each.help)
 
 
 def understood(option: Option, text: Any, axes: int) -> Any:

@@ -161,7 +161,7 @@ WRONG = [
     ("solid v.npy", "Missing option"),
     ("synthesize v.npy -o out.png", "v.npy"),
     ("synthesize in.png -o out.png --size 9x9x9", "--size: needs WIDTHxHEIGHT"),
-    ("synthesize in.png -o out.png --wrap z", "--wrap: allowed are xy, x, y and none"),
+    ("synthesize in.png -o out.png --wrap z", "--wrap: allowed are default, xy, x, y and none"),
     ("synthesize in.png -o out.png --field slant_3d", "--field: slant_3d is for volumes"),
     ("synthesize in.png -o out.exr", "out.exr: .exr cannot hold"),
 ]

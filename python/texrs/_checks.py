@@ -87,8 +87,10 @@ def as_items(value: object, name: str) -> Iterator[Any]:
     raise InvalidInput(f"{name}: needs a sequence, got {value!r}")
 
 
-def as_wrap(value: object, name: str = "wrap", *, axes: int = 2) -> tuple[bool, ...]:
-    """Check a choice of cyclic axes: one bool for all, or one an axis."""
+def as_wrap(value: object, name: str = "wrap", *, axes: int = 2, usual: bool | None = None) -> tuple[bool, ...]:
+    """Check a choice of cyclic axes: one bool for all, or one an axis; None is what is usual, where something is."""
+    if value is None and usual is not None:
+        return (usual,) * axes
     if isinstance(value, bool | np.bool_):
         return (bool(value),) * axes
     what = f"True, False or {axes} of them, one an axis"

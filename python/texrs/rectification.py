@@ -53,7 +53,7 @@ def rectify(
     view: View | Plane | None = None,
     resolution: float | None = None,
     size: int | Sequence[int] | None = None,
-    wrap: bool | Sequence[bool] = False,
+    wrap: bool | Sequence[bool] | None = None,
     seed: int = 0,
     interpolation: Interpolation = "cubic",
     progress: Progress | bool | None = None,
@@ -72,8 +72,8 @@ def rectify(
     size : int or (rows, columns), optional
         Of the texture, in pixels. By default all that is sharp, as a rectangle. What is larger is grown by example, what is
         smaller is its middle.
-    wrap : bool or (rows, columns)
-        Axes along which the texture is to be cyclic (`texrs.tile`).
+    wrap : bool or (rows, columns), optional
+        Axes along which the texture is to be cyclic (`texrs.tile`); None: neither.
     seed : int
         Chooses what is grown.
     interpolation : {"cubic", "linear", "nearest"}
@@ -112,7 +112,7 @@ def rectify(
     image = as_ndarray(image, "image")
     pixels = as_image(image, minimum=64)
     watch = progress or (lambda stage, share: None)
-    cyclic, number = as_wrap(wrap), as_seed(seed)
+    cyclic, number = as_wrap(wrap, usual=False), as_seed(seed)
     asked = None if size is None else as_size(size, minimum=SMALLEST)
     fine = None if resolution is None else as_float(resolution, "resolution", 0.05, 8)
     watch("plane", 0.0)

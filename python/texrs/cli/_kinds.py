@@ -139,13 +139,14 @@ DIRECTION = Kind(
 MAP_OR_AUTO = replace(MAP, metavar="FILE|auto", words=("auto",))
 NUMBERS = Kind("FILE", read_numbers, "Of several channels the mean counts.", file=True)
 AXES = Kind(
-    ("xy|x|y|none", "xyz|...|none"),
+    ("default|xy|x|y|none", "default|xyz|...|none"),
     lambda text, about: parse_axes(text, about.option, axes=about.axes),
     (
         "x is from left to right, y from top to bottom.",
         "x is from left to right, y from top to bottom, z from plane to plane.",
     ),
     show_axes,
+    words=("default",),
 )
 SIZE = Kind(
     ("WIDTHxHEIGHT", "WIDTHxHEIGHTxDEPTH"),

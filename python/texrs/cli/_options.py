@@ -147,6 +147,8 @@ class Options:
             text = given[option.name]
             if (which and not which(option)) or text is None or text == [] or text == option.default:
                 continue
+            if text == "default" and option.kind is not None and "default" in option.kind.words:
+                continue
             if option.kind is None or (isinstance(text, str) and text in option.kind.words):
                 values[option.path] = text
             else:
@@ -201,7 +203,7 @@ class Options:
             default = None
         if kind is not None and default is not None and default is not MISSING:
             default = kind.show(default)
-        elif kind is not None and "default" in kind.words:
+        elif kind is not None and "default" in kind.words and name not in self.optional:
             default = "default"
         shown = self.optional.get(name) or default not in (None, MISSING)
         words = () if kind is None or kind.file else kind.pick(kind.metavar, self.axes).split("|")

@@ -55,7 +55,11 @@ def parse_axes(text: str, option: str = "--wrap", *, axes: int = 2) -> tuple[boo
     known = "zyx"[-axes:]
     letters = text.strip().lower()
     if letters != "none" and (not letters or set(letters) - set(known) or len(set(letters)) < len(letters)):
-        wanted = "allowed are xy, x, y and none" if axes == 2 else "needs axes among x, y and z, each once, or none"
+        wanted = (
+            "allowed are default, xy, x, y and none"
+            if axes == 2
+            else "needs axes among x, y and z, each once, or none, or default"
+        )
         raise InvalidInput(f"{option}: {wanted}; got {text!r}")
     return tuple(letters != "none" and letter in letters for letter in known)
 

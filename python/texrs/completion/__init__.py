@@ -50,7 +50,7 @@ def complete(
     boundary: int = 0,
     mirror: bool | None = None,
     blend: float | None = None,
-    wrap: bool | Sequence[bool] = False,
+    wrap: bool | Sequence[bool] | None = None,
     seed: int = 0,
     progress: Progress | bool | None = None,
 ) -> Synthesis:
@@ -99,8 +99,8 @@ def complete(
         Weight of the values, 0 to 1e6, when colours of what is filled are corrected so that seams disappear: the smaller,
         the wider the correction; 0.003 is good for the picture's own colours, less where an ``exemplar`` has other light.
         None or 0: no correction. See `texrs.blend`, which corrects other maps in the same way, ``within`` the hole.
-    wrap : bool or (rows, columns)
-        Axes along which the picture is cyclic, so that a hole at its border is also filled from across.
+    wrap : bool or (rows, columns), optional
+        Axes along which the picture is cyclic, so that a hole at its border is also filled from across; None: neither.
     seed : int
         Chooses patches where nothing is known around.
     progress : callable or True, optional
@@ -161,7 +161,7 @@ def complete(
     pictures, open_ = check_pictures(picture, join_holes(asked, masked), exemplar)
     shapes = tuple((p.shape[0], p.shape[1]) for p in pictures)
     usable = check_allowed(allowed, open_, exemplar is None and method == "patch")
-    cyclic, seed = as_wrap(wrap), as_seed(seed)
+    cyclic, seed = as_wrap(wrap, usual=False), as_seed(seed)
     width = as_int(boundary, "boundary", 0, 1024)
     if patch is not None and method == "optimise":
         raise InvalidInput("patch: method 'optimise' has no patches; leave it out, or take method='patch'")

@@ -56,7 +56,7 @@ AXES = ("rows", "columns")
 def tile(
     image: Array | Exemplar | Material,
     *,
-    wrap: bool | Sequence[bool] = (True, True),
+    wrap: bool | Sequence[bool] | None = None,
     size: int | Sequence[int] | None = None,
     overlap: int | Sequence[int] | None = None,
     blend: float | None = None,
@@ -69,8 +69,8 @@ def tile(
     ----------
     image : (H, W) or (H, W, C) array, or Exemplar
         The picture, any real dtype, at least 2 pixels along an axis that wraps.
-    wrap : bool or (rows, columns)
-        Axes along which the result repeats.
+    wrap : bool or (rows, columns), optional
+        Axes along which the result repeats; None: both.
     size : int or (rows, columns), optional
         Size of the result in pixels, at least 2 along an axis that wraps. By default the picture's, or less along an axis
         where one cut between its ends shows clearly less than a cover of them. A result larger than the picture, at
@@ -120,7 +120,7 @@ def tile(
 
     """
     progress = listen(progress)
-    exemplar, cyclic = as_exemplar(image, "image"), as_wrap(wrap)
+    exemplar, cyclic = as_exemplar(image, "image"), as_wrap(wrap, usual=True)
     evened = as_bool(flatten, "flatten")
     if evened:
         exemplar = as_exemplar(even_light(exemplar.image))

@@ -80,7 +80,7 @@ def design(
     size: Size = None,
     *,
     seed: int = 0,
-    wrap: bool | Sequence[bool] = (True, True),
+    wrap: bool | Sequence[bool] | None = None,
     weights: Weights = None,
     density: Density = None,
     elements: ElementOptions | Elements = ElementOptions(),
@@ -103,8 +103,8 @@ def design(
         Size of the result, in pixels, at least 16 a side; twice the exemplar by default.
     seed : int
         Chooses the texture, 0 to 2^64 - 1: the same exemplar, options, seed and version give the same bytes.
-    wrap : bool or (rows, columns)
-        Axes along which the result repeats without a seam.
+    wrap : bool or (rows, columns), optional
+        Axes along which the result repeats without a seam; None: both.
     weights : (n,), (rows, columns) of int, or (rows, columns, n) array, optional
         Shares of n exemplars in the result, or which one is where, or their shares everywhere; equal by default. Borders
         follow outlines, by an element at most from where a map has them; shares on the whole are kept within 3 %.
@@ -212,7 +212,7 @@ def design_variants(
     size: Size = None,
     *,
     seed: int = 0,
-    wrap: bool | Sequence[bool] = (True, True),
+    wrap: bool | Sequence[bool] | None = None,
     weights: Weights = None,
     density: Density = None,
     elements: ElementOptions | Elements = ElementOptions(),
@@ -240,8 +240,8 @@ def design_variants(
         Size of each texture, in pixels, at least 16 a side; twice the exemplar by default.
     seed : int
         Chooses the textures, 0 to 2^64 - 1: they have the seeds ``seed``, ``seed + 1``, ...
-    wrap : bool or (rows, columns)
-        Axes along which each texture repeats without a seam.
+    wrap : bool or (rows, columns), optional
+        Axes along which each texture repeats without a seam; None: both.
     weights : (n,), (rows, columns) of int, or (rows, columns, n) array, optional
         Shares of n exemplars in each texture, or which one is where, or their shares everywhere; equal by default. Borders
         follow outlines, by an element at most from where a map has them; shares on the whole are kept within 3 %.

@@ -87,7 +87,7 @@ def check_arguments(
     size: Size,
     *,
     seed: int,
-    wrap: bool | Sequence[bool],
+    wrap: bool | Sequence[bool] | None,
     weights: Weights,
     density: Density,
     elements: ElementOptions | Elements,
@@ -108,7 +108,7 @@ def check_arguments(
             raise InvalidInput(f"{name}: needs {kind.__name__}(...), got {value!r}")
     check_together(exemplars, chosen.labels)
     rows, columns = as_size(size if size is not None else [2 * n for n in exemplars[0].shape], minimum=MINIMUM_SIDE)
-    first, cyclic = as_seed(seed), as_wrap(wrap)
+    first, cyclic = as_seed(seed), as_wrap(wrap, usual=True)
     shares = as_shares(weights, len(exemplars), (rows, columns))
     as_method(method, None, "paper")
     if density is not None and (weights is not None or method is not None):

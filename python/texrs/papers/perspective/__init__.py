@@ -76,7 +76,7 @@ def perspective(
     method: Method = None,
     scale_weight: float = 1.0,
     augment_scales: Sizes = "auto",
-    wrap: bool | Sequence[bool] = False,
+    wrap: bool | Sequence[bool] | None = None,
     seed: int = 0,
     interpolation: Interpolation = "cubic",
     progress: Progress | bool | None = None,
@@ -125,8 +125,8 @@ def perspective(
         Whether the exemplar may be resized. True: a plane is flattened and seen at any depth, of anything else there are
         resized copies. "auto": the same, but no copies where the exemplar has enough of every wanted scale. Sizes, 1/8 to
         4: those copies, and no plane. False: as it is; scales that it has not are brought to those it has, with a warning.
-    wrap : bool or (rows, columns)
-        Axes along which the result is to repeat; the target must do so, too.
+    wrap : bool or (rows, columns), optional
+        Axes along which the result is to repeat; None: neither. The target must repeat, too.
     seed : int
         Chooses the texture, 0 to 2^64 - 1; the same seed gives the same bytes.
     interpolation : {"nearest", "linear", "cubic"}

@@ -103,7 +103,7 @@ class Request:
         method: Method,
         scale_weight: float,
         augment_scales: Sizes,
-        wrap: bool | Sequence[bool],
+        wrap: bool | Sequence[bool] | None,
         seed: int,
         interpolation: Interpolation,
     ) -> Request:
@@ -114,7 +114,7 @@ class Request:
         as_method(method, None, "paper")
         as_choice(interpolation, "interpolation", ("nearest", "linear", "cubic"))
         check_sizes(augment_scales)
-        closed, number = as_wrap(wrap), as_seed(seed)
+        closed, number = as_wrap(wrap, usual=False), as_seed(seed)
         said = None if kind is None else as_kind(kind)
         angle = FOV if fov is None else as_float(fov, "fov", 1, 170)
         if fov is not None and (isinstance(scale_map, Plane) or is_words(scale_map)):

@@ -82,7 +82,7 @@ def solid(
     *,
     field: Field | None = None,
     seed: int = 0,
-    wrap: bool | Sequence[bool] = False,
+    wrap: bool | Sequence[bool] | None = None,
     quality: Quality = "preserve",
     bend: bool | None = None,
     method: Method = None,
@@ -105,8 +105,8 @@ def solid(
         How the texture is turned and scaled at each voxel (`texrs.fields`), with three axes; none leaves it as it is.
     seed : int
         Chooses the texture, 0 to 2^64 - 1; the same seed gives the same bytes.
-    wrap : bool or (bool, bool, bool)
-        Axes along which the result is to repeat: planes, rows, columns.
+    wrap : bool or (bool, bool, bool), optional
+        Axes along which the result is to repeat: planes, rows, columns; None: none of them.
     quality : {"preserve", "fast", "optimise"}
         How much work is done. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
         three times as many places for each patch. "fast" corrects blocks point by point, for textures without elements.
@@ -193,7 +193,7 @@ def synthesize(
     *,
     field: Field | None = None,
     seed: int = 0,
-    wrap: bool | Sequence[bool] = False,
+    wrap: bool | Sequence[bool] | None = None,
     quality: Quality = "preserve",
     bend: bool | None = None,
     plan: Choice = "usual",
@@ -217,8 +217,8 @@ def synthesize(
         How the texture is turned and scaled at each pixel (`texrs.fields`), with two axes; none leaves it as it is.
     seed : int
         Chooses the texture, 0 to 2^64 - 1; the same seed gives the same bytes.
-    wrap : bool or (bool, bool)
-        Axes along which the result is to repeat: rows, columns.
+    wrap : bool or (bool, bool), optional
+        Axes along which the result is to repeat: rows, columns; None: neither.
     quality : {"preserve", "fast", "optimise"}
         How much work is done. "preserve" stitches patches along minimum cuts, which keeps elements whole. "optimise" tries
         three times as many places for each patch. "fast" corrects blocks point by point, for textures without elements.

@@ -76,7 +76,7 @@ class Request:
         axes: int,
         field: Field | None,
         seed: int,
-        wrap: bool | Sequence[bool],
+        wrap: bool | Sequence[bool] | None,
         quality: Quality,
         bend: bool | None,
         method: Method,
@@ -88,7 +88,7 @@ class Request:
     ) -> Request:
         """Return the request of a caller, or raise what is wrong with it."""
         known = as_exemplar(exemplar, axes=axes, minimum=COARSEST)
-        region = Region.whole(as_size(size, axes=axes), as_wrap(wrap, axes=axes))
+        region = Region.whole(as_size(size, axes=axes), as_wrap(wrap, axes=axes, usual=False))
         as_method(method, None, "paper", "paper-compensated")
         if method is not None and (constraints is not None or guide is not None):
             what = "constraints" if constraints is not None else "guide"
