@@ -8,6 +8,7 @@ import pytest
 from plane_checks import look, look_twice, turn_between
 from texrs import Plane, planes, samples, scale_maps
 from texrs.errors import InvalidInput
+from texrs.planes._find import trust
 from texrs.planes._lines import Lines, find_lines, lean
 
 FLOOR = Plane((240, 320), slant=50, tilt=70, fov=55)
@@ -152,6 +153,17 @@ def test_what_is_not_the_plane_does_not_count() -> None:
     one, other = (planes.find(p, fov=55, known=ground) for p in (picture, covered))
     assert max(turn_between(one, plane)) <= 10
     assert max(turn_between(one, other)) <= 2
+
+
+def test_the_same_doubt_is_more_of_a_small_slant() -> None:
+    # Of the tilt of what hardly rises, that is; where there is hardly any slant the tilt does not count.
+    steep, aslant, front = (trust(rise, 0.03, 0.06, 1.4) for rise in (0.6, 0.2, 0.001))
+    assert aslant < 0.8 * steep
+    assert aslant < front
+    # As it is where bands differ, or something is off the plane; a longer lens makes a slant of the same rise larger.
+    assert trust(0.6, 0.5, 0.06, 1.4) < 0.7 * steep
+    assert trust(0.6, 0.03, 0.3, 1.4) < 0.5 * steep
+    assert trust(0.3, 0.03, 0.06, 3.0) < trust(0.3, 0.03, 0.06, 1.0)
 
 
 def test_confidence_says_what_to_believe() -> None:
