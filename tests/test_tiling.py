@@ -137,6 +137,14 @@ def test_regular_patterns_close_exactly_at_any_size():
     np.testing.assert_array_equal(made.image, np.roll(made.image, (37, 53), (0, 1)))
 
 
+@pytest.mark.parametrize("name", ["weave", "scales", "brick"])
+def test_the_ends_of_a_lattice_are_not_covered(name):
+    # It goes on only where its period does, which the length of a picture is not but by chance.
+    made = texrs.tile(picture(name))
+    assert find_things(guidance(as_image(picture(name)))).regular
+    assert all(j["cover"] == 0 and j["overlap"] <= 7 * 256 // 16 for j in made.report["joints"].values())
+
+
 def test_a_seam_that_closes_costs_no_more_than_the_least_one_but_for_little():
     guide = guidance(as_image(picture("pebbles")))
     strip = seam.Strip(guide[-60:], guide[:60], 0, np.full((60, 256), 0.5, np.float32))

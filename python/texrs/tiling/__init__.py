@@ -9,11 +9,11 @@ Departures, with their reasons:
 - The paper swaps the halves for columns, but prints them in order for rows, which would not be cyclic: here both swap.
 - The cut of the second axis lives on a cylinder and closes on itself. One that is cut open ends at two heights and
   opens the wrap of the first axis again.
-- The overlap is searched, up to half of the side, not fixed at 50 pixels. It is the period of the result: in brickwork few of
+- The overlap is searched, up to seven sixteenths of the side, not fixed at 50 pixels. It is the period of the result: in brickwork few of
   them make the courses meet, and large stones can only be parted where they end. What is laid over each other must fit,
   which a cheap cut through plain ground does not say.
 - Where two cuts are about as cheap as one, what is shown around the former edges is taken from elsewhere in the picture,
-  and the result keeps the picture's size.
+  and the result keeps the picture's size; not on a lattice, which goes on only where its period does.
 - A cut costs more the deeper inside elements it runs.
 - The picture is parted at a calm line near its middle, so that the border of the result does not follow an edge.
 - A result larger than the picture is a cyclic quilt of it.
@@ -47,6 +47,8 @@ __all__ = ["tile"]
 
 SHARE, LEAST = 8, 25
 """An overlap that is chosen is at least the side divided by the one, or the other in pixels."""
+MOST = 7
+"""Sixteenths of the side that it is at most."""
 LARGE = 0.22
 """Elements larger than this share of a side are seldom whole between two cuts: their ends are not covered."""
 AXES = ("rows", "columns")
@@ -199,7 +201,8 @@ def as_choices(
 
 def _choose(side: int, wanted: int, free: bool) -> Choice:
     if free:
-        return Choice(max(1, min(LEAST, side // SHARE)), side // 2, side)
+        # Of all that lies over each other every line but one would be taken: the border could not be at a calm one.
+        return Choice(max(1, min(LEAST, side // SHARE)), max(1, side * MOST // 16), side)
     # More than half cannot be laid over each other.
     overlap = min(side - wanted, wanted)
     return Choice(max(1, overlap), overlap, wanted)
@@ -231,7 +234,8 @@ def join_ends(
         joined = find_joint(
             make_levels(shown, depth),
             axis,
-            choices[axis].without_cover(things.side > LARGE * place.shape[axis]),
+            # Ends that are covered keep the picture's length, which no lattice has but by chance.
+            choices[axis].without_cover(things.regular or things.side > LARGE * place.shape[axis]),
             closed=bool(found),
             progress=lambda share, axis=axis: watch(f"join {AXES[axis]}", share),  # type: ignore[misc]
         )
