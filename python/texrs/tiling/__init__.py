@@ -9,9 +9,9 @@ Departures, with their reasons:
 - The paper swaps the halves for columns, but prints them in order for rows, which would not be cyclic: here both swap.
 - The cut of the second axis lives on a cylinder and closes on itself. One that is cut open ends at two heights and
   opens the wrap of the first axis again.
-- The overlap is searched, up to seven sixteenths of the side, not fixed at 50 pixels. It is the period of the result: in brickwork few of
-  them make the courses meet, and large stones can only be parted where they end. What is laid over each other must fit,
-  which a cheap cut through plain ground does not say.
+- The overlap is searched, up to seven sixteenths of the side, not fixed at 50 pixels. It is the period of the result: in
+  brickwork few of them make the courses meet, and large stones can only be parted where they end. What is laid over each
+  other must fit, which a cheap cut through plain ground does not say.
 - Where two cuts are about as cheap as one, what is shown around the former edges is taken from elsewhere in the picture,
   and the result keeps the picture's size; not on a lattice, which goes on only where its period does.
 - A cut costs more the deeper inside elements it runs.
