@@ -8,7 +8,7 @@ JOBS ?= 2
 MINUTES ?= 10
 RUST := Cargo.toml $(shell find rust -name '*.rs')
 
-.PHONY: help demo test fuzz lint format bench docs clean requirements
+.PHONY: help demo test fuzz lint lint-rust lint-python format bench docs clean requirements
 .DELETE_ON_ERROR:
 
 help:
@@ -58,10 +58,16 @@ fuzz: $(VENV)/.built
 		[ -z "$(SEED)" ] && [ $$(date +%s) -lt $$end ] || break; \
 	done
 
+# Side by side: the checks of either language leave a processor idle.
 lint: $(VENV)/.built
+	$(MAKE) --no-print-directory -j2 lint-rust lint-python
+
+lint-rust: | requirements
 	cargo fmt --check
 	cargo clippy --all-targets --quiet --features python -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --quiet
+
+lint-python: $(VENV)/.built
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
