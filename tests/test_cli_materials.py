@@ -1,5 +1,6 @@
 """Materials on the command line: folders of maps in, folders of maps out, nothing lost."""
 
+import hashlib
 import os
 from pathlib import Path
 
@@ -75,6 +76,31 @@ def test_depth_and_format(here: Path) -> None:
     assert io.read("new/deep/albedo.tif").dtype == np.uint16
     assert main(["design", "rock", "-o", "float", *SIZE, "--depth", "32"]) == 0
     assert io.read("float/height.exr").dtype == np.float32
+
+
+def test_a_folder_is_made_again_as_a_whole(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["design", "rock", "-o", "new", *SIZE, "--mipmaps", "small"]) == 0
+    io.write("new/mine.png", np.zeros((8, 8), np.uint8))
+    capsys.readouterr()
+    assert main(["rerun", "new", "-q"]) == 0
+    assert [line.split(":")[:2] for line in capsys.readouterr().out.splitlines()] == [
+        ["new/albedo.png", " the same bytes, SHA-256 " + texrs_hash("new/albedo.png")],
+        ["new/height.png", " the same bytes, SHA-256 " + texrs_hash("new/height.png")],
+    ]
+    assert main(["rerun", "small", "-q"]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 12
+    assert main(["rerun", "new", "-o", "other", "-q"]) == 2
+    assert "--out: is for one file" in capsys.readouterr().err
+    assert main(["rerun", "rock", "-q"]) == 2
+    assert "rock: no file in it says how it was made" in capsys.readouterr().err
+    assert main(["tile", "rock", "-o", "other", "-q"]) == 0
+    os.rename("other/albedo.png", "new/other.png")
+    assert main(["rerun", "new", "-q"]) == 2
+    assert "holds what several commands made" in capsys.readouterr().err
+
+
+def texrs_hash(path: str) -> str:
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
 def test_layers_of_a_file(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

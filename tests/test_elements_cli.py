@@ -41,6 +41,28 @@ def test_analyse_writes_what_the_function_finds(here: Path, capsys: Capture) -> 
     assert "wrote e.npz" in capsys.readouterr().err
 
 
+def test_a_material_is_analysed_by_all_its_maps(here: Path, capsys: Capture) -> None:
+    Path("stuff").mkdir()
+    flat = np.full_like(DOTS.image, 90)
+    iio.imwrite("stuff/stuff_albedo.png", flat)
+    iio.imwrite("stuff/stuff_height.png", DOTS.image[..., 0])
+    iio.imwrite("stuff/stuff_wet.png", DOTS.image[..., 1])
+    assert main(["analyse", "stuff", "-o", "e.npz", "--layout", "disjoint"]) == 0
+    assert "left out stuff_wet.png" in capsys.readouterr().err
+    found = elements.load("e.npz")
+    # What colours do not tell, heights do; the entry shows the colours.
+    assert (found.image == flat).all()
+    assert len(found.points) >= 0.8 * len(DOTS.centres)
+    assert main(["analyse", "stuff", "-o", "f.npz", "--layout", "disjoint", "--role", "stuff_wet=mask", "-q"]) == 0
+    assert main(["rerun", "f.npz", "-q"]) == 0
+    assert "the same bytes" in capsys.readouterr().out
+    assert main(["analyse", "in.png", "-o", "g.npz", "--role", "wet=mask"]) == 2
+    assert "--role: is for materials" in capsys.readouterr().err
+    assert main(["analyse", "stuff", "-o", "g.npz", "--role", "wet"]) == 2
+    assert "--role: needs MAP=ROLE" in capsys.readouterr().err
+    assert not Path("g.npz").exists()
+
+
 def test_places_may_follow_each_other(here: Path) -> None:
     from test_elements import annotate
 

@@ -65,6 +65,14 @@ def test_every_dtype_comes_back_to_the_bit(tmp_path: Path) -> None:
     assert path.read_bytes() == EVERY.save_exr(tmp_path / "again.exr").read_bytes()
 
 
+def test_weights_come_back(tmp_path: Path) -> None:
+    stones = Material({"albedo": draw("uint8", 3), "height": draw("uint16")}, weights={"height": 3})
+    back = Material.read(stones.save_exr(tmp_path / "a.exr"))
+    assert dict(back.weights) == {"height": 3.0}
+    assert (back.guide == stones.guide).all()
+    assert (back.guide != Material(dict(back)).guide).any()
+
+
 @pytest.mark.parametrize("dtype", ["uint8", "uint16"])
 def test_every_value_of_srgb_comes_back(dtype: str, tmp_path: Path) -> None:
     values = np.arange(np.iinfo(dtype).max + 1).astype(dtype).reshape(16, -1)

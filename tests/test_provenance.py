@@ -16,6 +16,7 @@ from PIL import Image, ImageCms
 import texrs
 from texrs import SourceMap, io, samples
 from texrs.cli import main
+from texrs.io._formats import FORMATS
 
 Capture = pytest.CaptureFixture[str]
 PROFILE = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
@@ -283,6 +284,31 @@ def test_every_output_is_made_again(here: Path, capsys: Capture, name: str) -> N
         assert main(["info", output]) == 0, (output, capsys.readouterr().err)
         assert f"made by texrs {texrs.__version__}: texrs {command.split()[0]}" in capsys.readouterr().out
     assert files(here) == whole
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_every_format_says_what_it_holds_and_is_made_again(here: Path, capsys: Capture, suffix: str) -> None:
+    allowed = FORMATS[suffix]
+    made = []
+    if allowed.images:
+        dtype = np.float32 if np.dtype(np.float32) in allowed.dtypes else np.uint8
+        image = io.read("in.png")
+        io.write("in.npy", image if dtype == np.uint8 else image.astype(dtype) / 255)
+        made.append(("image", f"tile in.npy -o image{suffix} --wrap x", "3 channels"))
+    if allowed.volumes:
+        made.append(("volume", f"solid in.tif -o volume{suffix} --size 16x17x18", "16 x 17 x 18, 3 channels"))
+    assert made
+    for kind, command, sides in made:
+        assert main([*command.split(), "-q"]) == 0, capsys.readouterr().err
+        capsys.readouterr()
+        output = f"{kind}{suffix}"
+        assert main(["rerun", output, "-q"]) == 0, capsys.readouterr().err
+        assert capsys.readouterr().out.startswith(f"{output}: the same bytes, SHA-256 ")
+        assert main(["info", output]) == 0
+        words = capsys.readouterr().out
+        assert words.startswith(f"{kind}: "), words
+        assert sides in words or kind == "volume"
+        assert f"made by texrs {texrs.__version__}: texrs {command.split()[0]}" in words
 
 
 def test_made_again_elsewhere_and_from_a_folder_that_moved(here: Path, capsys: Capture) -> None:

@@ -2,6 +2,7 @@
 
 import base64
 import gzip
+import re
 import struct
 import xml.etree.ElementTree as ElementTree
 from contextlib import suppress
@@ -379,3 +380,13 @@ def test_a_missing_extra_is_named(tmp_path, monkeypatch, library, suffix):
         tio.read_volume(tmp_path / f"a{suffix}")
     with pytest.raises(FileError, match=r"not installed \(pip install texrs\[vol\]\)"):
         tio.write_volume(tmp_path / f"b{suffix}", np.zeros((2, 2, 2)))
+
+
+def test_nrrd_does_not_say_when_it_was_written(tmp_path):
+    """The same volume gives the same bytes at any time."""
+    volume = np.arange(24, dtype=np.uint16).reshape(2, 3, 4)
+    tio.write_volume(tmp_path / "v.nrrd", volume)
+    header = (tmp_path / "v.nrrd").read_bytes().partition(b"\n\n")[0]
+    assert header.startswith(b"NRRD0005\n")
+    assert not re.search(rb"[0-9]{4}-[0-9]{2}-[0-9]{2}|[0-9]{2}:[0-9]{2}", header)
+    assert (tio.read_volume(tmp_path / "v.nrrd") == volume).all()

@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import time
+import warnings
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -17,20 +18,22 @@ from texrs import io
 from texrs._threads import threads
 from texrs.cli import _outputs, _provenance
 from texrs.cli._console import complain, keep, note, say, show_progress
-from texrs.cli._kinds import PICTURE, Kind
+from texrs.cli._kinds import EXAMPLE, Kind
 from texrs.cli._options import Option, Options, check_needed, take_options
 from texrs.cli._outputs import SAMPLE, Quiet, Threads, make_argument, make_option, name_arguments, to_write
 from texrs.cli._provenance import RUNNING, check_free
 from texrs.cli._readers import read_picture
-from texrs.cli._texts import PLACE
+from texrs.cli._stacks import Roles, read_roles
+from texrs.cli._texts import PLACE, About
 from texrs.database import TextureDatabase
 from texrs.elements import analyse, pictures
 from texrs.elements import page as draw_page
 from texrs.errors import FileError, InvalidInput
+from texrs.materials import Material
 from texrs.papers.splice import splice
 from texrs.synthesis import Synthesis
 
-PICTURED = Options(analyse, arguments={"image": PICTURE})
+PICTURED = Options(analyse, arguments={"image": EXAMPLE})
 ANALYSED = Options(analyse, leave={"image": "there may be several"})
 KEPT = Options(TextureDatabase.add, only=("name", "similarity", "replace"))
 SIMILAR = Options(TextureDatabase.add, only=("similarity",))
@@ -54,6 +57,7 @@ def analyse_command(
     more: Annotated[list[str] | None, make_argument("ROW,COL", "More places of --background.")] = None,
     stages: Annotated[str | None, to_write("stages", text="Folder for pictures of the points and the mask.")] = None,
     page: Annotated[str | None, to_write("page")] = None,
+    role: Roles = None,
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
@@ -68,7 +72,15 @@ def analyse_command(
     if page is not None:
         _outputs.check_outputs({"out": out, "page": page})
         _outputs.check_output(page, option="page")
-    options |= PICTURED.read(given, which=lambda o: o.file)
+    about = About(roles=read_roles(role))
+    with warnings.catch_warnings(record=True) as left:
+        warnings.simplefilter("always")
+        options |= PICTURED.read(given, about, which=lambda o: o.file)
+    for warning in left:
+        note(str(warning.message), quiet=quiet)
+    material = isinstance(options["image",], Material)
+    if role and not material:
+        raise InvalidInput("--role: is for materials, which are folders of maps or EXR files of layers")
     names = {o.path[-1]: o.flag for o in PICTURED} | {"image": given["image"], "count": "--threads"}
     with name_arguments(**names), threads(count), show_progress(quiet=quiet) as progress:
         entry = analyse(**PICTURED.call(options), progress=progress)

@@ -23,6 +23,7 @@ from texrs.cli import _provenance
 from texrs.cli._provenance import RUNNING, check_free, read_status
 from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.io._annotation import name_sidecar, needs_sidecar
+from texrs.io._files import find_suffix
 from texrs.synthesis import Synthesis
 
 SAMPLE = "sample:"
@@ -307,7 +308,7 @@ def deliver(
     """Write a result and what was asked for beside it; its colours are those of a picture that says ``like`` of them."""
     out = paths["out"] or ""
     image, axes = np.asarray(result.image), result.source.axes
-    suffix = Path(out).suffix
+    suffix = find_suffix(Path(out))
     known = None if like is None else like.fit(image.shape[axes] if image.ndim > axes else 1)
     # The result takes its name last, when all else is written.
     with write_output(out, option, inside=option != "out", like=known, made=made) as temporary:
@@ -332,8 +333,11 @@ def name_variants(seed: int, paths: Mapping[str, str | None]) -> dict[str, str |
     for option, path in paths.items():
         if path is not None and not Path(path).name:
             raise InvalidInput(f"--{option}: needs a name that the seed of a variant can follow, got {path!r}")
-    places = {option: None if path is None else Path(path) for option, path in paths.items()}
-    return {o: None if p is None else str(p.with_name(f"{p.stem}-{seed}{p.suffix}")) for o, p in places.items()}
+    named: dict[str, str | None] = {}
+    for option, path in paths.items():
+        suffix = "" if path is None else find_suffix(Path(path))
+        named[option] = None if path is None else f"{path.removesuffix(suffix)}-{seed}{suffix}"
+    return named
 
 
 def make_contact_sheet(images: Sequence[Array]) -> Array:

@@ -128,17 +128,16 @@ class Recipe:
 
 def rerun_command(
     context: typer.Context,
-    output: Annotated[str, make_argument("OUTPUT", "A file that texrs wrote.")],
+    output: Annotated[str, make_argument("OUTPUT", "A file that texrs wrote, or a folder of what one command made.")],
     out: Annotated[str | None, to_write("out", text="Where to write it; by default it is only compared.")] = None,
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
     """Make a file that texrs wrote again, from the same inputs, and compare."""
-    recipe = Recipe.read(output)
-    if recipe is None:
-        raise InvalidInput(
-            f"{output}: does not say how it was made" if os.path.exists(output) else f"{output}: is not there"
-        )
+    recipes = read_recipes(output)
+    recipe = recipes[0]
+    if out is not None and os.path.isdir(output):
+        raise InvalidInput(f"--out: is for one file; {output} is a folder, whose files are only compared")
     running = RUNNING.get()
     if out is not None and not (running and running.force):
         check_same(out, recipe)
@@ -146,7 +145,7 @@ def rerun_command(
     if command is None:
         raise InvalidInput(f"{output}: was made by texrs {recipe.verb}, which this version does not know")
     names = recipe.find_inputs()
-    beside = os.path.dirname(os.path.dirname(os.path.realpath(output))) if None in recipe.arguments else None
+    beside = os.path.dirname(os.path.dirname(os.path.realpath(recipe.path))) if None in recipe.arguments else None
     folder = tempfile.mkdtemp(prefix=".texrs-", dir=beside)
     token = ORIGINAL.set({place: name for name, place in names.items()})
     try:
@@ -154,7 +153,8 @@ def rerun_command(
             words = recipe.make_command(names, folder) + ([] if count is None else ["--threads", str(count)])
             command.main(words[1:] + ["--quiet"] * quiet, prog_name=recipe.verb, standalone_mode=False, parent=context)
         made = os.path.join(folder, recipe.file or os.path.basename(output))
-        compare(recipe, made)
+        for each in recipes:
+            compare(each, os.path.join(folder, each.file) if each.file is not None else made)
         if out is not None:
             with io.atomic(out) as temporary:
                 shutil.copyfile(made, temporary)
@@ -165,6 +165,23 @@ def rerun_command(
     finally:
         ORIGINAL.reset(token)
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def read_recipes(output: str) -> list[Recipe]:
+    """Return how a file was made, or each file of a folder, which one command made."""
+    if not os.path.isdir(output):
+        recipe = Recipe.read(output)
+        if recipe is None:
+            there = os.path.exists(output)
+            raise InvalidInput(f"{output}: does not say how it was made" if there else f"{output}: is not there")
+        return [recipe]
+    files = sorted(entry.path for entry in os.scandir(output) if entry.is_file())
+    known = [recipe for file in files if (recipe := Recipe.read(file)) is not None and recipe.file is not None]
+    if not known:
+        raise InvalidInput(f"{output}: no file in it says how it was made")
+    if len({(each.show(), each.output, tuple(each.inputs.items())) for each in known}) > 1:
+        raise InvalidInput(f"{output}: holds what several commands made; name one of its files")
+    return known
 
 
 def check_same(path: str, recipe: Recipe) -> None:

@@ -36,13 +36,18 @@ def _option(type_: Any, flag: str, metavar: str, text: str, default: str | bool 
     ]
 
 
-OPTIONS: dict[str, Any] = {
-    "role": _option(
-        list[str],
+Roles = Annotated[
+    list[str] | None,
+    typer.Option(
         "--role",
-        "MAP=ROLE",
-        "What a map is for whose name does not say it; the option may be repeated.",
+        metavar="MAP=ROLE",
+        help="What a map is for whose name does not say it; the option may be repeated.",
+        show_default=False,
+        rich_help_panel=PANEL,
     ),
+]
+OPTIONS: dict[str, Any] = {
+    "role": Roles,
     "depth": _option(
         int,
         "--depth",
@@ -75,12 +80,7 @@ class Stack:
     def take(cls, given: dict[str, Any]) -> Stack:
         """Take the options out of what a command was given, and check them."""
         roles, depth, suffix, pack = (given.pop(name, None) for name in OPTIONS)
-        said = {}
-        for text in roles or ():
-            name, equals, role = text.partition("=")
-            if not (name and equals and role):
-                raise InvalidInput(f"--role: needs MAP=ROLE, as in rock.png=height; got {text!r}")
-            said[name] = role
+        said = read_roles(roles)
         if depth not in (None, *DEPTHS):
             raise InvalidInput(f"--depth: allowed are 8, 16 and 32, got {depth}")
         if suffix not in (None, "png", "tif", "exr"):
@@ -172,6 +172,17 @@ class Stack:
         if (smaller := paths.get("mipmaps")) is not None:
             with _outputs.write_folder(smaller, "mipmaps", made=made) as folder:
                 self.save_smaller(material, folder)
+
+
+def read_roles(texts: Sequence[str] | None) -> dict[str, str]:
+    """Return what maps are said to be for."""
+    said = {}
+    for text in texts or ():
+        name, equals, role = text.partition("=")
+        if not (name and equals and role):
+            raise InvalidInput(f"--role: needs MAP=ROLE, as in rock.png=height; got {text!r}")
+        said[name] = role
+    return said
 
 
 def is_stack(text: str) -> bool:

@@ -25,6 +25,7 @@ from texrs.elements._proposal import ADVICE, DOUBTFUL, Start, propose
 from texrs.elements._search import Detections, search_similar
 from texrs.elements._separation import Separation, add_missing, find_nearest_pixels, reconcile
 from texrs.errors import InvalidInput
+from texrs.materials import Material
 from texrs.point_sets import directions, spacing
 
 FEWEST = 3
@@ -62,8 +63,8 @@ def analyse(
 
     Parameters
     ----------
-    image : (H, W) or (H, W, C) array
-        The texture, sides of at least 16; any dtype.
+    image : (H, W) or (H, W, C) array, or Material
+        The texture, sides of at least 16; any dtype. A material is decided on by all its maps, and shown by its colours.
     box : (row, column, height, width), optional
         Centre and size, in pixels, of the box around one element. Of a connected foreground it holds a mesh or a knot.
     mask : (H, W) array of bool, optional
@@ -114,6 +115,11 @@ def analyse(
 
     """
     progress = listen(progress)
+    if isinstance(image, Material):
+        rest: dict[str, Any] = {"box": box, "mask": mask, "background": background, "layout": layout, "points": points}
+        rest |= {"search": search, "method": method, "wrap": wrap, "seed": seed, "corrections": corrections}
+        found = analyse(image.guide, **rest, progress=progress)
+        return replace(found, image=as_image(image.base))
     pixels, steps = as_image(image, "image", minimum=SHORTEST), read_steps(() if corrections is None else corrections)
     size = (pixels.shape[0], pixels.shape[1])
     check_memory(BYTES * size[0] * size[1], "image")
@@ -129,18 +135,18 @@ def analyse(
     _check(given, start, how)
 
     # 2. Where the texture looks like the element.
-    found = _detect(guide, given, start, how, partial(watch, "search")) if cellular is None else cellular.found
+    seen = _detect(guide, given, start, how, partial(watch, "search")) if cellular is None else cellular.found
 
     # 3. What belongs to the elements.
     watch("separate", 0.0)
-    parted = _separate(guide, given, start, found, how) if cellular is None else cellular.parted
+    parted = _separate(guide, given, start, seen, how) if cellular is None else cellular.parted
     start, parted = _extend(guide, given, start, parted, how) if cellular is None else (start, parted)
     if len(parted.points) < FEWEST:
         raise InvalidInput(
             f"image: {len(parted.points)} elements were found, at least {FEWEST} are needed; try another box, more "
-            f"rotations or scales, a lower threshold (it was {found.threshold:.2f}), or give the points"
+            f"rotations or scales, a lower threshold (it was {seen.threshold:.2f}), or give the points"
         )
-    entry = _reanalyse(pixels, given, start, parted, how) or _make_entry(pixels, given, start, found, parted, how)
+    entry = _reanalyse(pixels, given, start, parted, how) or _make_entry(pixels, given, start, seen, parted, how)
     entry = entry if cellular is None else replace(entry, known=cellular.labels)
     watch("separate", 1.0)
     unsure = [

@@ -51,7 +51,7 @@ from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput
 from texrs.io import _descriptions, _files, _image_io, _npy, _pillow, _slabs, _tiff, _volumes
 from texrs.io._annotation import annotate, read_notes
-from texrs.io._files import atomic
+from texrs.io._files import atomic, find_suffix
 from texrs.io._formats import FORMATS, VOLUMES, as_spacing, check, detect_kind
 from texrs.io._notes import Notes
 from texrs.io._npy import read_arrays
@@ -437,7 +437,7 @@ def _write(
     description: str | None = None,
 ) -> None:
     target = _files.as_path(path)
-    suffix = ".nii.gz" if target.name.lower().endswith(".nii.gz") else target.suffix.lower()
+    suffix = find_suffix(target).lower()
     if suffix not in FORMATS:
         raise FileError(f"{target}: the suffix {suffix!r} is not one that is written: {', '.join(FORMATS)}")
     array, steps = check(value, suffix, axes), as_spacing(spacing, suffix)

@@ -162,7 +162,7 @@ def atomic(path: PathLike, *, overwrite: bool = True) -> Iterator[Path]:
             raise
         raise FileError(f"{target}: cannot be written ({describe_error(error)})") from None
     # A fixed, short stem: the target's own name may already be as long as names can be.
-    temporary = final.with_name(f".texrs-{secrets.token_hex(8)}{final.suffix}")
+    temporary = final.with_name(f".texrs-{secrets.token_hex(8)}{find_suffix(final)}")
     try:
         yield temporary
         if exists:
@@ -177,3 +177,8 @@ def atomic(path: PathLike, *, overwrite: bool = True) -> Iterator[Path]:
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def find_suffix(path: Path) -> str:
+    """Return the end of a name that says what is in the file: of a compressed volume, both parts."""
+    return path.name[-7:] if path.name.lower().endswith(".nii.gz") else path.suffix

@@ -122,6 +122,13 @@ def write_nrrd(path: Path, volume: Array, spacing: Sequence[float]) -> None:
     little = volume.astype(volume.dtype.newbyteorder("<"), copy=False)
     with path.open("xb") as file:
         nrrd.write(file, little, header, index_order="C", compression_level=1)
+    # The library writes when it wrote; the same volume is to give the same bytes.
+    with path.open("r+b") as file:
+        start = file.read(256)
+        first = start.find(b"# on ")
+        if first >= 0:
+            file.seek(first)
+            file.write(b"# without a date".ljust(start.index(b"\n", first) - first))
 
 
 def _find_channel(path: Path, sizes: list[int], kinds: list[str]) -> int | None:

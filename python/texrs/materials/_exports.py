@@ -26,6 +26,11 @@ class Exports(Mapping[str, Map]):
     def axes(self) -> int:
         """2 for pictures, 3 for volumes."""
 
+    @property
+    @abstractmethod
+    def weights(self) -> Mapping[str, float]:
+        """What was said of how much maps count when decisions are made."""
+
     def preview(
         self, *, tiles: tuple[int, int] = (2, 2), light: tuple[float, float] = (135.0, 45.0), side: int = 2048
     ) -> NDArray[np.uint8]:
@@ -174,7 +179,7 @@ class Exports(Mapping[str, Map]):
         self._check_flat()
         if depth not in (None, 16, 32):
             raise InvalidInput(f"depth: allowed are 16 and 32, got {depth!r}")
-        return write_exr(self, path, depth)
+        return write_exr(self, path, depth, self.weights)
 
     def save_gltf(
         self,

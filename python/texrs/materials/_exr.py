@@ -9,8 +9,9 @@ labels           Y                                whole numbers of 32 bit
 more than 4      0, 1, 2, ...                     as above
 ================ ================================ =========================================================
 
-Linear floats are kept as they are. Roles, spaces and dtypes stand in the header, so that integers come back to the bit:
-those of 8 bit are half floats in the file, those of 16 bit floats. Files of other programs are read by the names of layers.
+Linear floats are kept as they are. Roles, spaces, dtypes and weights stand in the header, so that integers come back to the
+bit: those of 8 bit are half floats in the file, those of 16 bit floats. Files of other programs are read by the names of
+layers.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from typing import Any
 
 import numpy as np
 
+from texrs._checks import as_float
 from texrs._colours import encode_srgb, to_light, to_pixels
 from texrs._typing import Array, Path
 from texrs.errors import FileError, InvalidInput
@@ -41,8 +43,8 @@ PICTURE = "colour"
 """The map whose channels belong to no layer."""
 
 
-def write_exr(maps: Mapping[str, Map], path: Path, depth: int | None) -> FilePath:
-    """Write each map as a layer."""
+def write_exr(maps: Mapping[str, Map], path: Path, depth: int | None, weights: Mapping[str, float]) -> FilePath:
+    """Write each map as a layer, and in the header what values cannot say."""
     target = FilePath(path)
     if target.suffix.lower() != ".exr":
         raise FileError(f"{path}: layers are written to .exr, not to {target.suffix!r}")
@@ -57,6 +59,8 @@ def write_exr(maps: Mapping[str, Map], path: Path, depth: int | None) -> FilePat
             "dtype": str(each.pixels.dtype if depth is None or stored.dtype == np.uint32 else stored.dtype),
             "channels": 0 if each.pixels.ndim == 2 else each.pixels.shape[-1],
         }
+        if name in weights:
+            said[name]["weight"] = weights[name]
         for number, letter in enumerate(name_channels(each.role, pixels.shape[-1])):
             channels[f"{name}.{letter}"] = stored[..., number]
     write_layers(target, channels, json.dumps({"maps": said}))
@@ -109,8 +113,8 @@ def restore(stored: Array, role: Role, space: str, dtype: np.dtype[Any]) -> Arra
     return to_pixels(values, dtype)
 
 
-def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map], dict[str, Role]]:
-    """Return the maps of a file, a layer each, and the roles that were said of them."""
+def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map], dict[str, Role], dict[str, float]]:
+    """Return the maps of a file, a layer each, the roles that were said of them, and the weights."""
     channels, words = read_layers(path)
     layers: dict[str, dict[str, Array]] = {}
     for full, pixels in channels.items():
@@ -139,7 +143,8 @@ def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map
         raise FileError(f"{path}: no layer has a name that says what it is for: {', '.join(short)}; say it by roles")
     if left:
         warnings.warn(f"{path}: left out {', '.join(left)}, whose names do not say what they are for", stacklevel=3)
-    return maps, {name: each.role for name, each in maps.items()}
+    weights = {name: told["weight"] for name, told in known.items() if "weight" in told and name in maps}
+    return maps, {name: each.role for name, each in maps.items()}, weights
 
 
 def join(path: str, name: str, letters: Mapping[str, Array]) -> Array:
@@ -167,6 +172,8 @@ def parse(words: str | None) -> dict[str, dict[str, Any]]:
             if np.dtype(each["dtype"]).kind not in "buif" or each["space"] not in ("srgb", "linear"):
                 return {}
             each["channels"] = int(each["channels"])
+            if "weight" in each:
+                each["weight"] = as_float(each["weight"], "weight", 0, 100)
     except (ValueError, TypeError, KeyError, AttributeError):
         return {}
     return dict(maps)

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path as FilePath
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -163,8 +164,8 @@ class Material(Exports):
         if FilePath(path).suffix.lower() == ".exr" and not FilePath(path).is_dir():
             if axes != 2:
                 raise InvalidInput(f"axes: the layers of {path} are pictures, got {axes}")
-            layers, found = read_exr(path, dict(roles or {}))
-            return cls(layers, roles=found)
+            layers, found, weights = read_exr(path, dict(roles or {}))
+            return cls(layers, roles=found, weights=weights)
         maps, found = read_maps(path, dict(roles or {}), axes)
         return cls(maps, roles=found, axes=axes)
 
@@ -196,6 +197,11 @@ class Material(Exports):
     def axes(self) -> int:
         """2 for pictures, 3 for volumes."""
         return self._axes
+
+    @property
+    def weights(self) -> Mapping[str, float]:
+        """What was said of how much maps count when decisions are made; the others count as their roles do."""
+        return MappingProxyType(self._weights)
 
     @property
     def base(self) -> Array:
