@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import texrs
-from plane_checks import look, look_at_room, turn_between
+from plane_checks import look, look_at_room, look_twice, turn_between
 from texrs import Plane, View, io, planes
 from texrs.cli import main
 from texrs.errors import InvalidInput
@@ -54,6 +54,37 @@ def test_a_sky_goes_on_above_the_floor_and_a_wall_behind_it() -> None:
     room = texrs.extend(picture, right=40, view=views, seed=1)
     rows, columns = np.rint(room.source.coordinates[:, 200:]).astype(int).reshape(-1, 2).T
     assert (low[rows, columns] == (line > 0).ravel()).mean() > 0.97
+
+
+def test_a_thing_at_the_border_does_not_go_on() -> None:
+    seen, ground = FLOOR.copy(), np.ones(FLOOR.shape[:2], np.bool_)
+    ground[100:, 50:120] = False
+    seen[~ground] = (210, 20, 200)
+    made = texrs.extend(seen, bottom=40, view=View(plane=PLANE, ground=ground), seed=1)
+    rows, columns = np.rint(made.source.coordinates[160:]).astype(int).reshape(-1, 2).T
+    assert ground[rows, columns].all()
+    # What covers all of the border does, as a wall on the left.
+    wall = np.ones_like(ground)
+    wall[:, :50] = False
+    made = texrs.extend(seen, left=30, view=View(plane=PLANE, ground=wall), seed=1)
+    rows, columns = np.rint(made.source.coordinates[:, :30]).astype(int).reshape(-1, 2).T
+    assert not wall[rows, columns].any()
+
+
+def test_a_plane_goes_on_away_from_a_horizon_that_is_seen() -> None:
+    steep = Plane((160, 176), 80, 90, fov=55)
+    assert steep.width([[0, 88]]).min() < 0
+    made = texrs.extend(FLOOR, bottom=20, view=steep, seed=1)
+    assert made.image.shape == (180, 176, 3)
+    with pytest.raises(InvalidInput, match="horizon"):
+        texrs.extend(FLOOR, top=20, view=steep)
+
+
+def test_a_doubtful_plane_is_not_followed() -> None:
+    with pytest.warns(UserWarning, match="not followed"):
+        made = texrs.extend(look_twice(), bottom=16, seed=1)
+    assert made.report["planes"] == [{"plane": None, "found": False}]
+    assert np.abs(np.abs(np.linalg.det(made.source.frames())) - 1).max() < 1e-6
 
 
 def test_again_and_otherwise() -> None:

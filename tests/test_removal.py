@@ -109,6 +109,23 @@ def test_what_goes_is_filled_from_the_ground_alone() -> None:
     assert not marked[rows, columns].any()
 
 
+def test_a_shadow_that_is_left_does_not_go_on() -> None:
+    picture, ground, marked = see("beans", sky=True, thing=True)
+    shadow = np.zeros(SIZE, bool)
+    shadow[100:, 92:104] = shadow[122:, 92:150] = True
+    picture[shadow & ~marked] //= 4
+    made = texrs.remove(picture, marked, view=View(plane=PLANE, ground=ground & ~marked & ~shadow), seed=1)
+    rows, columns = np.rint(made.source.coordinates[marked]).astype(int).T
+    assert not shadow[rows, columns].any()
+    # Nor does the sky, but where there is sky around the hole.
+    assert ground[rows, columns].all()
+    aloft = np.zeros(SIZE, bool)
+    aloft[20:35, 60:90] = True
+    made = texrs.remove(picture, aloft, view=View(plane=PLANE, ground=ground & ~shadow), seed=1)
+    rows, columns = np.rint(made.source.coordinates[aloft]).astype(int).T
+    assert not ground[rows, columns].any()
+
+
 def test_each_of_several_planes_is_filled_from_its_own() -> None:
     picture, low, floor, wall = look_at_room((160, 200))
     marked = np.zeros(low.shape, bool)

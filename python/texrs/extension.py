@@ -20,7 +20,7 @@ from texrs.completion._planes import LEAST, Part, add_rest, fill_parts
 from texrs.errors import InvalidInput
 from texrs.materials import Material
 from texrs.planes import Plane, View
-from texrs.planes._choose import as_views, find_grounds, see_in
+from texrs.planes._choose import as_views, find_grounds, follow_plane
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 
@@ -58,9 +58,10 @@ def extend(
         Size of the larger picture: what the sides above do not add to it is added evenly, but towards the horizon only as far
         as the plane goes, and on the other side then.
     view : View or Plane, or a sequence of them, optional
-        How the photograph shows the plane, as far as that is to be said; what is not is found. What is no ground, as the sky
-        above a floor, goes on as it lies. Of several planes, as a floor and a wall, each goes on by itself, up to the line
-        in which they meet; all but one need a ground.
+        How the photograph shows the plane, as far as that is to be said; what is not is found. Where that is not sure, or the
+        plane is seen from the front, things are as large as they are seen anywhere. What is no ground, as the sky above a
+        floor, goes on as it lies, but nothing that stands on it. Of several planes, as a floor and a wall, each goes on by
+        itself, up to the line in which they meet; all but one need a ground.
     boundary : int
         How many known pixels at the border may change, 0 to 64, which hides it better; by default none.
     blend : float, optional
@@ -88,7 +89,7 @@ def extend(
     Warns
     -----
     UserWarning
-        A plane that was found with a confidence below 0.4: give corners, or angles.
+        A plane that was found with a confidence below 0.4, and is not followed: give corners, or angles.
 
     Examples
     --------
@@ -124,14 +125,16 @@ def extend(
     settled = [v.settle((rows, columns)) for v in views]
     watch("plane", 0.0)
     grounds = find_grounds(pixels, settled, np.ones((rows, columns), np.bool_), everywhere=True)
-    seen = [see_in(pixels, v, said, ground) for v, (said, _), ground in zip(views, settled, grounds, strict=True)]
+    planes = [
+        follow_plane(pixels, ground, said, v.fov) for v, (said, _), ground in zip(views, settled, grounds, strict=True)
+    ]
     watch("plane", 1.0)
     # Beyond the horizon of a plane that is all there is lies nothing.
-    alone = len(add_rest([Part(ground) for ground in grounds], np.zeros((rows, columns), np.bool_))) == 1
+    alone = len(add_rest([Part(ground) for ground in grounds], np.zeros((rows, columns), np.bool_), pixels)) == 1
     for axis, before, after in ((1, "left", "right"), (0, "top", "bottom")):
         added[before] += missing[axis] // 2
         added[after] += missing[axis] - missing[axis] // 2
-        room = measure_room(seen[0].plane, added, axis)
+        room = (MOST, MOST) if planes[0][0] is None else measure_room(planes[0][0], added, axis)
         if alone and missing[axis] and sum(room) >= added[before] + added[after]:
             over = max(0, added[before] - room[0]) - max(0, added[after] - room[1])
             added[before], added[after] = added[before] - over, added[after] + over
@@ -140,11 +143,13 @@ def extend(
     canvas, hole = np.zeros((*size, pixels.shape[2]), pixels.dtype), np.ones(size, np.bool_)
     canvas[inner], hole[inner] = pixels, False
     parts = []
-    for each in seen:
+    for shown, (plane, _) in zip(grounds, planes, strict=True):
         ground = np.zeros(size, np.bool_)
-        ground[inner] = each.ground
-        parts.append(Part.of(ground, each.plane, (-added["top"], -added["left"])))
-    if len(parts := add_rest(parts, hole)) == 1 and not parts[0].everywhere:
+        ground[inner] = shown
+        parts.append(Part.of(ground, plane, (-added["top"], -added["left"])))
+    parts = add_rest(parts, hole, canvas)
+    reach = parts[0].reach
+    if len(parts) == 1 and reach is not None and (hole & ~reach).any():
         raise InvalidInput(
             "top, bottom, left, right: the picture would reach the plane's horizon; add fewer pixels, or say how the plane lies"
         )
@@ -169,8 +174,8 @@ def extend(
         "blend": screening,
         "light": follow,
         "seed": number,
-        "planes": [{"plane": each.plane.as_dict(), "found": each.found} for each in seen],
-        "ground": [round(float(each.ground.mean()), 4) for each in seen],
+        "planes": [{"plane": None if plane is None else plane.as_dict(), "found": found} for plane, found in planes],
+        "ground": [round(float(ground.mean()), 4) for ground in grounds],
     }
     return Synthesis(result, source, stages, report)
 

@@ -7,7 +7,6 @@ above a floor, is filled from what is not ground; so is each of several planes f
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,15 +14,15 @@ import numpy as np
 
 from texrs._arrays import as_bool, as_float, as_image, as_int, as_mask, as_ndarray, as_seed
 from texrs._progress import listen
-from texrs._typing import Array, Bools, Progress
+from texrs._typing import Array, Progress
 from texrs._verbs import takes_materials
 from texrs.blending import apply
 from texrs.completion._holes import widen
 from texrs.completion._planes import Part, add_rest, fill_parts
 from texrs.errors import InvalidInput
 from texrs.materials import Material
-from texrs.planes import Plane, View, find
-from texrs.planes._choose import SURE, as_views, find_grounds
+from texrs.planes import Plane, View
+from texrs.planes._choose import as_views, find_grounds, follow_plane
 from texrs.synthesis import Synthesis
 
 __all__ = ["remove"]
@@ -32,8 +31,6 @@ MARGIN = 1 / 150
 """By how much a mask is widened, of the shorter side: outlines are drawn too close, and things have soft edges."""
 RIM = 1 / 40
 """How far around it seams may run, of the shorter side."""
-FLAT = 8.0
-"""Degrees of slant up to which a plane is taken for seen from the front."""
 
 
 @takes_materials("image")
@@ -135,7 +132,7 @@ def remove(
         follow_plane(pixels, ground, said, v.fov) for v, (said, _), ground in zip(views, settled, grounds, strict=True)
     ]
     watch("plane", 1.0)
-    parts = add_rest([Part.of(g, plane) for g, (plane, _) in zip(grounds, planes, strict=True)], hole)
+    parts = add_rest([Part.of(g, plane) for g, (plane, _) in zip(grounds, planes, strict=True)], hole, pixels)
     made = fill_parts(pixels, hole, parts, boundary=rim, light=follow, patch=side, seed=number, progress=progress)
     how = made.finish(screening, (0, 0) if follow else None)
     source = made.source.finished((False, False), **how, **({"known": (~hole,)} if how else {}))
@@ -159,22 +156,3 @@ def remove(
         result = result.reshape(shape)
         stages |= {name: stages[name].reshape(shape) for name in ("known", "composite")}
     return Synthesis(result, source, stages, report)
-
-
-def follow_plane(pixels: Array, ground: Bools, said: Plane | None, fov: float | None) -> tuple[Plane | None, bool]:
-    """Return the plane that is said, or found surely enough, and whether it was found; none that is seen from the front."""
-    if said is not None:
-        return (None if said.slant < FLAT else said), False
-    try:
-        seen = find(pixels, fov=fov, known=ground)
-    except InvalidInput:
-        # Too little of it is known.
-        return None, False
-    if seen.confidence < SURE:
-        warnings.warn(
-            f"the plane was found with a confidence of {seen.confidence:.2f} of 1, so it is not followed; give the corners "
-            "of a rectangle of it, or slant and tilt",
-            stacklevel=4,
-        )
-        return None, False
-    return (None, False) if seen.slant < FLAT else (seen, True)

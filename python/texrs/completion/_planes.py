@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import guidance
 from texrs._light import divide_out, measure_lights
-from texrs._typing import Array, Bools, Progress
+from texrs._typing import Array, Bools, Floats, Progress
 from texrs.completion._fill import fill
 from texrs.completion._holes import paint_over, widen
 from texrs.completion._patches import choose_mirrors
@@ -30,6 +31,12 @@ LEAST = 0.05
 """Nearer to the horizon than this share of the middle's scale nothing is seen of a plane."""
 FEWEST = 0.02
 """Share of a picture that something beside the planes must take for anything to lie behind them."""
+BESIDE = 0.5
+"""How much nearer the camera a corner of the picture may be than its middle, from -1 to 1, for something behind to have it."""
+MOSTLY = 0.8
+"""Share of what is known around a hole that shows one thing, of which the hole is a part then."""
+ALIKE = 0.15
+"""Difference of mean colours, of 1, up to which what lies apart is one thing, as the sky on both sides of a tower."""
 BAND, NARROWEST, WIDEST = 0.4, 16, 64
 """By how much more of a plane is filled in than is shown, where it meets another: in roots of its area, and in pixels."""
 
@@ -46,11 +53,6 @@ class Part:
     """(H, W): where it can be seen at all; None for everywhere."""
     large: Bools | None = None
     """(H, W): where so much of it is seen that it may go on behind something; None for wherever it is seen."""
-
-    @property
-    def everywhere(self) -> bool:
-        """Whether it can be seen everywhere."""
-        return self.reach is None or bool(self.reach.all())
 
     @classmethod
     def of(cls, shown: Bools, plane: Plane | None, origin: Sequence[int] = (0, 0)) -> Part:
@@ -80,17 +82,45 @@ def lay(plane: Plane, shape: Sequence[int], origin: Sequence[int] = (0, 0)) -> S
     return Slope((float(middle[0]), float(middle[1])), 1.0, steep, down, (-down[1], down[0]), least, largest, 0.0)
 
 
-def add_rest(parts: Sequence[Part], hole: Bools) -> list[Part]:
-    """Return the parts with what is none of them: it goes on behind them where enough of it is seen."""
+def add_rest(parts: Sequence[Part], hole: Bools, pixels: Array) -> list[Part]:
+    """Return the parts with what is none of them: it goes on where enough of it is seen, and it is no thing on them.
+
+    A sky, or a wall, has a corner of the picture where one of the parts goes away from the camera (upwards, as floors do, where
+    it is not known how it lies), or is what a hole lies in; a cup on a table, or the shadow of one that is taken out, is
+    neither. What has other colours is another part: a wall does not go on as the sky beside it.
+    """
     from scipy.ndimage import label
 
     rest = ~hole
     for part in parts:
         rest = rest & ~part.shown
-    pieces, _ = label(rest)
-    large = np.bincount(pieces.ravel()) >= FEWEST * np.count_nonzero(~hole)
-    large[0] = False
-    return [*parts, Part(rest, large=large[pieces])] if large.any() else list(parts)
+    pieces, count = label(rest)
+    areas = np.bincount(pieces.ravel(), minlength=count + 1)
+    rows, columns = (np.flatnonzero((~hole).any(axis=axis)) for axis in (1, 0))
+    behind = np.zeros(count + 1, np.bool_)
+    for y, row in ((-1, rows[0]), (1, rows[-1])):
+        for x, column in ((-1, columns[0]), (1, columns[-1])):
+            downs = [(1.0, 0.0) if part.slope is None else part.slope.down for part in parts]
+            behind[pieces[row, column]] |= min(y * down[0] + x * down[1] for down in downs) <= BESIDE
+    holes, number = label(hole)
+    for each in range(1, number + 1):
+        around = pieces[widen(holes == each, 1) & ~hole]
+        behind |= np.bincount(around, minlength=count + 1) > MOSTLY * max(1, len(around))
+    behind &= areas >= FEWEST * np.count_nonzero(~hole)
+    behind[0] = False
+    colours, groups = guidance(paint_over(pixels, hole)), list[tuple[Floats, list[int]]]()
+    for piece in sorted(np.flatnonzero(behind).tolist(), key=lambda n: (-int(areas[n]), n)):
+        own = colours[pieces == piece].mean(axis=0, dtype=np.float64).astype(np.float32)
+        like = next((group for mean, group in groups if float(np.abs(own - mean).max()) <= ALIKE), None)
+        if like is None:
+            groups.append((own, [piece]))
+        else:
+            like.append(piece)
+    found = [Part(np.isin(pieces, group), large=np.isin(pieces, group)) for _, group in groups]
+    if found:
+        # Things stay where they are.
+        found[0] = Part(found[0].shown | (rest & ~behind[pieces]), large=found[0].large)
+    return [*parts, *found]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -184,7 +214,8 @@ def fill_parts(
         if len(parts) > 1:
             band = round(min(max(BAND * float(np.count_nonzero(region)) ** 0.5, NARROWEST), WIDEST))
             open_ = region | (widen(region, band) & ~part.shown)
-        usable = part.shown if part.shown.any() else ~hole
+        usable = part.shown if part.large is None else part.large
+        usable = usable if usable.any() else ~hole
         made = fill(
             [known],
             open_,

@@ -16,7 +16,11 @@ from texrs.planes._plane import Plane
 from texrs.planes._sizes import SURE, Sizes, measure
 from texrs.planes._view import View
 
-__all__ = ["SURE", "Seen", "as_views", "find_grounds", "measure_scale", "see", "see_in"]
+__all__ = ["SURE", "Seen", "as_views", "find_grounds", "follow_plane", "measure_scale", "see"]
+
+
+FLAT = 8.0
+"""Degrees of slant up to which a plane is taken for seen from the front."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,24 +35,42 @@ class Seen:
 
 
 def see(pixels: Array, view: View) -> Seen:
-    """Return what is said of a plane, and what is found where nothing is: all is checked before anything is looked for."""
+    """Return what is said of a plane, and what is found where nothing is, with a warning where that is not sure.
+
+    All is checked before anything is looked for.
+    """
     said = view.settle(pixels.shape)
     known = np.ones((pixels.shape[0], pixels.shape[1]), np.bool_)
-    return see_in(pixels, view, said[0], find_grounds(pixels, [said], known, everywhere=True)[0])
-
-
-def see_in(pixels: Array, view: View, said: Plane | None, ground: Bools) -> Seen:
-    """Return the plane of a ground, found where it is not said, and with a warning where that is not sure."""
-    if said is not None:
-        return Seen(said, ground, False)
+    ground = find_grounds(pixels, [said], known, everywhere=True)[0]
+    if said[0] is not None:
+        return Seen(said[0], ground, False)
     found = find(pixels, fov=view.fov, known=ground)
     if found.confidence < SURE:
         warnings.warn(
             f"the plane was found with a confidence of {found.confidence:.2f} of 1 (slant {found.slant:.0f}, tilt "
             f"{found.tilt:.0f}); where the result does not look right give the corners of a rectangle, or slant and tilt",
-            stacklevel=4,
+            stacklevel=3,
         )
     return Seen(found, ground, True)
+
+
+def follow_plane(pixels: Array, ground: Bools, said: Plane | None, fov: float | None) -> tuple[Plane | None, bool]:
+    """Return the plane that is said, or found surely enough, and whether it was found; none that is seen from the front."""
+    if said is not None:
+        return (None if said.slant < FLAT else said), False
+    try:
+        seen = find(pixels, fov=fov, known=ground)
+    except InvalidInput:
+        # Too little of it is known.
+        return None, False
+    if seen.confidence < SURE:
+        warnings.warn(
+            f"the plane was found with a confidence of {seen.confidence:.2f} of 1, so it is not followed; give the corners "
+            "of a rectangle of it, or slant and tilt",
+            stacklevel=4,
+        )
+        return None, False
+    return (None, False) if seen.slant < FLAT else (seen, True)
 
 
 def as_views(view: View | Plane | Sequence[View | Plane] | None) -> list[View]:
