@@ -124,9 +124,21 @@ def test_what_engines_load(here: Path, capsys: pytest.CaptureFixture[str]) -> No
     assert io.read("small/albedo.1.png").shape == (32, 32, 3)
     assert Path("rock.glb").read_bytes()[:4] == b"glTF"
     assert "standard_surface" in Path("mtlx/material.mtlx").read_text()
-    for made in ("small/height.2.png", "rock.glb", "mtlx/material.mtlx"):
+    for made, says in {
+        "small/height.2.png": "image: 16 x 16, 1 channel, uint16",
+        "rock.glb": "scene: glTF 2.0, plane, sphere, textures ",
+        "mtlx/material.mtlx": "material: MaterialX 1.",
+    }.items():
         assert main(["rerun", made, "-q"]) == 0, made
         assert "the same bytes" in capsys.readouterr().out
+        assert main(["info", made]) == 0
+        assert capsys.readouterr().out.startswith(says)
+    assert main(["info", "new"]) == 0
+    assert capsys.readouterr().out.startswith("material: 64 x 64, maps albedo (colour, uint8), height (height, uint16)")
+    for name in ("bad.glb", "bad.mtlx"):
+        Path(name).write_bytes(b"something else")
+        assert main(["info", name]) == 2
+        assert f"{name}: is no " in capsys.readouterr().err
 
 
 def test_variants_go_to_folders_of_their_own(here: Path) -> None:
@@ -139,7 +151,7 @@ def test_variants_go_to_folders_of_their_own(here: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        ("design rock -o rock --depth 12", "--depth: allowed are 8, 16 and 32, got 12"),
+        ("design rock -o new --depth 12", "--depth: allowed are 8, 16 and 32, got 12"),
         ("design rock -o new --format jpg", "--format: allowed are png, tif and exr, got 'jpg'"),
         ("design rock -o new --pack rgb", "--pack: allowed are orm and none, got 'rgb'"),
         ("design rock -o new --gltf rock.gltf", "--gltf: needs a name that ends in .glb"),
@@ -153,7 +165,9 @@ def test_variants_go_to_folders_of_their_own(here: Path) -> None:
         ("design rock/rock_albedo.png -o new.png --preview lit.png", "--preview: is for materials"),
         ("design rock rock/rock_albedo.png -o new", "either all are materials or none is"),
         ("design rock -o mine", "mine/albedo.png is there already"),
-        ("design same -o same", "same/albedo.png is read, and would be lost"),
+        ("design same -o same", "--out: same is read, and would hold other maps beside its own"),
+        ("tile rock -o new --mipmaps links/../rock", "rock is read, and would hold other maps"),
+        ("tile uneven -o new", "uneven: all must have one size; height has"),
         ("design rock -o links", "is read as rock/rock_albedo.png, and would be lost"),
         ("design rock -o new --preview rock/rock_wet.png", "--preview: rock/rock_wet.png is read"),
         ("design empty -o new", "empty: no picture has a name that says what it is for"),
@@ -164,6 +178,9 @@ def test_nothing_is_lost_and_nothing_half_written(
 ) -> None:
     Path("mine").mkdir()
     Path("mine/albedo.png").write_bytes(b"somebody's")
+    Path("uneven").mkdir()
+    io.write("uneven/albedo.png", np.zeros((32, 32, 3), np.uint8))
+    io.write("uneven/height.png", np.zeros((32, 33), np.uint8))
     Path("same").mkdir()
     io.write("same/albedo.png", np.zeros((32, 32, 3), np.uint8))
     Path("links").mkdir()

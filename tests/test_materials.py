@@ -210,7 +210,7 @@ def test_bad_materials_are_refused() -> None:
     for maps, options, words in (
         ({}, {}, "maps: needs a mapping"),
         ({"thing": picture}, {}, "thing: the name does not say"),
-        ({"albedo": picture, "height": picture[:-1, :, 0]}, {}, "height: all maps must have one size"),
+        ({"albedo": picture, "height": picture[:-1, :, 0]}, {}, "maps: all must have one size; height has"),
         ({"normal": picture[..., 0]}, {}, "normal: a map of role normal has 3 or 4 channels, got 1"),
         ({"albedo": picture}, {"roles": {"albedo": "shiny"}}, "allowed roles are"),
         ({"albedo": picture}, {"roles": {"colour": "mask"}}, "there is no map 'colour'"),

@@ -115,9 +115,22 @@ class Command(TyperCommand):
         force = ctx.params.get("force", False)
         given = ctx.params.items()
         inputs = [text for name, value in given if name not in outputs for text in find_texts(value)]
-        check_apart(list_files(inputs), {name: value for name, value in given if name in outputs})
+        written = {name: value for name, value in given if name in outputs}
+        check_apart(list_files(inputs), written)
+        if self.name != "batch":
+            check_folders_apart(inputs, written)
         with _provenance.record(_provenance.make_record(self, ctx.params, force=force) if outputs else None):
             return super().invoke(ctx)
+
+
+def check_folders_apart(inputs: Iterable[str], outputs: Mapping[str, Any]) -> None:
+    """Check that nothing is written beside the maps of a material that is read, where it would be taken for one of them."""
+    read = {os.path.realpath(text): text for text in inputs if os.path.isdir(text)}
+    for name, value in outputs.items():
+        if isinstance(value, str) and os.path.realpath(value) in read:
+            raise InvalidInput(
+                f"--{name}: {value} is read, and would hold other maps beside its own; write to another folder"
+            )
 
 
 def list_files(texts: Iterable[str]) -> list[str]:

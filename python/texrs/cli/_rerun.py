@@ -7,6 +7,8 @@ import os
 import shlex
 import shutil
 import tempfile
+import warnings
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -209,8 +211,13 @@ def compare(recipe: Recipe, made: str) -> None:
 # --- what a file holds -----------------------------------------------------------------------------------------------
 
 
-def info_command(file: Annotated[str, make_argument("FILE", "Any file that texrs reads or writes.")]) -> None:
+def info_command(
+    file: Annotated[str, make_argument("FILE", "Any file that texrs reads or writes, or a folder of maps.")],
+) -> None:
     """Print what a file holds, and how texrs made it."""
+    if os.path.isdir(file):
+        say(describe_material(file, "maps"))
+        return
     recipe = Recipe.read(file)
     for line in describe_file(file, recipe):
         say(line)
@@ -241,6 +248,8 @@ def describe_file(file: str, recipe: Recipe | None) -> list[str]:
     if suffix == ".stl":
         count = int.from_bytes(Path(file).read_bytes()[80:84], "little")
         return [f"surface: {count} triangles"]
+    if suffix in (".glb", ".mtlx"):
+        return [describe_scene(file) if suffix == ".glb" else describe_document(file)]
     if suffix == ".npz":
         for read in (describe_map, describe_elements, describe_arrays):
             try:
@@ -248,10 +257,7 @@ def describe_file(file: str, recipe: Recipe | None) -> list[str]:
             except FileError:
                 continue
     if is_stack(file):
-        shown = Material.read(file)
-        return [
-            f"material: {' x '.join(map(str, shown.shape))}, layers {', '.join(map(describe_layer, shown.items()))}"
-        ]
+        return [describe_material(file, "layers")]
     volume = recipe is not None and recipe.verb == "solid" and recipe.output == "--out"
     try:
         image, axes = (io.read_volume(file), 3) if volume else (io.read(file), 2)
@@ -262,6 +268,41 @@ def describe_file(file: str, recipe: Recipe | None) -> list[str]:
             raise error from None
     what = "scale map" if recipe is not None and recipe.verb == "scale-map" else ("image", "volume")[axes - 2]
     return [f"{what}: {describe(image, axes)}, {image.min()} to {image.max()}"]
+
+
+def describe_material(path: str, what: str) -> str:
+    """Return a line about the maps of a folder, or the layers of a file."""
+    with warnings.catch_warnings(record=True) as left:
+        warnings.simplefilter("always")
+        shown = Material.read(path)
+    for warning in left:
+        note(str(warning.message), quiet=False)
+    return f"material: {show_sides(shown.shape)}, {what} {', '.join(map(describe_layer, shown.items()))}"
+
+
+def describe_scene(file: str) -> str:
+    """Return a line about a binary glTF file."""
+    content = Path(file).read_bytes()
+    length = int.from_bytes(content[12:16], "little")
+    try:
+        if content[:4] != b"glTF":
+            raise ValueError
+        scene = json.loads(content[20 : 20 + length])
+        shapes = ", ".join(node["name"] for node in scene["nodes"] if "mesh" in node)
+        pictures = ", ".join(image["name"] for image in scene["images"])
+        return f"scene: glTF {scene['asset']['version']}, {shapes}, textures {pictures}"
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise FileError(f"{file}: is no binary glTF file, or is damaged") from None
+
+
+def describe_document(file: str) -> str:
+    """Return a line about a MaterialX document."""
+    try:
+        root = ElementTree.fromstring(Path(file).read_bytes())
+    except ElementTree.ParseError:
+        raise FileError(f"{file}: is no MaterialX document, or is damaged") from None
+    names = [each.get("value", "") for each in root.iter("input") if each.get("type") == "filename"]
+    return f"material: MaterialX {root.get('version', '')}, of {', '.join(dict.fromkeys(names))}"
 
 
 def describe_layer(each: tuple[str, Map]) -> str:

@@ -89,7 +89,9 @@ class Material(Exports):
         self._shape = next(iter(sizes.values()))
         for name, size in sizes.items():
             if size != self._shape:
-                raise InvalidInput(f"{name}: all maps must have one size, got {size} beside {self._shape}")
+                raise InvalidInput(
+                    f"maps: all must have one size; {name} has {size}, {next(iter(sizes))} has {self._shape}"
+                )
         self._weights = {name: as_float(w, f"weights[{name!r}]", 0, 100) for name, w in share.items()}
         if len(self) > 1 and not any(self._weights.get(name, WEIGHTS[each.role]) for name, each in self.items()):
             raise InvalidInput("weights: all are 0, so there is nothing to decide on")
