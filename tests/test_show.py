@@ -15,6 +15,7 @@ PEBBLES = texrs.samples.pebbles((64, 64)).image
 DOTS = texrs.samples.load("dots", size=(96, 96))
 MADE = texrs.tile(PEBBLES)
 VOLUME = texrs.samples.stripes((32, 36, 40)).image
+STONES = texrs.Material({"albedo": PEBBLES, "height": PEBBLES[..., 0]})
 THINGS = {
     "Synthesis": MADE,
     "SourceMap": MADE.source,
@@ -33,6 +34,10 @@ THINGS = {
     "ElementOptions": texrs.ElementOptions(labels=DOTS.labels),
     "Comparison": texrs.volume.compare(VOLUME, VOLUME),
     "Particles": texrs.volume.particles(VOLUME[..., 0] > 100),
+    "Material": STONES,
+    "Map": STONES["height"],
+    "ScaleMap": texrs.scale_maps.from_angles((64, 64), 40, 90),
+    "Sample": DOTS,
     "list": [MADE] * 3,
     "Gallery": texrs.Gallery([MADE] * 3),
     "long Gallery": texrs.Gallery([MADE] * 30),
@@ -45,6 +50,15 @@ def test_everything_says_what_it_is_on_one_short_line(name: str):
     assert "\n" not in text
     assert len(text) < 420
     assert "array(" not in text
+
+
+def test_a_scale_map_is_shown_with_its_contours():
+    seen = THINGS["ScaleMap"]
+    assert repr(seen) == f"<ScaleMap of width, 64 x 64, {seen.min():.4g} to {seen.max():.4g}>"
+    assert open_png(seen._repr_png_()).shape == texrs.scale_maps.picture(seen).shape
+    # Parts that are no maps show as other arrays do.
+    assert repr(seen[0])[:10] == "ScaleMap(["
+    assert seen[0]._repr_png_() is None
 
 
 def test_what_is_as_by_default_is_not_said():
@@ -67,6 +81,10 @@ def open_png(data: bytes) -> Any:
         (texrs.Exemplar(VOLUME, axes=3), (36, 40, 3)),
         (THINGS["Elements"], (96, 96, 3)),
         (THINGS["layout"], (64, 64, 3)),
+        (STONES, (64, 64, 3)),
+        (texrs.Material({"albedo": VOLUME}, axes=3), (36, 40, 3)),
+        (DOTS, (96, 96, 3)),
+        (texrs.samples.stripes((32, 36, 40)), (36, 40, 3)),
         (THINGS["Field"], (240, 240, 3)),
         (texrs.fields.circular(), (240, 240, 3)),
         (THINGS["field of frames"], (240, 240, 3)),

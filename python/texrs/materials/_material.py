@@ -14,6 +14,7 @@ import numpy as np
 from texrs._arrays import as_choice, as_float, as_image, as_int
 from texrs._cache import content_hash
 from texrs._progress import listen
+from texrs._show import as_png
 from texrs._typing import Array, Floats, Path, Progress
 from texrs.blending import apply
 from texrs.errors import InvalidInput
@@ -27,6 +28,10 @@ __all__ = ["Material"]
 
 CHANNELS = {Role.NORMAL: (3, 4), Role.NORMAL_DX: (3, 4), Role.ORM: (3, 4), Role.VECTOR: (2, 3), Role.LABELS: (1,)}
 """How many channels maps of a role may have; of others any."""
+
+
+SHOWN = 512
+"""Pixels of the longer side in a notebook."""
 
 
 class Material(Exports):
@@ -189,6 +194,12 @@ class Material(Exports):
         """Return the size, and the name, role and dtype of each map."""
         maps = ", ".join(f"{name} ({each.role.value}, {each.pixels.dtype})" for name, each in self.items())
         return f"<Material of {' x '.join(map(str, self._shape))}: {maps}>"
+
+    def _repr_png_(self) -> bytes:
+        """Show the material under a light in a notebook, or the middle plane of a volume."""
+        if self._axes == 3:
+            return as_png(self.base[self._shape[0] // 2])
+        return as_png(self.preview(tiles=(1, 1), side=SHOWN))
 
     @property
     def shape(self) -> tuple[int, ...]:

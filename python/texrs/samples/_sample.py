@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_seed
+from texrs._show import as_png
 
 LayoutName: TypeAlias = Literal["disjoint", "connected", "jointed"]
 """How elements hang together: apart on a ground, in one net, or parted by joints."""
@@ -66,6 +67,10 @@ class Sample:
         shape = "x".join(map(str, self.image.shape))
         known = [f.name for f in fields(self)[2:] if getattr(self, f.name) is not None]
         return f"Sample({self.name!r}, {shape}, known: {', '.join(known) or 'nothing'})"
+
+    def _repr_png_(self) -> bytes:
+        """Show the picture, or the middle plane of a volume, in a notebook."""
+        return as_png(self.image[len(self.image) // 2] if self.image.ndim == 4 else self.image)
 
 
 def make_generator(name: str, seed: object) -> np.random.Generator:

@@ -7,6 +7,7 @@ from typing import Any, Literal, TypeAlias, cast
 import numpy as np
 
 from texrs._arrays import as_choice, power_single
+from texrs._show import as_png
 from texrs._typing import Floats
 from texrs.scale_maps._maps import LEAST, as_map
 
@@ -86,6 +87,19 @@ class ScaleMap(np.ndarray[tuple[int, ...], np.dtype[np.float32]]):
             made = made.view(ScaleMap)
             made.kind = self.kind
         return made
+
+    def __repr__(self) -> str:
+        """Return the size, the kind and the range on one line."""
+        if self.ndim != 2 or not self.size:
+            return super().__repr__()
+        kind = "" if self.kind is None else f" of {self.kind}"
+        return f"<ScaleMap{kind}, {self.shape[0]} x {self.shape[1]}, {self.min():.4g} to {self.max():.4g}>"
+
+    def _repr_png_(self) -> bytes | None:
+        """Show the map with its contours in a notebook."""
+        from texrs.scale_maps._pictures import picture
+
+        return as_png(picture(self)) if self.ndim == 2 and self.size and bool((self > 0).all()) else None
 
     def __reduce__(self) -> Any:
         """Keep the kind in pickles."""
