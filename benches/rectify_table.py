@@ -1,11 +1,18 @@
-"""Flat textures of floors whose planes are known: how evenly large things are in them, and how square.
+"""Flat textures of floors whose planes are known: how evenly large things are in them, and whether they can be tiled.
 
     [TEXRS_TEXTURES=FOLDER] python benches/rectify_table.py [--pictures DIR]
+        [--evaluator <texture_quality.py>] [--tears <deep_quality.py>]
 
 Each floor, generated or told by ``ground-truth.json`` in FOLDER, is made flat as `texrs.rectify` finds it. Of every pixel of
 the texture the true plane says how large a piece of the floor it shows, and how far from square that is. The spread is the
-standard deviation of the natural logarithm of the size; 0.08 is asked at most. By hand, of the true plane, there is none. All
-are homographies, so that straight lines stay straight. With `--pictures` each photograph and its flat texture are written.
+standard deviation of the natural logarithm of the size; 0.08 is asked at most. By hand: of the homography of four corners of a
+rectangle of the true plane, as they are clicked: whole pixels, one off. All are homographies, so that straight lines stay
+straight.
+
+With an evaluator that has `tile`, both are tiled, ours by ``wrap=True``, that by hand as it is cut out: which bounds fail (a
+line inside may stand out half as much again as in the flat texture). With one that has `Judge`: what share of the tile looks
+torn to a judge of the flat texture once its borders are rolled into its middle; 0.18 is asked at most. With `--pictures` each
+photograph, its flat texture, and both tiles, two by two of each, are written.
 """
 
 from __future__ import annotations
@@ -16,6 +23,7 @@ import sys
 import warnings
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +31,7 @@ import texrs
 from texrs import io
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+from evaluators import as_float, load
 from planes_table import floors, told
 
 
@@ -34,28 +43,82 @@ def measure(made: texrs.Synthesis, true: texrs.Plane) -> tuple[float, float]:
     return float(np.log(values).mean(axis=-1).std()), float(np.median(values[..., 0] / values[..., 1]))
 
 
+def click(plane: texrs.Plane, rng: np.random.Generator) -> texrs.Plane:
+    """Return the plane of four corners of a rectangle that somebody clicks in a photograph: they are a pixel off."""
+    rows, columns = plane.shape
+    middle = plane.flatten(np.array([[0.62 * rows, 0.5 * columns]]))[0]
+    for half in np.geomspace(0.5 * min(rows, columns), 8, 24):
+        corners = plane.project(middle + half * np.array([[-1, -1], [-1, 1], [1, 1], [1, -1]]))
+        if (corners >= 2).all() and (corners <= np.array([rows, columns]) - 3).all():
+            break
+    seen = np.rint(corners) + rng.integers(-1, 2, corners.shape)
+    return texrs.Plane.of_corners(plane.shape, seen, fov=plane.fov)
+
+
+def judge_tile(evaluator: Any, tears: Any, flat: np.ndarray, tile: np.ndarray) -> tuple[list[str], float]:
+    """Return the bounds of an evaluator that a tile fails, and the share of it that looks torn to another's judge."""
+    one, other = as_float(flat), as_float(tile)
+    failed = []
+    if evaluator is not None:
+        found, own = evaluator.tile(other), evaluator.tile(one)
+        bounds = {n: evaluator.BOUNDS[n] for n in found if n in evaluator.BOUNDS}
+        bounds["hidden"] = 0.0, 1.5 * max(own["hidden"], 0.2)
+        failed = [n for n, (low, high) in bounds.items() if not low <= found[n] <= high]
+    rolled = np.roll(other, (other.shape[0] // 2, other.shape[1] // 2), (0, 1))
+    torn = (
+        np.nan
+        if tears is None or min(*flat.shape[:2], *tile.shape[:2]) < 96
+        else tears.Judge(one).scores(rolled)["tear"]
+    )
+    return failed, float(torn)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--pictures", type=Path)
+    parser.add_argument("--evaluator", type=Path)
+    parser.add_argument("--tears", type=Path)
     options = parser.parse_args()
-    print("| floor | true slant | found | confidence | spread | stretched | by hand |\n" + "|---" * 7 + "|", flush=True)
-    spreads = []
+    evaluator, tears = (None if path is None else load(path) for path in (options.evaluator, options.tears))
+    judged = evaluator is not None or tears is not None
+    names = ["floor", "true slant", "found", "confidence", "spread", "stretched", "by hand: spread", "stretched"]
+    names += ["tile: fails", "torn", "by hand: fails", "torn"] if judged else []
+    print("| " + " | ".join(names) + " |\n" + "|---" * len(names) + "|", flush=True)
+    spreads, fails, rng = [], [], np.random.default_rng(0)
     for number, (name, plane, picture) in enumerate(chain(floors(1), told(os.environ.get("TEXRS_TEXTURES")))):
+        view = texrs.View(fov=plane.fov)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            made = texrs.rectify(picture, view=texrs.View(fov=plane.fov))
-        found = made.report["plane"]
-        spread, stretched = measure(made, plane)
-        hand, _ = measure(texrs.rectify(picture, view=plane), plane)
-        spreads.append(spread)
-        sure = f"{found['slant']:.1f} | {found['confidence']:.2f}"
-        print(f"| {name} | {plane.slant:.1f} | {sure} | {spread:.3f} | {stretched:.2f} | {hand:.3f} |", flush=True)
+            made = texrs.rectify(picture, view=view)
+            found = made.report["plane"]
+            spread, stretched = measure(made, plane)
+            by_hand = texrs.rectify(picture, view=click(plane, rng))
+            hand, aside = measure(by_hand, plane)
+            spreads.append(spread)
+            cells = [name, f"{plane.slant:.1f}", f"{found['slant']:.1f}", f"{found['confidence']:.2f}"]
+            cells += [f"{spread:.3f}", f"{stretched:.2f}", f"{hand:.3f}", f"{aside:.2f}"]
+            tile = texrs.rectify(picture, view=view, wrap=True).image if judged else made.image
+        if judged:
+            ours = judge_tile(evaluator, tears, made.image, tile)
+            cut = judge_tile(evaluator, tears, by_hand.image, by_hand.image)
+            fails.append([len(ours[0]), len(cut[0]), ours[1] <= 0.18, cut[1] <= 0.18])
+            for failed, torn in (ours, cut):
+                cells += [", ".join(failed) or "-", f"{torn:.2f}"]
+        print("| " + " | ".join(cells) + " |", flush=True)
         if options.pictures:
             options.pictures.mkdir(parents=True, exist_ok=True)
             io.write(options.pictures / f"{number:02d}-{name}.png", picture)
             io.write(options.pictures / f"{number:02d}-{name}-flat.png", made.image)
+            for kind, shown in (("tile", tile), ("hand", by_hand.image)) if judged else ():
+                io.write(options.pictures / f"{number:02d}-{name}-{kind}.png", np.tile(shown, (2, 2, 1)))
     within = sum(s <= 0.08 for s in spreads)
     print(f"\nspread at most 0.08 in {within} of {len(spreads)}; median {np.median(spreads):.3f}")
+    if judged:
+        ours, cut, whole, pieces = zip(*fails, strict=True)
+        print(f"no bound failed: {sum(n == 0 for n in ours)}, by hand {sum(n == 0 for n in cut)} of {len(fails)}")
+        print(
+            f"torn at most 0.18: {sum(whole)}, by hand {sum(pieces)} of {len(fails)}; too small for a judge count as torn"
+        )
 
 
 if __name__ == "__main__":
