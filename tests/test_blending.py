@@ -478,3 +478,22 @@ def test_parts_do_not_stain_each_other() -> None:
     np.testing.assert_array_equal(texrs.blend(source, image, wrap=False, parts=parts), shown)
     with pytest.raises(InvalidInput, match="parts: needs shape"):
         texrs.blend(source, image, wrap=False, parts=parts[:4])
+
+
+@pytest.mark.parametrize("cyclic", [False, True])
+@pytest.mark.parametrize("shape", [(40, 56), (9, 30), (1, 5)])
+def test_sums_along_seams_are_those_of_the_whole_picture_filtered(shape, cyclic):
+    """Beside those of SciPy, which filters every pixel; they are the same but for the last bit of a single one."""
+    from scipy.ndimage import gaussian_filter
+
+    random = np.random.default_rng(5)
+    marked = random.random(shape) < 0.2
+    marked[0, -1] = True
+    at = np.nonzero(marked)
+    values = random.normal(size=len(at[0])).astype(np.float32)
+    spread = np.zeros(shape, np.float32)
+    spread[at] = values
+    wanted = gaussian_filter(spread, _seams.ALONG, mode="wrap" if cyclic else "constant")[at]
+    found = _seams.Along.of(at, shape, cyclic=cyclic).sum_up(values)
+    assert found.dtype == np.float32
+    np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-8)

@@ -14,6 +14,12 @@ from texrs.source_map import SourceMap
 
 ALONG = 2.0
 """Standard deviation, in pixels, of the window along a seam in which outlines are looked for."""
+REACH = 8
+"""Pixels from which on the window is empty."""
+BELL = np.exp(-0.5 * np.square(np.arange(REACH + 1) / ALONG))
+# Rounded: of exponentials the last bits hang on the processor.
+WINDOW = np.round(BELL / (2 * BELL.sum() - 1), 15).tolist()
+"""What pixels count, by how far away they are."""
 OUTLINE = (0.35, 0.6)
 """Share of the step across a seam that one of its sources shows itself, from which on it may be an outline of a thing, and
 from which on it surely is. Where noise is cut, it shows up to a quarter."""
@@ -77,7 +83,7 @@ class Look:
         step = there - here
         lack = (own[0] + own[1]) / known - step
         if self.outlines:
-            outline = measure_outlines(step, own, at, self.source.shape, "wrap" if wrap else "constant")
+            outline = measure_outlines(step, own, at, self.source.shape, cyclic=wrap)
             lack *= 1 - outline[:, np.newaxis]
         return Seam(at, after, lack)
 
@@ -93,25 +99,63 @@ class Seam:
 
 
 def measure_outlines(
-    step: Floats, own: tuple[Floats, Floats], at: tuple[Array, ...], shape: tuple[int, ...], ends: str
+    step: Floats, own: tuple[Floats, Floats], at: tuple[Array, ...], shape: tuple[int, ...], *, cyclic: bool
 ) -> Floats:
     """Return how surely each pair of neighbours lies on an outline of a thing that occludes what is beyond, 0 to 1.
 
     There one of the sources shows most of the step itself. Both are summed up along the seam: in noise a single
     pair may agree by chance.
     """
-    from scipy.ndimage import gaussian_filter
-
-    def sum_up(values: Floats) -> Floats:
-        spread = np.zeros(shape, np.float32)
-        spread[at] = values.sum(axis=-1)
-        found: Floats = gaussian_filter(spread, ALONG, mode=ends)[at]
-        return found
-
-    shown = np.maximum(*(sum_up(mine * step) for mine in own))
+    along = Along.of(at, shape, cyclic=cyclic)
+    shown = np.maximum(*(along.sum_up((mine * step).sum(axis=-1)) for mine in own))
     least, sure = OUTLINE
-    surely: Floats = np.clip((shown / np.maximum(sum_up(step**2), 1e-12) - least) / (sure - least), 0, 1)
+    surely: Floats = np.clip(
+        (shown / np.maximum(along.sum_up((step**2).sum(axis=-1)), 1e-12) - least) / (sure - least), 0, 1
+    )
     return surely
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Along:
+    """Pixels on seams, whose values are summed up with those of others near by, under a Gaussian.
+
+    Few pixels lie on seams. Each adds to those above and below it, and takes what was added beside it: a picture is never
+    filtered as a whole.
+    """
+
+    rows: NDArray[np.intp]
+    columns: NDArray[np.intp]
+    shape: tuple[int, int]
+    """Where the picture is not cyclic, with a margin that nothing lies in."""
+
+    @classmethod
+    def of(cls, at: tuple[Array, ...], shape: tuple[int, ...], *, cyclic: bool) -> Along:
+        """Return those at (rows, columns) of a picture, both of whose axes are cyclic or neither."""
+        margin = 0 if cyclic else REACH
+        return cls(at[0] + margin, at[1] + margin, (shape[0] + 2 * margin, shape[1] + 2 * margin))
+
+    def sum_up(self, values: Floats) -> Floats:
+        """Return the sums (n,) around each of the pixels."""
+        height, width = self.shape
+        added, exact = np.zeros(height * width), values.astype(np.float64)
+        added[self.rows * width + self.columns] = WINDOW[0] * exact
+        for far in range(REACH, 0, -1):
+            for step in (-far, far):
+                added[(self.rows + step) % height * width + self.columns] += WINDOW[far] * exact
+        first = self.rows * width
+
+        def look(step: int) -> NDArray[np.float64]:
+            # As many digits as what is summed up has.
+            seen: NDArray[np.float64] = (
+                added[first + (self.columns + step) % width].astype(np.float32).astype(np.float64)
+            )
+            return seen
+
+        found: NDArray[np.float64] = WINDOW[0] * look(0)
+        for far in range(REACH, 0, -1):
+            found += (look(-far) + look(far)) * WINDOW[far]
+        sums: Floats = found.astype(np.float32)
+        return sums
 
 
 def list_seams(source: SourceMap, axis: int, wrap: bool) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
