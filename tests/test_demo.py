@@ -42,7 +42,9 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
     designed: Callable[..., Texture] = Workshop.design
     monkeypatch.setattr(Workshop, "design", lambda self, name, *sizes, **o: designed(self, name, 64, 64, tiles=1, **o))
     monkeypatch.setattr("texrs.demo._pictures.SIDE", 64)
-    monkeypatch.setattr("texrs.demo._maps.SIZE", 128)
+    monkeypatch.setattr("texrs.demo._maps.SIZE", 64)
+    monkeypatch.setattr("texrs.demo._perspective.SIDE", 128)
+    monkeypatch.setattr("texrs.demo._splice.SIDE", 96)
     monkeypatch.setattr("texrs.demo._samples.SIDE", 64)
     monkeypatch.setattr("texrs.demo._samples.EDGE", 32)
     for name, side in (("EDGE", 32), ("SIZE", 24), ("SIDE", 64), ("WIDTH", 48), ("CUBE", 48)):
