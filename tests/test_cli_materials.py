@@ -10,6 +10,7 @@ import pytest
 import texrs
 from texrs import Material, io, samples
 from texrs.cli import main
+from texrs.cli._verbs import NAMES
 
 SIZE = ["--size", "64x64", "-q"]
 
@@ -76,6 +77,49 @@ def test_depth_and_format(here: Path) -> None:
     assert io.read("new/deep/albedo.tif").dtype == np.uint16
     assert main(["design", "rock", "-o", "float", *SIZE, "--depth", "32"]) == 0
     assert io.read("float/height.exr").dtype == np.float32
+
+
+VERBS = {
+    "complete": "complete rock hole.png",
+    "design": "design rock --size 64",
+    "extend": "extend rock --left 8 --slant 0",
+    "perspective": "perspective rock --size 64 --scale-map front",
+    "rectify": "rectify rock --slant 20 --tilt 90 --fov 50",
+    "remove": "remove rock hole.png --slant 0",
+    "self-splice": "self-splice rock",
+    "splice": "splice rock sample:dots --size 64",
+    "synthesize": "synthesize rock --size 64",
+    "tile": "tile rock",
+}
+
+
+def test_every_verb_of_pictures_is_tried() -> None:
+    assert VERBS.keys() == set(NAMES) - {"solid"}
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_takes_a_folder(here: Path, capsys: pytest.CaptureFixture[str], verb: str) -> None:
+    io.write("hole.png", np.pad(np.full((8, 8), 255, np.uint8), 28))
+    # Elements, and sides as long as the verbs of photographs need them.
+    dots = samples.dots((64, 64)).image
+    Path("rock/rock_wet.png").unlink()
+    io.write("rock/rock_albedo.png", dots)
+    io.write("rock/rock_height.png", dots[..., 1].astype(np.uint16) * 257)
+    shown = "--preview lit.png --gltf it.glb --map map.npz -q"
+    assert main([*VERBS[verb].split(), "-o", "new", *shown.split()]) == 0, capsys.readouterr().err
+    made = Material.read("new")
+    assert {name: str(each.pixels.dtype) for name, each in made.items()} == {"albedo": "uint8", "height": "uint16"}
+    assert (made["height"].pixels.shape) == texrs.SourceMap.load("map.npz").shape
+    assert main(["apply", "map.npz", "rock/rock_height.png", "-o", "again.png", "-q"]) == 0
+    assert (io.read("again.png") == made["height"].pixels).all()
+    for each in ("new", "lit.png", "it.glb", "map.npz"):
+        assert main(["rerun", each, "-q"]) == 0
+    assert capsys.readouterr().out.count("the same bytes") == 5
+
+
+def test_a_material_says_itself_what_labels_are(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["synthesize", "rock", "-o", "new", "--size", "64", "--labels", "-q"]) == 2
+    assert "--labels: is for a picture" in capsys.readouterr().err
 
 
 def test_a_folder_is_made_again_as_a_whole(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

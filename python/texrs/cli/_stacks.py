@@ -151,7 +151,8 @@ class Stack:
         """Write the maps, and what was asked for beside them."""
         material, out = result.material, paths["out"] or ""
         assert material is not None
-        _outputs.deliver_beside(result, paths, Path(out).suffix, made)
+        # A folder is made again as one.
+        _outputs.deliver_beside(result, paths, Path(out).suffix or "/", made)
         if Path(out).suffix.lower() == LAYERED:
             with _outputs.write_output(out, option, inside=option != "out", made=made) as place:
                 material.save_exr(place)

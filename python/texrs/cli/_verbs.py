@@ -8,6 +8,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import wraps
 from typing import Annotated, Any
 
 import numpy as np
@@ -343,12 +344,22 @@ def _see(verb: Callable[..., Synthesis], **more: Kind) -> Verb:
 def _grow(verb: Callable[..., Synthesis], kind: Kind, axes: int) -> Verb:
     from texrs.exemplar import Exemplar
 
+    @wraps(Exemplar)
+    def make_exemplar(image: Any, **said: Any) -> Any:
+        if not isinstance(image, Material):
+            return Exemplar(image, **said)
+        for name in said.keys() - {"axes"}:
+            raise InvalidInput(
+                f"--{name.replace('_', '-')}: is for a picture; of a material the roles of its maps say it"
+            )
+        return image
+
     options = Options(
         verb,
         arguments={"exemplar.image": kind},
         kinds={"guide.exemplar": NUMBERS, "guide.output": NUMBERS},
         names=GROWN,
-        makers={"exemplar": Exemplar},
+        makers={"exemplar": make_exemplar},
         optional=TWICE,
         axes=axes,
     )
