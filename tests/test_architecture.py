@@ -18,7 +18,7 @@ LAYERS = (
     ("_arrays",),
     ("_colours",),
     ("_evidence", "_light", "_show", "_threads", "kernels"),
-    ("_evening",),
+    ("_chunks", "_evening"),
     ("_engine",),
     ("source_map",),
     ("blending",),
@@ -35,7 +35,7 @@ LAYERS = (
     ("tiling",),
     ("completion",),
     ("papers",),
-    ("database", "extension", "rectification", "removal", "transforms"),
+    ("database", "extension", "lazy", "rectification", "removal", "transforms"),
     ("demo",),
     ("cli",),
 )

@@ -8,18 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_image, as_list, as_ndarray, power_single
+from texrs._chunks.dasks import make_dask
+from texrs._chunks.reading import Channel
 from texrs._show import as_png
 from texrs._typing import Array, Bools, Frames, Interpolation, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.kernels.gather import gather
 from texrs.source_map._antialias import gather_smoothed
 from texrs.source_map._finish import Finish
+from texrs.source_map._parts import IMAGE, Lookups
 from texrs.source_map._pixels import Pixels, divide_bands, label_pieces
 from texrs.source_map._vectors import turn_vectors
 
@@ -343,6 +347,88 @@ class SourceMap:
         channels = 3 if kind == "normal" else 2
         return self._turn(out, kind, green, any(float(e[..., :channels].min()) < 0 for e in images))
 
+    def part(self, box: tuple[slice, ...]) -> SourceMap:
+        """Return the map of a part of the picture.
+
+        Parameters
+        ----------
+        box : tuple of slice
+            Of each axis, from a first pixel to one beyond the last, both within the picture.
+
+        Returns
+        -------
+        SourceMap
+            With the same labels, into the same exemplars. How the whole was finished, as where it was blended, does not hold of
+            a part.
+
+        Raises
+        ------
+        InvalidInput
+            Not such slices.
+
+        Examples
+        --------
+        >>> from texrs import SourceMap
+        >>> SourceMap.identity((20, 30)).part((slice(4, 8), slice(10, 30)))
+        <SourceMap of 4 x 20 into 20 x 30>
+
+        """
+        fits = len(box) == self.axes and all(
+            isinstance(s, slice) and s.step is None and 0 <= (s.start or 0) < (s.stop or 0) <= n
+            for s, n in zip(box, self.shape, strict=False)
+        )
+        if not fits:
+            raise InvalidInput(f"box: needs {self.axes} ranges within {self.shape}, got {box!r}")
+        frame = self.frame
+        if isinstance(frame, Frames):
+            origin = [s.start or 0 for s in box]
+            frame = frame.lattice([s.stop - o for s, o in zip(box, origin, strict=True)], origin=origin)
+        elif frame is not None and frame.ndim > 3:
+            frame = frame[box]
+        return SourceMap(self.coordinates[box], self.exemplar[box], self.label[box], frame, self.shapes)
+
+    def to_dask(
+        self, exemplars: Array | Sequence[Array], chunks: int | Sequence[int] | None = None, **options: Any
+    ) -> Any:
+        """Return what `render` returns as an array of Dask: a block is looked up when it is asked for.
+
+        Parameters
+        ----------
+        exemplars : array, or a sequence of one an exemplar
+            As for `render`.
+        chunks : int, or one an axis, optional
+            Of a block; 512 each in pictures and 128 in volumes by default.
+        **options
+            Those of `render`.
+
+        Returns
+        -------
+        dask.array.Array
+
+        Raises
+        ------
+        InvalidInput
+            As `render`, or there is no Dask (``pip install texrs[dask]``).
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from texrs import SourceMap
+        >>> heights = np.arange(12.0).reshape(3, 4)
+        >>> float(SourceMap.identity((3, 4)).to_dask(heights, 2).sum().compute())
+        66.0
+
+        """
+        images = [np.asarray(each) for each in as_list(exemplars)]
+        # What is wrong is said now, and not when a worker comes to it.
+        channel = Channel.of(self.part((slice(0, 1),) * self.axes).render(images, **options), self.axes)
+        frame = self.frame
+        if isinstance(frame, Frames):
+            frame = getattr(frame, "key", None) or self.frame_array()
+        said = (self.coordinates, self.exemplar, self.label, frame, self.shapes, *images, sorted(options.items()))
+        reader = Lookups(partial(_render_part, self, images, options), channel, said)
+        return make_dask(reader, self.shape, chunks, self.axes, IMAGE)
+
     def _shrunk(self) -> NDArray[np.float32]:
         """Return by how much each pixel's surroundings are smaller than in the exemplar, as a length."""
         frame = self.frame_array()
@@ -602,3 +688,7 @@ class SourceMap:
             return replace(made, finish=Finish.from_arrays(parts, made.shape, shapes))
         except (InvalidInput, TypeError, ValueError) as error:
             raise FileError(f"{path}: is damaged ({error})") from None
+
+
+def _render_part(source: SourceMap, images: list[Array], options: dict[str, Any], box: tuple[slice, ...]) -> Array:
+    return source.part(box).render(images, **options)

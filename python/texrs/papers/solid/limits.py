@@ -9,7 +9,7 @@ from texrs.errors import LimitExceeded
 from texrs.fields import Field
 from texrs.growth import patch_side
 
-__all__ = ["check_memory"]
+__all__ = ["check_memory", "estimate_bytes"]
 
 CUT = 1000
 """Bytes of a point of a patch: places that are tried at once, what they show, pairs and capacities."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,7 +26,8 @@ from texrs.kernels.gather import gather
 from texrs.materials import Material
 from texrs.materials._material import apply_materials
 from texrs.papers.solid.layers import WORK, Layers
-from texrs.papers.solid.limits import check_memory
+from texrs.papers.solid.limits import check_memory, estimate_bytes
+from texrs.papers.solid.parts import InParts
 from texrs.papers.solid.ranges import FAR, as_origin, as_region
 from texrs.papers.solid.request import as_field, as_interpolation
 from texrs.papers.solid.settings import CANDIDATES, ON_DEMAND, Quality, as_quality
@@ -42,10 +43,8 @@ ARRIVED = 4
 _BAND = 1 << 20
 
 
-class Texture:
+class Texture(InParts):
     """What pictures and volumes without borders have in common."""
-
-    axes: ClassVar[int]
 
     def __init__(
         self,
@@ -275,6 +274,41 @@ class Texture:
         if self._material is None:
             raise InvalidInput("texture: is made from one array, not from a material; its values are those of sample()")
         return self._sample_maps(as_points(points, self.axes), self._as_how(interpolation), listen(progress))
+
+    def estimate_memory(self, size: int | Sequence[int]) -> int:
+        """Return the bytes that a process takes at most, about, that makes windows of a size; beside those of Python itself.
+
+        Parameters
+        ----------
+        size : int, or one an axis
+            Of a window, or a chunk.
+
+        Returns
+        -------
+        int
+            The window, what is kept of the exemplar, and ``cache_bytes``.
+
+        Examples
+        --------
+        >>> import texrs
+        >>> texrs.PlaneTexture(texrs.samples.weave((64, 64)).image, cache_bytes=64 << 20).estimate_memory(512) < 500e6
+        True
+
+        """
+        region = Region.whole(as_size(size, axes=self.axes))
+        beside = 0 if self._quality == "fast" else WORK
+        return estimate_bytes(self._exemplar.pixels, region, self._field) + beside + self._cache_bytes
+
+    def look_up(
+        self, origin: Sequence[int], size: Sequence[int], names: Sequence[str], progress: Progress | None = None
+    ) -> Material:
+        """Return some maps of a material in a window, without what else `window` makes."""
+        assert self._material is not None
+        region = Region(tuple(size), tuple(origin), (False,) * self.axes)
+        self._check(region)
+        source = self._look(region, progress)[1].finished(region.wrap, interpolation=self._how)
+        some = Material({name: self._material[name] for name in names}, weights={}, axes=self.axes)
+        return apply_materials([some], source, progress)
 
     def _sample_maps(
         self,

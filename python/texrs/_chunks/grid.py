@@ -1,0 +1,101 @@
+"""How an array is divided into chunks."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from texrs._checks import as_tuple
+from texrs.errors import InvalidInput
+
+__all__ = ["Box", "Grid", "as_sides"]
+
+MOST = 2**40
+"""A side may have as many samples."""
+CHUNK = {2: 512, 3: 128}
+"""Sides of chunks, unless others are asked for."""
+
+Box = tuple[slice, ...]
+"""A part of an array, by its axes without channels."""
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """The chunks of an array, without its channels.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Samples along each axis.
+    chunks : tuple of int
+        Of a chunk; the last along an axis may be shorter.
+
+    Examples
+    --------
+    >>> grid = Grid.of((100, 300), 128)
+    >>> len(grid), grid[2]
+    (3, (slice(0, 100, None), slice(256, 300, None)))
+
+    """
+
+    shape: tuple[int, ...]
+    chunks: tuple[int, ...]
+
+    @classmethod
+    def of(cls, shape: object, chunks: object = None, axes: int = 2) -> Grid:
+        """Check a shape, and how it is to be divided: by default into chunks of 512^2 or 128^3.
+
+        Raises
+        ------
+        InvalidInput
+            Not so many integers of at least 1.
+
+        """
+        sides = as_sides(shape, "shape", axes)
+        wanted = as_sides(CHUNK[axes] if chunks is None else chunks, "chunks", axes)
+        return cls(sides, tuple(min(c, n) for c, n in zip(wanted, sides, strict=True)))
+
+    @property
+    def counts(self) -> tuple[int, ...]:
+        """Chunks along each axis."""
+        return tuple(-(-n // c) for n, c in zip(self.shape, self.chunks, strict=True))
+
+    def __len__(self) -> int:
+        """Return how many chunks there are."""
+        return math.prod(self.counts)
+
+    def index(self, number: int) -> tuple[int, ...]:
+        """Return where a chunk lies among the others."""
+        found = []
+        for count in reversed(self.counts):
+            number, rest = divmod(number, count)
+            found.append(rest)
+        return tuple(reversed(found))
+
+    def __getitem__(self, number: int) -> Box:
+        """Return the part of the array that a chunk holds."""
+        if not 0 <= number < len(self):
+            raise IndexError(number)
+        return tuple(
+            slice(i * c, min((i + 1) * c, n))
+            for i, c, n in zip(self.index(number), self.chunks, self.shape, strict=True)
+        )
+
+    def halved(self) -> Grid:
+        """Return the grid of half the resolution, with chunks as large."""
+        shape = tuple(-(-n // 2) for n in self.shape)
+        return Grid(shape, tuple(min(c, n) for c, n in zip(self.chunks, shape, strict=True)))
+
+
+def as_sides(value: object, name: str, axes: int) -> tuple[int, ...]:
+    """Check a size that need not fit in memory: one integer, or one an axis."""
+    what = f"an integer or {axes} of them, each at least 1"
+    given: Sequence[object] = (
+        (value,) * axes if isinstance(value, numbers.Integral) else as_tuple(value, name, axes, what)
+    )
+    for side in given:
+        if isinstance(side, bool) or not isinstance(side, numbers.Integral) or not 1 <= int(side) < MOST:
+            raise InvalidInput(f"{name}: needs {what}, got {value!r}")
+    return tuple(int(side) for side in given if isinstance(side, numbers.Integral))

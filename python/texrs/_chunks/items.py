@@ -1,0 +1,179 @@
+"""Many results of one function in a Zarr store: each item computed once, whoever computes it."""
+
+from __future__ import annotations
+
+import math
+import os
+import pickle
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from texrs._arrays import try_array
+from texrs._cache import content_hash
+from texrs._chunks import workers
+from texrs._chunks.grid import as_sides
+from texrs._chunks.store import Stored, list_done, make_array, open_array, open_group
+from texrs._chunks.workers import Scheduler
+from texrs._progress import listen
+from texrs._typing import Array, Path, Progress
+from texrs._version import __version__
+from texrs.errors import FileError, InvalidInput, TexrsError
+
+__all__ = ["Failed", "map_items"]
+
+Function = Callable[..., Any]
+Item = Any
+
+
+class Failed(TexrsError):
+    """Some items failed; the others are there, and the same call tries again those that are not.
+
+    Attributes
+    ----------
+    reasons : dict of int to str
+        Why, by the number of the item.
+
+    """
+
+    def __init__(self, reasons: dict[int, str]) -> None:
+        first = ", ".join(f"{number} ({reason})" for number, reason in list(reasons.items())[:3])
+        more = f" and {len(reasons) - 3} more" if len(reasons) > 3 else ""
+        super().__init__(f"items: {len(reasons)} failed: {first}{more}; the others are there")
+        self.reasons = reasons
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Travel with the reasons."""
+        return Failed, (self.reasons,)
+
+
+def map_items(
+    function: Function,
+    items: Sequence[Item],
+    path: Path,
+    *,
+    shape: int | Sequence[int] | None = None,
+    key: str | None = None,
+    scheduler: Scheduler = None,
+    threads: int | None = None,
+    overwrite: bool = False,
+    progress: Progress | bool | None = None,
+) -> Stored:
+    """Compute a function for each item, and stream the results to a Zarr store (see `texrs.lazy.map`)."""
+    begun, watch = time.monotonic(), listen(progress)
+    if not callable(function):
+        raise InvalidInput(f"function: needs a function, got {type(function).__name__}")
+    given = list(items)
+    if not given:
+        raise InvalidInput("items: needs at least one, got none")
+    lattice = (len(given),) if shape is None else _as_lattice(shape, len(given))
+    record = {"version": __version__, "of": key or _digest(function, given), "items": list(lattice)}
+    group = open_group(path, record, {}, overwrite=overwrite)
+    store, work = os.fspath(path), _Item(function, given, os.fspath(path), lattice)
+    todo = _find_missing(group, lattice)
+    total, made, reasons = len(given), 0, dict[int, str]()
+    there = total - len(todo)
+    while todo and not list(group.array_keys()):
+        # The first result says what the arrays are like, before several workers write to them.
+        number = todo.pop(0)
+        reason = work(number, group)
+        made += reason is None
+        if reason is not None:
+            reasons[number] = reason
+    for number, reason in workers.run(work, todo, scheduler, threads_each=threads):
+        if reason is None:
+            made += 1
+        else:
+            reasons[number] = reason
+        if watch is not None:
+            watch("items", (there + made + len(reasons)) / total)
+    if reasons:
+        raise Failed(dict(sorted(reasons.items())))
+    return Stored(store, lattice, total, made, time.monotonic() - begun)
+
+
+def _as_lattice(shape: object, count: int) -> tuple[int, ...]:
+    axes = len(shape) if isinstance(shape, Sequence) else 1
+    sides = as_sides(shape, "shape", max(axes, 1))
+    if math.prod(sides) != count:
+        raise InvalidInput(f"shape: {sides} holds {math.prod(sides)} items, got {count}")
+    return sides
+
+
+def _digest(function: Function, items: list[Item]) -> str:
+    """Return a digest of what is to be computed: what is there of something else is not gone on with."""
+    return content_hash(workers.pack(function), *(pickle.dumps(item) for item in items)).hex()
+
+
+def _as_arrays(result: Any) -> dict[str, Array]:
+    """Return the arrays of a result: of a synthesis the image, of its material all maps."""
+    material, image = getattr(result, "material", None), getattr(result, "image", None)
+    if material is not None:
+        return {name: np.asarray(each.pixels) for name, each in material.items()}
+    if isinstance(result, Mapping):
+        return {str(name): try_array(value) for name, value in result.items()}
+    return {"image": try_array(result if image is None else image)}
+
+
+def _arrange(group: Any, lattice: tuple[int, ...], first: Mapping[str, Array]) -> None:
+    for name, array in first.items():
+        ones = (1,) * len(lattice)
+        make_array(group, name, (*lattice, *array.shape), (*ones, *array.shape), array.dtype)
+
+
+def _find_missing(group: Any, lattice: tuple[int, ...]) -> list[int]:
+    """Return the items of which some array is not there."""
+    count = math.prod(lattice)
+    names = list(group.array_keys())
+    if not names:
+        return list(range(count))
+    axes = len(lattice)
+    done = set.intersection(*({index[:axes] for index in list_done(group[name])} for name in names))
+    return [n for n in range(count) if tuple(map(int, np.unravel_index(n, lattice))) not in done]
+
+
+@dataclass(frozen=True)
+class _Item:
+    """Computes and writes an item; returns why it failed, if it did."""
+
+    function: Function
+    items: list[Item]
+    store: str
+    lattice: tuple[int, ...]
+
+    def compute(self, number: int) -> dict[str, Array]:
+        item = self.items[number]
+        if isinstance(item, Mapping):
+            return _as_arrays(self.function(**item))
+        return _as_arrays(self.function(*item) if isinstance(item, tuple) else self.function(item))
+
+    def __call__(self, number: int, group: Any = None) -> str | None:
+        try:
+            made = self.compute(number)
+            if group is not None:
+                _arrange(group, self.lattice, made)
+            for name, array in made.items():
+                self._write(number, name, array)
+        except (FileError, MemoryError):
+            raise
+        except Exception as error:  # One that is broken does not stop the others.
+            return f"{type(error).__name__}: {error}" if not isinstance(error, TexrsError) else str(error)
+        return None
+
+    def _write(self, number: int, name: str, array: Array) -> None:
+        try:
+            whole = open_array(self.store, name)
+        except (FileNotFoundError, KeyError):
+            raise InvalidInput(f"function: gave a map {name!r}, which the first item does not have") from None
+        wanted = whole.shape[len(self.lattice) :]
+        if array.shape != wanted or array.dtype != whole.dtype:
+            raise InvalidInput(
+                f"function: gave {array.dtype} of shape {array.shape}, for the first item {whole.dtype} of {wanted}"
+            )
+        try:
+            whole[tuple(map(int, np.unravel_index(number, self.lattice)))] = array
+        except OSError as error:
+            raise FileError(f"{self.store}: cannot be written ({error.strerror or error})") from error

@@ -1,0 +1,96 @@
+"""Coarser levels of what is stored, for viewers: each half of the one before, and what OME-Zarr says of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from texrs._chunks.grid import Grid
+from texrs._typing import Array
+
+__all__ = ["count_levels", "describe_image", "halve_block"]
+
+VERSION = "0.5"
+"""Of OME-Zarr."""
+_COLOURS = {1: ("FFFFFF",), 2: ("FFFFFF", "808080"), 3: ("FF0000", "00FF00", "0000FF")}
+
+
+def count_levels(grid: Grid) -> int:
+    """Return how many levels there are until one chunk holds all."""
+    return 1 + max(0, math.ceil(math.log2(max(n / c for n, c in zip(grid.shape, grid.chunks, strict=True)))))
+
+
+def halve_block(block: Array, axes: int, *, labelled: bool) -> Array:
+    """Return a part at half the resolution: means of 2^A samples, of the one or two that there are at odd ends.
+
+    Whole numbers are rounded, halves upwards. Of classes the most frequent is taken, of several the least.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> halve_block(np.array([[1, 2, 9], [3, 4, 9]], np.uint8), 2, labelled=False)
+    array([[3, 9]], dtype=uint8)
+    >>> halve_block(np.array([[1, 2, 9], [2, 4, 9]], np.uint8), 2, labelled=True)
+    array([[2, 9]], dtype=uint8)
+
+    """
+    # The last sample counts twice where it has no neighbour.
+    pads = [(0, n % 2) for n in block.shape[:axes]] + [(0, 0)] * (block.ndim - axes)
+    whole = np.pad(block, pads, mode="edge") if any(pad[1] for pad in pads) else block
+    parts = [whole[tuple(slice(s, None, 2) for s in corner)] for corner in product((0, 1), repeat=axes)]
+    if labelled:
+        stack = np.sort(np.stack(parts), axis=0)
+        votes = np.stack([(stack == part).sum(axis=0) for part in stack])
+        return np.asarray(np.take_along_axis(stack, votes.argmax(axis=0)[np.newaxis], axis=0)[0])
+    if block.dtype.kind in "ui" and block.dtype.itemsize < 8:
+        total = np.zeros(parts[0].shape, np.int64)
+        for part in parts:
+            total += part
+        return np.asarray((total + len(parts) // 2) // len(parts), block.dtype)
+    mean = np.zeros(parts[0].shape, np.float64)
+    for part in parts:
+        mean += part / len(parts)
+    return np.asarray(np.rint(mean) if block.dtype.kind in "ui" else mean).astype(block.dtype)
+
+
+def describe_image(
+    name: str,
+    grids: Sequence[Grid],
+    channels: int | None,
+    origin: Sequence[int],
+    spacing: Sequence[float],
+    unit: str | None,
+) -> dict[str, Any]:
+    """Return what OME-Zarr says of an image: its axes, its levels, and where each lies; channels come first there.
+
+    References
+    ----------
+    .. [1] J. Moore et al., "OME-Zarr: a cloud-optimized bioimaging file format", 2023; specification 0.5.
+
+    """
+    axes = len(grids[0].shape)
+    space = [{"name": letter, "type": "space", **({"unit": unit} if unit else {})} for letter in "zyx"[3 - axes :]]
+    before = [] if channels is None else [{"name": "c", "type": "channel"}]
+    datasets = []
+    for level, _ in enumerate(grids):
+        step = 2**level
+        # Sample i of a level lies in the middle of those that it is the mean of.
+        first = [(o + (step - 1) / 2) * s for o, s in zip(origin, spacing, strict=True)]
+        one, none = [1.0] * len(before), [0.0] * len(before)
+        moves = [
+            {"type": "scale", "scale": [*one, *(s * step for s in spacing)]},
+            {"type": "translation", "translation": [*none, *first]},
+        ]
+        datasets.append({"path": str(level), "coordinateTransformations": moves})
+    said: dict[str, Any] = {
+        "version": VERSION,
+        "multiscales": [{"name": name, "axes": before + space, "datasets": datasets, "type": "mean"}],
+    }
+    if channels in _COLOURS:
+        shown = [{"label": str(i), "color": c, "active": True} for i, c in enumerate(_COLOURS[channels])]
+        said["omero"] = {"channels": shown}
+    return said

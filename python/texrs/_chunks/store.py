@@ -1,0 +1,327 @@
+"""Zarr: images in chunks, each written whole or not at all, so that what is there need not be made again."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from texrs._checks import as_int
+from texrs._chunks import workers
+from texrs._chunks.grid import Box, Grid
+from texrs._chunks.pyramid import count_levels, describe_image, halve_block
+from texrs._chunks.reading import Channel, Reader
+from texrs._chunks.workers import Scheduler
+from texrs._progress import listen
+from texrs._typing import Array, Path, Progress
+from texrs._version import __version__
+from texrs.errors import FileError, InvalidInput
+
+__all__ = ["Stored", "import_zarr", "list_done", "open_group", "write_image"]
+
+RECORD = "texrs"
+"""The attribute that says what a store holds."""
+IMAGE = "image"
+"""Name of the map of what has one alone: it lies at the root."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stored:
+    """What was stored.
+
+    Attributes
+    ----------
+    path : str
+        The store.
+    shape : tuple of int
+        Of the array, channels last, without them where there are several maps.
+    chunks : int
+        How many there are, of all maps and levels.
+    made : int
+        Those that were made now; the others were there.
+    seconds : float
+        How long it took.
+
+    """
+
+    path: str
+    shape: tuple[int, ...]
+    chunks: int
+    made: int
+    seconds: float
+
+
+def import_zarr() -> Any:
+    """Return the library.
+
+    Raises
+    ------
+    InvalidInput
+        It is not installed, or an old one is.
+
+    """
+    try:
+        import zarr
+    except ImportError:
+        raise InvalidInput("path: a Zarr store needs the extra: pip install texrs[dask]") from None
+    if int(zarr.__version__.split(".")[0]) < 3:
+        raise InvalidInput(f"path: a Zarr store needs zarr 3, got {zarr.__version__}")
+    return zarr
+
+
+def open_group(path: Path, record: Mapping[str, Any], attributes: Mapping[str, Any], *, overwrite: bool) -> Any:
+    """Return the group of a store: the one that is there, if it is of the same, or a new one.
+
+    Raises
+    ------
+    FileError
+        Something else is there, and is not to be replaced.
+
+    """
+    zarr, name = import_zarr(), os.fspath(path)
+    # As it comes back from JSON.
+    said = json.loads(json.dumps(dict(record)))
+    try:
+        if not overwrite:
+            try:
+                group = zarr.open_group(name, mode="r+")
+            except (FileNotFoundError, KeyError):
+                group = None
+            if group is not None:
+                if group.attrs.get(RECORD) != said:
+                    raise FileError(
+                        f"{name}: holds something else, or was made with other options; overwrite=True replaces it"
+                    )
+                return group
+            if os.path.lexists(name) and (not os.path.isdir(name) or os.listdir(name)):
+                raise FileError(f"{name}: is there, and is no Zarr store; overwrite=True replaces it")
+        elif os.path.isfile(name):
+            os.remove(name)
+        return zarr.create_group(name, zarr_format=3, overwrite=overwrite, attributes={**attributes, RECORD: said})
+    except FileError:
+        raise
+    except Exception as error:
+        raise FileError(f"{name}: the store cannot be opened ({error})") from error
+
+
+def make_array(
+    group: Any,
+    name: str,
+    shape: Sequence[int],
+    chunks: Sequence[int],
+    dtype: np.dtype[Any],
+    axes: Sequence[str] | None = None,
+) -> Any:
+    """Return an array of a group, made if it is not there; chunks of nothing but zeros are written too."""
+    if name in group:
+        return group[name]
+    return group.create_array(
+        name,
+        shape=tuple(shape),
+        chunks=tuple(chunks),
+        dtype=dtype,
+        fill_value=0,
+        dimension_names=None if axes is None else list(axes),
+        # What is not there has not been made.
+        config={"write_empty_chunks": True},
+    )
+
+
+def open_array(path: str, name: str) -> Any:
+    """Return an array of a store, to write chunks to."""
+    zarr = import_zarr()
+    return zarr.open_array(path, path=name, mode="r+", config={"write_empty_chunks": True})
+
+
+def list_done(array: Any) -> set[tuple[int, ...]]:
+    """Return the chunks that are there, by their index along each axis."""
+    from zarr.core.sync import sync
+
+    store, prefix = array.store_path.store, f"{array.path}/c/".lstrip("/")
+
+    async def find() -> set[tuple[int, ...]]:
+        found = set()
+        async for key in store.list_prefix(prefix):
+            parts = key[len(prefix) :].split("/")
+            if all(part.isdigit() for part in parts):
+                found.add(tuple(map(int, parts)))
+        return found
+
+    try:
+        return set(sync(find()))
+    except FileNotFoundError:
+        return set()
+
+
+def write_image(
+    reader: Reader,
+    shape: object,
+    path: Path,
+    *,
+    axes: int,
+    chunks: object = None,
+    levels: int | None = None,
+    origin: Sequence[int] | None = None,
+    spacing: Sequence[float] | None = None,
+    unit: str | None = None,
+    scheduler: Scheduler = None,
+    threads: int | None = None,
+    overwrite: bool = False,
+    progress: Progress | bool | None = None,
+) -> Stored:
+    """Write maps to an OME-Zarr store; what an interrupted run has left is gone on with.
+
+    A single map named ``image`` lies at the root, several in a group each.
+
+    Raises
+    ------
+    InvalidInput
+        A wrong size, or there is no zarr.
+    FileError
+        The store holds something else, or cannot be written.
+
+    """
+    begun, watch = time.monotonic(), listen(progress)
+    grid = Grid.of(shape, chunks, axes)
+    count = count_levels(grid) if levels is None else as_int(levels, "levels", 1, 32)
+    grids = [grid]
+    while len(grids) < count:
+        grids.append(grids[-1].halved())
+    start, apart = tuple(origin or (0,) * axes), tuple(spacing or (1.0,) * axes)
+    record = {
+        "version": __version__,
+        "of": reader.key,
+        "shape": list(grid.shape),
+        "chunks": list(grid.chunks),
+        "levels": count,
+        "origin": list(start),
+        "spacing": list(apart),
+        "axes": axes,
+        "maps": {n: [c.dtype.str, list(c.channels), c.labelled] for n, c in reader.maps.items()},
+    }
+    alone = list(reader.maps) == [IMAGE]
+    says = {
+        name: {"ome": describe_image(name, grids, c.channels[0] if c.channels else None, start, apart, unit)}
+        for name, c in reader.maps.items()
+    }
+    if reader.key is None and not overwrite:
+        # Nobody can tell whether what is there is of the same function.
+        record["of"] = f"unknown {time.time_ns()}"
+    group = open_group(path, record, says[IMAGE] if alone else {}, overwrite=overwrite)
+    letters = "zyx"[3 - axes :]
+    try:
+        for name, channel in reader.maps.items():
+            inner = group if alone else group.require_group(name)
+            if not alone:
+                inner.attrs.update(says[name])
+            for level, each in enumerate(grids):
+                make_array(
+                    inner,
+                    str(level),
+                    (*channel.channels, *each.shape),
+                    (*channel.channels, *each.chunks),
+                    channel.dtype,
+                    "c" * len(channel.channels) + letters,
+                )
+    except OSError as error:
+        raise FileError(f"{os.fspath(path)}: cannot be written ({error})") from error
+    store = os.fspath(path)
+    total = sum(map(len, grids)) * len(reader.maps)
+    made = 0
+    clock = _Clock(watch, total)
+    for level, each in enumerate(grids):
+        missing = {n: _find_missing(store, _place(n, level, alone), c, each) for n, c in reader.maps.items()}
+        todo = sorted(set().union(*missing.values()))
+        there = len(each) * len(reader.maps) - sum(map(len, missing.values()))
+        clock.skip(there)
+        work: Any = (
+            _Fill(reader, each, store, alone) if level == 0 else _Halve(dict(reader.maps), each, level, store, alone)
+        )
+        for number, _ in workers.run(work, todo, scheduler, threads_each=threads):
+            new = sum(number in missing[name] for name in reader.maps)
+            made += new
+            clock.advance(new, f"level {level}" if level else "chunks")
+    channels = next(iter(reader.maps.values())).channels if alone else ()
+    return Stored(store, (*grid.shape, *channels), total, made, time.monotonic() - begun)
+
+
+def _place(name: str, level: int, alone: bool) -> str:
+    return str(level) if alone else f"{name}/{level}"
+
+
+def _find_missing(store: str, place: str, channel: Channel, grid: Grid) -> set[int]:
+    """Return the numbers of the chunks of an array that are not there."""
+    done = list_done(open_array(store, place))
+    before = (0,) * len(channel.channels)
+    return {n for n in range(len(grid)) if (*before, *grid.index(n)) not in done}
+
+
+@dataclass(frozen=True)
+class _Fill:
+    """Makes a chunk of the finest level, of all maps."""
+
+    reader: Reader
+    grid: Grid
+    store: str
+    alone: bool
+
+    def __call__(self, number: int) -> None:
+        box = self.grid[number]
+        maps = self.reader.maps
+        for name, block in self.reader.read(box, list(maps)).items():
+            _write(self.store, _place(name, 0, self.alone), box, block, maps[name])
+
+
+@dataclass(frozen=True)
+class _Halve:
+    """Makes a chunk of a level from the one before."""
+
+    maps: dict[str, Channel]
+    grid: Grid
+    level: int
+    store: str
+    alone: bool
+
+    def __call__(self, number: int) -> None:
+        box = self.grid[number]
+        for name, channel in self.maps.items():
+            finer = open_array(self.store, _place(name, self.level - 1, self.alone))
+            sides = finer.shape[len(channel.channels) :]
+            there = tuple(slice(2 * s.start, min(2 * s.stop, n)) for s, n in zip(box, sides, strict=True))
+            block = finer[(*(slice(None),) * len(channel.channels), *there)]
+            if channel.channels:
+                block = np.moveaxis(block, 0, -1)
+            small = halve_block(block, len(box), labelled=channel.labelled)
+            _write(self.store, _place(name, self.level, self.alone), box, small, channel)
+
+
+def _write(store: str, place: str, box: Box, block: Array, channel: Channel) -> None:
+    values = np.moveaxis(block, -1, 0) if channel.channels else block
+    try:
+        open_array(store, place)[(*(slice(None),) * len(channel.channels), *box)] = values
+    except OSError as error:
+        raise FileError(f"{store}: cannot be written ({error.strerror or error})") from error
+
+
+class _Clock:
+    """Tells how far it is, how fast it goes, and how long it will take."""
+
+    def __init__(self, watch: Progress | None, total: int) -> None:
+        self.watch, self.total, self.done, self.new = watch, max(total, 1), 0, 0
+        self.begun = time.monotonic()
+
+    def skip(self, count: int) -> None:
+        """Count what was there."""
+        self.done += count
+
+    def advance(self, count: int, stage: str) -> None:
+        """Count what was made."""
+        self.done += count
+        self.new += count
+        if self.watch is not None:
+            self.watch(stage, min(1.0, self.done / self.total))

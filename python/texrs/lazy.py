@@ -1,0 +1,171 @@
+"""Past one process: results of any number in a store, made by any workers, each once.
+
+Needs the extra: ``pip install texrs[dask]``. The scheduler is the caller's: this process, some of this machine, or a cluster of
+Dask. What travels to workers is small: an exemplar's pixels, options and the digest of both; what is known of the
+exemplar is worked out there, once a worker. A worker has one pool of threads. A texture says beforehand what memory a worker
+takes (`texrs.SolidTexture.estimate_memory`).
+
+See Also
+--------
+texrs.SolidTexture.to_dask, texrs.SolidTexture.to_zarr : Parts of unbounded textures of any size.
+texrs.SourceMap.to_dask : Maps of a result, looked up where they are asked for.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from texrs._chunks.items import Failed, map_items
+from texrs._chunks.store import Stored, import_zarr
+from texrs._chunks.workers import WorkerLost
+from texrs._typing import Path, Progress
+from texrs.errors import FileError, InvalidInput
+
+__all__ = ["Failed", "Stored", "WorkerLost", "map", "open"]
+
+
+def __dir__() -> list[str]:
+    return __all__
+
+
+def map(
+    function: Callable[..., Any],
+    items: Sequence[Any],
+    path: Path,
+    *,
+    shape: int | Sequence[int] | None = None,
+    key: str | None = None,
+    scheduler: Any = None,
+    threads: int | None = None,
+    overwrite: bool = False,
+    progress: Progress | bool | None = None,
+) -> Stored:
+    """Compute a function for each item, such as a variant for each seed, and stream the results to a Zarr store.
+
+    A result is there whole or not at all, and each is computed once: what a run that was stopped has left, whatever stopped it,
+    is gone on with when the same call is made again.
+
+    Parameters
+    ----------
+    function : callable
+        Such as ``functools.partial(texrs.design, image, 256)``. It returns a `texrs.Synthesis` (whose image is kept, and of a
+        material all maps), an array, or a mapping of arrays by name; those of all items have one shape.
+    items : sequence
+        What it is called with: a tuple is its arguments, a mapping its named ones, anything else its only one.
+    path : path_like
+        A folder, which workers see too. Each map is an array of it, whose leading axes are the items.
+    shape : int or sequence of int, optional
+        How the items lie: (20, 20) for a matrix of sources and targets, row by row; by default in one row.
+    key : str, optional
+        Says what is computed; by default a digest of the function and the items. A store of another is refused.
+    scheduler : None, int, str or distributed.Client
+        Who computes. None: this process. A number: so many processes of this machine, which a script must start under
+        ``if __name__ == "__main__":``. An address, or a client: the workers of that cluster.
+    threads : int, optional
+        Of each worker; by default the cores are shared out.
+    overwrite : bool
+        Whether what is there, and is not of the same, is replaced.
+    progress : callable or True, optional
+        Called with the stage and the share of it that is done; raising stops the work. True shows a bar.
+
+    Returns
+    -------
+    Stored
+        How many items there are, and how many were computed now.
+
+    Raises
+    ------
+    Failed
+        Some items failed; the others are there.
+    WorkerLost
+        An item ended three workers.
+    InvalidInput
+        Nothing to compute, another number than ``shape`` has, or no such scheduler.
+    FileError
+        The store holds something else, or cannot be written.
+
+    Examples
+    --------
+    >>> import functools, tempfile
+    >>> import texrs
+    >>> dots = texrs.samples.dots((64, 64)).image
+    >>> vary = functools.partial(texrs.synthesize, dots, 48)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     done = texrs.lazy.map(vary, [{"seed": seed} for seed in range(4)], f"{folder}/dots.zarr")
+    ...     shape = texrs.lazy.open(f"{folder}/dots.zarr").shape
+    >>> done.made, shape
+    (4, (4, 48, 48, 3))
+
+    """
+    return map_items(
+        function,
+        items,
+        path,
+        shape=shape,
+        key=key,
+        scheduler=scheduler,
+        threads=threads,
+        overwrite=overwrite,
+        progress=progress,
+    )
+
+
+def open(path: Path, name: str | None = None, *, level: int = 0) -> Any:
+    """Open what is stored as an array of Dask, with channels last.
+
+    Parameters
+    ----------
+    path : path_like
+        A store that `map` or ``to_zarr`` wrote, or any OME-Zarr image.
+    name : str, optional
+        The map, where there are several.
+    level : int
+        Of an image, 0 the finest.
+
+    Returns
+    -------
+    dask.array.Array
+
+    Raises
+    ------
+    FileError
+        There is no such store or map.
+    InvalidInput
+        Several maps and no name, or there is no Dask.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import texrs
+    >>> plane = texrs.PlaneTexture(texrs.samples.weave((64, 64)).image)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     done = plane.to_zarr(f"{folder}/weave.zarr", 100, 64)
+    ...     texrs.lazy.open(f"{folder}/weave.zarr", level=1).shape
+    (50, 50, 3)
+
+    """
+    from texrs._chunks.dasks import import_dask
+
+    zarr, array, where = import_zarr(), import_dask(), os.fspath(path)
+    try:
+        group = zarr.open_group(where, mode="r")
+    except Exception as error:
+        raise FileError(f"{where}: is no Zarr store ({error})") from None
+    names = [*group.group_keys(), *group.array_keys()]
+    if "ome" not in group.attrs and "multiscales" not in group.attrs:
+        if name is None and len(names) != 1:
+            raise InvalidInput(f"name: there are {', '.join(sorted(names)) or 'no maps'} in {where}; say which")
+        if (name or names[0]) not in names:
+            raise FileError(f"{where}: has no {name!r}; there are {', '.join(sorted(names))}")
+        group = group[name or names[0]]
+        if not hasattr(group, "array_keys"):
+            return array.from_array(group, chunks=group.chunks)
+    said = group.attrs.get("ome", group.attrs).get("multiscales", [{}])[0]
+    paths = [each["path"] for each in said.get("datasets", [])]
+    if not 0 <= level < len(paths):
+        raise InvalidInput(f"level: there are {len(paths)}, got {level}")
+    found = array.from_array(group[paths[level]], chunks=group[paths[level]].chunks)
+    kinds = [axis.get("type") for axis in said.get("axes", [])]
+    return array.moveaxis(found, kinds.index("channel"), -1) if "channel" in kinds else found

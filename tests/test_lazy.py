@@ -1,0 +1,371 @@
+"""Past one process: Dask, Zarr, workers that are killed, stores that are gone on with."""
+
+import errno
+import hashlib
+import json
+import os
+import signal
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import texrs
+from texrs import fields, lazy, samples
+from texrs._chunks import store as stores
+from texrs._chunks.grid import Grid
+from texrs._chunks.pyramid import count_levels, halve_block
+from texrs.errors import FileError, InvalidInput
+
+pytest.importorskip("dask")
+zarr = pytest.importorskip("zarr")
+import dask  # noqa: E402
+from distributed import Client, LocalCluster  # noqa: E402
+
+WEAVE = samples.weave((48, 64)).image
+STRIPES = samples.stripes((32, 32, 32)).image[:24, :24, :24]
+MATERIAL = {"albedo": WEAVE, "height": WEAVE[..., 1].astype(np.float32) / 255, "labels": WEAVE[..., 0] > 99}
+PLANE = texrs.PlaneTexture(WEAVE, seed=3, field=fields.circular(centre=(-30, 10), axes=2))
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[Client]:
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 3}),
+        LocalCluster(2, threads_per_worker=1, dashboard_address=None) as cluster,
+        Client(cluster, set_as_default=False) as made,
+    ):
+        yield made
+
+
+def digest(path: Path) -> dict[str, str]:
+    """Return digests of all values that are stored, by array."""
+    found: dict[str, str] = {}
+
+    def walk(group: Any) -> None:
+        for _, array in group.arrays():
+            values = array[:]
+            found[array.path] = hashlib.sha256(
+                repr((values.shape, values.dtype)).encode() + values.tobytes()
+            ).hexdigest()
+        for _, inner in group.groups():
+            walk(inner)
+
+    walk(zarr.open_group(path, mode="r"))
+    return found
+
+
+# --- Dask ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("how", ["synchronous", "threads"])
+def test_blocks_are_windows(how: str) -> None:
+    made = PLANE.to_dask((90, 70), (40, 64), origin=(-20, 5))
+    assert made.chunks == ((40, 40, 10), (64, 6), (3,))
+    assert made.dtype == np.uint8
+    assert np.array_equal(made.compute(scheduler=how), PLANE[-20:70, 5:75])
+    assert np.array_equal(made[7:50, 60:66].compute(scheduler=how), PLANE[-13:30, 65:71])
+
+
+def test_the_texture_is_one_key_of_the_graph_and_the_names_tell_parts_apart() -> None:
+    with pytest.raises(InvalidInput, match="blocks, a graph of Dask holds"):
+        PLANE.to_dask(10_000_000, 512)
+    few = PLANE.to_dask(200, 64)
+    assert len(few.__dask_graph__()) == 16 + 1
+    assert few.name == PLANE.to_dask(200, 64).name
+    others = [PLANE.to_dask(200, 32), PLANE.to_dask(200, 64, origin=1), texrs.PlaneTexture(WEAVE).to_dask(200, 64)]
+    assert len({few.name, *(other.name for other in others)}) == 4
+
+
+def test_volumes_and_maps_of_materials() -> None:
+    solid = texrs.SolidTexture(STRIPES, seed=1)
+    assert np.array_equal(solid.to_dask((20, 30, 10), 20).compute(scheduler="synchronous"), solid[0:20, 0:30, 0:10])
+    stones = texrs.PlaneTexture(texrs.Material(MATERIAL), seed=1)
+    wanted = stones.window((5, 6), (50, 40)).material
+    assert wanted is not None
+    for name in MATERIAL:
+        made = stones.to_dask((50, 40), 32, origin=(5, 6), map=name)
+        assert np.array_equal(made.compute(scheduler="synchronous"), wanted[name].pixels)
+    assert np.array_equal(stones.to_dask((50, 40), 32, origin=(5, 6)).compute(), wanted["albedo"].pixels)
+    with pytest.raises(InvalidInput, match="map: there is no 'normal'"):
+        stones.to_dask(8, map="normal")
+
+
+def test_a_cluster_makes_the_same(client: Client) -> None:
+    made = PLANE.to_dask((90, 70), 40)
+    assert np.array_equal(client.compute(made).result(), PLANE[0:90, 0:70])
+
+
+def test_source_maps_are_looked_up_lazily() -> None:
+    made = texrs.synthesize(WEAVE, (70, 90), field=fields.circular(axes=2), seed=1)
+    other = WEAVE.astype(np.float32) / 7
+    found = made.source.to_dask(other, 32)
+    assert found.shape == (70, 90, 3)
+    assert np.array_equal(found.compute(scheduler="threads"), made.source.render(other))
+    normals = np.zeros((*WEAVE.shape[:2], 3), np.float32)
+    normals[..., 0], normals[..., 2] = -0.6, 0.8
+    turned = made.source.to_dask(normals, (32, 64), kind="normal", interpolation="nearest")
+    assert np.array_equal(turned.compute(), made.source.render(normals, kind="normal", interpolation="nearest"))
+    plain = texrs.design(WEAVE, 96, seed=2)
+    assert np.array_equal(plain.source.to_dask(WEAVE, 50).compute(), plain.stages["composite"])
+    with pytest.raises(InvalidInput, match="exemplars: number 0 needs size"):
+        made.source.to_dask(WEAVE[:-1])
+
+
+# --- Zarr ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_store_holds_the_windows_and_their_levels(tmp_path: Path) -> None:
+    done = PLANE.to_zarr(tmp_path / "a.zarr", (90, 70), 32, origin=(-20, 5), spacing=(0.5, 0.25), unit="micrometer")
+    assert (done.shape, done.chunks, done.made) == ((90, 70, 3), 9 + 4 + 1, 14)
+    assert np.array_equal(lazy.open(done.path).compute(), PLANE[-20:70, 5:75])
+    half = lazy.open(done.path, level=1).compute()
+    assert half.shape == (45, 35, 3)
+    whole = PLANE[-20:70, 5:75].astype(int)
+    mean = (whole[::2, ::2] + whole[1::2, ::2] + whole[::2, 1::2] + whole[1::2, 1::2] + 2) // 4
+    assert np.array_equal(half, mean)
+    said = zarr.open_group(done.path, mode="r").attrs["ome"]
+    scale = said["multiscales"][0]
+    assert said["version"] == "0.5"
+    assert [axis["name"] for axis in scale["axes"]] == ["c", "y", "x"]
+    assert [each["path"] for each in scale["datasets"]] == ["0", "1", "2"]
+    second = scale["datasets"][1]["coordinateTransformations"]
+    assert second[0] == {"type": "scale", "scale": [1.0, 1.0, 0.5]}
+    assert second[1] == {"type": "translation", "translation": [0.0, -9.75, 1.375]}
+    assert scale["axes"][1]["unit"] == "micrometer"
+
+
+def test_materials_are_a_group_each_and_classes_are_not_mixed(tmp_path: Path) -> None:
+    stones = texrs.PlaneTexture(texrs.Material(MATERIAL), seed=1)
+    done = stones.to_zarr(tmp_path / "m.zarr", 40, 32)
+    wanted = stones.window(0, 40).material
+    assert wanted is not None
+    for name in MATERIAL:
+        assert np.array_equal(lazy.open(done.path, name).compute(), wanted[name].pixels)
+    assert lazy.open(done.path, "labels", level=1).dtype == np.bool_
+    with pytest.raises(InvalidInput, match="name: there are albedo, height, labels"):
+        lazy.open(done.path)
+    with pytest.raises(FileError, match="has no 'gloss'"):
+        lazy.open(done.path, "gloss")
+
+
+def test_levels_of_odd_sizes_and_of_classes() -> None:
+    assert count_levels(Grid.of((100, 300), 128)) == 3
+    rng = np.random.default_rng(0)
+    block = rng.integers(0, 3, (5, 6, 7)).astype(np.uint8)
+    voted = halve_block(block, 3, labelled=True)
+    for at in np.ndindex(voted.shape):
+        part = block[tuple(slice(2 * i, 2 * i + 2) for i in at)]
+        # Odd ends count twice.
+        repeat = [2 // n for n in part.shape]
+        votes = np.bincount(np.tile(part, repeat).reshape(-1), minlength=3)
+        assert voted[at] == votes.argmax()
+    values = rng.random((4, 6, 2)).astype(np.float32)
+    mean = halve_block(values, 2, labelled=False)
+    assert np.allclose(mean, values.reshape(2, 2, 3, 2, 2).mean(axis=(1, 3)))
+    assert mean.dtype == np.float32
+
+
+@pytest.mark.parametrize("how", ["processes", "cluster"])
+def test_workers_store_the_same(how: str, tmp_path: Path, client: Client) -> None:
+    PLANE.to_zarr(tmp_path / "a.zarr", (90, 70), 32)
+    heard: list[tuple[str, float]] = []
+    done = PLANE.to_zarr(
+        tmp_path / "b.zarr",
+        (90, 70),
+        32,
+        scheduler=2 if how == "processes" else client.scheduler.address,
+        progress=lambda *told: heard.append(told),
+    )
+    assert done.made == done.chunks
+    assert digest(tmp_path / "a.zarr") == digest(tmp_path / "b.zarr")
+    assert heard[-1][1] == 1.0
+    assert [share for _, share in heard] == sorted(share for _, share in heard)
+
+
+def test_what_is_there_is_not_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Stop(Exception):
+        pass
+
+    def stop(stage: str, share: float) -> None:
+        if share > 0.4:
+            raise Stop
+
+    with pytest.raises(Stop):
+        PLANE.to_zarr(tmp_path / "a.zarr", 100, 32, progress=stop)
+    done = PLANE.to_zarr(tmp_path / "a.zarr", 100, 32)
+    assert 0 < done.made < done.chunks
+    assert PLANE.to_zarr(tmp_path / "a.zarr", 100, 32).made == 0
+    (tmp_path / "a.zarr" / "0" / "c" / "0" / "1" / "2").unlink()
+    assert PLANE.to_zarr(tmp_path / "a.zarr", 100, 32).made == 1
+    PLANE.to_zarr(tmp_path / "b.zarr", 100, 32)
+    assert digest(tmp_path / "a.zarr") == digest(tmp_path / "b.zarr")
+
+
+def test_another_thing_is_not_written_over(tmp_path: Path) -> None:
+    PLANE.to_zarr(tmp_path / "a.zarr", 40, 32)
+    before = digest(tmp_path / "a.zarr")
+    other = texrs.PlaneTexture(WEAVE, seed=9)
+    for made in (
+        lambda: other.to_zarr(tmp_path / "a.zarr", 40, 32),
+        lambda: PLANE.to_zarr(tmp_path / "a.zarr", 40, 20),
+        lambda: PLANE.to_zarr(tmp_path / "a.zarr", 40, 32, origin=1),
+    ):
+        with pytest.raises(FileError, match="overwrite=True"):
+            made()
+    assert digest(tmp_path / "a.zarr") == before
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "letter.txt").write_text("dear")
+    with pytest.raises(FileError, match="is no Zarr store"):
+        PLANE.to_zarr(tmp_path / "mine", 40, 32)
+    assert other.to_zarr(tmp_path / "a.zarr", 40, 32, overwrite=True).made == 5
+    assert digest(tmp_path / "a.zarr") != before
+
+
+def test_a_full_disk_leaves_no_half_chunk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    writes = 0
+    plain = stores._write
+
+    def fill(store: str, place: str, *rest: Any) -> None:
+        nonlocal writes
+        writes += 1
+        if writes == 3:
+            # Cut off in the middle of the file, as a full disk does.
+            import zarr.storage._local as local
+
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(local, "_put", _full)
+                plain(store, place, *rest)
+        plain(store, place, *rest)
+
+    monkeypatch.setattr(stores, "_write", fill)
+    with pytest.raises(FileError, match="No space left"):
+        PLANE.to_zarr(tmp_path / "a.zarr", 100, 32)
+    monkeypatch.setattr(stores, "_write", plain)
+    assert PLANE.to_zarr(tmp_path / "a.zarr", 100, 32).made == 21 - 2
+    PLANE.to_zarr(tmp_path / "b.zarr", 100, 32)
+    assert digest(tmp_path / "a.zarr") == digest(tmp_path / "b.zarr")
+
+
+def _full(*given: Any, **more: Any) -> int:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def kill_once(mark: Path, points: np.ndarray) -> np.ndarray:
+    """A field whose first worker is killed in the middle of its work."""
+    if points[:, 0].max() > 60 and not mark.exists():
+        mark.touch()
+        if os.environ.get("TEXRS_TEST_MAY_DIE"):
+            os.kill(os.getpid(), signal.SIGKILL)
+    return np.broadcast_to(np.eye(2), (len(points), 2, 2))
+
+
+@pytest.mark.parametrize("how", ["processes", "cluster"])
+def test_a_worker_is_killed_and_the_store_is_complete(
+    how: str, tmp_path: Path, client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wanted = texrs.PlaneTexture(WEAVE, seed=3, field=fields.from_function(partial(kill_once, tmp_path / "no"), 2))
+    wanted.to_zarr(tmp_path / "a.zarr", 100, 32)
+    assert (tmp_path / "no").exists()
+    dying = texrs.PlaneTexture(WEAVE, seed=3, field=fields.from_function(partial(kill_once, tmp_path / "mark"), 2))
+    monkeypatch.setenv("TEXRS_TEST_MAY_DIE", "1")
+    if how == "cluster":
+        client.run(os.environ.update, {"TEXRS_TEST_MAY_DIE": "1"})
+    done = dying.to_zarr(tmp_path / "b.zarr", 100, 32, scheduler=2 if how == "processes" else client)
+    assert (tmp_path / "mark").exists()
+    assert done.made == done.chunks
+    assert digest(tmp_path / "a.zarr") == digest(tmp_path / "b.zarr")
+
+
+# --- results of any function -----------------------------------------------------------------------------------------
+
+
+def vary(seed: int, log: Path | None = None) -> texrs.Synthesis:
+    if log is not None:
+        with log.open("a") as file:
+            file.write(f"{seed}\n")
+    return texrs.synthesize(WEAVE, 32, seed=seed)
+
+
+@pytest.mark.parametrize("how", [None, 2, "cluster"])
+def test_each_item_is_computed_once(how: Any, tmp_path: Path, client: Client) -> None:
+    log = tmp_path / "log"
+    items = [(seed, log) for seed in range(12)]
+    scheduler = client if how == "cluster" else how
+    done = lazy.map(vary, items, tmp_path / "v.zarr", scheduler=scheduler)
+    assert (done.made, done.chunks, done.shape) == (12, 12, (12,))
+    assert sorted(map(int, log.read_text().split())) == list(range(12))
+    found = lazy.open(done.path)
+    assert found.chunks == ((1,) * 12, (32,), (32,), (3,))
+    assert np.array_equal(found.compute(), np.stack([vary(seed).image for seed in range(12)]))
+    (Path(done.path) / "image" / "c" / "5" / "0" / "0" / "0").unlink()
+    assert lazy.map(vary, items, tmp_path / "v.zarr", scheduler=scheduler).made == 1
+    assert log.read_text().split().count("5") == 2
+
+
+def outer(row: int, column: int) -> dict[str, np.ndarray]:
+    if (row, column) == (1, 1):
+        raise ValueError("not this one")
+    return {"sum": np.array([row + column]), "rows": np.full((2, 3), row, np.float32)}
+
+
+def test_a_matrix_of_several_maps_and_one_that_fails(tmp_path: Path) -> None:
+    items = [(row, column) for row in range(3) for column in range(2)]
+    with pytest.raises(lazy.Failed, match=r"items: 1 failed: 3 \(ValueError: not this one\)") as caught:
+        lazy.map(outer, items, tmp_path / "m.zarr", shape=(3, 2), scheduler=2)
+    assert list(caught.value.reasons) == [3]
+    sums = lazy.open(tmp_path / "m.zarr", "sum").compute()[..., 0]
+    assert np.array_equal(sums, [[0, 1], [1, 0], [2, 3]])
+    assert lazy.open(tmp_path / "m.zarr", "rows").shape == (3, 2, 2, 3)
+    with pytest.raises(lazy.Failed, match="items: 1 failed"):
+        lazy.map(outer, items, tmp_path / "m.zarr", shape=(3, 2))
+
+
+def test_results_of_other_shapes_are_named(tmp_path: Path) -> None:
+    with pytest.raises(lazy.Failed, match=r"2 \(function: gave float64 of shape \(3,\)"):
+        lazy.map(np.zeros, [2, 2, 3], tmp_path / "m.zarr")
+    with pytest.raises(FileError, match="holds something else"):
+        lazy.map(np.zeros, [2, 2], tmp_path / "m.zarr")
+    lazy.map(lambda n: np.full(2, n), [1, 2], tmp_path / "l.zarr", scheduler=2)  # Sent by cloudpickle.
+    assert lazy.open(tmp_path / "l.zarr").compute().tolist() == [[1, 1], [2, 2]]
+
+
+def die(number: int) -> np.ndarray:
+    if number == 3:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return np.zeros(1)
+
+
+def test_what_always_ends_its_worker_is_said(tmp_path: Path) -> None:
+    with pytest.raises(lazy.WorkerLost, match="ended 3 workers"):
+        lazy.map(die, range(5), tmp_path / "d.zarr", scheduler=2)
+
+
+def test_wrong_arguments(tmp_path: Path) -> None:
+    for call, message in (
+        (lambda: PLANE.to_zarr(tmp_path / "x.zarr", (0, 4)), "shape: needs an integer or 2"),
+        (lambda: PLANE.to_zarr(tmp_path / "x.zarr", 40, (4, 4, 4)), "chunks: needs an integer or 2"),
+        (lambda: PLANE.to_zarr(tmp_path / "x.zarr", 40, levels=0), "levels"),
+        (lambda: PLANE.to_zarr(tmp_path / "x.zarr", 40, origin=10**9), "origin, shape: need to lie within"),
+        (lambda: PLANE.to_zarr(tmp_path / "x.zarr", 40, scheduler=1.5), "scheduler: needs None"),
+        (lambda: PLANE.to_zarr(tmp_path / "y.zarr", 40, scheduler=0), "scheduler: needs an integer"),
+        (lambda: PLANE.to_dask(2**41), "shape"),
+        (lambda: lazy.map(7, [1], tmp_path / "x.zarr"), "function: needs"),  # type: ignore[arg-type]
+        (lambda: lazy.map(np.zeros, [], tmp_path / "x.zarr"), "items: needs at least one"),
+        (lambda: lazy.map(np.zeros, [1, 2], tmp_path / "x.zarr", shape=(2, 2)), "shape: .* holds 4 items, got 2"),
+    ):
+        with pytest.raises(InvalidInput, match=message):
+            call()
+    with pytest.raises(FileError, match="is no Zarr store"):
+        lazy.open(tmp_path / "none.zarr")
+
+
+def test_the_metadata_are_json_that_others_read(tmp_path: Path) -> None:
+    PLANE.to_zarr(tmp_path / "a.zarr", 40, 32)
+    said = json.loads((tmp_path / "a.zarr" / "zarr.json").read_text())
+    assert said["zarr_format"] == 3
+    assert said["attributes"]["texrs"]["of"]
+    assert said["attributes"]["ome"]["omero"]["channels"][0]["color"] == "FF0000"
