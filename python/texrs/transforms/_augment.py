@@ -8,15 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_image, as_ndarray, as_seed
+from texrs._colours import shrink
 from texrs._typing import Array
 from texrs.errors import InvalidInput
-from texrs.exemplar import Exemplar, as_exemplar
+from texrs.exemplar import ElementOptions, Exemplar, as_exemplar
 from texrs.papers.design import design
 from texrs.source_map import SourceMap
 from texrs.transforms._boxes import follow_boxes
 
 SHORTEST = 16
 """Least side of a picture."""
+LARGE = 128
+"""Least side from which on things are found on half of the samples: where they end is then known to a pixel, in a third of
+the time."""
 
 
 class Augmented(NamedTuple):
@@ -34,6 +38,22 @@ class Augmented(NamedTuple):
     """Where each pixel comes from: whatever else is in register follows with ``source.render``."""
 
 
+def find_things(image: Exemplar) -> ElementOptions:
+    """Return how the elements of a picture are found: of a large one by their labels, on half of its samples."""
+    pixels = image.pixels
+    if image.labels or min(image.shape) < LARGE or pixels.dtype.kind not in "uf":
+        return ElementOptions()
+    half = tuple(n // 2 for n in image.shape)
+    means = shrink(pixels.astype(np.float32), half)
+    small = Exemplar(np.rint(means).astype(pixels.dtype) if pixels.dtype.kind == "u" else means)
+    found = small.segment()
+    if found.kind != "components" or found.lattice is not None or found.courses is not None:
+        # What keeps to lines is to keep to them exactly.
+        return ElementOptions()
+    rows, columns = (np.arange(n) * m // n for n, m in zip(image.shape, half, strict=True))
+    return ElementOptions(labels=found.elements[np.ix_(rows, columns)])
+
+
 class TextureAugment:
     """Lay a picture anew from pieces of itself, joined along minimum cuts; labels and boxes follow.
 
@@ -45,7 +65,7 @@ class TextureAugment:
     released while the kernels work, so that threads serve as well as processes, and forked and spawned workers are alike. In a
     loader with a worker a core, `texrs.threads` or the environment variable ``RAYON_NUM_THREADS=1`` keeps workers out of each
     other's way. What is known of a picture is kept for a while, so that its second result takes a fraction of the first's
-    time.
+    time. Things of a picture of 128 pixels a side and more are found on half of its samples, which is as good and faster.
 
     Parameters
     ----------
@@ -110,7 +130,8 @@ class TextureAugment:
         labels = None if mask is None else as_ndarray(mask, "mask")
         if labels is not None and as_image(labels, "mask").shape[:2] != known.shape:
             raise InvalidInput(f"mask: needs the size of the image, {known.shape}, got {labels.shape[:2]}")
-        source = design(known, known.shape, seed=number, wrap=False, plan="still").source
+        things = known.remember("things of an augmented picture", lambda: find_things(known))
+        source = design(known, known.shape, seed=number, wrap=False, plan="still", elements=things).source
         shown = source.render(known.image, interpolation="nearest")
         followed = None if labels is None else source.render(labels, interpolation="nearest")
         kept, index = (None, None) if boxes is None else follow_boxes(source, boxes, self.visible)
