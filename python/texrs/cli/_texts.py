@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from texrs._arrays import as_size
+from texrs._checks import MAX_PIXELS
 from texrs._typing import Array
 from texrs.errors import FileError, InvalidInput
 
@@ -37,7 +38,7 @@ class About:
     """What maps of materials are for."""
 
 
-def parse_size(text: str, option: str = "--size", *, axes: int = 2) -> tuple[int, ...]:
+def parse_size(text: str, option: str = "--size", *, axes: int = 2, limit: int = MAX_PIXELS) -> tuple[int, ...]:
     """Return (rows, columns) of ``1024x512``, which is the width and the height, or of ``512`` a square.
 
     With three axes the depth comes last in the text, and the planes first in what is returned.
@@ -47,7 +48,7 @@ def parse_size(text: str, option: str = "--size", *, axes: int = 2) -> tuple[int
         wanted = ("WIDTHxHEIGHT, as in 1024x512", "WIDTHxHEIGHTxDEPTH, as in 128x96x64")[axes - 2]
         raise InvalidInput(f"{option}: needs {wanted}, or one number; got {text!r}")
     sides = [int(p) for p in reversed(parts)]
-    return as_size(sides if len(sides) > 1 else sides[0], option, axes=axes)
+    return as_size(sides if len(sides) > 1 else sides[0], option, axes=axes, limit=limit)
 
 
 def parse_axes(text: str, option: str = "--wrap", *, axes: int = 2) -> tuple[bool, ...]:

@@ -1,0 +1,164 @@
+"""A command that makes one thing of another: a verb of the library, between reading its inputs and writing what it made."""
+
+from __future__ import annotations
+
+import inspect
+import itertools
+import os
+import time
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from texrs import io
+from texrs._arrays import as_int
+from texrs._threads import threads
+from texrs._typing import Array
+from texrs.cli import _outputs, _provenance
+from texrs.cli._console import keep, note, show_progress
+from texrs.cli._options import Options, as_command, make_parameter
+from texrs.cli._outputs import Quiet, Threads, describe, name_arguments, to_write
+from texrs.cli._provenance import check_free
+from texrs.cli._stacks import OPTIONS, SHOWN, Stack
+from texrs.cli._texts import About
+from texrs.materials import Material
+from texrs.synthesis import Synthesis
+
+VARIANTS = typer.Option(
+    help="Make so many, OUT-SEED each, and OUT as their contact sheet.", show_default="one, in OUT", metavar="N"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Verb:
+    """A function that makes a `Synthesis`, as a command."""
+
+    options: Options
+    times: int = 1
+    """How large the result is, of the sides of the first input, where no size is given."""
+    shape: str = ""
+    """The file whose shape the result has, where one is given and no size is."""
+    several: Callable[..., Iterable[Synthesis]] | None = None
+    """The function that makes ``count`` of them."""
+    says: Callable[[Synthesis], str] = lambda result: ""
+    """What else is to be said of the result."""
+    scaled: bool = True
+    """Whether a pixel of the result is as large as one of the first input."""
+    knows: Callable[[Mapping[str, Any]], Mapping[tuple[str, ...], Any]] = lambda given: {}
+    """Values that the texts of the options tell, where they are not given."""
+
+    def make_command(self) -> Callable[..., None]:
+        """Return the function of the command."""
+        return as_command(self.run, self.make_parameters())
+
+    def make_parameters(self) -> list[inspect.Parameter]:
+        """Return all arguments and options."""
+        parameters = [o.make_parameter() for o in self.options if o.argument]
+        parameters.append(make_parameter("out", Annotated[str, to_write("out")]))
+        parameters += [o.make_parameter() for o in self.options if not o.argument]
+        if self.several is not None:
+            parameters.append(make_parameter("variants", Annotated[int | None, VARIANTS], None))
+        # Materials are pictures.
+        stacked = self.options.axes == 2
+        for name in ("map", "stages", *(SHOWN if stacked else ())):
+            parameters.append(make_parameter(name, Annotated[str | None, to_write(name)], None))
+        parameters += [make_parameter(name, type_, None) for name, type_ in OPTIONS.items() if stacked]
+        return [*parameters, make_parameter("count", Threads, None), make_parameter("quiet", Quiet, False)]
+
+    def run(self, *, count: int | None, quiet: bool, variants: int | None = None, **given: Any) -> None:
+        """Do the command: what can be checked is checked before any file is read, and before the work."""
+        start, options = time.monotonic(), self.options
+        stack = Stack.take(given)
+        paths: dict[str, str | None] = {name: given.pop(name, None) for name in _outputs.OUTPUTS}
+        out = paths["out"] or ""
+        values = options.read(given, which=lambda o: not o.file)
+        read = _outputs.list_files(text for value in given.values() for text in _outputs.find_texts(value))
+        places = [paths]
+        if variants is not None:
+            seeds = range(given["seed"], given["seed"] + as_int(variants, "--variants", 1, 4096))
+            places = [_outputs.name_variants(seed, paths) for seed in seeds]
+            for each in places:
+                _outputs.check_apart(read, each)
+                check_free(each["out"] or "")
+        for each in places:
+            _outputs.check_outputs(each)
+        about = About(axes=options.axes, roles=stack.roles)
+        with warnings.catch_warnings(record=True) as early:
+            warnings.simplefilter("always")
+            values |= options.read(given, about, which=lambda o: o.file and (o.argument or o.name == self.shape))
+        example, like = self.find_example(values), self.read_colours(given)
+        size = self.find_size(values, example)
+        material = self.find_material(values)
+        if material is None:
+            stack.refuse(paths)
+            _outputs.check_output(out, example, size)
+            deliver: Callable[..., None] = _outputs.deliver
+        else:
+            for each in places:
+                stack.check_outputs(material, each, read)
+            deliver = stack.deliver
+        about = replace(about, size=size, like=example)
+        small, made = [], None
+        with (
+            name_arguments(**options.name_values(given), count="--threads"),
+            threads(count),
+            show_progress(quiet=quiet) as progress,
+            warnings.catch_warnings(record=True) as said,
+        ):
+            warnings.simplefilter("always")
+            values |= options.read(given, about, which=lambda o: o.file and o.path not in values)
+            call = options.call({**self.knows(given), **values})
+            if any(o.name == "size" and o.required for o in options):
+                call["size"] = size
+            if variants is None or self.several is None:
+                made = options.function(**call, progress=progress)
+                deliver(made, paths, like=like)
+            else:
+                several = self.several(count=variants, **call, progress=progress)
+                for seed, each, made in zip(itertools.count(given["seed"]), places, several, strict=False):
+                    alone = {"--variants": None, "--seed": str(seed) if seed else None}
+                    deliver(made, each, like=like, made=_provenance.narrow(options=alone, seed=seed))
+                    keep(each["out"] or "")
+                    small.append(_outputs.shrink(made.image))
+        for warning in (*early, *said):
+            if issubclass(warning.category, UserWarning):
+                note(str(warning.message), quiet=quiet)
+        if small and material is None:
+            with _outputs.write_output(out, like=like) as temporary:
+                io.write(temporary, _outputs.make_contact_sheet(small))
+        assert made is not None
+        sheet = " and their contact sheet" if material is None else ""
+        many = f"{len(small)} textures{sheet}, each " if small else ""
+        what = f"{many}{describe(np.asarray(made.image), options.axes)}{self.says(made)}"
+        note(f"wrote {out}: {what}, in {time.monotonic() - start:.1f} s", quiet=quiet)
+
+    def find_material(self, values: Mapping[tuple[str, ...], Any]) -> Material | None:
+        """Return the material that is read, if there is one."""
+        every = (each for value in values.values() for each in (value if isinstance(value, list) else [value]))
+        return next((each for each in every if isinstance(each, Material)), None)
+
+    def find_example(self, values: Mapping[tuple[str, ...], Any]) -> Array:
+        """Return the pixels of the first input."""
+        first = values[next(o.path for o in self.options if o.argument)]
+        first = first[0] if isinstance(first, list) else first
+        # Analysed elements hold theirs, and materials have one that shows them.
+        return np.asarray(first.base if isinstance(first, Material) else getattr(first, "image", first))
+
+    def read_colours(self, given: Mapping[str, Any]) -> io.Notes:
+        """Return what the first input says of its colours, which are those of the result, and of its pixels."""
+        first = given[next(o.name for o in self.options if o.argument)]
+        name = first[0] if isinstance(first, list) else first
+        notes = io.read_notes(name) if os.path.isfile(name) else io.Notes()
+        return replace(notes, made=None, density=notes.density if self.scaled else None)
+
+    def find_size(self, values: Mapping[tuple[str, ...], Any], example: Array) -> tuple[int, ...]:
+        """Return about how large the result will be."""
+        if ("size",) in values:
+            return tuple(values["size",])
+        if (self.shape,) in values and not isinstance(values[self.shape,], str):
+            return tuple(values[self.shape,].shape[: self.options.axes])
+        return tuple(self.times * n for n in example.shape[: self.options.axes])

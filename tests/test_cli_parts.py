@@ -1,0 +1,79 @@
+"""Commands whose results are larger than memory: in chunks, by any workers."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import texrs
+from texrs import io, lazy, samples
+from texrs.cli import main
+
+pytest.importorskip("dask")
+pytest.importorskip("zarr")
+
+STRIPES = samples.stripes((32, 32, 32)).image[:24, :24, :24]
+WEAVE = samples.weave((48, 64)).image
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    io.write_volume(tmp_path / "stripes.tif", STRIPES)
+    io.write(tmp_path / "weave.png", WEAVE)
+    return tmp_path
+
+
+@pytest.mark.parametrize("workers", [None, 2])
+def test_a_solid_into_zarr(files: Path, workers: int | None, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["solid", f"{files}/stripes.tif", "-o", f"{files}/out.zarr", "--size", "30x20x24", "--chunks", "16"]
+    words += ["--origin", "-5,7,1", "--seed", "3", *(["--workers", str(workers)] if workers else [])]
+    assert main(words) == 0
+    said = capsys.readouterr().err
+    assert "each worker takes up to" in said
+    assert "9 chunks, of which 0 were there" in said
+    wanted = texrs.SolidTexture(STRIPES, seed=3)[1:25, 7:27, -5:25]
+    assert np.array_equal(lazy.open(files / "out.zarr").compute(), wanted)
+    assert main(words) == 0
+    found = capsys.readouterr().err
+    assert "9 chunks, of which 9 were there" in found
+    assert main([*words[:-2], "--seed", "4"]) == 2
+    assert "holds something else" in capsys.readouterr().err
+    assert main([*words, "--seed", "4", "--force"]) == 0
+
+
+@pytest.mark.parametrize("name", ["out.npy", "out.tif"])
+def test_slabs(files: Path, name: str) -> None:
+    words = ["solid", f"{files}/stripes.tif", "-o", f"{files}/{name}", "--size", "20x21x22", "--chunks", "8", "-q"]
+    assert main(words) == 0
+    assert np.array_equal(io.read_volume(files / name), texrs.SolidTexture(STRIPES)[0:22, 0:21, 0:20])
+    assert main([*words, "--origin", "2,3,4", "--force"]) == 0
+    assert np.array_equal(io.read_volume(files / name), texrs.SolidTexture(STRIPES)[4:26, 3:24, 2:22])
+
+
+def test_a_window_of_a_picture(files: Path) -> None:
+    words = ["synthesize", f"{files}/weave.png", "-o", f"{files}/far.png", "--size", "40x30", "--origin"]
+    assert main([*words, "1000000,-7", "-q"]) == 0
+    assert np.array_equal(io.read(files / "far.png"), texrs.PlaneTexture(WEAVE)[-7:23, 1000000:1000040])
+    assert (
+        main(["synthesize", f"{files}/weave.png", "-o", f"{files}/p.zarr", "--size", "70", "--chunks", "32", "-q"]) == 0
+    )
+    assert np.array_equal(lazy.open(files / "p.zarr").compute(), texrs.PlaneTexture(WEAVE)[0:70, 0:70])
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--out", "x.npy", "--workers", "2"], "--workers: is for results in a .zarr"),
+        (["--out", "x.zarr", "--workers", "2", "--scheduler", "tcp://a"], "one of them can be asked for"),
+        (["--out", "x.zarr", "--workers", "0"], "--workers: needs an integer"),
+        (["--out", "x.zarr", "--wrap", "xyz"], "--wrap: is for results that are made at once"),
+        (["--out", "x.zarr", "--map", "m.npz"], "--map: is for results that are made at once"),
+        (["--out", "x.zarr", "--origin", "1,2"], "--origin: needs X,Y,Z"),
+        (["--out", "x.npy", "--size", "2048"], "to OUT.zarr, or with --chunks, it is made in parts"),
+        (["--out", "x.zarr", "--chunks", "0"], "--chunks: each side must be at least 1"),
+    ],
+)
+def test_what_is_refused(files: Path, words: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    given = [f"{files}/{w}" if w.startswith(("x.", "m.")) else w for w in words]
+    assert main(["solid", f"{files}/stripes.tif", *given]) == 2
+    assert message in capsys.readouterr().err
