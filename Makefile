@@ -1,5 +1,5 @@
 # Each goal sets up all it needs in this folder: a virtual environment in .venv and a release build.
-# make demo | test | fuzz | lint | bench | docs | format | clean
+# make demo | test | fuzz | lint | bench | wheel | docs | format | clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -8,7 +8,7 @@ JOBS ?= 2
 MINUTES ?= 10
 RUST := Cargo.toml $(shell find rust -name '*.rs')
 
-.PHONY: help demo test fuzz lint lint-rust lint-python format bench docs clean requirements
+.PHONY: help demo test fuzz lint lint-rust lint-python format bench wheel docs clean requirements
 .DELETE_ON_ERROR:
 
 help:
@@ -18,6 +18,7 @@ help:
 	@echo "make lint    formatting, clippy, rustdoc, ruff, mypy, stubtest"
 	@echo "make format  rewrite the sources in the house's format"
 	@echo "make bench   criterion benches of the kernels"
+	@echo "make wheel   a wheel and a source distribution in dist/, tried in clean environments"
 	@echo "make docs    API documentation of the kernels"
 	@echo "make clean   remove what the other goals made"
 
@@ -80,6 +81,13 @@ format: $(VENV)/.tools
 
 bench: | requirements
 	cargo bench
+
+# Built for this machine, and used in clean environments by each Python that is here.
+wheel: $(VENV)/.tools
+	rm -rf dist
+	$(BIN)/maturin build --release --quiet --out dist
+	$(BIN)/maturin sdist --out dist
+	$(BIN)/python .ci/wheel $(PYTHONS)
 
 docs: | requirements
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps
