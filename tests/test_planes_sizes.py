@@ -12,7 +12,7 @@ from texrs import Plane, io, planes, samples
 from texrs.cli import main
 from texrs.errors import InvalidInput
 from texrs.planes._choose import measure_scale
-from texrs.planes._sizes import SURE, agree
+from texrs.planes._sizes import SURE, agree, weigh_bands
 
 
 @pytest.mark.parametrize("name", ["weave", "dots", "pebbles"])
@@ -23,8 +23,8 @@ def test_a_bulge_is_no_plane(name: str) -> None:
     assert found.confidence >= SURE
     off = np.log(found.scale) - np.log(truth)
     assert np.corrcoef(np.log(found.scale).ravel(), np.log(truth).ravel())[0, 1] > 0.93
-    # The plane that is nearest is off by as much as the sizes range.
-    assert off.std() < 0.55 * np.log(truth).std()
+    # The plane that is nearest is off by as much as the sizes range; patterns under one Gaussian find six tenths of that.
+    assert off.std() < 0.35 * np.log(truth).std()
 
 
 def test_a_column_is_no_plane() -> None:
@@ -43,6 +43,16 @@ def test_a_plane_is_one(slant: float, tilt: float) -> None:
     assert found.plane is not None
     assert found.confidence == found.plane.confidence
     np.testing.assert_array_equal(found.scale, found.plane.scale_map())
+
+
+def test_few_things_that_differ_by_chance_are_no_curve() -> None:
+    with np.errstate(all="raise"):
+        found = planes.measure(look("bricks", Plane((256, 320), 0, 90)))
+    assert found.shape == "even"
+    assert found.confidence < SURE
+    slope = np.linspace(-0.5, 0.5, 200)
+    assert weigh_bands([slope, slope, slope]) == 1
+    assert weigh_bands([0.5 * slope, 0.7 * slope, slope]) < 0.4
 
 
 def test_what_nobody_knows_is_even_and_said() -> None:

@@ -11,6 +11,7 @@ small patterns is the same where all are of one size. What the camera blurs is k
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from texrs._typing import Bools, Floats
 from texrs.kernels.gather import gather
 
-__all__ = ["blur_levels", "follow", "measure_windows"]
+__all__ = ["blur_levels", "follow", "measure_in_sizes", "measure_windows"]
 
 Reals = NDArray[np.float64]
 
@@ -93,6 +94,22 @@ def follow(levels: list[Floats], known: Bools, sigma: float, start: Reals, round
 def measure_windows(levels: list[Floats], known: Bools, rise: Reals, sigma: float) -> tuple[Reals, Reals]:
     """Return points of the plane of a horizon, (n, 2), in pixels from the picture's middle, and N around each, (n, 2, 2)."""
     return _Flat(levels, known, rise).measure(sigma)
+
+
+def measure_in_sizes(levels: list[Floats], known: Bools, rise: Reals, sigmas: Sequence[float]) -> tuple[Reals, Reals]:
+    """Return points of the plane, (n, 2), and logarithms of sizes of patterns around each under each Gaussian, (sigmas, n)."""
+    flat = _Flat(levels, known, rise)
+    found = [flat.measure(sigma) for sigma in sigmas]
+    # Under the widest fewest windows are whole.
+    points = min((p for p, _ in found), key=len)
+    sizes = []
+    for at, slopes in found:
+        if not len(points):
+            return points, np.empty((len(sigmas), 0))
+        nearest = np.square(points[:, np.newaxis] - at).sum(axis=-1).argmin(axis=1)
+        (a, b), (c, d) = slopes[nearest].transpose(1, 2, 0)
+        sizes.append(-0.25 * np.log(np.maximum(a * d - b * c, 1e-30)))
+    return points, np.stack(sizes)
 
 
 def _hasten(change: Reals, moved: Reals, differs: Reals) -> Reals:

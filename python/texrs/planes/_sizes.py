@@ -19,7 +19,7 @@ from texrs._arrays import as_image, as_mask, exp_single, guidance, log_single
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.planes._find import find, prepare
-from texrs.planes._patterns import blur_levels, measure_windows
+from texrs.planes._patterns import blur_levels, measure_in_sizes
 from texrs.planes._plane import Plane
 from texrs.scale_maps import ScaleMap
 from texrs.scale_maps._trend import follow
@@ -33,7 +33,10 @@ Shape: TypeAlias = Literal["plane", "curved", "free", "even"]
 SURE = 0.4
 """Confidence below which it is said that what was found may be wrong."""
 BANDS = 1.0, 1.6, 2.5
-"""Standard deviations of the Gaussians under which patterns are looked at, in samples."""
+"""Standard deviations of the Gaussians under which patterns are looked at, in samples, where they are of the usual size."""
+LADDER, SETTLING = tuple(0.6 * 1.3**k for k in range(9)), 6
+"""Those under which they are measured; and how often each is looked at anew under one that grows with it. Under one that does
+not, small patterns are blurred away, and a third to a half of what sizes change is not seen."""
 FINEST, DETAILS = 1 / 400, (1.0, 2.5, 6.0)
 """Of the shorter side, and at least one pixel: what is too fine to be a feature of a mask; and so many times of it."""
 LATTICE = 24
@@ -46,6 +49,8 @@ BENT, MORE = 0.04, 0.8
 the plane itself: what is far is blurred, so that steep planes seem to bend."""
 ROUGH = 0.12
 """The same of what is off a curved surface."""
+UNEVEN = 0.6
+"""Logarithm of the ratio of what patterns of two bands say sizes change by, at which the confidence is 1 / e of what it was."""
 FEWEST = 24
 """Windows that say something about a curved surface."""
 TERMS = 6
@@ -129,6 +134,7 @@ def measure(image: object, *, known: object = None) -> Sizes:
     masks = list_masks(pixels, there)
     said += [evaluate(fit(places, m[places].astype(np.float64), size), places, size) for m in masks]
     agreed, confidence = agree(said)
+    confidence = float(f"{confidence * weigh_bands(said[: len(voices)]):.3g}")
     if confidence < SURE and plane is not None and sure:
         # It may bend, but nobody knows how.
         return Sizes(ScaleMap(plane.scale_map(), "width"), "plane", plane, plane.confidence)
@@ -142,18 +148,32 @@ def list_patterns(pixels: Array, known: Bools, plane: Plane) -> list[Reals]:
     """Return quadratic surfaces of the logarithms of sizes, as patterns of each band have them, measured on about a plane."""
     size = pixels.shape[0], pixels.shape[1]
     grey, there, step = prepare(guidance(pixels), known)
-    levels = blur_levels(grey)
     # Of what is shrunk.
     rise = plane._rise * step
+    points, sizes = measure_in_sizes(blur_levels(grey), there, rise, LADDER)
+    if len(points) < FEWEST:
+        return []
+    width = 1 / (1 - points[:, 0] * rise[0] - points[:, 1] * rise[1])
+    rows, columns = (points[:, k] * width * step + (size[k] - 1) / 2 for k in range(2))
+    terms = list_terms((rows, columns), size)
     found = []
     for sigma in BANDS:
-        points, slopes = measure_windows(levels, there, rise, sigma)
-        if len(points) >= FEWEST:
-            width = 1 / (1 - points[:, 0] * rise[0] - points[:, 1] * rise[1])
-            rows, columns = (points[:, k] * width * step + (size[k] - 1) / 2 for k in range(2))
-            logs = 1.5 * np.log(width) - 0.25 * np.log(np.maximum(np.linalg.det(slopes), 1e-30))
-            found.append(fit((rows, columns), logs, size))
+        away = np.zeros(len(points))
+        for _ in range(SETTLING):
+            # On the plane, where all are about as large.
+            flat = look_up(sizes, np.log(sigma / LADDER[0]) / np.log(LADDER[1] / LADDER[0]) + away)
+            smooth = np.einsum("ni,i->n", terms, fit((rows, columns), flat, size))
+            away = (smooth - np.median(smooth)) / np.log(LADDER[1] / LADDER[0])
+        found.append(fit((rows, columns), flat + 1.5 * np.log(width), size))
     return found
+
+
+def look_up(sizes: Reals, steps: Reals) -> Reals:
+    """Return what each place, a column, has at so many steps of a ladder, between its rungs, and no further than its ends."""
+    at = np.clip(steps, 0, len(sizes) - 1)
+    low = np.minimum(at.astype(np.intp), len(sizes) - 2)
+    places = np.arange(sizes.shape[1])
+    return np.asarray(sizes[low, places] + (at - low) * (sizes[low + 1, places] - sizes[low, places]), np.float64)
 
 
 def list_masks(pixels: Array, known: Bools) -> list[Floats]:
@@ -240,6 +260,15 @@ def agree(said: list[Reals]) -> tuple[list[int], float]:
     spread = max(float(ranges[agreed].mean()), LEVEL)
     alike = float(np.mean([apart[best, k] for k in agreed if k != best]))
     return agreed, float(f"{share * np.exp(-((alike / (2 * spread)) ** 2)):.3g}")
+
+
+def weigh_bands(said: list[Reals]) -> float:
+    """Return how much it counts that patterns of all bands say the same: less where one says more than another.
+
+    They see the same few things, so what is only chance is the same to all, but coarse ones see fewer of them.
+    """
+    ranges = [max(float(a.std()), LEVEL) for a in said]
+    return float(np.exp(-((np.log(max(ranges) / min(ranges)) / UNEVEN) ** 2))) if ranges else 1.0
 
 
 def shape_of(
