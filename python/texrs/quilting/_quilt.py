@@ -74,7 +74,7 @@ class Quilt:
         self.all_colours = np.concatenate([p.colours.reshape(-1, channels) for p in pictures])
         depth = np.concatenate([p.depth.ravel() for p in pictures])
         self.samples = Samples(self.all_colours, depth, (COLOUR, DEPTH))
-        self.all_hands = np.concatenate([np.linalg.det(p.source.frames()).ravel() > 0 for p in pictures])
+        self.all_hands = np.concatenate([mark_hands(p.source).ravel() for p in pictures])
         self.cells = np.concatenate([number_cells(p.source).ravel() for p in pictures])
         self.used = np.zeros(int(self.cells.max()) + 1)
         self.steps: dict[int, NDArray[np.float64]] = {}
@@ -196,6 +196,15 @@ def number_cells(source: SourceMap) -> NDArray[np.int64]:
     cell = np.clip(source.coordinates, 0, np.array(source.shapes[which]) - 1).astype(np.int64) // CELL
     numbers: NDArray[np.int64] = first + cell[..., 0] * (source.shapes[which][1] // CELL + 1) + cell[..., 1]
     return numbers
+
+
+def mark_hands(source: SourceMap) -> Bools:
+    """Mark the pixels that show an exemplar, and not its mirror image."""
+    frame = source.frame_array()
+    if frame is None:
+        return np.ones(source.shape, np.bool_)
+    unturned = frame[..., 0, 0] * frame[..., 1, 1] > frame[..., 0, 1] * frame[..., 1, 0]
+    return np.asarray(unturned[source.label] if frame.ndim == 3 else unturned, np.bool_)
 
 
 def find_calm_lines(lines: Floats) -> list[int]:
