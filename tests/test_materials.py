@@ -109,6 +109,25 @@ def test_a_single_map_is_decided_on_as_a_picture() -> None:
     assert (made["albedo"].pixels == texrs.design(pebbles, 64).image).all()
 
 
+def test_elements_are_those_of_the_colours_where_these_tell_surely() -> None:
+    """What decides where patches fit may show the joints between things more than the things."""
+    sample = texrs.samples.dots((96, 96))
+    random = np.random.default_rng(3)
+    noise = random.random((96, 96, 3), np.float32)
+    stones = Material({"albedo": sample.image, "normal": noise}, weights={"normal": 20})
+    own, found = texrs.elements.analyse(sample.image), texrs.elements.analyse(stones)
+    assert min(own.report["confidence"].values()) > 0.6
+    assert (found.points == own.points).all()
+    assert (found.image == sample.image).all()
+    made = texrs.splice(stones, sample.image, seed=1)
+    assert made.material is not None
+    assert made.material["normal"].pixels.dtype == np.float32
+    with pytest.raises(InvalidInput, match=r"^a: .*texrs.elements.analyse takes a box"):
+        texrs.splice(
+            Material({"albedo": np.full((64, 64, 3), 90, np.uint8), "mask": np.zeros((64, 64), bool)}), sample.image
+        )
+
+
 def test_several_materials_are_mixed() -> None:
     other = make(seed=5)
     result = texrs.design([STONES, other], 96, weights=[0.5, 0.5])

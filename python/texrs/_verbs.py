@@ -6,10 +6,11 @@ import inspect
 from collections.abc import Callable
 from dataclasses import replace
 from functools import wraps
-from typing import Any, ParamSpec, TypeVar, cast
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast
 
+from texrs._arrays import as_image
 from texrs._progress import listen
-from texrs._typing import Progress
+from texrs._typing import Array, Progress
 from texrs.errors import InvalidInput
 from texrs.materials._material import Material, apply_materials, guide_materials
 from texrs.source_map import SourceMap
@@ -17,11 +18,16 @@ from texrs.synthesis import Synthesis
 
 __all__ = ["takes_materials"]
 
+if TYPE_CHECKING:
+    from texrs.elements import Elements
+
 P = ParamSpec("P")
 T = TypeVar("T")
 
 
-def takes_materials(*names: str, beside: tuple[str, ...] = ()) -> Callable[[Callable[P, T]], Callable[P, T]]:
+def takes_materials(
+    *names: str, beside: tuple[str, ...] = (), analysed: bool = False
+) -> Callable[[Callable[P, T]], Callable[P, T]]:
     """Let a verb take materials for its examples: it decides on what they tell, and all their maps come of it.
 
     Parameters
@@ -30,6 +36,8 @@ def takes_materials(*names: str, beside: tuple[str, ...] = ()) -> Callable[[Call
         The verb's parameters that its source map looks into, in the order of its exemplars; one may hold a list.
     beside : tuple of str
         Parameters of which only what they look like counts.
+    analysed : bool
+        Whether the verb needs the elements of what it is given, which of a material its colours may tell best.
 
     Returns
     -------
@@ -52,9 +60,11 @@ def takes_materials(*names: str, beside: tuple[str, ...] = ()) -> Callable[[Call
             if not any(_holds(value) for value in (*args, *kwargs.values())):
                 return verb(*args, **kwargs)
             given = signature.bind(*args, **kwargs)
+            watch = given.arguments["progress"] = listen(given.arguments.get("progress"))
             for name in beside:
                 if isinstance(given.arguments.get(name), Material):
-                    given.arguments[name] = given.arguments[name].guide
+                    other = given.arguments[name]
+                    given.arguments[name] = _analyse(other, other.guide, name, watch) if analysed else other.guide
             used = [name for name in names if given.arguments.get(name) is not None]
             several = [m for name in used for m in _as_list(given.arguments[name])]
             if not any(isinstance(m, Material) for m in several):
@@ -64,10 +74,12 @@ def takes_materials(*names: str, beside: tuple[str, ...] = ()) -> Callable[[Call
             guides = iter(guide_materials([m.flatten() for m in materials] if lit is True else materials))
             for name in used:
                 value = given.arguments[name]
-                given.arguments[name] = (
-                    [next(guides) for _ in value] if isinstance(value, list | tuple) else next(guides)
-                )
-            watch = given.arguments["progress"] = listen(given.arguments.get("progress"))
+                if analysed:
+                    given.arguments[name] = _analyse(value, next(guides), name, watch)
+                else:
+                    given.arguments[name] = (
+                        [next(guides) for _ in value] if isinstance(value, list | tuple) else next(guides)
+                    )
             if lit is True:
                 # What is decided on is in even light already.
                 given.arguments["flatten"] = False
@@ -95,6 +107,17 @@ def finish(made: Synthesis, materials: list[Material], progress: Progress | None
         report={**made.report, "maps": maps},
         material=material,
     )
+
+
+def _analyse(material: object, guide: Array, name: str, progress: Progress | None) -> Elements:
+    """Return the elements of a material, which are compared by all its maps."""
+    # Most verbs need none.
+    from texrs.elements import analyse
+
+    try:
+        return replace(analyse(material, progress=progress), image=as_image(guide))
+    except InvalidInput as error:
+        raise InvalidInput(f"{name}: {error}; texrs.elements.analyse takes a box, points and a mask") from None
 
 
 def _flattened(source: SourceMap) -> SourceMap:

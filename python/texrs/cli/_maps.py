@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from texrs import io
-from texrs._arrays import as_float
+from texrs._arrays import as_float, as_int
 from texrs._threads import threads
 from texrs.blending import apply
 from texrs.cli import _outputs, _provenance
@@ -82,6 +82,8 @@ def change_finish(places: SourceMap, values: Mapping[tuple[str, ...], Any]) -> F
     fields = {path[1]: value for path, value in values.items() if path[0] == "finish"}
     if "screening" in fields:
         fields["screening"] = as_float(fields["screening"], "--blend", 0, 1e6) or None
+    if "band" in fields:
+        fields["band"] = as_int(fields["band"], "--band", 1, 2**31)
     return replace(known, **fields)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, Literal
@@ -36,6 +36,8 @@ AGAIN = 0.8
 """Share of the elements of a proposed box that those of a better one must be."""
 BYTES = 500
 """Of memory for a pixel, at the most: vectors, spectra and running sums of eight channels, and colour models."""
+SURE = 0.9
+"""Confidence of what is proposed of the colours of a material, from which on its other maps are not asked."""
 LITTLE, MUCH = 0.02, 0.95
 """Shares of foreground outside of which a mask cannot be right."""
 
@@ -64,7 +66,8 @@ def analyse(
     Parameters
     ----------
     image : (H, W) or (H, W, C) array, or Material
-        The texture, sides of at least 16; any dtype. A material is decided on by all its maps, and shown by its colours.
+        The texture, sides of at least 16; any dtype. A material is decided on by its colours where they
+        tell surely, else by all its maps if these tell more; it is shown by its colours.
     box : (row, column, height, width), optional
         Centre and size, in pixels, of the box around one element. Of a connected foreground it holds a mesh or a knot.
     mask : (H, W) array of bool, optional
@@ -118,8 +121,7 @@ def analyse(
     if isinstance(image, Material):
         rest: dict[str, Any] = {"box": box, "mask": mask, "background": background, "layout": layout, "points": points}
         rest |= {"search": search, "method": method, "wrap": wrap, "seed": seed, "corrections": corrections}
-        found = analyse(image.guide, **rest, progress=progress)
-        return replace(found, image=as_image(image.base))
+        return _choose_map(image, partial(analyse, **rest, progress=progress))
     pixels, steps = as_image(image, "image", minimum=SHORTEST), read_steps(() if corrections is None else corrections)
     size = (pixels.shape[0], pixels.shape[1])
     check_memory(BYTES * size[0] * size[1], "image")
@@ -156,6 +158,28 @@ def analyse(
     ]
     entry = replace(entry, report={**entry.report, "doubts": [*entry.report["doubts"], *unsure]})
     return correct(entry, steps)
+
+
+def _choose_map(material: Material, look: Callable[[Array], Elements]) -> Elements:
+    """Return what is found in the colours of a material, or in all its maps where that is surer."""
+    entries: list[Elements] = []
+    trouble: InvalidInput | None = None
+    for pixels in (material.base, material.guide):
+        try:
+            entries.append(look(pixels))
+        except InvalidInput as error:
+            trouble = error
+        if entries and _be_sure(entries[-1]) >= SURE:
+            break
+    if not entries:
+        assert trouble is not None
+        raise trouble
+    return replace(max(entries, key=_be_sure), image=as_image(material.base))
+
+
+def _be_sure(entry: Elements) -> float:
+    """Return how sure the least sure of what was proposed is."""
+    return float(min(entry.report["confidence"].values(), default=1.0))
 
 
 def _repeat_channel(guide: Floats) -> Floats:

@@ -101,7 +101,7 @@ SCREENING = 0.01
 Edit: TypeAlias = str | Mapping[str, Any] | Sequence[Mapping[str, Any]]
 
 
-@takes_materials("a", beside=("b",))
+@takes_materials("a", beside=("b",), analysed=True)
 def splice(
     a: Elements | Material | Array,
     b: Elements | Material | Array,
@@ -267,7 +267,7 @@ def splice(
     )
 
 
-@takes_materials("a")
+@takes_materials("a", analysed=True)
 def self_splice(
     a: Elements | Material | Array,
     edit: Edit | None = None,
