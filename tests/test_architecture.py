@@ -35,7 +35,7 @@ LAYERS = (
     ("tiling",),
     ("completion",),
     ("papers",),
-    ("database", "extension", "lazy", "rectification", "removal", "transforms"),
+    ("database", "extension", "lazy", "rectification", "removal", "tile_set", "transforms"),
     ("demo",),
     ("cli",),
 )

@@ -36,6 +36,7 @@ from .rectification import rectify
 from .removal import remove
 from .source_map import Finish, Reuse, SourceMap
 from .synthesis import Gallery, Synthesis
+from .tile_set import TileSet
 from .tiling import tile
 
 __all__ = [
@@ -55,6 +56,7 @@ __all__ = [
     "SourceMap",
     "Synthesis",
     "TextureDatabase",
+    "TileSet",
     "View",
     "__version__",
     "apply",

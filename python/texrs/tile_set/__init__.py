@@ -1,0 +1,389 @@
+"""Designs without an end: corner tiles, of which any window is looked up.
+
+A. Lagae and P. Dutre, "An alternative for Wang tiles: colored edges versus colored corners", ACM Transactions on Graphics
+25(4), 2006. Each corner of a lattice has one of three colours, by hash; the four corners of a cell say which of 81 tiles lies
+there. So neighbours agree along their edges and at their corners, nothing repeats, and a window takes the time of a copy,
+wherever it is.
+
+The flow: several cyclic pictures are designed (`texrs.design_variants`); strips between each two corners are cut from them,
+and the inside of each tile is cut into its ring of strips, once along all edges (`texrs.tile_set._cutting`). Of several
+places those are taken whose cuts show least; cuts through elements cost more.
+
+In the atlas the tiles lie on a torus of 9 x 9, in which each is there once and fits its neighbours: it can be filtered, and
+is a cyclic texture itself.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_int, as_seed, as_size
+from texrs._cache import content_hash
+from texrs._checks import as_tuple
+from texrs._chunks.dasks import make_dask
+from texrs._chunks.grid import Box, as_sides
+from texrs._chunks.reading import Channel
+from texrs._chunks.store import Stored, write_image
+from texrs._progress import listen, stage
+from texrs._typing import Array, Floats, Path, Progress
+from texrs.errors import InvalidInput
+from texrs.exemplar import Exemplar, as_exemplar
+from texrs.materials import Material
+from texrs.papers.design import design_variants
+from texrs.source_map import SourceMap
+from texrs.synthesis import Synthesis
+from texrs.tile_set._corners import TILES, TORUS, draw_colours, number_tiles
+from texrs.tile_set._cutting import Pictures, cut_tiles
+from texrs.tile_set._shaders import write_shaders
+
+__all__ = ["TileSet"]
+
+FAR = 10**15
+"""Coordinates of the world are within so many pixels."""
+IMAGE = "image"
+KEEP = 4.0
+"""What a cut deep inside of an element costs more, as a multiple."""
+DEPTH = 3.0
+
+
+class TileSet:
+    """An unbounded design: 81 corner tiles, and which one lies where.
+
+    Parameters
+    ----------
+    exemplar : (H, W) or (H, W, C) array, Exemplar or Material
+        The example, as `texrs.design` takes it.
+    side : int, optional
+        Of a tile, 32 to 1024 and a multiple of 4; that of the exemplar's shorter side, 64 to 256, by default.
+    seed : int
+        Chooses the tiles and where they lie, 0 to 2^64 - 1.
+    variants : int
+        Cyclic pictures that tiles are cut from, 1 to 64, each twice as large as a tile.
+    progress : callable or True, optional
+        Called as ``progress(stage, share)``; raising stops the work. True shows a bar.
+    **options
+        Those of `texrs.design_variants`, such as ``plan`` or ``deformation``.
+
+    Raises
+    ------
+    InvalidInput
+        What `texrs.design` refuses, or an option out of its range.
+    Cancelled
+        The work was stopped.
+
+    Examples
+    --------
+    >>> import texrs
+    >>> stones = texrs.TileSet(texrs.samples.dots((64, 64)).image, 64, seed=1, variants=1)
+    >>> far = stones.window((10**12, -5), (40, 60))
+    >>> far.image.shape, bool((far.image == stones[10**12 : 10**12 + 40, -5:55]).all())
+    ((40, 60, 3), True)
+
+    """
+
+    axes = 2
+
+    def __init__(
+        self,
+        exemplar: Array | Exemplar | Material,
+        side: int | None = None,
+        *,
+        seed: int = 0,
+        variants: int = 4,
+        progress: Progress | bool | None = None,
+        **options: Any,
+    ) -> None:
+        watch = listen(progress)
+        shown = exemplar.guide if isinstance(exemplar, Material) else exemplar
+        known = as_exemplar(shown)
+        if side is None:
+            side = int(np.clip(min(known.shape), 64, 256)) // 4 * 4
+        if as_int(side, "side", 32, 1024) % 4:
+            raise InvalidInput(f"side: needs a multiple of 4, got {side}")
+        self._side, self._seed = side, as_seed(seed)
+        if {"size", "wrap", "count"} & options.keys():
+            raise InvalidInput(f"{min({'size', 'wrap', 'count'} & options.keys())}: is said by side and variants")
+        given = exemplar if isinstance(exemplar, Material) else known
+        made = list(
+            design_variants(given, as_int(variants, "variants", 1, 64), 2 * side, seed=seed, progress=watch, **options)
+        )
+        depth = _measure_depth(known)
+        pictures = Pictures(
+            [each.image for each in made],
+            [np.asarray(KEEP * each.source.render(depth, interpolation="linear"), np.float32) for each in made],
+        )
+        advance = stage(watch, "tiles")
+        tiles = cut_tiles(pictures, side, self._seed, advance or (lambda share: None))
+        around = np.pad(TORUS, (0, 1), mode="wrap")
+        order = number_tiles(around)
+        self._place: NDArray[np.intp] = np.empty(TILES, np.intp)
+        self._place[order.reshape(-1)] = np.arange(TILES)
+        laid = tiles[order].transpose(0, 2, 1, 3, 4).reshape(9 * side, 9 * side, 3)
+        materials = [each.material for each in made if each.material is not None]
+        self._maps: dict[str, Array] = {}
+        if materials:
+            for name in materials[0]:
+                images = [each[name].pixels for each in materials]
+                self._maps[name] = Pictures(images, []).look(laid)
+        else:
+            self._maps[IMAGE] = pictures.look(laid)
+        self._like = materials[0] if materials else None
+        outer = SourceMap(
+            laid[..., 1:].astype(np.float32),
+            laid[..., 0].astype(np.uint16),
+            laid[..., 0].astype(np.uint32),
+            None,
+            tuple(each.image.shape[:2] for each in made),
+        )
+        self._source = outer.compose([each.source for each in made])
+
+    def __repr__(self) -> str:
+        """Say what the tiles are."""
+        return f"<{TILES} corner tiles of {self._side} x {self._side}, seed {self._seed}>"
+
+    @property
+    def side(self) -> int:
+        """Pixels of a tile's side."""
+        return self._side
+
+    @property
+    def atlas(self) -> Array:
+        """All tiles on a torus, (9 side, 9 side[, C]): each fits those beside it."""
+        return self._maps[self._base]
+
+    @property
+    def material(self) -> Material | None:
+        """All maps of the atlas, of a material."""
+        return None if self._like is None else self._like.replace(**self._maps)
+
+    @property
+    def source(self) -> SourceMap:
+        """Where the pixels of the atlas come from."""
+        return self._source
+
+    @cached_property
+    def key(self) -> str:
+        """Digest of all that decides the windows."""
+        return content_hash(self._side, self._seed, *self._maps, *self._maps.values()).hex()
+
+    @property
+    def _base(self) -> str:
+        return IMAGE if self._like is None else self._like.base_name
+
+    def index(self, origin: int | Sequence[int], size: int | Sequence[int]) -> NDArray[np.uint8]:
+        """Return which tile lies in each cell of the lattice.
+
+        Parameters
+        ----------
+        origin : int or (int, int)
+            First cell: cell (i, j) begins at pixel (i side, j side).
+        size : int or (rows, columns)
+            Cells.
+
+        Returns
+        -------
+        (rows, columns) uint8
+            Where the tile is in the atlas: 9 times its row, and its column.
+
+        """
+        first, sides = self._as_origin(origin), as_size(size)
+        lines = [np.arange(o, o + n + 1, dtype=np.int64) for o, n in zip(first, sides, strict=True)]
+        return self._place[number_tiles(draw_colours(self._seed, *lines))].astype(np.uint8)
+
+    def __getitem__(self, index: Any) -> Array:
+        """Return a part: ``tiles[y0:y1, x0:x1]``, of any integers."""
+        wanted = "ranges [y0:y1, x0:x1] of integers, each with both ends"
+        parts = as_tuple(index, "index", 2, wanted)
+        if not all(isinstance(p, slice) and p.step is None and None not in (p.start, p.stop) for p in parts):
+            raise InvalidInput(f"index: needs {wanted}, got {index!r}")
+        origin = self._as_origin([p.start for p in parts])
+        size = as_size([int(p.stop) - o for p, o in zip(parts, origin, strict=True)])
+        return self._read(origin, size, [self._maps[self._base]])[0]
+
+    def window(
+        self, origin: int | Sequence[int], size: int | Sequence[int], *, progress: Progress | bool | None = None
+    ) -> Synthesis:
+        """Return a part with its source map.
+
+        Parameters
+        ----------
+        origin : int or (int, int)
+            First pixel, of the world; any integers within 10^15.
+        size : int or (rows, columns)
+            Pixels.
+        progress : callable or True, optional
+            As for all verbs; there is little to tell.
+
+        Returns
+        -------
+        Synthesis
+            The image, of a material all maps, and the source map, whose labels are those of the atlas.
+
+        Raises
+        ------
+        InvalidInput
+            Not such an origin or size.
+
+        """
+        watch = stage(listen(progress), "window")
+        start, sides = self._as_origin(origin), as_size(size)
+        source = self._source
+        frame = source.frame_array()
+        names, dense = list(self._maps), frame is not None and frame.ndim > 3
+        arrays: list[Array] = [source.coordinates, source.exemplar, source.label, *self._maps.values()]
+        if frame is not None and dense:
+            arrays.append(frame)
+        coordinates, exemplar, label, *found = self._read(start, sides, arrays)
+        here = SourceMap(coordinates, exemplar, label, found[-1] if dense else frame, source.shapes)
+        maps = dict(zip(names, found[: len(names)], strict=True))
+        report = {"side": self._side, "seed": self._seed, "origin": list(start)}
+        if watch is not None:
+            watch(1.0)
+        material = None if self._like is None else self._like.replace(**maps)
+        return Synthesis(maps[self._base], here, {"composite": maps[self._base]}, report, material)
+
+    def _read(self, origin: Sequence[int], size: Sequence[int], arrays: Sequence[Array]) -> list[Array]:
+        """Return windows of arrays of the atlas."""
+        side = self._side
+        first = [o // side for o in origin]
+        cells = [(o + n - 1) // side - f + 1 for o, n, f in zip(origin, size, first, strict=True)]
+        index = self.index(first, cells)
+        out = [np.empty((*size, *a.shape[2:]), a.dtype) for a in arrays]
+        for i, j in np.ndindex(*index.shape):
+            here, there = [], []
+            for axis, k in enumerate((i, j)):
+                start = (first[axis] + k) * side - origin[axis]
+                low, high = max(0, start), min(size[axis], start + side)
+                here.append(slice(low, high))
+                corner = (int(index[i, j]) // 9, int(index[i, j]) % 9)[axis] * side
+                there.append(slice(corner + low - start, corner + high - start))
+            for made, atlas in zip(out, arrays, strict=True):
+                made[tuple(here)] = atlas[tuple(there)]
+        return out
+
+    def to_dask(
+        self,
+        shape: int | Sequence[int],
+        chunks: int | Sequence[int] | None = None,
+        *,
+        origin: int | Sequence[int] = 0,
+        map: str | None = None,
+    ) -> Any:
+        """Return a part as an array of Dask, as `texrs.PlaneTexture.to_dask` does."""
+        name = map or self._base
+        if name not in self._maps:
+            raise InvalidInput(f"map: there is no {map!r}; there are {', '.join(self._maps)}")
+        return make_dask(_Reader(self, self._as_part(origin, shape)), shape, chunks, 2, name)
+
+    def to_zarr(
+        self,
+        path: Path,
+        shape: int | Sequence[int],
+        chunks: int | Sequence[int] | None = None,
+        *,
+        origin: int | Sequence[int] = 0,
+        **options: Any,
+    ) -> Stored:
+        """Write a part to an OME-Zarr store, as `texrs.PlaneTexture.to_zarr` does, with its options."""
+        start = self._as_part(origin, shape)
+        return write_image(_Reader(self, start), shape, path, axes=2, chunks=chunks, origin=start, **options)
+
+    def save(self, folder: Path, cells: int | Sequence[int] = 256) -> list[FilePath]:
+        """Write the tiles for engines: the atlas of each map, an index texture, and short shaders for GLSL and Godot.
+
+        Parameters
+        ----------
+        folder : path_like
+            Made where it is missing; files of these names are replaced.
+        cells : int or (rows, columns)
+            Of the index texture. A shader goes around at its ends.
+
+        Returns
+        -------
+        list of pathlib.Path
+            ``NAME.png`` (.tif of floats) for each map, ``index.png``, ``tiles.glsl`` and ``tiles.gdshader``.
+
+        Raises
+        ------
+        FileError
+            A file cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import texrs
+        >>> tiles = texrs.TileSet(texrs.samples.dots((64, 64)).image, 32, variants=1)
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     [path.name for path in tiles.save(folder, 16)]
+        ['image.png', 'index.png', 'tiles.glsl', 'tiles.gdshader']
+
+        """
+        from texrs.io import write
+
+        where, sides = FilePath(folder), as_size(cells)
+        where.mkdir(parents=True, exist_ok=True)
+        written = []
+        for name, array in self._maps.items():
+            written.append(where / f"{name}.{'tif' if array.dtype.kind == 'f' else 'png'}")
+            write(written[-1], array)
+        # Cyclic, as a shader reads it: the corners at the far ends are those at the near ones.
+        colours = draw_colours(self._seed, *(np.arange(n, dtype=np.int64) for n in sides))
+        around = number_tiles(np.pad(colours, (0, 1), mode="wrap"))
+        written.append(where / "index.png")
+        write(written[-1], self._place[around].astype(np.uint8))
+        return written + write_shaders(where, os.path.basename(written[0]))
+
+    def _as_origin(self, origin: int | Sequence[int]) -> tuple[int, int]:
+        values = (origin, origin) if isinstance(origin, int | np.integer) else origin
+        pair = as_tuple(values, "origin", 2, f"2 integers within {FAR}")
+        row, column = (as_int(v, "origin", -FAR, FAR) for v in pair)
+        return row, column
+
+    def _as_part(self, origin: int | Sequence[int], shape: object) -> tuple[int, int]:
+        as_sides(shape, "shape", 2)
+        return self._as_origin(origin)
+
+
+@dataclass(frozen=True)
+class _Reader:
+    """Reads parts of tiles, whose first pixel is at an origin."""
+
+    tiles: TileSet
+    origin: tuple[int, int]
+
+    @property
+    def maps(self) -> Mapping[str, Channel]:
+        """What there is."""
+        like = self.tiles._like
+        return {
+            name: Channel.of(each, 2, labelled=like is not None and like[name].role.labelled)
+            for name, each in self.tiles._maps.items()
+        }
+
+    @property
+    def key(self) -> str:
+        """Digest of the tiles and the origin."""
+        return content_hash(self.tiles.key, self.origin).hex()
+
+    def read(self, box: Box, names: Sequence[str]) -> Mapping[str, Array]:
+        """Return a part of some maps."""
+        start = [s.start + o for s, o in zip(box, self.origin, strict=True)]
+        size = [s.stop - s.start for s in box]
+        found = self.tiles._read(start, size, [self.tiles._maps[name] for name in names])
+        return dict(zip(names, found, strict=True))
+
+
+def _measure_depth(known: Exemplar) -> Floats:
+    """Return how deep inside of an element each pixel is, 0 to 1, where elements are found."""
+    parts = known.segment()
+    if parts.kind != "components":
+        return np.zeros(known.shape, np.float32)
+    return parts.measure_depth(DEPTH)

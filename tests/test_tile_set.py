@@ -1,0 +1,158 @@
+"""Designs without an end: corner tiles."""
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import texrs
+from texrs import io, samples
+from texrs.tile_set._corners import COLOURS, TILES, TORUS, draw_colours, number_tiles
+
+DOTS = samples.dots((64, 64)).image
+FAR = 10**12
+
+
+@pytest.fixture(scope="module")
+def tiles() -> texrs.TileSet:
+    return texrs.TileSet(DOTS, 48, seed=1, variants=2)
+
+
+@pytest.fixture(scope="module")
+def stones() -> texrs.TileSet:
+    maps = {"albedo": DOTS, "height": DOTS[..., 1].astype(np.float32) / 255, "labels": DOTS[..., 0] > 128}
+    return texrs.TileSet(texrs.Material(maps), 32, seed=2, variants=1)
+
+
+def test_the_torus_holds_each_tile_once() -> None:
+    found = number_tiles(np.pad(TORUS, (0, 1), mode="wrap"))
+    assert sorted(found.reshape(-1)) == list(range(TILES))
+
+
+def test_colours_are_even_and_hang_on_the_place_alone() -> None:
+    lines = np.arange(-200, 200)
+    colours = draw_colours(3, lines, lines)
+    assert np.abs(np.bincount(colours.reshape(-1), minlength=COLOURS) / colours.size - 1 / 3).max() < 0.01
+    assert np.array_equal(draw_colours(3, lines[50:90], lines[7:9]), colours[50:90, 7:9])
+    assert (draw_colours(4, lines, lines) != colours).mean() > 0.6
+    pairs = (colours[:, 1:] == colours[:, :-1]).mean(), (colours[1:] == colours[:-1]).mean()
+    assert np.allclose(pairs, 1 / 3, atol=0.02)
+
+
+def test_windows_agree_wherever_they_are(tiles: texrs.TileSet) -> None:
+    for row, column in ((0, 0), (-1000, 7), (FAR, -FAR)):
+        whole = tiles[row : row + 200, column : column + 160]
+        assert whole.shape == (200, 160, 3)
+        assert np.array_equal(tiles[row + 33 : row + 140, column + 50 : column + 51], whole[33:140, 50:51])
+        assert np.array_equal(tiles.window((row + 3, column), (50, 160)).image, whole[3:53])
+    assert not np.array_equal(tiles[0:100, 0:100], tiles[FAR : FAR + 100, 0:100])
+
+
+def test_tiles_agree_along_their_edges(tiles: texrs.TileSet) -> None:
+    """A strip lies on both sides of an edge, so that nothing is seen there."""
+    side = tiles.side
+    image = tiles[0 : 12 * side, 0 : 12 * side].astype(float)
+    across = np.abs(np.diff(image, axis=1)).mean(axis=(0, 2))
+    at = np.arange(1, 12) * side - 1
+    assert across[at].mean() < 1.15 * np.delete(across, at).mean()
+    down = np.abs(np.diff(image, axis=0)).mean(axis=(1, 2))
+    assert down[at].mean() < 1.15 * np.delete(down, at).mean()
+    assert tiles.source.shape == tiles.atlas.shape[:2] == (9 * side, 9 * side)
+
+
+def test_the_source_map_shows_the_window(tiles: texrs.TileSet) -> None:
+    made = tiles.window((FAR + 5, -77), (90, 130))
+    shown = made.source.render(DOTS).astype(int)
+    # But for colours that the design blended.
+    assert np.median(np.abs(shown - made.image)) <= 3
+    assert made.source.shape == (90, 130)
+    assert made.report["origin"] == [FAR + 5, -77]
+
+
+def test_materials_stay_in_register(stones: texrs.TileSet) -> None:
+    made = stones.window((-40, FAR), (70, 90))
+    assert made.material is not None
+    assert {name: (m.pixels.shape, str(m.pixels.dtype)) for name, m in made.material.items()} == {
+        "albedo": ((70, 90, 3), "uint8"),
+        "height": ((70, 90), "float32"),
+        "labels": ((70, 90), "bool"),
+    }
+    height, albedo = made.material["height"].pixels, made.material["albedo"].pixels[..., 1] / 255
+    assert np.corrcoef(height.reshape(-1), albedo.reshape(-1))[0, 1] > 0.95
+    assert stones.material is not None
+    assert stones.material["height"].pixels.shape == (288, 288)
+
+
+def test_nothing_repeats_as_a_whole(tiles: texrs.TileSet) -> None:
+    index = tiles.index((0, 0), (60, 60))
+    assert len(np.unique(index)) == TILES
+    for step in (1, 2, 9, 16, 32):
+        assert (index[step:] == index[:-step]).mean() < 0.05
+        assert (index[:, step:] == index[:, :-step]).mean() < 0.05
+
+
+def test_same_bytes_again_in_threads_and_after_travelling(tiles: texrs.TileSet) -> None:
+    with texrs.threads(1):
+        again = texrs.TileSet(DOTS, 48, seed=1, variants=2)
+    assert again.key == tiles.key
+    assert np.array_equal(again.source.coordinates, tiles.source.coordinates)
+    back = pickle.loads(pickle.dumps(tiles))
+    assert np.array_equal(back[FAR : FAR + 60, 0:60], tiles[FAR : FAR + 60, 0:60])
+    assert texrs.TileSet(DOTS, 48, seed=2, variants=1).key != tiles.key
+
+
+def test_dask_and_zarr(stones: texrs.TileSet, tmp_path: Path) -> None:
+    pytest.importorskip("dask")
+    pytest.importorskip("zarr")
+    lazily = stones.to_dask((100, 70), 32, origin=(FAR, 5), map="height")
+    wanted = stones.window((FAR, 5), (100, 70)).material
+    assert wanted is not None
+    assert np.array_equal(lazily.compute(scheduler="threads"), wanted["height"].pixels)
+    done = stones.to_zarr(tmp_path / "t.zarr", (100, 70), 64, origin=(FAR, 5))
+    assert np.array_equal(texrs.lazy.open(done.path, "labels").compute(), wanted["labels"].pixels)
+    assert stones.to_zarr(tmp_path / "t.zarr", (100, 70), 64, origin=(FAR, 5)).made == 0
+
+
+def test_engines_read_what_is_saved(stones: texrs.TileSet, tmp_path: Path) -> None:
+    """What the shader does, in NumPy: the same pixels as a window; and the index goes around."""
+    files = stones.save(tmp_path, (8, 12))
+    assert [f.name for f in files] == [
+        "albedo.png",
+        "height.tif",
+        "labels.png",
+        "index.png",
+        "tiles.glsl",
+        "tiles.gdshader",
+    ]
+    atlas, index = io.read(tmp_path / "albedo.png"), io.read(tmp_path / "index.png")
+    side = stones.side
+    shown = np.concatenate(
+        [
+            np.concatenate(
+                [atlas[t // 9 * side : (t // 9 + 1) * side, t % 9 * side : (t % 9 + 1) * side] for t in map(int, row)],
+                axis=1,
+            )
+            for row in index
+        ]
+    )
+    # The last row and column go on to the first, where the world would go on otherwise.
+    assert np.array_equal(shown[: 7 * side, : 11 * side], stones[0 : 7 * side, 0 : 11 * side])
+    assert "textureGrad(atlas" in (tmp_path / "tiles.glsl").read_text()
+    assert "shader_type spatial" in (tmp_path / "tiles.gdshader").read_text()
+
+
+def test_wrong_arguments(tiles: texrs.TileSet) -> None:
+    for call, message in (
+        (lambda: texrs.TileSet(DOTS, 30), "side: needs an integer from 32"),
+        (lambda: texrs.TileSet(DOTS, 50), "side: needs a multiple of 4"),
+        (lambda: texrs.TileSet(DOTS, 48, variants=0), "variants"),
+        (lambda: texrs.TileSet(DOTS, 48, wrap=True), "wrap: is said by side"),
+        (lambda: tiles.window((0, 10**16), 5), "origin"),
+        (lambda: tiles.window(0, (5, 0)), "size"),
+        (lambda: tiles[0:5], "index: needs ranges"),
+        (lambda: tiles[0:5, ::2], "index: needs ranges"),
+        (lambda: tiles.to_dask(50, map="gloss"), "map: there is no 'gloss'"),
+    ):
+        with pytest.raises(texrs.errors.InvalidInput, match=message):
+            call()
