@@ -209,3 +209,30 @@ def test_a_batch_that_was_stopped_goes_on(here: Path, capsys: Capture, number: i
     assert main(command) == 0
     assert {n: (here / n).stat().st_mtime_ns for n in done} == done
     assert len(list(here.glob("made/*-*-*.png"))) == 8
+
+
+def test_folders_of_maps_are_done_as_a_whole(here: Path, capsys: Capture) -> None:
+    for name in ("rock", "moss"):
+        Path("stacks", name).mkdir(parents=True)
+        image = samples.load("dots", size=(48, 48), seed=len(name)).image
+        io.write(f"stacks/{name}/{name}_albedo.png", image)
+        io.write(f"stacks/{name}/{name}_height.png", image[..., 0].astype(np.uint16))
+    words = ["batch", "design", "-o", "made", "--seeds", "0:2", "--set", "size=48", "--set", "tiles=1"]
+    for inputs in (["stacks/*"], ["stacks"]):
+        assert main([*words, *inputs]) == 0, capsys.readouterr().err
+        made = sorted(str(p.relative_to(here)) for p in Path("made").resolve().rglob("*.png"))
+        assert made == [f"made/{n}-{s}/{m}.png" for n in ("moss", "rock") for s in (0, 1) for m in ("albedo", "height")]
+    # The second time all was there.
+    assert capsys.readouterr().err.count("is there") == 4
+    assert main([*words, "stacks", "--sheet", "sheet.png", "-q"]) == 0
+    assert io.read("made/rock-0/height.png").dtype == np.uint16
+    assert io.read("sheet.png").std() > 5
+    # What was lost or changed since is made again, and nothing else.
+    whole = files(here)
+    Path("made/rock-1/height.png").unlink()
+    capsys.readouterr()
+    assert main([*words, "stacks"]) == 0
+    assert capsys.readouterr().err.count("is there") == 3
+    assert files(here) == whole
+    assert main(["rerun", "made/moss-1", "-q"]) == 0
+    assert capsys.readouterr().out.count("the same bytes") == 2

@@ -160,6 +160,12 @@ REFUSED = {
 }
 
 
+def test_the_width_of_a_correction_is_checked_before_maps_are_read(here: Path, capsys: Capture) -> None:
+    SourceMap.identity((64, 80)).save("map.npz")
+    assert main(["apply", "map.npz", "no.png", "-o", "out.png", "--band", "-5"]) == 2
+    assert "--band: needs an integer from 1" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("command", REFUSED)
 def test_bad_input_gets_one_line_and_leaves_what_was_there(here: Path, capsys: Capture, command: str) -> None:
     lines = HOLE.copy()

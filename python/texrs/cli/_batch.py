@@ -32,6 +32,7 @@ from texrs.cli._outputs import SAMPLE, Quiet, Threads, make_argument, make_optio
 from texrs.cli._provenance import check_free, read_status
 from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.io._annotation import is_unchanged
+from texrs.materials import Material, guess_role
 
 PICTURES = (".png", ".tif", ".tiff", ".exr", ".hdr", ".webp", ".jpg", ".jpeg", ".bmp", ".gif", ".npy", ".npz")
 VOLUMES = (".tif", ".tiff", ".npy", ".npz", ".nrrd", ".nii", ".gz", ".vti")
@@ -171,6 +172,11 @@ def is_done(command: Any, context: Any, job: Job) -> bool:
         path = context.params.get(option)
         if path is None:
             continue
+        if os.path.isdir(path) and option == "out":
+            packed = context.params.get("pack") is not None
+            if not is_folder_done(record, path, 1 if packed else len(list_maps(job.source))):
+                return False
+            continue
         made = io.read_notes(path).made if os.path.isfile(path) else None
         if made is None or not is_unchanged(path, made):
             return False
@@ -179,6 +185,22 @@ def is_done(command: Any, context: Any, job: Job) -> bool:
             return False
     stages = context.params.get("stages")
     return stages is None or bool(_outputs.list_stages(stages))
+
+
+def is_folder_done(record: _provenance.Record, folder: str, least: int) -> bool:
+    """Return whether so many maps or more are in a folder, all made as they would be now."""
+    count = 0
+    for path in _provenance.list_folder(folder):
+        made = io.read_notes(path).made
+        if made is None:
+            continue
+        said, wanted = json.loads(made), json.loads(record.tell(path, inside=True))
+        if any(said.get(key) != value for key, value in wanted.items() if key != "content") or not is_unchanged(
+            path, made
+        ):
+            return False
+        count += 1
+    return count >= max(least, 1) and not any(name.startswith(".texrs-") for name in os.listdir(folder))
 
 
 # --- recipes ---------------------------------------------------------------------------------------------------------
@@ -261,7 +283,7 @@ def parse_options(texts: Sequence[str]) -> dict[str, Any]:
 
 
 def find_inputs(recipe: Recipe) -> list[str]:
-    """Return the files that are meant, in the order of the recipe, each once."""
+    """Return the files that are meant, in the order of the recipe, each once; folders of maps where there are no files."""
     suffixes = VOLUMES if recipe.verb in ("solid", "slice") else PICTURES
     found: dict[str, None] = {}
     for text in recipe.inputs:
@@ -269,13 +291,30 @@ def find_inputs(recipe: Recipe) -> list[str]:
             some = [text]
         elif os.path.isdir(text):
             there = (os.path.join(text, name) for name in sorted(os.listdir(text)) if not name.startswith("."))
-            some = [p for p in there if os.path.isfile(p) and Path(p).suffix.lower() in suffixes]
+            several = list(there)
+            some = [p for p in several if os.path.isfile(p) and Path(p).suffix.lower() in suffixes]
+            some = some or [p for p in several if is_material(p, recipe.verb)]
         else:
-            some = sorted(p for p in glob.glob(text, recursive=True) if os.path.isfile(p))
+            several = sorted(glob.glob(text, recursive=True))
+            some = [p for p in several if os.path.isfile(p)]
+            some = some or [p for p in several if is_material(p, recipe.verb)]
         if not some:
             raise InvalidInput(f"inputs: nothing is found for {text!r}")
         found |= dict.fromkeys(some)
     return list(found)
+
+
+def is_material(path: str, verb: str) -> bool:
+    """Return whether a folder holds maps of a material, which a command takes as a whole."""
+    if verb in ("solid", "slice") or not os.path.isdir(path) or Path(path).name.startswith("."):
+        return False
+    return bool(list_maps(path))
+
+
+def list_maps(folder: str) -> list[str]:
+    """Return the pictures in a folder whose names say what they are for."""
+    names = sorted(os.listdir(folder)) if os.path.isdir(folder) else []
+    return [n for n in names if Path(n).suffix.lower() in PICTURES and guess_role(Path(n).stem) is not None]
 
 
 def list_jobs(recipe: Recipe) -> Iterator[Job]:
@@ -309,7 +348,9 @@ def expand(recipe: Recipe, source: str) -> Iterator[Job]:
     out = recipe.out
     if "{" not in out and not Path(out).suffix:
         parts = ["{name}", *(["{preset}"] if recipe.presets else []), *(["{seed}"] if len(recipe.seeds) > 1 else [])]
-        out = os.path.join(out, "-".join(parts) + (suffix if suffix in KEPT else ".png"))
+        # The maps of a material go to a folder of their own.
+        end = "" if os.path.isdir(source) else suffix if suffix in KEPT else ".png"
+        out = os.path.join(out, "-".join(parts) + end)
     presets = recipe.presets or {"": {}}
     chosen: list[int | None] = [*recipe.seeds] or [None]
     for (preset, options), seed in itertools.product(presets.items(), chosen):
@@ -386,6 +427,8 @@ def draw_sheet(paths: Sequence[str]) -> Array:
 
 def read_shown(path: str) -> Array:
     """Read a picture, or the middle plane of a volume."""
+    if os.path.isdir(path):
+        return Material.read(path).preview(tiles=(1, 1), side=CELL)
     try:
         image: Array = io.read(path)
     except FileError:
