@@ -117,6 +117,33 @@ def test_every_verb_takes_a_folder(here: Path, capsys: pytest.CaptureFixture[str
     assert capsys.readouterr().out.count("the same bytes") == 5
 
 
+def test_a_layout_may_be_that_of_a_material(here: Path) -> None:
+    """Of the second only where things lie counts: the result is a picture, as the first is."""
+    io.write("dots.png", samples.dots((64, 64)).image)
+    io.write("rock/rock_albedo.png", samples.dots((64, 64), seed=5).image)
+    io.write("rock/rock_height.png", samples.dots((64, 64), seed=5).image[..., 0])
+    Path("rock/rock_wet.png").unlink()
+    assert main(["splice", "dots.png", "rock", "-o", "made.png", "-q"]) == 0
+    assert io.read("made.png").shape == (64, 64, 3)
+
+
+def test_what_else_lies_in_a_folder_of_maps_does_not_count(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("rock/notes.txt").write_text("1")
+    assert main(["tile", "rock", "-o", "new", "-q", "--stages", "rock/stages"]) == 0
+    Path("rock/notes.txt").write_text("2")
+    io.write("rock/lit.png", np.zeros((8, 8), np.uint8))
+    assert main(["rerun", "new", "-q"]) == 0
+    capsys.readouterr()
+    assert main(["info", "new/albedo.png"]) == 0
+    out = capsys.readouterr().out
+    assert "rock_albedo.png" in out
+    assert "notes" not in out
+    assert "wet" not in out
+    io.write("rock/rock_height.png", np.zeros((48, 64), np.uint8))
+    assert main(["rerun", "new", "-q"]) == 2
+    assert "rock_height.png has changed since" in capsys.readouterr().err
+
+
 def test_a_material_says_itself_what_labels_are(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["synthesize", "rock", "-o", "new", "--size", "64", "--labels", "-q"]) == 2
     assert "--labels: is for a picture" in capsys.readouterr().err

@@ -90,6 +90,7 @@ def takes_materials(
                 return cast(T, finish(made, materials, watch))
             return cast(T, (finish(one, materials, watch) for one in made))
 
+        run.takes = names  # type: ignore[attr-defined]
         return run
 
     return decorate

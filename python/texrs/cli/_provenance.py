@@ -23,6 +23,8 @@ from texrs import io
 from texrs._version import __version__
 from texrs.errors import InvalidInput
 from texrs.io._annotation import BLANK, hash_file, is_unchanged, name_sidecar, needs_sidecar
+from texrs.materials import guess_role
+from texrs.materials._files import SUFFIXES
 
 LEFT = (
     "count",
@@ -169,11 +171,24 @@ def make_record(command: Any, given: Mapping[str, Any], *, force: bool) -> Recor
                 names += texts if re.search("FILE|csv", p.metavar or "") else []
     files = {name: status for name in names if (status := read_status(name)) is not None}
     stacks = tuple(dict.fromkeys(name for name in names if list_folder(name))) if command.name != "database" else ()
-    files |= {f: status for name in stacks for f in list_folder(name) if (status := read_status(f)) is not None}
+    said = [str(text).partition("=")[0] for text in given.get("role") or ()]
+    # Of a folder of maps what else lies there does not count; a batch takes all pictures.
+    inside = [f for name in stacks for f in list_folder(name) if command.name == "batch" or is_map(f, said)]
+    files |= {f: status for f in inside if (status := read_status(f)) is not None}
     folder = arguments[0] if command.name == "database" else given.get("folder")
     seed = given.get("seed")
     places = {name: os.path.realpath(name) for name in (*files, *stacks, *([folder] if folder is not None else []))}
     return Record(command.name, arguments, options, seed, files, places, folder, stacks, force, ORIGINAL.get() or {})
+
+
+def is_map(path: str, said: Sequence[str]) -> bool:
+    """Return whether a file of a folder is a map of the material in it: by its name, or by what was said of it."""
+    name = os.path.basename(path)
+    suffix = next((s for s in SUFFIXES if name.lower().endswith(s)), None)
+    if suffix is None:
+        return False
+    stem = name[: -len(suffix)]
+    return name in said or stem in said or guess_role(stem) is not None
 
 
 @contextmanager

@@ -137,8 +137,10 @@ class Verb:
         note(f"wrote {out}: {what}, in {time.monotonic() - start:.1f} s", quiet=quiet)
 
     def find_material(self, values: Mapping[tuple[str, ...], Any]) -> Material | None:
-        """Return the material that is read, if there is one."""
-        every = (each for value in values.values() for each in (value if isinstance(value, list) else [value]))
+        """Return the material that the result is one of, if there is one; of others only what they look like counts."""
+        names = getattr(self.options.function, "takes", ())
+        several = (value for path, value in values.items() if path[0] in names)
+        every = (each for value in several for each in (value if isinstance(value, list) else [value]))
         return next((each for each in every if isinstance(each, Material)), None)
 
     def find_example(self, values: Mapping[tuple[str, ...], Any]) -> Array:
