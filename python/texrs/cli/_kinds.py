@@ -170,9 +170,9 @@ KINDS = {
         "BYTES", lambda text, about: parse_bytes(text, about.option), "As in 900M or 16G.", plain=True
     ),
     "field": Kind(
-        "WORDS|FILE.npz",
+        "WORDS|FILE",
         lambda text, about: read_field(text, about.size),
-        "As in circular:axis=z or zigzag:period=64,angle=30, or frames in a file.",
+        "As in circular:axis=z or zigzag:period=64,angle=30, or frames or directions in a file.",
         file=True,
     ),
     "scale_map": MAP,

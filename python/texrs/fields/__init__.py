@@ -16,6 +16,9 @@ x, y and z stand for the axes of columns, rows and planes.
 `scale_ramp`         growing along an axis
 `constant`           any matrix
 `from_array`         frames on a grid of any resolution
+`from_directions`    a vector at each place, completed to frames
+`from_gradient`      up a map
+`from_structure`     along the grain of a picture or a volume
 `interpolate`        frames set at points
 `from_function`      a function of the point
 ===================  ==========================================================================
@@ -25,6 +28,7 @@ makes a field of a text (``zigzag:period=64,angle=30``), `names` lists them, `ch
 long work.
 """
 
+from texrs.fields._directions import from_directions, from_gradient, from_structure
 from texrs.fields._field import LEAST_DETERMINANT, WORST_CONDITION, Field, check
 from texrs.fields._parse import names, parse
 from texrs.fields._sampled import from_array, from_function, interpolate
@@ -38,7 +42,10 @@ __all__ = [
     "circular",
     "constant",
     "from_array",
+    "from_directions",
     "from_function",
+    "from_gradient",
+    "from_structure",
     "identity",
     "interpolate",
     "names",

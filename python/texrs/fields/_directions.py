@@ -1,0 +1,260 @@
+"""Fields from directions, as simulations, scans and painters have them: a vector a place, completed to frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from texrs._arrays import as_choice, as_float, try_array
+from texrs.errors import InvalidInput
+from texrs.fields._field import Field
+from texrs.fields._sampled import from_array
+
+__all__ = ["from_directions", "from_gradient", "from_structure"]
+
+SMALLEST = 1e-9
+"""Length below which a vector has no direction, as a share of the longest."""
+DIGITS = 6
+"""Of directions: what solvers of different processors disagree on lies below."""
+_LETTERS = "yx", "zyx"
+
+
+def from_directions(
+    directions: ArrayLike,
+    extent: Sequence[int] | None = None,
+    *,
+    along: str = "x",
+    up: Sequence[float] | None = None,
+    order: str | None = None,
+    signed: bool = True,
+    origin: Sequence[float] | None = None,
+) -> Field:
+    """Return a field that turns one axis of the exemplar into given directions.
+
+    In volumes the other two axes are completed: one lies as near to ``up`` as it can, the last across both. Lengths do not
+    count; where there is no direction, that of the nearest place which has one is taken.
+
+    Parameters
+    ----------
+    directions : (R, C, 2) or (P, R, C, 3) array_like
+        Steps in voxels of the output.
+    extent : sequence of int, optional
+        Voxels that the array spreads over, as for `from_array`; by default one for each vector.
+    along : {"x", "y", "z"}
+        The axis of the exemplar that goes there: that of columns, rows or planes.
+    up : sequence of 3 float, optional
+        (plane, row, column), of volumes; by default the direction that is least gone along.
+    order : {"zyx", "xyz", "yx", "xy"}, optional
+        Of the components; as of the axes of arrays, (plane, row, column), by default.
+    signed : bool
+        False: v and -v mean the same, as of fibres, and neighbours are brought to agree.
+    origin : sequence of float, optional
+        The first voxel; by default 0.
+
+    Returns
+    -------
+    Field
+        Of rotations.
+
+    Raises
+    ------
+    InvalidInput
+        Not such an array, no direction anywhere, or a wrong option.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs import fields
+    >>> rows, columns = np.mgrid[-8:8, -8:8] + 0.5
+    >>> around = fields.from_directions(np.stack([columns, -rows], axis=-1))
+    >>> around.frames((8, 15)).round(2) + 0  # to the right of the middle x goes down
+    array([[-0.07,  1.  ],
+           [-1.  , -0.07]], dtype=float32)
+
+    """
+    given = try_array(directions)
+    axes = given.shape[-1] if given.ndim else 0
+    if given.dtype.kind not in "buif" or axes not in (2, 3) or given.ndim != axes + 1 or not given.size:
+        raise InvalidInput(
+            f"directions: needs numbers of shape (R, C, 2) or (P, R, C, 3), got {given.dtype} of {given.shape}"
+        )
+    letters = _LETTERS[axes - 2]
+    as_choice(along, "along", tuple(letters))
+    vectors = np.asarray(given, np.float64)
+    if not np.isfinite(vectors).all():
+        raise InvalidInput(f"directions: {int((~np.isfinite(vectors)).sum())} of {vectors.size} values are not finite")
+    if order is not None:
+        as_choice(order, "order", (letters, letters[::-1]))
+        vectors = vectors if order == letters else vectors[..., ::-1]
+    unit = _fill(vectors)
+    if not signed:
+        unit = _agree(unit)
+    return from_array(_complete(unit, letters.index(along), up), extent, origin=origin)
+
+
+def from_gradient(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0, across: bool = False) -> Field:
+    """Return a field that follows where a map rises, such as a height, a distance or a density.
+
+    Parameters
+    ----------
+    volume : (R, C) or (P, R, C) array_like
+        The map.
+    along : {"x", "y", "z"}
+        The axis of the exemplar that goes up the map.
+    sigma : float
+        Samples that the map is smoothed by, 0 to 100.
+    across : bool
+        Of pictures: the axis goes along contours, a quarter turned.
+
+    Returns
+    -------
+    Field
+
+    Raises
+    ------
+    InvalidInput
+        Not such an array, or it is the same everywhere.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs import fields
+    >>> fields.from_gradient(np.mgrid[:16, :16][0] * 1.0).frames((8, 8)).round(3) + 0  # x goes down the rows
+    array([[ 0.,  1.],
+           [-1.,  0.]], dtype=float32)
+
+    """
+    slopes = _slopes(_as_map(volume), sigma)
+    if across:
+        if slopes.shape[-1] != 2:
+            raise InvalidInput("across: is for pictures; a volume has no one direction along its contours")
+        slopes = np.stack([-slopes[..., 1], slopes[..., 0]], axis=-1)
+    return from_directions(slopes, along=along)
+
+
+def from_structure(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0) -> Field:
+    """Return a field that follows the grain of a picture or a volume: where it changes least, by its structure tensor.
+
+    Parameters
+    ----------
+    volume : (R, C) or (P, R, C) array_like
+        What has a grain, such as wood or fibres.
+    along : {"x", "y", "z"}
+        The axis of the exemplar that goes along it.
+    sigma : float
+        Samples over which the tensor is smoothed, 0 to 100; slopes are taken at half of that.
+
+    Returns
+    -------
+    Field
+
+    Raises
+    ------
+    InvalidInput
+        Not such an array, or it is the same everywhere.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs import fields
+    >>> stripes = np.sin(np.mgrid[:32, :32][1])  # that run down the rows
+    >>> np.abs(fields.from_structure(stripes, along="y").frames((16, 16))).round(2)
+    array([[1., 0.],
+           [0., 1.]], dtype=float32)
+
+    """
+    slopes = _slopes(_as_map(volume), sigma / 2)
+    if not np.abs(slopes).max():
+        raise InvalidInput("volume: is the same everywhere, so that there is no grain")
+    axes = slopes.shape[-1]
+    tensor = np.empty((*slopes.shape, axes))
+    for i in range(axes):
+        for j in range(axes):
+            tensor[..., i, j] = _smooth(slopes[..., i] * slopes[..., j], sigma)
+    least = np.linalg.eigh(tensor)[1][..., 0]
+    return from_directions(least, along=along, signed=False)
+
+
+def _as_map(volume: ArrayLike) -> NDArray[np.float64]:
+    given = try_array(volume)
+    if given.dtype.kind not in "buif" or given.ndim not in (2, 3) or min(given.shape) < 2:
+        raise InvalidInput(f"volume: needs numbers of shape (R, C) or (P, R, C), got {given.dtype} of {given.shape}")
+    return np.asarray(given, np.float64)
+
+
+def _slopes(values: NDArray[np.float64], sigma: float) -> NDArray[np.float64]:
+    """Return by how much a smoothed map rises along each axis, (..., A)."""
+    along: list[NDArray[np.float64]] = list(np.gradient(_smooth(values, sigma)))
+    return np.stack(along, axis=-1)
+
+
+def _smooth(values: NDArray[np.float64], sigma: float) -> NDArray[np.float64]:
+    from scipy.ndimage import gaussian_filter
+
+    return np.asarray(gaussian_filter(values, as_float(sigma, "sigma", 0, 100)))
+
+
+def _fill(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return unit vectors; where there is none, that of the nearest place which has one."""
+    from scipy.ndimage import distance_transform_edt
+
+    length = np.sqrt((vectors**2).sum(axis=-1))
+    none = length <= SMALLEST * length.max()
+    if none.all():
+        raise InvalidInput("directions: all have no length, so that there is no direction")
+    unit = vectors / np.where(none, 1, length)[..., np.newaxis]
+    if none.any():
+        nearest = distance_transform_edt(none, return_distances=False, return_indices=True)
+        unit = unit[tuple(nearest)]
+    return np.asarray(np.round(unit, DIGITS))
+
+
+def _agree(unit: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return lines as arrows that agree with those before them, along one axis after the other."""
+    out = unit.copy()
+    for axis in reversed(range(out.ndim - 1)):
+        line = np.moveaxis(out, axis, 0)
+        for i in range(1, len(line)):
+            flip = (line[i] * line[i - 1]).sum(axis=-1) < 0
+            line[i][flip] *= -1
+    return out
+
+
+def _complete(unit: NDArray[np.float64], along: int, up: Sequence[float] | None) -> NDArray[np.float64]:
+    """Return frames (..., A, A) whose column ``along`` is the direction."""
+    axes = unit.shape[-1]
+    frames = np.empty((*unit.shape, axes))
+    frames[..., along] = unit
+    if axes == 2:
+        # The other column is a quarter turned, so that nothing is mirrored.
+        turned = np.stack([-unit[..., 1], unit[..., 0]], axis=-1)
+        frames[..., 1 - along] = turned if along == 0 else -turned
+        return frames
+    flat = unit.reshape(-1, 3)
+    if up is None:
+        spread = np.einsum("ni,nj->ij", flat, flat) / len(flat)
+        upwards = np.round(np.linalg.eigh(spread)[1][:, 0], DIGITS)
+        upwards *= np.sign(upwards[np.abs(upwards).argmax()])
+    else:
+        upwards = np.asarray(up, np.float64)
+        if upwards.shape != (3,) or not np.isfinite(upwards).all() or not upwards.any():
+            raise InvalidInput(f"up: needs 3 numbers that are not all 0, got {up!r}")
+        upwards = upwards / np.sqrt((upwards**2).sum())
+    # Where a direction is that of up, the axis that it is least along stands in.
+    spare = np.eye(3)[np.abs(flat).argmin(axis=1)]
+    near = np.abs(flat @ upwards) > 0.999
+    wanted = np.where(near[:, np.newaxis], spare, upwards)
+    second = wanted - (wanted * flat).sum(axis=1, keepdims=True) * flat
+    second /= np.sqrt((second**2).sum(axis=1, keepdims=True))
+    third = np.cross(flat, second)
+    shape = unit.shape
+    # What stands up in the exemplar stays so: up goes to its planes, or to its rows where planes go along.
+    one, other = [axis for axis in range(3) if axis != along]
+    frames[..., one] = second.reshape(shape)
+    frames[..., other] = third.reshape(shape)
+    flipped = np.linalg.det(frames.reshape(-1, 3, 3)[:1])[0] < 0
+    if flipped:
+        frames[..., other] *= -1
+    return frames
