@@ -35,7 +35,7 @@ LAYERS = (
     ("tiling",),
     ("completion",),
     ("papers",),
-    ("database", "extension", "lazy", "rectification", "removal", "tile_set", "transforms"),
+    ("database", "extension", "lazy", "painting", "rectification", "removal", "tile_set", "transforms"),
     ("demo",),
     ("cli",),
 )
