@@ -20,6 +20,11 @@ from texrs.papers.solid.window import SolidTexture
 
 __all__ = ["Painted", "paint"]
 
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 FINEST = 4.0
 """Exemplars along the longest side of a mesh, unless it is said how large the texture is."""
 _BAND = 1 << 18
