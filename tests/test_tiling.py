@@ -145,6 +145,18 @@ def test_the_ends_of_a_lattice_are_not_covered(name):
     assert all(j["cover"] == 0 and j["overlap"] <= 7 * 256 // 16 for j in made.report["joints"].values())
 
 
+def test_a_lattice_closes_at_sizes_larger_than_the_picture():
+    from scipy.ndimage import gaussian_filter
+
+    unit = gaussian_filter(np.random.default_rng(3).random((40, 56)), 3, mode="wrap")
+    image = np.tile((unit - unit.min()) / np.ptp(unit), (5, 4))[:160, :170].astype(np.float32)
+    made = texrs.tile(image, size=(205, 285))
+    assert made.report["method"] == "quilt"
+    # Five of each, so 41 and 57 pixels long.
+    off = np.abs(made.image - np.roll(made.image, (41, 57), (0, 1))).mean()
+    assert off < 0.15 * made.image.std(), off / made.image.std()
+
+
 def test_a_seam_that_closes_costs_no_more_than_the_least_one_but_for_little():
     guide = guidance(as_image(picture("pebbles")))
     strip = seam.Strip(guide[-60:], guide[:60], 0, np.full((60, 256), 0.5, np.float32))

@@ -16,7 +16,8 @@ Departures, with their reasons:
   and the result keeps the picture's size; not on a lattice, which goes on only where its period does.
 - A cut costs more the deeper inside elements it runs.
 - The picture is parted at a calm line near its middle, so that the border of the result does not follow an edge.
-- A result larger than the picture is a cyclic quilt of it.
+- A result larger than the picture is a cyclic quilt of it; a lattice is stretched by as little as makes it close, as in
+  `texrs.design`.
 """
 
 from __future__ import annotations
@@ -76,7 +77,7 @@ def tile(
     size : int or (rows, columns), optional
         Size of the result in pixels, at least 2 along an axis that wraps. By default the picture's, or less along an axis
         where one cut between its ends shows clearly less than a cover of them. A result larger than the picture, at
-        least 8 pixels a side, is a quilt of it.
+        least 8 pixels a side, is a quilt of it, for which a lattice is stretched so that it closes.
     overlap : int or (rows, columns), optional
         How many pixels of two opposite edges are laid over each other, 1 to half the side, instead of a size. By
         default what shows least.

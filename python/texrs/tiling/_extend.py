@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from texrs._typing import Floats, Progress
+from texrs.exemplar.regularity import bend, find_lattice
+from texrs.kernels.gather import gather
 from texrs.quilting import Picture, quilt
 from texrs.source_map import SourceMap
 from texrs.tiling._things import find_things
@@ -19,12 +22,33 @@ def extend(colours: Floats, size: tuple[int, int], wrap: Sequence[bool], watch: 
     """Return the map of a cyclic quilt of a picture."""
     shape = (colours.shape[0], colours.shape[1])
     things = find_things(colours)
+    picture = Picture(colours, SourceMap.identity(shape), np.float32(DEEP) * things.depth, things.regular)
     return quilt(
-        [Picture(colours, SourceMap.identity(shape), np.float32(DEEP) * things.depth, things.regular)],
+        [close_lattice(picture, size, wrap)],
         size,
         patch=max(2, round(PATCH * min(shape))),
         overlap=max(1, round(OVERLAP * min(shape))),
         wrap=(wrap[0], wrap[1]),
         seed=0,
         progress=lambda share: watch("quilt", share),
+    )
+
+
+def close_lattice(picture: Picture, size: tuple[int, int], wrap: Sequence[bool]) -> Picture:
+    """Return a picture stretched so that its lattice closes on the torus; as it is where that would change it by much.
+
+    The lattice is looked for in the picture itself: a fine one does not show in a small copy.
+    """
+    lattice = find_lattice(picture.colours)
+    closing = None if lattice is None else lattice.close(size, (wrap[0], wrap[1]))
+    if lattice is None or closing is None:
+        return picture
+    source = bend(picture.source.shape, closing)
+    return replace(
+        picture,
+        colours=gather(picture.colours, source.coordinates, interpolation="cubic"),
+        source=source,
+        depth=gather(picture.depth, source.coordinates, interpolation="nearest"),
+        regular=True,
+        lattice=closing @ lattice.vectors,
     )
