@@ -35,6 +35,8 @@ STAGE = re.compile(r"[0-9]{2,}-.*\.png|(points|mask|numbers)\.png|report\.json")
 
 MAIN, MORE, FILES, WORK = "Options", "More options", "Other files to write", "How it is done"
 """Groups of options in the help."""
+NO_MATERIALS = ("batch", "samples")
+"""Commands that read no folder of maps: a folder that is called as what they are given is none."""
 MATTER = ("out", "folder", "size", "to", "seed", "seeds", "options", "field", "wrap", "slant", "at")
 """Options that matter most, the first three of which come first in the help of a command."""
 
@@ -117,7 +119,7 @@ class Command(TyperCommand):
         inputs = [text for name, value in given if name not in outputs for text in find_texts(value)]
         written = {name: value for name, value in given if name in outputs}
         check_apart(list_files(inputs), written)
-        if self.name != "batch":
+        if self.name not in NO_MATERIALS:
             check_folders_apart(inputs, written)
         with _provenance.record(_provenance.make_record(self, ctx.params, force=force) if outputs else None):
             return super().invoke(ctx)
