@@ -141,13 +141,18 @@ class Pixels:
             if frames is not None:
                 frames[band] = self.frames(at)
                 if frame is not None:
-                    frames[band] @= frame[band] if frame.ndim > 3 else frame[outer[band]]
+                    frames[band] = chain_frames(frames[band], frame[band] if frame.ndim > 3 else frame[outer[band]])
         keys = number_pairs(outer, self, place, label)
         if frames is None and (frame is not None or self.table is not None):
             outer_of, inner_of = np.divmod(keys, np.uint64(max(1, self.labels)))
             frames = self.frames_of(inner_of)
-            frames = np.asarray(frames if frame is None else frames @ frame[outer_of], np.float32)
+            frames = frames if frame is None else chain_frames(frames, frame[outer_of])
         return coordinates, exemplar, label, frames
+
+
+def chain_frames(inner: NDArray[np.float32], outer: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return products of matrices: in double precision, for BLAS differs in the last bit from processor to processor."""
+    return np.einsum("...ij,...jk->...ik", inner, outer, dtype=np.float64).astype(np.float32)
 
 
 BAND = 1 << 18
