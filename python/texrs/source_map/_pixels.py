@@ -152,7 +152,7 @@ class Pixels:
 
 def chain_frames(inner: NDArray[np.float32], outer: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return products of matrices: in double precision, for BLAS differs in the last bit from processor to processor."""
-    return np.einsum("...ij,...jk->...ik", inner, outer, dtype=np.float64).astype(np.float32)
+    return np.asarray(np.einsum("...ij,...jk->...ik", inner, outer, dtype=np.float64), np.float32)
 
 
 BAND = 1 << 18
