@@ -123,9 +123,9 @@ def test_fields_in_words_and_in_files(here):
     for text, extent, says in (
         ("round", size, "--field: there is no 'round'"),
         ("slant_3d", size[:2], "--field: slant_3d is for volumes"),
-        ("two.npz", size, "two.npz: needs a single array of frames, has 2"),
+        ("two.npz", size, "two.npz: needs a single array, or one with the key"),
         ("flat.npz", size, "flat.npz: the frame at"),
-        ("frames.npz", size[:2], "frames.npz: holds frames of 3 axes, 2 are needed"),
+        ("frames.npz", size[:2], "frames.npz: holds (2, 2, 2, 3, 3), a field of 3 axes; 2 are needed"),
         ("none.npz", size, "none.npz: there is no such file"),
     ):
         with pytest.raises(TexrsError) as caught:

@@ -133,17 +133,17 @@ ORIGINAL: ContextVar[Mapping[str, str] | None] = ContextVar("original", default=
 
 
 def read_status(path: str) -> os.stat_result | None:
-    """Return the status of the regular file that a path leads to, if there is one."""
+    """Return the status of the regular file, or of the store of Zarr, that a path leads to, if there is one."""
     with suppress(OSError, ValueError):
         status = os.stat(path)
-        if stat.S_ISREG(status.st_mode):
+        if stat.S_ISREG(status.st_mode) or io.is_store(path):
             return status
     return None
 
 
 def list_folder(name: str) -> list[str]:
     """Return the files in a folder; none where it is not one."""
-    if not name or "\0" in name or not os.path.isdir(name):
+    if not name or "\0" in name or not os.path.isdir(name) or io.is_store(name):
         return []
     return sorted(os.path.join(name, entry.name) for entry in os.scandir(name) if entry.is_file())
 

@@ -137,24 +137,8 @@ def read_field(text: str, size: tuple[int, ...]) -> Any:
     """Return the field that words describe, or that of the frames or directions in a file, over an output of a size."""
     from texrs import fields
 
-    suffix = Path(text).suffix.lower()
-    if suffix not in (".npz", ".npy", ".nrrd"):
-        with name_arguments(field="--field"):
-            return fields.parse(text, len(size), size)
-    if suffix == ".npz":
-        arrays = list(io.read_arrays(text).values())
-    else:
-        # Pictures of vectors are two channels, volumes of them three.
-        arrays = [io.read(text) if len(size) == 2 and suffix == ".npy" else io.read_volume(text)]
-    if len(arrays) != 1:
-        raise FileError(f"{text}: needs a single array of frames, has {len(arrays)}")
-    with name_arguments(frames=text):
-        vectors = arrays[0].ndim == len(size) + 1 and arrays[0].shape[-1] == len(size)
-        make = fields.from_directions if vectors else fields.from_array
-        field = make(arrays[0], size if vectors or arrays[0].ndim == len(size) + 2 else None)
-    if field.axes != len(size):
-        raise InvalidInput(f"{text}: holds frames of {field.axes} axes, {len(size)} are needed")
-    return field
+    with name_arguments(field="--field"):
+        return fields.as_field(text, len(size), size)
 
 
 def read_direction(text: str, about: About) -> Any:

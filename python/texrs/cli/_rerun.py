@@ -104,7 +104,7 @@ class Recipe:
         for name, sha in self.inputs.items():
             # Beside the result, as it was; where the command is given; in the same folder.
             places = (os.path.join(folder, name), name, os.path.join(folder, os.path.basename(name)))
-            there = [os.path.normpath(p) for p in places if os.path.isfile(p)]
+            there = [os.path.normpath(p) for p in places if os.path.isfile(p) or io.is_store(p)]
             same = next((p for p in there if hash_file(p) == sha), None)
             if sha == CHANGED:
                 wrong.append(f"{name} {CHANGED}")
@@ -215,6 +215,9 @@ def info_command(
     file: Annotated[str, make_argument("FILE", "Any file that texrs reads or writes, or a folder of maps.")],
 ) -> None:
     """Print what a file holds, and how texrs made it."""
+    if io.is_store(file):
+        say(describe_store(file))
+        return
     if os.path.isdir(file):
         say(describe_material(file, "maps"))
         return
@@ -268,6 +271,12 @@ def describe_file(file: str, recipe: Recipe | None) -> list[str]:
             raise error from None
     what = "scale map" if recipe is not None and recipe.verb == "scale-map" else ("image", "volume")[axes - 2]
     return [f"{what}: {describe(image, axes)}, {image.min()} to {image.max()}"]
+
+
+def describe_store(path: str) -> str:
+    """Return a line about the array of a Zarr store; sides from planes to columns."""
+    array, _ = io.read_vectors(path)
+    return f"store: {' x '.join(map(str, array.shape))} of {array.dtype}, {array.min()} to {array.max()}"
 
 
 def describe_material(path: str, what: str) -> str:

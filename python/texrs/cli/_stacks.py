@@ -189,7 +189,7 @@ def read_roles(texts: Sequence[str] | None) -> dict[str, str]:
 def is_stack(text: str) -> bool:
     """Return whether a name is that of a folder, or of an EXR file whose channels are not those of one picture."""
     if os.path.isdir(text):
-        return True
+        return not io.is_store(text)
     if Path(text).suffix.lower() != LAYERED:
         return False
     with suppress(FileError):

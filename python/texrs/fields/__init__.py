@@ -21,7 +21,10 @@ x, y and z stand for the axes of columns, rows and planes.
 `from_structure`     along the grain of a picture or a volume
 `interpolate`        frames set at points
 `from_function`      a function of the point
+`read`               the vectors or frames of a file
 ===================  ==========================================================================
+
+Wherever a field is taken, its words, an array of vectors or frames, or the file of one will do as well (`as_field`).
 
 The field is kept, not a dense array of frames: what is evaluated at a point depends on that point alone. `parse`
 makes a field of a text (``zigzag:period=64,angle=30``), `names` lists them, `check` looks for singular frames before
@@ -30,6 +33,7 @@ long work.
 
 from texrs.fields._directions import from_directions, from_gradient, from_structure
 from texrs.fields._field import LEAST_DETERMINANT, WORST_CONDITION, Field, check
+from texrs.fields._given import FieldLike, as_field, read
 from texrs.fields._parse import names, parse
 from texrs.fields._sampled import from_array, from_function, interpolate
 from texrs.fields._shapes import circular, constant, identity, scale_ramp, shear, slant, slant_3d, spiral, zigzag
@@ -38,6 +42,8 @@ __all__ = [
     "LEAST_DETERMINANT",
     "WORST_CONDITION",
     "Field",
+    "FieldLike",
+    "as_field",
     "check",
     "circular",
     "constant",
@@ -50,6 +56,7 @@ __all__ = [
     "interpolate",
     "names",
     "parse",
+    "read",
     "scale_ramp",
     "shear",
     "slant",

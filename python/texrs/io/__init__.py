@@ -19,7 +19,10 @@ Suffix                dtypes                                      Channels   Los
 
 .. [1] of the largest channel of each pixel, with which the three share an exponent.
 .. [2] volumes alone; needs the extra: ``pip install texrs[vol]``.
-.. [3] volumes alone, for ParaView; read as it is written here.
+.. [3] volumes alone, for ParaView; read in every encoding that VTK writes.
+
+Zarr stores are read too, arrays and OME-Zarr images (extra ``dask``), and VTK's structured points (``.vtk``); textures without
+borders write the former (`texrs.SolidTexture.to_zarr`).
 
 Volumes are written to ``.tif``, ``.tiff``, ``.npy``, ``.npz`` and to the last four, which also keep
 the distances between voxels. What is (plane, row, column) here is z, y, x there, and x runs fastest
@@ -49,22 +52,26 @@ from texrs._checks import MAX_PIXELS, as_int
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput
-from texrs.io import _descriptions, _files, _image_io, _npy, _pillow, _slabs, _tiff, _volumes
+from texrs.io import _descriptions, _files, _image_io, _npy, _pillow, _slabs, _stores, _tiff, _volumes, _vtk
 from texrs.io._annotation import annotate, read_notes
 from texrs.io._files import atomic, find_suffix
 from texrs.io._formats import FORMATS, VOLUMES, as_spacing, check, detect_kind
 from texrs.io._notes import Notes
 from texrs.io._npy import read_arrays
+from texrs.io._stores import is_store
+from texrs.io._vectors import read_vectors
 
 __all__ = [
     "Notes",
     "annotate",
     "atomic",
+    "is_store",
     "read",
     "read_arrays",
     "read_description",
     "read_fov",
     "read_notes",
+    "read_vectors",
     "read_volume",
     "write",
     "write_slabs",
@@ -87,8 +94,8 @@ def read(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
     Parameters
     ----------
     path : path_like
-        PNG, TIFF, EXR, HDR, WebP, JPEG, GIF (the first frame), BMP, .npy or .npz, whichever its
-        content says it is.
+        PNG, TIFF, EXR, HDR, WebP, JPEG, GIF (the first frame), BMP, .npy, .npz or the folder of a Zarr store, whichever
+        its content says it is.
     limit : int
         Pixels that the image may have, and a sixteenth of the bytes.
 
@@ -126,6 +133,8 @@ def read(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
         return _tiff.take_image(name, planes, orientation)
     if kind in ("npy", "npz"):
         return _read_numpy(name, kind, limit, 2)
+    if kind == "zarr":
+        return _stores.read_store(name, limit, 2)
     if kind in VOLUMES:
         raise FileError(f"{name}: is a {kind} file, which holds a volume; texrs.io.read_volume reads it")
     file = _files.load(name, limit)
@@ -200,8 +209,9 @@ def read_volume(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
     Parameters
     ----------
     path : path_like
-        A TIFF stack (a single image is a volume of one plane), .npy, .npz, .vti, NRRD or NIfTI (these with the extra
-        ``vol``), whichever its content says it is. A NIfTI file that scales its samples gives float32.
+        A TIFF stack (a single image is a volume of one plane), .npy, .npz, .vti, .vtk, NRRD or NIfTI (these with the extra
+        ``vol``), or the folder of a Zarr store (extra ``dask``), whichever its content says it is. A NIfTI file that
+        scales its samples gives float32. Of OME-Zarr the finest level is read; a path inside the store names another.
     limit : int
         Voxels that the volume may have, and a sixteenth of the bytes.
 
@@ -237,11 +247,16 @@ def read_volume(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
         return _volumes.read_nrrd(name, limit)
     if kind == "vti":
         return _volumes.read_vti(name, limit)
+    if kind == "vtk":
+        return _vtk.read_structured_points(name, limit)
+    if kind == "zarr":
+        return _stores.read_store(name, limit, 3)
     if kind in ("nii", "nii.gz"):
         return _volumes.read_nifti(name, limit, compressed=kind == "nii.gz")
     if kind not in ("npy", "npz"):
         raise FileError(
-            f"{name}: is a {kind} file, which holds one image; volumes are read from TIFF, .npy, .npz, .vti, NRRD and NIfTI"
+            f"{name}: is a {kind} file, which holds one image; "
+            "volumes are read from TIFF, .npy, .npz, .vti, .vtk, NRRD, NIfTI and Zarr"
         )
     return _read_numpy(name, kind, limit, 3)
 

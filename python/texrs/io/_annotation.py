@@ -15,6 +15,7 @@ from texrs.errors import FileError
 from texrs.io import _chunks, _files, _tags, _texts
 from texrs.io._formats import detect_kind
 from texrs.io._notes import Notes
+from texrs.io._stores import is_store
 
 BLOCK = 2**20
 DIGEST = re.compile(r'"content": "[0-9a-f]{64}"')
@@ -211,7 +212,11 @@ def digest(path: Path) -> str:
 
 
 def hash_file(path: PathLike) -> str:
-    """Return the SHA-256 of a file."""
+    """Return the SHA-256 of a file, or of a store, that of the names and the contents of all its files."""
+    if is_store(path):
+        files = sorted(p for p in _files.as_path(path).rglob("*") if p.is_file())
+        lines = [f"{hash_file(p)} {p.relative_to(path).as_posix()}" for p in files]
+        return hashlib.sha256("\n".join(lines).encode()).hexdigest()
     with _files.as_path(path).open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

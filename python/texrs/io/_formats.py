@@ -11,7 +11,7 @@ import numpy as np
 from texrs._checks import as_float, as_tuple
 from texrs._typing import Array
 from texrs.errors import FileError, InvalidInput
-from texrs.io import _files, _npy, _volumes
+from texrs.io import _files, _npy, _stores, _volumes, _vtk
 
 MAGIC = (
     (b"\x89PNG\r\n\x1a\n", "png"),
@@ -31,13 +31,16 @@ MAGIC = (
     (_volumes.NRRD_MAGIC, "nrrd"),
     (_volumes.GZIP_MAGIC, "nii.gz"),
     (_volumes.VTI_MAGIC, "vti"),
+    (b"<VTKFile", "vti"),
+    (b"<?xml", "vti"),
+    (_vtk.LEGACY_MAGIC, "vtk"),
     *((magic, "nii") for magic in _volumes.NIFTI_MAGIC),
 )
 
 _NUMBERS = frozenset(np.dtype(kind) for kind in ("?", "u1", "i1", "u2", "i2", "u4", "i4", "f2", "f4", "f8"))
 _SMALL = frozenset({np.dtype(np.bool_), np.dtype(np.uint8)})
 _MOST_CHANNELS = 64
-VOLUMES = ("nrrd", "nii", "nii.gz", "vti")
+VOLUMES = ("nrrd", "nii", "nii.gz", "vti", "vtk")
 UNIT = (1.0, 1.0, 1.0)
 
 
@@ -82,6 +85,8 @@ FORMATS = {
 
 def detect_kind(path: Path) -> str:
     """Return which format a file has, by its content."""
+    if _stores.is_store(path):
+        return "zarr"
     _files.check_file(path)
     with _files.translate_errors(path, "reading"), path.open("rb") as file:
         start = file.read(40)
@@ -91,7 +96,7 @@ def detect_kind(path: Path) -> str:
     if start.startswith(b"RIFF") and start[8:12] == b"WEBP":
         return "webp"
     raise FileError(
-        f"{path}: its content is none of PNG, TIFF, EXR, HDR, WebP, JPEG, GIF, BMP, .npy, .npz, NRRD, NIfTI, .vti"
+        f"{path}: its content is none of PNG, TIFF, EXR, HDR, WebP, JPEG, GIF, BMP, .npy, .npz, NRRD, NIfTI, .vti, .vtk, Zarr"
     )
 
 

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from texrs._typing import Array
 from texrs.errors import FileError
+from texrs.io import _vtk
 from texrs.io._files import check_file, check_size, translate_errors
 
 VTI_MAGIC = b'<?xml version="1.0"?>\n<VTKFile'
@@ -248,7 +249,7 @@ def write_vti(path: Path, volume: Array, spacing: Sequence[float]) -> None:
 
 
 def read_vti(path: Path, limit: int) -> Array:
-    """Read the image data that `write_vti` writes: one array of points, in base64 at the end."""
+    """Read image data; what `write_vti` writes, one array of points in base64 at the end, piece by piece."""
     length = check_file(path)
     with translate_errors(path, "reading"), path.open("rb") as file:
         start = file.read(_LONGEST_HEADER)
@@ -256,7 +257,8 @@ def read_vti(path: Path, limit: int) -> Array:
         end = start.find(mark)
         found = _VTI.search(start[:end].decode("latin-1")) if end >= 0 else None
         if found is None:
-            raise FileError(f"{path}: is no image data with one array of points in base64, as texrs writes it")
+            # Of other programs, which put samples in other places.
+            return _vtk.read_image_data(path, limit)
         sizes = [int(n) + 1 for n in found["extent"].split()[1::2]]
         channels = int(found["channels"])
         dtype = np.dtype(f"<{_VTI_KINDS[found['kind']]}{int(found['bits']) // 8}")

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from texrs._arrays import as_float, as_image, as_int, as_size, guidance, try_array
+from texrs._conversion import as_ndarray
 from texrs._progress import listen
 from texrs._typing import Array, Floats, Interpolation, Path, Progress
 from texrs.errors import FileError, InvalidInput, LimitExceeded
@@ -63,6 +64,7 @@ def slices(volume: ArrayLike, at: Sequence[int] | None = None, *, gap: int = 2) 
     (40, 140, 3)
 
     """
+    volume = as_ndarray(volume, "volume", axes=3)
     v = as_image(volume, "volume", axes=3)
     places = [n // 2 for n in v.shape[:3]] if at is None else list(at)
     if len(places) != 3:
@@ -128,6 +130,7 @@ def oblique(
     (25, 20)
 
     """
+    volume = as_ndarray(volume, "volume", axes=3)
     v = as_image(volume, "volume", axes=3)
     shape = np.array(v.shape[:3])
     middle = (shape - 1) / 2 if point is None else as_direction(point, "point")

@@ -61,7 +61,7 @@ from texrs._progress import listen, stage
 from texrs._typing import Array, Interpolation, Progress
 from texrs._verbs import takes_materials
 from texrs.exemplar import Exemplar
-from texrs.fields import Field
+from texrs.fields import FieldLike
 from texrs.growth import Constraints, Grown, Guide, Windows, grow, keep
 from texrs.growth.engine import Places, Show
 from texrs.materials import Material
@@ -80,7 +80,7 @@ def solid(
     exemplar: Array | Exemplar | Material,
     size: int | Sequence[int],
     *,
-    field: Field | None = None,
+    field: FieldLike | None = None,
     seed: int = 0,
     wrap: bool | Sequence[bool] | None = None,
     quality: Quality = "preserve",
@@ -101,8 +101,10 @@ def solid(
         are labels and along which axes it repeats, which are measured otherwise.
     size : int or (int, int, int)
         Planes, rows and columns of the result.
-    field : Field, optional
-        How the texture is turned and scaled at each voxel (`texrs.fields`), with three axes; none leaves it as it is.
+    field : Field, str, array_like or path_like, optional
+        How the texture is turned and scaled at each voxel (`texrs.fields`), with three axes: a field, its words, or
+        directions (P, R, C, 3) or frames (P, R, C, 3, 3), spread over the output, as an array or
+        a file; none leaves it as it is.
     seed : int
         Chooses the texture, 0 to 2^64 - 1; the same seed gives the same bytes.
     wrap : bool or (bool, bool, bool), optional
@@ -191,7 +193,7 @@ def synthesize(
     exemplar: Array | Exemplar | Material,
     size: int | Sequence[int],
     *,
-    field: Field | None = None,
+    field: FieldLike | None = None,
     seed: int = 0,
     wrap: bool | Sequence[bool] | None = None,
     quality: Quality = "preserve",
@@ -213,8 +215,10 @@ def synthesize(
         along which axes it repeats, which are measured otherwise.
     size : int or (int, int)
         Rows and columns of the result.
-    field : Field, optional
-        How the texture is turned and scaled at each pixel (`texrs.fields`), with two axes; none leaves it as it is.
+    field : Field, str, array_like or path_like, optional
+        How the texture is turned and scaled at each pixel (`texrs.fields`), with two axes: a field, its words, or
+        directions (R, C, 2) or frames (R, C, 2, 2), spread over the output, as an array or
+        a file; none leaves it as it is.
     seed : int
         Chooses the texture, 0 to 2^64 - 1; the same seed gives the same bytes.
     wrap : bool or (bool, bool), optional

@@ -14,13 +14,13 @@ from texrs._typing import Array, Interpolation
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
 from texrs.exemplar.analysis import COARSEST
-from texrs.fields import Field
+from texrs.fields import Field, FieldLike
+from texrs.fields import as_field as make_field
 from texrs.growth import Conditions, Constraints, Guide
 from texrs.materials import Material
 from texrs.papers.solid.limits import check_memory
 from texrs.papers.solid.plans import Choice, check_plan
 from texrs.papers.solid.settings import Quality, as_quality
-from texrs.volume._values import check_field
 
 __all__ = ["Method", "Request", "as_field", "as_interpolation"]
 
@@ -74,7 +74,7 @@ class Request:
         size: int | Sequence[int],
         *,
         axes: int,
-        field: Field | None,
+        field: FieldLike | None,
         seed: int,
         wrap: bool | Sequence[bool] | None,
         quality: Quality,
@@ -97,7 +97,7 @@ class Request:
             raise InvalidInput(f"bend: needs True, False or None, got {bend!r}")
         chosen = check_plan(plan, method, as_quality(quality))
         how = as_interpolation(interpolation, known, "cubic" if method is None else "nearest")
-        turned = as_field(field, axes)
+        turned = as_field(field, axes, region.shape)
         if turned is not None:
             turned = turned.over(region.shape)
         check_memory(known.pixels, region, turned, memory_limit)
@@ -105,9 +105,9 @@ class Request:
         return cls(known, region, turned, as_seed(seed), as_quality(quality), bend, chosen, method, conditions, how)
 
 
-def as_field(field: object, axes: int) -> Field | None:
-    """Check a field; the identity is none."""
-    known = check_field(field, axes)
+def as_field(field: object, axes: int, extent: Sequence[int] | None = None) -> Field | None:
+    """Check a field, or make it of what was given; the identity is none."""
+    known = make_field(field, axes, extent)
     still = known is None or (
         known.constant is not None and np.array_equal(known.constant, np.eye(axes, dtype=np.float32))
     )

@@ -18,7 +18,7 @@ from texrs._verbs import finish
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
 from texrs.exemplar.analysis import COARSEST
-from texrs.fields import Field
+from texrs.fields import Field, FieldLike
 from texrs.fields._field import as_points
 from texrs.growth import Windows
 from texrs.growth.engine import Places
@@ -50,7 +50,7 @@ class Texture(InParts):
         self,
         exemplar: Array | Exemplar | Material,
         *,
-        field: Field | None = None,
+        field: FieldLike | None = None,
         seed: int = 0,
         quality: Quality = "preserve",
         interpolation: Interpolation | None = None,

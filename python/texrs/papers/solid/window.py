@@ -33,7 +33,7 @@ class PlaneTexture(Texture):
     exemplar : (H, W) or (H, W, C) array, Exemplar or Material
         Any real dtype and channels; each side at least 16. `texrs.Exemplar` says whether its values are labels and
         along which axes it repeats, which are measured otherwise.
-    field : Field, optional
+    field : Field, str, array_like or path_like, optional
         How the texture is turned and scaled at each point of the world (`texrs.fields`), with two axes, as it stands:
         a centre or a length that was left open is that of the unbounded field. None leaves it as it is.
     seed : int
@@ -81,7 +81,7 @@ class SolidTexture(Texture):
     exemplar : (D, H, W) or (D, H, W, C) array, Exemplar or Material
         Any real dtype and channels; each side at least 16. `texrs.Exemplar`, with ``axes=3``, says whether its values
         are labels and along which axes it repeats, which are measured otherwise.
-    field : Field, optional
+    field : Field, str, array_like or path_like, optional
         How the texture is turned and scaled at each point of the world (`texrs.fields`), with three axes, as it
         stands: a centre or a length that was left open is that of the unbounded field. None leaves it as it is.
     seed : int

@@ -1,0 +1,185 @@
+"""Fields as they are given: words, arrays of vectors or of frames, and files of these."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path as FilePath
+from typing import Any, TypeAlias
+
+from numpy.typing import ArrayLike
+
+from texrs import io
+from texrs._arrays import try_array
+from texrs._typing import Path
+from texrs.errors import InvalidInput
+from texrs.fields._directions import from_directions
+from texrs.fields._field import Field
+from texrs.fields._parse import parse
+from texrs.fields._sampled import from_array
+
+__all__ = ["FieldLike", "as_field", "read"]
+
+FieldLike: TypeAlias = Field | ArrayLike | os.PathLike[str]
+"""What stands for a field: see `as_field`."""
+
+SUFFIXES = (".npy", ".npz", ".nrrd", ".nii", ".nii.gz", ".vti", ".vtk", ".zarr", ".tif", ".tiff")
+_OPTIONS = ("along", "order", "up", "signed")
+
+
+def is_file(text: str) -> bool:
+    """Return whether a text names a file of vectors, and not a field in words."""
+    return _split(text)[0].lower().rstrip("/").endswith(SUFFIXES) or io.is_store(_split(text)[0])
+
+
+def read(path: Path, extent: Sequence[int] | None = None, *, axes: int | None = None, **options: Any) -> Field:
+    """Return the field of the vectors or the frames in a file.
+
+    Parameters
+    ----------
+    path : path_like
+        .npy, .npz, .zarr, .nrrd, .nii, .vti, .vtk or .tif: directions (..., 2) or (..., 3), or frames (..., A, A). In the
+        formats of ParaView, Slicer and the like components are x, y, z; in the others as the axes of arrays, unless
+        ``order`` says otherwise.
+    extent : sequence of int, optional
+        Voxels that it spreads over, as for `from_array`; by default one for each vector.
+    axes : int, optional
+        2 or 3, that the field must have; of a single plane of vectors in space, 2 drops what leads out of it.
+    **options
+        Of `from_directions`: ``along``, ``up``, ``order``, ``signed``.
+
+    Returns
+    -------
+    Field
+
+    Raises
+    ------
+    FileError
+        Missing, not readable, or not such an array.
+    InvalidInput
+        Vectors or frames that make no field, or of another number of axes.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np
+    >>> from texrs import fields
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "flow.npy")
+    ...     np.save(path, np.broadcast_to([0.0, 1.0, 0.0], (4, 4, 4, 3)))  # x goes down the rows
+    ...     fields.read(path, (32, 32, 32)).frames((8, 8, 8))[:, 2]
+    array([0., 1., 0.], dtype=float32)
+
+    """
+    array, spatial = io.read_vectors(path)
+    if axes == 2 and array.ndim >= 3 and array.shape[0] == 1:
+        array = array[0]
+    if axes == 2 and array.ndim == 3 and array.shape[2] == 3:
+        array = array[..., :2] if spatial else array[..., 1:]
+    if spatial and options.get("order") is None and array.shape[-1] in (2, 3):
+        options = {**options, "order": "xyz"[: array.shape[-1]]}
+    try:
+        return make(array, extent, axes=axes, **options)
+    except InvalidInput as error:
+        said = str(error).removeprefix("frames: ").removeprefix("directions: ")
+        raise InvalidInput(f"{os.fspath(path)}: {said}") from None
+
+
+def make(array: Any, extent: Sequence[int] | None = None, *, axes: int | None = None, **options: Any) -> Field:
+    """Return the field of an array of directions, (R, C, 2) or (P, R, C, 3), or of frames, (..., A, A)."""
+    given = try_array(array)
+    count = given.shape[-1] if given.ndim else 0
+    if count in (2, 3) and given.ndim == count + 1:
+        field = from_directions(given, extent if extent is None or len(extent) == count else None, **options)
+    elif count in (2, 3) and given.ndim == count + 2:
+        field = from_array(given, extent if extent is None or len(extent) == count else None)
+    else:
+        raise InvalidInput(
+            "needs directions (R, C, 2) or (P, R, C, 3), or frames (R, C, 2, 2) or (P, R, C, 3, 3), "
+            f"got {given.dtype} of {given.shape}"
+        )
+    if axes is not None and field.axes != axes:
+        raise InvalidInput(f"holds {given.shape}, a field of {field.axes} axes; {axes} are needed")
+    return field
+
+
+def as_field(value: object, axes: int, extent: Sequence[int] | None = None) -> Field | None:
+    """Return the field that was given: itself, in words, as an array, or as the file of one; None stays.
+
+    Parameters
+    ----------
+    value : Field, str, array_like, path_like or None
+        Words are those of `parse`; an array is of directions, (R, C, 2) or (P, R, C, 3), or of frames, (..., A, A); a file
+        holds such an array (`read`), and may be followed by options of `from_directions`, as in
+        ``flow.npy:along=z,order=xyz`` (also ``up=1x0x0`` and ``signed=no``).
+    axes : int
+        2 or 3.
+    extent : sequence of int, optional
+        Voxels that arrays spread over, and over which words are meant; by default one for each vector.
+
+    Returns
+    -------
+    Field or None
+
+    Raises
+    ------
+    InvalidInput
+        None of these, or of another number of axes.
+    FileError
+        A file that is missing, damaged, or holds no such array.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs import fields
+    >>> fields.as_field("circular:axis=z", 3).axes
+    3
+    >>> fields.as_field(np.ones((4, 4, 4, 3)), 3, (32, 32, 32)).axes
+    3
+
+    """
+    if value is None:
+        return None
+    if isinstance(value, Field):
+        if value.axes != axes:
+            raise InvalidInput(f"field: needs a field of {axes} axes, got {value}")
+        return value
+    if isinstance(value, str) and not is_file(value):
+        return parse(value, axes, extent)
+    if isinstance(value, str | os.PathLike):
+        name, words = _split(value) if isinstance(value, str) else (os.fspath(value), "")
+        return read(FilePath(name), extent, axes=axes, **_parse_options(words))
+    given = try_array(value)
+    if given.dtype.kind not in "buif" or given.ndim < 3:
+        raise InvalidInput(f"field: needs a field of {axes} axes, got {type(value).__name__}")
+    try:
+        return make(given, extent, axes=axes)
+    except InvalidInput as error:
+        text = str(error)
+        raise InvalidInput(text if text.startswith("directions:") else f"field: {text}") from None
+
+
+def _split(text: str) -> tuple[str, str]:
+    """Return of ``flow.npy:along=z`` the file and the options."""
+    name, colon, words = text.rpartition(":")
+    return (name, words) if colon and "=" in words and name.lower().rstrip("/").endswith(SUFFIXES) else (text, "")
+
+
+def _parse_options(words: str) -> dict[str, Any]:
+    options: dict[str, Any] = {}
+    for part in words.split(",") if words else []:
+        key, _, value = (p.strip() for p in part.partition("="))
+        if key not in _OPTIONS:
+            raise InvalidInput(f"field: knows {', '.join(f'{o}=' for o in _OPTIONS)} after a file, got {part!r}")
+        if key == "up":
+            try:
+                options[key] = [float(n) for n in value.split("x")]
+            except ValueError:
+                raise InvalidInput(f"field: up= needs three numbers such as 1x0x0, got {value!r}") from None
+        elif key == "signed":
+            if value not in ("yes", "no"):
+                raise InvalidInput(f"field: signed= needs yes or no, got {value!r}")
+            options[key] = value == "yes"
+        else:
+            options[key] = value
+    return options

@@ -1,0 +1,140 @@
+"""Zarr stores, read: plain arrays, and OME-Zarr images, of which the finest level counts."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from texrs._typing import Array
+from texrs.errors import FileError
+from texrs.io._files import BYTES_PER_PIXEL, check_size, translate_errors
+
+MARKS = ("zarr.json", ".zarray", ".zgroup")
+"""One of these lies in the folder of every array and group."""
+_RECORD = "texrs"
+_MOST_CHANNELS = 64
+_SPACE = "zyx"
+
+
+def is_store(path: str | os.PathLike[str]) -> bool:
+    """Return whether a folder is an array or a group of Zarr.
+
+    Examples
+    --------
+    >>> is_store("/")
+    False
+
+    """
+    return any(os.path.isfile(os.path.join(path, mark)) for mark in MARKS)
+
+
+def read_store(path: Path, limit: int, axes: int | None) -> Array:
+    """Return the array of a store with the channels last; ``axes`` of space, or as it is."""
+    with translate_errors(path, "reading the store"):
+        array, names = _find(path)
+        _check_complete(path, array)
+        if array.dtype.kind not in "buif" or array.dtype.itemsize > 8:
+            raise FileError(f"{path}: holds {array.dtype}; bool, integers and floats are read")
+        if axes is None:
+            check_size(path, (array.size,), 1, array.dtype.itemsize, limit * BYTES_PER_PIXEL)
+            return _tidy(array[...])
+        keep, order, channels = _arrange(path, array.shape, names, axes)
+        sides = [array.shape[a] for a in order if a != channels]
+        check_size(path, tuple(sides), 1 if channels is None else array.shape[channels], array.dtype.itemsize, limit)
+        values = np.asarray(array[keep])
+        left = [a for a in range(array.ndim) if not isinstance(keep[a], int)]
+        return _tidy(values.transpose([left.index(a) for a in order]))
+
+
+def _tidy(values: Any) -> Array:
+    array = np.asarray(values)
+    return np.array(array, array.dtype.newbyteorder("="), order="C")
+
+
+def _find(path: Path) -> tuple[Any, tuple[str, ...] | None]:
+    """Return the array that a path names, or that a group is of, and what its axes are called."""
+    zarr = _import_zarr(path)
+    node = zarr.open(os.fspath(path), mode="r")
+    if isinstance(node, zarr.Array):
+        return node, _name_axes(node)
+    said = node.attrs.get("ome", node.attrs)
+    images = said.get("multiscales") if isinstance(said, Mapping) else None
+    if images:
+        levels = images[0]["datasets"]
+        array = node[levels[0]["path"]]
+        axes = images[0].get("axes")
+        if axes is None:
+            return array, tuple("tczyx"[-array.ndim :])
+        return array, tuple(str(a["name"] if isinstance(a, Mapping) else a) for a in axes)
+    names = sorted(name for name, _ in node.members())
+    arrays = sorted(name for name, _ in node.arrays())
+    if len(names) == 1 and arrays:
+        return node[arrays[0]], _name_axes(node[arrays[0]])
+    if not names:
+        raise FileError(f"{path}: is an empty group of Zarr")
+    shown = ", ".join(names[:8])
+    raise FileError(
+        f"{path}: holds several arrays ({shown}); name one, as in {os.path.join(os.fspath(path), names[0])}"
+    )
+
+
+def _name_axes(array: Any) -> tuple[str, ...] | None:
+    names = getattr(array.metadata, "dimension_names", None)
+    return tuple(map(str, names)) if names and all(names) else None
+
+
+def _check_complete(path: Path, array: Any) -> None:
+    """Refuse what an interrupted run of texrs has left: chunks that are missing would be taken for zeros."""
+    store = array.store_path.store
+    root = getattr(store, "root", None)
+    if root is None:
+        return
+    folder = Path(root, array.path)
+    for parent in (folder, *folder.parents[:3]):
+        if is_store(parent) and _RECORD in _import_zarr(path).open(os.fspath(parent), mode="r").attrs:
+            missing = prod(array.cdata_shape) - array.nchunks_initialized
+            if missing:
+                raise FileError(
+                    f"{path}: is not finished, {missing} of {prod(array.cdata_shape)} chunks are missing; "
+                    "what makes it goes on when it is run again"
+                )
+            return
+
+
+def _arrange(
+    path: Path, shape: tuple[int, ...], names: tuple[str, ...] | None, axes: int
+) -> tuple[tuple[Any, ...], list[int], int | None]:
+    """Return what is taken of each axis, which axis comes where, and which the channels are."""
+    space = _SPACE[-axes:]
+    what = ("a picture", "a volume")[axes - 2]
+    keep: list[Any] = [slice(None)] * len(shape)
+    if names is not None and set(space) <= {n.lower() for n in names}:
+        lower = [n.lower() for n in names]
+        order = [lower.index(letter) for letter in space]
+        others = [a for a in range(len(shape)) if a not in order]
+        for a in [a for a in others if shape[a] == 1 and lower[a] != "c"]:
+            keep[a] = 0
+            others.remove(a)
+    else:
+        # Without names the axes are those of arrays, the channels last.
+        order, others = list(range(min(axes, len(shape)))), list(range(axes, len(shape)))
+    if len(order) < axes or len(others) > 1:
+        called = f" ({', '.join(names)})" if names else ""
+        raise FileError(f"{path}: holds an array of {' x '.join(map(str, shape))}{called}, which is not {what}")
+    channels = others[0] if others else None
+    if channels is not None and shape[channels] > _MOST_CHANNELS:
+        raise FileError(f"{path}: has {shape[channels]} channels, up to {_MOST_CHANNELS} are read")
+    return tuple(keep), order + others, channels
+
+
+def _import_zarr(path: Path) -> Any:
+    try:
+        import zarr
+    except ImportError:
+        raise FileError(f"{path}: needs the package zarr, which is not installed (pip install texrs[dask])") from None
+    return zarr

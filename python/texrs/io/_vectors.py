@@ -1,0 +1,81 @@
+"""Arrays of vectors and matrices, from whatever files they are kept in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from texrs._checks import MAX_PIXELS, as_int
+from texrs._typing import Array
+from texrs._typing import Path as PathLike
+from texrs.errors import FileError
+from texrs.io import _files, _npy, _stores, _tiff, _volumes, _vtk
+from texrs.io._formats import detect_kind
+
+SPATIAL = ("nrrd", "nii", "nii.gz", "vti", "vtk")
+"""Files of programs whose vectors are x, y, z."""
+
+
+def read_vectors(path: PathLike, *, limit: int = MAX_PIXELS) -> tuple[Array, bool]:
+    """Return an array of numbers at places, such as directions or frames, with all its axes.
+
+    Parameters
+    ----------
+    path : path_like
+        .npy, .npz (of a single array), a Zarr store, NRRD, NIfTI, .vti or .vtk (their vectors, where there are several
+        arrays), or a TIFF of so many channels.
+    limit : int
+        Sixteenth of the bytes that it may need.
+
+    Returns
+    -------
+    array : ndarray
+        The places first, in the order of arrays: (plane, row, column).
+    spatial : bool
+        Whether components are x, y, z there, as those programs have it whose format it is.
+
+    Raises
+    ------
+    FileError
+        Missing, not readable, damaged, or of another kind.
+    LimitExceeded
+        More memory than the limit.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np
+    >>> from texrs import io
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "flow.npy")
+    ...     np.save(path, np.zeros((4, 5, 6, 3)))
+    ...     array, spatial = io.read_vectors(path)
+    >>> array.shape, spatial
+    ((4, 5, 6, 3), False)
+
+    """
+    name, most = _files.as_path(path), as_int(limit, "limit", 1, 2**40)
+    kind = detect_kind(name)
+    return _read(name, kind, most), kind in SPATIAL
+
+
+def _read(name: Path, kind: str, limit: int) -> Array:
+    if kind == "npy":
+        return _npy.read_npy(name, limit)
+    if kind == "npz":
+        return _npy.read_npz(name, limit)
+    if kind == "zarr":
+        return _stores.read_store(name, limit, None)
+    if kind == "vti":
+        return _vtk.read_image_data(name, limit, vectors=True)
+    if kind == "vtk":
+        return _vtk.read_structured_points(name, limit, vectors=True)
+    if kind == "nrrd":
+        return _volumes.read_nrrd(name, limit)
+    if kind in ("nii", "nii.gz"):
+        return _volumes.read_nifti(name, limit, compressed=kind == "nii.gz")
+    if kind == "tiff":
+        planes, orientation = _tiff.read_tiff(name, limit)
+        return _tiff.take_volume(name, planes, orientation)
+    raise FileError(
+        f"{name}: is a {kind} file; vectors are read from .npy, .npz, Zarr, NRRD, NIfTI, .vti, .vtk and TIFF"
+    )
