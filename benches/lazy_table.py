@@ -1,13 +1,23 @@
 """How fast workers fill a store, what memory they take, and whether all is the same.
 
-Run ``python benches/lazy_table.py [--side 192] [--chunks 96] [--items 200]``. Seconds are of the wall: let nothing else run.
+Run ``python benches/lazy_table.py volume|items|matrix|tiles [--side 512] [--workers 1,2]``. Processor seconds are said beside
+those of the wall, which count only where nothing else runs: their ratio is the efficiency that a quiet machine would show.
 """
 
 import argparse
 import functools
+import hashlib
+import itertools
+import multiprocessing
+import os
 import resource
+import shutil
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -15,42 +25,162 @@ import texrs
 from texrs import lazy, samples
 
 
-def store(texture: texrs.SolidTexture, side: int, chunks: int, folder: str, workers: int) -> tuple[float, np.ndarray]:
-    start = time.perf_counter()
-    done = texture.to_zarr(f"{folder}/{workers}.zarr", side, chunks, levels=1, scheduler=workers, threads=1)
-    return time.perf_counter() - start, lazy.open(done.path).compute()
+@dataclass
+class Spent:
+    """What a piece of work took, in this process and in those that it started and that have ended."""
+
+    wall: float = 0.0
+    processor: float = 0.0
+    memory: float = 0.0
+    """GiB of the largest process that was started."""
+
+
+@contextmanager
+def measure() -> Iterator[Spent]:
+    spent = Spent()
+    both = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    start, before = time.perf_counter(), sum(u.ru_utime + u.ru_stime for u in map(resource.getrusage, both))
+    yield spent
+    # What a process took is known when it has ended.
+    for each in multiprocessing.active_children():
+        each.join(60)
+    used = list(map(resource.getrusage, both))
+    spent.wall = time.perf_counter() - start
+    spent.processor = sum(u.ru_utime + u.ru_stime for u in used) - before
+    spent.memory = used[1].ru_maxrss / 2**20
+
+
+def digest(array: np.ndarray) -> str:
+    return hashlib.sha256(np.ascontiguousarray(array)).hexdigest()[:16]
+
+
+def volume(given: argparse.Namespace, folder: str) -> None:
+    """Fill a volume, and compare it with windows made alone."""
+    texture = texrs.SolidTexture(samples.particles((48, 48, 48)).image, seed=1)
+    stated = texture.estimate_memory(given.chunks) / 2**30
+    first = None
+    for workers in map(int, given.workers.split(",")):
+        path = f"{folder}/{workers}.zarr"
+        with measure() as spent:
+            texture.to_zarr(path, given.side, given.chunks, levels=given.levels, scheduler=workers, threads=1)
+        whole = lazy.open(path)
+        rng, same = np.random.default_rng(0), []
+        for _ in range(given.windows):
+            low = rng.integers(0, given.side - 40, 3)
+            made = texture.window(low.tolist(), 40).image
+            same.append(np.array_equal(made, whole[tuple(slice(a, a + 40) for a in low)].compute()))
+        rate = given.side**3 / spent.wall / 1e6
+        said = digest(np.stack([digest(whole[i : i + 64].compute()) for i in range(0, given.side, 64)]))
+        print(
+            f"{given.side}^3 in chunks of {given.chunks}^3, {workers} workers: {spent.wall:.0f} s of the wall "
+            f"({rate:.3f} million voxels a second), {spent.processor:.0f} processor seconds "
+            f"({spent.processor / given.side**3 * 1e6:.2f} a million voxels), {spent.memory:.2f} GiB at most "
+            f"({stated:.2f} stated beforehand); {sum(same)} of {len(same)} windows the same; {said}",
+            flush=True,
+        )
+        if first is None:
+            first = workers, spent
+        else:
+            share = first[1].processor / spent.processor * workers / first[0]
+            print(f"  efficiency by processor seconds {share:.2f}, by the wall {first[1].wall / spent.wall:.2f}")
+        if not given.keep:
+            shutil.rmtree(path)
+
+
+def make_variant(image: np.ndarray, size: int, folder: str | None, seed: int) -> texrs.Synthesis:
+    if folder is not None:
+        with open(f"{folder}/{os.getpid()}.log", "a") as file:
+            file.write(f"{seed}\n")
+    return texrs.synthesize(image, size, seed=seed)
+
+
+def make_pair(pictures: list[np.ndarray], size: int, folder: str | None, row: int, column: int) -> np.ndarray:
+    if folder is not None:
+        with open(f"{folder}/{os.getpid()}.log", "a") as file:
+            file.write(f"{row} {column}\n")
+    return texrs.splice(pictures[row], pictures[column]).image[:size, :size]
+
+
+def compute(given: argparse.Namespace, folder: str, function: functools.partial, items: list, shape: object) -> None:
+    """Compute items in this process and on a cluster, and compare time and digests."""
+    from distributed import Client, LocalCluster
+
+    spent, found = {}, {}
+    for workers in (0, 2):
+        log = f"{folder}/log{workers}"
+        os.makedirs(log)
+        work = functools.partial(function.func, *function.args, log)
+        path = f"{folder}/{workers}.items"
+        with measure() as spent[workers]:
+            if workers:
+                with (
+                    LocalCluster(workers, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
+                    Client(cluster) as client,
+                ):
+                    lazy.map(work, items, path, shape=shape, key="bench", scheduler=client)
+            else:
+                lazy.map(work, items, path, shape=shape, key="bench", threads=1)
+        found[workers] = digest(lazy.open(path, "image").compute())
+        lines = [line for each in Path(log).iterdir() for line in each.read_text().splitlines()]
+        print(
+            f"{len(items)} items, {workers or 'no'} workers: {spent[workers].wall:.1f} s of the wall, "
+            f"{spent[workers].processor:.1f} processor seconds, {spent[workers].processor / len(items):.4f} an item; "
+            f"computed {len(lines)} times, {len(set(lines))} different; {found[workers]}",
+            flush=True,
+        )
+    print(f"  of ideal {spent[0].processor / spent[2].processor:.2f} by processor seconds", flush=True)
+    print(f"  the same: {found[0] == found[2]}", flush=True)
+
+
+def items(given: argparse.Namespace, folder: str) -> None:
+    """Variants of one picture."""
+    image = samples.dots((96, 96)).image
+    work = functools.partial(make_variant, image, given.size)
+    compute(given, folder, work, [{"seed": seed} for seed in range(given.count)], None)
+
+
+def matrix(given: argparse.Namespace, folder: str) -> None:
+    """Splices of all pairs of pictures."""
+    pictures = [samples.dots((96, 96), seed=seed).image for seed in range(given.rows)]
+    work = functools.partial(make_pair, pictures, 96)
+    pairs = [{"row": r, "column": c} for r, c in itertools.product(range(given.rows), repeat=2)]
+    compute(given, folder, work, pairs, (given.rows, given.rows))
+
+
+def tiles(given: argparse.Namespace, folder: str) -> None:
+    """Windows of corner tiles far away."""
+    with measure() as spent:
+        made = texrs.TileSet(samples.pebbles((192, 192)).image, seed=1)
+    print(f"{made}: made in {spent.processor:.0f} processor seconds")
+    for far in (0, 10**12):
+        start, busy = time.perf_counter(), time.process_time()
+        window = made[far : far + 4096, -far : 4096 - far]
+        busy = time.process_time() - busy
+        print(
+            f"4096^2 at {far}: {time.perf_counter() - start:.3f} s of the wall, {busy:.3f} processor; {digest(window)}"
+        )
+    with measure():
+        made.to_zarr(f"{folder}/t.zarr", 4096, 1024, origin=(10**12, -(10**12)), levels=1, scheduler=2)
+    print(f"  by two workers {digest(lazy.open(f'{folder}/t.zarr').compute())}")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--side", type=int, default=192)
-    parser.add_argument("--chunks", type=int, default=96)
-    parser.add_argument("--items", type=int, default=200)
+    parser.add_argument("part", choices=("volume", "items", "matrix", "tiles"))
+    parser.add_argument("--side", type=int, default=256)
+    parser.add_argument("--chunks", type=int, default=128)
+    parser.add_argument("--levels", type=int, default=1)
+    parser.add_argument("--windows", type=int, default=4)
+    parser.add_argument("--workers", default="1,2")
+    parser.add_argument("--count", type=int, default=1000)
+    parser.add_argument("--size", type=int, default=256)
+    parser.add_argument("--rows", type=int, default=20)
+    parser.add_argument("--folder", help="For the stores; a temporary one by default.")
+    parser.add_argument("--keep", action="store_true", help="Keep the volumes.")
     given = parser.parse_args()
-    texture = texrs.SolidTexture(samples.particles((48, 48, 48)).image, seed=1)
-    texture.exemplar.stitcher  # noqa: B018
-    with tempfile.TemporaryDirectory() as folder:
-        times, volumes = zip(*(store(texture, given.side, given.chunks, folder, n) for n in (1, 2)), strict=True)
-        memory = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 2**20
-        rng = np.random.default_rng(0)
-        low = rng.integers(0, given.side - 40, 3)
-        window = texture.window(low.tolist(), 40).image
-        same = np.array_equal(window, volumes[1][tuple(slice(a, a + 40) for a in low)])
-        rate = given.side**3 / times[1] / 1e6
-        print(f"{given.side}^3, chunks {given.chunks}^3: 1 worker {times[0]:.1f} s, 2 workers {times[1]:.1f} s,")
-        print(f"  efficiency {times[0] / times[1]:.2f}, {rate:.3f} million voxels a second, {memory:.2f} GiB at most,")
-        print(f"  equal {np.array_equal(*volumes)}, and to a window made alone {same}")
-        make = functools.partial(texrs.synthesize, samples.dots((96, 96)).image, 128)
-        items = [{"seed": seed} for seed in range(given.items)]
-        spent = {}
-        for workers in (None, 2):
-            start = time.perf_counter()
-            lazy.map(make, items, f"{folder}/{workers}.items", scheduler=workers)
-            spent[workers] = time.perf_counter() - start
-        share = spent[None] / spent[2]
-        print(
-            f"{given.items} variants of 128^2: here {spent[None]:.1f} s, 2 workers {spent[2]:.1f} s, ratio {share:.2f}"
-        )
+    part = {"volume": volume, "items": items, "matrix": matrix, "tiles": tiles}[given.part]
+    with tempfile.TemporaryDirectory(dir=given.folder) as folder:
+        part(given, given.folder if given.keep else folder)
 
 
 if __name__ == "__main__":

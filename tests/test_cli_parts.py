@@ -1,5 +1,7 @@
 """Commands whose results are larger than memory: in chunks, by any workers."""
 
+import errno
+import os
 from pathlib import Path
 
 import numpy as np
@@ -41,13 +43,59 @@ def test_a_solid_into_zarr(files: Path, workers: int | None, capsys: pytest.Capt
     assert main([*words, "--seed", "4", "--force"]) == 0
 
 
-@pytest.mark.parametrize("name", ["out.npy", "out.tif"])
-def test_slabs(files: Path, name: str) -> None:
-    words = ["solid", f"{files}/stripes.tif", "-o", f"{files}/{name}", "--size", "20x21x22", "--chunks", "8", "-q"]
-    assert main(words) == 0
-    assert np.array_equal(io.read_volume(files / name), texrs.SolidTexture(STRIPES)[0:22, 0:21, 0:20])
-    assert main([*words, "--origin", "2,3,4", "--force"]) == 0
-    assert np.array_equal(io.read_volume(files / name), texrs.SolidTexture(STRIPES)[4:26, 3:24, 2:22])
+@pytest.mark.parametrize("name", ["out.npy", "out.tif", "out.raw", "out.vti"])
+def test_files_of_any_format(files: Path, name: str) -> None:
+    words = ["solid", f"{files}/stripes.tif", "-o", f"{files}/{name}", "--size", "20x18x17", "--chunks", "16", "-q"]
+    assert main([*words, "--origin", "2,3,4"]) == 0
+    wanted = texrs.SolidTexture(STRIPES)[4:21, 3:21, 2:22]
+    assert np.array_equal(io.read_volume(files / name.replace(".raw", ".nhdr")), wanted)
+    assert not [each for each in files.iterdir() if "texrs-part" in each.name]
+    if name == "out.raw":
+        assert (files / name).read_bytes() == wanted.tobytes()
+
+
+@pytest.mark.parametrize("name", ["out.npy", "out.raw"])
+def test_files_by_workers_and_after_a_stop(
+    files: Path, name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each chunk is made once, whoever makes it; what a stopped run has left is gone on with, by two processes."""
+    words = ["solid", f"{files}/stripes.tif", "-o", f"{files}/{name}", "--size", "24", "--chunks", "24x24x8"]
+    texture, made = texrs.SolidTexture(STRIPES), []
+    read = type(texture).__getitem__
+
+    def stop(self: texrs.SolidTexture, index: tuple[slice, ...]) -> np.ndarray:
+        if len(made) == 2:
+            raise KeyboardInterrupt
+        made.append(index)
+        return read(self, index)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(texrs.SolidTexture, "__getitem__", stop)
+        assert main([*words, "--chunks", "24x24x8"]) == 130
+    assert not (files / name).exists()
+    part = files / f".{name}.texrs-part"
+    journal = files / f"{part.name}.json"
+    assert journal.read_text().splitlines()[1:] == ["0", "1"]
+    with journal.open("a") as file:
+        file.write("2")  # Cut off before its end: the chunk is made again.
+    capsys.readouterr()
+    assert main([*words, "--workers", "2"]) == 0
+    assert "3 chunks, of which 2 were there" in capsys.readouterr().err
+    whole = np.fromfile(files / name, np.uint8)[-(24**3) * 3 :].reshape(24, 24, 24, 3)
+    assert np.array_equal(whole, texture[0:24, 0:24, 0:24])
+
+
+def test_what_has_no_room_is_said_before_the_work(
+    files: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(*given: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "posix_fallocate", full, raising=False)
+    before = sorted(files.iterdir())
+    assert main(["solid", f"{files}/stripes.tif", "-o", f"{files}/out.npy", "--size", "24", "--chunks", "8"]) == 2
+    assert "has no room for its 0.00 GiB; nothing was begun" in capsys.readouterr().err
+    assert sorted(files.iterdir()) == before
 
 
 def test_a_window_of_a_picture(files: Path) -> None:
@@ -63,7 +111,8 @@ def test_a_window_of_a_picture(files: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--out", "x.npy", "--workers", "2"], "--workers: is for results in a .zarr"),
+        (["--out", "x.bin", "--workers", "2"], "is not one that is written"),
+        (["--out", "x.exr", "--workers", "2"], "x.exr: .exr cannot hold volumes"),
         (["--out", "x.zarr", "--workers", "2", "--scheduler", "tcp://a"], "one of them can be asked for"),
         (["--out", "x.zarr", "--workers", "0"], "--workers: needs an integer"),
         (["--out", "x.zarr", "--wrap", "xyz"], "--wrap: is for results that are made at once"),

@@ -280,6 +280,7 @@ def nifti(dims=(3, 2, 2, 2), code=2, bits=8, magic=b"n+1\0", offset=352.0, tail=
         ("a.nrrd", b"NRRD0004\n" + b"#" * 2**17, FileError, "header does not end"),
         ("a.nrrd", header() + bytes(7), FileError, "cut off; its samples need 8 bytes, 7 are there"),
         ("a.nrrd", header(data_file="/etc/hostname"), FileError, "keeps its samples in other files"),
+        ("a.nrrd", header(data_file="../b.raw"), FileError, "keeps its samples in other files"),
         ("a.nrrd", header(encoding="ascii") + b"1 2 3", FileError, "raw and gzip are read"),
         ("a.nrrd", header(encoding=None) + bytes(8), FileError, "encoding|corrupt"),
         ("a.nrrd", header(type="block") + bytes(8), FileError, "holds samples of type 'block'|corrupt"),

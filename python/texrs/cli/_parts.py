@@ -1,4 +1,4 @@
-"""Results that are larger than memory: ``texrs solid`` and ``texrs synthesize`` in chunks, by any workers."""
+"""Results that are larger than memory: ``texrs solid``, ``synthesize`` and ``tiles`` in chunks, by any workers."""
 
 from __future__ import annotations
 
@@ -6,18 +6,19 @@ import inspect
 import math
 import os
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
 
-from texrs import io
 from texrs._checks import as_int
+from texrs._chunks.flat import HEADER, RAW, check_suffix, fill
 from texrs._chunks.grid import Grid
-from texrs._threads import threads
-from texrs._typing import Array, Progress
+from texrs._chunks.parts import InParts as Parts
+from texrs._chunks.store import Stored
+from texrs._typing import Progress
 from texrs.cli import _outputs, _provenance
 from texrs.cli._console import note, show_progress
 from texrs.cli._options import make_parameter
@@ -28,13 +29,13 @@ from texrs.cli._verb import Verb
 from texrs.errors import InvalidInput, LimitExceeded
 from texrs.papers.solid.window import PlaneTexture, SolidTexture
 
-__all__ = ["InParts"]
+__all__ = ["OPTIONS", "Asked", "InParts", "is_stored", "make_options", "write_part"]
 
 OPTIONS: dict[str, tuple[Any, str, str]] = {
     "origin": (str, "X,Y[,Z]", "A window of the texture without borders that begins there; any integers within 10^9."),
     "chunks": (str, "WIDTHxHEIGHT", "In chunks of that size, for results that are larger than memory."),
-    "workers": (int, "N", "So many processes make the chunks of a .zarr."),
-    "scheduler": (str, "ADDRESS", "The workers of a cluster of Dask make the chunks of a .zarr."),
+    "workers": (int, "N", "So many processes make the chunks."),
+    "scheduler": (str, "ADDRESS", "The workers of a cluster of Dask make the chunks."),
 }
 """Options that ask for a part of a texture without borders."""
 TAKEN = ("exemplar", "field", "seed", "quality", "interpolation", "memory_limit")
@@ -43,49 +44,46 @@ PAUSE = 5.0
 """Seconds between two forecasts."""
 
 
+def make_options() -> list[inspect.Parameter]:
+    """Return the options of parts."""
+    made = []
+    for name, (kind, metavar, text) in OPTIONS.items():
+        info = typer.Option(metavar=metavar, help=text, show_default=False, rich_help_panel="Larger than memory")
+        made.append(make_parameter(name, Annotated[kind | None, info], None))
+    return made
+
+
 @dataclass(frozen=True, slots=True)
 class InParts(Verb):
     """A verb whose result may be as large as a disk: then it is a part of the texture without borders."""
 
     def make_parameters(self) -> list[inspect.Parameter]:
         """Return the verb's own, and those of parts."""
-        parameters = Verb.make_parameters(self)
-        for name, (kind, metavar, text) in OPTIONS.items():
-            info = typer.Option(metavar=metavar, help=text, show_default=False, rich_help_panel="Larger than memory")
-            parameters.append(make_parameter(name, Annotated[kind | None, info], None))
-        return parameters
+        return [*Verb.make_parameters(self), *make_options()]
 
     def run(self, *, count: int | None, quiet: bool, variants: int | None = None, **given: Any) -> None:
         """Do the command: at once, or in parts where that is asked for."""
         said = {name: given.pop(name, None) for name in OPTIONS}
-        stored = str(given["out"]).lower().rstrip("/").endswith(".zarr")
-        if not stored and all(value is None for value in said.values()):
+        out = str(given["out"])
+        if not (is_stored(out) or out.lower().endswith(RAW)) and all(value is None for value in said.values()):
             try:
                 Verb.run(self, count=count, quiet=quiet, variants=variants, **given)
             except LimitExceeded as error:
                 raise LimitExceeded(f"{error}; to OUT.zarr, or with --chunks, it is made in parts") from None
             return
-        for name in ("workers", "scheduler"):
-            if said[name] is not None and not stored:
-                raise InvalidInput(f"--{name}: is for results in a .zarr, got --out {given['out']}")
-        if said["workers"] is not None and said["scheduler"] is not None:
-            raise InvalidInput("--workers, --scheduler: one of them can be asked for")
-        self.run_parts(given, said, stored, count=count, quiet=quiet)
+        self.run_parts(given, said, count=count, quiet=quiet)
 
-    def run_parts(
-        self, given: dict[str, Any], said: Mapping[str, Any], stored: bool, *, count: int | None, quiet: bool
-    ) -> None:
+    def run_parts(self, given: dict[str, Any], said: Mapping[str, Any], *, count: int | None, quiet: bool) -> None:
         """Make a part of the texture without borders, chunk by chunk."""
-        start, axes, options = time.monotonic(), self.options.axes, self.options
+        axes, options = self.options.axes, self.options
         paths = {name: given.pop(name, None) for name in _outputs.OUTPUTS}
         for name, path in paths.items():
             if path is not None and name != "out":
                 raise InvalidInput(f"--{name}: is for results that are made at once, without {_list(said)}")
         roles = Stack.take(given).roles
-        out, text = str(paths["out"]), given["size"]
+        text = given["size"]
         size = None if text is None else parse_size(text, axes=axes, limit=1 << 50)
-        chunks = None if said["chunks"] is None else parse_size(said["chunks"], "--chunks", axes=axes)
-        origin = _parse_origin(said["origin"], axes)
+        asked = Asked.read(said, axes)
         call = options.call(options.read(given | {"size": None}, About(axes=axes, roles=roles)))
         usual = {p.name: p.default for p in inspect.signature(options.function).parameters.values()}
         for name, value in call.items():
@@ -95,51 +93,76 @@ class InParts(Verb):
         with name_arguments(**options.name_values(given), shape="--size", origin="--origin", chunks="--chunks"):
             texture = kind(**{name: call[name] for name in TAKEN if name in call})
         sides = size or tuple(self.times * n for n in texture.exemplar.shape)
-        grid = Grid.of(sides, chunks, axes)
-        memory = texture.estimate_memory(grid.chunks if stored else (grid.chunks[0], *sides[1:]))
+        memory = texture.estimate_memory(Grid.of(sides, asked.chunks, axes).chunks)
         note(f"each worker takes up to {memory / 2**30:.1f} GiB", quiet=quiet)
-        with show_progress(quiet=quiet) as progress, name_arguments(scheduler="--scheduler", shape="--size"):
-            watch = _Forecast(progress, math.prod(sides))
-            if stored:
-                running = _provenance.RUNNING.get()
-                workers = said["workers"]
-                done = texture.to_zarr(
-                    out,
-                    sides,
-                    grid.chunks,
-                    origin=origin,
-                    scheduler=said["scheduler"] if workers is None else as_int(workers, "--workers", 1, 1024),
-                    threads=count,
-                    overwrite=bool(running and running.force),
-                    progress=watch,
-                )
-                what = f"{done.chunks} chunks, of which {done.chunks - done.made} were there"
-            else:
-                what = "x".join(map(str, reversed(sides)))
-                with threads(count):
-                    self.write_slabs(texture, out, grid, origin, watch)
-        note(f"wrote {out}: {what}, in {time.monotonic() - start:.1f} s", quiet=quiet)
+        write_part(texture, str(paths["out"]), sides, asked, count=count, quiet=quiet)
 
-    def write_slabs(
-        self, texture: PlaneTexture | SolidTexture, out: str, grid: Grid, origin: tuple[int, ...], watch: Progress
-    ) -> None:
-        """Write a file of one array; of a volume no more than a slab is in memory."""
-        sides = grid.shape
 
-        def make() -> Iterator[Array]:
-            for first in range(0, sides[0], grid.chunks[0]):
-                last = min(first + grid.chunks[0], sides[0])
-                ends = [(first, last), *((0, n) for n in sides[1:])]
-                yield texture[tuple(slice(o + a, o + b) for o, (a, b) in zip(origin, ends, strict=True))]
-                watch("slabs", last / sides[0])
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What is said of a part, and of who makes it."""
 
-        with _outputs.write_output(out) as temporary:
-            if len(sides) == 2:
-                io.write(temporary, np.concatenate(list(make())))
-            elif os.path.splitext(out)[1].lower() in (".npy", ".tif", ".tiff"):
-                io.write_slabs(temporary, make(), (*sides, *texture.exemplar.image.shape[3:]))
-            else:
-                io.write_volume(temporary, np.concatenate(list(make())))
+    origin: tuple[int, ...]
+    chunks: tuple[int, ...] | None
+    scheduler: int | str | None
+
+    @classmethod
+    def read(cls, said: Mapping[str, Any], axes: int) -> Asked:
+        """Check the options."""
+        workers, scheduler = said["workers"], said["scheduler"]
+        if workers is not None and scheduler is not None:
+            raise InvalidInput("--workers, --scheduler: one of them can be asked for")
+        chunks = None if said["chunks"] is None else parse_size(said["chunks"], "--chunks", axes=axes)
+        who = scheduler if workers is None else as_int(workers, "--workers", 1, 1024)
+        return cls(_parse_origin(said["origin"], axes), chunks, who)
+
+
+def is_stored(out: str) -> bool:
+    """Return whether a name is that of a store of Zarr."""
+    return out.lower().rstrip("/").endswith(".zarr")
+
+
+def write_part(whole: Parts, out: str, sides: tuple[int, ...], asked: Asked, *, count: int | None, quiet: bool) -> None:
+    """Write a part of what has no borders, to a store or to a file; what an interrupted run has left is gone on with."""
+    start, running = time.monotonic(), _provenance.RUNNING.get()
+    grid = Grid.of(sides, asked.chunks, whole.axes)
+    with (
+        name_arguments(scheduler="--scheduler", shape="--size", origin="--origin", chunks="--chunks"),
+        show_progress(quiet=quiet) as progress,
+    ):
+        watch = _Forecast(progress, math.prod(sides))
+        if is_stored(out):
+            done = whole.to_zarr(
+                out,
+                sides,
+                grid.chunks,
+                origin=asked.origin,
+                scheduler=asked.scheduler,
+                threads=count,
+                overwrite=bool(running and running.force),
+                progress=watch,
+            )
+        else:
+            done = write_file(whole, out, grid, asked, count, watch)
+    there = f"{done.chunks} chunks, of which {done.chunks - done.made} were there"
+    note(f"wrote {out}: {_outputs.show_sides(sides)}, {there}, in {time.monotonic() - start:.1f} s", quiet=quiet)
+
+
+def write_file(whole: Parts, out: str, grid: Grid, asked: Asked, count: int | None, watch: Progress) -> Stored:
+    """Fill the part file of a name, and let what it becomes say how it was made."""
+    part = whole.read_part(asked.origin, grid.shape)
+    check_suffix(out, whole.axes, part.reader.maps[part.base], grid.chunks)
+    header = str(Path(out).with_suffix(HEADER)) if Path(out).suffix.lower() == RAW else None
+    # That it can be written, over nothing of somebody else's, is checked before the work.
+    for name in filter(None, (out, header)):
+        _outputs.check_output(name)
+    filled = fill(part.reader, part.base, grid, out, scheduler=asked.scheduler, threads=count, progress=watch)
+    if header is not None:
+        with _outputs.write_output(header) as temporary:
+            temporary.write_text(filled.describe(os.path.basename(out)), encoding="ascii")
+    with _outputs.write_output(out) as temporary:
+        filled.finish(temporary)
+    return filled.stored
 
 
 class _Forecast:

@@ -69,20 +69,26 @@ _STL_TITLE = b"texrs".ljust(80)
 
 
 def read_nrrd(path: Path, limit: int) -> Array:
-    """Read an NRRD volume whose samples lie in the file itself, raw or compressed by gzip."""
+    """Read an NRRD volume whose samples lie in the file itself, or in one beside it, raw or compressed by gzip."""
     nrrd: Any = _import_library("nrrd", "pynrrd", path)
     length = check_file(path)
     with translate_errors(path, "reading"), path.open("rb") as file:
         # The library reads lines of any length: give it no more than a header may have.
         start = file.read(_LONGEST_HEADER)
         end = min((at + n for n, at in ((2, start.find(b"\n\n")), (4, start.find(b"\r\n\r\n"))) if at >= 0), default=-1)
+        if end < 0 and length == len(start) and re.search(rb"^data ?file:", start, re.MULTILINE):
+            # A header alone ends with its file.
+            end = length
         if end < 0:
             raise FileError(f"{path}: its NRRD header does not end within {_LONGEST_HEADER} bytes")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             header = nrrd.read_header(io.BytesIO(start[:end]))
-        if "data file" in header or "datafile" in header:
-            raise FileError(f"{path}: keeps its samples in other files, which are not read")
+        beside = header.get("data file", header.get("datafile"))
+        if beside is not None and (
+            not isinstance(beside, str) or beside in ("", ".", "..") or re.search(r"[/\\%\s]|^LIST$", beside)
+        ):
+            raise FileError(f"{path}: keeps its samples in other files, of which one that lies beside it is read")
         encoding = str(header.get("encoding", "")).lower()
         if encoding not in _NRRD_ENCODINGS:
             raise FileError(f"{path}: its encoding is {encoding!r}; raw and gzip are read")
@@ -101,8 +107,15 @@ def read_nrrd(path: Path, limit: int) -> Array:
         sides = tuple(n for a, n in enumerate(sizes) if a != channel)[::-1]
         channels = 1 if channel is None else sizes[channel]
         check_size(path, sides, channels, dtype.itemsize, limit)
-        file.seek(end)
-        flat = _read_samples(path, file, length - end, prod(sizes), dtype, compressed=_NRRD_ENCODINGS[encoding])
+        compressed = _NRRD_ENCODINGS[encoding]
+        if beside is None:
+            file.seek(end)
+            flat = _read_samples(path, file, length - end, prod(sizes), dtype, compressed=compressed)
+        else:
+            apart = path.with_name(beside)
+            left = check_file(apart)
+            with translate_errors(apart, "reading"), apart.open("rb") as samples:
+                flat = _read_samples(apart, samples, left, prod(sizes), dtype, compressed=compressed)
     volume = flat.reshape(sizes[::-1])
     if channel is not None:
         volume = np.moveaxis(volume, len(sizes) - 1 - channel, -1)

@@ -28,10 +28,9 @@ from numpy.typing import NDArray
 from texrs._arrays import as_int, as_seed, as_size
 from texrs._cache import content_hash
 from texrs._checks import as_tuple
-from texrs._chunks.dasks import make_dask
 from texrs._chunks.grid import Box, as_sides
+from texrs._chunks.parts import InParts, Part
 from texrs._chunks.reading import Channel
-from texrs._chunks.store import Stored, write_image
 from texrs._progress import listen, stage
 from texrs._typing import Array, Floats, Path, Progress
 from texrs.errors import InvalidInput
@@ -54,7 +53,7 @@ KEEP = 4.0
 DEPTH = 3.0
 
 
-class TileSet:
+class TileSet(InParts):
     """An unbounded design: 81 corner tiles, and which one lies where.
 
     Parameters
@@ -269,32 +268,11 @@ class TileSet:
                 made[tuple(here)] = atlas[tuple(there)]
         return out
 
-    def to_dask(
-        self,
-        shape: int | Sequence[int],
-        chunks: int | Sequence[int] | None = None,
-        *,
-        origin: int | Sequence[int] = 0,
-        map: str | None = None,
-    ) -> Any:
-        """Return a part as an array of Dask, as `texrs.PlaneTexture.to_dask` does."""
-        name = map or self._base
-        if name not in self._maps:
-            raise InvalidInput(f"map: there is no {map!r}; there are {', '.join(self._maps)}")
-        return make_dask(_Reader(self, self._as_part(origin, shape)), shape, chunks, 2, name)
-
-    def to_zarr(
-        self,
-        path: Path,
-        shape: int | Sequence[int],
-        chunks: int | Sequence[int] | None = None,
-        *,
-        origin: int | Sequence[int] = 0,
-        **options: Any,
-    ) -> Stored:
-        """Write a part to an OME-Zarr store, as `texrs.PlaneTexture.to_zarr` does, with its options."""
-        start = self._as_part(origin, shape)
-        return write_image(_Reader(self, start), shape, path, axes=2, chunks=chunks, origin=start, **options)
+    def read_part(self, origin: int | Sequence[int], shape: int | Sequence[int]) -> Part:
+        """Check where a part begins, and that it lies within the world; return what reads it."""
+        as_sides(shape, "shape", 2)
+        start = self._as_origin(origin)
+        return Part(_Reader(self, start), start, self._base)
 
     def save(self, folder: Path, cells: int | Sequence[int] = 256) -> list[FilePath]:
         """Write the tiles for engines: the atlas of each map, an index texture, and short shaders for GLSL and Godot.
@@ -346,10 +324,6 @@ class TileSet:
         pair = as_tuple(values, "origin", 2, f"2 integers within {FAR}")
         row, column = (as_int(v, "origin", -FAR, FAR) for v in pair)
         return row, column
-
-    def _as_part(self, origin: int | Sequence[int], shape: object) -> tuple[int, int]:
-        as_sides(shape, "shape", 2)
-        return self._as_origin(origin)
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from texrs.materials import Material
 from texrs.materials._material import apply_materials
 from texrs.papers.solid.layers import WORK, Layers
 from texrs.papers.solid.limits import check_memory, estimate_bytes
-from texrs.papers.solid.parts import InParts
+from texrs.papers.solid.parts import Endless
 from texrs.papers.solid.ranges import FAR, as_origin, as_region
 from texrs.papers.solid.request import as_field, as_interpolation
 from texrs.papers.solid.settings import CANDIDATES, ON_DEMAND, Quality, as_quality
@@ -43,7 +43,7 @@ ARRIVED = 4
 _BAND = 1 << 20
 
 
-class Texture(InParts):
+class Texture(Endless):
     """What pictures and volumes without borders have in common."""
 
     def __init__(
