@@ -36,7 +36,7 @@ LAYERS = (
     ("completion",),
     ("papers",),
     ("database", "extension", "lazy", "painting", "rectification", "removal", "tile_set", "transforms"),
-    ("demo",),
+    ("_napari", "demo"),
     ("cli",),
 )
 """Lowest first: a module imports its own package and the layers below its own, and nothing else."""

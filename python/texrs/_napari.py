@@ -1,0 +1,222 @@
+"""The reader of napari's plugin (extra ``texrs[napari]``): stores, volumes, source maps and elements as layers.
+
+`napari.yaml` beside this file is its manifest. Nothing of napari is imported: what is returned are its plain tuples of data,
+options and the kind of layer. Stores are opened lazily, at all their levels.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from texrs import elements, io
+from texrs._typing import Array
+from texrs.errors import FileError, TexrsError
+from texrs.source_map import SourceMap
+
+LayerData = tuple[Any, dict[str, Any], str]
+"""Data, options, and the kind of layer."""
+_SUFFIXES = (".npy", ".npz", ".nrrd", ".nii", ".nii.gz", ".tif", ".tiff", ".vti", ".vtk")
+_BRIGHT = 4
+"""Channels up to which a last axis may be colours."""
+
+
+def get_reader(path: str | Sequence[str]) -> Callable[[str | Sequence[str]], list[LayerData]] | None:
+    """Return what reads a path, or several; None where texrs reads none of them.
+
+    Examples
+    --------
+    >>> get_reader("picture.docx") is None
+    True
+
+    """
+    names = [path] if isinstance(path, str | os.PathLike) else list(path)
+    known = [io.is_store(name) or os.fspath(name).lower().endswith(_SUFFIXES) for name in names]
+    return read if names and all(known) else None
+
+
+def read(path: str | Sequence[str]) -> list[LayerData]:
+    """Return the layers of a path, or of several."""
+    names = [path] if isinstance(path, str | os.PathLike) else list(path)
+    return [layer for name in names for layer in _read(Path(name))]
+
+
+def _read(path: Path) -> list[LayerData]:
+    stem = path.name.partition(".")[0]
+    if io.is_store(path):
+        return read_store(path, stem)
+    if path.suffix.lower() == ".npz":
+        for make in (read_source_map, read_elements):
+            with suppress(TexrsError):
+                return make(path, stem)
+    try:
+        array, axes = io.read_volume(path), 3
+    except FileError as error:
+        try:
+            array, axes = io.read(path), 2
+        except FileError:
+            raise error from None
+    return [show(array, axes, stem)]
+
+
+def show(array: Array, axes: int, name: str) -> LayerData:
+    """Return a layer of a picture or a volume: colours, one channel, or one after the other."""
+    if axes == 3 and array.shape[0] == 1:
+        # Of a single plane there is nothing to go through.
+        array, axes = array[0], 2
+    if array.dtype == np.bool_:
+        return array.astype(np.uint8), {"name": name}, "labels"
+    if array.ndim == axes:
+        return array, {"name": name}, "image"
+    if array.shape[-1] in (3, 4) and _are_colours(array):
+        return array, {"name": name, "rgb": True}, "image"
+    return np.moveaxis(array, -1, 0), {"name": name, "channel_axis": 0}, "image"
+
+
+def _are_colours(array: Any) -> bool:
+    """Return whether values are in the range that viewers take for colours."""
+    if array.dtype in (np.uint8, np.uint16):
+        return True
+    return bool(array.dtype.kind == "f" and array.size and float(array.min()) >= 0 and float(array.max()) <= 1)
+
+
+def read_source_map(path: Path, name: str) -> list[LayerData]:
+    """Return where each sample comes from, as colours, and its patches, as labels."""
+    places = SourceMap.load(path)
+    most = np.array(places.shapes)[places.exemplar] - 1
+    share = np.clip(places.coordinates / np.maximum(most, 1), 0, 1)
+    blue = 0.25 + 0.75 * places.exemplar[..., np.newaxis] / max(len(places.shapes) - 1, 1)
+    # Two axes in red and green, and blue tells exemplars apart; of volumes there are three axes.
+    colours = np.concatenate([share, blue], axis=-1) if places.axes == 2 else share
+    shown = np.rint(255 * colours).astype(np.uint8)
+    patches = places.label.astype(np.int64) + 1
+    return [
+        (shown, {"name": f"{name} places", "rgb": True}, "image"),
+        (patches, {"name": f"{name} patches", "opacity": 0.4, "visible": False}, "labels"),
+    ]
+
+
+def read_elements(path: Path, name: str) -> list[LayerData]:
+    """Return a picture, the elements found in it, and their middles."""
+    entry = elements.load(path)
+    return [
+        show(entry.image, 2, name),
+        (entry.labels.astype(np.int32), {"name": f"{name} elements", "opacity": 0.4}, "labels"),
+        (entry.points, {"name": f"{name} middles", "size": max(2, min(entry.box) / 8)}, "points"),
+    ]
+
+
+# --- stores ----------------------------------------------------------------------------------------------------------
+
+
+def read_store(path: Path, name: str) -> list[LayerData]:
+    """Return a layer for each image of a store, with all its levels, read where they are looked at."""
+    import zarr
+    from dask import array as lazy
+
+    try:
+        node = zarr.open(os.fspath(path), mode="r")
+    except Exception as error:
+        raise FileError(f"{path}: is no Zarr store ({error})") from None
+    if isinstance(node, zarr.Array):
+        return [_show_lazy([lazy.from_zarr(node)], _name_axes(node), {"name": name})]
+    layers = _find_images(node, name)
+    if not layers:
+        raise FileError(f"{path}: holds no image")
+    return layers
+
+
+def _find_images(group: Any, name: str, depth: int = 3) -> list[LayerData]:
+    """Return the images of a group: its own, or those of the arrays and the groups in it."""
+    from dask import array as lazy
+
+    said = group.attrs.get("ome", group.attrs)
+    images = said.get("multiscales") if isinstance(said, Mapping) else None
+    if images:
+        levels = [lazy.from_zarr(group[each["path"]]) for each in images[0]["datasets"]]
+        axes = images[0].get("axes") or list("tczyx"[-levels[0].ndim :])
+        names = [str(a["name"] if isinstance(a, Mapping) else a) for a in axes]
+        scale, move = _find_place(images[0], len(names))
+        labelled = _is_labelled(group, name)
+        return [_show_lazy(levels, names, {"name": name, "scale": scale, "translate": move}, labelled=labelled)]
+    found = [
+        _show_lazy([lazy.from_zarr(a)], _name_axes(a), {"name": n}) for n, a in sorted(group.arrays()) if a.ndim > 1
+    ]
+    for n, inner in sorted(group.groups()) if depth else ():
+        found += _find_images(inner, n, depth - 1)
+    return found
+
+
+def _name_axes(array: Any) -> list[str] | None:
+    names = getattr(array.metadata, "dimension_names", None)
+    return [str(n) for n in names] if names and all(names) else None
+
+
+def _find_place(image: Mapping[str, Any], axes: int) -> tuple[list[float], list[float]]:
+    """Return the size of a sample along each axis, and where the first lies."""
+    scale, move = [1.0] * axes, [0.0] * axes
+    for each in image["datasets"][0].get("coordinateTransformations", ()):
+        if each.get("type") == "scale":
+            scale = [float(s) for s in each["scale"]]
+        elif each.get("type") == "translation":
+            move = [float(m) for m in each["translation"]]
+    return scale, move
+
+
+def _is_labelled(group: Any, name: str) -> bool:
+    """Return whether a store of texrs says that its values are classes."""
+    for root in (group, None if group.path == "" else _open_root(group)):
+        said = {} if root is None else root.attrs.get("texrs", {})
+        if isinstance(said, Mapping) and "maps" in said:
+            known = said["maps"]
+            entry = known.get(name) or (next(iter(known.values())) if len(known) == 1 else None)
+            return bool(entry and entry[2])
+    return False
+
+
+def _open_root(group: Any) -> Any:
+    import zarr
+
+    with suppress(Exception):
+        return zarr.open_group(group.store, mode="r")
+    return None
+
+
+def _show_lazy(
+    levels: list[Any], names: list[str] | None, options: dict[str, Any], *, labelled: bool = False
+) -> LayerData:
+    """Return a layer of the levels of an image, with the channels where viewers look for them."""
+    first = levels[0]
+    channel: int | None = None
+    if names is not None:
+        channel = names.index("c") if "c" in names else None
+    elif first.ndim > 2 and first.shape[-1] <= _BRIGHT:
+        channel = first.ndim - 1
+    several = len(levels) > 1
+    if channel is None:
+        kept: dict[str, Any] = {}
+    else:
+        # Of a lazy array the range is not looked for: floats are colours where somebody has said so.
+        colours = first.shape[channel] in (3, 4) and first.dtype in (np.uint8, np.uint16)
+        if colours:
+            from dask import array as lazy
+
+            levels = [lazy.moveaxis(level, channel, -1) for level in levels]
+            kept = {"rgb": True}
+        else:
+            kept = {"channel_axis": channel}
+        for key in ("scale", "translate"):
+            if key in options:
+                options[key] = [v for a, v in enumerate(options[key]) if a != channel]
+    data = levels if several else levels[0]
+    if labelled and not kept and first.dtype.kind in "iub":
+        return data, {**options, "multiscale": several}, "labels"
+    if first.dtype == np.uint8 and "rgb" not in kept:
+        # What is bright is not to depend on which part is looked at first.
+        kept["contrast_limits"] = [0, 255]
+    return data, {**options, **kept, "multiscale": several}, "image"
