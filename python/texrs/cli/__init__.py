@@ -30,6 +30,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "synthesize": "Grow a picture from a picture, under a frame field.",
     },
     "Pictures": {
+        "tiles": "Cut corner tiles from designs: an endless texture, of which any window is looked up.",
         "tile": "Make a picture cyclic, so that copies side by side have no edge between them.",
         "complete": "Fill a hole in a picture with patches of what is known of it, or of another picture.",
         "extend": "Make a photograph of a plane larger, on any side, in the same perspective.",
@@ -68,6 +69,10 @@ def load(name: str) -> Callable[..., None]:
             from texrs.cli import _scales
 
             return _scales.COMMAND
+        case "tiles":
+            from texrs.cli import _tiles
+
+            return _tiles.COMMAND
         case "slice":
             from texrs.cli import _slices
 

@@ -1,0 +1,122 @@
+"""The command of designs without an end: ``texrs tiles``."""
+
+from __future__ import annotations
+
+import os
+import time
+from typing import Annotated, Any
+
+import typer
+
+from texrs import io
+from texrs._threads import threads
+from texrs.cli import _outputs
+from texrs.cli._console import note, show_progress
+from texrs.cli._kinds import EXAMPLE
+from texrs.cli._options import Options, take_options
+from texrs.cli._outputs import Quiet, Threads, describe, make_option, name_arguments, to_write
+from texrs.cli._parts import Asked, is_stored, write_part
+from texrs.cli._provenance import check_free
+from texrs.cli._stacks import Roles, Stack, is_stack
+from texrs.cli._texts import About, parse_size
+from texrs.errors import InvalidInput
+from texrs.materials import Material
+from texrs.papers.design import design_variants
+from texrs.tile_set import TileSet
+
+CELLS = 256
+"""Of the index texture along each side."""
+TILED = Options(TileSet, arguments={"exemplar": EXAMPLE})
+DESIGNED = Options(design_variants, only=("elements", "deformation", "plan", "tiles", "patch", "blend"))
+PANEL = "Larger than memory"
+
+
+@take_options(TILED, DESIGNED)
+def tiles_command(
+    out: Annotated[
+        str,
+        to_write("out", "DIR|OUT", "Folder for the atlas, its index and shaders; or a window: a picture, or a .zarr."),
+    ],
+    given: dict[str, Any],
+    size: Annotated[
+        str | None, make_option("WIDTHxHEIGHT", "Of a window, which is written instead of the tiles.")
+    ] = None,
+    origin: Annotated[str | None, make_option("X,Y", "Where a window begins; any integers within 10^15.")] = None,
+    cells: Annotated[
+        str | None, make_option("WIDTHxHEIGHT", f"Cells of the index texture, {CELLS} a side by default.")
+    ] = None,
+    chunks: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WIDTHxHEIGHT", help="A window in chunks of that size.", show_default=False, rich_help_panel=PANEL
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="So many processes make the chunks.", show_default=False, rich_help_panel=PANEL),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="The workers of a cluster of Dask do.", show_default=False, rich_help_panel=PANEL
+        ),
+    ] = None,
+    role: Roles = None,
+    count: Threads = None,
+    quiet: Quiet = False,
+) -> None:
+    """Cut corner tiles from designs: an endless texture, of which any window is looked up."""
+    start = time.monotonic()
+    said = {"origin": origin, "chunks": chunks, "workers": workers, "scheduler": scheduler}
+    asked, windowed = Asked.read(said, 2), size is not None
+    for name, value in said.items():
+        if value is not None and not windowed:
+            raise InvalidInput(f"--{name}: is of a window, and needs --size")
+    if windowed and cells is not None:
+        raise InvalidInput("--cells: is of the index texture, which a window (--size) has none of")
+    sides = parse_size(size or str(CELLS), limit=1 << 60) if windowed else parse_size(cells or str(CELLS), "--cells")
+    parts = is_stored(out) or chunks is not None or asked.scheduler is not None
+    stack = Stack.take(dict.fromkeys(("depth", "format", "pack")) | {"role": role})
+    values = TILED.read(given, which=lambda o: not o.file) | DESIGNED.read(given)
+    folder = is_stack(given["exemplar"])
+    if not windowed:
+        _outputs.check_folder(out)
+        for name in ("index.png", "tiles.glsl", "tiles.gdshader"):
+            check_free(os.path.join(out, name))
+    elif not parts and not folder:
+        _outputs.check_output(out)
+    values |= TILED.read(given, About(roles=stack.roles), which=lambda o: o.file)
+    call = TILED.call(values) | DESIGNED.call(
+        {path: v for path, v in values.items() if path not in {o.path for o in TILED}}
+    )
+    example = call["exemplar"]
+    if isinstance(example, Material):
+        if windowed and not parts:
+            stack.check_outputs(example, {"out": out}, [])
+    elif role:
+        stack.refuse({})
+    names = DESIGNED.name_values(given) | TILED.name_values(given)
+    with name_arguments(**names, count="--threads"), threads(count), show_progress(quiet=quiet) as progress:
+        tiles = TileSet(**call, progress=progress)
+    note(f"made {tiles!r}, in {time.monotonic() - start:.1f} s", quiet=quiet)
+    if not windowed:
+        # What the command wrote before is its own: each name is asked for in `write_folder`.
+        with _outputs.write_folder(out, "out") as place:
+            files = tiles.save(place, sides)
+        note(f"wrote {out}: {', '.join(file.name for file in files)}", quiet=quiet)
+        return
+    if parts:
+        write_part(tiles, out, sides, asked, count=count, quiet=quiet)
+        return
+    with name_arguments(size="--size", origin="--origin"):
+        made = tiles.window(asked.origin, sides)
+    if made.material is None:
+        notes = io.read_notes(given["exemplar"]) if os.path.isfile(given["exemplar"]) else io.Notes()
+        with _outputs.write_output(out, like=io.Notes(profile=notes.profile, srgb=notes.srgb)) as temporary:
+            io.write(temporary, made.image)
+    else:
+        stack.deliver(made, {"out": out})
+    note(f"wrote {out}: {describe(made.image, 2)}, in {time.monotonic() - start:.1f} s", quiet=quiet)
+
+
+COMMAND = tiles_command
