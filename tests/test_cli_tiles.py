@@ -10,7 +10,7 @@ from texrs import io, samples
 from texrs.cli import main
 
 DOTS = samples.dots((64, 64)).image
-OPTIONS = ["--side", "48", "--variants", "1", "--plan", "still", "-q"]
+OPTIONS = ["--side", "48", "--pictures", "1", "--plan", "still", "-q"]
 FAR = 10**12
 
 
@@ -27,7 +27,7 @@ def tiles() -> texrs.TileSet:
 
 
 def test_the_set_is_what_engines_read(here: Path, tiles: texrs.TileSet, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["tiles", "dots.png", "-o", "set", "--cells", "12x8", *OPTIONS]
+    words = ["tiles", "dots.png", "-o", "set", "--index", "12x8", *OPTIONS]
     assert main(words) == 0
     assert np.array_equal(io.read("set/image.png"), tiles.atlas)
     assert io.read("set/index.png").shape == (8, 12)
@@ -67,7 +67,7 @@ def test_windows_larger_than_memory(here: Path, tiles: texrs.TileSet) -> None:
     [
         (["-o", "set", "--origin", "3,4"], "--origin: is of a window, and needs --size"),
         (["-o", "set", "--workers", "2"], "--workers: is of a window"),
-        (["-o", "w.png", "--size", "8", "--cells", "8"], "--cells: is of the index texture"),
+        (["-o", "w.png", "--size", "8", "--index", "8"], "--index: is of the index texture"),
         (["-o", "set", "--side", "50"], "--side: needs a multiple of 4"),
         (["-o", "w.png", "--size", "8", "--origin", "1"], "--origin: needs X,Y"),
         (["-o", "set", "--role", "a=height"], "--role: is for materials"),

@@ -177,9 +177,9 @@ def read_recipes(output: str) -> list[Recipe]:
             there = os.path.exists(output)
             raise InvalidInput(f"{output}: does not say how it was made" if there else f"{output}: is not there")
         return [recipe]
-    there = {entry.path for entry in os.scandir(output) if entry.is_file()}
+    inside = {entry.path for entry in os.scandir(output) if entry.is_file()}
     # What says how another file was made is no file of its own.
-    files = sorted(file for file in there if not (file.endswith(".json") and file.removesuffix(".json") in there))
+    files = sorted(file for file in inside if not (file.endswith(".json") and file.removesuffix(".json") in inside))
     known = [recipe for file in files if (recipe := Recipe.read(file)) is not None and recipe.file is not None]
     if not known:
         raise InvalidInput(f"{output}: no file in it says how it was made")

@@ -26,8 +26,10 @@ from texrs.tile_set import TileSet
 
 CELLS = 256
 """Of the index texture along each side."""
-TILED = Options(TileSet, arguments={"exemplar": EXAMPLE})
-DESIGNED = Options(design_variants, only=("elements", "deformation", "plan", "tiles", "patch", "blend"))
+TILED = Options(TileSet, arguments={"exemplar": EXAMPLE}, names={"variants": "pictures"})
+DESIGNED = Options(
+    design_variants, only=("elements", "deformation", "plan", "tiles", "patch", "blend"), names={"elements": "element"}
+)
 PANEL = "Larger than memory"
 
 
@@ -41,8 +43,8 @@ def tiles_command(
     size: Annotated[
         str | None, make_option("WIDTHxHEIGHT", "Of a window, which is written instead of the tiles.")
     ] = None,
-    origin: Annotated[str | None, make_option("X,Y", "Where a window begins; any integers within 10^15.")] = None,
-    cells: Annotated[
+    origin: Annotated[str | None, make_option("X,Y[,Z]", "Where a window begins; any integers within 10^15.")] = None,
+    index: Annotated[
         str | None, make_option("WIDTHxHEIGHT", f"Cells of the index texture, {CELLS} a side by default.")
     ] = None,
     chunks: Annotated[
@@ -72,9 +74,9 @@ def tiles_command(
     for name, value in said.items():
         if value is not None and not windowed:
             raise InvalidInput(f"--{name}: is of a window, and needs --size")
-    if windowed and cells is not None:
-        raise InvalidInput("--cells: is of the index texture, which a window (--size) has none of")
-    sides = parse_size(size or str(CELLS), limit=1 << 60) if windowed else parse_size(cells or str(CELLS), "--cells")
+    if windowed and index is not None:
+        raise InvalidInput("--index: is of the index texture, which a window (--size) has none of")
+    sides = parse_size(size or str(CELLS), limit=1 << 60) if windowed else parse_size(index or str(CELLS), "--index")
     parts = is_stored(out) or chunks is not None or asked.scheduler is not None
     stack = Stack.take(dict.fromkeys(("depth", "format", "pack")) | {"role": role})
     values = TILED.read(given, which=lambda o: not o.file) | DESIGNED.read(given)
