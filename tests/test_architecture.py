@@ -18,7 +18,7 @@ LAYERS = (
     ("_arrays",),
     ("_colours",),
     ("_evidence", "_light", "_show", "_threads", "kernels"),
-    ("_chunks", "_evening"),
+    ("_chunks", "_evening", "_viewer"),
     ("_engine",),
     ("source_map",),
     ("blending",),

@@ -13,6 +13,7 @@ from typing import Any
 from texrs._arrays import as_image
 from texrs._show import as_png, measure, preview, spell_list
 from texrs._typing import Array, Path
+from texrs._viewer import as_page
 from texrs.materials._material import Material
 from texrs.source_map import SourceMap
 
@@ -96,6 +97,12 @@ class Synthesis:
     def _repr_png_(self) -> bytes:
         """Show the image, or slices of a volume, in a notebook."""
         return as_png(self._flatten(self.image))
+
+    def _repr_html_(self) -> str | None:
+        """Show a volume in a notebook by slices with sliders; of a picture nothing, so that it is shown as one."""
+        if self.source.axes == 2:
+            return None
+        return as_page(as_image(self.image, "image", axes=3))
 
     def _flatten(self, stage: Array) -> Array:
         """Return slices of what is as large as a volume; anything else is a picture already."""

@@ -21,7 +21,7 @@ from texrs.cli._outputs import Quiet, Threads, describe, make_argument, name_arg
 from texrs.cli._readers import read_volume
 from texrs.cli._texts import About, parse_numbers
 from texrs.errors import InvalidInput
-from texrs.volume import cube, oblique, paint, slices, turntable
+from texrs.volume import Viewer, cube, oblique, paint, slices, turntable
 
 _AXES = ("plane", "row", "column")
 
@@ -75,7 +75,7 @@ TURNED = Options(turntable, only=("size", "frames", "elevation", "seconds", "int
 @take_options(ACROSS, CUT, BLOCK, TURNED)
 def slice_command(
     volume: Annotated[str, make_argument("VOLUME", "The volume: a file, or sample:NAME.")],
-    out: Annotated[str, to_write("out", text="Image file to write.")],
+    out: Annotated[str, to_write("out", text="Image file to write, or a page (.html) with sliders.")],
     given: dict[str, Any],
     as_cube: Annotated[bool, typer.Option("--cube", help="A block of the material, on a transparent ground.")] = False,
     as_turntable: Annotated[bool, typer.Option("--turntable", help="The block turning, as an animated GIF.")] = False,
@@ -93,6 +93,9 @@ def slice_command(
     used = owners[(chosen or ["--at"])[0]]
     options = used.call(used.read(given))
     check_needed(given, owners, (chosen or ["--at"])[0])
+    paged = Path(out).suffix.lower() in (".html", ".htm")
+    if paged and chosen:
+        raise InvalidInput(f"--out: a page shows slices along all axes, without {chosen[0]}; got {out!r}")
     moving = Path(out).suffix.lower() == ".gif"
     if moving != as_turntable:
         raise InvalidInput(f"--out: {'a picture is not' if moving else '--turntable is'} written to .gif, got {out!r}")
@@ -103,13 +106,18 @@ def slice_command(
             voxels = paint(voxels)
         if used is not ACROSS:
             options["interpolation"] = "nearest"
-    if not (as_cube or as_turntable):
+    if not (as_cube or as_turntable or paged):
         _outputs.check_output(out, voxels[0])
     with name_arguments(volume=volume, point="--oblique", normal="--oblique", count="--threads"), threads(count):
         if as_turntable:
             with show_progress(quiet=quiet) as progress, _outputs.write_output(out) as temporary:
                 turntable(voxels, temporary, **options, progress=progress)
             note(f"wrote {out}: {given['frames']} pictures, in {time.monotonic() - start:.1f} s", quiet=quiet)
+            return
+        if paged:
+            with _outputs.write_output(out) as temporary:
+                Viewer(voxels).save(temporary)
+            note(f"wrote {out}: {describe(voxels, 3)}, in {time.monotonic() - start:.1f} s", quiet=quiet)
             return
         picture = draw(voxels, used, options)
     with _outputs.write_output(out) as temporary:

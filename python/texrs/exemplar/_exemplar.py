@@ -16,6 +16,7 @@ from texrs._engine.stitcher import Stitcher
 from texrs._progress import listen
 from texrs._show import as_png, measure
 from texrs._typing import Array, Floats, Path, Progress
+from texrs._viewer import as_page
 from texrs.errors import FileError, InvalidInput
 from texrs.exemplar.analysis import (
     COARSEST,
@@ -104,6 +105,10 @@ class Exemplar:
     def _repr_png_(self) -> bytes:
         """Show the picture in a notebook; of a volume the middle plane."""
         return as_png(self._image if self._axes == 2 else self._image[self.shape[0] // 2])
+
+    def _repr_html_(self) -> str | None:
+        """Show a volume in a notebook by slices with sliders."""
+        return None if self._axes == 2 else as_page(self._pixels)
 
     # --- pixels ------------------------------------------------------------------------------------------------------
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_seed
 from texrs._show import as_png
+from texrs._viewer import as_page
 
 LayoutName: TypeAlias = Literal["disjoint", "connected", "jointed"]
 """How elements hang together: apart on a ground, in one net, or parted by joints."""
@@ -71,6 +72,10 @@ class Sample:
     def _repr_png_(self) -> bytes:
         """Show the picture, or the middle plane of a volume, in a notebook."""
         return as_png(self.image[len(self.image) // 2] if self.image.ndim == 4 else self.image)
+
+    def _repr_html_(self) -> str | None:
+        """Show a volume in a notebook by slices with sliders."""
+        return as_page(self.image) if self.image.ndim == 4 else None
 
 
 def make_generator(name: str, seed: object) -> np.random.Generator:

@@ -1,0 +1,143 @@
+"""A volume in a page: a slice along each axis, moved by sliders, without a kernel and without a library.
+
+The voxels travel as one picture in which the planes lie side by side, and a few lines of JavaScript cut slices from it. Where
+scripts do not run, as in previews of notebooks, three slices are shown as they are.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from base64 import b64encode
+
+import numpy as np
+
+from texrs._show import as_png, preview
+from texrs._typing import Array
+from texrs.io._image_io import encode
+
+MOST = 2**20
+"""Characters of a page's part, about."""
+_STEPS = 12
+"""Tries to come below that, each of fewer voxels."""
+_SIDE = 260
+"""Pixels of the screen that the longest side of a volume takes."""
+_NAMES = ("plane", "row", "column")
+
+_PAGE = """\
+<div class="texrs-slices" id="{id}" style="font:13px sans-serif">
+<img alt="three slices of a volume of {sides}" src="data:image/png;base64,{still}">
+<script>(() => {{
+for (const box of document.querySelectorAll('[id="{id}"]:not([data-on])')) {{
+  box.dataset.on = 1;
+  const n = {shape}, step = {step}, wide = {wide}, names = {names}, picture = new Image();
+  picture.onload = () => {{
+    const all = document.createElement("canvas");
+    [all.width, all.height] = [picture.width, picture.height];
+    const from = all.getContext("2d", {{willReadFrequently: true}});
+    from.drawImage(picture, 0, 0);
+    const voxels = new Uint32Array(from.getImageData(0, 0, all.width, all.height).data.buffer);
+    const at = (p, r, c) => voxels[(Math.floor(p / wide) * n[1] + r) * all.width + (p % wide) * n[2] + c];
+    const row = document.createElement("div");
+    row.style = "display:flex;flex-wrap:wrap;gap:12px;align-items:flex-end";
+    names.forEach((name, axis) => {{
+      const [down, along] = [0, 1, 2].filter(a => a != axis), part = document.createElement("label");
+      const canvas = document.createElement("canvas"), slider = document.createElement("input");
+      const says = document.createElement("div"), zoom = {side} / Math.max(...n);
+      [canvas.width, canvas.height] = [n[along], n[down]];
+      canvas.style = `display:block;image-rendering:pixelated;width:${{n[along] * zoom}}px;height:${{n[down] * zoom}}px`;
+      Object.assign(slider, {{type: "range", min: 0, max: n[axis] - 1, value: n[axis] >> 1}});
+      slider.style = `width:${{Math.max(90, n[along] * zoom)}}px;margin:4px 0 0`;
+      slider.setAttribute("aria-label", name);
+      const draw = () => {{
+        const place = [0, 0, 0], to = canvas.getContext("2d"), out = to.createImageData(n[along], n[down]);
+        const pixels = new Uint32Array(out.data.buffer);
+        place[axis] = +slider.value;
+        for (let i = 0, d = 0; d < n[down]; d++)
+          for (let a = 0; a < n[along]; a++) {{
+            [place[down], place[along]] = [d, a];
+            pixels[i++] = at(...place);
+          }}
+        to.putImageData(out, 0, 0);
+        says.textContent = `${{name}} ${{slider.value * step[axis]}} of {sides_list}`.replace("*", {whole}[axis]);
+      }};
+      slider.oninput = draw;
+      part.append(canvas, slider, says);
+      row.append(part);
+      draw();
+    }});
+    box.querySelector("img").replaceWith(row);
+  }};
+  picture.src = "data:image/webp;base64,{voxels}";
+}}
+}})()</script>
+</div>
+"""
+
+
+def as_page(volume: Array) -> str:
+    """Return HTML that shows a volume (D, H, W, C), of less than about a million characters whatever its size.
+
+    Larger volumes are shown at every second voxel, or fewer.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> text = as_page(np.zeros((8, 8, 8, 3), np.uint8))
+    >>> text.count("<script>"), len(text) < 5000
+    (1, True)
+
+    """
+    sides = volume.shape[:3]
+    # The cube root of 2 each time: half the voxels.
+    for attempt in range(_STEPS):
+        least = 2 ** (attempt / 3)
+        step = tuple(max(1, math.floor(least * max(1.0, n / 128))) for n in sides)
+        seen = _as_bytes(volume[:: step[0], :: step[1], :: step[2]])
+        packed, wide = _pack(seen)
+        if len(packed) * 4 / 3 < MOST * 0.75:
+            break
+    still = b64encode(as_png(_show_still(seen))).decode()
+    digest = hashlib.sha256(packed).hexdigest()[:12]
+    return _PAGE.format(
+        id=f"texrs-{digest}",
+        sides=" x ".join(map(str, sides)),
+        still=still,
+        shape=list(seen.shape[:3]),
+        step=list(step),
+        wide=wide,
+        names=list(_NAMES),
+        side=_SIDE,
+        whole=list(sides),
+        sides_list="*",
+        voxels=b64encode(packed).decode(),
+    )
+
+
+def _as_bytes(volume: Array) -> Array:
+    """Return colours of 8 bits, (D, H, W, 3 or 4), as other pictures are shown; of other numbers of channels the first."""
+    seen = preview(volume) if volume.shape[-1] in (3, 4) else preview(volume[..., :1])
+    seen = seen if seen.ndim == 4 else seen[..., np.newaxis]
+    return np.repeat(seen, 3, axis=-1) if seen.shape[-1] == 1 else seen
+
+
+def _pack(seen: Array) -> tuple[bytes, int]:
+    """Return a lossless picture of all planes in rows, and how many lie in a row."""
+    planes, rows, columns, channels = seen.shape
+    wide = min(planes, max(1, round(math.sqrt(planes * rows / columns))))
+    tall = -(-planes // wide)
+    grid = np.zeros((tall * wide, rows, columns, channels), np.uint8)
+    grid[:planes] = seen
+    sheet = grid.reshape(tall, wide, rows, columns, channels).transpose(0, 2, 1, 3, 4)
+    return encode("volume", np.ascontiguousarray(sheet.reshape(tall * rows, wide * columns, channels)), "webp"), wide
+
+
+def _show_still(seen: Array) -> Array:
+    """Return the middle slices side by side, 2 pixels apart."""
+    cuts = [np.take(seen, n // 2, axis=axis) for axis, n in enumerate(seen.shape[:3])]
+    height, width = max(c.shape[0] for c in cuts), sum(c.shape[1] for c in cuts) + 4
+    out, left = np.full((height, width, seen.shape[3]), 255, np.uint8), 0
+    for cut in cuts:
+        out[: cut.shape[0], left : left + cut.shape[1]] = cut
+        left += cut.shape[1] + 2
+    return out

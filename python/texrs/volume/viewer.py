@@ -1,0 +1,85 @@
+"""A volume in a notebook or in a page of its own, slice by slice."""
+
+from __future__ import annotations
+
+from numpy.typing import ArrayLike
+
+from texrs._arrays import as_image
+from texrs._conversion import as_ndarray
+from texrs._show import measure
+from texrs._typing import Path
+from texrs._viewer import as_page
+from texrs.errors import FileError
+from texrs.io import atomic
+from texrs.volume.labels import paint
+
+__all__ = ["Viewer"]
+
+
+class Viewer:
+    """A volume that shows itself in a notebook: a slice along each axis, moved by sliders.
+
+    Nothing is needed to look at it but a browser, neither a kernel nor a network; what it is shown by has at most about a
+    megabyte, for which large volumes are shown at every second voxel, or fewer. Results, exemplars and samples of volumes show
+    themselves so.
+
+    Parameters
+    ----------
+    volume : array_like or path_like
+        Shape (D, H, W) or (D, H, W, C); of other numbers of channels than 3 and 4 the first is shown.
+    labels : bool
+        The values are labels: each is given a colour.
+
+    Raises
+    ------
+    InvalidInput
+        Not a volume, or not labels.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from texrs import samples, volume
+    >>> viewer = volume.Viewer(samples.stripes((32, 32, 32)).image)
+    >>> viewer
+    <Viewer of 32 x 32 x 32, 3 channels of uint8>
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     page = pathlib.Path(folder, "stripes.html")
+    ...     viewer.save(page)
+    ...     page.read_text(encoding="utf-8")[:15]
+    '<!doctype html>'
+
+    """
+
+    def __init__(self, volume: ArrayLike | Path, *, labels: bool = False) -> None:
+        given = as_ndarray(volume, "volume", axes=3)
+        self._voxels = as_image(paint(given) if labels else given, "volume", axes=3)
+
+    def __repr__(self) -> str:
+        """Return the size, the channels and the dtype."""
+        return f"<Viewer of {measure(self._voxels, 3)}>"
+
+    def _repr_html_(self) -> str:
+        """Show it in a notebook."""
+        return as_page(self._voxels)
+
+    def save(self, path: Path, *, overwrite: bool = True) -> None:
+        """Write a page that any browser opens.
+
+        Parameters
+        ----------
+        path : path_like
+            With the suffix .html; written whole or not at all.
+        overwrite : bool
+            Whether a file that exists may be replaced.
+
+        Raises
+        ------
+        FileError
+            Another suffix, or the file cannot be written.
+
+        """
+        if not str(path).lower().endswith((".html", ".htm")):
+            raise FileError(f"{path}: needs a name that ends in .html")
+        head = '<!doctype html>\n<html lang="en"><meta charset="utf-8"><title>A volume</title>\n<body>\n'
+        with atomic(path, overwrite=overwrite) as temporary:
+            temporary.write_text(f"{head}{as_page(self._voxels)}</body></html>\n", encoding="utf-8")
