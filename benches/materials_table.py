@@ -18,6 +18,7 @@ from __future__ import annotations
 import argparse
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -128,7 +129,8 @@ def report(name: str, verb: str, words: list[str], example: Path, given: argpars
         while (done := os.wait4(process.pid, os.WNOHANG))[0] == 0:
             time.sleep(0.2)
             if time.monotonic() - start > given.limit:
-                process.kill()
+                # By its number: Popen would fetch the status that is waited for here.
+                os.kill(process.pid, signal.SIGKILL)
     except KeyboardInterrupt:
         process.kill()
         raise

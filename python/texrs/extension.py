@@ -112,8 +112,7 @@ def extend(
     missing = [n - m for n, m in zip(size, add_sizes((rows, columns), added), strict=True)]
     if min(missing) < 0 or max(missing) > 2 * MOST:
         raise InvalidInput(
-            f"to: needs {rows} x {columns} pixels, and what the sides add, at least, and at most {2 * MOST} more; got "
-            f"{size[0]} x {size[1]}"
+            f"to: needs {rows, columns} pixels, and what the sides add, at least, and at most {2 * MOST} more; got {size}"
         )
     if size == (rows, columns):
         raise InvalidInput("top, bottom, left, right: all are 0, so there is nothing to add")

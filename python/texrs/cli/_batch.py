@@ -27,7 +27,7 @@ from texrs import io
 from texrs._show import preview
 from texrs._typing import Array
 from texrs.cli import _outputs, _provenance
-from texrs.cli._console import PARTLY, Stopped, UsageFailure, complain, hush, keep, note
+from texrs.cli._console import PARTLY, Stopped, UsageFailure, complain, hush, keep, note, say_sizes
 from texrs.cli._outputs import SAMPLE, Quiet, Threads, make_argument, make_option, to_write
 from texrs.cli._provenance import check_free, read_status
 from texrs.errors import FileError, InvalidInput, TexrsError
@@ -154,7 +154,7 @@ def run_jobs(
         except MemoryError:
             failed.append((job, "needs more memory than there is"))
         except (TexrsError, OSError) as error:
-            failed.append((job, str(error)))
+            failed.append((job, say_sizes(str(error))))
         except Exception as error:  # One that is broken does not stop the others.
             failed.append((job, f"internal error: {type(error).__name__}: {error}"))
         else:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import signal
 import sys
 import threading
@@ -38,6 +39,11 @@ GRACE = 1.0
 UsageFailure = cast(type[Exception], next(c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException"))
 
 
+SIDES = re.compile(r"\((\d+(?:, \d+){1,3})\)")
+ANY_SHAPE = re.compile(r"\([A-Za-z.]\w*,|\(\d+, [A-Za-z]")
+SPEAKS_OF_SIZES = re.compile(r"\b(?:pixels|voxels|sides?|sizes?|shapes?)\b")
+MOST_CHANNELS = 4
+"""How errors speak of sizes."""
 _HUSHED: ContextVar[bool] = ContextVar("hushed", default=False)
 KEPT: list[str] = []
 """Files of a batch that are done, which stay when the rest fails."""
@@ -84,7 +90,7 @@ def _run(work: Callable[[], object]) -> int:
         complain(_describe_usage(failure))
         code = BAD_INPUT
     except TexrsError as error:
-        complain(str(error))
+        complain(say_sizes(str(error)))
         code = BAD_INPUT
     except MemoryError:
         complain("this needs more memory than there is; a smaller size or exemplar needs less")
@@ -126,6 +132,34 @@ def note(line: str, *, quiet: bool) -> None:
     """Print what was done, unless nobody wants to know."""
     if not quiet and not _HUSHED.get():
         complain(line)
+
+
+def say_sizes(message: str) -> str:
+    """Return what an error says with sizes as options take them: the width first.
+
+    Functions take rows first, and so speak their errors. Those that speak of arrays of any shape do not mean sizes.
+
+    Examples
+    --------
+    >>> say_sizes("size: each side must be at least 16, got (40, 8)")
+    'size: each side must be at least 16, got 8 x 40'
+    >>> say_sizes("mask.png: needs shape (64, 96), got (40, 30, 3)")
+    'mask.png: needs shape 96 x 64, got 30 x 40 with 3 channels'
+    >>> say_sizes("points: needs numbers of shape (n, 2), got shape (40, 30)")
+    'points: needs numbers of shape (n, 2), got shape (40, 30)'
+
+    """
+    if not SPEAKS_OF_SIZES.search(message) or ANY_SHAPE.search(message):
+        return message
+
+    def turn(found: re.Match[str]) -> str:
+        sides = [n.strip() for n in found[1].split(",")]
+        # No volume is as thin as a pixel has channels.
+        channels = sides.pop() if len(sides) > 2 and int(sides[-1]) <= MOST_CHANNELS else ""
+        many = f" with {channels} channel{'s' if channels != '1' else ''}" if channels else ""
+        return " x ".join(reversed(sides)) + many
+
+    return SIDES.sub(turn, message)
 
 
 def complain(message: str) -> None:

@@ -307,9 +307,11 @@ def name_arguments(**names: str) -> Iterator[None]:
         yield
     except InvalidInput as error:
         argument, colon, rest = str(error).partition(":")
-        if not colon or not argument.isidentifier():
+        several = argument.split(", ")
+        if not colon or not all(each.isidentifier() for each in several):
             raise
-        raise type(error)(f"{names.get(argument, '--' + argument.replace('_', '-'))}:{rest}") from None
+        called = dict.fromkeys(names.get(each, "--" + each.replace("_", "-")) for each in several)
+        raise type(error)(f"{', '.join(called)}:{rest}") from None
 
 
 def deliver(

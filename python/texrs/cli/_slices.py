@@ -22,6 +22,8 @@ from texrs.cli._readers import read_volume
 from texrs.cli._texts import About, parse_numbers
 from texrs.errors import InvalidInput
 from texrs.volume import Viewer, cube, oblique, paint, slices, turntable
+from texrs.volume._values import as_direction
+from texrs.volume.pictures import as_steps, check_cube, check_turntable
 
 _AXES = ("plane", "row", "column")
 
@@ -96,6 +98,8 @@ def slice_command(
     paged = Path(out).suffix.lower() in (".html", ".htm")
     if paged and chosen:
         raise InvalidInput(f"--out: a page shows slices along all axes, without {chosen[0]}; got {out!r}")
+    with name_arguments(point="--oblique", normal="--oblique", count="--threads"), threads(count):
+        check_view(used, options)
     moving = Path(out).suffix.lower() == ".gif"
     if moving != as_turntable:
         raise InvalidInput(f"--out: {'a picture is not' if moving else '--turntable is'} written to .gif, got {out!r}")
@@ -123,6 +127,20 @@ def slice_command(
     with _outputs.write_output(out) as temporary:
         io.write(temporary, picture)
     note(f"wrote {out}: {describe(picture, 2)}, in {time.monotonic() - start:.1f} s", quiet=quiet)
+
+
+def check_view(used: Options, options: dict[str, Any]) -> None:
+    """Check what the volume is to look like before it is read, which may take long."""
+    asked = {name: value for name, value in options.items() if name != "interpolation"}
+    if used is BLOCK:
+        check_cube(**asked)
+    elif used is TURNED:
+        check_turntable(**asked)
+    elif used is CUT:
+        point, normal = asked["normal"]
+        as_steps(normal, None)
+        if point is not None:
+            as_direction(point, "point")
 
 
 def draw(voxels: Array, used: Options, options: dict[str, Any]) -> Array:

@@ -198,9 +198,9 @@ def cube(
     ((115, 4), np.uint8(0), np.uint8(255))
 
     """
+    longer, around, above = check_cube(size, azimuth, elevation)
+    view = _view(around, above)
     colours = guidance(as_image(volume, "volume", axes=3))
-    longer = as_int(size, "size", 16, _LARGEST)
-    view = _view(as_float(azimuth, "azimuth", -1e6, 1e6), as_float(elevation, "elevation", -90, 90))
     half = np.array(colours.shape[:3]) / 2
     reach = np.abs(view[:2]) @ half * _MARGIN
     pixel = 2 * reach.max() / longer
@@ -269,10 +269,7 @@ def turntable(
     progress = listen(progress)
     from PIL import Image
 
-    count, side = as_int(frames, "frames", 2, 360), as_int(size, "size", 16, 1024)
-    above, period = as_float(elevation, "elevation", -90, 90), as_float(seconds, "seconds", 0.1, 600)
-    if count * side * side > _MOST:
-        raise LimitExceeded(f"frames, size: {count} pictures of {side} x {side} are more than {_MOST} pixels in all")
+    count, side, above, period = check_turntable(frames, size, elevation, seconds)
     if not str(path).lower().endswith(".gif"):
         raise FileError(f"{path}: needs a name that ends in .gif")
     if not isinstance(background, Sequence | np.ndarray) or len(background) != 3:
@@ -301,6 +298,23 @@ def turntable(
         )
     if progress is not None:
         progress("turning", 1.0)
+
+
+def check_cube(size: int = 512, azimuth: float = 40, elevation: float = 30) -> tuple[int, float, float]:
+    """Check what a block is to look like, before a volume is there; raises as `cube` does."""
+    turned = as_float(azimuth, "azimuth", -1e6, 1e6), as_float(elevation, "elevation", -90, 90)
+    return as_int(size, "size", 16, _LARGEST), *turned
+
+
+def check_turntable(
+    frames: int = 24, size: int = 320, elevation: float = 25, seconds: float = 4
+) -> tuple[int, int, float, float]:
+    """Check what a turntable is to look like, before a volume is there; raises as `turntable` does."""
+    count, side = as_int(frames, "frames", 2, 360), as_int(size, "size", 16, 1024)
+    above, period = as_float(elevation, "elevation", -90, 90), as_float(seconds, "seconds", 0.1, 600)
+    if count * side * side > _MOST:
+        raise LimitExceeded(f"frames, size: {count} pictures of {side} x {side} are more than {_MOST} pixels in all")
+    return count, side, above, period
 
 
 def _render(
