@@ -21,9 +21,10 @@ from texrs.cli._outputs import Quiet, Threads, describe, make_argument, name_arg
 from texrs.cli._readers import read_volume
 from texrs.cli._texts import About, parse_numbers
 from texrs.errors import InvalidInput
-from texrs.volume import Viewer, cube, oblique, paint, slices, turntable
+from texrs.volume import Viewer, cube, oblique, paint, slices, transparent, turntable
 from texrs.volume._values import as_direction
 from texrs.volume.pictures import as_steps, check_cube, check_turntable
+from texrs.volume.transparent import check_transfer, parse_transfer
 
 _AXES = ("plane", "row", "column")
 
@@ -71,27 +72,45 @@ CUT = Options(
     kinds={"normal": Kind("POINT/NORMAL", parse_oblique, "As in 30,20,10/1,1,0; /1,1,0 is through the middle.")},
 )
 BLOCK = Options(cube, only=("size", "azimuth", "elevation", "interpolation"))
+CLEAR = Options(
+    transparent,
+    only=("size", "azimuth", "elevation", "transfer", "shading"),
+    kinds={
+        "transfer": Kind(
+            "V:COLOUR:ALPHA,...",
+            lambda text, about: parse_transfer(text),
+            "As in 0:own:0,0.4:own:0,0.6:#cc3322:0.2; own is the colour of the voxel.",
+        )
+    },
+)
 TURNED = Options(turntable, only=("size", "frames", "elevation", "seconds", "interpolation"))
 
 
-@take_options(ACROSS, CUT, BLOCK, TURNED)
+@take_options(ACROSS, CUT, BLOCK, CLEAR, TURNED)
 def slice_command(
     volume: Annotated[str, make_argument("VOLUME", "The volume: a file, or sample:NAME.")],
     out: Annotated[str, to_write("out", text="Image file to write, or a page (.html) with sliders.")],
     given: dict[str, Any],
     as_cube: Annotated[bool, typer.Option("--cube", help="A block of the material, on a transparent ground.")] = False,
+    as_clear: Annotated[bool, typer.Option("--transparent", help="The block seen through.")] = False,
     as_turntable: Annotated[bool, typer.Option("--turntable", help="The block turning, as an animated GIF.")] = False,
     labels: Annotated[bool, typer.Option("--labels", help="The volume holds labels: each is given a colour.")] = False,
     count: Threads = None,
     quiet: Quiet = False,
 ) -> None:
-    """Show a volume: slices along its axes, a cut in any direction, a cube or a turntable."""
+    """Show a volume: slices along its axes, a cut in any direction, a cube, seen through, or a turntable."""
     start = time.monotonic()
-    asked = {"--at": given["at"], "--oblique": given["normal"], "--cube": as_cube, "--turntable": as_turntable}
+    asked = {
+        "--at": given["at"],
+        "--oblique": given["normal"],
+        "--cube": as_cube,
+        "--transparent": as_clear,
+        "--turntable": as_turntable,
+    }
     chosen = [option for option, there in asked.items() if there]
     if len(chosen) > 1:
         raise InvalidInput(f"{' and '.join(chosen)}: one of them can be asked for")
-    owners = {"--at": ACROSS, "--oblique": CUT, "--cube": BLOCK, "--turntable": TURNED}
+    owners = {"--at": ACROSS, "--oblique": CUT, "--cube": BLOCK, "--transparent": CLEAR, "--turntable": TURNED}
     used = owners[(chosen or ["--at"])[0]]
     options = used.call(used.read(given))
     check_needed(given, owners, (chosen or ["--at"])[0])
@@ -103,14 +122,14 @@ def slice_command(
     moving = Path(out).suffix.lower() == ".gif"
     if moving != as_turntable:
         raise InvalidInput(f"--out: {'a picture is not' if moving else '--turntable is'} written to .gif, got {out!r}")
-    _outputs.check_output(out, np.zeros((1, 1, 4), np.uint8) if as_cube else None)
+    _outputs.check_output(out, np.zeros((1, 1, 4), np.uint8) if as_cube or as_clear else None)
     voxels = read_volume(volume)
     if labels:
         with name_arguments(labels=volume):
             voxels = paint(voxels)
-        if used is not ACROSS:
+        if used not in (ACROSS, CLEAR):
             options["interpolation"] = "nearest"
-    if not (as_cube or as_turntable or paged):
+    if not (as_cube or as_clear or as_turntable or paged):
         _outputs.check_output(out, voxels[0])
     with name_arguments(volume=volume, point="--oblique", normal="--oblique", count="--threads"), threads(count):
         if as_turntable:
@@ -134,6 +153,9 @@ def check_view(used: Options, options: dict[str, Any]) -> None:
     asked = {name: value for name, value in options.items() if name != "interpolation"}
     if used is BLOCK:
         check_cube(**asked)
+    elif used is CLEAR:
+        check_cube(**{name: asked[name] for name in ("size", "azimuth", "elevation") if name in asked})
+        check_transfer(asked.get("transfer"))
     elif used is TURNED:
         check_turntable(**asked)
     elif used is CUT:
@@ -147,6 +169,8 @@ def draw(voxels: Array, used: Options, options: dict[str, Any]) -> Array:
     """Return the picture that was asked for."""
     if used is BLOCK:
         return cube(voxels, **options)
+    if used is CLEAR:
+        return transparent(voxels, **options)
     if used is CUT:
         point, normal = options.pop("normal")
         return oblique(voxels, point, normal, **options)

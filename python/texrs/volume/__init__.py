@@ -1,7 +1,7 @@
 """Pictures of volumes, and statistics of how like its exemplar a synthesised one is.
 
-Pictures: `slices`, `oblique`, `cube`, `turntable`, `Viewer` (a page with sliders); `paint` gives labels colours, `surface` the
-triangles around one.
+Pictures: `slices`, `oblique`, `cube`, `transparent` (seen through), `turntable`, `Viewer` (a page with sliders); `paint` gives
+labels colours, `surface` the triangles around one.
 
 Statistics, each of which can be used alone, most of them for pictures too; `compare` makes a report of them all:
 
@@ -34,6 +34,7 @@ from texrs.volume.structure import (
     speckle,
     texture_normal,
 )
+from texrs.volume.transparent import transparent
 from texrs.volume.viewer import Viewer
 
 __all__ = [
@@ -63,6 +64,7 @@ __all__ = [
     "speckle",
     "surface",
     "texture_normal",
+    "transparent",
     "turntable",
     "two_point",
 ]
