@@ -19,7 +19,7 @@ help:
 	@echo "make format  rewrite the sources in the house's format"
 	@echo "make bench   criterion benches of the kernels"
 	@echo "make wheel   a wheel and a source distribution in dist/, tried in clean environments"
-	@echo "make docs    API documentation of the kernels"
+	@echo "make docs    documentation, gallery and reference: docs/_build/html/index.html"
 	@echo "make clean   remove what the other goals made"
 
 requirements:
@@ -89,10 +89,17 @@ wheel: $(VENV)/.tools
 	$(BIN)/maturin sdist --out dist
 	$(BIN)/python .ci/wheel $(PYTHONS)
 
-docs: | requirements
-	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps
-	@echo "Open target/doc/texrs/index.html in a browser."
+$(VENV)/.documented: $(VENV)/.built
+	$(BIN)/python -m pip install --quiet --group docs
+	@touch $@
+
+# Pages of Python, with those of the kernels in the folder rust; warnings are errors.
+docs: $(VENV)/.documented
+	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --quiet
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+	rm -rf docs/_build/html/rust && cp -r target/doc docs/_build/html/rust
+	@echo "Open docs/_build/html/index.html in a browser."
 
 clean:
-	rm -rf $(VENV) target demo dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) target demo dist docs/_build docs/generated .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find python -name '*.so' -delete

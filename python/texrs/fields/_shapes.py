@@ -185,7 +185,7 @@ def circular(
 ) -> Field:
     """Return the field that winds the texture round an axis: one of its axes is radial, one tangential.
 
-    With d the way from the axis to a point, F e_r = d / |d|, F e_t = the same turned by a right angle towards t, and
+    With d the way from the axis to a point, ``F e_r = d / |d|``, F e_t = the same turned by a right angle towards t, and
     the third axis stays. On the axis itself F is the identity.
 
     Parameters

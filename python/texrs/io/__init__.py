@@ -6,20 +6,22 @@ Suffix                dtypes                                      Channels   Los
 ``.png``              bool, uint8, uint16                         1, 2, 3, 4 nothing
 ``.tif`` ``.tiff``    bool, (u)int8/16/32, float16/32/64          1 to 64    nothing
 ``.exr``              float16, float32                            1, 2, 3, 4 nothing
-``.hdr``              float32, finite, not negative               3          beyond 8 bits [1]_
+``.hdr``              float32, finite, not negative               3          beyond 8 bits (a)
 ``.webp``             bool, uint8                                 3, 4       nothing
 ``.jpg`` ``.jpeg``    bool, uint8                                 1, 3       JPEG, quality 95
 ``.bmp``              bool, uint8                                 1, 3       nothing
 ``.npy`` ``.npz``     bool, (u)int8/16/32/64, float16/32/64       1 to 64    nothing
-``.nrrd`` [2]_        bool, (u)int8/16/32/64, float32/64          1 to 64    nothing
-``.nii`` [2]_         bool, (u)int8/16/32/64, float32/64          1 to 64    nothing
-``.nii.gz`` [2]_      the same                                    1 to 64    nothing
-``.vti`` [3]_         bool, (u)int8/16/32/64, float32/64          1 to 64    nothing
+``.nrrd`` (b)         bool, (u)int8/16/32/64, float32/64          1 to 64    nothing
+``.nii`` (b)          bool, (u)int8/16/32/64, float32/64          1 to 64    nothing
+``.nii.gz`` (b)       the same                                    1 to 64    nothing
+``.vti`` (c)          bool, (u)int8/16/32/64, float32/64          1 to 64    nothing
 ===================== =========================================== ========== ====================
 
-.. [1] of the largest channel of each pixel, with which the three share an exponent.
-.. [2] volumes alone; needs the extra: ``pip install texrs[vol]``.
-.. [3] volumes alone, for ParaView; read in every encoding that VTK writes.
+(a) Of the largest channel of each pixel, with which the three share an exponent.
+
+(b) Volumes alone; needs the extra: ``pip install texrs[vol]``.
+
+(c) Volumes alone, for ParaView; read in every encoding that VTK writes.
 
 Zarr stores are read too, arrays and OME-Zarr images (extra ``dask``), and VTK's structured points (``.vtk``); textures without
 borders write the former (`texrs.SolidTexture.to_zarr`).

@@ -48,7 +48,7 @@ class CellReuse:
 
 
 def coherence(source: SourceMap, axis: int, field: Field | None = None) -> Bools:
-    """Return where a voxel and the next along an axis go on in one piece: max |S(p + e) - S(p) - J e| < 0.6.
+    """Return where a voxel and the next along an axis go on in one piece: ``max |S(p + e) - S(p) - J e| < 0.6``.
 
     Parameters
     ----------

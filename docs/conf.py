@@ -1,0 +1,62 @@
+"""How the documentation is built: `make docs`. Pages that say what the code says are made from the code."""
+
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+
+from pages import write_pages  # noqa: E402
+
+import texrs  # noqa: E402
+
+project = "texrs"
+author = "the texrs developers"
+version = release = texrs.__version__
+extensions = ["sphinx.ext.autodoc", "sphinx.ext.extlinks", "numpydoc", "myst_nb", "sphinx_gallery.gen_gallery"]
+exclude_patterns = ["_build", "pictures", "gallery/README.rst", "generated/gallery/*.ipynb", "generated/gallery/*.py"]
+default_role = "py:obj"
+nb_execution_mode = "off"
+myst_enable_extensions = ["deflist", "colon_fence"]
+myst_heading_anchors = 3
+
+extlinks = {"doi": ("https://doi.org/%s", "doi:%s")}
+autodoc_typehints = "none"
+autodoc_member_order = "alphabetical"
+numpydoc_show_class_members = False
+numpydoc_class_members_toctree = False
+
+html_theme = "pydata_sphinx_theme"
+html_title = "texrs"
+html_static_path = ["static"]
+html_css_files = ["texrs.css"]
+html_show_sourcelink = False
+html_sidebars = {"index": [], "install": [], "five-minutes": [], "promises": [], "glossary": []}
+html_theme_options = {
+    "navigation_with_keys": False,
+    "show_toc_level": 2,
+    "header_links_before_dropdown": 8,
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_start": ["copyright"],
+    "footer_end": [],
+    "pygments_light_style": "a11y-high-contrast-light",
+    "pygments_dark_style": "a11y-high-contrast-dark",
+}
+copyright = "the texrs developers; MIT or Apache-2.0"
+
+sphinx_gallery_conf = {
+    "examples_dirs": ["gallery"],
+    "gallery_dirs": ["generated/gallery"],
+    "filename_pattern": r"/plot_",
+    "capture_repr": (),
+    "download_all_examples": False,
+    "remove_config_comments": True,
+    "reset_modules": ("matplotlib",),
+    "min_reported_time": 1e9,
+    "show_memory": False,
+    "show_signature": False,
+    "plot_gallery": True,
+    "abort_on_example_error": True,
+}
+
+write_pages(HERE)

@@ -1,0 +1,111 @@
+"""Pages that are made from the code: the API by its docstrings, the commands by their parsers, the words of ARCHITECTURE.md."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import shutil
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import texrs
+
+NOTICE = "% Made by docs/pages.py.\n\n"
+
+
+def write_pages(docs: Path) -> None:
+    """Write all such pages anew, to the folder ``generated``."""
+    out = docs / "generated"
+    for each in ("api", "commands.md", "words.md"):
+        if (out / each).is_dir():
+            shutil.rmtree(out / each)
+    (out / "api").mkdir(parents=True, exist_ok=True)
+    write_api(out / "api")
+    (out / "commands.md").write_text(list_commands(), encoding="utf-8")
+    (out / "words.md").write_text(list_words(docs.parent / "ARCHITECTURE.md"), encoding="utf-8")
+
+
+# --- API -------------------------------------------------------------------------------------------------------------
+
+
+def list_modules() -> list[ModuleType]:
+    """Return the public modules, by name."""
+    found, left = [], [texrs]
+    while left:
+        module = left.pop()
+        found.append(module)
+        left += [m for n in module.__all__ if isinstance(m := getattr(module, n), ModuleType)]
+    return sorted(found, key=lambda m: m.__name__)
+
+
+def write_api(folder: Path) -> None:
+    """Write a page a module, with all that is public in it, and a page that lists them."""
+    names = []
+    for module in list_modules():
+        name = module.__name__
+        names.append(name)
+        lines = [name, "=" * len(name), "", f".. automodule:: {name}", "   :no-members:", ""]
+        entries = [(n, getattr(module, n)) for n in module.__all__ if not n.startswith("_")]
+        if module is not texrs:
+            # What is also a name of texrs itself is described there.
+            above = [n for n, value in entries if getattr(texrs, n, None) is value]
+            entries = [(n, value) for n, value in entries if n not in above]
+            lines += [f"Also `texrs.{n}`." for n in above] + [""]
+        for kind, wanted in (("autofunction", inspect.isroutine), ("autoclass", inspect.isclass)):
+            some = [n for n, value in entries if wanted(value)]
+            if not some:
+                continue
+            title = "Functions" if kind == "autofunction" else "Classes"
+            lines += [title, "-" * len(title), ""]
+            for n in some:
+                lines += [f".. {kind}:: {name}.{n}"]
+                if kind == "autoclass":
+                    lines += ["   :members:"]
+                lines += [""]
+        (folder / f"{name}.rst").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    listed = [
+        f"- [{name}]({name}.rst): {_first_line(module)}" for name, module in zip(names, list_modules(), strict=True)
+    ]
+    text = f"{NOTICE}# API reference\n\nAll that is public, by module.\n\n" + "\n".join(listed)
+    text += '\n\nThe kernels in Rust have <a href="../../rust/texrs/index.html">a reference of their own</a>.'
+    text += "\n\n```{toctree}\n:hidden:\n\n" + "\n".join(names) + "\n```\n"
+    (folder / "index.md").write_text(text, encoding="utf-8")
+
+
+def _first_line(module: ModuleType) -> str:
+    return (module.__doc__ or "").strip().splitlines()[0]
+
+
+# --- commands --------------------------------------------------------------------------------------------------------
+
+
+def list_commands() -> str:
+    """Return what each command says of itself."""
+    import typer
+
+    from texrs.cli import GROUPS, app, make_command
+
+    group: Any = typer.main.get_command(app)
+    wide = {"resilient_parsing": True, "terminal_width": 100, "max_content_width": 100}
+    top = group.make_context("texrs", [], **wide)
+    text = f"{NOTICE}# Commands\n\nWhat `texrs COMMAND --help` says.\n\n"
+    for title, commands in GROUPS.items():
+        text += f"## {title}\n\n"
+        for name, short in commands.items():
+            command = make_command(name)
+            said = command.get_help(command.make_context(name, [], parent=top, **wide))
+            text += f"### texrs {name}\n\n{short}\n\n```text\n{said}\n```\n\n"
+    return text
+
+
+# --- words -----------------------------------------------------------------------------------------------------------
+
+
+def list_words(architecture: Path) -> str:
+    """Return the glossary of ARCHITECTURE.md."""
+    table = architecture.read_text(encoding="utf-8").partition("## The words")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| (.+?) \| (.+?) \|$", table, re.MULTILINE)[1:]
+    words = "".join(f"{word}\n  {meaning}\n\n" for word, meaning in sorted(rows, key=lambda row: row[0].lower()))
+    intro = "The words of the interface, of messages and of the code, each with one meaning."
+    return f"{NOTICE}# Glossary\n\n{intro}\n\n```{{glossary}}\n{words.rstrip()}\n```\n"
