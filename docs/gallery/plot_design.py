@@ -2,17 +2,18 @@
 More of the same stones
 =======================
 
-One small picture becomes a large one: its elements are found, moved, and stitched back along minimum cuts.
+One picture becomes a larger one, without a seam along both axes: elements are found, moved, and stitched back along
+minimum cuts.
 """
 
 import matplotlib.pyplot as plt
 
 import texrs
 
-pebbles = texrs.samples.pebbles((128, 128)).image
-result = texrs.design(pebbles, (256, 384), seed=7)
+pebbles = texrs.samples.pebbles((192, 192)).image
+result = texrs.design(pebbles, (288, 480), seed=7)
 
-figure, (left, right) = plt.subplots(1, 2, width_ratios=[128, 384], figsize=(10, 5), layout="constrained")
+figure, (left, right) = plt.subplots(1, 2, width_ratios=[192, 480], figsize=(11, 4.8), layout="constrained")
 left.imshow(pebbles)
 left.set_title("the example")
 right.imshow(result.image)

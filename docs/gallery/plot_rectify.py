@@ -1,0 +1,21 @@
+"""
+A floor made flat
+=================
+
+How the plane lies is found in the picture, and what the camera saw sharply is grown to a texture of any size.
+"""
+
+import matplotlib.pyplot as plt
+
+import texrs
+
+floor = texrs.samples.tilted_discs((256, 256)).image
+flat = texrs.rectify(floor, size=256, wrap=True, seed=1)
+
+figure, row = plt.subplots(1, 2, figsize=(9, 4.6), layout="constrained")
+shown = {"as it was seen": floor, "flat, and without a seam": flat.image}
+for axes, (title, picture) in zip(row, shown.items(), strict=True):
+    axes.imshow(picture)
+    axes.set_title(title)
+    axes.set_axis_off()
+plt.show()

@@ -1,0 +1,21 @@
+"""
+Wood wound round an axis
+========================
+
+A block is grown from a small one and follows a frame field: here layers go around an axis.
+"""
+
+import matplotlib.pyplot as plt
+
+import texrs
+
+wood = texrs.samples.wood_solid((48, 48, 48)).image
+rings = texrs.solid(wood, 72, field="circular:axis=z", seed=5).image
+
+figure, row = plt.subplots(1, 2, figsize=(9, 4.8), layout="constrained")
+shown = {"the example": texrs.volume.cube(wood, 400), "wound round an axis": texrs.volume.cube(rings, 400)}
+for axes, (title, picture) in zip(row, shown.items(), strict=True):
+    axes.imshow(picture)
+    axes.set_title(title)
+    axes.set_axis_off()
+plt.show()

@@ -1,0 +1,24 @@
+"""
+A photograph without a seam
+===========================
+
+What were the borders of a photograph is joined along the cuts that show least; the rest of it stays as it was. Laid twice by
+twice, the photograph shows its borders as a cross, and the tile shows none.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+from skimage import data
+
+import texrs
+
+gravel = data.gravel()[:256, :256]
+tile = texrs.tile(gravel).image
+
+figure, row = plt.subplots(1, 2, figsize=(11, 5.6), layout="constrained")
+shown = {"the photograph, 2 x 2": np.tile(gravel, (2, 2)), "the tile, 2 x 2": np.tile(tile, (2, 2))}
+for axes, (title, picture) in zip(row, shown.items(), strict=True):
+    axes.imshow(picture, cmap="gray", vmin=0, vmax=255)
+    axes.set_title(title)
+    axes.set_axis_off()
+plt.show()
