@@ -132,8 +132,8 @@ def test_frames_come_from_a_file_and_sizes_from_the_example(here: Path) -> None:
 WRONG = [
     ("solid v.npy -o out.tif --size 20x20", "--size: needs WIDTHxHEIGHTxDEPTH, as in 128x96x64, or one number"),
     ("solid v.npy -o out.tif --size 0", "--size: each side must be at least 1"),
-    ("solid v.npy -o out.tif --size 10000", "--size: (10000, 10000, 10000) has 1000000000000 pixels"),
-    ("solid v.npy -o out.tif --size 64 --memory-limit 9M", "--size: (64, 64, 64) would take"),
+    ("solid v.npy -o out.tif --size 10000", "--size: 10000 x 10000 x 10000 has 1000000000000 pixels"),
+    ("solid v.npy -o out.tif --size 64 --memory-limit 9M", "--size: 64 x 64 x 64 would take"),
     ("solid v.npy -o out.tif --memory-limit lots", "--memory-limit: needs a number of bytes, as in 900M"),
     ("solid v.npy -o out.tif --field circles", "--field: there is no 'circles'; did you mean circular?"),
     ("solid v.npy -o out.tif --field zigzag:angle=x", "--field: angle needs a number"),
@@ -148,7 +148,7 @@ WRONG = [
     ("solid v.npy -o out.tif --constraint-mask m.npy", "m.npy: there is no such file"),
     (
         "solid v.npy -o out.tif --size 20 --constraint-mask v.npy --constraint-values v.npy",
-        "v.npy: needs shape (20, 20, 20)",
+        "v.npy: needs shape 20 x 20 x 20",
     ),
     ("solid v.npy -o out.tif --threads 0", "--threads: needs an integer from 1"),
     ("solid v.npy -o out.png", "out.png: .png cannot hold volumes of uint8 with 3 channels"),
@@ -182,7 +182,7 @@ def test_thin_and_broken_volumes(here: Path, capsys: Capture) -> None:
     io.write_volume("thin.npy", VOLUME[:1])
     io.write_volume("nan.npy", np.full((20, 20, 20), np.nan, np.float32))
     for name, says in (
-        ("thin", "each side must be at least 16, got shape (1, 32, 32)"),
+        ("thin", "each side must be at least 16, got shape 32 x 32 x 1"),
         ("nan", "8000 of 8000 values"),
     ):
         assert main(["solid", f"{name}.npy", "-o", "out.tif", "-q"]) == 2
