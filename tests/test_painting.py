@@ -1,5 +1,6 @@
 """Meshes painted with textures of space."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,9 @@ import pytest
 import texrs
 from texrs import samples
 from texrs.errors import FileError, InvalidInput
-from texrs.painting import bake_points, paint
+from texrs.painting import follow, paint
+from texrs.painting._baking import bake_points, lean
+from texrs.painting._meshes import find_normals
 
 trimesh = pytest.importorskip("trimesh")
 
@@ -77,6 +80,76 @@ def test_materials_and_depth() -> None:
     }
 
 
+def test_heights_lean_as_they_do_on_the_surface(tmp_path: Path) -> None:
+    """A ramp along x over a square: its normals lean to the left all over, and the file has them, in 16 bit."""
+    pytest.importorskip("xatlas")
+    corners = np.array([[0, 0, 0], [8, 0, 0], [8, 8, 0], [0, 8, 0]], float)
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    points, there = bake_points(corners, faces, corners[:, :2] / 8, 32, 2)
+    steep = np.arctan(0.4 * np.sqrt(2))  # Of both components together the slope is 0.4.
+    normal = lean(points[..., 0].astype(np.float32), points, there, there)
+    assert np.allclose(normal, [-np.sin(steep), 0, np.cos(steep)], atol=1e-5)
+    normal = lean(points[..., 1].astype(np.float32), points, there, there)
+    assert np.allclose(normal[..., 1], -np.sin(steep), atol=1e-5)
+    maps = {"albedo": STRIPES.astype(np.uint16) * 257, "height": STRIPES[..., 0], "roughness": STRIPES[..., 1]}
+    painted = paint(BALL, texrs.SolidTexture(texrs.Material(maps, axes=3)), scale=1.0, atlas=64)
+    painted.save(tmp_path / "ball.glb")
+    data = (tmp_path / "ball.glb").read_bytes()
+    said = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
+    (material,) = said["materials"]
+    assert material["normalTexture"]
+    assert material["pbrMetallicRoughness"].keys() >= {"baseColorTexture", "metallicRoughnessTexture"}
+    start = 28 + int.from_bytes(data[12:16], "little")
+    for image in said["images"]:
+        view = said["bufferViews"][image["bufferView"]]
+        picture = data[start + view["byteOffset"] :][: view["byteLength"]]
+        assert picture[24] == 16  # Bits of a sample, in the header of PNG.
+    attributes = said["meshes"][0]["primitives"][0]["attributes"]
+    assert set(attributes) == {"POSITION", "NORMAL", "TANGENT", "TEXCOORD_0"}
+
+
+def test_smooth_things_stay_smooth_where_the_atlas_is_cut_and_edges_sharp(baked: texrs.painting.Painted) -> None:
+    normals = find_normals(baked.vertices, baked.faces)
+    assert (normals * baked.vertices / 10).sum(axis=1).min() > 0.99
+    _, same = np.unique(baked.vertices, axis=0, return_inverse=True)
+    for place in np.unique(same):
+        assert np.ptp(normals[same.reshape(-1) == place], axis=0).max() < 1e-9
+    box = trimesh.creation.box()
+    corners = box.vertices[box.faces].reshape(-1, 3)
+    split = find_normals(corners, np.arange(36).reshape(-1, 3))
+    assert np.allclose(np.sort(np.abs(split), axis=1), [0, 0, 1])
+
+
+def along_surface(field: texrs.fields.Field, points: np.ndarray) -> np.ndarray:
+    """Return where the x axis of the exemplar goes, as x, y, z."""
+    return field.frames(points[:, ::-1] * 2.0)[..., 2][:, ::-1]
+
+
+def test_directions_lie_in_the_surface_as_they_are_said(tmp_path: Path) -> None:
+    tube = trimesh.creation.cylinder(radius=4.0, height=30.0, sections=48)
+    angle = np.linspace(0, 2 * np.pi, 13)[:-1] + 0.1
+    points = np.stack([4 * np.cos(angle), 4 * np.sin(angle), np.linspace(-9, 9, 12)], axis=1)
+    out = points * [1, 1, 0] / 4
+    around = np.stack([-np.sin(angle), np.cos(angle), 0 * angle], axis=1)
+    mesh = (tube.vertices, tube.faces)
+    for said, wanted, signed in (
+        ("z", np.tile([0, 0, 1.0], (12, 1)), True),
+        ("around:z", around, True),
+        ("curvature", around, False),
+        ("curvature:least", np.tile([0, 0, 1.0], (12, 1)), False),
+        ([[[4, 0, -9], [4, 0, 9]]], np.tile([0, 0, 1.0], (12, 1)), True),
+    ):
+        field = follow(mesh, said, scale=2.0, resolution=32)
+        found = along_surface(field, points)
+        dots = (found * wanted).sum(axis=1)
+        assert (dots if signed else np.abs(dots)).min() > 0.9, said
+        # Planes of the exemplar go up out of the surface.
+        assert (field.frames(points[:, ::-1] * 2.0)[..., 0][:, ::-1] * out).sum(axis=1).min() > 0.9
+    (tmp_path / "s.json").write_text(json.dumps({"strokes": [{"points": [[4, 0, -9], [4, 0, 9]]}]}))
+    again = follow(mesh, str(tmp_path / "s.json"), scale=2.0, resolution=32)
+    assert np.array_equal(along_surface(again, points), found)
+
+
 @pytest.mark.parametrize(
     ("call", "error", "message"),
     [
@@ -86,6 +159,11 @@ def test_materials_and_depth() -> None:
         (lambda: paint(BALL, TEXTURE, scale=0), InvalidInput, "scale"),
         (lambda: paint(BALL, TEXTURE, atlas=4), InvalidInput, "atlas"),
         (lambda: paint("nowhere.obj", TEXTURE), FileError, "nowhere.obj"),
+        (lambda: follow(BALL, "north", scale=1), InvalidInput, "directions: needs x, y, z"),
+        (lambda: follow(BALL, "curvature:some", scale=1), InvalidInput, "allowed are curvature"),
+        (lambda: follow(BALL, "[]", scale=1), InvalidInput, "needs strokes"),
+        (lambda: follow(BALL, [[[0, 0, 1]]], scale=1), InvalidInput, "stroke 0 needs at least two points"),
+        (lambda: follow(BALL, "nowhere.json", scale=1), FileError, "nowhere.json"),
     ],
 )
 def test_wrong_arguments(call, error: type[Exception], message: str) -> None:

@@ -33,6 +33,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     io.write("hole.png", np.pad(np.full((8, 8), 255, np.uint8), 28))
     io.write_volume("in.tif", samples.load("stripes", size=(32, 32, 32)).image)
     SourceMap.identity((64, 64)).save("map.npz")
+    Path("in.obj").write_text("v 0 0 0\nv 8 0 0\nv 0 8 0\nv 0 0 8\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
     texrs.TextureDatabase("db").add("in.png", "dots", mask=sample.mask, layout="disjoint")
     return tmp_path
 
@@ -56,6 +57,7 @@ WRITERS = {
     "database splice": "database db splice dots dots -o {}.png",
     "design": "design in.png --size 48 --tiles 1 -o {}.png",
     "extend": "extend in.png --left 8 --slant 0 -o {}.png",
+    "paint": "paint in.obj in.tif --vertices --voxels 2 -o {}.glb",
     "perspective": "perspective in.png --size 64 -o {}.png",
     "rectify": "rectify in.png --slant 20 --tilt 90 --fov 50 -o {}.png",
     "remove": "remove in.png hole.png --slant 0 -o {}.png",

@@ -44,6 +44,7 @@ GROUPS: dict[str, dict[str, str]] = {
     },
     "Results": {
         "apply": "Make the heights, normals or labels of a result, through its source map.",
+        "paint": "Paint a mesh with a texture of space, made from a volume.",
         "slice": "Show a volume: slices along its axes, a cut in any direction, a cube or a turntable.",
         "info": "Say what a file holds, and how texrs made it.",
         "rerun": "Make a file that texrs wrote again, from the same inputs, and compare.",
@@ -69,6 +70,10 @@ def load(name: str) -> Callable[..., None]:
             from texrs.cli import _scales
 
             return _scales.COMMAND
+        case "paint":
+            from texrs.cli import _paint
+
+            return _paint.COMMAND
         case "tiles":
             from texrs.cli import _tiles
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from texrs._arrays import as_choice, as_float, try_array
 from texrs.errors import InvalidInput
 from texrs.fields._field import Field
-from texrs.fields._sampled import from_array
+from texrs.fields._sampled import make_grid
 
 __all__ = ["from_directions", "from_gradient", "from_structure"]
 
@@ -26,7 +26,7 @@ def from_directions(
     extent: Sequence[int] | None = None,
     *,
     along: str = "x",
-    up: Sequence[float] | None = None,
+    up: ArrayLike | None = None,
     order: str | None = None,
     signed: bool = True,
     origin: Sequence[float] | None = None,
@@ -34,7 +34,8 @@ def from_directions(
     """Return a field that turns one axis of the exemplar into given directions.
 
     In volumes the other two axes are completed: one lies as near to ``up`` as it can, the last across both. Lengths do not
-    count; where there is no direction, that of the nearest place which has one is taken.
+    count; where there is no direction, that of the nearest place which has one is taken, and so it is where neighbours point in
+    opposite ways, as around a vortex.
 
     Parameters
     ----------
@@ -44,8 +45,9 @@ def from_directions(
         Voxels that the array spreads over, as for `from_array`; by default one for each vector.
     along : {"x", "y", "z"}
         The axis of the exemplar that goes there: that of columns, rows or planes.
-    up : sequence of 3 float, optional
-        (plane, row, column), of volumes; by default the direction that is least gone along.
+    up : (3,) or (P, R, C, 3) array_like, optional
+        (plane, row, column), of volumes, for all or place by place, as the normals of a surface; by default the direction that
+        is least gone along.
     order : {"zyx", "xyz", "yx", "xy"}, optional
         Of the components; as of the axes of arrays, (plane, row, column), by default.
     signed : bool
@@ -91,7 +93,7 @@ def from_directions(
     unit = _fill(vectors)
     if not signed:
         unit = _agree(unit)
-    return from_array(_complete(unit, letters.index(along), up), extent, origin=origin)
+    return make_grid(_complete(unit, letters.index(along), up), extent, origin, opposed=True)
 
 
 def from_gradient(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0, across: bool = False) -> Field:
@@ -222,7 +224,7 @@ def _agree(unit: NDArray[np.float64]) -> NDArray[np.float64]:
     return out
 
 
-def _complete(unit: NDArray[np.float64], along: int, up: Sequence[float] | None) -> NDArray[np.float64]:
+def _complete(unit: NDArray[np.float64], along: int, up: ArrayLike | None) -> NDArray[np.float64]:
     """Return frames (..., A, A) whose column ``along`` is the direction."""
     axes = unit.shape[-1]
     frames = np.empty((*unit.shape, axes))
@@ -239,12 +241,14 @@ def _complete(unit: NDArray[np.float64], along: int, up: Sequence[float] | None)
         upwards *= np.sign(upwards[np.abs(upwards).argmax()])
     else:
         upwards = np.asarray(up, np.float64)
-        if upwards.shape != (3,) or not np.isfinite(upwards).all() or not upwards.any():
-            raise InvalidInput(f"up: needs 3 numbers that are not all 0, got {up!r}")
-        upwards = upwards / np.sqrt((upwards**2).sum())
+        if upwards.shape not in ((3,), unit.shape) or not np.isfinite(upwards).all() or not upwards.any(axis=-1).all():
+            raise InvalidInput(
+                f"up: needs 3 numbers that are not all 0, or such for each of {unit.shape[:-1]}, got {up!r}"
+            )
+        upwards = upwards.reshape(-1, 3) / np.sqrt((upwards.reshape(-1, 3) ** 2).sum(axis=1, keepdims=True))
     # Where a direction is that of up, the axis that it is least along stands in.
     spare = np.eye(3)[np.abs(flat).argmin(axis=1)]
-    near = np.abs(flat @ upwards) > 0.999
+    near = np.abs((flat * upwards).sum(axis=1)) > 0.999
     wanted = np.where(near[:, np.newaxis], spare, upwards)
     second = wanted - (wanted * flat).sum(axis=1, keepdims=True) * flat
     second /= np.sqrt((second**2).sum(axis=1, keepdims=True))

@@ -73,6 +73,13 @@ def from_array(
            [0., 1.]], dtype=float32)
 
     """
+    return make_grid(frames, extent, origin)
+
+
+def make_grid(
+    frames: ArrayLike, extent: Sequence[int] | None, origin: Sequence[float] | None, *, opposed: bool = False
+) -> Field:
+    """Return a field of an array of frames, as `from_array`."""
     given = _as_numbers(frames, "frames")
     axes = given.shape[-1] if given.ndim else 0
     if axes not in (2, 3) or given.shape[-2:] != (axes, axes) or given.ndim != axes + 2 or given.size == 0:
@@ -89,7 +96,7 @@ def from_array(
         return np.asarray(np.stack(np.unravel_index(index, sides), axis=-1) * step + first, np.float64)
 
     turns, stretches = _split(given.reshape(-1, axes, axes), places)
-    return _Grid(axes, sides, tuple(first), tuple(step), turns, stretches)
+    return _Grid(axes, sides, tuple(first), tuple(step), turns, stretches, opposed)
 
 
 def interpolate(points: ArrayLike, frames: ArrayLike) -> Field:
@@ -185,6 +192,8 @@ class _Grid(Field):
     step: tuple[float, ...]
     turns: Floats
     stretches: Floats | None
+    opposed: bool = False
+    """Whether the nearest frame counts where those around point in opposite ways, as around a vortex; else that is refused."""
 
     def _frames(self, points: NDArray[np.float64]) -> Matrices:
         low, share = [], []
@@ -206,6 +215,11 @@ class _Grid(Field):
             turn += weight * self.turns[..., index]
             if stretch is not None and self.stretches is not None:
                 stretch += weight * self.stretches[..., index]
+        if self.opposed and (flat := np.abs(determinants(turn)) < _FLATTEST).any():
+            index = np.zeros(int(flat.sum()), np.int64)
+            for a, n in enumerate(self.sides):
+                index = index * n + np.minimum(low[a][flat] + (share[a][flat] > 0.5), n - 1)
+            turn[..., flat] = self.turns[..., index]
         return _join(turn, stretch, points)
 
     def describe(self) -> str:

@@ -40,9 +40,9 @@ from texrs.materials._surface import (
     take_surface,
 )
 
-__all__ = ["make_pictures", "write_gltf"]
+__all__ = ["make_pictures", "write_gltf", "write_shapes"]
 
-FLOAT, SHORT = 5126, 5123
+FLOAT, SHORT, LONG = 5126, 5123, 5125
 VERTICES, INDICES = 34962, 34963
 LINEAR, MIPMAPS, REPEAT = 9729, 9987, 10497
 BEAM = "KHR_materials_emissive_strength"
@@ -64,7 +64,15 @@ def write_gltf(maps: Mapping[str, Map], path: Path, shapes: Sequence[str], repea
     size = next(iter(maps.values())).pixels.shape[:2]
     makers = {"plane": make_plane, "sphere": make_sphere}
     pictures, material = make_pictures(maps, depth)
-    document, data = lay_out([(s, makers[s](size, times)) for s in wanted], material, target.stem)
+    return write_shapes([(s, makers[s](size, times)) for s in wanted], pictures, material, target)
+
+
+def write_shapes(
+    shapes: Sequence[tuple[str, Mesh]], pictures: Mapping[str, Array], material: dict[str, Any], target: FilePath
+) -> list[FilePath]:
+    """Write shapes of one material, whose textures are pictures by number, and return the files."""
+    suffix = target.suffix.lower()
+    document, data = lay_out(shapes, material, target.stem)
     files: dict[FilePath, bytes] = {}
     for number, (name, picture) in enumerate(pictures.items()):
         coded = encode(name, picture, "png")
@@ -177,13 +185,16 @@ def lay_out(shapes: Sequence[tuple[str, Mesh]], material: dict[str, Any], name: 
             ("NORMAL", "VEC3", mesh.normals),
             ("TANGENT", "VEC4", mesh.tangents),
             ("TEXCOORD_0", "VEC2", mesh.places),
+            *((key, ("SCALAR", "VEC2", "VEC3", "VEC4")[each.shape[1] - 1], each) for key, each in mesh.more.items()),
             ("indices", "SCALAR", mesh.faces),
         ):
+            if array is None:
+                continue
             numbers[key] = len(document["accessors"])
             document["accessors"].append(describe(array, kind, len(document["bufferViews"]), key == "POSITION"))
             coded = array.tobytes()
             view = {"buffer": 0, "byteOffset": len(data), "byteLength": len(coded)}
-            document["bufferViews"].append(view | {"target": INDICES if kind == "SCALAR" else VERTICES})
+            document["bufferViews"].append(view | {"target": INDICES if key == "indices" else VERTICES})
             data += pad(coded, b"\0")
         indices = numbers.pop("indices")
         primitive = {"attributes": numbers, "indices": indices, "material": 0}
@@ -200,10 +211,12 @@ def describe(array: NDArray[Any], kind: str, view: int, bounds: bool) -> dict[st
     count = array.size // WORDS[kind]
     found: dict[str, Any] = {
         "bufferView": view,
-        "componentType": SHORT if array.dtype == np.uint16 else FLOAT,
+        "componentType": {"u2": SHORT, "u4": LONG}.get(array.dtype.str[1:], FLOAT),
         "count": count,
         "type": kind,
     }
+    if kind == "VEC4" and array.dtype == np.uint16:
+        found["normalized"] = True
     if bounds:
         found |= {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()}
     return found

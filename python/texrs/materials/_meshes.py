@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._typing import Floats
+from texrs._typing import Array, Floats
 
 __all__ = ["Mesh", "make_plane", "make_sphere"]
 
@@ -24,20 +24,24 @@ class Mesh:
     ----------
     positions, normals : (N, 3) float32 array
         Corners, and which way is out.
-    tangents : (N, 4) float32 array
-        Which way the picture's columns grow, and 1: its rows grow against the product of normal and tangent.
-    places : (N, 2) float32 array
+    tangents : (N, 4) float32 array, optional
+        Which way the picture's columns grow, and 1: its rows grow against the product of normal and tangent; -1 where the
+        picture is mirrored.
+    places : (N, 2) float32 array, optional
         Where in the picture: columns and rows, a whole picture from one integer to the next.
-    faces : (M, 3) uint16 array
+    faces : (M, 3) uint16 or uint32 array
         Three corners each.
+    more : dict of str to array
+        What else corners have, by the names of glTF.
 
     """
 
     positions: Floats
     normals: Floats
-    tangents: Floats
-    places: Floats
-    faces: NDArray[np.uint16]
+    tangents: Floats | None
+    places: Floats | None
+    faces: NDArray[np.unsignedinteger]
+    more: dict[str, Array] = field(default_factory=dict)
 
 
 def make_plane(shape: Sequence[int], repeat: int) -> Mesh:

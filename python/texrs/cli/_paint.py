@@ -1,0 +1,111 @@
+"""The command that paints meshes: ``texrs paint``."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated, Any
+
+import typer
+
+from texrs._threads import threads
+from texrs.cli import _outputs
+from texrs.cli._console import note, show_progress
+from texrs.cli._kinds import Kind
+from texrs.cli._options import Options, take_options
+from texrs.cli._outputs import Quiet, Threads, make_option, name_arguments, to_write
+from texrs.cli._provenance import check_free
+from texrs.cli._readers import read_volume
+from texrs.cli._stacks import Roles, read_roles
+from texrs.cli._texts import About
+from texrs.errors import InvalidInput
+from texrs.materials import Material
+from texrs.painting import choose_scale, follow, paint
+from texrs.painting._files import check_suffix
+from texrs.painting._meshes import read_mesh
+from texrs.papers.solid.window import SolidTexture
+
+
+def read_block(text: str, about: About) -> Any:
+    """Read a volume, or a folder of volumes that are the maps of a material."""
+    if not os.path.isdir(text):
+        return read_volume(text)
+    with name_arguments(roles="--role", maps=text):
+        return Material.read(text, roles=about.roles, axes=3)
+
+
+BLOCK = Kind("FILE|FOLDER", read_block, "A volume, a folder of volumes that are maps, or sample:NAME.", file=True)
+TEXTURE = Options(SolidTexture, arguments={"exemplar": BLOCK}, leave={"cache_bytes": "one process makes all"}, axes=3)
+MESH = Kind("FILE", lambda text, about: text, ".obj, .ply, .stl or .glb.")
+PAINTED = Options(
+    paint, only=("mesh", "scale", "atlas", "padding"), arguments={"mesh": MESH}, names={"scale": "voxels"}
+)
+FOLLOWED = Options(
+    follow,
+    only=("directions", "along"),
+    kinds={"directions": Kind("AXIS|around:AXIS|curvature|FILE.json", lambda text, about: text)},
+    optional={"directions": "as the texture lies"},
+)
+
+
+@take_options(PAINTED, TEXTURE, FOLLOWED)
+def paint_command(
+    out: Annotated[
+        str, to_write("out", "OUT.glb", "Mesh to write: .glb, .gltf, .obj with its .mtl; of corners also .ply.")
+    ],
+    given: dict[str, Any],
+    corners: Annotated[bool, typer.Option("--vertices", help="Colours of corners, without an atlas.")] = False,
+    bits: Annotated[int | None, make_option("8|16", "Of the pictures; 8 where all maps have these, else 16.")] = None,
+    role: Roles = None,
+    count: Threads = None,
+    quiet: Quiet = False,
+) -> None:
+    """Paint a mesh with a texture of space, made from a volume."""
+    start, mesh = time.monotonic(), given["mesh"]
+    if bits not in (None, 8, 16):
+        raise InvalidInput(f"--bits: allowed are 8 and 16, got {bits}")
+    with name_arguments(**{out: "--out"}):
+        check_suffix(out, baked=not corners)
+    folder = os.path.dirname(os.path.realpath(out))
+    _outputs.check_output(out)
+    values = {**PAINTED.read(given), **FOLLOWED.read(given), **TEXTURE.read(given, which=lambda o: not o.file)}
+    if ("directions",) in values and given["field"] is not None:
+        raise InvalidInput("--directions, --field: one of them can be asked for")
+    if ("along",) in values and ("directions",) not in values:
+        raise InvalidInput("--along: needs --directions")
+    values |= TEXTURE.read(given, About(axes=3, roles=read_roles(role)), which=lambda o: o.file)
+    call, painted, followed = (
+        o.call({p: v for p, v in values.items() if p in {i.path for i in o}}) for o in (TEXTURE, PAINTED, FOLLOWED)
+    )
+    if role and not isinstance(call["exemplar"], Material):
+        raise InvalidInput("--role: is for materials, which are folders of maps")
+    painted.pop("mesh")
+    surface = read_mesh(mesh)
+    names = {n: v for o in (FOLLOWED, PAINTED, TEXTURE) for n, v in o.name_values(given).items()}
+    with name_arguments(**names, count="--threads"), threads(count), show_progress(quiet=quiet) as progress:
+        texture = SolidTexture(**call)
+        if followed:
+            size = painted.setdefault("scale", choose_scale(surface[0], texture))
+            texture = SolidTexture(**call | {"field": follow(surface[:2], **followed, scale=size)})
+        painted["atlas"] = None if corners else painted.get("atlas", given["atlas"])
+        made = paint(mesh, texture, **painted, progress=progress)
+    depth: Any = bits
+    with TemporaryDirectory(prefix=".texrs-", dir=folder) as beside:
+        # Files name each other, so they are written under their own names first.
+        *others, last = reversed(made.save(Path(beside, os.path.basename(out)), depth=depth))
+        targets = [os.path.join(folder, file.name) for file in others]
+        for target in targets:
+            check_free(target)
+        for file, target in zip(others, targets, strict=True):
+            with _outputs.write_output(target, inside=False) as temporary:
+                shutil.copyfile(file, temporary)
+        with _outputs.write_output(out) as temporary:
+            shutil.copyfile(last, temporary)
+    size_ = f"{len(made.vertices)} corners" if made.uv is None else f"an atlas of {given['atlas']} x {given['atlas']}"
+    note(f"wrote {out}: {len(made.faces)} triangles, {size_}, in {time.monotonic() - start:.1f} s", quiet=quiet)
+
+
+COMMAND = paint_command

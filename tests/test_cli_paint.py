@@ -1,0 +1,85 @@
+"""Meshes painted from the command line."""
+
+import json
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import texrs
+from texrs import io, samples
+from texrs.cli import main
+
+trimesh = pytest.importorskip("trimesh")
+pytest.importorskip("xatlas")
+
+STRIPES = samples.stripes((32, 32, 32)).image[:20, :20, :20]
+SMALL = ["--voxels", "2", "-q"]
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    trimesh.creation.icosphere(subdivisions=1, radius=6.0).export("ball.stl")
+    io.write_volume("stripes.tif", STRIPES)
+    return tmp_path
+
+
+def read_glb(path: str) -> dict:
+    data = Path(path).read_bytes()
+    (length,) = struct.unpack("<I", data[12:16])
+    return json.loads(data[20 : 20 + length])
+
+
+def test_an_atlas_and_its_provenance(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["paint", "ball.stl", "stripes.tif", "-o", "a.glb", "--atlas", "64", *SMALL]
+    assert main(words) == 0
+    made = texrs.painting.paint("ball.stl", texrs.SolidTexture(STRIPES), scale=2, atlas=64)
+    shown = trimesh.load("a.glb", force="mesh", process=False)
+    assert np.array_equal(np.asarray(shown.visual.material.baseColorTexture)[..., :3], made.maps["image"])
+    assert main(["rerun", "a.glb", "-q"]) == 0
+    assert "the same bytes" in capsys.readouterr().out
+    assert main([*words, "--padding", "2"]) == 0  # Its own file is replaced.
+
+
+def test_a_material_in_16_bit_along_an_axis_as_obj(here: Path) -> None:
+    texrs.Material({"albedo": STRIPES, "height": STRIPES[..., 0]}, axes=3).save("block")
+    words = ["paint", "ball.stl", "block", "-o", "a.obj", "--atlas", "64", "--bits", "16", "--directions", "around:z"]
+    assert main([*words, "--along", "y", *SMALL]) == 0
+    lines = Path("a.mtl").read_text().splitlines()
+    named = {word: name for word, _, name in (line.partition(" ") for line in lines)}
+    assert named["map_Kd"] == "a_basecolor.png"
+    assert {word for word, name in named.items() if name.endswith(".png")} == {"map_Kd", "norm", "map_Bump"}
+    assert all(io.read(name).dtype == np.uint16 for name in named.values() if name.endswith(".png"))
+    shown = trimesh.load("a.obj", force="mesh", process=False)
+    assert len(shown.faces) == 80
+    assert shown.visual.uv.shape == (len(shown.vertices), 2)
+
+
+def test_colours_of_corners(here: Path) -> None:
+    assert main(["paint", "ball.stl", "stripes.tif", "-o", "c.ply", "--vertices", *SMALL]) == 0
+    vertices, faces = texrs.painting._meshes.read_mesh("ball.stl")[:2]
+    wanted = texrs.SolidTexture(STRIPES).sample(vertices[:, ::-1] * 2)
+    assert np.array_equal(trimesh.load("c.ply", process=False).visual.vertex_colors[:, :3], wanted)
+    assert len(faces) == 80
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["-o", "a.png"], "a mesh is written to .glb"),
+        (["-o", "a.ply"], "with colours of corners to .ply"),
+        (["-o", "a.glb", "--along", "y"], "--along: needs --directions"),
+        (["-o", "a.glb", "--directions", "up"], "--directions: needs x, y, z"),
+        (["-o", "a.glb", "--directions", "x", "--field", "circular"], "one of them can be asked for"),
+        (["-o", "a.glb", "--bits", "12"], "--bits: allowed are 8 and 16"),
+        (["-o", "a.glb", "--role", "a=height"], "--role: is for materials"),
+        (["-o", "a.glb", "--voxels", "0"], "--voxels"),
+    ],
+)
+def test_what_is_refused(here: Path, words: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    before = sorted(p.name for p in here.iterdir())
+    assert main(["paint", "ball.stl", "stripes.tif", *words]) == 2
+    assert message in capsys.readouterr().err
+    assert sorted(p.name for p in here.iterdir()) == before
