@@ -18,8 +18,8 @@ RELIEF = 12.0
 """Height of the relief, in pixels."""
 
 
-SIZE = 320
-"""Side of what is designed."""
+SIZE, MAP = 320, 170
+"""Side of what is designed, and of a map at least: the five of a material stand in one row."""
 
 
 def _maps(workshop: Workshop) -> str:
@@ -35,7 +35,8 @@ def _maps(workshop: Workshop) -> str:
                 figure(example.preview(tiles=(1, 1)), "The example, lit"),
                 pair(result.material.preview(tiles=(1, 1)), "The result, lit", "Tiled 2 x 2"),
             )
-            + grid([*show(example), *show(result.material)], least=120)
+            + grid(show(example, "of the example"), least=MAP)
+            + grid(show(result.material, "of the result"), least=MAP)
         )
     return code(
         "texrs design STONES -o NEW --size 2048x2048 --preview lit.png   # a folder of maps, and a folder of maps\n"
@@ -54,13 +55,13 @@ def make_material(name: str, side: int) -> Material:
     return Material({**maps, "labels": sample.labels})
 
 
-def show(material: Material) -> list[str]:
+def show(material: Material, whose: str) -> list[str]:
     """Return the pictures of maps."""
     notes = {"normal": "y up, turned", "labels": "never mixed"}
     return [
         figure(
             paint(each.pixels) if each.role.labelled else each.pixels,
-            name.capitalize(),
+            f"{name.capitalize()} {whose}",
             note=f"{each.pixels.dtype}{', ' if name in notes else ''}{notes.get(name, '')}",
             exact=each.role.labelled,
         )
