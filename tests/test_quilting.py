@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 
 import texrs
 from texrs import SourceMap, samples
+from texrs.blending import measure_visibility
 from texrs.quilting import Picture, quilt
 from texrs.quilting._finder import halve
 from texrs.quilting._quilt import find_calm_lines
-from texrs.quilting._windows import Span, Window, divide_axis
+from texrs.quilting._windows import Span, Window, divide_axis, plan_waves
 
 
 def picture(image: np.ndarray, *, mirrored: bool = False) -> Picture:
@@ -167,3 +168,51 @@ def test_a_calm_line_is_no_edge() -> None:
 def test_halve() -> None:
     image = np.arange(30, dtype=np.float32).reshape(5, 6, 1)
     assert halve(image)[..., 0].tolist() == [[3.5, 5.5, 7.5], [15.5, 17.5, 19.5]]
+
+
+@given(
+    width=st.integers(200, 900),
+    height=st.integers(40, 400),
+    patch=st.integers(12, 40),
+    share=st.floats(0, 0.5),
+    wrap=st.tuples(st.booleans(), st.booleans()),
+)
+def test_patches_of_a_wave_lie_apart(
+    width: int, height: int, patch: int, share: float, wrap: tuple[bool, bool]
+) -> None:
+    rows, columns = (
+        divide_axis(n, 64, patch, int(share * patch), w) for n, w in zip((height, width), wrap, strict=True)
+    )
+    waves = plan_waves(rows, columns, 4)
+    assert sorted((w.rows.start, w.columns.start) for wave in waves for w in wave) == sorted(
+        (r.start, c.start) for r in rows for c in columns
+    )
+    covered = np.zeros((height, width), bool)
+    for wave in waves:
+        near = np.zeros((height, width), int)
+        for window in wave:
+            near[window.surround((height, width), wrap).index] += 1
+            # All that it says to meet above and before it lies there already.
+            at, known = window.index((height, width)), window.mark_known()
+            if window.rows.after == 0:
+                assert covered[at][known].all()
+        assert near.max() == 1
+        for window in wave:
+            covered[window.index((height, width))] = True
+
+
+def test_waves_are_the_same_for_any_number_of_threads(monkeypatch: pytest.MonkeyPatch, pebbles: np.ndarray) -> None:
+    monkeypatch.setattr("texrs.quilting.LARGE", 0)
+    asked = {"size": (200, 640), "patch": 48, "overlap": 16}
+    sources = []
+    for count in (1, 2, 7):
+        with texrs.threads(count):
+            sources.append(made([picture(pebbles)], **asked))
+    assert all((s.coordinates == sources[0].coordinates).all() for s in sources[1:])
+    assert all((s.label == sources[0].label).all() for s in sources[1:])
+    # Laid in another order, it is as good a texture.
+    monkeypatch.undo()
+    row = made([picture(pebbles)], **asked)
+    assert (row.coordinates != sources[0].coordinates).any()
+    waves, raster = (measure_visibility(s, pebbles, s.render(pebbles), wrap=True) for s in (sources[0], row))
+    assert waves.mean < 1.1 * raster.mean

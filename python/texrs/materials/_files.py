@@ -11,6 +11,7 @@ import numpy as np
 
 from texrs import io
 from texrs._arrays import to_unit
+from texrs._threads import SideBySide
 from texrs._typing import Array, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.materials._map import Map
@@ -38,6 +39,8 @@ SUFFIXES = (
 """Of files that may be maps."""
 MOST = 64
 """Maps that a material may have."""
+AT_ONCE = 4
+"""Files that are written at once."""
 SMALLER = "mipmaps"
 """Folder of what is not a map of the material itself, so that reading finds maps of one size."""
 
@@ -118,12 +121,15 @@ def write_maps(
     small: list[FilePath] = []
     (smaller if mipmaps else place).mkdir(parents=True, exist_ok=True)
     with ExitStack() as stack:
+        work: list[tuple[FilePath, Map]] = []
         for name, each in maps.items():
             files.append(place / f"{name}{endings[name]}")
-            write(stack.enter_context(io.atomic(files[-1])), convert(each.pixels, depth))
+            work.append((stack.enter_context(io.atomic(files[-1])), each))
             for level, less in enumerate(halve(each, axes) if mipmaps else (), 1):
                 small.append(smaller / f"{name}.{level}{endings[name]}")
-                write(stack.enter_context(io.atomic(small[-1])), convert(less.pixels, depth))
+                work.append((stack.enter_context(io.atomic(small[-1])), less))
+        with SideBySide(AT_ONCE) as beside:
+            beside.do(lambda each, _: write(each[0], convert(each[1].pixels, depth)), work)
     return files + small
 
 

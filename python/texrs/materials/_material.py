@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path as FilePath
@@ -15,6 +15,7 @@ from texrs._arrays import as_choice, as_float, as_image, as_int
 from texrs._cache import content_hash
 from texrs._progress import listen
 from texrs._show import as_png
+from texrs._threads import SideBySide
 from texrs._typing import Array, Floats, Path, Progress
 from texrs.blending import apply
 from texrs.errors import InvalidInput
@@ -28,8 +29,8 @@ __all__ = ["Material"]
 
 CHANNELS = {Role.NORMAL: (3, 4), Role.NORMAL_DX: (3, 4), Role.ORM: (3, 4), Role.VECTOR: (2, 3), Role.LABELS: (1,)}
 """How many channels maps of a role may have; of others any."""
-
-
+AT_ONCE = 2
+"""Maps that are made at once: each takes up to 0.4 GB beside what it becomes."""
 SHOWN = 512
 """Pixels of the longer side in a notebook."""
 
@@ -395,29 +396,32 @@ def guide_materials(materials: Sequence[Material]) -> list[Array]:
 def apply_materials(materials: Sequence[Material], source: SourceMap, progress: Progress | None = None) -> Material:
     """Return the material that a source map makes of several with the same maps."""
     check_alike(materials)
-    first, made = materials[0], {}
+    first, made = materials[0], dict[str, Map]()
     finish = source.finish
     if finish is not None and finish.flatten:
         # Colours alone are lit, and each map says how it encodes light.
         materials, finish = [m.flatten() for m in materials], replace(finish, flatten=False)
-    for number, (name, each) in enumerate(first.items()):
+    names = list(first)
 
-        def watch(stage: str, share: float, number: int = number, name: str = name) -> None:
-            if progress is not None:
-                progress(f"map {name}", (number + share) / len(first))
+    def make(name: str, watch: Callable[[float], object]) -> Array:
+        role, images = first[name].role, [m[name].pixels for m in materials]
+        kind: Literal["colour", "normal", "vector", "label"] = "colour"
+        if role.labelled:
+            kind = "label"
+        elif role.normal:
+            kind = "normal"
+        elif role is Role.VECTOR:
+            kind = "vector"
+        green: Literal["up", "down"] = "down" if role is Role.NORMAL_DX else "up"
+        return apply(source, images, kind=kind, green=green, finish=finish, progress=lambda _, share: watch(share))
 
-        watch("", 0.0)
-        images = [m[name].pixels for m in materials]
-        if each.role.labelled:
-            pixels = apply(source, images, kind="label", finish=finish, progress=watch)
-        elif each.role.normal:
-            green: Literal["up", "down"] = "up" if each.role is Role.NORMAL else "down"
-            pixels = apply(source, images, kind="normal", green=green, finish=finish, progress=watch)
-        elif each.role is Role.VECTOR:
-            pixels = apply(source, images, kind="vector", finish=finish, progress=watch)
-        else:
-            pixels = apply(source, images, finish=finish, progress=watch)
-        made[name] = replace(each, pixels=pixels)
+    def tell(number: int, share: float) -> None:
+        if progress is not None:
+            progress(f"map {names[number]}", (number + share) / len(names))
+
+    with SideBySide(AT_ONCE) as beside:
+        for name, pixels in zip(names, beside.do(make, names, tell), strict=True):
+            made[name] = replace(first[name], pixels=pixels)
     return Material(made, weights=first._weights, axes=first.axes)
 
 

@@ -17,6 +17,8 @@ Departures, with their reasons:
 - A patch is charged for showing what others show already, and for going on where a neighbour ends. A charge that
   multiplies the match would let the exact continuation of a neighbour, whose match costs nothing, win for ever.
 - What lies in courses is quilted along them alone: its pictures are laid so that their joints lie at the same places.
+- In large textures rows of patches follow each other at a distance of two patches, so that several are cut in side by side;
+  each is charged for what was repeated before all of these.
 - A patch that shows the mirror image of what it overlaps is refused: along the axis of a mirror the two meet without a
   seam, and the eye sees nothing else.
 """
@@ -26,13 +28,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from texrs._engine.noise import uniform
+from texrs._threads import SideBySide
 from texrs.kernels.patch_search import Match
 from texrs.quilting._finder import Finder
 from texrs.quilting._quilt import Picture, Quilt
-from texrs.quilting._windows import Window, divide_axis
+from texrs.quilting._windows import divide_axis, plan_waves
 from texrs.source_map import SourceMap
 
 __all__ = ["Picture", "quilt"]
+
+LARGE, AT_ONCE = 2**22, 4
+"""Pixels of a texture from which on patches of so many rows are cut in side by side: it takes half the time on two cores."""
 
 
 def quilt(
@@ -78,19 +84,18 @@ def quilt(
     shape = (rows[0].extent, columns[0].extent)
     finder = Finder([p.colours for p in pictures], shape, fixed)
     canvas = Quilt(pictures, size, wrap)
-    windows = [Window(r, c) for r in rows for c in columns]
-    for number, window in enumerate(windows):
-        progress(number / len(windows))
-        if number == 0:
-            which = int(uniform(seed, 0, 0, 0, 3) * len(pictures))
-            free = [n - m + 1 for n, m in zip(pictures[which].colours.shape, shape, strict=False)]
-            row, column = (
-                window.corner[axis] if axis == fixed else int(uniform(seed, 1 + axis, 0, 0, 3) * n)
-                for axis, n in enumerate(free)
-            )
-            canvas.lay(window, Match(0.0, which, row, column))
-        else:
-            canvas.paste(window, finder)
+    first, *waves = plan_waves(rows, columns, at_once=AT_ONCE if size[0] * size[1] > LARGE else 1)
+    which = int(uniform(seed, 0, 0, 0, 3) * len(pictures))
+    free = [n - m + 1 for n, m in zip(pictures[which].colours.shape, shape, strict=False)]
+    row, column = (
+        first[0].corner[axis] if axis == fixed else int(uniform(seed, 1 + axis, 0, 0, 3) * n)
+        for axis, n in enumerate(free)
+    )
+    canvas.lay(first[0], Match(0.0, which, row, column))
+    with SideBySide(AT_ONCE) as beside:
+        for number, wave in enumerate(waves, 1):
+            progress(number / (1 + len(waves)))
+            canvas.paste(wave, finder, beside)
     progress(1.0)
     # A cyclic texture may begin anywhere.
     rolled = {axis: uniform(seed, axis, 0, 0, 6) for axis in range(2) if wrap[axis]}

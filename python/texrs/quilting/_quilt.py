@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._engine.stitcher import FREE, Pasting, Samples
+from texrs._threads import SideBySide
 from texrs._typing import Bools, Floats
 from texrs.kernels.patch_search import Match
 from texrs.quilting._finder import Finder
@@ -88,8 +89,18 @@ class Quilt:
         lines = corner[:, np.newaxis] + np.multiply.outer(width, rows)
         return np.asarray(lines[..., np.newaxis] + columns, np.uint32)
 
-    def paste(self, window: Window, finder: Finder) -> None:
-        """Cut the most promising matches into what is there, and keep the one that shows and repeats the least."""
+    def paste(self, windows: Sequence[Window], finder: Finder, beside: SideBySide) -> None:
+        """Cut a patch into each of some windows that lie apart: each is chosen as if it were the first of them."""
+        chosen = beside.do(lambda window, _: self.choose(window, finder), windows)
+        for window, (match, around, taken, seams) in zip(windows, chosen, strict=True):
+            self.seams[around.index] = seams
+            self.lay(window, match, taken[around.inner])
+
+    def choose(self, window: Window, finder: Finder) -> tuple[Match, Surroundings, Bools, Floats]:
+        """Cut the most promising matches into what is there, and return the one that shows and repeats the least.
+
+        With it, the window and what is beside it, which pixels of these take the patch, and the seams that there are then.
+        """
         old, known = self.place[window.index(self.size)], window.mark_known()
         colours = self.all_colours.take(old, axis=0, mode="clip")
         regular = self.pictures[0].regular
@@ -114,8 +125,7 @@ class Quilt:
             # A seam through plain ground would not tell a place that is out of step.
             charges += [m.cost / usual for m in pool]
         chosen = min(range(len(best)), key=lambda i: seams[i] / least + charges[best[i]])
-        taken, self.seams[around.index] = self.samples.cut(pasting, patches[chosen])
-        self.lay(window, exact[chosen], taken[around.inner])
+        return exact[chosen], around, *self.samples.cut(pasting, patches[chosen])
 
     def lay(self, window: Window, match: Match, mask: Bools | None = None) -> None:
         """Lay a patch, or what of it a mask marks."""

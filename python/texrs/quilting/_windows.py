@@ -113,6 +113,32 @@ class Surroundings:
     """Axes around which it goes, so that beside it there is only itself."""
 
 
+def plan_waves(rows: Sequence[Span], columns: Sequence[Span], at_once: int) -> list[list[Window]]:
+    """Return the windows of a texture in the order in which patches are cut into them: those of a wave lie apart.
+
+    One after the other in raster order; or so many rows at once, each two patches behind the one above it, so that what
+    a patch overlaps, but for what a cyclic axis has beyond its end, lies there already.
+
+    Examples
+    --------
+    >>> spans = divide_axis(200, 30, 30, 10, False)
+    >>> waves = plan_waves(spans[:2], spans, 2)
+    >>> [[(spans.index(w.rows), spans.index(w.columns)) for w in wave] for wave in waves][:4]
+    [[(0, 0)], [(0, 1)], [(0, 2), (1, 0)], [(0, 3), (1, 1)]]
+
+    """
+    # With a pixel beside each: where every second one meets, patches are too near to each other.
+    apart = all(b.start - a.start >= a.extent + 2 for a, b in zip(columns, columns[2:], strict=False))
+    if at_once == 1 or not apart or len(columns) < 2 * at_once + 2:
+        return [[Window(r, c)] for r in rows for c in columns]
+    waves = []
+    for top in range(0, len(rows), at_once):
+        band = list(enumerate(rows[top : top + at_once]))
+        for time in range(len(columns) + 2 * (len(band) - 1)):
+            waves.append([Window(r, columns[time - 2 * k]) for k, r in band if 0 <= time - 2 * k < len(columns)])
+    return waves
+
+
 def index_box(ends: Sequence[tuple[int, int]], size: tuple[int, int]) -> Any:
     """Return the index of a box in a texture of this size, around the edges."""
     if all(low >= 0 and high <= n for (low, high), n in zip(ends, size, strict=True)):
