@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 import texrs
-from plane_checks import look, look_at_room
+from plane_checks import dress, look, look_at_room
 from texrs import Plane, View, io, planes
 from texrs.cli import main
 from texrs.completion._sides import share_out
@@ -56,6 +56,19 @@ def test_ground_is_told_from_sky_and_things(name: str) -> None:
 def test_strong_light_is_no_other_ground(name: str) -> None:
     picture, *_ = see(name)
     assert planes.find_ground(shine(picture)).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "above"), [("setts", "bark"), ("beans", "bark"), ("weave", "grit"), ("pebbles", "bricks")]
+)
+def test_a_wall_is_no_ground_where_one_slow_change_follows_both(name: str, above: str) -> None:
+    plane = Plane((225, 300), 42, 90, fov=55)
+    picture, ground = dress(look(name, plane), plane.tilt, above=above, seed=1)
+    found = planes.find_ground(picture)
+    assert (found & ground).sum() / (found | ground).sum() >= 0.9
+    # The border of a shadow is a step too.
+    shadow = np.where(ground[..., np.newaxis], 1.0, 0.8) * look(name, plane)
+    assert planes.find_ground(shadow.astype(np.uint8)).mean() > 0.97
 
 
 def shine(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:

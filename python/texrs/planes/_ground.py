@@ -16,6 +16,7 @@ from texrs._arrays import as_image, as_mask, guidance
 from texrs._light import Light
 from texrs._typing import Bools, Floats
 from texrs.errors import InvalidInput
+from texrs.planes._step import find_step
 
 __all__ = ["find_ground"]
 
@@ -100,11 +101,13 @@ def find_ground(image: object, *, known: object = None) -> Bools:
     if min(size) < TELLING:
         return there
     colours, seen = shrink(guidance(pixels), there)
-    if is_evenly_covered(colours, seen):
-        return there
-    follows = find_windows(colours, seen)
+    follows = seen if is_evenly_covered(colours, seen) else find_windows(colours, seen)
     if np.count_nonzero(seen & ~follows) < FEWEST * np.count_nonzero(seen):
-        return there
+        # One slow change follows it all, but two may do so better.
+        side = find_step(*look(colours, seen), seen)
+        if side is None:
+            return there
+        follows = side
     ground = settle(colours, seen, follows)
     if np.count_nonzero(seen & ~ground) < THING * ground.size:
         return there
@@ -151,11 +154,16 @@ def blur(values: NDArray[np.float64], known: Bools, sigma: float) -> NDArray[np.
     return np.stack(channels, axis=-1)
 
 
-def find_windows(colours: NDArray[np.float64], known: Bools) -> Bools:
-    """Mark the pixels whose windows follow what most of the picture follows."""
+def look(colours: NDArray[np.float64], known: Bools) -> tuple[NDArray[np.float64], float]:
+    """Return the means of colours, and of squares of two bands of detail, in windows, and the deviation of these."""
     sigma = max(NARROWEST, WINDOW * min(known.shape))
     details = [np.square(colours - blur(colours, known, s)).sum(axis=-1) for s in BANDS]
-    facts = blur(np.stack([*np.moveaxis(colours, -1, 0), *details], axis=-1), known, sigma)
+    return blur(np.stack([*np.moveaxis(colours, -1, 0), *details], axis=-1), known, sigma), sigma
+
+
+def find_windows(colours: NDArray[np.float64], known: Bools) -> Bools:
+    """Mark the pixels whose windows follow what most of the picture follows."""
+    facts, sigma = look(colours, known)
     facts[..., 3:] = 0.5 * np.log(facts[..., 3:] + 1e-5)
     least = np.array([COLOUR] * 3 + [CONTRAST] * len(BANDS))
     step = max(1, int(sigma / 2))
