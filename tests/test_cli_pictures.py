@@ -145,7 +145,7 @@ REFUSED = {
     "complete in.png": "HOLE: needs a mask",
     "complete in.png no.png": "no.png",
     "complete no.png hole.png": "no.png",
-    "complete in.png other.png": "other.png: needs shape (64, 80), got (64, 64)",
+    "complete in.png other.png": "other.png: needs shape 80 x 64, got 64 x 64",
     "complete in.png white.png": "white.png: covers the whole image",
     "complete in.png lines.png": "lines.png: leaves no 4 x 4 pixels",
     "complete in.png hole.png --patch 65": "--patch: needs an integer from 4 to 64, got 65",

@@ -322,5 +322,5 @@ def test_a_photograph_is_extended_to_a_size() -> None:
     ).report["added"]
     assert up["top"] < 35 < up["bottom"]
     assert up["top"] + up["bottom"] == 80
-    with pytest.raises(InvalidInput, match="to: needs 180 x 240"):
+    with pytest.raises(InvalidInput, match=r"to: needs \(180, 240\)"):
         texrs.extend(FLOOR, to=(100, 300), view=PLANE)

@@ -214,14 +214,21 @@ def fill(
     work = _Place(reader, name, grid, str(part), len(header), shape, dtype.str)
     todo = [number for number in range(len(grid)) if number not in done]
     made = 0
-    with _name_journal(part).open("a", encoding="utf-8") as journal:
-        for number, _ in workers.run(work, todo, scheduler, threads_each=threads):
-            journal.write(f"{number}\n")
-            journal.flush()
-            os.fsync(journal.fileno())
-            made += 1
-            if watch is not None:
-                watch("chunks", (len(done) + made) / len(grid))
+    try:
+        with _name_journal(part).open("a", encoding="utf-8") as journal:
+            for number, _ in workers.run(work, todo, scheduler, threads_each=threads):
+                journal.write(f"{number}\n")
+                journal.flush()
+                os.fsync(journal.fileno())
+                made += 1
+                if watch is not None:
+                    watch("chunks", (len(done) + made) / len(grid))
+    except InvalidInput:
+        if not done and not made:
+            # Refused before anything was made, as workers that do not answer are: there is nothing to go on with.
+            part.unlink(missing_ok=True)
+            _name_journal(part).unlink(missing_ok=True)
+        raise
     stored = Stored(str(target), shape, len(grid), made, time.monotonic() - begun)
     return Filled(part, len(header), shape, dtype, axes, stored)
 
