@@ -5,7 +5,7 @@ import pytest
 
 import texrs
 from reference.look_up import view
-from texrs import samples
+from texrs import _rust, samples
 from texrs.blending import _seams, _values, _visibility, blend, measure_visibility
 from texrs.blending._correction import divide_strips
 from texrs.errors import InvalidInput
@@ -494,6 +494,6 @@ def test_sums_along_seams_are_those_of_the_whole_picture_filtered(shape, cyclic)
     spread = np.zeros(shape, np.float32)
     spread[at] = values
     wanted = gaussian_filter(spread, _seams.ALONG, mode="wrap" if cyclic else "constant")[at]
-    found = _seams.Along.of(at, shape, cyclic=cyclic).sum_up(values)
+    found = _rust.sum_nearby(np.stack(at, axis=1), values, shape, cyclic, _seams.WINDOW)
     assert found.dtype == np.float32
     np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-8)

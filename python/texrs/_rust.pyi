@@ -30,6 +30,7 @@ __all__ = [
     "seam_strips",
     "set_threads",
     "similar",
+    "sum_nearby",
     "uniform",
     "upsample",
     "warp_mesh",
@@ -53,6 +54,9 @@ def gather(
 def outlines(
     labels: NDArray[int32], windows: Sequence[tuple[int, Sequence[int], Sequence[int]]]
 ) -> list[NDArray[float32] | None]: ...
+def sum_nearby(
+    points: NDArray[int64], values: NDArray[float32], shape: Sequence[int], cyclic: bool, window: Sequence[float]
+) -> NDArray[float32]: ...
 def place(
     distance: NDArray[float32],
     origin: Sequence[float],

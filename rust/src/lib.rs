@@ -25,6 +25,7 @@
 //! | [`warp`] | where each pixel comes from, of pictures warped by moved points, and of moved shapes -> `gather` |
 //! | [`gather`] | an exemplar of any type looked up through coordinates |
 //! | [`ncc`] | normalised cross-correlation of a template with each window of an image |
+//! | [`nearby`] | sums over what lies near by, of values at few points of an image |
 //! | [`mean_shift`] | joint spatial and range filtering |
 //! | [`sparse`] | symmetric positive definite systems: factored once, solved many times |
 //! | [`image_io`] | 8/16-bit and float image files, with limits |
@@ -51,6 +52,6 @@ pub use engine::{appearance, blocks, coherence, guide, optimize, pyramid, stitch
 pub use foundation::error::{Error, Result};
 pub use foundation::{error, fixed, grid, hash, par, pca};
 pub use kernels::{
-    complete, distance, gather, image_io, mean_shift, ncc, patch_search, poisson, seam, sparse,
-    warp,
+    complete, distance, gather, image_io, mean_shift, ncc, nearby, patch_search, poisson, seam,
+    sparse, warp,
 };

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs import _rust
 from texrs._typing import Array, Bools, Floats, Interpolation
 from texrs.blending._values import Samples
 from texrs.source_map import SourceMap
@@ -106,56 +107,15 @@ def measure_outlines(
     There one of the sources shows most of the step itself. Both are summed up along the seam: in noise a single
     pair may agree by chance.
     """
-    along = Along.of(at, shape, cyclic=cyclic)
-    shown = np.maximum(*(along.sum_up((mine * step).sum(axis=-1)) for mine in own))
+    points = np.stack(at, axis=1, dtype=np.int64)
+
+    def sum_up(values: Floats) -> Floats:
+        return _rust.sum_nearby(points, values, shape, cyclic, WINDOW)
+
+    shown = np.maximum(*(sum_up((mine * step).sum(axis=-1)) for mine in own))
     least, sure = OUTLINE
-    surely: Floats = np.clip(
-        (shown / np.maximum(along.sum_up((step**2).sum(axis=-1)), 1e-12) - least) / (sure - least), 0, 1
-    )
+    surely: Floats = np.clip((shown / np.maximum(sum_up((step**2).sum(axis=-1)), 1e-12) - least) / (sure - least), 0, 1)
     return surely
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Along:
-    """Pixels on seams, whose values are summed up with those of others near by, under a Gaussian.
-
-    Few pixels lie on seams. Each adds to those above and below it, and takes what was added beside it: a picture is never
-    filtered as a whole.
-    """
-
-    rows: NDArray[np.intp]
-    columns: NDArray[np.intp]
-    shape: tuple[int, int]
-    """Where the picture is not cyclic, with a margin that nothing lies in."""
-
-    @classmethod
-    def of(cls, at: tuple[Array, ...], shape: tuple[int, ...], *, cyclic: bool) -> Along:
-        """Return those at (rows, columns) of a picture, both of whose axes are cyclic or neither."""
-        margin = 0 if cyclic else REACH
-        return cls(at[0] + margin, at[1] + margin, (shape[0] + 2 * margin, shape[1] + 2 * margin))
-
-    def sum_up(self, values: Floats) -> Floats:
-        """Return the sums (n,) around each of the pixels."""
-        height, width = self.shape
-        added, exact = np.zeros(height * width), values.astype(np.float64)
-        added[self.rows * width + self.columns] = WINDOW[0] * exact
-        for far in range(REACH, 0, -1):
-            for step in (-far, far):
-                added[(self.rows + step) % height * width + self.columns] += WINDOW[far] * exact
-        first = self.rows * width
-
-        def look(step: int) -> NDArray[np.float64]:
-            # As many digits as what is summed up has.
-            seen: NDArray[np.float64] = (
-                added[first + (self.columns + step) % width].astype(np.float32).astype(np.float64)
-            )
-            return seen
-
-        found: NDArray[np.float64] = WINDOW[0] * look(0)
-        for far in range(REACH, 0, -1):
-            found += (look(-far) + look(far)) * WINDOW[far]
-        sums: Floats = found.astype(np.float32)
-        return sums
 
 
 def list_seams(source: SourceMap, axis: int, wrap: bool) -> tuple[tuple[Array, ...], tuple[Array, ...]]:

@@ -10,6 +10,7 @@ mod hash;
 mod image_io;
 mod mean_shift;
 mod ncc;
+mod nearby;
 mod patch_search;
 mod poisson;
 mod seam;
@@ -127,6 +128,8 @@ mod _rust {
     use super::mean_shift::mean_shift;
     #[pymodule_export]
     use super::ncc::Correlation;
+    #[pymodule_export]
+    use super::nearby::sum_nearby;
     #[pymodule_export]
     use super::patch_search::PatchIndex;
     #[pymodule_export]

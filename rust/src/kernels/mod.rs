@@ -6,6 +6,7 @@ pub mod gather;
 pub mod image_io;
 pub mod mean_shift;
 pub mod ncc;
+pub mod nearby;
 pub mod patch_search;
 pub mod poisson;
 pub mod seam;

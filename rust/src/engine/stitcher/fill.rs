@@ -21,6 +21,11 @@ const PROBES: usize = 4096;
 const BATCH: usize = 4;
 /// Centres ahead among which they are looked for.
 const AHEAD: usize = 256;
+/// Patches that the field shows smaller than they are cover at least so many points along a side, in the plane and in space:
+/// toward a horizon there would be one for every few points.
+const SEEN: [f32; 2] = [24.0, 12.0];
+/// But none is made larger than this share of the exemplar's shortest side for it.
+const LARGEST: f32 = 0.4;
 
 /// A patch that has been cut, but not laid yet.
 pub(super) struct Found<const D: usize> {
@@ -47,16 +52,11 @@ impl<const D: usize> Stitching<'_, D> {
             let batch = self.batch(&mut ahead);
             let first = self.laid;
             let found = par::map(batch.len(), |k| {
-                match self.chart(batch[k], self.options.patch) {
+                let (centre, side) = (batch[k], self.side(batch[k]));
+                match self.chart(centre, side) {
                     Some(chart) => {
                         let known = self.covered(&chart);
-                        self.find(
-                            chart,
-                            &known,
-                            batch[k],
-                            self.options.patch,
-                            first + k as u32,
-                        )
+                        self.find(chart, &known, centre, side, first + k as u32)
                     }
                     None => Ok(None),
                 }
@@ -74,8 +74,8 @@ impl<const D: usize> Stitching<'_, D> {
     /// The lattice of centres, in row-major order.
     fn centres(&self) -> VecDeque<[i32; D]> {
         let grid = &self.canvas.grid;
-        let step =
-            (self.options.patch * (1.0 - self.options.overlap) * self.least_scale()).max(2.0);
+        let least = self.least_scale();
+        let step = (self.side_seen(least) * (1.0 - self.options.overlap) * least).max(2.0);
         let axes: [Vec<i32>; D] =
             std::array::from_fn(|a| along(grid.shape()[a], grid.wrap()[a], step));
         let Ok(lattice) = Grid::new(std::array::from_fn(|a| axes[a].len()), [false; D]) else {
@@ -93,9 +93,10 @@ impl<const D: usize> Stitching<'_, D> {
         let (mut batch, mut waiting) = (Vec::new(), VecDeque::new());
         let mut claimed: Vec<Reach<D>> = Vec::new();
         while let Some(centre) = ahead.pop_front() {
-            let reach = Chart::reach(&self.canvas, self.frames, centre, o.patch, o.bend);
+            let side = self.side(centre);
+            let reach = Chart::reach(&self.canvas, self.frames, centre, side, o.bend);
             let free = !claimed.iter().any(|other| self.meet(&reach, other));
-            let core = (CORE * o.patch * (1.0 - o.overlap) * self.scale(centre)) as i32;
+            let core = (CORE * side * (1.0 - o.overlap) * self.scale(centre)) as i32;
             if free && self.all_covered(centre, core.max(1)) {
                 continue;
             }
@@ -131,12 +132,12 @@ impl<const D: usize> Stitching<'_, D> {
 
     /// Lays patches wherever something is left.
     fn fill_gaps(&mut self) -> Result<()> {
-        let (grid, side) = (self.canvas.grid, self.options.patch);
+        let grid = self.canvas.grid;
         let mut next = 0;
         while let Some(p) = (next..grid.len()).find(|&p| !self.canvas.covered(p as u32)) {
             next = p;
             let at = grid.point(p).map(|x| x as i32);
-            let before = self.canvas.free;
+            let (before, side) = (self.canvas.free, self.side(at));
             self.cover_around(self.middle(at), side)?;
             for share in [1.0, 0.5, 0.25] {
                 if !self.canvas.covered(p as u32) {
@@ -277,7 +278,7 @@ impl<const D: usize> Stitching<'_, D> {
 
     /// The middle of what is not covered near a point.
     fn middle(&self, at: [i32; D]) -> [i32; D] {
-        let reach = (self.options.patch * 0.5 * self.scale(at)) as i32;
+        let reach = (self.side(at) * 0.5 * self.scale(at)) as i32;
         let window = self
             .canvas
             .window(at.map(|x| x - reach), at.map(|x| x + reach + 1));
@@ -302,6 +303,19 @@ impl<const D: usize> Stitching<'_, D> {
             .canvas
             .window(centre.map(|x| x - reach), centre.map(|x| x + reach + 1));
         window.is_none_or(|w| w.points.iter().all(|&p| self.canvas.covered(p)))
+    }
+
+    /// The side of a patch around a point, in samples of the exemplar.
+    fn side(&self, centre: [i32; D]) -> f32 {
+        self.side_seen(self.scale(centre))
+    }
+
+    /// The side of a patch where the exemplar is so much enlarged.
+    fn side_seen(&self, scale: f32) -> f32 {
+        let patch = self.options.patch;
+        let shape = self.cutter.source().grid().shape();
+        let shortest = shape.into_iter().min().unwrap_or(0) as f32;
+        patch.max((SEEN[D - 2].min(patch) / scale).min(LARGEST * shortest))
     }
 
     /// How much they are enlarged where that is least, but for the very least.
