@@ -6,6 +6,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -209,6 +211,101 @@ def test_a_batch_that_was_stopped_goes_on(here: Path, capsys: Capture, number: i
     assert main(command) == 0
     assert {n: (here / n).stat().st_mtime_ns for n in done} == done
     assert len(list(here.glob("made/*-*-*.png"))) == 8
+
+
+@pytest.mark.parametrize("how", ["--workers", "--scheduler"])
+def test_workers_make_the_same_bytes_each_once(here: Path, capsys: Capture, how: str) -> None:
+    """By processes and by a cluster: the same files, what is there is left alone, and what fails is said at the end."""
+    Path("stones/broken.png").write_bytes(Path("stones/dots.png").read_bytes()[:200])
+    assert main(["batch", "all.toml"]) == 3
+    alone = files(here)
+    kept = {n: os.stat(n).st_mtime_ns for n in alone if n.startswith("made/dots-still")}
+    for name in alone:
+        if name.startswith("made/weave") or name.endswith("turned-3.png"):
+            Path(name).unlink()
+    capsys.readouterr()
+    with workers_of(how) as words:
+        assert main(["batch", "all.toml", *words]) == 3
+        err = capsys.readouterr().err.splitlines()
+        assert files(here) == alone
+        assert {n: os.stat(n).st_mtime_ns for n in kept} == kept
+        assert sum("is there" in line for line in err) == 3
+        assert sum(": wrote made/dots" in line or ": wrote made/weave" in line for line in err) == 5
+        assert err[-5].startswith("texrs: failed: stones/broken.png to made/broken-still-3.png: ")
+        assert err[-1].startswith("texrs: 8 of 12 results are there, 4 failed")
+        assert main(["batch", "all.toml", *words, "-q"]) == 3
+    assert files(here) == alone
+
+
+@contextmanager
+def workers_of(how: str) -> Iterator[list[str]]:
+    """The option that asks for two processes, or for two threads of a worker of a cluster."""
+    if how == "--workers":
+        yield [how, "2"]
+        return
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(1, threads_per_worker=2, dashboard_address=":0") as cluster:
+        yield [how, cluster.scheduler_address]
+
+
+def test_who_shares_the_work_is_checked(here: Path, capsys: Capture) -> None:
+    for words, message in (
+        (["--workers", "0"], "--workers: needs an integer"),
+        (["--workers", "2", "--scheduler", "tcp://a"], "one of them can be asked for"),
+        (["--scheduler", "nobody"], "--scheduler: none answers at 'nobody'"),
+    ):
+        before = files(here)
+        assert main(["batch", "all.toml", *words]) == 2
+        assert message in capsys.readouterr().err
+        assert files(here) == before
+
+
+def test_stores_of_zarr_are_inputs(here: Path) -> None:
+    zarr = pytest.importorskip("zarr")
+    block = samples.stripes((32, 32, 32)).image
+    for name in ("one", "two"):
+        zarr.save_array(f"vols/{name}.zarr", block)
+    words = ["batch", "solid", "-o", "made", "--set", "size=20", "--set", "quality=fast", "-q"]
+    for inputs in (["vols"], ["vols/*.zarr"], ["vols/one.zarr", "vols/two.zarr"]):
+        assert main([*words, *inputs]) == 0
+        assert sorted(n for n in files(here) if n.startswith("made") and n.endswith(".npy")) == [
+            "made/one.npy",
+            "made/two.npy",
+        ]
+    assert main(["batch", "slice", "vols", "-o", "cuts", "-q"]) == 0
+    assert Path("cuts/two.png").exists()
+    assert list(said("made/one.npy")["inputs"]) == ["../vols/one.zarr"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_stopped_workers_leave_nothing_and_nobody(here: Path, number: int) -> None:
+    """Ctrl-C reaches all processes of a terminal at once, and the death of the first one none but itself."""
+    size = ["--set", "size=400", "--seeds", "0:4", "--workers", "2"]
+
+    def heed() -> None:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    with subprocess.Popen(
+        [sys.executable, "-m", "texrs", "batch", "all.toml", *size],
+        stderr=subprocess.PIPE,
+        preexec_fn=heed,
+        start_new_session=True,
+    ) as process:
+        assert process.stderr is not None
+        first = process.stderr.readline().decode()
+        assert ": wrote made/" in first
+        if number == signal.SIGINT:
+            os.killpg(process.pid, number)
+        else:
+            process.send_signal(number)
+        # All workers have its other end: it is closed when the last of them is gone.
+        rest = process.stderr.read().decode()
+    assert process.returncode == (130 if number == signal.SIGINT else -9)
+    assert "Traceback" not in rest
+    if number == signal.SIGINT:
+        assert "the same command goes on from there" in rest
+    assert not [n for n in files(here) if ".texrs-" in n]
 
 
 def test_folders_of_maps_are_done_as_a_whole(here: Path, capsys: Capture) -> None:

@@ -35,7 +35,7 @@ PLANE = texrs.PlaneTexture(WEAVE, seed=3, field=fields.circular(centre=(-30, 10)
 def client() -> Iterator[Client]:
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 3}),
-        LocalCluster(2, threads_per_worker=1, dashboard_address=None) as cluster,
+        LocalCluster(2, threads_per_worker=1, dashboard_address=":0") as cluster,
         Client(cluster, set_as_default=False) as made,
     ):
         yield made

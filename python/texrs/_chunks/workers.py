@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import _thread
 import multiprocessing
 import os
 import pickle
+import signal
+import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from texrs._cache import content_hash
@@ -26,6 +31,8 @@ TRIES = 3
 """Times that a task may end its worker."""
 AHEAD = 2
 """Tasks that wait at each worker while it does another, so that it need not wait for the next."""
+GRACE = 5.0
+"""Seconds that a worker has to remove what is half-written, when it is to end."""
 
 
 class WorkerLost(TexrsError):
@@ -33,7 +40,12 @@ class WorkerLost(TexrsError):
 
 
 def run(
-    work: Work, numbers: Sequence[int], scheduler: Scheduler = None, *, threads_each: int | None = None
+    work: Work,
+    numbers: Sequence[int],
+    scheduler: Scheduler = None,
+    *,
+    threads_each: int | None = None,
+    spare: bool = False,
 ) -> Iterator[tuple[int, Any]]:
     """Do some tasks, each by its number; neighbours are done by the same worker, as far as that goes.
 
@@ -49,12 +61,15 @@ def run(
     threads_each : int, optional
         Of the pool of kernel threads, one a worker. By default the cores are shared out among processes, and workers of a
         cluster have as many as it says.
+    spare : bool
+        Whether a task that ends three workers stops no other: then `WorkerLost` is what it is said to have returned.
 
     Yields
     ------
     (int, object)
         A number and what its task returned, in the order in which they are done. A task whose worker is killed is done again
-        by another.
+        by another. Where nobody asks for more, as after Ctrl-C, processes leave what they are at, and clear it away; what the
+        workers of a cluster have begun they finish.
 
     Raises
     ------
@@ -70,11 +85,11 @@ def run(
                 yield number, work(number)
     elif isinstance(scheduler, int) and not isinstance(scheduler, bool):
         count = min(as_int(scheduler, "scheduler", 1, 1024), max(1, len(numbers)))
-        yield from _run_processes(work, numbers, count, threads_each)
+        yield from _run_processes(work, numbers, count, threads_each, spare)
     else:
         client, own = _as_client(scheduler)
         try:
-            yield from _run_cluster(work, numbers, client, threads_each)
+            yield from _run_cluster(work, numbers, client, threads_each, spare)
         finally:
             if own:
                 client.close()
@@ -84,81 +99,152 @@ def run(
 
 _WORK: Work | None = None
 _THREADS: int | None = None
+_LEAVING = False
 
 
-def _begin(payload: bytes, count: int) -> None:
-    """Take what a worker is to do, once."""
+def _begin(payload: bytes, count: int, stop: Any) -> None:
+    """Take what a worker is to do, once, and heed who started it."""
     global _WORK, _THREADS
+    # Ctrl-C goes to all processes of a terminal; who started this one says what is to be done.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     _WORK, _THREADS = pickle.loads(payload), count
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), _leave)
+    threading.Thread(target=_heed, args=(stop,), daemon=True).start()
+
+
+def _heed(stop: Any) -> None:
+    """Wait for word to stop, or for the end of who started this process: nobody else would end it then."""
+    with suppress(EOFError, OSError):
+        stop.recv_bytes()
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGTERM)
+    else:
+        _thread.interrupt_main(signal.SIGTERM)
+    time.sleep(GRACE)
+    os._exit(1)
+
+
+def _leave(number: int, frame: Any) -> None:
+    """End what is being done, so that all that is half-written is removed; only once, for that is not to be ended."""
+    global _LEAVING
+    if not _LEAVING:
+        _LEAVING = True
+        raise SystemExit(1)
 
 
 def _do(number: int) -> Any:
     assert _WORK is not None
+    if _LEAVING:
+        raise SystemExit(1)
     with threads(_THREADS):
         return _WORK(number)
 
 
+@contextmanager
+def _hold_interrupts() -> Iterator[None]:
+    """Let no Ctrl-C reach what is started within, not even while it starts."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+class _Process:
+    """A worker, and the tasks that wait at it in their order: the first of them is being done."""
+
+    def __init__(self, payload: bytes, count: int) -> None:
+        # Spawned: a fork would inherit the locks of threads that it does not have.
+        context = multiprocessing.get_context("spawn")
+        heard, self._stop = context.Pipe(duplex=False)
+        self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_begin, initargs=(payload, count, heard))
+        self.tasks: dict[Future[Any], int] = {}
+
+    def submit(self, number: int) -> None:
+        """Let it do a task after the others."""
+        with _hold_interrupts():
+            self.tasks[self._pool.submit(_do, number)] = number
+
+    def end(self) -> None:
+        """Let it leave what it is at."""
+        if self.tasks:
+            with suppress(OSError):
+                self._stop.send_bytes(b"stop")
+        self._pool.shutdown(wait=False, cancel_futures=True)
+
+    def wait(self) -> None:
+        """Wait for its end."""
+        self._pool.shutdown()
+        self._stop.close()
+
+
 def _run_processes(
-    work: Work, numbers: Sequence[int], count: int, threads_each: int | None
+    work: Work, numbers: Sequence[int], count: int, threads_each: int | None, spare: bool
 ) -> Iterator[tuple[int, Any]]:
     """Do tasks in processes, each of which takes a row of neighbours, and then the last ones of the longest row."""
     payload = pack(work)
     each = threads_each or max(1, (os.cpu_count() or 1) // count)
     rows = [deque(numbers[len(numbers) * i // count : len(numbers) * (i + 1) // count]) for i in range(count)]
     tries: dict[int, int] = {}
+    processes = [_Process(payload, each) for _ in range(count)]
 
-    def start() -> ProcessPoolExecutor:
-        # Spawned: a fork would inherit the locks of threads that it does not have.
-        context = multiprocessing.get_context("spawn")
-        return ProcessPoolExecutor(1, mp_context=context, initializer=_begin, initargs=(payload, each))
-
-    pools = [start() for _ in range(count)]
-    running: dict[Future[Any], tuple[int, int]] = {}
-
-    def feed(pool: int) -> None:
-        while sum(p == pool for p, _ in running.values()) < AHEAD:
-            longest = max(range(count), key=lambda i: len(rows[i]))
-            if rows[pool]:
-                number = rows[pool].popleft()
-            elif rows[longest]:
-                number = rows[longest].pop()
-            else:
+    def feed(place: int) -> None:
+        while len(processes[place].tasks) < AHEAD:
+            row = rows[place] or max(rows, key=len)
+            if not row:
                 return
-            running[pools[pool].submit(_do, number)] = pool, number
+            number = row.popleft() if row is rows[place] else row.pop()
+            try:
+                processes[place].submit(number)
+            except BrokenProcessPool:
+                rows[place].appendleft(number)
+                if processes[place].tasks:
+                    return
+                processes[place] = _Process(payload, each)
 
     try:
-        for pool in range(count):
-            feed(pool)
-        while running:
+        for place in range(count):
+            feed(place)
+        while running := [future for one in processes for future in one.tasks]:
             done, _ = wait(running, return_when=FIRST_COMPLETED)
-            broken = set()
-            for future in done:
-                pool, number = running.pop(future)
-                try:
-                    result = future.result()
-                except BrokenProcessPool:
-                    broken.add(pool)
-                    tries[number] = tries.get(number, 0) + 1
-                    if tries[number] == TRIES:
-                        raise WorkerLost(
-                            f"chunk {number}: ended {TRIES} workers; there may be too little memory for so many, or the "
-                            "script that started them needs its work under: if __name__ == '__main__'"
-                        ) from None
-                    rows[pool].appendleft(number)
-                    continue
-                yield number, result
-                feed(pool)
-            for pool in broken:
-                for future, (p, number) in list(running.items()):
-                    if p == pool:
-                        del running[future]
-                        rows[pool].appendleft(number)
-                pools[pool].shutdown(wait=False)
-                pools[pool] = start()
-                feed(pool)
+            for place, one in enumerate(processes):
+                ready = [future for future in one.tasks if future in done]
+                for future in ready:
+                    if not isinstance(future.exception(), BrokenProcessPool):
+                        yield one.tasks.pop(future), future.result()
+                if any(future in one.tasks for future in ready):
+                    # Only the first of those that wait was being done when it ended.
+                    first, *others = one.tasks.values()
+                    one.tasks.clear()
+                    one.end()
+                    tries[first] = tries.get(first, 0) + 1
+                    lost = tries[first] == TRIES
+                    rows[place].extendleft(reversed(others if lost else [first, *others]))
+                    processes[place] = _Process(payload, each)
+                    if lost:
+                        yield first, _lose(first, spare)
+                feed(place)
     finally:
-        for executor in pools:
-            executor.shutdown(wait=False, cancel_futures=True)
+        for one in processes:
+            one.end()
+        for one in processes:
+            one.wait()
+
+
+def _lose(number: int, spare: bool) -> WorkerLost:
+    """Return, or raise, that a task ended its workers."""
+    error = WorkerLost(
+        f"task {number}: ended {TRIES} workers; there may be too little memory for so many, or the "
+        "script that started them needs its work under: if __name__ == '__main__'"
+    )
+    if not spare:
+        raise error
+    return error
 
 
 def pack(work: Work) -> bytes:
@@ -197,7 +283,7 @@ def _as_client(scheduler: Scheduler) -> tuple[Any, bool]:
 
 
 def _run_cluster(
-    work: Work, numbers: Sequence[int], client: Any, threads_each: int | None
+    work: Work, numbers: Sequence[int], client: Any, threads_each: int | None, spare: bool
 ) -> Iterator[tuple[int, Any]]:
     """Do tasks on the workers of a cluster; it sees to those whose worker is lost."""
     from distributed import as_completed
@@ -243,7 +329,9 @@ def _run_cluster(
             try:
                 result = future.result()
             except KilledWorker as error:
-                raise WorkerLost(f"chunk {number}: {error}") from None
+                result = WorkerLost(f"task {number}: {error}")
+                if not spare:
+                    raise result from None
             if (more := submit(slot)) is not None:
                 queue.add(more)
             yield number, result

@@ -125,6 +125,9 @@ def make_command(name: str) -> Any:
 class Group(TyperGroup):
     """All commands, of which one is made when it is asked for."""
 
+    make_command = staticmethod(make_command)
+    """Makes a command, in any process."""
+
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands."""
         return list(COMMANDS)

@@ -29,7 +29,7 @@ from texrs.cli._verb import Verb
 from texrs.errors import InvalidInput, LimitExceeded
 from texrs.papers.solid.window import PlaneTexture, SolidTexture
 
-__all__ = ["OPTIONS", "Asked", "InParts", "is_stored", "make_options", "write_part"]
+__all__ = ["OPTIONS", "Asked", "InParts", "is_stored", "make_options", "read_scheduler", "write_part"]
 
 OPTIONS: dict[str, tuple[Any, str, str]] = {
     "origin": (str, "X,Y[,Z]", "A window of the texture without borders that begins there; any integers within 10^9."),
@@ -109,12 +109,15 @@ class Asked:
     @classmethod
     def read(cls, said: Mapping[str, Any], axes: int) -> Asked:
         """Check the options."""
-        workers, scheduler = said["workers"], said["scheduler"]
-        if workers is not None and scheduler is not None:
-            raise InvalidInput("--workers, --scheduler: one of them can be asked for")
         chunks = None if said["chunks"] is None else parse_size(said["chunks"], "--chunks", axes=axes)
-        who = scheduler if workers is None else as_int(workers, "--workers", 1, 1024)
-        return cls(_parse_origin(said["origin"], axes), chunks, who)
+        return cls(_parse_origin(said["origin"], axes), chunks, read_scheduler(said["workers"], said["scheduler"]))
+
+
+def read_scheduler(workers: int | None, scheduler: str | None) -> int | str | None:
+    """Return who does the work: so many processes, the workers of a cluster, or None, this process."""
+    if workers is not None and scheduler is not None:
+        raise InvalidInput("--workers, --scheduler: one of them can be asked for")
+    return scheduler if workers is None else as_int(workers, "--workers", 1, 1024)
 
 
 def is_stored(out: str) -> bool:

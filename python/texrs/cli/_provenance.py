@@ -40,6 +40,8 @@ LEFT = (
     "materialx",
     "page",
     "sheet",
+    "workers",
+    "scheduler",
 )
 """Parameters of commands that change nothing in a result, or name one."""
 CHANGED = "changed while it was read"
@@ -169,6 +171,10 @@ def make_record(command: Any, given: Mapping[str, Any], *, force: bool) -> Recor
                 options[flag] = texts if isinstance(value, list | tuple) else texts[0]
                 # A word, as the x of --wrap, is no file even if there is one of that name.
                 names += texts if re.search("FILE|csv", p.metavar or "") else []
+    shared = any(given.get(name) is not None for name in ("workers", "scheduler"))
+    if shared and given.get("origin", "") is None and given.get("chunks") is None:
+        # Who makes it does not change the result, but that it is a part of what has no borders does.
+        options["--origin"] = "0,0,0" if command.name == "solid" else "0,0"
     files = {name: status for name in names if (status := read_status(name)) is not None}
     stacks = tuple(dict.fromkeys(name for name in names if list_folder(name))) if command.name != "database" else ()
     said = [str(text).partition("=")[0] for text in given.get("role") or ()]
