@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 import texrs
 from texrs import io, lazy, samples
 from texrs.cli import main
+from texrs.errors import LimitExceeded
 
 pytest.importorskip("dask")
 pytest.importorskip("zarr")
@@ -126,3 +128,51 @@ def test_what_is_refused(files: Path, words: list[str], message: str, capsys: py
     given = [f"{files}/{w}" if w.startswith(("x.", "m.")) else w for w in words]
     assert main(["solid", f"{files}/stripes.tif", *given]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_maps_are_looked_up_into_a_store(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    weave, heights = f"{files}/weave.png", f"{files}/heights.npy"
+    np.save(heights, WEAVE[..., 1].astype(np.float32))
+    assert main(["synthesize", weave, "-o", f"{files}/a.png", "--size", "80x60", "--map", f"{files}/m.npz", "-q"]) == 0
+    words = ["apply", f"{files}/m.npz", "-o"]
+    assert main([*words, f"{files}/b.npy", heights, "-q"]) == 0
+    assert main([*words, f"{files}/b.zarr", heights]) == 0
+    assert "b.zarr: 80 x 60, 1 chunks" in capsys.readouterr().err
+    assert np.array_equal(io.read(files / "b.zarr"), np.load(files / "b.npy"))
+    assert main([*words, f"{files}/b.zarr", weave]) == 2
+    assert "holds something else" in capsys.readouterr().err
+    assert main([*words, f"{files}/b.zarr", weave, "--force", "--kind", "label", "-q"]) == 0
+    assert np.array_equal(io.read(files / "b.zarr"), io.read(files / "a.png"))
+    assert main([*words, f"{files}/c.zarr", weave, "--blend", "0.2"]) == 2
+    assert "--blend 0 leaves them as they are" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["design"], "40000 x 40000 has 1600000000 pixels, .*; texrs tiles makes an endless design"),
+        (["tile"], "; texrs tiles makes an endless design, and writes windows of any size$"),
+        (["tiles"], "--size: .* more than the limit of 268435456; to OUT.zarr, or with --chunks, it is made in parts$"),
+        (["synthesize"], "more than the limit of 268435456; to OUT.zarr, or with --chunks, it is made in parts$"),
+        (["perspective"], "more than the limit of 268435456$"),
+    ],
+)
+def test_what_is_too_large_is_told_how_it_is_made(
+    files: Path, words: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*words, f"{files}/weave.png", "-o", f"{files}/x.png", "--size", "40000"]) == 2
+    assert re.search(message, capsys.readouterr().err.strip())
+
+
+def test_python_is_told_in_its_own_words() -> None:
+    for verb, words in (
+        (texrs.design, "texrs.TileSet makes"),
+        (texrs.tile, "texrs.TileSet makes"),
+        (texrs.synthesize, "texrs.PlaneTexture.to_zarr and to_dask make it in parts"),
+    ):
+        with pytest.raises(LimitExceeded, match=words):
+            verb(WEAVE, size=40_000)
+    with pytest.raises(LimitExceeded, match=r"texrs\.SolidTexture\.to_zarr and to_dask"):
+        texrs.solid(STRIPES, 600)
+    with pytest.raises(LimitExceeded, match=r"texrs\.PlaneTexture\.to_zarr"):
+        texrs.PlaneTexture(WEAVE)[0:20_000, 0:20_000]

@@ -115,6 +115,23 @@ def test_source_maps_are_looked_up_lazily() -> None:
         made.source.to_dask(WEAVE[:-1])
 
 
+@pytest.mark.parametrize("scheduler", [None, 2])
+def test_source_maps_are_looked_up_into_a_store(tmp_path: Path, scheduler: int | None) -> None:
+    made = texrs.synthesize(WEAVE, (70, 90), field=fields.circular(axes=2), seed=1)
+    other = WEAVE.astype(np.float32) / 7
+    for options in ({}, {"antialias": True}, {"interpolation": "nearest"}):
+        store = tmp_path / f"{len(options)}{'nearest' in options.values()}.zarr"
+        done = made.source.to_zarr(store, other, 32, scheduler=scheduler, **options)
+        assert (done.shape, done.made) == ((70, 90, 3), done.chunks)
+        assert np.array_equal(texrs.io.read(store), made.source.render(other, **options))
+        assert made.source.to_zarr(store, other, 32, **options).made == 0
+    with pytest.raises(FileError, match="holds something else"):
+        made.source.to_zarr(store, other + 1, 32)
+    solid = texrs.solid(STRIPES, 32, seed=1)
+    solid.source.to_zarr(tmp_path / "solid.zarr", STRIPES, 20, levels=1, spacing=(2, 1, 1))
+    assert np.array_equal(texrs.io.read_volume(tmp_path / "solid.zarr"), solid.image)
+
+
 # --- Zarr ------------------------------------------------------------------------------------------------------------
 
 

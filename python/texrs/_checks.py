@@ -23,9 +23,9 @@ def as_list(value: object) -> list[Any]:
 
 
 def as_size(
-    value: object, name: str = "size", *, axes: int = 2, minimum: int = 1, limit: int = MAX_PIXELS
+    value: object, name: str = "size", *, axes: int = 2, minimum: int = 1, limit: int = MAX_PIXELS, way: str = ""
 ) -> tuple[int, ...]:
-    """Check a size: an int for a square, or one int an axis (rows, columns).
+    """Check a size: an int for a square, or one int an axis (rows, columns); ``way`` says what makes larger ones.
 
     Raises
     ------
@@ -47,12 +47,12 @@ def as_size(
         raise InvalidInput(f"{name}: each side must be at least {minimum}, got {result}")
     pixels = math.prod(result)
     if pixels > limit:
-        raise LimitExceeded(f"{name}: {result} has {pixels} pixels, more than the limit of {limit}")
+        raise LimitExceeded(f"{name}: {result} has {pixels} pixels, more than the limit of {limit}{way and '; ' + way}")
     return result
 
 
-def check_memory(needed: int, name: str = "size") -> None:
-    """Refuse what needs more bytes than the machine has.
+def check_memory(needed: int, name: str = "size", *, way: str = "") -> None:
+    """Refuse what needs more bytes than the machine has; ``way`` says what needs less.
 
     Raises
     ------
@@ -65,7 +65,10 @@ def check_memory(needed: int, name: str = "size") -> None:
     except (AttributeError, ValueError, OSError):
         return
     if needed > there > 0:
-        raise LimitExceeded(f"{name}: needs {needed / 1e9:.1f} GB of memory, this machine has {there / 1e9:.1f} GB")
+        more = f"; {way}" if way else ""
+        raise LimitExceeded(
+            f"{name}: needs {needed / 1e9:.1f} GB of memory, this machine has {there / 1e9:.1f} GB{more}"
+        )
 
 
 def as_tuple(value: object, name: str, length: int, what: str) -> tuple[Any, ...]:

@@ -11,12 +11,14 @@ from typing import Annotated, Any
 
 from texrs import io
 from texrs._arrays import as_float, as_int
+from texrs._evening import flatten
 from texrs._threads import threads
 from texrs.blending import apply
 from texrs.cli import _outputs, _provenance
-from texrs.cli._console import note
+from texrs.cli._console import note, show_progress
 from texrs.cli._options import Options, take_options
-from texrs.cli._outputs import Quiet, Threads, describe, make_argument, name_arguments, to_write
+from texrs.cli._outputs import Quiet, Threads, describe, make_argument, name_arguments, show_sides, to_write
+from texrs.cli._parts import is_stored
 from texrs.cli._provenance import check_free
 from texrs.errors import InvalidInput
 from texrs.materials import Role, guess_role
@@ -42,7 +44,7 @@ APPLIED = Options(
 def apply_command(
     source: Annotated[str, make_argument("MAP.npz", "A source map that --map wrote.")],
     maps: Annotated[list[str], make_argument("IMAGE", "Images in register with the exemplar.")],
-    out: Annotated[str, to_write("out", text="Image file to write; a folder for several.")],
+    out: Annotated[str, to_write("out", text="Image file or .zarr to write; a folder for several.")],
     given: dict[str, Any],
     count: Threads = None,
     quiet: Quiet = False,
@@ -54,13 +56,18 @@ def apply_command(
         raise InvalidInput("--blend: is for pictures; the source map is that of a volume")
     groups = group(maps, len(places.shapes))
     targets = name_targets(groups, out, [source, *maps])
+    finish = change_finish(places, values | APPLIED.read(given, which=lambda o: o.file))
+    if is_stored(out):
+        plain = {path[0]: v for path, v in values.items() if len(path) == 1}
+        with name_arguments(**APPLIED.name_values(given), exemplars=" and ".join(maps)):
+            store_map(places, maps, out, fit(finish, maps, given), plain, count=count, quiet=quiet)
+        return
     records = [_provenance.narrow([source, *paths]) for paths in groups]
     for target, made in zip(targets, records, strict=True):
         with _provenance.record(made):
             check_free(target)
     read = io.read if places.axes == 2 else io.read_volume
     write = io.write if places.axes == 2 else io.write_volume
-    finish = change_finish(places, values | APPLIED.read(given, which=lambda o: o.file))
     # All results or none take their names, at the end.
     with ExitStack() as stack, threads(count):
         for paths, target, made in zip(groups, targets, records, strict=True):
@@ -74,6 +81,36 @@ def apply_command(
                 image = apply(places, images, finish=fit(finish, paths, given), **plain)
             write(temporary, image)
             note(f"{paths[0]} gives {target}: {describe(image, places.axes)}", quiet=quiet)
+
+
+def store_map(
+    places: SourceMap,
+    paths: Sequence[str],
+    out: str,
+    finish: Finish,
+    given: Mapping[str, Any],
+    *,
+    count: int | None,
+    quiet: bool,
+) -> None:
+    """Look a map up into a store, chunk by chunk, so that the result is never in memory as a whole."""
+    if finish.screening is not None or finish.light is not None:
+        raise InvalidInput(
+            f"--out: {out} is made in parts, and the seams of this result are blended, which takes all of it at once; "
+            "--blend 0 leaves them as they are, or write to a file"
+        )
+    read = io.read if places.axes == 2 else io.read_volume
+    images, kind = [read(path) for path in paths], given.get("kind", "colour")
+    if finish.flatten and kind == "colour":
+        images = [flatten(image) for image in images]
+    how = {"interpolation": finish.interpolation, "antialias": finish.antialias, **given}
+    how |= {"kind": "colour", "interpolation": "nearest"} if kind == "label" else {}
+    running = _provenance.RUNNING.get()
+    with show_progress(quiet=quiet) as progress:
+        done = places.to_zarr(
+            out, images, threads=count, overwrite=bool(running and running.force), progress=progress, **how
+        )
+    note(f"{paths[0]} gives {out}: {show_sides(places.shape)}, {done.chunks} chunks", quiet=quiet)
 
 
 def change_finish(places: SourceMap, values: Mapping[tuple[str, ...], Any]) -> Finish:

@@ -26,10 +26,10 @@ from texrs.cli._outputs import name_arguments
 from texrs.cli._stacks import Stack
 from texrs.cli._texts import About, parse_numbers, parse_size
 from texrs.cli._verb import Verb
-from texrs.errors import InvalidInput, LimitExceeded
+from texrs.errors import InvalidInput
 from texrs.papers.solid.window import PlaneTexture, SolidTexture
 
-__all__ = ["OPTIONS", "Asked", "InParts", "is_stored", "make_options", "read_scheduler", "write_part"]
+__all__ = ["BEYOND", "OPTIONS", "Asked", "InParts", "is_stored", "make_options", "read_scheduler", "write_part"]
 
 OPTIONS: dict[str, tuple[Any, str, str]] = {
     "origin": (str, "X,Y[,Z]", "A window of the texture without borders that begins there; any integers within 10^9."),
@@ -40,6 +40,8 @@ OPTIONS: dict[str, tuple[Any, str, str]] = {
 """Options that ask for a part of a texture without borders."""
 TAKEN = ("exemplar", "field", "seed", "quality", "interpolation", "memory_limit")
 """Parameters that textures without borders have too."""
+BEYOND = "to OUT.zarr, or with --chunks, it is made in parts"
+"""What an error says of results that are too large to be made at once."""
 PAUSE = 5.0
 """Seconds between two forecasts."""
 
@@ -61,15 +63,12 @@ class InParts(Verb):
         """Return the verb's own, and those of parts."""
         return [*Verb.make_parameters(self), *make_options()]
 
-    def run(self, *, count: int | None, quiet: bool, variants: int | None = None, **given: Any) -> None:
+    def make(self, *, count: int | None, quiet: bool, variants: int | None = None, **given: Any) -> None:
         """Do the command: at once, or in parts where that is asked for."""
         said = {name: given.pop(name, None) for name in OPTIONS}
         out = str(given["out"])
         if not (is_stored(out) or out.lower().endswith(RAW)) and all(value is None for value in said.values()):
-            try:
-                Verb.run(self, count=count, quiet=quiet, variants=variants, **given)
-            except LimitExceeded as error:
-                raise LimitExceeded(f"{error}; to OUT.zarr, or with --chunks, it is made in parts") from None
+            Verb.make(self, count=count, quiet=quiet, variants=variants, **given)
             return
         self.run_parts(given, said, count=count, quiet=quiet)
 

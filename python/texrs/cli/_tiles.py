@@ -9,13 +9,14 @@ from typing import Annotated, Any
 import typer
 
 from texrs import io
+from texrs._checks import as_size
 from texrs._threads import threads
 from texrs.cli import _outputs
 from texrs.cli._console import note, show_progress
 from texrs.cli._kinds import EXAMPLE
 from texrs.cli._options import Options, take_options
 from texrs.cli._outputs import Quiet, Threads, describe, make_option, name_arguments, to_write
-from texrs.cli._parts import Asked, is_stored, write_part
+from texrs.cli._parts import BEYOND, Asked, is_stored, write_part
 from texrs.cli._provenance import check_free
 from texrs.cli._stacks import Roles, Stack, is_stack
 from texrs.cli._texts import About, parse_size
@@ -78,6 +79,9 @@ def tiles_command(
         raise InvalidInput("--index: is of the index texture, which a window (--size) has none of")
     sides = parse_size(size or str(CELLS), limit=1 << 60) if windowed else parse_size(index or str(CELLS), "--index")
     parts = is_stored(out) or chunks is not None or asked.scheduler is not None
+    if windowed and not parts:
+        # Before the tiles are cut.
+        as_size(sides, "--size", way=BEYOND)
     stack = Stack.take(dict.fromkeys(("depth", "format", "pack")) | {"role": role})
     values = TILED.read(given, which=lambda o: not o.file) | DESIGNED.read(given)
     folder = is_stack(given["exemplar"])

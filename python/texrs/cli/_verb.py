@@ -25,6 +25,7 @@ from texrs.cli._outputs import Quiet, Threads, describe, name_arguments, to_writ
 from texrs.cli._provenance import check_free
 from texrs.cli._stacks import OPTIONS, SHOWN, Stack
 from texrs.cli._texts import About
+from texrs.errors import LimitExceeded
 from texrs.materials import Material
 from texrs.synthesis import Synthesis
 
@@ -48,6 +49,8 @@ class Verb:
     """What else is to be said of the result."""
     scaled: bool = True
     """Whether a pixel of the result is as large as one of the first input."""
+    beyond: str = ""
+    """What makes larger ones."""
     knows: Callable[[Mapping[str, Any]], Mapping[tuple[str, ...], Any]] = lambda given: {}
     """Values that the texts of the options tell, where they are not given."""
 
@@ -70,6 +73,16 @@ class Verb:
         return [*parameters, make_parameter("count", Threads, None), make_parameter("quiet", Quiet, False)]
 
     def run(self, *, count: int | None, quiet: bool, variants: int | None = None, **given: Any) -> None:
+        """Do the command; what is too large is told how it is made."""
+        try:
+            self.make(count=count, quiet=quiet, variants=variants, **given)
+        except LimitExceeded as error:
+            if not self.beyond or not str(error).startswith(("size:", "--size:")):
+                raise
+            # How Python makes it does not help here.
+            raise LimitExceeded(f"{str(error).partition('; texrs.')[0]}; {self.beyond}") from None
+
+    def make(self, *, count: int | None, quiet: bool, variants: int | None = None, **given: Any) -> None:
         """Do the command: what can be checked is checked before any file is read, and before the work."""
         start, options = time.monotonic(), self.options
         stack = Stack.take(given)

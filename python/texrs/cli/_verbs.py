@@ -52,6 +52,7 @@ NAMES = (
     "synthesize",
     "tile",
 )
+TILES = "texrs tiles makes an endless design, and writes windows of any size"
 TWICE = {"size": "twice the exemplar"}
 GROWN = {"constraints": "constraint", "guide": "guide", "exemplar.image": "exemplar"}
 
@@ -70,7 +71,7 @@ def make_verb(name: str) -> Verb:
             from texrs.papers.design import design, design_variants
 
             options = Options(design, arguments={"exemplar": ENTRIES}, names={"elements": "element"})
-            return Verb(options, times=2, several=design_variants)
+            return Verb(options, times=2, several=design_variants, beyond=TILES)
         case "perspective":
             from texrs.papers.perspective import perspective
 
@@ -112,7 +113,7 @@ def make_verb(name: str) -> Verb:
         case _:
             from texrs.tiling import tile
 
-            return Verb(Options(tile, arguments={"image": EXAMPLE}))
+            return Verb(Options(tile, arguments={"image": EXAMPLE}), beyond=TILES)
 
 
 def count_moved(result: Synthesis) -> str:
@@ -218,6 +219,6 @@ def _grow(verb: Callable[..., Synthesis], kind: Kind, axes: int) -> Verb:
         optional=TWICE,
         axes=axes,
     )
-    from texrs.cli._parts import InParts
+    from texrs.cli._parts import BEYOND, InParts
 
-    return InParts(options, times=2)
+    return InParts(options, times=2, beyond=BEYOND)

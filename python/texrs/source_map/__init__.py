@@ -8,29 +8,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_image, as_list, as_ndarray, power_single
-from texrs._chunks.dasks import make_dask
-from texrs._chunks.reading import Channel
 from texrs._show import as_png
 from texrs._typing import Array, Bools, Frames, Interpolation, Path
-from texrs.errors import FileError, InvalidInput
+from texrs.errors import InvalidInput
 from texrs.kernels.gather import gather
 from texrs.source_map._antialias import gather_smoothed
+from texrs.source_map._files import read_map, write_map
 from texrs.source_map._finish import Finish
-from texrs.source_map._parts import IMAGE, Lookups
+from texrs.source_map._parts import Parted
 from texrs.source_map._pixels import Pixels, divide_bands, label_pieces
 from texrs.source_map._vectors import turn_vectors
 
 __all__ = ["Finish", "Reuse", "SourceMap"]
-
-FORMAT = 1
-"""Version of the file layout."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +49,7 @@ class Reuse:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SourceMap:
+class SourceMap(Parted):
     """Where each output pixel (or voxel) comes from.
 
     Attributes
@@ -77,46 +72,6 @@ class SourceMap:
         put together by hand.
 
     """
-
-    coordinates: NDArray[np.float32]
-    exemplar: NDArray[np.uint16]
-    label: NDArray[np.uint32]
-    frame: NDArray[np.float32] | Frames | None
-    shapes: tuple[tuple[int, ...], ...]
-    finish: Finish | None = None
-
-    def __post_init__(self) -> None:
-        """Check that the parts agree."""
-        shape = self.coordinates.shape[:-1]
-        axes = self.coordinates.shape[-1] if self.coordinates.ndim else 0
-        if len(shape) != axes or axes not in (2, 3):
-            raise InvalidInput(
-                "coordinates: needs shape (rows, columns, 2) or (planes, rows, columns, 3), "
-                f"got {self.coordinates.shape}"
-            )
-        for name, array, dtype in (
-            ("coordinates", self.coordinates, np.float32),
-            ("exemplar", self.exemplar, np.uint16),
-            ("label", self.label, np.uint32),
-        ):
-            if array.dtype != dtype or array.shape[:axes] != shape:
-                raise InvalidInput(f"{name}: needs {np.dtype(dtype)} over {shape}, got {array.dtype} {array.shape}")
-        if isinstance(self.frame, Frames):
-            if self.frame.axes != axes:
-                raise InvalidInput(f"frame: the field has {self.frame.axes} axes, the map {axes}")
-        elif self.frame is not None:
-            table = self.frame.ndim == 3
-            wanted = self.frame.shape[:1] if table else shape
-            if self.frame.dtype != np.float32 or self.frame.shape != (*wanted, axes, axes):
-                raise InvalidInput(
-                    f"frame: needs float32 (labels, {axes}, {axes}) or {(*shape, axes, axes)}, got {self.frame.shape}"
-                )
-            if table and self.label.size and int(self.label.max()) >= len(self.frame):
-                raise InvalidInput(f"frame: has {len(self.frame)} rows, but labels reach {int(self.label.max())}")
-        if any(len(s) != axes for s in self.shapes):
-            raise InvalidInput(f"shapes: each needs {axes} sides, got {self.shapes}")
-        if self.exemplar.size and int(self.exemplar.max()) >= len(self.shapes):
-            raise InvalidInput(f"exemplar: reaches {int(self.exemplar.max())}, but there are {len(self.shapes)} shapes")
 
     def __repr__(self) -> str:
         """Return its size, and those of the exemplars."""
@@ -234,33 +189,6 @@ class SourceMap:
         """
         return replace(self, finish=Finish(tuple(wrap), **how))
 
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Shape of the output, without channels."""
-        return self.label.shape
-
-    @property
-    def axes(self) -> int:
-        """Number of axes, 2 or 3."""
-        return self.label.ndim
-
-    def frame_array(self) -> NDArray[np.float32] | None:
-        """Return `frame` as an array.
-
-        Returns
-        -------
-        None, (L, A, A) or (..., A, A) float32
-            None stands for the identity; a table by label; or dense.
-
-        Examples
-        --------
-        >>> from texrs import SourceMap
-        >>> SourceMap.identity((2, 3)).frame_array() is None
-        True
-
-        """
-        return self.frame.lattice(self.shape) if isinstance(self.frame, Frames) else self.frame
-
     def frames(self) -> NDArray[np.float32]:
         """Return the Jacobian J of every pixel.
 
@@ -346,88 +274,6 @@ class SourceMap:
         # Asked of the exemplars, for a part of them that a picture shows may have no negative value.
         channels = 3 if kind == "normal" else 2
         return self._turn(out, kind, green, any(float(e[..., :channels].min()) < 0 for e in images))
-
-    def part(self, box: tuple[slice, ...]) -> SourceMap:
-        """Return the map of a part of the picture.
-
-        Parameters
-        ----------
-        box : tuple of slice
-            Of each axis, from a first pixel to one beyond the last, both within the picture.
-
-        Returns
-        -------
-        SourceMap
-            With the same labels, into the same exemplars. How the whole was finished, as where it was blended, does not hold of
-            a part.
-
-        Raises
-        ------
-        InvalidInput
-            Not such slices.
-
-        Examples
-        --------
-        >>> from texrs import SourceMap
-        >>> SourceMap.identity((20, 30)).part((slice(4, 8), slice(10, 30)))
-        <SourceMap of 4 x 20 into 20 x 30>
-
-        """
-        fits = len(box) == self.axes and all(
-            isinstance(s, slice) and s.step is None and 0 <= (s.start or 0) < (s.stop or 0) <= n
-            for s, n in zip(box, self.shape, strict=False)
-        )
-        if not fits:
-            raise InvalidInput(f"box: needs {self.axes} ranges within {self.shape}, got {box!r}")
-        frame = self.frame
-        if isinstance(frame, Frames):
-            origin = [s.start or 0 for s in box]
-            frame = frame.lattice([s.stop - o for s, o in zip(box, origin, strict=True)], origin=origin)
-        elif frame is not None and frame.ndim > 3:
-            frame = frame[box]
-        return SourceMap(self.coordinates[box], self.exemplar[box], self.label[box], frame, self.shapes)
-
-    def to_dask(
-        self, exemplars: Array | Sequence[Array], chunks: int | Sequence[int] | None = None, **options: Any
-    ) -> Any:
-        """Return what `render` returns as an array of Dask: a block is looked up when it is asked for.
-
-        Parameters
-        ----------
-        exemplars : array, or a sequence of one an exemplar
-            As for `render`.
-        chunks : int, or one an axis, optional
-            Of a block; 512 each in pictures and 128 in volumes by default.
-        **options
-            Those of `render`.
-
-        Returns
-        -------
-        dask.array.Array
-
-        Raises
-        ------
-        InvalidInput
-            As `render`, or there is no Dask (``pip install texrs[dask]``).
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> from texrs import SourceMap
-        >>> heights = np.arange(12.0).reshape(3, 4)
-        >>> float(SourceMap.identity((3, 4)).to_dask(heights, 2).sum().compute())
-        66.0
-
-        """
-        images = [np.asarray(each) for each in as_list(exemplars)]
-        # What is wrong is said now, and not when a worker comes to it.
-        channel = Channel.of(self.part((slice(0, 1),) * self.axes).render(images, **options), self.axes)
-        frame = self.frame
-        if isinstance(frame, Frames):
-            frame = getattr(frame, "key", None) or self.frame_array()
-        said = (self.coordinates, self.exemplar, self.label, frame, self.shapes, *images, sorted(options.items()))
-        reader = Lookups(partial(_render_part, self, images, options), channel, said)
-        return make_dask(reader, self.shape, chunks, self.axes, IMAGE)
 
     def _shrunk(self) -> NDArray[np.float32]:
         """Return by how much each pixel's surroundings are smaller than in the exemplar, as a length."""
@@ -626,21 +472,7 @@ class SourceMap:
         (2, 3)
 
         """
-        from texrs.io import atomic
-
-        parts: dict[str, Any] = {
-            "texrs_source_map": np.array(FORMAT),
-            "coordinates": self.coordinates,
-            "exemplar": self.exemplar,
-            "label": self.label,
-            "shapes": np.array(self.shapes, np.int64),
-        }
-        if (frame := self.frame_array()) is not None:
-            parts["frame"] = frame
-        if self.finish is not None:
-            parts |= self.finish.arrays()
-        with atomic(path) as temporary, open(temporary, "wb") as file:
-            np.savez_compressed(file, **parts)
+        write_map(self, path)
 
     @classmethod
     def load(cls, path: Path) -> SourceMap:
@@ -672,23 +504,4 @@ class SourceMap:
         ((2, 3),)
 
         """
-        from texrs.io import read_arrays
-
-        parts = read_arrays(path)
-        names = ("texrs_source_map", "coordinates", "exemplar", "label", "shapes")
-        if any(name not in parts for name in names):
-            raise FileError(f"{path}: is not a source map")
-        if parts["texrs_source_map"].ravel().tolist() != [FORMAT]:
-            raise FileError(f"{path}: has another layout than {FORMAT}, which this version of texrs reads")
-        try:
-            shapes = tuple(tuple(int(n) for n in s) for s in parts["shapes"])
-            made = cls(parts["coordinates"], parts["exemplar"], parts["label"], parts.get("frame"), shapes)
-            if "finish" not in parts:
-                return made
-            return replace(made, finish=Finish.from_arrays(parts, made.shape, shapes))
-        except (InvalidInput, TypeError, ValueError) as error:
-            raise FileError(f"{path}: is damaged ({error})") from None
-
-
-def _render_part(source: SourceMap, images: list[Array], options: dict[str, Any], box: tuple[slice, ...]) -> Array:
-    return source.part(box).render(images, **options)
+        return read_map(path, cls)

@@ -1,23 +1,274 @@
-"""A source map as an array in chunks: each is looked up when it is asked for."""
+"""A source map in parts: the map of one, and what it shows as arrays in chunks, each looked up when it is asked for."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, Self
 
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._arrays import as_list
 from texrs._cache import content_hash
+from texrs._chunks.dasks import make_dask
 from texrs._chunks.grid import Box
 from texrs._chunks.reading import Channel
-from texrs._typing import Array
+from texrs._chunks.store import IMAGE, Stored, write_image
+from texrs._typing import Array, Frames, Path, Progress
+from texrs.errors import InvalidInput
+from texrs.source_map._finish import Finish
 
-__all__ = ["IMAGE", "Lookups"]
+__all__ = ["Parted"]
 
-IMAGE = "image"
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Parted:
+    """The arrays of a source map, which agree, and what it gives in parts."""
+
+    coordinates: NDArray[np.float32]
+    exemplar: NDArray[np.uint16]
+    label: NDArray[np.uint32]
+    frame: NDArray[np.float32] | Frames | None
+    shapes: tuple[tuple[int, ...], ...]
+    finish: Finish | None = None
+
+    def __post_init__(self) -> None:
+        """Check that the parts agree."""
+        shape = self.coordinates.shape[:-1]
+        axes = self.coordinates.shape[-1] if self.coordinates.ndim else 0
+        if len(shape) != axes or axes not in (2, 3):
+            raise InvalidInput(
+                "coordinates: needs shape (rows, columns, 2) or (planes, rows, columns, 3), "
+                f"got {self.coordinates.shape}"
+            )
+        for name, array, dtype in (
+            ("coordinates", self.coordinates, np.float32),
+            ("exemplar", self.exemplar, np.uint16),
+            ("label", self.label, np.uint32),
+        ):
+            if array.dtype != dtype or array.shape[:axes] != shape:
+                raise InvalidInput(f"{name}: needs {np.dtype(dtype)} over {shape}, got {array.dtype} {array.shape}")
+        if isinstance(self.frame, Frames):
+            if self.frame.axes != axes:
+                raise InvalidInput(f"frame: the field has {self.frame.axes} axes, the map {axes}")
+        elif self.frame is not None:
+            table = self.frame.ndim == 3
+            wanted = self.frame.shape[:1] if table else shape
+            if self.frame.dtype != np.float32 or self.frame.shape != (*wanted, axes, axes):
+                raise InvalidInput(
+                    f"frame: needs float32 (labels, {axes}, {axes}) or {(*shape, axes, axes)}, got {self.frame.shape}"
+                )
+            if table and self.label.size and int(self.label.max()) >= len(self.frame):
+                raise InvalidInput(f"frame: has {len(self.frame)} rows, but labels reach {int(self.label.max())}")
+        if any(len(s) != axes for s in self.shapes):
+            raise InvalidInput(f"shapes: each needs {axes} sides, got {self.shapes}")
+        if self.exemplar.size and int(self.exemplar.max()) >= len(self.shapes):
+            raise InvalidInput(f"exemplar: reaches {int(self.exemplar.max())}, but there are {len(self.shapes)} shapes")
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the output, without channels."""
+        return self.label.shape
+
+    @property
+    def axes(self) -> int:
+        """Number of axes, 2 or 3."""
+        return self.label.ndim
+
+    def frame_array(self) -> NDArray[np.float32] | None:
+        """Return `frame` as an array.
+
+        Returns
+        -------
+        None, (L, A, A) or (..., A, A) float32
+            None stands for the identity; a table by label; or dense.
+
+        Examples
+        --------
+        >>> from texrs import SourceMap
+        >>> SourceMap.identity((2, 3)).frame_array() is None
+        True
+
+        """
+        return self.frame.lattice(self.shape) if isinstance(self.frame, Frames) else self.frame
+
+    def render(self, *exemplars: Any, **options: Any) -> Array:
+        """Return what exemplars look like through the map."""
+        raise NotImplementedError
+
+    def part(self, box: tuple[slice, ...]) -> Self:
+        """Return the map of a part of the picture.
+
+        Parameters
+        ----------
+        box : tuple of slice
+            Of each axis, from a first pixel to one beyond the last, both within the picture.
+
+        Returns
+        -------
+        SourceMap
+            With the same labels, into the same exemplars. How the whole was finished, as where it was blended, does not hold of
+            a part.
+
+        Raises
+        ------
+        InvalidInput
+            Not such slices.
+
+        Examples
+        --------
+        >>> from texrs import SourceMap
+        >>> SourceMap.identity((20, 30)).part((slice(4, 8), slice(10, 30)))
+        <SourceMap of 4 x 20 into 20 x 30>
+
+        """
+        fits = len(box) == self.axes and all(
+            isinstance(s, slice) and s.step is None and 0 <= (s.start or 0) < (s.stop or 0) <= n
+            for s, n in zip(box, self.shape, strict=False)
+        )
+        if not fits:
+            raise InvalidInput(f"box: needs {self.axes} ranges within {self.shape}, got {box!r}")
+        frame = self.frame
+        if isinstance(frame, Frames):
+            origin = [s.start or 0 for s in box]
+            frame = frame.lattice([s.stop - o for s, o in zip(box, origin, strict=True)], origin=origin)
+        elif frame is not None and frame.ndim > 3:
+            frame = frame[box]
+        return replace(
+            self,
+            coordinates=self.coordinates[box],
+            exemplar=self.exemplar[box],
+            label=self.label[box],
+            frame=frame,
+            finish=None,
+        )
+
+    def to_dask(
+        self,
+        exemplars: Array | Sequence[Array],
+        chunks: int | Sequence[int] | None = None,
+        **options: Any,
+    ) -> Any:
+        """Return what `render` returns as an array of Dask: a block is looked up when it is asked for.
+
+        Parameters
+        ----------
+        exemplars : array, or a sequence of one an exemplar
+            As for `render`.
+        chunks : int, or one an axis, optional
+            Of a block; 512 each in pictures and 128 in volumes by default.
+        **options
+            Those of `render`.
+
+        Returns
+        -------
+        dask.array.Array
+
+        Raises
+        ------
+        InvalidInput
+            As `render`, or there is no Dask (``pip install texrs[dask]``).
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from texrs import SourceMap
+        >>> heights = np.arange(12.0).reshape(3, 4)
+        >>> float(SourceMap.identity((3, 4)).to_dask(heights, 2).sum().compute())
+        66.0
+
+        """
+        return make_dask(_read_parts(self, exemplars, options), self.shape, chunks, self.axes, IMAGE)
+
+    def to_zarr(
+        self,
+        path: Path,
+        exemplars: Array | Sequence[Array],
+        chunks: int | Sequence[int] | None = None,
+        *,
+        levels: int | None = None,
+        spacing: Sequence[float] | None = None,
+        unit: str | None = None,
+        scheduler: Any = None,
+        threads: int | None = None,
+        overwrite: bool = False,
+        progress: Progress | bool | None = None,
+        **options: Any,
+    ) -> Stored:
+        """Write what `render` returns to an OME-Zarr store, with its coarser levels: it is never in memory as a whole.
+
+        What a run that was stopped has left is gone on with. `texrs.lazy.open` and `texrs.io.read` read the store.
+
+        Parameters
+        ----------
+        path : path_like
+            A folder, which workers see too.
+        exemplars : array, or a sequence of one an exemplar
+            As for `render`.
+        chunks : int, or one an axis, optional
+            Of a chunk; 512 each in pictures and 128 in volumes by default.
+        levels : int, optional
+            How many resolutions, each half of the one before; by default until one chunk holds all.
+        spacing : sequence of float, optional
+            Of pixels along each axis, 1 by default.
+        unit : str, optional
+            Of the spacing, such as "micrometer".
+        scheduler : None, int, str or distributed.Client
+            Who looks the chunks up, as in `texrs.lazy.map`; each worker has the map.
+        threads : int, optional
+            Of each worker; by default the cores are shared out.
+        overwrite : bool
+            Whether what is there, and is not of the same, is replaced.
+        progress : callable or True, optional
+            Called with the stage and the share of it that is done; raising stops the work. True shows a bar.
+        **options
+            Those of `render`.
+
+        Returns
+        -------
+        texrs.lazy.Stored
+            How many chunks there are, and were made.
+
+        Raises
+        ------
+        InvalidInput
+            As `render`, no such scheduler, or there is no zarr (``pip install texrs[dask]``).
+        FileError
+            The store holds something else, or cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import numpy as np
+        >>> import texrs
+        >>> heights = np.arange(12.0).reshape(3, 4)
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     done = texrs.SourceMap.identity((3, 4)).to_zarr(f"{folder}/heights.zarr", heights, 2)
+        ...     back = texrs.io.read(f"{folder}/heights.zarr")
+        >>> done.chunks, bool((back == heights).all())
+        (5, True)
+
+        """
+        return write_image(
+            _read_parts(self, exemplars, options),
+            self.shape,
+            path,
+            axes=self.axes,
+            chunks=chunks,
+            levels=levels,
+            spacing=spacing,
+            unit=unit,
+            scheduler=scheduler,
+            threads=threads,
+            overwrite=overwrite,
+            progress=progress,
+        )
 
 
 @dataclass(frozen=True)
-class Lookups:
+class _Lookups:
     """Reads parts of what exemplars look like through a source map."""
 
     look_up: Callable[[Box], Array]
@@ -37,3 +288,19 @@ class Lookups:
     def read(self, box: Box, names: Sequence[str]) -> Mapping[str, Array]:
         """Return a part."""
         return {IMAGE: self.look_up(box)}
+
+
+def _read_parts(source: Parted, exemplars: Array | Sequence[Array], options: dict[str, Any]) -> _Lookups:
+    images = [np.asarray(each) for each in as_list(exemplars)]
+    # What is wrong is said now, and not when a worker comes to it.
+    first = source.part((slice(0, 1),) * source.axes).render(images, **options)
+    channel = Channel.of(first, source.axes, labelled=options.get("interpolation") == "nearest")
+    frame = source.frame
+    if isinstance(frame, Frames):
+        frame = getattr(frame, "key", None) or source.frame_array()
+    said = (source.coordinates, source.exemplar, source.label, frame, source.shapes, *images, sorted(options.items()))
+    return _Lookups(partial(_render_part, source, images, options), channel, said)
+
+
+def _render_part(source: Parted, images: list[Array], options: dict[str, Any], box: Box) -> Array:
+    return source.part(box).render(images, **options)

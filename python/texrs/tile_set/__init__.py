@@ -47,6 +47,8 @@ __all__ = ["TileSet"]
 
 FAR = 10**15
 """Coordinates of the world are within so many pixels."""
+LARGER = "texrs.TileSet.to_zarr and to_dask give it in parts"
+"""How what is too large for one array is had."""
 IMAGE = "image"
 KEEP = 4.0
 """What a cut deep inside of an element costs more, as a multiple."""
@@ -204,7 +206,7 @@ class TileSet(InParts):
         if not all(isinstance(p, slice) and p.step is None and None not in (p.start, p.stop) for p in parts):
             raise InvalidInput(f"index: needs {wanted}, got {index!r}")
         origin = self._as_origin([p.start for p in parts])
-        size = as_size([int(p.stop) - o for p, o in zip(parts, origin, strict=True)])
+        size = as_size([int(p.stop) - o for p, o in zip(parts, origin, strict=True)], way=LARGER)
         return self._read(origin, size, [self._maps[self._base]])[0]
 
     def window(
@@ -233,7 +235,7 @@ class TileSet(InParts):
 
         """
         watch = stage(listen(progress), "window")
-        start, sides = self._as_origin(origin), as_size(size)
+        start, sides = self._as_origin(origin), as_size(size, way=LARGER)
         source = self._source
         frame = source.frame_array()
         names, dense = list(self._maps), frame is not None and frame.ndim > 3

@@ -48,6 +48,8 @@ __all__ = ["tile"]
 
 SHARE, LEAST = 8, 25
 """An overlap that is chosen is at least the side divided by the one, or the other in pixels."""
+LARGER = "texrs.TileSet makes an endless design, and gives it in parts"
+"""How larger ones are made."""
 MOST = 7
 """Sixteenths of the side that it is at most."""
 LARGE = 0.22
@@ -167,7 +169,7 @@ def as_sides(size: object, shape: tuple[int, int], wrap: Sequence[bool]) -> tupl
             raise InvalidInput(f"image: needs at least 2 {AXES[axis]} to wrap them, got {side}")
     if size is None:
         return shape
-    rows, columns = as_size(size)
+    rows, columns = as_size(size, way=LARGER)
     for axis, side in enumerate((rows, columns)):
         if wrap[axis] and side < 2:
             raise InvalidInput(f"size: needs at least 2 {AXES[axis]} to wrap them, got {side}")

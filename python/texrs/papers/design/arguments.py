@@ -41,6 +41,8 @@ Choice: TypeAlias = Literal["auto", "move", "still"]
 
 MINIMUM_SIDE = 16
 """An exemplar with a shorter side holds no texture to speak of."""
+LARGER = "texrs.TileSet makes an endless design, and gives it in parts"
+"""How larger ones are made."""
 SPARE = 500_000_000
 """Bytes that do not grow with the result."""
 
@@ -107,7 +109,8 @@ def check_arguments(
         if not isinstance(value, kind):
             raise InvalidInput(f"{name}: needs {kind.__name__}(...), got {value!r}")
     check_together(exemplars, chosen.labels)
-    rows, columns = as_size(size if size is not None else [2 * n for n in exemplars[0].shape], minimum=MINIMUM_SIDE)
+    sides = size if size is not None else [2 * n for n in exemplars[0].shape]
+    rows, columns = as_size(sides, minimum=MINIMUM_SIDE, way=LARGER)
     first, cyclic = as_seed(seed), as_wrap(wrap, usual=True)
     shares = as_shares(weights, len(exemplars), (rows, columns))
     as_method(method, None, "paper")
@@ -132,7 +135,7 @@ def check_arguments(
         method == "paper",
         progress or (lambda stage, share: None),
     )
-    check_memory(count_bytes(arguments))
+    check_memory(count_bytes(arguments), way=LARGER)
     return arguments
 
 

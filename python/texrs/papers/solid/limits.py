@@ -9,10 +9,15 @@ from texrs.errors import LimitExceeded
 from texrs.fields import Field
 from texrs.growth import patch_side
 
-__all__ = ["check_memory", "estimate_bytes"]
+__all__ = ["LARGER", "check_memory", "estimate_bytes"]
 
 CUT = 1000
 """Bytes of a point of a patch: places that are tried at once, what they show, pairs and capacities."""
+LARGER = {
+    2: "texrs.PlaneTexture.to_zarr and to_dask make it in parts",
+    3: "texrs.SolidTexture.to_zarr and to_dask make it in parts",
+}
+"""How larger ones are made, by the number of axes."""
 LIMIT = 8 << 30
 """Bytes that a synthesis may take unless another limit is given."""
 
@@ -40,5 +45,5 @@ def check_memory(image: Array, region: Region, field: Field | None, limit: objec
     if total > most:
         raise LimitExceeded(
             f"size: {region.shape} would take {total / 2**30:.1f} GiB, more than the limit of "
-            f"{most / 2**30:.1f} GiB (memory_limit); an unbounded texture gives it in parts"
+            f"{most / 2**30:.1f} GiB (memory_limit); {LARGER[len(region.shape)]}"
         )

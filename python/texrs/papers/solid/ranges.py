@@ -10,6 +10,7 @@ import numpy as np
 from texrs._arrays import as_size
 from texrs._engine.pyramid import Region
 from texrs.errors import InvalidInput
+from texrs.papers.solid.limits import LARGER
 
 __all__ = ["FAR", "as_origin", "as_region"]
 
@@ -54,7 +55,7 @@ def as_region(index: object, axes: int) -> tuple[Region, list[bool]]:
         origin.append(start)
         shape.append(stop - start)
         single.append(one)
-    return Region(as_size(tuple(shape), axes=axes), tuple(origin), (False,) * axes), single
+    return Region(as_size(tuple(shape), axes=axes, way=LARGER[axes]), tuple(origin), (False,) * axes), single
 
 
 def _as_end(value: object) -> int | None:

@@ -18,7 +18,7 @@ from texrs.fields import Field, FieldLike
 from texrs.fields import as_field as make_field
 from texrs.growth import Conditions, Constraints, Guide
 from texrs.materials import Material
-from texrs.papers.solid.limits import check_memory
+from texrs.papers.solid.limits import LARGER, check_memory
 from texrs.papers.solid.plans import Choice, check_plan
 from texrs.papers.solid.settings import Quality, as_quality
 
@@ -88,7 +88,7 @@ class Request:
     ) -> Request:
         """Return the request of a caller, or raise what is wrong with it."""
         known = as_exemplar(exemplar, axes=axes, minimum=COARSEST)
-        region = Region.whole(as_size(size, axes=axes), as_wrap(wrap, axes=axes, usual=False))
+        region = Region.whole(as_size(size, axes=axes, way=LARGER[axes]), as_wrap(wrap, axes=axes, usual=False))
         as_method(method, None, "paper", "paper-compensated")
         if method is not None and (constraints is not None or guide is not None):
             what = "constraints" if constraints is not None else "guide"

@@ -26,7 +26,7 @@ from texrs.kernels.gather import gather
 from texrs.materials import Material
 from texrs.materials._material import apply_materials
 from texrs.papers.solid.layers import WORK, Layers
-from texrs.papers.solid.limits import check_memory, estimate_bytes
+from texrs.papers.solid.limits import LARGER, check_memory, estimate_bytes
 from texrs.papers.solid.parts import Endless
 from texrs.papers.solid.ranges import FAR, as_origin, as_region
 from texrs.papers.solid.request import as_field, as_interpolation
@@ -160,7 +160,7 @@ class Texture(Endless):
         """
         progress = listen(progress)
         start = as_origin(origin, self.axes)
-        region = Region(as_size(size, axes=self.axes), start, (False,) * self.axes)
+        region = Region(as_size(size, axes=self.axes, way=LARGER[self.axes]), start, (False,) * self.axes)
         self._check(region)
         places, source = self._look(region, progress)
         source = source.finished(region.wrap, interpolation=self._how)
