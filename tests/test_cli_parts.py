@@ -11,7 +11,7 @@ import pytest
 import texrs
 from texrs import io, lazy, samples
 from texrs.cli import main
-from texrs.errors import LimitExceeded
+from texrs.errors import InvalidInput, LimitExceeded
 
 pytest.importorskip("dask")
 pytest.importorskip("zarr")
@@ -176,3 +176,21 @@ def test_python_is_told_in_its_own_words() -> None:
         texrs.solid(STRIPES, 600)
     with pytest.raises(LimitExceeded, match=r"texrs\.PlaneTexture\.to_zarr"):
         texrs.PlaneTexture(WEAVE)[0:20_000, 0:20_000]
+
+
+def test_voxels_of_results_lie_as_far_apart_as_those_of_examples(files: Path) -> None:
+    apart = (2.0, 0.5, 0.25)
+    io.write_volume(files / "a.nrrd", np.resize(STRIPES, (32, 32, 32, 3)), spacing=apart)
+    words = ["solid", f"{files}/a.nrrd", "--size", "24", "--quality", "fast", "-q", "-o"]
+    assert main([*words, f"{files}/once.vti", "--map", f"{files}/m.npz"]) == 0
+    for name, more in (("b.zarr", []), ("b.raw", []), ("b.vti", ["--chunks", "16"])):
+        assert main([*words, f"{files}/{name}", *more]) == 0
+    assert main(["apply", f"{files}/m.npz", f"{files}/a.nrrd", "-o", f"{files}/again.nii.gz", "-q"]) == 0
+    for name in ("once.vti", "b.zarr", "b.nhdr", "b.vti", "again.nii.gz"):
+        assert io.read_spacing(files / name) == apart
+    assert main([*words, f"{files}/plain.tif"]) == 0
+    texture = texrs.SolidTexture(STRIPES)
+    texture.to_file(files / "c.vti", 8, spacing=apart)
+    assert io.read_spacing(files / "c.vti") == apart
+    with pytest.raises(InvalidInput, match="spacing: .npy cannot keep it"):
+        texture.to_file(files / "c.npy", 8, spacing=apart)

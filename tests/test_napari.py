@@ -128,3 +128,12 @@ def test_what_texrs_does_not_read(manager: Any, tmp_path: Path) -> None:
     (tmp_path / "bad.npy").write_bytes(b"no")
     with pytest.raises(FileError, match="its content is none of"):
         _napari.read(str(tmp_path / "bad.npy"))
+
+
+@pytest.mark.parametrize("suffix", [".nrrd", ".nii.gz", ".vti", ".zarr"])
+@pytest.mark.parametrize("channels", [1, 3, 5])
+def test_voxels_lie_as_far_apart_as_the_file_says(manager: Any, tmp_path: Path, suffix: str, channels: int) -> None:
+    volume = np.resize(STRIPES, (6, 7, 8, channels)) if channels > 1 else STRIPES[..., 0]
+    io.write_volume(tmp_path / f"a{suffix}", volume, spacing=(3, 1, 0.5))
+    [(_, options, _)] = open_files(manager, tmp_path / f"a{suffix}")
+    assert options["scale"] == [3, 1, 0.5]

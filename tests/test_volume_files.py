@@ -391,3 +391,63 @@ def test_nrrd_does_not_say_when_it_was_written(tmp_path):
     assert header.startswith(b"NRRD0005\n")
     assert not re.search(rb"[0-9]{4}-[0-9]{2}-[0-9]{2}|[0-9]{2}:[0-9]{2}", header)
     assert (tio.read_volume(tmp_path / "v.nrrd") == volume).all()
+
+
+# --- distances and stores --------------------------------------------------------------------------------------------
+
+APART = (2.5, 0.75, 0.5)
+
+
+@pytest.mark.parametrize("suffix", [".nrrd", ".nii", ".nii.gz", ".vti", ".zarr"])
+@pytest.mark.parametrize("channels", [1, 3])
+def test_spacing_comes_back(tmp_path, suffix, channels):
+    if suffix == ".zarr":
+        pytest.importorskip("zarr")
+    volume = np.arange(5 * 6 * 7 * channels, dtype=np.uint8).reshape((5, 6, 7, channels)[: 3 + (channels > 1)])
+    tio.write_volume(tmp_path / f"a{suffix}", volume, spacing=APART)
+    np.testing.assert_array_equal(tio.read_volume(tmp_path / f"a{suffix}"), volume)
+    assert tio.read_spacing(tmp_path / f"a{suffix}") == APART
+    with pytest.raises(InvalidInput, match="spacing: .npy cannot keep it; .*zarr can"):
+        tio.write_volume(tmp_path / "a.npy", volume, spacing=APART)
+    tio.write_volume(tmp_path / "b.npy", volume)
+    assert tio.read_spacing(tmp_path / "b.npy") is None
+
+
+def test_spacing_of_other_programs(tmp_path):
+    head = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n"
+    turned = "space: left-posterior-superior\nspace directions: (0,3,4) (0.5,0,0) (0,0,2)\n"
+    for name, text, wanted in (
+        ("a", "", None),
+        ("b", "spacings: 0.5 0.25 3\n", (3, 0.25, 0.5)),
+        ("c", turned, (2, 0.5, 5)),
+        ("d", "spacings: 0.5 nan 3\n", None),
+    ):
+        (tmp_path / f"{name}.nrrd").write_bytes((head + text + "\n").encode() + bytes(8))
+        assert tio.read_spacing(tmp_path / f"{name}.nrrd") == wanted
+    points = "# vtk DataFile Version 3.0\nx\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 1\nORIGIN 0 0 0\n"
+    for key in ("SPACING", "ASPECT_RATIO"):
+        text = f"{points}{key} 0.5 0.25 3\nPOINT_DATA 4\nSCALARS s float\nLOOKUP_TABLE default\n1 2 3 4\n"
+        (tmp_path / "p.vtk").write_text(text)
+        assert tio.read_spacing(tmp_path / "p.vtk") == (3, 0.25, 0.5)
+
+
+def test_stores_are_written_whole_and_over_none_but_their_like(tmp_path):
+    zarr = pytest.importorskip("zarr")
+    volume = np.random.default_rng(0).random((9, 140, 8, 2)).astype(np.float16)
+    tio.write_volume(tmp_path / "a.zarr", volume)
+    said = zarr.open_group(tmp_path / "a.zarr", mode="r")
+    assert [axis["name"] for axis in said.attrs["ome"]["multiscales"][0]["axes"]] == ["c", "z", "y", "x"]
+    assert said["0"].chunks == (2, 9, 128, 8)
+    with pytest.raises(FileError, match="exists already"):
+        tio.write_volume(tmp_path / "a.zarr", volume, overwrite=False)
+    tio.write_volume(tmp_path / "a.zarr", volume[:4] > 0.5)
+    assert tio.read_volume(tmp_path / "a.zarr").dtype == np.bool_
+    tio.write(tmp_path / "p.zarr", volume[0, ..., 0])
+    np.testing.assert_array_equal(tio.read(tmp_path / "p.zarr"), volume[0, ..., 0])
+    (tmp_path / "mine.zarr").mkdir()
+    (tmp_path / "mine.zarr" / "letter.txt").write_text("dear")
+    with pytest.raises(FileError, match="is no Zarr store"):
+        tio.write_volume(tmp_path / "mine.zarr", volume)
+    with pytest.raises(FileError, match="there is no folder"):
+        tio.write_volume(tmp_path / "none" / "a.zarr", volume)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.zarr", "mine.zarr", "p.zarr"]

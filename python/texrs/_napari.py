@@ -55,27 +55,32 @@ def _read(path: Path) -> list[LayerData]:
             with suppress(TexrsError):
                 return make(path, stem)
     try:
-        array, axes = io.read_volume(path), 3
+        array, axes, spacing = io.read_volume(path), 3, io.read_spacing(path)
     except FileError as error:
         try:
-            array, axes = io.read(path), 2
+            array, axes, spacing = io.read(path), 2, None
         except FileError:
             raise error from None
-    return [show(array, axes, stem)]
+    return [show(array, axes, stem, spacing)]
 
 
-def show(array: Array, axes: int, name: str) -> LayerData:
+def show(array: Array, axes: int, name: str, spacing: Sequence[float] | None = None) -> LayerData:
     """Return a layer of a picture or a volume: colours, one channel, or one after the other."""
+    said: dict[str, Any] = {"name": name}
+    if spacing is not None:
+        said["scale"] = [float(s) for s in spacing]
     if axes == 3 and array.shape[0] == 1:
         # Of a single plane there is nothing to go through.
         array, axes = array[0], 2
+        if spacing is not None:
+            said["scale"] = said["scale"][1:]
     if array.dtype == np.bool_:
-        return array.astype(np.uint8), {"name": name}, "labels"
+        return array.astype(np.uint8), said, "labels"
     if array.ndim == axes:
-        return array, {"name": name}, "image"
+        return array, said, "image"
     if array.shape[-1] in (3, 4) and _are_colours(array):
-        return array, {"name": name, "rgb": True}, "image"
-    return np.moveaxis(array, -1, 0), {"name": name, "channel_axis": 0}, "image"
+        return array, said | {"rgb": True}, "image"
+    return np.moveaxis(array, -1, 0), said | {"channel_axis": 0}, "image"
 
 
 def _are_colours(array: Any) -> bool:

@@ -32,11 +32,12 @@ from texrs._typing import Array, Path, Progress
 from texrs._version import __version__
 from texrs.errors import FileError, InvalidInput
 from texrs.io._files import as_path, find_suffix
-from texrs.io._formats import FORMATS, check
+from texrs.io._formats import FORMATS, RAW, check
 
 __all__ = ["HEADER", "RAW", "Filled", "check_suffix", "fill"]
 
-RAW, HEADER = ".raw", ".nhdr"
+HEADER = ".nhdr"
+"""Of the file beside raw samples, which says what they are."""
 BLOCK = 2**24
 """Bytes that are written at once where a system cannot take room beforehand."""
 
@@ -73,26 +74,30 @@ class Filled:
         """Return the array, which stays on the disk."""
         return np.memmap(self.part, self.dtype, "r", self.start, self.shape)
 
-    def finish(self, temporary: FilePath) -> None:
-        """Write what was asked for to a temporary name, and remove the part file."""
+    def finish(self, temporary: FilePath, spacing: Sequence[float] | None = None) -> None:
+        """Write what was asked for to a temporary name, with the distances of voxels, and remove the part file."""
         suffix = temporary.suffix.lower()
         if suffix in (".npy", RAW):
             os.replace(self.part, temporary)
         elif self.axes == 3 and suffix in (".tif", ".tiff"):
             io.write_slabs(temporary, self._list_planes(), self.shape)
         else:
-            (io.write if self.axes == 2 else io.write_volume)(temporary, self.open())
+            if self.axes == 2:
+                io.write(temporary, self.open())
+            else:
+                io.write_volume(temporary, self.open(), spacing=spacing)
         with suppress(OSError):
             self.part.unlink(missing_ok=True)
         with suppress(OSError):
             _name_journal(self.part).unlink(missing_ok=True)
 
-    def describe(self, name: str) -> str:
+    def describe(self, name: str, spacing: Sequence[float] | None = None) -> str:
         """Return the header of raw samples that lie in a file of a name, as NRRD has it: axes from the fastest on."""
         channels, sides = self.shape[self.axes :], self.shape[: self.axes]
         kinds = [{3: "RGB-color", 4: "RGBA-color"}.get(n, "vector") for n in channels] + ["domain"] * 3
         kind = {"float32": "float", "float64": "double", "bool": "uint8"}.get(self.dtype.name, self.dtype.name)
         # A picture is a volume of one plane.
+        apart = reversed((*(1.0,) * (3 - self.axes), *map(float, spacing or ())))
         sizes = [*channels, *reversed((*(1,) * (3 - self.axes), *sides))]
         lines = [
             "NRRD0004",
@@ -100,6 +105,7 @@ class Filled:
             f"dimension: {len(sizes)}",
             f"sizes: {' '.join(map(str, sizes))}",
             f"kinds: {' '.join(kinds)}",
+            *([] if spacing is None else [f"spacings: {' '.join([*('nan' for _ in channels), *map(str, apart)])}"]),
             "encoding: raw",
             "endian: little",
             f"data file: {name}",

@@ -16,6 +16,8 @@ from texrs._chunks.store import Stored, write_image
 from texrs._typing import Path, Progress
 from texrs.errors import InvalidInput
 from texrs.io import atomic
+from texrs.io._files import find_suffix
+from texrs.io._formats import as_spacing
 
 __all__ = ["InParts", "Part"]
 
@@ -199,6 +201,7 @@ class InParts(ABC):
         *,
         origin: int | Sequence[int] = 0,
         map: str | None = None,
+        spacing: Sequence[float] | None = None,
         scheduler: Any = None,
         threads: int | None = None,
         progress: Progress | bool | None = None,
@@ -221,6 +224,8 @@ class InParts(ABC):
             First voxel, of the world.
         map : str, optional
             Of a material, the map; by default the one that shows it.
+        spacing : sequence of float, optional
+            Of voxels along each axis, in formats of volumes that keep it, as .raw and .vti do.
         scheduler : None, int, str or distributed.Client
             Who makes the chunks. None: this process. A number: so many processes of this machine, which a script must start
             under ``if __name__ == "__main__":``. An address, or a client: the workers of that cluster, on the same disk.
@@ -254,16 +259,27 @@ class InParts(ABC):
 
         """
         part, grid = self.read_part(origin, shape), Grid.of(shape, chunks, self.axes)
+        steps = check_spacing(path, spacing, self.axes)
         filled = fill(part.reader, part.name(map), grid, path, scheduler=scheduler, threads=threads, progress=progress)
-        write_filled(filled, path)
+        write_filled(filled, path, steps)
         return filled.stored
 
 
-def write_filled(filled: Filled, path: Path) -> None:
+def check_spacing(path: Path, spacing: Sequence[float] | None, axes: int) -> Sequence[float] | None:
+    """Check distances of voxels, and that a file of a name keeps them."""
+    if spacing is None:
+        return None
+    suffix = find_suffix(FilePath(path)).lower()
+    if axes != 3:
+        raise InvalidInput("spacing: is of volumes; no format of pictures keeps it")
+    return as_spacing(spacing, ".nrrd" if suffix == RAW else suffix)
+
+
+def write_filled(filled: Filled, path: Path, spacing: Sequence[float] | None = None) -> None:
     """Write a file of what is filled, and of raw samples the header."""
     target = FilePath(path)
     if target.suffix.lower() == RAW:
         with atomic(target.with_suffix(HEADER)) as temporary:
-            temporary.write_text(filled.describe(target.name), encoding="ascii")
+            temporary.write_text(filled.describe(target.name, spacing), encoding="ascii")
     with atomic(target) as temporary:
-        filled.finish(temporary)
+        filled.finish(temporary, spacing)

@@ -1,22 +1,16 @@
-"""Coarser levels of what is stored, for viewers: each half of the one before, and what OME-Zarr says of them."""
+"""Coarser levels of what is stored, for viewers: each half of the one before."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from itertools import product
-from typing import Any
 
 import numpy as np
 
 from texrs._chunks.grid import Grid
 from texrs._typing import Array
 
-__all__ = ["count_levels", "describe_image", "halve_block"]
-
-VERSION = "0.5"
-"""Of OME-Zarr."""
-_COLOURS = {1: ("FFFFFF",), 2: ("FFFFFF", "808080"), 3: ("FF0000", "00FF00", "0000FF")}
+__all__ = ["count_levels", "halve_block"]
 
 
 def count_levels(grid: Grid) -> int:
@@ -55,42 +49,3 @@ def halve_block(block: Array, axes: int, *, labelled: bool) -> Array:
     for part in parts:
         mean += part / len(parts)
     return np.asarray(np.rint(mean) if block.dtype.kind in "ui" else mean).astype(block.dtype)
-
-
-def describe_image(
-    name: str,
-    grids: Sequence[Grid],
-    channels: int | None,
-    origin: Sequence[int],
-    spacing: Sequence[float],
-    unit: str | None,
-) -> dict[str, Any]:
-    """Return what OME-Zarr says of an image: its axes, its levels, and where each lies; channels come first there.
-
-    References
-    ----------
-    .. [1] J. Moore et al., "OME-Zarr: a cloud-optimized bioimaging file format", 2023; specification 0.5.
-
-    """
-    axes = len(grids[0].shape)
-    space = [{"name": letter, "type": "space", **({"unit": unit} if unit else {})} for letter in "zyx"[3 - axes :]]
-    before = [] if channels is None else [{"name": "c", "type": "channel"}]
-    datasets = []
-    for level, _ in enumerate(grids):
-        step = 2**level
-        # Sample i of a level lies in the middle of those that it is the mean of.
-        first = [(o + (step - 1) / 2) * s for o, s in zip(origin, spacing, strict=True)]
-        one, none = [1.0] * len(before), [0.0] * len(before)
-        moves = [
-            {"type": "scale", "scale": [*one, *(s * step for s in spacing)]},
-            {"type": "translation", "translation": [*none, *first]},
-        ]
-        datasets.append({"path": str(level), "coordinateTransformations": moves})
-    said: dict[str, Any] = {
-        "version": VERSION,
-        "multiscales": [{"name": name, "axes": before + space, "datasets": datasets, "type": "mean"}],
-    }
-    if channels in _COLOURS:
-        shown = [{"label": str(i), "color": c, "active": True} for i, c in enumerate(_COLOURS[channels])]
-        said["omero"] = {"channels": shown}
-    return said

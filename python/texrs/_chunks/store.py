@@ -14,13 +14,14 @@ import numpy as np
 from texrs._checks import as_int
 from texrs._chunks import workers
 from texrs._chunks.grid import Box, Grid
-from texrs._chunks.pyramid import count_levels, describe_image, halve_block
+from texrs._chunks.pyramid import count_levels, halve_block
 from texrs._chunks.reading import Channel, Reader
 from texrs._chunks.workers import Scheduler
 from texrs._progress import listen
 from texrs._typing import Array, Path, Progress
 from texrs._version import __version__
 from texrs.errors import FileError, InvalidInput
+from texrs.io._ome import describe_image
 
 __all__ = ["Stored", "import_zarr", "list_done", "open_group", "write_image"]
 
@@ -206,7 +207,7 @@ def write_image(
     }
     alone = list(reader.maps) == [IMAGE]
     says = {
-        name: {"ome": describe_image(name, grids, c.channels[0] if c.channels else None, start, apart, unit)}
+        name: {"ome": describe_image(name, axes, count, c.channels[0] if c.channels else None, start, apart, unit)}
         for name, c in reader.maps.items()
     }
     if reader.key is None and not overwrite:

@@ -67,7 +67,6 @@ def apply_command(
         with _provenance.record(made):
             check_free(target)
     read = io.read if places.axes == 2 else io.read_volume
-    write = io.write if places.axes == 2 else io.write_volume
     # All results or none take their names, at the end.
     with ExitStack() as stack, threads(count):
         for paths, target, made in zip(groups, targets, records, strict=True):
@@ -79,7 +78,11 @@ def apply_command(
             with name_arguments(**APPLIED.name_values(given), exemplars=" and ".join(paths)):
                 plain = {path[0]: v for path, v in values.items() if len(path) == 1}
                 image = apply(places, images, finish=fit(finish, paths, given), **plain)
-            write(temporary, image)
+            if places.axes == 2:
+                io.write(temporary, image)
+            else:
+                spacing = _outputs.read_kept_spacing(paths[0], target, 3)
+                io.write_volume(temporary, image, spacing=spacing)
             note(f"{paths[0]} gives {target}: {describe(image, places.axes)}", quiet=quiet)
 
 
@@ -108,7 +111,13 @@ def store_map(
     running = _provenance.RUNNING.get()
     with show_progress(quiet=quiet) as progress:
         done = places.to_zarr(
-            out, images, threads=count, overwrite=bool(running and running.force), progress=progress, **how
+            out,
+            images,
+            spacing=_outputs.read_kept_spacing(paths[0], out, places.axes),
+            threads=count,
+            overwrite=bool(running and running.force),
+            progress=progress,
+            **how,
         )
     note(f"{paths[0]} gives {out}: {show_sides(places.shape)}, {done.chunks} chunks", quiet=quiet)
 

@@ -24,6 +24,7 @@ from texrs.cli._provenance import RUNNING, check_free, read_status
 from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.io._annotation import name_sidecar, needs_sidecar
 from texrs.io._files import find_suffix
+from texrs.io._formats import RAW, STORE, keeps_spacing
 from texrs.synthesis import Synthesis
 
 SAMPLE = "sample:"
@@ -261,6 +262,8 @@ def write_output(
     The file says how it was made: as the command was asked for, or as ``made`` has it. ``inside`` tells that the option names
     its folder. ``like`` is what the picture that it was made from says of its colours.
     """
+    if find_suffix(Path(path)).lower() == STORE:
+        raise FileError(f"{path}: stores of Zarr are written by texrs solid, synthesize, tiles and apply")
     with io.atomic(path) as temporary:
         check_free(path, option)
         try:
@@ -314,11 +317,20 @@ def name_arguments(**names: str) -> Iterator[None]:
         raise type(error)(f"{', '.join(called)}:{rest}") from None
 
 
+def read_kept_spacing(source: Any, out: str, axes: int) -> Sequence[float] | None:
+    """Return how far voxels of a file lie apart, as those of a result do, if the result can say so."""
+    suffix = find_suffix(Path(out)).lower()
+    keeps = axes == 3 and (suffix == RAW or keeps_spacing(suffix))
+    there = isinstance(source, str) and (os.path.isfile(source) or io.is_store(source))
+    return io.read_spacing(source) if keeps and there else None
+
+
 def deliver(
     result: Synthesis,
     paths: Mapping[str, str | None],
     *,
     like: io.Notes | None = None,
+    spacing: Sequence[float] | None = None,
     made: _provenance.Record | None = None,
     option: str = "out",
 ) -> None:
@@ -329,7 +341,10 @@ def deliver(
     known = None if like is None else like.fit(image.shape[axes] if image.ndim > axes else 1)
     # The result takes its name last, when all else is written.
     with write_output(out, option, inside=option != "out", like=known, made=made) as temporary:
-        (io.write if axes == 2 else io.write_volume)(temporary, result.image)
+        if axes == 2:
+            io.write(temporary, result.image)
+        else:
+            io.write_volume(temporary, result.image, spacing=spacing)
         deliver_beside(result, paths, suffix, made)
 
 

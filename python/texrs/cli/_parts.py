@@ -6,7 +6,7 @@ import inspect
 import math
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -22,7 +22,7 @@ from texrs._typing import Progress
 from texrs.cli import _outputs, _provenance
 from texrs.cli._console import note, show_progress
 from texrs.cli._options import make_parameter
-from texrs.cli._outputs import name_arguments
+from texrs.cli._outputs import name_arguments, read_kept_spacing
 from texrs.cli._stacks import Stack
 from texrs.cli._texts import About, parse_numbers, parse_size
 from texrs.cli._verb import Verb
@@ -94,7 +94,8 @@ class InParts(Verb):
         sides = size or tuple(self.times * n for n in texture.exemplar.shape)
         memory = texture.estimate_memory(Grid.of(sides, asked.chunks, axes).chunks)
         note(f"each worker takes up to {memory / 2**30:.1f} GiB", quiet=quiet)
-        write_part(texture, str(paths["out"]), sides, asked, count=count, quiet=quiet)
+        spacing = read_kept_spacing(given[next(o.name for o in options if o.argument)], str(paths["out"]), axes)
+        write_part(texture, str(paths["out"]), sides, asked, spacing, count=count, quiet=quiet)
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +125,16 @@ def is_stored(out: str) -> bool:
     return out.lower().rstrip("/").endswith(".zarr")
 
 
-def write_part(whole: Parts, out: str, sides: tuple[int, ...], asked: Asked, *, count: int | None, quiet: bool) -> None:
+def write_part(
+    whole: Parts,
+    out: str,
+    sides: tuple[int, ...],
+    asked: Asked,
+    spacing: Sequence[float] | None = None,
+    *,
+    count: int | None,
+    quiet: bool,
+) -> None:
     """Write a part of what has no borders, to a store or to a file; what an interrupted run has left is gone on with."""
     start, running = time.monotonic(), _provenance.RUNNING.get()
     grid = Grid.of(sides, asked.chunks, whole.axes)
@@ -139,18 +149,27 @@ def write_part(whole: Parts, out: str, sides: tuple[int, ...], asked: Asked, *, 
                 sides,
                 grid.chunks,
                 origin=asked.origin,
+                spacing=spacing,
                 scheduler=asked.scheduler,
                 threads=count,
                 overwrite=bool(running and running.force),
                 progress=watch,
             )
         else:
-            done = write_file(whole, out, grid, asked, count, watch)
+            done = write_file(whole, out, grid, asked, spacing, count, watch)
     there = f"{done.chunks} chunks, of which {done.chunks - done.made} were there"
     note(f"wrote {out}: {_outputs.show_sides(sides)}, {there}, in {time.monotonic() - start:.1f} s", quiet=quiet)
 
 
-def write_file(whole: Parts, out: str, grid: Grid, asked: Asked, count: int | None, watch: Progress) -> Stored:
+def write_file(
+    whole: Parts,
+    out: str,
+    grid: Grid,
+    asked: Asked,
+    spacing: Sequence[float] | None,
+    count: int | None,
+    watch: Progress,
+) -> Stored:
     """Fill the part file of a name, and let what it becomes say how it was made."""
     part = whole.read_part(asked.origin, grid.shape)
     check_suffix(out, whole.axes, part.reader.maps[part.base], grid.chunks)
@@ -161,9 +180,9 @@ def write_file(whole: Parts, out: str, grid: Grid, asked: Asked, count: int | No
     filled = fill(part.reader, part.base, grid, out, scheduler=asked.scheduler, threads=count, progress=watch)
     if header is not None:
         with _outputs.write_output(header) as temporary:
-            temporary.write_text(filled.describe(os.path.basename(out)), encoding="ascii")
+            temporary.write_text(filled.describe(os.path.basename(out), spacing), encoding="ascii")
     with _outputs.write_output(out) as temporary:
-        filled.finish(temporary)
+        filled.finish(temporary, spacing)
     return filled.stored
 
 

@@ -106,6 +106,9 @@ class Verb:
         example, like = self.find_example(values), self.read_colours(given)
         size = self.find_size(values, example)
         material = self.find_material(values)
+        first = given[next(o.name for o in options if o.argument)]
+        spacing = _outputs.read_kept_spacing(first, out, options.axes)
+        apart = {} if spacing is None else {"spacing": spacing}
         if material is None:
             stack.refuse(paths)
             _outputs.check_output(out, example, size)
@@ -129,7 +132,7 @@ class Verb:
                 call["size"] = size
             if variants is None or self.several is None:
                 made = options.function(**call, progress=progress)
-                deliver(made, paths, like=like)
+                deliver(made, paths, like=like, **apart)
             else:
                 several = self.several(count=variants, **call, progress=progress)
                 for seed, each, made in zip(itertools.count(given["seed"]), places, several, strict=False):

@@ -15,6 +15,7 @@ Suffix                dtypes                                      Channels   Los
 ``.nii`` (b)          bool, (u)int8/16/32/64, float32/64          1 to 64    nothing
 ``.nii.gz`` (b)       the same                                    1 to 64    nothing
 ``.vti`` (c)          bool, (u)int8/16/32/64, float32/64          1 to 64    nothing
+``.zarr`` (d)         bool, (u)int8/16/32/64, float16/32/64       1 to 64    nothing
 ===================== =========================================== ========== ====================
 
 (a) Of the largest channel of each pixel, with which the three share an exponent.
@@ -23,11 +24,11 @@ Suffix                dtypes                                      Channels   Los
 
 (c) Volumes alone, for ParaView; read in every encoding that VTK writes.
 
-Zarr stores are read too, arrays and OME-Zarr images (extra ``dask``), and VTK's structured points (``.vtk``); textures without
-borders write the former (`texrs.SolidTexture.to_zarr`).
+(d) A folder: OME-Zarr of one level; needs the extra: ``pip install texrs[dask]``. Any arrays and OME-Zarr images are read, and
+VTK's structured points (``.vtk``); textures without borders write stores of any size (`texrs.SolidTexture.to_zarr`).
 
-Volumes are written to ``.tif``, ``.tiff``, ``.npy``, ``.npz`` and to the last four, which also keep
-the distances between voxels. What is (plane, row, column) here is z, y, x there, and x runs fastest
+Volumes are written to ``.tif``, ``.tiff``, ``.npy``, ``.npz`` and to the last five, which also keep
+the distances between voxels (`read_spacing`). What is (plane, row, column) here is z, y, x there, and x runs fastest
 in the file. Volumes larger than memory are written slab by slab (`write_slabs`), surfaces as
 ``.stl`` (`write_surface`). GIF is read, its first frame. A dtype that a format cannot hold is
 refused, never converted; bool is written as 0 and 255 (to ``.npy`` and ``.npz`` as it is). A single
@@ -46,7 +47,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from itertools import chain
 from math import atan, degrees, prod
-from pathlib import Path
 
 import numpy as np
 
@@ -54,10 +54,11 @@ from texrs._checks import MAX_PIXELS, as_int
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput
-from texrs.io import _descriptions, _files, _image_io, _npy, _pillow, _slabs, _stores, _tiff, _volumes, _vtk
+from texrs.io import _descriptions, _files, _image_io, _npy, _pillow, _slabs, _stores, _tiff, _volumes
 from texrs.io._annotation import annotate, read_notes
 from texrs.io._files import atomic, find_suffix
-from texrs.io._formats import FORMATS, VOLUMES, as_spacing, check, detect_kind
+from texrs.io._formats import FORMATS, STORE, VOLUMES, as_spacing, check, detect_kind
+from texrs.io._grids import READERS, read_numpy, read_spacing
 from texrs.io._notes import Notes
 from texrs.io._npy import read_arrays
 from texrs.io._stores import is_store
@@ -73,6 +74,7 @@ __all__ = [
     "read_description",
     "read_fov",
     "read_notes",
+    "read_spacing",
     "read_vectors",
     "read_volume",
     "write",
@@ -134,7 +136,7 @@ def read(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
         planes, orientation = _tiff.read_tiff(name, limit)
         return _tiff.take_image(name, planes, orientation)
     if kind in ("npy", "npz"):
-        return _read_numpy(name, kind, limit, 2)
+        return read_numpy(name, kind, limit, 2)
     if kind == "zarr":
         return _stores.read_store(name, limit, 2)
     if kind in VOLUMES:
@@ -242,25 +244,12 @@ def read_volume(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
     """
     name, limit = _files.as_path(path), as_int(limit, "limit", 1, 2**40)
     kind = detect_kind(name)
-    if kind == "tiff":
-        planes, orientation = _tiff.read_tiff(name, limit)
-        return _tiff.take_volume(name, planes, orientation)
-    if kind == "nrrd":
-        return _volumes.read_nrrd(name, limit)
-    if kind == "vti":
-        return _volumes.read_vti(name, limit)
-    if kind == "vtk":
-        return _vtk.read_structured_points(name, limit)
-    if kind == "zarr":
-        return _stores.read_store(name, limit, 3)
-    if kind in ("nii", "nii.gz"):
-        return _volumes.read_nifti(name, limit, compressed=kind == "nii.gz")
-    if kind not in ("npy", "npz"):
+    if kind not in READERS:
         raise FileError(
             f"{name}: is a {kind} file, which holds one image; "
             "volumes are read from TIFF, .npy, .npz, .vti, .vtk, NRRD, NIfTI and Zarr"
         )
-    return _read_numpy(name, kind, limit, 3)
+    return READERS[kind](name, limit)
 
 
 def write(path: PathLike, array: Array, *, overwrite: bool = True, description: str | None = None) -> None:
@@ -308,14 +297,15 @@ def write_volume(
     Parameters
     ----------
     path : path_like
-        With the suffix .tif, .tiff, .npy, .npz, .nrrd, .nii, .nii.gz (these three with the extra ``vol``) or .vti.
+        With the suffix .tif, .tiff, .npy, .npz, .nrrd, .nii, .nii.gz (these three with the extra ``vol``), .vti, or .zarr
+        (extra ``dask``): a folder, OME-Zarr of one level.
     array : array_like
         Shape (D, H, W) or (D, H, W, C).
     overwrite : bool
         Whether a file that exists may be replaced.
     spacing : sequence of 3 float, optional
-        From plane to plane, from row to row and from column to column, in whatever unit; by default 1. The last four
-        formats keep it, the others cannot.
+        From plane to plane, from row to row and from column to column, in whatever unit; by default 1. The last five
+        formats keep it, the others cannot; `read_spacing` reads it.
 
     Raises
     ------
@@ -434,17 +424,6 @@ def write_surface(path: PathLike, vertices: Array, faces: Array, *, overwrite: b
         _volumes.write_stl(temporary, corners.astype(np.float32), triangles.astype(np.int64))
 
 
-def _read_numpy(name: Path, kind: str, limit: int, axes: int) -> Array:
-    array = _npy.read_npy(name, limit) if kind == "npy" else _npy.read_npz(name, limit)
-    if array.ndim not in (axes, axes + 1):
-        what = ("an image is (H, W) or (H, W, C)", "a volume is (D, H, W) or (D, H, W, C)")[axes - 2]
-        hint = "; texrs.io.read_volume reads volumes" if axes == 2 and array.ndim == 4 else ""
-        raise FileError(f"{name}: holds an array of shape {array.shape}; {what}{hint}")
-    channels = array.shape[axes] if array.ndim > axes else 1
-    _files.check_size(name, array.shape[:axes], channels, array.itemsize, limit)
-    return array
-
-
 def _write(
     path: PathLike,
     value: Array,
@@ -455,9 +434,12 @@ def _write(
 ) -> None:
     target = _files.as_path(path)
     suffix = find_suffix(target).lower()
-    if suffix not in FORMATS:
-        raise FileError(f"{target}: the suffix {suffix!r} is not one that is written: {', '.join(FORMATS)}")
+    if suffix not in FORMATS and suffix != STORE:
+        raise FileError(f"{target}: the suffix {suffix!r} is not one that is written: {', '.join(FORMATS)}, {STORE}")
     array, steps = check(value, suffix, axes), as_spacing(spacing, suffix)
+    if suffix == STORE:
+        _stores.write_store(target, array, axes, steps[3 - axes :], overwrite=overwrite)
+        return
     with atomic(target, overwrite=overwrite) as temporary, _files.translate_errors(target, "writing"):
         if suffix == ".npy":
             _npy.write_npy(temporary, array)

@@ -40,6 +40,10 @@ MAGIC = (
 _NUMBERS = frozenset(np.dtype(kind) for kind in ("?", "u1", "i1", "u2", "i2", "u4", "i4", "f2", "f4", "f8"))
 _SMALL = frozenset({np.dtype(np.bool_), np.dtype(np.uint8)})
 _MOST_CHANNELS = 64
+RAW = ".raw"
+"""The suffix of samples without a header, which lies beside them."""
+STORE = ".zarr"
+"""The suffix of a folder, which is a store of Zarr."""
 VOLUMES = ("nrrd", "nii", "nii.gz", "vti", "vtk")
 UNIT = (1.0, 1.0, 1.0)
 
@@ -100,11 +104,16 @@ def detect_kind(path: Path) -> str:
     )
 
 
+def keeps_spacing(suffix: str) -> bool:
+    """Return whether files of a suffix say how far their voxels lie apart."""
+    return suffix == STORE or (suffix in FORMATS and not FORMATS[suffix].images)
+
+
 def as_spacing(spacing: Sequence[float] | None, suffix: str) -> tuple[float, ...]:
     if spacing is None:
         return UNIT
-    if FORMATS[suffix].images:
-        raise InvalidInput(f"spacing: {suffix} cannot keep it; .nrrd, .nii, .nii.gz and .vti can")
+    if not keeps_spacing(suffix):
+        raise InvalidInput(f"spacing: {suffix} cannot keep it; .nrrd, .nii, .nii.gz, .vti and .zarr can")
     steps = as_tuple(spacing, "spacing", 3, "three numbers, of planes, rows and columns")
     return tuple(as_float(s, "spacing", 1e-12, 1e12) for s in steps)
 
@@ -121,7 +130,7 @@ def check(value: object, suffix: str, axes: int) -> Array:
         shapes = ("(H, W) or (H, W, C)", "(D, H, W) or (D, H, W, C)")[axes - 2]
         raise InvalidInput(f"array: needs shape {shapes}, not empty; got shape {array.shape}")
     array = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("="))
-    form, volume = FORMATS[suffix], axes == 3
+    form, volume = _NUMPY if suffix == STORE else FORMATS[suffix], axes == 3
     channels = array.shape[axes] if array.ndim > axes else 1
     if not form.holds(array.dtype, channels, volume):
         common = sorted(FORMATS, key=lambda suffix: (not FORMATS[suffix].images, suffix))

@@ -1,9 +1,11 @@
-"""Zarr stores, read: plain arrays, and OME-Zarr images, of which the finest level counts."""
+"""Zarr stores: plain arrays, and OME-Zarr images, of which the finest level counts, read; images of one level written."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+import secrets
+import shutil
+from collections.abc import Mapping, Sequence
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -13,12 +15,14 @@ import numpy as np
 from texrs._typing import Array
 from texrs.errors import FileError
 from texrs.io._files import BYTES_PER_PIXEL, check_size, translate_errors
+from texrs.io._ome import describe_image
 
 MARKS = ("zarr.json", ".zarray", ".zgroup")
 """One of these lies in the folder of every array and group."""
 _RECORD = "texrs"
 _MOST_CHANNELS = 64
 _SPACE = "zyx"
+_CHUNK = {2: 512, 3: 128}
 
 
 def is_store(path: str | os.PathLike[str]) -> bool:
@@ -49,6 +53,56 @@ def read_store(path: Path, limit: int, axes: int | None) -> Array:
         values = np.asarray(array[keep])
         left = [a for a in range(array.ndim) if not isinstance(keep[a], int)]
         return _tidy(values.transpose([left.index(a) for a in order]))
+
+
+def read_store_spacing(path: Path) -> Sequence[float] | None:
+    """Return the distances that OME-Zarr states of the finest level, x first."""
+    with translate_errors(path, "reading the store"):
+        node = _import_zarr(path).open(os.fspath(path), mode="r")
+        said = node.attrs.get("ome", node.attrs)
+        images = said.get("multiscales") if isinstance(said, Mapping) else None
+        if not images:
+            return None
+        names = [str(a["name"] if isinstance(a, Mapping) else a) for a in images[0].get("axes", "tczyx")]
+        for each in images[0]["datasets"][0].get("coordinateTransformations", ()):
+            if each.get("type") == "scale" and len(each["scale"]) == len(names):
+                return [
+                    s
+                    for _, s in sorted(
+                        (_SPACE[::-1].index(n), s) for n, s in zip(names, each["scale"], strict=True) if n in _SPACE
+                    )
+                ]
+    return None
+
+
+def write_store(path: Path, array: Array, axes: int, spacing: Sequence[float], *, overwrite: bool) -> None:
+    """Write an image or a volume as OME-Zarr of one level, whole or not at all; no folder but a store is replaced."""
+    zarr, final = _import_zarr(path), Path(os.path.realpath(path))
+    if final.exists() and not (overwrite and is_store(final)):
+        raise FileError(f"{path}: exists already" if is_store(final) else f"{path}: is there, and is no Zarr store")
+    if not final.parent.is_dir():
+        raise FileError(f"{path}: there is no folder {path.parent}")
+    channels = array.shape[axes] if array.ndim > axes else None
+    values = array if channels is None else np.moveaxis(array, -1, 0)
+    chunks = (*values.shape[: values.ndim - axes], *(min(_CHUNK[axes], n) for n in array.shape[:axes]))
+    temporary = final.with_name(f".texrs-{secrets.token_hex(8)}.zarr")
+    with translate_errors(path, "writing the store"):
+        try:
+            said = describe_image("image", axes, 1, channels, (0,) * axes, spacing, None)
+            group = zarr.create_group(os.fspath(temporary), zarr_format=3, attributes={"ome": said})
+            letters = [*("c" * (channels is not None)), *_SPACE[3 - axes :]]
+            stored = group.create_array(
+                "0", shape=values.shape, chunks=chunks, dtype=values.dtype, dimension_names=letters
+            )
+            stored[...] = values
+            if final.exists():
+                os.replace(final, former := temporary.with_suffix(".former"))
+                os.replace(temporary, final)
+                shutil.rmtree(former, ignore_errors=True)
+            else:
+                os.replace(temporary, final)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
 
 
 def _tidy(values: Any) -> Array:

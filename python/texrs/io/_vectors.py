@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from texrs._checks import MAX_PIXELS, as_int
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError
-from texrs.io import _files, _npy, _stores, _tiff, _volumes, _vtk
+from texrs.io import _files
 from texrs.io._formats import detect_kind
+from texrs.io._grids import VECTORS
 
 SPATIAL = ("nrrd", "nii", "nii.gz", "vti", "vtk")
 """Files of programs whose vectors are x, y, z."""
@@ -55,27 +54,8 @@ def read_vectors(path: PathLike, *, limit: int = MAX_PIXELS) -> tuple[Array, boo
     """
     name, most = _files.as_path(path), as_int(limit, "limit", 1, 2**40)
     kind = detect_kind(name)
-    return _read(name, kind, most), kind in SPATIAL
-
-
-def _read(name: Path, kind: str, limit: int) -> Array:
-    if kind == "npy":
-        return _npy.read_npy(name, limit)
-    if kind == "npz":
-        return _npy.read_npz(name, limit)
-    if kind == "zarr":
-        return _stores.read_store(name, limit, None)
-    if kind == "vti":
-        return _vtk.read_image_data(name, limit, vectors=True)
-    if kind == "vtk":
-        return _vtk.read_structured_points(name, limit, vectors=True)
-    if kind == "nrrd":
-        return _volumes.read_nrrd(name, limit)
-    if kind in ("nii", "nii.gz"):
-        return _volumes.read_nifti(name, limit, compressed=kind == "nii.gz")
-    if kind == "tiff":
-        planes, orientation = _tiff.read_tiff(name, limit)
-        return _tiff.take_volume(name, planes, orientation)
-    raise FileError(
-        f"{name}: is a {kind} file; vectors are read from .npy, .npz, Zarr, NRRD, NIfTI, .vti, .vtk and TIFF"
-    )
+    if kind not in VECTORS:
+        raise FileError(
+            f"{name}: is a {kind} file; vectors are read from .npy, .npz, Zarr, NRRD, NIfTI, .vti, .vtk and TIFF"
+        )
+    return VECTORS[kind](name, most), kind in SPATIAL

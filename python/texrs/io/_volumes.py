@@ -70,20 +70,9 @@ _STL_TITLE = b"texrs".ljust(80)
 
 def read_nrrd(path: Path, limit: int) -> Array:
     """Read an NRRD volume whose samples lie in the file itself, or in one beside it, raw or compressed by gzip."""
-    nrrd: Any = _import_library("nrrd", "pynrrd", path)
     length = check_file(path)
     with translate_errors(path, "reading"), path.open("rb") as file:
-        # The library reads lines of any length: give it no more than a header may have.
-        start = file.read(_LONGEST_HEADER)
-        end = min((at + n for n, at in ((2, start.find(b"\n\n")), (4, start.find(b"\r\n\r\n"))) if at >= 0), default=-1)
-        if end < 0 and length == len(start) and re.search(rb"^data ?file:", start, re.MULTILINE):
-            # A header alone ends with its file.
-            end = length
-        if end < 0:
-            raise FileError(f"{path}: its NRRD header does not end within {_LONGEST_HEADER} bytes")
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            header = nrrd.read_header(io.BytesIO(start[:end]))
+        header, end = _read_nrrd_header(path, file, length)
         beside = header.get("data file", header.get("datafile"))
         if beside is not None and (
             not isinstance(beside, str) or beside in ("", ".", "..") or re.search(r"[/\\%\s]|^LIST$", beside)
@@ -120,6 +109,34 @@ def read_nrrd(path: Path, limit: int) -> Array:
     if channel is not None:
         volume = np.moveaxis(volume, len(sizes) - 1 - channel, -1)
     return _tidy(volume)
+
+
+def read_nrrd_spacing(path: Path) -> Sequence[float] | None:
+    """Return the distances that a header states, in the order of the file, by numbers or as the lengths of steps in space."""
+    length = check_file(path)
+    with translate_errors(path, "reading"), path.open("rb") as file:
+        header, _ = _read_nrrd_header(path, file, length)
+        steps = header.get("spacings")
+        if steps is None and header.get("space directions") is not None:
+            none = [np.nan] * 3
+            steps = [np.linalg.norm(none if row is None else row) for row in header["space directions"]]
+    return None if steps is None else [float(s) for s in steps if np.isfinite(s)]
+
+
+def _read_nrrd_header(path: Path, file: BinaryIO, length: int) -> tuple[dict[str, Any], int]:
+    """Return what a header says, and where it ends."""
+    nrrd: Any = _import_library("nrrd", "pynrrd", path)
+    # The library reads lines of any length: give it no more than a header may have.
+    start = file.read(_LONGEST_HEADER)
+    end = min((at + n for n, at in ((2, start.find(b"\n\n")), (4, start.find(b"\r\n\r\n"))) if at >= 0), default=-1)
+    if end < 0 and length == len(start) and re.search(rb"^data ?file:", start, re.MULTILINE):
+        # A header alone ends with its file.
+        end = length
+    if end < 0:
+        raise FileError(f"{path}: its NRRD header does not end within {_LONGEST_HEADER} bytes")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return dict(nrrd.read_header(io.BytesIO(start[:end]))), end
 
 
 def write_nrrd(path: Path, volume: Array, spacing: Sequence[float]) -> None:
@@ -164,24 +181,10 @@ def _find_channel(path: Path, sizes: list[int], kinds: list[str]) -> int | None:
 
 def read_nifti(path: Path, limit: int, *, compressed: bool) -> Array:
     """Read a NIfTI volume in one file, of version 1 or 2."""
-    nibabel: Any = _import_library("nibabel", "nibabel", path)
     length = check_file(path)
     with translate_errors(path, "reading"), path.open("rb") as raw:
         file: BinaryIO = gzip.GzipFile(fileobj=raw) if compressed else raw  # type: ignore[assignment]
-        start = file.read(540)
-        if start[:4] not in NIFTI_MAGIC:
-            raise FileError(f"{path}: is compressed, but not a NIfTI file")
-        second = start[:4] in NIFTI_MAGIC[2:]
-        need = 540 if second else 348
-        if len(start) < need:
-            raise FileError(f"{path}: is cut off; its NIfTI header does not end")
-        if (start[4:7] if second else start[344:347]) != (b"n+2" if second else b"n+1"):
-            raise FileError(f"{path}: is not a NIfTI file that holds its own samples")
-        kind = nibabel.Nifti2Header if second else nibabel.Nifti1Header
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            header = kind(start[:need], check=False)
-            dtype = np.dtype(header.get_data_dtype())
+        header, dtype, need = _read_nifti_header(path, file)
         fields = dtype.names or ()
         colours = len(fields) if fields and all(dtype[n] == np.uint8 for n in fields) else 0
         if not colours and (dtype.kind not in "uif" or dtype.itemsize > 8):
@@ -211,6 +214,34 @@ def read_nifti(path: Path, limit: int, *, compressed: bool) -> Array:
     if slope is not None and (slope, intercept or 0) != (1, 0):
         volume = (volume * float(slope) + float(intercept or 0)).astype(np.float32)
     return _tidy(volume)
+
+
+def read_nifti_spacing(path: Path, *, compressed: bool) -> Sequence[float] | None:
+    """Return the distances that a header states, x first."""
+    check_file(path)
+    with translate_errors(path, "reading"), path.open("rb") as raw:
+        file: BinaryIO = gzip.GzipFile(fileobj=raw) if compressed else raw  # type: ignore[assignment]
+        header, _, _ = _read_nifti_header(path, file)
+        return [abs(float(s)) for s in header["pixdim"][1:4]]
+
+
+def _read_nifti_header(path: Path, file: BinaryIO) -> tuple[Any, np.dtype[Any], int]:
+    """Return what a header says, the dtype of the samples, and its length."""
+    nibabel: Any = _import_library("nibabel", "nibabel", path)
+    start = file.read(540)
+    if start[:4] not in NIFTI_MAGIC:
+        raise FileError(f"{path}: is compressed, but not a NIfTI file")
+    second = start[:4] in NIFTI_MAGIC[2:]
+    need = 540 if second else 348
+    if len(start) < need:
+        raise FileError(f"{path}: is cut off; its NIfTI header does not end")
+    if (start[4:7] if second else start[344:347]) != (b"n+2" if second else b"n+1"):
+        raise FileError(f"{path}: is not a NIfTI file that holds its own samples")
+    kind = nibabel.Nifti2Header if second else nibabel.Nifti1Header
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        header = kind(start[:need], check=False)
+        return header, np.dtype(header.get_data_dtype()), need
 
 
 def write_nifti(path: Path, volume: Array, spacing: Sequence[float], *, compressed: bool) -> None:

@@ -19,9 +19,13 @@ import numpy as np
 
 from texrs._typing import Array
 from texrs.errors import FileError
-from texrs.io._files import check_size, load, translate_errors
+from texrs.io._files import check_file, check_size, load, translate_errors
 
 LEGACY_MAGIC = b"# vtk DataFile"
+_SPACING = re.compile(
+    rb"<ImageData\b[^>]*\bSpacing\s*=\s*[\"']([^\"'<>]{1,200})[\"']|^\s*(?:SPACING|ASPECT_RATIO)\s+([^\n]{1,200})$",
+    re.MULTILINE | re.IGNORECASE,
+)
 
 _MOST_CHANNELS = 64
 _XML_TYPES = {
@@ -77,6 +81,14 @@ def _shape(path: Path, found: _Found, data: bytes) -> Array:
     flat = np.frombuffer(data, found.dtype, count=size // found.dtype.itemsize)
     shape = found.sides if found.channels == 1 else (*found.sides, found.channels)
     return np.array(flat.reshape(shape), found.dtype.newbyteorder("="), order="C")
+
+
+def read_spacing(path: Path) -> Sequence[float] | None:
+    """Return the distances that the header of a file of either kind states, x first."""
+    check_file(path)
+    with translate_errors(path, "reading"), path.open("rb") as file:
+        found = _SPACING.search(file.read(2**16))
+        return None if found is None else [float(s) for s in (found[1] or found[2]).split()]
 
 
 # --- image data ------------------------------------------------------------------------------------------------------

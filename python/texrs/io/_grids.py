@@ -1,0 +1,106 @@
+"""Who reads grids of samples, by format: volumes, arrays of vectors, and how far apart the samples lie."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+from texrs._typing import Array
+from texrs._typing import Path as PathLike
+from texrs.errors import FileError
+from texrs.io import _files, _npy, _stores, _tiff, _volumes, _vtk
+from texrs.io._formats import detect_kind
+
+__all__ = ["READERS", "VECTORS", "read_numpy", "read_spacing"]
+
+Reader = Callable[[Path, int], Array]
+"""Returns what a file holds, if it is within a limit of samples."""
+
+
+def _read_tiff(name: Path, limit: int) -> Array:
+    planes, orientation = _tiff.read_tiff(name, limit)
+    return _tiff.take_volume(name, planes, orientation)
+
+
+def read_numpy(name: Path, kind: str, limit: int, axes: int) -> Array:
+    """Return an image or a volume from a file of NumPy."""
+    array = _npy.read_npy(name, limit) if kind == "npy" else _npy.read_npz(name, limit)
+    if array.ndim not in (axes, axes + 1):
+        what = ("an image is (H, W) or (H, W, C)", "a volume is (D, H, W) or (D, H, W, C)")[axes - 2]
+        hint = "; texrs.io.read_volume reads volumes" if axes == 2 and array.ndim == 4 else ""
+        raise FileError(f"{name}: holds an array of shape {array.shape}; {what}{hint}")
+    channels = array.shape[axes] if array.ndim > axes else 1
+    _files.check_size(name, array.shape[:axes], channels, array.itemsize, limit)
+    return array
+
+
+READERS: dict[str, Reader] = {
+    "tiff": _read_tiff,
+    "npy": lambda name, limit: read_numpy(name, "npy", limit, 3),
+    "npz": lambda name, limit: read_numpy(name, "npz", limit, 3),
+    "vti": _volumes.read_vti,
+    "vtk": _vtk.read_structured_points,
+    "nrrd": _volumes.read_nrrd,
+    "nii": partial(_volumes.read_nifti, compressed=False),
+    "nii.gz": partial(_volumes.read_nifti, compressed=True),
+    "zarr": lambda name, limit: _stores.read_store(name, limit, 3),
+}
+"""Of volumes."""
+VECTORS: dict[str, Reader] = READERS | {
+    "npy": _npy.read_npy,
+    "npz": _npy.read_npz,
+    "vti": partial(_vtk.read_image_data, vectors=True),
+    "vtk": partial(_vtk.read_structured_points, vectors=True),
+    "zarr": lambda name, limit: _stores.read_store(name, limit, None),
+}
+"""Of arrays that may have more axes."""
+SPACINGS: dict[str, Callable[[Path], Sequence[float] | None]] = {
+    "vti": _vtk.read_spacing,
+    "vtk": _vtk.read_spacing,
+    "nrrd": _volumes.read_nrrd_spacing,
+    "nii": partial(_volumes.read_nifti_spacing, compressed=False),
+    "nii.gz": partial(_volumes.read_nifti_spacing, compressed=True),
+    "zarr": _stores.read_store_spacing,
+}
+"""Of distances between samples, x first."""
+
+
+def read_spacing(path: PathLike) -> tuple[float, float, float] | None:
+    """Return how far the voxels of a file lie apart.
+
+    Parameters
+    ----------
+    path : path_like
+        A volume, or any other file.
+
+    Returns
+    -------
+    (float, float, float) or None
+        From plane to plane, from row to row and from column to column, as NRRD, NIfTI, .vti, .vtk and OME-Zarr state it;
+        None where nothing is stated.
+
+    Raises
+    ------
+    FileError
+        Missing, or its header is damaged.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np
+    >>> from texrs import io
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "block.vti")
+    ...     io.write_volume(path, np.zeros((4, 5, 6), np.uint8), spacing=(2, 0.5, 0.5))
+    ...     io.read_spacing(path)
+    (2.0, 0.5, 0.5)
+
+    """
+    name = _files.as_path(path)
+    kind = detect_kind(name)
+    steps = SPACINGS[kind](name) if kind in SPACINGS else None
+    if steps is None or len(steps) != 3 or not all(math.isfinite(s) and s > 0 for s in steps):
+        return None
+    return float(steps[2]), float(steps[1]), float(steps[0])
