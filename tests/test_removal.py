@@ -79,7 +79,7 @@ def shine(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def test_light_is_followed() -> None:
-    lit = shine(look("bricks", PLANE))
+    lit = shine(look("weave", PLANE))
     marked = np.zeros(SIZE, bool)
     marked[60:125, 150:225] = True
     seen = np.where(marked[..., np.newaxis], np.uint8(90), lit)

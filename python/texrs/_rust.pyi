@@ -207,6 +207,7 @@ class Stitcher:
         seed: int,
         held: NDArray[bool_],
         given: NDArray[int32],
+        loose: NDArray[bool_],
         demand: tuple[NDArray[int16], NDArray[int16], NDArray[uint16], NDArray[uint32], int] | None,
         progress: Callable[[float], object] | None,
     ) -> tuple[NDArray[int32], NDArray[uint32], NDArray[int16], float, int]: ...

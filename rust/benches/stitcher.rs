@@ -80,10 +80,7 @@ fn sides<const D: usize>(c: &mut Criterion, side: usize) {
             group.bench_function(id, |b| {
                 b.iter(|| {
                     par::install(threads, || {
-                        let nothing = Given {
-                            points: &[],
-                            places: &[],
-                        };
+                        let nothing = Given::NOTHING;
                         let monitor = Monitor::default();
                         stitch(&source, &region, frames, None, nothing, &OPTIONS, &monitor).unwrap()
                     })

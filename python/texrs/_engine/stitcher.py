@@ -63,7 +63,7 @@ class Stitched(NamedTuple):
     places : (points * A) int32
         In units of 1/4096 of a sample.
     patches : (points) uint32
-        The patch that each point shows; one beyond the last for points that were given.
+        The patch that each point shows; beyond the last for points that were given.
     frames : (patches, A, A) int16
         The Jacobian at the centre of each, in units of 1/4096.
     seams : float
@@ -180,6 +180,7 @@ class Stitcher:
         seed: int = 0,
         held: NDArray[np.bool_] | None = None,
         given: NDArray[np.int32] | None = None,
+        loose: NDArray[np.bool_] | None = None,
         demand: Demand | None = None,
         progress: Report | None = None,
     ) -> Stitched:
@@ -214,6 +215,8 @@ class Stitcher:
             Points that keep their places.
         given : (points * A) int32, optional
             The places of the held points; those of others do not count.
+        loose : (points) bool, optional
+            Which of the held points patches may take all the same, where seams show less then.
         demand : Demand, optional
             What else the points are to show.
         progress : callable, optional
@@ -254,6 +257,7 @@ class Stitcher:
             as_seed(seed),
             flatten(held),
             np.zeros(0, np.int32) if given is None else given,
+            flatten(loose),
             demand,
             progress,
         )

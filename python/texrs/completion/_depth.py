@@ -41,6 +41,7 @@ def fill_in_depth(
     plane: Plane,
     wide: Bools,
     *,
+    far: Bools | None = None,
     usable: Bools,
     side: int | None,
     wrap: tuple[bool, bool],
@@ -55,6 +56,8 @@ def fill_in_depth(
         What it holds in the hole does not matter.
     open_, wide : (H, W) bool
         The hole, and what may be replaced.
+    far : (H, W) bool, optional
+        What may be replaced where things lie apart.
     plane : texrs.scale_maps._plane.Plane
         The plane that it shows.
     usable : (H, W) bool
@@ -81,6 +84,8 @@ def fill_in_depth(
     sheet = Flattened.of(guidance(paint_over(picture, open_)), plane, asked, whole)
     if not sheet.free.any():
         return None
+    if far is not None and sheet.elements is not None:
+        wide = far
     own = SIDE * sheet.side(asked) if side is None else side * sheet.steps_at(float(np.median(asked)))
     region = look_around(wide, ceil(AROUND * own * float(asked.max()) / sheet.resolution), 1, wrap)
     part = tuple(slice(o, o + n) for o, n in zip(region.origin, region.shape, strict=True))
@@ -92,18 +97,20 @@ def fill_in_depth(
         plane.scales(grid).astype(np.float32),
         side=own,
         seed=seed,
-        held=~inside,
+        held=~open_[part],
         given=sheet.place(grid),
+        loose=inside & ~open_[part],
         frames=sheet.fix(plane.fold(grid)),
         progress=progress,
     )
     identity = SourceMap.identity(open_.shape)
     frames = np.broadcast_to(np.eye(2, dtype=np.float32), (*open_.shape, 2, 2)).copy()
     label = np.zeros(open_.shape, np.uint32)
-    number, count = np.unique(found.patches[inside], return_inverse=True)
-    identity.coordinates[part][inside] = found.coordinates[inside]
-    frames[part][inside] = found.frames[inside]
-    label[part][inside] = count.ravel() + 1
+    new = found.patches < len(found.stitched.frames)
+    number, count = np.unique(found.patches[new], return_inverse=True)
+    identity.coordinates[part][new] = found.coordinates[new]
+    frames[part][new] = found.frames[new]
+    label[part][new] = count.ravel() + 1
     return (
         SourceMap(identity.coordinates, identity.exemplar, label, frames, (open_.shape,)),
         found.side,

@@ -33,6 +33,7 @@ def fill(
     open_: Bools,
     wide: Bools,
     *,
+    far: Bools | None = None,
     usable: Bools,
     plane: Plane | None,
     scales: Sequence[Floats] | None,
@@ -50,6 +51,8 @@ def fill(
         The picture, and another one to copy from if there is one.
     open_, wide : (H, W) bool
         The hole, and what may be replaced.
+    far : (H, W) bool, optional
+        What may be replaced of a plane whose things lie apart: what the hole cuts through is left out whole.
     usable : (H, W) bool
         What may be copied.
     plane : Plane, optional
@@ -74,6 +77,7 @@ def fill(
             open_,
             plane,
             wide,
+            far=far,
             usable=usable,
             side=patch,
             wrap=wrap,

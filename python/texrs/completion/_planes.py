@@ -163,6 +163,7 @@ def fill_parts(
     parts: Sequence[Part],
     *,
     boundary: int = 0,
+    things: int = 0,
     light: bool = False,
     patch: int | None = None,
     seed: int = 0,
@@ -180,6 +181,8 @@ def fill_parts(
         What goes on there.
     boundary : int
         Pixels around the holes that may change too.
+    things : int
+        The same of planes whose things lie apart from each other.
     light : bool
         Whether what is copied is compared, and goes on, as it would look in even light.
     patch : int, optional
@@ -210,7 +213,8 @@ def fill_parts(
         if not region.any():
             counts.append(0)
             continue
-        open_, accepted = region, region | (widen(region, boundary) & part.shown)
+        open_ = region
+        near, far = (region | (widen(region, width) & part.shown) for width in (boundary, max(boundary, things)))
         if len(parts) > 1:
             band = round(min(max(BAND * float(np.count_nonzero(region)) ** 0.5, NARROWEST), WIDEST))
             open_ = region | (widen(region, band) & ~part.shown)
@@ -219,7 +223,8 @@ def fill_parts(
         made = fill(
             [known],
             open_,
-            open_ | accepted,
+            open_ | near,
+            far=open_ | far,
             usable=usable & ~hole,
             plane=part.slope,
             scales=None,
@@ -229,7 +234,7 @@ def fill_parts(
             seed=seed,
             progress=progress,
         )
-        new = accepted & (made.source.label > 0)
+        new = far & (made.source.label > 0)
         coordinates[new] = made.source.coordinates[new]
         frames[new] = made.source.frames()[new]
         label[new] = made.source.label[new] + sum(counts)

@@ -71,6 +71,7 @@ def stitch_sheet(
     seed: int = 0,
     held: NDArray[np.bool_] | None = None,
     given: NDArray[np.int32] | None = None,
+    loose: NDArray[np.bool_] | None = None,
     frames: NDArray[np.int16] | None = None,
     progress: Progress | None = None,
 ) -> FromSheet:
@@ -94,6 +95,8 @@ def stitch_sheet(
         Pixels that keep their places.
     given : (rows, columns, 2) int32, optional
         The places of those in the sheet, in fixed point.
+    loose : (rows, columns) bool, optional
+        Which of those patches may take all the same, where seams show less then.
     frames : (N, 2, 2) int16, optional
         How the sheet is to be seen, in all or at each pixel, in fixed point; None goes by the target.
     progress : callable, optional
@@ -121,6 +124,7 @@ def stitch_sheet(
         seed=seed,
         held=held,
         given=None if given is None else given.reshape(-1),
+        loose=loose,
         demand=Demand(
             sheet.values(strength), code(log_single(target), strength).reshape(-1), weight, excess=sheet.excess
         ),

@@ -102,11 +102,13 @@ impl Stitcher {
         seed: u64,
         held: PyReadonlyArray1<'py, bool>,
         given: PyReadonlyArray1<'py, i32>,
+        loose: PyReadonlyArray1<'py, bool>,
         demand: Option<GuideIn<'py>>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<StitchedOut<'py>> {
         let options = options(patch, weights, charges, seed);
         let (jacobians, held, given) = (jacobians.as_slice()?, held.as_slice()?, given.as_slice()?);
+        let loose = loose.as_slice()?;
         let demand = slices(&demand)?;
         macro_rules! stitched {
             ($source:expr) => {
@@ -116,6 +118,7 @@ impl Stitcher {
                     let given = Given {
                         points: held,
                         places: grouped("given", given)?,
+                        loose,
                     };
                     let frames = frames(jacobians)?;
                     let made = stitcher::stitch(

@@ -11,13 +11,21 @@ use crate::foundation::memory;
 pub(super) const FREE: u32 = u32::MAX;
 /// A point that is given, and stays.
 pub(super) const HELD: u32 = u32::MAX - 1;
+/// A point that is given, until a patch takes it.
+pub(super) const LOOSE: u32 = u32::MAX - 2;
+
+/// Whether what a point shows is a patch's.
+#[inline(always)]
+pub(super) fn is_patch(patch: u32) -> bool {
+    patch < LOOSE
+}
 
 /// An output, some points of which show patches.
 pub(super) struct Canvas<const D: usize> {
     pub grid: Grid<D>,
     /// Where each point looks.
     pub places: Vec<Place<D>>,
-    /// The patch that each point shows, or [`FREE`], or [`HELD`].
+    /// The patch that each point shows, or [`FREE`], [`HELD`] or [`LOOSE`].
     pub patches: Vec<u32>,
     /// Cost of the seam from each point to the next one along each axis.
     pub seams: Vec<[f32; D]>,

@@ -114,11 +114,7 @@ pub fn cover<const D: usize>(
     options: &Options,
     monitor: &Monitor,
 ) -> Result<Shown<D>> {
-    let nothing = Given {
-        points: &[],
-        places: &[],
-    };
-    super::check(region, frames, nothing, options)?;
+    super::check(region, frames, Given::NOTHING, options)?;
     let canvas = paint(
         region,
         frames,

@@ -6,7 +6,7 @@
 
 use std::collections::{HashMap, HashSet, VecDeque};
 
-use super::canvas::{FREE, HELD, Window};
+use super::canvas::{Window, is_patch};
 use super::chart::{Chart, flood};
 use super::cut::{Cutting, widen};
 use super::{Patch, Stitching};
@@ -105,7 +105,7 @@ impl<const D: usize> Stitching<'_, D> {
     /// The instance that a point shows, if any.
     #[inline(always)]
     fn instance(&self, patch: u32, place: Place<D>) -> Option<Key> {
-        if patch == FREE || patch == HELD {
+        if !is_patch(patch) {
             return None;
         }
         let element = self.cutter.source().element(place);
@@ -213,7 +213,7 @@ impl<const D: usize> Stitching<'_, D> {
         let mut found: Vec<(u32, usize)> = Vec::new();
         for &p in &window.points {
             let patch = self.canvas.patches[p as usize];
-            if patch == FREE || patch == HELD || patch == instance.key.0 {
+            if !is_patch(patch) || patch == instance.key.0 {
                 continue;
             }
             match found.iter_mut().find(|f| f.0 == patch) {

@@ -38,7 +38,7 @@ use crate::foundation::par::Monitor;
 use crate::{Error, Result};
 
 use balance::Balance;
-use canvas::{Canvas, HELD};
+use canvas::{Canvas, HELD, LOOSE};
 use chart::Chart;
 pub use cover::{Prepared, Shown, cover, judge};
 use cut::{Cutter, LARGE};
@@ -74,13 +74,24 @@ pub struct Options {
     pub seed: u64,
 }
 
-/// Points that are given: none, or one flag and one place a point.
+/// Points that are given: none, or flags and one place a point.
 #[derive(Debug, Clone, Copy)]
 pub struct Given<'a, const D: usize> {
     /// Which.
     pub points: &'a [bool],
     /// Where they look.
     pub places: &'a [Place<D>],
+    /// Which of them patches may take, where seams show less then; empty where all stay.
+    pub loose: &'a [bool],
+}
+
+impl<const D: usize> Given<'_, D> {
+    /// No point is given.
+    pub const NOTHING: Self = Self {
+        points: &[],
+        places: &[],
+        loose: &[],
+    };
 }
 
 /// What has been stitched.
@@ -154,7 +165,8 @@ pub fn stitch<const D: usize>(
     check(region, frames, given, options)?;
     let mut canvas = Canvas::new(region.grid, matches!(frames, Frames::Dense(_)))?;
     for (p, _) in given.points.iter().enumerate().filter(|(_, held)| **held) {
-        canvas.patches[p] = HELD;
+        let stays = !given.loose.get(p).is_some_and(|&loose| loose);
+        canvas.patches[p] = if stays { HELD } else { LOOSE };
         canvas.places[p] = given.places[p];
         canvas.free -= 1;
     }
@@ -203,8 +215,10 @@ fn check<const D: usize>(
 ) -> Result<()> {
     let n = region.grid.len();
     frames.check(n)?;
-    for got in [given.points.len(), given.places.len()] {
-        if got != given.points.len() || !(got == 0 || got == n) {
+    let loose = given.loose.len();
+    for got in [given.points.len(), given.places.len(), loose] {
+        let none = got == 0 && (given.points.is_empty() || got == loose);
+        if !(none || (got == n && got == given.points.len())) {
             return Err(Error::Shape {
                 argument: "held",
                 expected: region.grid.shape().to_vec(),

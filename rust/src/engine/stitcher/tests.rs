@@ -22,10 +22,6 @@ const NO_CLASSES: Adjacency<'static> = Adjacency {
     classes: &[],
     costs: &[],
 };
-const NOTHING_GIVEN: Given<'static, 2> = Given {
-    points: &[],
-    places: &[],
-};
 const OPTIONS: Options = Options {
     patch: 8.0,
     overlap: 0.4,
@@ -246,7 +242,7 @@ proptest! {
             (Frames::Dense(&dense), true),
         ] {
             let options = Options { bend, seed, ..OPTIONS };
-            let made = stitch(&source, &region, frames, None, NOTHING_GIVEN, &options, &Monitor::default()).unwrap();
+            let made = stitch(&source, &region, frames, None, Given::NOTHING, &options, &Monitor::default()).unwrap();
             prop_assert_eq!(made.places.len(), region.grid.len());
             prop_assert!(made.patches.iter().all(|&p| (p as usize) < made.frames.len().max(1)));
             let shape = source.grid().shape();
@@ -275,14 +271,16 @@ fn a_bent_chart_of_one_frame_is_the_rigid_one() {
 }
 
 #[test]
-fn what_is_given_stays() {
+fn what_is_given_stays_unless_it_is_loose() {
     let source = source([16, 16], [false; 2]);
     let region = region([24, 24], [false, true]);
     let points: Vec<bool> = (0..24 * 24).map(|p| p % 7 == 0).collect();
     let places = vec![[3 * ONE, 5 * ONE]; 24 * 24];
+    let loose: Vec<bool> = (0..24 * 24).map(|p| p % 3 == 0).collect();
     let given = Given {
         points: &points,
         places: &places,
+        loose: &loose,
     };
     let frames = Frames::Constant(identity());
     let made = stitch(
@@ -295,11 +293,16 @@ fn what_is_given_stays() {
         &Monitor::default(),
     )
     .unwrap();
-    for (p, &held) in points.iter().enumerate() {
-        assert!(!held || made.places[p] == [3 * ONE, 5 * ONE]);
-        assert_eq!(held, made.patches[p] == canvas::HELD);
-        assert_ne!(made.patches[p], FREE);
+    for p in 0..points.len() {
+        let (shown, held) = (made.patches[p], points[p] && !loose[p]);
+        assert_eq!(held, shown == canvas::HELD);
+        assert!(!(held || shown == canvas::LOOSE) || made.places[p] == [3 * ONE, 5 * ONE]);
+        assert!(shown != canvas::LOOSE || (points[p] && loose[p]));
+        assert_ne!(shown, FREE);
     }
+    // Of what shows another place all around it, patches take much.
+    let kept = made.patches.iter().filter(|&&p| p == canvas::LOOSE).count();
+    assert!(kept < (0..24 * 24).filter(|p| p % 21 == 0).count());
 }
 
 #[test]
@@ -366,7 +369,7 @@ fn bad_arrays_and_options_are_refused() {
                 &region,
                 frames,
                 None,
-                NOTHING_GIVEN,
+                Given::NOTHING,
                 &options,
                 &Monitor::default()
             )
@@ -376,6 +379,7 @@ fn bad_arrays_and_options_are_refused() {
     let few = Given {
         points: &[true],
         places: &[[0; 2]],
+        loose: &[],
     };
     assert!(
         stitch(
@@ -397,7 +401,7 @@ fn bad_arrays_and_options_are_refused() {
             &region,
             frames,
             None,
-            NOTHING_GIVEN,
+            Given::NOTHING,
             &OPTIONS,
             &stopped
         )
