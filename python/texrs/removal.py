@@ -139,7 +139,9 @@ def remove(
     ]
     watch("plane", 1.0)
     parts = add_rest([Part.of(g, plane) for g, (plane, _) in zip(grounds, planes, strict=True)], hole, pixels)
-    made = fill_parts(pixels, hole, parts, boundary=rim, things=things, light=follow, patch=side, seed=number, progress=progress)
+    made = fill_parts(
+        pixels, hole, parts, boundary=rim, things=things, light=follow, patch=side, seed=number, progress=progress
+    )
     how = made.finish(screening, (0, 0) if follow else None)
     source = made.source.finished((False, False), **how, **({"known": (~hole,)} if how else {}))
     result = apply(source, pixels, progress=progress)
