@@ -4,11 +4,11 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-JOBS ?= 2
+JOBS ?= $(shell getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2)
 MINUTES ?= 10
 RUST := Cargo.toml $(shell find rust -name '*.rs')
 
-.PHONY: help demo test fuzz lint lint-rust lint-python format bench wheel docs clean requirements
+.PHONY: help demo test test-rust test-python fuzz lint lint-rust lint-python format bench wheel docs clean requirements
 .DELETE_ON_ERROR:
 
 help:
@@ -44,8 +44,12 @@ demo: $(VENV)/.built
 
 # All Rust tests are in the library: to build it once more for others would take a minute. Workers share the processors: were
 # each to have threads for matrices too, these would wait for each other.
-test: $(VENV)/.built
+test: test-rust test-python
+
+test-rust: | requirements
 	cargo test --quiet --lib
+
+test-python: $(VENV)/.built
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal -q
 
 # Rounds with a seed each, until one fails or the time is up; with a SEED, the round of that seed.
@@ -59,14 +63,14 @@ fuzz: $(VENV)/.built
 		[ -z "$(SEED)" ] && [ $$(date +%s) -lt $$end ] || break; \
 	done
 
-# Side by side: the checks of either language leave a processor idle.
-lint: $(VENV)/.built
-	$(MAKE) --no-print-directory -j2 lint-rust lint-python
+# Side by side with `make -j2 lint`: the checks of either language leave a processor idle.
+lint: lint-rust lint-python
 
+# With the same features, dependencies are checked once.
 lint-rust: | requirements
 	cargo fmt --check
 	cargo clippy --all-targets --quiet --features python -- -D warnings
-	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --quiet
+	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --quiet --features python
 
 lint-python: $(VENV)/.built
 	$(BIN)/ruff format --check .

@@ -1,8 +1,38 @@
 """What all tests share."""
 
+import functools
+from collections.abc import Callable
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
 from hypothesis import settings
+
+from texrs import samples
 
 settings.register_profile("fixed", derandomize=True, deadline=None)
 settings.register_profile("fuzz", deadline=None, print_blob=True)
 # The same cases each time; `make fuzz` asks for the other profile, with a seed of its own.
 settings.load_profile("fixed")
+
+
+def draw_once(make: Callable[..., samples.Sample]) -> Callable[..., samples.Sample]:
+    """Return a generator that draws a sample once, and gives a copy of it each time: dozens of modules use the same."""
+    kept = functools.cache(make)
+
+    @functools.wraps(make)
+    def draw(*given: Any, **options: Any) -> samples.Sample:
+        try:
+            drawn = kept(*given, **options)
+        except TypeError:  # A list, or a wrong argument.
+            return make(*given, **options)
+        arrays = {f.name: value for f in fields(drawn) if isinstance(value := getattr(drawn, f.name), np.ndarray)}
+        return replace(drawn, **{name: array.copy() for name, array in arrays.items()})
+
+    return draw
+
+
+# The generators themselves are tested through `inspect.unwrap`.
+for name, generator in samples._GENERATORS.items():
+    samples._GENERATORS[name] = draw_once(generator)
+    setattr(samples, name, samples._GENERATORS[name])

@@ -544,8 +544,13 @@ def test_apply_to_a_volume(here: Path) -> None:
 COMMAND: Any = typer.main.get_command(app)
 
 
+@functools.cache
+def find_command(command: str) -> Any:
+    return COMMAND.get_command(None, command)
+
+
 def parameters(command: str) -> list[Any]:
-    found: list[Any] = COMMAND.get_command(None, command).params
+    found: list[Any] = find_command(command).params
     return found
 
 
@@ -558,7 +563,7 @@ def pairs() -> list[tuple[str, str, str]]:
     found = []
     for command in COMMANDS:
         given = parameters(command)
-        kinds = inspect.signature(COMMAND.get_command(None, command).callback, eval_str=True).parameters
+        kinds = inspect.signature(find_command(command).callback, eval_str=True).parameters
         texts = [p.name for p in given if "str" in str(kinds[p.name].annotation).split(", <")[0] and not writes(p)]
         found += [(command, read, p.name) for read in texts for p in given if writes(p)]
     return found
@@ -592,7 +597,7 @@ def test_no_command_writes_over_what_it_reads(here: Path, command: str, read: st
                 else:
                     options += [max(p.opts, key=len), *values]
         with pytest.raises(InvalidInput, match=f"--{written}: {target} is read"):
-            COMMAND.main([command, *arguments, *options], standalone_mode=False)
+            find_command(command).main([*arguments, *options], standalone_mode=False)
         assert files(here) == before
 
 

@@ -112,9 +112,12 @@ def test_every_verb_takes_a_folder(here: Path, capsys: pytest.CaptureFixture[str
     assert (made["height"].pixels.shape) == texrs.SourceMap.load("map.npz").shape
     assert main(["apply", "map.npz", "rock/rock_height.png", "-o", "again.png", "-q"]) == 0
     assert (io.read("again.png") == made["height"].pixels).all()
-    for each in ("new", "lit.png", "it.glb", "map.npz"):
+    # How a file of a kind says what made it is the same for all verbs.
+    again = ("new", "lit.png", "it.glb", "map.npz") if verb == "tile" else ("new",)
+    for each in again:
         assert main(["rerun", each, "-q"]) == 0
-    assert capsys.readouterr().out.count("the same bytes") == 5
+    # A material is two files.
+    assert capsys.readouterr().out.count("the same bytes") == len(again) + 1
 
 
 def test_a_layout_may_be_that_of_a_material(here: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 import typer
 
 import texrs
-from texrs import io
+from texrs import cli, io
 from texrs.cli import app, main
 
 COMMANDS = {
@@ -83,6 +84,7 @@ def test_bad_options_are_refused_before_the_work(
         raise Work(path)
 
     monkeypatch.setattr("texrs.cli._slices.read_volume", read)
+    monkeypatch.setattr("texrs.cli.make_command", cache(cli.make_command))
     group = typer.main.get_command(app)
     verb, *mode = command.split()
     known = group.get_command(typer.Context(group), verb)  # type: ignore[attr-defined]

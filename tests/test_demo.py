@@ -44,6 +44,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("texrs.demo._pictures.SIDE", 64)
     monkeypatch.setattr("texrs.demo._maps.SIZE", 64)
     monkeypatch.setattr("texrs.demo._perspective.SIDE", 128)
+    monkeypatch.setattr("texrs.demo._perspective.SIZE", 96)
     monkeypatch.setattr("texrs.demo._splice.SIDE", 96)
     monkeypatch.setattr("texrs.demo._samples.SIDE", 64)
     monkeypatch.setattr("texrs.demo._samples.EDGE", 32)
