@@ -14,7 +14,14 @@ project = "texrs"
 author = "the texrs developers"
 version = release = texrs.__version__
 extensions = ["sphinx.ext.autodoc", "sphinx.ext.extlinks", "numpydoc", "myst_nb", "sphinx_gallery.gen_gallery"]
-exclude_patterns = ["_build", "pictures", "gallery/README.rst", "generated/gallery/*.ipynb", "generated/gallery/*.py"]
+exclude_patterns = [
+    "_build",
+    "pictures",
+    "generated/extra",
+    "gallery/README.rst",
+    "generated/gallery/*.ipynb",
+    "generated/gallery/*.py",
+]
 default_role = "py:obj"
 nb_execution_mode = "off"
 myst_enable_extensions = ["deflist", "colon_fence"]
@@ -29,6 +36,7 @@ numpydoc_class_members_toctree = False
 html_theme = "pydata_sphinx_theme"
 html_title = "texrs"
 html_static_path = ["static"]
+html_extra_path = ["generated/extra"]
 html_css_files = ["texrs.css"]
 html_show_sourcelink = False
 html_sidebars = {"index": [], "install": [], "five-minutes": [], "promises": [], "glossary": []}

@@ -23,6 +23,7 @@ def write_pages(docs: Path) -> None:
     (out / "api").mkdir(parents=True, exist_ok=True)
     write_api(out / "api")
     (out / "commands.md").write_text(list_commands(), encoding="utf-8")
+    write_comparison(out)
     (out / "words.md").write_text(list_words(docs.parent / "ARCHITECTURE.md"), encoding="utf-8")
 
 
@@ -109,3 +110,54 @@ def list_words(architecture: Path) -> str:
     words = "".join(f"{word}\n  {meaning}\n\n" for word, meaning in sorted(rows, key=lambda row: row[0].lower()))
     intro = "The words of the interface, of messages and of the code, each with one meaning."
     return f"{NOTICE}# Glossary\n\n{intro}\n\n```{{glossary}}\n{words.rstrip()}\n```\n"
+
+
+# --- comparison ------------------------------------------------------------------------------------------------------
+
+COMPARED = """
+Each of ten pictures, of {side} pixels a side, by what texrs has for three tasks, and by what others have that is installed
+where this page was made. The pictures stand in [the page of the comparison](./shown/comparison.html), which this command
+writes:
+
+```sh
+texrs compare -o comparison.html
+```
+
+Your own pictures, one task, and programs that are not found by themselves:
+
+```text
+texrs compare stones.jpg bark.jpg --task more --program embark=PATH -o comparison.html
+```
+
+Of every figure less is better, 0 is what the example has itself, and the best of each column is bold; what costs nothing stands
+there for comparison alone. Figures see some of what eyes see: a texture in which things are torn may have good ones.
+"""
+
+
+def write_comparison(out: Path) -> None:
+    """Compare methods on built-in pictures: the means in a page of the documentation, the pictures in one of their own.
+
+    Nothing is compared again while the package is as it was.
+    """
+    from texrs import samples
+    from texrs.cli._compare import USUAL
+    from texrs.comparison import TASKS, compare
+    from texrs.comparison._page import explain, tabulate
+
+    page, shown = out / "comparison.md", out / "extra" / "shown" / "comparison.html"
+    newest = max(
+        file.stat().st_mtime for file in Path(texrs.__file__).parent.rglob("*") if file.suffix in (".py", ".so")
+    )
+    if shown.exists() and page.exists() and shown.stat().st_mtime > newest:
+        return
+    shown.parent.mkdir(parents=True, exist_ok=True)
+    side = 112
+    found = compare({name: samples.load(name).image for name in USUAL}, side=side)
+    text = f"{NOTICE}# Compared with others\n{COMPARED.format(side=side)}\n```{{raw}} html\n{explain(True)}\n```\n"
+    for task, about in TASKS.items():
+        some = [r for r in found.results if r.task == task]
+        text += f"\n## {about.title}\n\n{about.lead}\n\n```{{raw}} html\n{tabulate(some, True)}\n```\n"
+    text += "\n## Not here\n\nWhat was not installed, and how to get it:\n\n"
+    text += "".join(f"- {each.method} ({TASKS[each.task].title.lower()}): {each.get}\n" for each in found.missing)
+    page.write_text(text, encoding="utf-8")
+    shown.write_text(found.page(), encoding="utf-8")

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import texrs
-from texrs.demo import _html as html
+from texrs import _html as html
 
 CROP, SEED = 256, 7
 STILL = texrs.DeformationOptions(operations=0, mirror=False)

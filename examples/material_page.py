@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import texrs
-from texrs.demo._html import document, figure, pair, row, section
+from texrs._html import document, figure, pair, row, section
 
 
 def show(folder: Path, size: int, seed: int) -> str:

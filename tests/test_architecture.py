@@ -18,7 +18,7 @@ LAYERS = (
     ("_arrays",),
     ("_colours",),
     ("_evidence", "_light", "_show", "_threads", "kernels"),
-    ("_chunks", "_evening", "_viewer"),
+    ("_chunks", "_evening", "_html", "_viewer"),
     ("_engine",),
     ("source_map",),
     ("blending",),
@@ -36,7 +36,7 @@ LAYERS = (
     ("completion",),
     ("papers",),
     ("database", "extension", "lazy", "painting", "rectification", "removal", "tile_set", "transforms"),
-    ("_napari", "demo"),
+    ("_napari", "comparison", "demo"),
     ("cli",),
 )
 """Lowest first: a module imports its own package and the layers below its own, and nothing else."""

@@ -52,6 +52,7 @@ def said(path: str | Path) -> dict[str, Any]:
 WRITERS = {
     "analyse": "analyse in.png --mask mask.png --layout disjoint -o {}.npz",
     "apply": "apply map.npz in.png -o {}.png",
+    "compare": "compare in.png --task tile --crop 48 --larger 48 --no-seconds -o {}.html",
     "complete": "complete in.png hole.png -o {}.png",
     "database matrix": "database db matrix -o {}.png",
     "database splice": "database db splice dots dots -o {}.png",

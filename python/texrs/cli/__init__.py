@@ -53,6 +53,7 @@ GROUPS: dict[str, dict[str, str]] = {
     "Examples": {
         "samples": "List the built-in examples, or write them to a folder.",
         "demo": "Write a page that shows what texrs makes, on built-in examples.",
+        "compare": "Compare methods, of texrs and of others that are installed, on pictures: a page of results and figures.",
     },
 }
 """All commands, and what they are for, as the help shows them."""
@@ -94,6 +95,10 @@ def load(name: str) -> Callable[..., None]:
             from texrs.cli import _rerun
 
             return _rerun.COMMANDS[name]
+        case "compare":
+            from texrs.cli import _compare
+
+            return _compare.COMMAND
         case "demo" | "samples":
             from texrs.cli import _examples
 

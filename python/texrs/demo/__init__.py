@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from texrs._html import document, section
 from texrs._typing import Progress
 from texrs.demo._design import RESULTS, SEEDS, STAGES
-from texrs.demo._html import document, section
 from texrs.demo._maps import MAPS
 from texrs.demo._perspective import PERSPECTIVE
 from texrs.demo._pictures import COMPLETE, TILE

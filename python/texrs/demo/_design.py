@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from texrs._html import code, figure, grid, pair, row
 from texrs._show import preview
 from texrs._typing import Array
-from texrs.demo._html import code, figure, grid, pair, row
 from texrs.demo._workshop import Section, Workshop
 from texrs.papers.design import DeformationOptions
 

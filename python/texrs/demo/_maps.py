@@ -7,8 +7,8 @@ from html import escape
 import numpy as np
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 
+from texrs._html import code, figure, grid, pair, row
 from texrs._typing import Array, Labels
-from texrs.demo._html import code, figure, grid, pair, row
 from texrs.demo._workshop import Section, Workshop, load_sample
 from texrs.materials import Material
 from texrs.papers.design import design

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from texrs import samples, scale_maps
+from texrs._html import code, figure, grid
 from texrs._typing import Floats
 from texrs.completion import complete
-from texrs.demo._html import code, figure, grid
 from texrs.demo._workshop import Section, Workshop
 from texrs.papers.perspective import perspective
 from texrs.rectification import rectify

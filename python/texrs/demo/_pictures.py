@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from texrs._html import code, figure, grid, pair, row
 from texrs._typing import Bools
 from texrs.completion import complete
-from texrs.demo._html import code, figure, grid, pair, row
 from texrs.demo._workshop import Section, Workshop, load_sample
 from texrs.tiling import tile
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from texrs import fields, samples
-from texrs.demo._html import code, figure, grid
+from texrs._html import code, figure, grid
 from texrs.demo._workshop import Section, Workshop, load_sample
 from texrs.papers.solid import solid, synthesize
 from texrs.volume import cube

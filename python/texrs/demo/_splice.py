@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from texrs.demo._html import code, figure, grid
+from texrs._html import code, figure, grid
 from texrs.demo._workshop import Section, Workshop, load_sample
 from texrs.elements import Elements
 from texrs.layouts import courses, lattice

@@ -1,4 +1,4 @@
-"""HTML of the demo: the page, its sections, its pictures."""
+"""HTML of pages that are one file: the page, its sections, its pictures."""
 
 from __future__ import annotations
 
@@ -69,7 +69,16 @@ def section(name: str, title: str, lead: str, body: str) -> str:
     return f'<section id="{escape(name)}"><h2>{escape(title)}</h2><p class="lead">{escape(lead)}</p>{body}</section>'
 
 
-def document(links: Sequence[tuple[str, str]], sections: Sequence[str]) -> str:
+def document(
+    links: Sequence[tuple[str, str]],
+    sections: Sequence[str],
+    *,
+    title: str = "texrs",
+    lead: str = "New textures from one example.",
+    end: str = "All results were made when this page was written; the same version makes the same ones.",
+    command: str = "texrs demo",
+    style: str = "",
+) -> str:
     """Put the page together."""
     menu = "".join(f'<a href="#{escape(name)}">{escape(title)}</a>' for name, title in links)
     body = "\n".join(sections)
@@ -79,16 +88,15 @@ def document(links: Sequence[tuple[str, str]], sections: Sequence[str]) -> str:
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta name="color-scheme" content="light dark">
-<title>texrs: new textures from one example</title>
-<style>{STYLE}</style>
+<title>{escape(title)}: {escape(lead[:1].lower() + lead[1:].rstrip("."))}</title>
+<style>{STYLE}{style}</style>
 </head>
 <body>
-<header><h1>texrs</h1><p>New textures from one example.</p><nav>{menu}</nav></header>
+<header><h1>{escape(title)}</h1><p>{escape(lead)}</p><nav>{menu}</nav></header>
 <main>
 {body}
 </main>
-<footer>Made by <code>texrs demo</code>, version {escape(__version__)}. All results were made when this page was
-written; the same version makes the same ones.</footer>
+<footer>Made by <code>{escape(command)}</code>, version {escape(__version__)}. {escape(end)}</footer>
 </body>
 </html>
 """

@@ -1,0 +1,91 @@
+"""The command ``texrs compare``."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from texrs._threads import threads
+from texrs.cli import _outputs
+from texrs.cli._console import note, show_progress
+from texrs.cli._outputs import SAMPLE, Quiet, Threads, make_argument, make_option, name_arguments, to_write
+from texrs.cli._readers import read_picture
+from texrs.errors import InvalidInput
+
+USUAL = ("pebbles", "leaves_and_flowers", "bricks", "weave", "bark", "dots", "brick", "gravel", "grass", "coins")
+"""What is compared where nothing is said: generated examples, and photographs."""
+SHOWN = ("more", "tile", "hole")
+
+
+def compare_command(
+    pictures: Annotated[
+        list[str] | None, make_argument("FILE", "Pictures, or sample:NAME; ten of the built-in examples by default.")
+    ] = None,
+    out: Annotated[str, to_write("out", "OUT.html", "Page to write: one file that holds all of it.")] = "",
+    task: Annotated[
+        list[str] | None, make_option("|".join(SHOWN), "What is compared, repeatable; all by default.")
+    ] = None,
+    crop: Annotated[int, typer.Option(help="Pixels a side of what is taken of the middle of each picture.")] = 128,
+    larger: Annotated[
+        int | None, make_option(None, "Pixels a side of the larger textures; half as many again by default.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of all methods that have one.")] = 0,
+    program: Annotated[
+        list[str] | None,
+        make_option("NAME=PATH", "Where a program of others is: embark or resynthesizer; repeatable."),
+    ] = None,
+    timed: Annotated[
+        bool, typer.Option("--seconds/--no-seconds", help="Say how long each took; without, the same bytes each time.")
+    ] = True,
+    count: Threads = None,
+    quiet: Quiet = False,
+) -> None:
+    """Compare methods, of texrs and of others that are installed, on pictures: a page of results and figures."""
+    start = time.monotonic()
+    # Which needs the verbs.
+    from texrs.comparison import compare
+
+    if not out:
+        raise InvalidInput("--out: is needed")
+    _outputs.check_suffix("out", out, ".html")
+    _outputs.check_output(out)
+    named = {}
+    for text in program or ():
+        name, equals, path = text.partition("=")
+        if not equals:
+            raise InvalidInput(f"--program: needs NAME=PATH, got {text!r}")
+        named[name] = path
+    texts = pictures or [SAMPLE + name for name in USUAL]
+    given = {}
+    for text in texts:
+        name = text.removeprefix(SAMPLE) if text.startswith(SAMPLE) else Path(text).stem
+        if name in given:
+            raise InvalidInput(f"{text}: another picture is called {name} too")
+        given[name] = read_picture(text)
+    names = {"tasks": "--task", "side": "--crop", "size": "--larger", "programs": "--program", "seed": "--seed"}
+    with name_arguments(**names, count="--threads"), threads(count), show_progress(quiet=quiet) as progress:
+        found = compare(
+            given,
+            tasks=task or SHOWN,
+            side=crop,
+            size=larger,
+            seed=seed,
+            programs=named,
+            timed=timed,
+            progress=progress,
+        )
+    with _outputs.write_output(out) as temporary:
+        temporary.write_text(found.page(), encoding="utf-8")
+    failed = sum(r.image is None for r in found.results)
+    tail = f", {failed} failed" if failed else ""
+    note(
+        f"wrote {out}: {len(given)} pictures, {len(found.results)} results{tail}, "
+        f"{len(found.missing)} methods not here, in {time.monotonic() - start:.1f} s",
+        quiet=quiet,
+    )
+
+
+COMMAND = compare_command

@@ -1,0 +1,173 @@
+"""The page of a comparison: for each task a table of the means, then the pictures with their figures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from html import escape
+
+import numpy as np
+
+from texrs._html import code, document, encode_uri, section
+from texrs._typing import Array, Bools
+from texrs.comparison._measures import MEASURES
+from texrs.comparison._methods import FREE
+from texrs.comparison._results import Missing, Result
+from texrs.comparison._tasks import TASKS
+
+SECONDS = "seconds"
+INTRO = (
+    "All methods get the same 8-bit pictures and make theirs with their own defaults; no result was chosen. Of every figure "
+    "less is better, 0 is what the example has itself, and the best of each column is bold. Figures see some of what eyes "
+    "see: torn things and doubled ones they hardly see, so look at the pictures first. What costs nothing, copies and the "
+    "picture as it is, stands there for comparison alone."
+)
+MISS = "Methods that are not installed here, and how to get them. The page takes them in by itself once they are."
+
+
+def make_page(
+    pictures: Mapping[str, Array],
+    holes: Mapping[str, Bools],
+    results: Sequence[Result],
+    missing: Sequence[Missing],
+    *,
+    timed: bool,
+) -> str:
+    """Return the page: HTML that refers to nothing outside itself."""
+    links, parts = [("about", "What is compared")], [section("about", "What is compared", INTRO, explain(timed))]
+    for task, about in TASKS.items():
+        some = [r for r in results if r.task == task]
+        if some:
+            body = tabulate(some, timed) + show_pictures(pictures, holes if task == "hole" else {}, some)
+            links.append((task, about.title))
+            parts.append(section(task, about.title, about.lead, body))
+    if missing:
+        rows = "".join(
+            f"<tr><th scope=row>{escape(m.method)}</th><td>{escape(TASKS[m.task].title)}</td><td>{link(m.get)}</td></tr>"
+            for m in missing
+        )
+        head = "<tr><th scope=col>method</th><th scope=col>task</th><th scope=col>how to get it</th></tr>"
+        links.append(("missing", "Not here"))
+        parts.append(section("missing", "Not here", MISS, table(head + rows)))
+    end = f"{len(pictures)} pictures, {len({r.method for r in results})} methods."
+    return document(
+        links,
+        parts,
+        title="Compared",
+        lead="What several methods make of the same pictures.",
+        end=end,
+        command="texrs compare",
+        style=STYLE,
+    )
+
+
+def explain(timed: bool) -> str:
+    """Say what is measured."""
+    rows = [(name, unit, text) for name, (unit, text) in MEASURES.items()]
+    if timed:
+        rows.append((SECONDS, "s", "processor seconds, of all threads and programs; what is loaded first counts too"))
+    entries = "".join(
+        f"<dt>{escape(name)}{f' <small>{escape(unit)}</small>' if unit else ''}</dt><dd>{escape(text)}</dd>"
+        for name, unit, text in rows
+    )
+    return f"<dl>{entries}</dl>"
+
+
+def tabulate(results: Sequence[Result], timed: bool) -> str:
+    """Return a table of the means over the pictures, a row for each method."""
+    names = [*next((r.figures for r in results if r.figures), {}), *([SECONDS] if timed else [])]
+    methods = list(dict.fromkeys(r.method for r in results))
+    means = {
+        (m, n): find_mean([read(r, n) for r in results if r.method == m and r.image is not None])
+        for m in methods
+        for n in names
+    }
+    best = {
+        n: min((v for m in methods if m not in FREE and (v := means[m, n]) is not None), default=None) for n in names
+    }
+    head = "<th scope=col>mean over the pictures</th>" + "".join(f"<th scope=col>{escape(n)}</th>" for n in names)
+    rows = []
+    for method in methods:
+        cells = []
+        for name in names:
+            value = means[method, name]
+            text = "-" if value is None else f"{value:.2f}"
+            least = best[name]
+            won = method not in FREE and value is not None and least is not None and text == f"{least:.2f}"
+            cells.append(f"<td>{f'<b>{text}</b>' if won else text}</td>")
+        failed = sum(r.image is None for r in results if r.method == method)
+        note = f" <small>{failed} failed</small>" if failed else ""
+        rows.append(f"<tr><th scope=row>{escape(method)}{note}</th>{''.join(cells)}</tr>")
+    return table(f"<tr>{head}</tr>{''.join(rows)}")
+
+
+def read(result: Result, name: str) -> float:
+    """Return one of the figures of a result."""
+    return result.seconds if name == SECONDS else result.figures[name]
+
+
+def find_mean(values: Sequence[float]) -> float | None:
+    """Return the mean, if there is any."""
+    return float(np.mean(values)) if values else None
+
+
+def show_pictures(pictures: Mapping[str, Array], holes: Mapping[str, Bools], results: Sequence[Result]) -> str:
+    """Return a row for each picture: what was given, and what each method made."""
+    rows = []
+    for name, image in pictures.items():
+        hole = holes.get(name)
+        given = image if hole is None else np.where(hole[..., np.newaxis], np.uint8(255), image)
+        shown = [show(given, name, "given", "")]
+        for result in (r for r in results if r.picture == name):
+            figures = ", ".join(f"{n} {v:.2f}" for n, v in result.figures.items())
+            if result.image is None:
+                shown.append(
+                    f'<figure class="failed"><p>failed: {escape(result.failure)}</p>{caption(result.method)}</figure>'
+                )
+            else:
+                shown.append(show(result.image, name, result.method, figures, four=result.task == "tile"))
+        rows.append(f'<h3>{escape(name)}</h3><div class="shown">{"".join(shown)}</div>')
+    return "".join(rows)
+
+
+def show(image: Array, name: str, method: str, figures: str, *, four: bool = False) -> str:
+    """Return a picture and its figures; ``four`` shows it two by two, for its borders."""
+    height, width = image.shape[:2]
+    alt = f"{name}: {method}{', two by two' if four else ''}"
+    if four:
+        style = f"--picture:url({encode_uri(image)});aspect-ratio:{width}/{height}"
+        ground = f'<div class="ground four" role="img" aria-label="{escape(alt)}" style="{style}"></div>'
+        return f"<figure>{ground}{caption(method, figures)}</figure>"
+    picture = f'<img src="{encode_uri(image)}" alt="{escape(alt)}" width="{width}" height="{height}" loading="lazy">'
+    return f"<figure>{picture}{caption(method, figures)}</figure>"
+
+
+def caption(method: str, figures: str = "") -> str:
+    """Return what stands below a picture."""
+    return f"<figcaption>{escape(method)}{f'<small>{escape(figures)}</small>' if figures else ''}</figcaption>"
+
+
+def table(rows: str) -> str:
+    """Return a table that is moved sideways where it is too wide, by keys also."""
+    return f'<div class="wide" tabindex="0"><table>{rows}</table></div>'
+
+
+def link(text: str) -> str:
+    """Show a command as one."""
+    return code(text) if text.startswith("pip ") and "," not in text else escape(text)
+
+
+STYLE = """
+.wide { overflow-x: auto; margin-bottom: 1.5rem; }
+table { border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; background: var(--card); }
+th, td { padding: .4rem .8rem; border: 1px solid var(--line); text-align: right; vertical-align: top; }
+th[scope=row], tr:first-child th:first-child, #missing td, #missing th { text-align: left; }
+td pre { margin: 0; padding: 0; border: 0; }
+td b { color: var(--accent); }
+dl { display: grid; grid-template-columns: max-content 1fr; gap: .3rem 1rem; font-size: .9rem; }
+dt { font-weight: 600; } dt small { display: inline; font-weight: 400; } dd { margin: 0; color: var(--soft); }
+.shown { display: grid; grid-template-columns: repeat(auto-fill, minmax(150px, 1fr)); gap: 1rem; align-items: start; }
+.failed p { margin: 0; padding: 1rem; border: 1px dashed var(--line); border-radius: 6px; font-size: .85rem;
+  color: var(--soft); }
+@media (max-width: 620px) { dl { grid-template-columns: 1fr; } dd { padding-bottom: .4rem; }
+  .shown { grid-template-columns: 1fr 1fr; gap: .7rem; } }
+"""
