@@ -108,6 +108,74 @@ def test_heights_lean_as_they_do_on_the_surface(tmp_path: Path) -> None:
     assert set(attributes) == {"POSITION", "NORMAL", "TANGENT", "TEXCOORD_0"}
 
 
+def carved(vectors: np.ndarray, role: str = "normal", **options: object) -> texrs.SolidTexture:
+    """A texture of a material whose normals are the same everywhere."""
+    normals = np.broadcast_to(np.float32(vectors), (24, 24, 24, 3)).copy()
+    normals[0, 0, 0] = -normals[0, 0, 0]  # Some are negative, so that they are numbers as they are.
+    return texrs.SolidTexture(texrs.Material({"albedo": STRIPES, "n": normals}, roles={"n": role}, axes=3), **options)
+
+
+SQUARE = np.array([[2, 2, 4], [9, 2, 4], [9, 9, 4], [2, 9, 4]], float)
+HALVES = np.array([[0, 1, 2], [0, 2, 3]])
+TURNED = np.array([[0, 1], [0, 0], [1, 0], [1, 1]], float)  # Columns of the atlas go along y, its rows up along -x.
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize(
+    ("vector", "role", "wanted"),
+    [
+        # The rows of the texture go along the mesh's y, and the y of normals against them.
+        ((0.6, 0, 0.8), "normal", (0.6, 0, 0.8)),
+        ((0, 0.6, 0.8), "normal", (0, -0.6, 0.8)),
+        ((0, 0.6, 0.8), "normal-dx", (0, 0.6, 0.8)),
+    ],
+)
+def test_normals_of_space_lean_on_a_plane_as_they_do_in_the_texture(vector, role, wanted, turned: bool) -> None:
+    mesh = trimesh.Trimesh(SQUARE, HALVES, process=False)
+    mesh.visual = trimesh.visual.TextureVisuals(uv=TURNED if turned else (SQUARE[:, :2] - 2) / 7)
+    relief = paint(mesh, carved(vector, role), scale=1.0, atlas=16).relief
+    assert relief is not None
+    x, y, z = wanted
+    assert np.allclose(np.median(relief, axis=(0, 1)), (y, -x, z) if turned else wanted, atol=1e-5)
+
+
+def test_normals_of_space_tilt_a_ball_by_what_lies_in_its_surface(baked: texrs.painting.Painted) -> None:
+    """Of a relief that rises along x the part in the surface counts; the bytes of a viewer give that normal back."""
+    from texrs.painting._relief import bake_frames
+
+    flat = paint(BALL, carved((0, 0, 1)), scale=1.0, atlas=128).relief
+    assert flat is not None
+    assert np.median(flat[..., 2]) > 0.99999
+    relief = paint(BALL, carved((0.6, 0, 0.8)), scale=1.0, atlas=128).relief
+    assert relief is not None
+    assert baked.uv is not None
+    frames = bake_frames(baked.vertices, baked.faces, baked.uv, 128, 0)
+    there = bake_points(baked.vertices, baked.faces, baked.uv, 128, 0)[1]
+    shown = np.einsum("nij,ni->nj", frames[there], relief[there])
+    out, rise = frames[there][:, 2], np.array([-0.75, 0, 0])
+    wanted = out - (rise - (out @ rise)[:, np.newaxis] * out)
+    wanted /= np.linalg.norm(wanted, axis=1, keepdims=True)
+    apart = np.abs(shown / np.linalg.norm(shown, axis=1, keepdims=True) - wanted).max(axis=1)
+    assert np.quantile(apart, 0.99) < 1e-4
+
+
+def test_normals_of_space_turn_with_the_field_and_are_written(tmp_path: Path) -> None:
+    # The texture's columns go along the mesh's y.
+    quarter = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], float)
+    field = texrs.fields.from_function(lambda points: np.broadcast_to(quarter, (len(points), 3, 3)), 3)
+    mesh = trimesh.Trimesh(SQUARE, HALVES, process=False)
+    mesh.visual = trimesh.visual.TextureVisuals(uv=(SQUARE[:, :2] - 2) / 7)
+    painted = paint(mesh, carved((0.6, 0, 0.8), field=field), scale=1.0, atlas=16)
+    assert painted.relief is not None
+    assert np.allclose(np.median(painted.relief, axis=(0, 1)), (0, 0.6, 0.8), atol=1e-5)
+    # Those of a volume are directions in space, and turn too; y grows against the rows.
+    assert np.allclose(np.median(painted.maps["n"], axis=(0, 1)), (0, -0.6, 0.8), atol=1e-5)
+    painted.save(tmp_path / "a.glb")
+    there = trimesh.load(tmp_path / "a.glb", force="mesh", process=False)
+    pixels = np.median(np.asarray(there.visual.material.normalTexture)[..., :3], axis=(0, 1))
+    assert np.abs(pixels - 255 * (np.array([0, 0.6, 0.8]) + 1) / 2).max() <= 1
+
+
 def test_smooth_things_stay_smooth_where_the_atlas_is_cut_and_edges_sharp(baked: texrs.painting.Painted) -> None:
     normals = find_normals(baked.vertices, baked.faces)
     assert (normals * baked.vertices / 10).sum(axis=1).min() > 0.99

@@ -130,3 +130,31 @@ def test_parts_that_disagree_are_refused():
         start.render(np.zeros((5, 4)))
     with pytest.raises(InvalidInput, match="^exemplars"):
         start.render([np.zeros((4, 4))] * 2)
+
+
+@pytest.mark.parametrize("green", ["up", "down"])
+def test_directions_of_volumes_turn_in_space(green):
+    """A normal is that of a plane seen through the map, and a step is one that the map takes back."""
+    rng = np.random.default_rng(4)
+    frames = rng.normal(size=(5, 3, 3)).astype(np.float32)
+    start = SourceMap.identity((1, 1, 5))
+    source = SourceMap(
+        start.coordinates * 0, start.exemplar, np.arange(5, dtype=np.uint32).reshape(1, 1, 5), frames, start.shapes
+    )
+    side = 1 if green == "down" else -1
+    given = rng.normal(size=3)
+    own = given[::-1] * [1, side, 1]  # (plane, row, column)
+    exemplar = np.tile(given, (1, 1, 5, 1))
+    exemplar[0, 0, 1:, 0] = -9  # Numbers as they are, whatever the first one is.
+    for kind, wanted in (
+        ("slope", np.einsum("nji,j->ni", frames, own)),
+        ("normal", np.einsum("nji,j->ni", frames, own)),
+        ("vector", np.linalg.solve(frames.astype(float), np.tile(own, (5, 1))[..., np.newaxis])[..., 0]),
+    ):
+        found = source.render(exemplar, kind=kind, green=green, interpolation="nearest")[0, 0]
+        length = {"slope": None, "normal": 1.0, "vector": np.linalg.norm(given)}[kind]
+        if length is not None:
+            wanted = wanted * length / np.linalg.norm(wanted, axis=1, keepdims=True)
+        np.testing.assert_allclose(found[:, ::-1] * [1, side, 1], wanted, rtol=1e-4, atol=1e-5)
+    with pytest.raises(InvalidInput, match=r"needs shape \(planes, rows, columns, 3\)"):
+        source.render(exemplar[..., :2], kind="vector")

@@ -10,9 +10,13 @@ Notes
 What a volume costs, measured by ``benches/lazy_table.py`` on particles of 48^3 in chunks of 128^3: about 6.5 to 8.5 processor
 seconds a million voxels, under 0.5 GiB a worker (0.8 is stated beforehand). A worker repeats work along the sides of the row of
 chunks that it makes, so that few chunks a worker are dear: of 256^3, 4 chunks each, two workers took 1.3 times the processor
-seconds of one. On paper, 64 workers of 1024^3 have 8 chunks each and take about 1.2 times what one takes, 7000 to 9000
-seconds in all, or two to three minutes each; disks (3 GB) and the scheduler (512 tasks of 15 s) are no limit, the repeated
-work is. Larger chunks lessen it, for more memory.
+seconds of one.
+An estimate, which nobody has measured: 64 workers of 1024^3 would have 8 chunks each, take about 1.2 times the processor
+seconds of one worker, 7000 to 9000 in all, and so two to three minutes each. It rests on the measurements above, of one
+machine with two cores and up to two workers, and on what was not seen there: that cores of a cluster are as fast and have the
+memory to themselves, that work repeated by 8 chunks is a little less than by 4, that a shared disk takes 3 GB meanwhile, and
+that the scheduler hands out 512 tasks of about 15 seconds without delay. The repeated work is then the limit; larger chunks
+lessen it, for more memory.
 
 See Also
 --------

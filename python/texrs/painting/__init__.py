@@ -21,6 +21,7 @@ from texrs.painting._baking import bake_points, fill_between, lean
 from texrs.painting._directions import follow
 from texrs.painting._files import write_mesh
 from texrs.painting._meshes import read_mesh, unwrap
+from texrs.painting._relief import bake_frames, carve, read_slopes
 from texrs.papers.solid.window import SolidTexture
 
 __all__ = ["Painted", "follow", "paint"]
@@ -53,7 +54,7 @@ class Painted:
     roles : dict of str to Role
         What the maps of a material are for.
     relief : (size, size, 3) float32, optional
-        Normals of the heights of a material over the atlas: x to its right, y up, z out of the surface.
+        Normals over the atlas, x to its right, y up, z out of the surface: those of a material, or else those of its heights.
 
     """
 
@@ -67,10 +68,9 @@ class Painted:
     def save(self, path: Path, *, depth: Literal[8, 16] | None = None) -> list[FilePath]:
         """Write the mesh with every map that its format has a place for.
 
-        To .glb and .gltf go colours, opacity, roughness, metal, occlusion, light, and heights as the normals that they have
-        on the surface; to .obj the same beside it, by its .mtl. Corners have their colours as light in 16 bit in .glb, with
-        other maps as attributes of their names (_HEIGHT), and as they are seen in .obj and .ply. Normals of a texture of
-        space are directions there, and not written.
+        To .glb and .gltf go colours, opacity, roughness, metal, occlusion, light, and `relief`; to .obj the same beside it, by
+        its .mtl. Corners have their colours as light in 16 bit in .glb, with other maps as attributes of their names (_HEIGHT),
+        and as they are seen in .obj and .ply; without an atlas there is no relief.
 
         Parameters
         ----------
@@ -115,7 +115,8 @@ def paint(
         Triangles: a file (.obj, .ply, .stl, .glb), a mesh, or arrays (N, 3) and (M, 3). Its own coordinates in an atlas are
         kept, others are made by xatlas. x, y and z are those of columns, rows and planes.
     texture : SolidTexture
-        Of an array, or of a material, of which all maps are sampled.
+        Of an array, or of a material, of which all maps are sampled. Its normals say how its relief leans along columns and
+        rows, (0, 0, 1) not at all, and the surface leans as much wherever it cuts the texture.
     scale : float, optional
         Voxels of the texture in a unit of the mesh; by default the longest side shows the exemplar four times.
     atlas : int, optional
@@ -168,8 +169,15 @@ def paint(
         empty[there] = values
         whole[name] = fill_between(empty, there)
     relief = None
+    normal = next((name for name, role in roles.items() if role.normal), None)
     height = next((name for name, role in roles.items() if role is Role.HEIGHT), None)
-    if height is not None:
+    if material is not None and normal is not None:
+        slopes = read_slopes(material[normal])
+        relief = np.zeros((side, side, 3), np.float32)
+        frames = bake_frames(vertices, faces, uv, side, more)[there]
+        relief[there] = carve(_sample_slopes(texture, points[there] * size, slopes), frames)
+        relief = fill_between(relief, there)
+    elif height is not None:
         values = whole[height] if whole[height].ndim == 2 else whole[height][..., 0]
         inside = bake_points(vertices, faces, uv, side, 0)[1]
         relief = lean(to_unit(values) if values.dtype.kind in "bui" else values, points, there, inside)
@@ -180,6 +188,16 @@ def choose_scale(vertices: NDArray[np.float64], texture: SolidTexture) -> float:
     """Return voxels in a unit of a mesh: the longest side shows the exemplar so many times."""
     longest = float(np.ptp(vertices, axis=0).max())
     return FINEST * max(texture.exemplar.shape) / max(longest, 1e-12)
+
+
+def _sample_slopes(texture: SolidTexture, points: NDArray[np.float64], slopes: Floats) -> NDArray[np.float64]:
+    """Return how much a relief rises along x, y and z of space at points."""
+    parts = []
+    for start in range(0, len(points), _BAND):
+        source = texture.trace(points[start : start + _BAND, ::-1])
+        how = source.finish.interpolation if source.finish else "cubic"
+        parts.append(source.render(slopes, kind="slope", green="down", interpolation=how).reshape(-1, 3))
+    return np.concatenate(parts).astype(np.float64)
 
 
 def _sample(texture: SolidTexture, points: NDArray[np.float64], watch: Progress | None) -> dict[str, Array]:

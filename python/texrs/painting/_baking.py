@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from texrs._typing import Array, Floats
 from texrs.painting._meshes import Floats64
 
-__all__ = ["bake_points", "fill_between", "lean"]
+__all__ = ["bake_points", "bake_values", "fill_between", "lean"]
 
 STEEPNESS = 0.4
 """Root mean square slope that heights are shown with, for nothing says in what units they are."""
@@ -21,10 +21,17 @@ def bake_points(
 
     Those beside a triangle lie in its plane; where several do, that of the nearest triangle counts.
     """
-    points = np.zeros((side, side, 3))
+    return bake_values(vertices, faces, uv, side, padding)
+
+
+def bake_values(
+    values: Floats64, faces: NDArray[np.int64], uv: Floats64, side: int, padding: int
+) -> tuple[Floats64, NDArray[np.bool_]]:
+    """Return what corners (N, K) have between them at each texel, and beside their triangles as it goes on there."""
+    points = np.zeros((side, side, values.shape[1]))
     away = np.full((side, side), np.inf, np.float32)
     corners = np.stack([uv[..., 0] * side - 0.5, (1 - uv[..., 1]) * side - 0.5], axis=-1)[faces]
-    for triangle, flat in zip(vertices[faces], corners, strict=True):
+    for triangle, flat in zip(values[faces], corners, strict=True):
         edge, other = flat[1] - flat[0], flat[2] - flat[0]
         double = edge[0] * other[1] - edge[1] * other[0]
         if abs(double) < 1e-12:

@@ -77,7 +77,8 @@ def write_mesh(
         return write_shapes([("mesh", mesh)], {}, material, target)
     seen = {name: each for name, each in maps.items() if each.role not in (Role.NORMAL, Role.NORMAL_DX)}
     if relief is not None:
-        seen["normal"] = Map(relief, Role.NORMAL, "linear")
+        # As shares, for of numbers that happen to be positive nobody could tell.
+        seen["normal"] = Map((relief + np.float32(1)) / np.float32(2), Role.NORMAL, "linear")
     pictures, material = make_pictures(seen, bits)
     rough = material["pbrMetallicRoughness"]
     if "metallicRoughnessTexture" not in rough:

@@ -232,7 +232,7 @@ class SourceMap(Parted):
             "normal": a tangent-space normal map (channels x, y, z; unsigned values mean 2 v - 1). Its vectors turn
             with the local frame. "vector": directions on the surface (channels x, y, and what does not turn), such as those
             of flow or of brushed metal; they turn and keep their length. "slope": how much heights grow to the right and
-            along y.
+            along y. In a volume all are directions in space, whose z, along the planes, turns too.
         green : {"up", "down"}
             Whether the y of normals and vectors grows up (OpenGL) or down (DirectX).
 
@@ -272,7 +272,7 @@ class SourceMap(Parted):
                 f"kind, green: allowed are colour, normal, vector or slope, up or down; got {kind!r}, {green!r}"
             )
         # Asked of the exemplars, for a part of them that a picture shows may have no negative value.
-        channels = 3 if kind == "normal" else 2
+        channels = 3 if kind == "normal" or self.axes == 3 else 2
         return self._turn(out, kind, green, any(float(e[..., :channels].min()) < 0 for e in images))
 
     def _shrunk(self) -> NDArray[np.float32]:
@@ -285,10 +285,11 @@ class SourceMap(Parted):
 
     def _turn(self, vectors: Array, kind: str, green: str, signed: bool) -> Array:
         """Turn vectors with the frame: a surface h(S(p)) has the slope J^T grad h, and a step J^-1 v shows the step v."""
-        count = 3 if kind == "normal" else 2
+        count = 3 if kind == "normal" or self.axes == 3 else 2
         what = "a normal map" if kind == "normal" else "a map of vectors"
-        if self.axes != 2 or vectors.ndim != 3 or vectors.shape[-1] < count:
-            raise InvalidInput(f"exemplars: {what} needs shape (rows, columns, {count}), got {vectors.shape}")
+        if vectors.ndim != self.axes + 1 or vectors.shape[-1] < count:
+            sides = ("rows, columns", "planes, rows, columns")[self.axes - 2]
+            raise InvalidInput(f"exemplars: {what} needs shape ({sides}, {count}), got {vectors.shape}")
         if vectors.dtype == np.bool_:
             raise InvalidInput(f"exemplars: {what} cannot be bool")
         frame = self.frame_array()

@@ -275,6 +275,41 @@ class Texture(Endless):
             raise InvalidInput("texture: is made from one array, not from a material; its values are those of sample()")
         return self._sample_maps(as_points(points, self.axes), self._as_how(interpolation), listen(progress))
 
+    def trace(self, points: ArrayLike, *, progress: Progress | bool | None = None) -> SourceMap:
+        """Return where the texture at any points comes from, so that other maps of the exemplar can be looked up there.
+
+        Parameters
+        ----------
+        points : (..., 2) or (..., 3) array_like
+            As for `sample`.
+        progress : callable or True, optional
+            Called with the stage and the share of it that is done; raising stops the work. True shows a bar.
+
+        Returns
+        -------
+        SourceMap
+            Of a picture (or a volume) of one row, a pixel a point; `texrs.apply` interpolates as `sample` does.
+
+        Raises
+        ------
+        InvalidInput
+            As for `sample`.
+        Cancelled
+            The work was stopped.
+
+        Examples
+        --------
+        >>> import texrs
+        >>> weave = texrs.samples.weave((64, 64)).image
+        >>> plane = texrs.PlaneTexture(weave, seed=2)
+        >>> points = [[0, 1000.5], [-7, 3]]
+        >>> bool((texrs.apply(plane.trace(points), weave)[0] == plane.sample(points)).all())
+        True
+
+        """
+        source = self._trace(as_points(points, self.axes), listen(progress))
+        return source.finished((False,) * self.axes, interpolation=self._how)
+
     def estimate_memory(self, size: int | Sequence[int]) -> int:
         """Return the bytes that a process takes at most, about, that makes windows of a size; beside those of Python itself.
 
@@ -320,14 +355,18 @@ class Texture(Endless):
     ) -> dict[str, Array]:
         """Return maps at points, as those of a picture of one row."""
         assert self._material is not None
-        places, frames = self._carry_on(at.reshape(-1, self.axes), progress)
-        row = (*(1,) * (self.axes - 1), len(places))
-        frame = None if frames is None else frames.reshape(*row, self.axes, self.axes)
-        source = SourceMap.from_coordinates(places.reshape(*row, self.axes), self._exemplar.shape, frame=frame)
+        source = self._trace(at, progress)
         name, whole = self._material.base_name, self._material
         used = Material({name: whole[name]}, axes=self.axes) if only_base else whole
         made = apply_materials([used], source.finished((False,) * self.axes, interpolation=how), progress)
         return {n: m.pixels.reshape(*at.shape[:-1], *m.pixels.shape[self.axes :]) for n, m in made.items()}
+
+    def _trace(self, at: NDArray[np.float64], progress: Progress | None) -> SourceMap:
+        """Return where points come from, as the source map of a picture of one row."""
+        places, frames = self._carry_on(at.reshape(-1, self.axes), progress)
+        row = (*(1,) * (self.axes - 1), len(places))
+        frame = None if frames is None else frames.reshape(*row, self.axes, self.axes)
+        return SourceMap.from_coordinates(places.reshape(*row, self.axes), self._exemplar.shape, frame=frame)
 
     def _carry_on(
         self, at: NDArray[np.float64], progress: Progress | None

@@ -1,0 +1,65 @@
+"""The relief of a texture of space on a surface, as the normals that viewers take.
+
+Normals of a volume say how its relief leans along columns and rows; through the frames of the texture they are slopes in
+space. What of these lies in the surface tilts its normal: n - (g - (g n) n), which is that of the surface moved out by a height
+with the gradient g (J. F. Blinn, "Simulation of wrinkled surfaces", SIGGRAPH 1978). Viewers want it in the frame of the
+atlas: along its columns, up its rows, and out, as they interpolate these between corners.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Floats
+from texrs.materials import Map, Role
+from texrs.painting._baking import bake_values
+from texrs.painting._meshes import Floats64, find_normals, find_tangents
+
+__all__ = ["bake_frames", "carve", "read_slopes"]
+
+FLATTEST = 0.05
+"""Least z of a normal: the steepest relief is that of 87 degrees."""
+
+
+def read_slopes(normals: Map) -> Floats:
+    """Return how much the relief rises along columns, rows and planes, (..., 3), of normals in any encoding."""
+    pixels = normals.pixels[..., :3]
+    values = pixels.astype(np.float64)
+    if pixels.dtype.kind in "ui":
+        values /= np.iinfo(pixels.dtype).max
+    if not (values < 0).any():
+        values = 2 * values - 1
+    up = np.maximum(values[..., 2], FLATTEST)
+    # Rows go down, and y up unless it is said to be otherwise.
+    side = -1.0 if normals.role is Role.NORMAL_DX else 1.0
+    slopes = np.stack([-values[..., 0] / up, side * values[..., 1] / up, np.zeros(up.shape)], axis=-1)
+    return np.asarray(slopes, np.float32)
+
+
+def bake_frames(
+    vertices: Floats64, faces: NDArray[np.int64], uv: Floats64, side: int, padding: int
+) -> NDArray[np.float64]:
+    """Return where each texel's columns go on the surface, where its rows go up, and the way out, (side, side, 3, 3)."""
+    normals = find_normals(vertices, faces)
+    tangents = find_tangents(vertices, faces, uv, normals)
+    values = bake_values(np.concatenate([normals, tangents], axis=1), faces, uv, side, padding)[0]
+    out, along = _scale(values[..., :3]), _scale(values[..., 3:6])
+    up = _scale(np.cross(out, along)) * np.where(values[..., 6:] < 0, -1.0, 1.0)
+    return np.stack([along, up, out], axis=-2)
+
+
+def carve(slopes: NDArray[np.float64], frames: NDArray[np.float64]) -> Floats:
+    """Return normals (N, 3) in frames (N, 3, 3) of a surface with slopes (N, 3) in space."""
+    out = frames[:, 2]
+    tilted = _scale(out - (slopes - (slopes * out).sum(axis=1, keepdims=True) * out))
+    # The frame need not be square: what it makes of the answer is to be the normal.
+    along, up = frames[:, 0], frames[:, 1]
+    volume = (along * np.cross(up, out)).sum(axis=1, keepdims=True)
+    parts = [(tilted * np.cross(a, b)).sum(axis=1) for a, b in ((up, out), (out, along), (along, up))]
+    sign = np.where(volume < 0, -1.0, 1.0)
+    return np.asarray(_scale(np.stack(parts, axis=1) * sign), np.float32)
+
+
+def _scale(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(vectors / np.maximum(np.sqrt((vectors**2).sum(axis=-1, keepdims=True)), 1e-12))
