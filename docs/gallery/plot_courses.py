@@ -1,0 +1,27 @@
+"""
+A wall in other courses
+=======================
+
+A layout may be drawn. Bricks take the places of stones in courses of three heights, each brick whole, with joints as
+wide as they were.
+"""
+
+import matplotlib.pyplot as plt
+
+import texrs
+
+wall = texrs.Elements.of_sample(texrs.samples.bricks((192, 192)))
+courses = texrs.layouts.courses((240, 320), [20, 34, 26], 52, vary=0.4, seed=1)
+built = texrs.splice(wall, courses, (240, 320), layout_scale=1, seed=2).image
+
+figure, row = plt.subplots(1, 3, width_ratios=[192, 320, 320], figsize=(11, 3.4), layout="constrained")
+shown = {
+    "a wall": wall.image,
+    "courses": courses.image,
+    "built of its bricks": built,
+}
+for axes, (title, picture) in zip(row, shown.items(), strict=True):
+    axes.imshow(picture, cmap="gray")
+    axes.set_title(title)
+    axes.set_axis_off()
+plt.show()

@@ -1,0 +1,28 @@
+"""
+Scattered over a ground
+=======================
+
+Things of one picture are scattered over another, each whole, as densely as a map says: buttons over a cloth, more of
+them to the right. What was asked and what was reached stands in the report.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import texrs
+
+cloth, buttons = texrs.samples.weave((192, 192)).image, texrs.samples.dots((192, 192)).image
+density = np.linspace(0, 0.5, 360)[np.newaxis] * np.ones((240, 1))
+result = texrs.design([cloth, buttons], (240, 360), density=density, seed=5)
+
+figure, row = plt.subplots(1, 3, width_ratios=[192, 192, 360], figsize=(11, 3.2), layout="constrained")
+shown = {
+    "the ground": cloth,
+    "what is scattered": buttons,
+    "more to the right": result.image,
+}
+for axes, (title, picture) in zip(row, shown.items(), strict=True):
+    axes.imshow(picture)
+    axes.set_title(title)
+    axes.set_axis_off()
+plt.show()

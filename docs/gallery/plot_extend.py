@@ -1,0 +1,27 @@
+"""
+More of the floor
+=================
+
+A photograph of a plane goes on to both sides, in its own perspective. Nothing that was there changes.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import texrs
+
+floor = texrs.samples.tilted_bricks((224, 256)).image
+wider = texrs.extend(floor, left=48, right=144, seed=1).image
+frame = np.full(wider.shape, 255, np.uint8)
+frame[:, 48:304] = floor
+
+figure, row = plt.subplots(1, 2, figsize=(11, 3.5), layout="constrained")
+shown = {
+    "as it was seen": frame,
+    "and what lies around it": wider,
+}
+for axes, (title, picture) in zip(row, shown.items(), strict=True):
+    axes.imshow(picture)
+    axes.set_title(title)
+    axes.set_axis_off()
+plt.show()

@@ -1,0 +1,33 @@
+"""
+Bark turned by a field
+======================
+
+A frame says where the axes of the example go. Drawn are its axes at some places, and the bark that was grown along
+them.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import texrs
+from texrs import fields
+
+bark = texrs.samples.bark((128, 128)).image
+field = fields.spiral(40, axes=2).over((300, 300))
+grown = texrs.synthesize(bark, 300, field=field, seed=1).image
+at = np.stack(np.mgrid[18:300:33, 18:300:33], axis=-1).reshape(-1, 2).astype(float)
+frames = field.frames(at)
+
+figure, row = plt.subplots(1, 3, width_ratios=[128, 300, 300], figsize=(11, 4.4), layout="constrained")
+shown = {
+    "the example": bark,
+    "where its axes go": np.full((300, 300, 3), 255),
+    "grown": grown,
+}
+for axis, colour in enumerate(("tab:red", "tab:blue")):
+    row[1].quiver(at[:, 1], at[:, 0], frames[:, 1, axis], frames[:, 0, axis], angles="xy", color=colour, scale=14)
+for axes, (title, picture) in zip(row, shown.items(), strict=True):
+    axes.imshow(picture)
+    axes.set_title(title)
+    axes.set_axis_off()
+plt.show()

@@ -1,0 +1,29 @@
+"""
+Two textures by a map
+=====================
+
+Two examples share a picture as a map says. Things of one lie whole on the other: the border between them follows
+outlines, not the map's edge.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import texrs
+
+pebbles, leaves = texrs.samples.pebbles((192, 192)).image, texrs.samples.leaves_and_flowers((192, 192)).image
+rows, columns = np.mgrid[:288, :400]
+path = np.abs(rows - 144 - 70 * np.sin(columns / 64)) < 48
+result = texrs.design([leaves, pebbles], path.shape, weights=path.astype(int), seed=2)
+
+figure, row = plt.subplots(1, 3, width_ratios=[192, 192, 400], figsize=(11, 3.2), layout="constrained")
+shown = {
+    "leaves": leaves,
+    "pebbles": pebbles,
+    "a path": result.image,
+}
+for axes, (title, picture) in zip(row, shown.items(), strict=True):
+    axes.imshow(picture)
+    axes.set_title(title)
+    axes.set_axis_off()
+plt.show()

@@ -1,0 +1,35 @@
+"""
+What a source map says
+======================
+
+A result is not an image: for each pixel it says where in the example it comes from. Neighbours that come from
+neighbours belong to one patch; where that ends there is a seam.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import texrs
+
+pebbles = texrs.samples.pebbles((160, 160)).image
+result = texrs.design(pebbles, (200, 260), seed=9)
+rows, columns = np.moveaxis(result.source.coordinates, -1, 0) / 160
+where = np.stack([rows, columns, 0.7 - 0.5 * (rows + columns) / 2], axis=-1)
+seams = ~(result.source.continues(0, wrap=True) & result.source.continues(1, wrap=True))
+drawn = np.where(seams[..., np.newaxis], [255, 255, 255], result.image // 2)
+ramp = np.stack([*np.mgrid[:1:160j, :1:160j], np.zeros((160, 160))], axis=-1)
+ramp[..., 2] = 0.7 - 0.25 * ramp[..., :2].sum(axis=-1)
+
+figure, row = plt.subplots(1, 5, width_ratios=[160, 160, 260, 260, 260], figsize=(11, 2.4), layout="constrained")
+shown = {
+    "the example": pebbles,
+    "its places": ramp,
+    "the result": result.image,
+    "where each pixel is from": np.clip(where, 0, 1),
+    "seams": drawn,
+}
+for axes, (title, picture) in zip(row, shown.items(), strict=True):
+    axes.imshow(picture)
+    axes.set_title(title)
+    axes.set_axis_off()
+plt.show()

@@ -1,0 +1,25 @@
+"""
+Corner tiles
+============
+
+An endless design in the memory of one picture: square tiles whose corners have colours, laid so that colours meet. Each
+meets all others without a seam, and any window is a look-up.
+"""
+
+import matplotlib.pyplot as plt
+
+import texrs
+
+tiles = texrs.TileSet(texrs.samples.leaves_and_flowers((256, 256)).image, 128, seed=1)
+window = tiles[10**9 : 10**9 + 288, 0:480]
+
+figure, row = plt.subplots(1, 2, width_ratios=[288, 480], figsize=(11, 4.2), layout="constrained")
+shown = {
+    "the atlas of tiles": tiles.atlas,
+    "a window, far out": window,
+}
+for axes, (title, picture) in zip(row, shown.items(), strict=True):
+    axes.imshow(picture)
+    axes.set_title(title)
+    axes.set_axis_off()
+plt.show()
