@@ -10,6 +10,8 @@ RUST := Cargo.toml $(shell find rust -name '*.rs')
 
 .PHONY: help demo test test-rust test-python fuzz lint lint-rust lint-python format bench wheel docs clean requirements
 .DELETE_ON_ERROR:
+# Compilers count the processors themselves: what make says of its own jobs is not for them.
+unexport MAKEFLAGS
 
 help:
 	@echo "make demo    pictures of every system at work on built-in examples: demo/index.html"
@@ -43,14 +45,15 @@ demo: $(VENV)/.built
 	@echo "Open demo/index.html in a browser."
 
 # All Rust tests are in the library: to build it once more for others would take a minute. Workers share the processors: were
-# each to have threads for matrices too, these would wait for each other.
+# each to have threads for matrices too, these would wait for each other. Dozens of processes start: byte code is kept for them,
+# whatever the environment says.
 test: test-rust test-python
 
 test-rust: | requirements
 	cargo test --quiet --lib
 
 test-python: $(VENV)/.built
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal -q
+	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal -q
 
 # Rounds with a seed each, until one fails or the time is up; with a SEED, the round of that seed.
 fuzz: $(VENV)/.built
