@@ -4,7 +4,6 @@ import errno
 import hashlib
 import json
 import os
-import signal
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 import pytest
 
 import texrs
+from lazy_work import WEAVE, die, kill_once, outer, vary
 from texrs import fields, lazy, samples
 from texrs._chunks import store as stores
 from texrs._chunks.grid import Grid
@@ -25,7 +25,6 @@ zarr = pytest.importorskip("zarr")
 import dask  # noqa: E402
 from distributed import Client, LocalCluster  # noqa: E402
 
-WEAVE = samples.weave((48, 64)).image
 STRIPES = samples.stripes((32, 32, 32)).image[:24, :24, :24]
 MATERIAL = {"albedo": WEAVE, "height": WEAVE[..., 1].astype(np.float32) / 255, "labels": WEAVE[..., 0] > 99}
 PLANE = texrs.PlaneTexture(WEAVE, seed=3, field=fields.circular(centre=(-30, 10), axes=2))
@@ -119,7 +118,8 @@ def test_source_maps_are_looked_up_lazily() -> None:
 def test_source_maps_are_looked_up_into_a_store(tmp_path: Path, scheduler: int | None) -> None:
     made = texrs.synthesize(WEAVE, (70, 90), field=fields.circular(axes=2), seed=1)
     other = WEAVE.astype(np.float32) / 7
-    for options in ({}, {"antialias": True}, {"interpolation": "nearest"}):
+    each: list[dict[str, Any]] = [{}, {"antialias": True}, {"interpolation": "nearest"}]
+    for options in each[1:2] if scheduler else each:
         store = tmp_path / f"{len(options)}{'nearest' in options.values()}.zarr"
         done = made.source.to_zarr(store, other, 32, scheduler=scheduler, **options)
         assert (done.shape, done.made) == ((70, 90, 3), done.chunks)
@@ -271,15 +271,6 @@ def _full(*given: Any, **more: Any) -> int:
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-def kill_once(mark: Path, points: np.ndarray) -> np.ndarray:
-    """A field whose first worker is killed in the middle of its work."""
-    if points[:, 0].max() > 60 and not mark.exists():
-        mark.touch()
-        if os.environ.get("TEXRS_TEST_MAY_DIE"):
-            os.kill(os.getpid(), signal.SIGKILL)
-    return np.broadcast_to(np.eye(2), (len(points), 2, 2))
-
-
 @pytest.mark.parametrize("how", ["processes", "cluster"])
 def test_a_worker_is_killed_and_the_store_is_complete(
     how: str, tmp_path: Path, client: Client, monkeypatch: pytest.MonkeyPatch
@@ -300,13 +291,6 @@ def test_a_worker_is_killed_and_the_store_is_complete(
 # --- results of any function -----------------------------------------------------------------------------------------
 
 
-def vary(seed: int, log: Path | None = None) -> texrs.Synthesis:
-    if log is not None:
-        with log.open("a") as file:
-            file.write(f"{seed}\n")
-    return texrs.synthesize(WEAVE, 32, seed=seed)
-
-
 @pytest.mark.parametrize("how", [None, 2, "cluster"])
 def test_each_item_is_computed_once(how: Any, tmp_path: Path, client: Client) -> None:
     log = tmp_path / "log"
@@ -321,12 +305,6 @@ def test_each_item_is_computed_once(how: Any, tmp_path: Path, client: Client) ->
     (Path(done.path) / "image" / "c" / "5" / "0" / "0" / "0").unlink()
     assert lazy.map(vary, items, tmp_path / "v.zarr", scheduler=scheduler).made == 1
     assert log.read_text().split().count("5") == 2
-
-
-def outer(row: int, column: int) -> dict[str, np.ndarray]:
-    if (row, column) == (1, 1):
-        raise ValueError("not this one")
-    return {"sum": np.array([row + column]), "rows": np.full((2, 3), row, np.float32)}
 
 
 def test_a_matrix_of_several_maps_and_one_that_fails(tmp_path: Path) -> None:
@@ -348,12 +326,6 @@ def test_results_of_other_shapes_are_named(tmp_path: Path) -> None:
         lazy.map(np.zeros, [2, 2], tmp_path / "m.zarr")
     lazy.map(lambda n: np.full(2, n), [1, 2], tmp_path / "l.zarr", scheduler=2)  # Sent by cloudpickle.
     assert lazy.open(tmp_path / "l.zarr").compute().tolist() == [[1, 1], [2, 2]]
-
-
-def die(number: int) -> np.ndarray:
-    if number == 3:
-        os.kill(os.getpid(), signal.SIGKILL)
-    return np.zeros(1)
 
 
 def test_what_always_ends_its_worker_is_said(tmp_path: Path) -> None:

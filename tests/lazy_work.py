@@ -1,0 +1,40 @@
+"""What workers do in the tests of what is past one process: each worker imports this, and so no more than this."""
+
+import os
+import signal
+from pathlib import Path
+
+import numpy as np
+
+import texrs
+from texrs import samples
+
+WEAVE = samples.weave((48, 64)).image
+
+
+def kill_once(mark: Path, points: np.ndarray) -> np.ndarray:
+    """A field whose first worker is killed in the middle of its work."""
+    if points[:, 0].max() > 60 and not mark.exists():
+        mark.touch()
+        if os.environ.get("TEXRS_TEST_MAY_DIE"):
+            os.kill(os.getpid(), signal.SIGKILL)
+    return np.broadcast_to(np.eye(2), (len(points), 2, 2))
+
+
+def vary(seed: int, log: Path | None = None) -> texrs.Synthesis:
+    if log is not None:
+        with log.open("a") as file:
+            file.write(f"{seed}\n")
+    return texrs.synthesize(WEAVE, 32, seed=seed)
+
+
+def outer(row: int, column: int) -> dict[str, np.ndarray]:
+    if (row, column) == (1, 1):
+        raise ValueError("not this one")
+    return {"sum": np.array([row + column]), "rows": np.full((2, 3), row, np.float32)}
+
+
+def die(number: int) -> np.ndarray:
+    if number == 3:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return np.zeros(1)
