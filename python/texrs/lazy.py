@@ -21,7 +21,7 @@ lessen it, for more memory.
 See Also
 --------
 texrs.SolidTexture.to_dask, texrs.SolidTexture.to_zarr : Parts of unbounded textures of any size.
-texrs.SourceMap.to_dask : Maps of a result, looked up where they are asked for.
+texrs.SourceMap.to_dask, texrs.SourceMap.to_zarr : Maps of a result, looked up where they are asked for.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from typing import Any
 
 from texrs._chunks.items import Failed, map_items
 from texrs._chunks.store import Stored, import_zarr
+from texrs._chunks.words import share_words
 from texrs._chunks.workers import WorkerLost
 from texrs._typing import Path, Progress
 from texrs.errors import FileError, InvalidInput
@@ -43,6 +44,7 @@ def __dir__() -> list[str]:
     return __all__
 
 
+@share_words
 def map(
     function: Callable[..., Any],
     items: Sequence[Any],
@@ -74,14 +76,14 @@ def map(
     key : str, optional
         Says what is computed; by default a digest of the function and the items. A store of another is refused.
     scheduler : None, int, str or distributed.Client
-        Who computes. None: this process. A number: so many processes of this machine, which a script must start under
-        ``if __name__ == "__main__":``. An address, or a client: the workers of that cluster.
+        Who computes.
+        {scheduler}
     threads : int, optional
-        Of each worker; by default the cores are shared out.
+        {threads}
     overwrite : bool
-        Whether what is there, and is not of the same, is replaced.
+        {overwrite}
     progress : callable or True, optional
-        Called with the stage and the share of it that is done; raising stops the work. True shows a bar.
+        {progress}
 
     Returns
     -------

@@ -13,6 +13,7 @@ from texrs._chunks.flat import HEADER, RAW, Filled, fill
 from texrs._chunks.grid import Grid
 from texrs._chunks.reading import Reader
 from texrs._chunks.store import Stored, write_image
+from texrs._chunks.words import share_words
 from texrs._typing import Path, Progress
 from texrs.errors import InvalidInput
 from texrs.io import atomic
@@ -57,6 +58,7 @@ class InParts(ABC):
     def read_part(self, origin: int | Sequence[int], shape: int | Sequence[int]) -> Part:
         """Check where a part begins, and that it lies within the world; return what reads it."""
 
+    @share_words
     def to_dask(
         self,
         shape: int | Sequence[int],
@@ -79,7 +81,7 @@ class InParts(ABC):
         origin : int, or one an axis
             First voxel, of the world.
         map : str, optional
-            Of a material, the map; by default the one that shows it.
+            {map}
 
         Returns
         -------
@@ -105,6 +107,7 @@ class InParts(ABC):
         part = self.read_part(origin, shape)
         return make_dask(part.reader, shape, chunks, self.axes, part.name(map))
 
+    @share_words
     def to_zarr(
         self,
         path: Path,
@@ -133,24 +136,24 @@ class InParts(ABC):
         shape : int, or one an axis
             Voxels along each axis.
         chunks : int, or one an axis, optional
-            Of a chunk; 512 each in pictures and 128 in volumes by default.
+            {chunks}
         origin : int, or one an axis
             First voxel, of the world.
         levels : int, optional
-            How many resolutions, each half of the one before; by default until one chunk holds all.
+            {levels}
         spacing : sequence of float, optional
             Of voxels along each axis, 1 by default.
         unit : str, optional
-            Of the spacing, such as "micrometer".
+            {unit}
         scheduler : None, int, str or distributed.Client
-            Who makes the chunks. None: this process. A number: so many processes of this machine, which a script must start
-            under ``if __name__ == "__main__":``. An address, or a client: the workers of that cluster.
+            Who makes the chunks.
+            {scheduler}
         threads : int, optional
-            Of each worker; by default the cores are shared out.
+            {threads}
         overwrite : bool
-            Whether what is there, and is not of the same, is replaced.
+            {overwrite}
         progress : callable or True, optional
-            Called with the stage and the share of it that is done; raising stops the work. True shows a bar.
+            {progress}
 
         Returns
         -------
@@ -193,6 +196,7 @@ class InParts(ABC):
             progress=progress,
         )
 
+    @share_words
     def to_file(
         self,
         path: Path,
@@ -219,20 +223,20 @@ class InParts(ABC):
         shape : int, or one an axis
             Voxels along each axis.
         chunks : int, or one an axis, optional
-            Of a chunk; 512 each in pictures and 128 in volumes by default.
+            {chunks}
         origin : int, or one an axis
             First voxel, of the world.
         map : str, optional
-            Of a material, the map; by default the one that shows it.
+            {map}
         spacing : sequence of float, optional
             Of voxels along each axis, in formats of volumes that keep it, as .raw and .vti do.
         scheduler : None, int, str or distributed.Client
-            Who makes the chunks. None: this process. A number: so many processes of this machine, which a script must start
-            under ``if __name__ == "__main__":``. An address, or a client: the workers of that cluster, on the same disk.
+            Who makes the chunks.
+            {scheduler}
         threads : int, optional
-            Of each worker; by default the cores are shared out.
+            {threads}
         progress : callable or True, optional
-            Called with the stage and the share of it that is done; raising stops the work. True shows a bar.
+            {progress}
 
         Returns
         -------

@@ -16,6 +16,7 @@ from texrs._chunks.dasks import make_dask
 from texrs._chunks.grid import Box
 from texrs._chunks.reading import Channel
 from texrs._chunks.store import IMAGE, Stored, write_image
+from texrs._chunks.words import share_words
 from texrs._typing import Array, Frames, Path, Progress
 from texrs.errors import InvalidInput
 from texrs.source_map._finish import Finish
@@ -182,6 +183,7 @@ class Parted:
         """
         return make_dask(_read_parts(self, exemplars, options), self.shape, chunks, self.axes, IMAGE)
 
+    @share_words
     def to_zarr(
         self,
         path: Path,
@@ -208,21 +210,22 @@ class Parted:
         exemplars : array, or a sequence of one an exemplar
             As for `render`.
         chunks : int, or one an axis, optional
-            Of a chunk; 512 each in pictures and 128 in volumes by default.
+            {chunks}
         levels : int, optional
-            How many resolutions, each half of the one before; by default until one chunk holds all.
+            {levels}
         spacing : sequence of float, optional
             Of pixels along each axis, 1 by default.
         unit : str, optional
-            Of the spacing, such as "micrometer".
+            {unit}
         scheduler : None, int, str or distributed.Client
-            Who looks the chunks up, as in `texrs.lazy.map`; each worker has the map.
+            Who looks the chunks up; each worker has the map.
+            {scheduler}
         threads : int, optional
-            Of each worker; by default the cores are shared out.
+            {threads}
         overwrite : bool
-            Whether what is there, and is not of the same, is replaced.
+            {overwrite}
         progress : callable or True, optional
-            Called with the stage and the share of it that is done; raising stops the work. True shows a bar.
+            {progress}
         **options
             Those of `render`.
 
