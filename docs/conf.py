@@ -7,6 +7,7 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
 from pages import write_pages  # noqa: E402
+from strips import write_strips  # noqa: E402
 
 import texrs  # noqa: E402
 
@@ -68,4 +69,5 @@ sphinx_gallery_conf = {
     "abort_on_example_error": True,
 }
 
+write_strips(HERE / "generated")
 write_pages(HERE)

@@ -116,8 +116,8 @@ def list_words(architecture: Path) -> str:
 
 COMPARED = """
 Each of ten pictures, of {side} pixels a side, by what texrs has for three tasks, and by what others have that is installed
-where this page was made. The pictures stand in [the page of the comparison](./shown/comparison.html), which this command
-writes:
+where this page was made. The pictures stand in <a href="../shown/comparison.html">the page of the comparison</a>, which this
+command writes:
 
 ```sh
 texrs compare -o comparison.html

@@ -1,11 +1,14 @@
-"""The commands that the README and the first pages of the documentation show are run as they stand, one after the other."""
+"""The commands that the README, the first pages and the guides show are run as they stand, one after the other."""
 
 import re
 import shlex
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import texrs
+from texrs import io, samples
 from texrs.cli import main
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -26,6 +29,47 @@ def test_commands_are_run_as_they_stand(page: str, tmp_path: Path, monkeypatch: 
     assert commands
     for command in commands:
         assert main(shlex.split(command)[1:]) == 0, command
+
+
+GUIDES = sorted(
+    path.stem for path in (ROOT / "docs" / "guides").glob("*.md") if "\ntexrs " in path.read_text(encoding="utf-8")
+)
+
+
+@pytest.fixture(scope="module")
+def examples(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder that guides start from: all samples, the generated ones smaller than they are written for a reader."""
+    folder = tmp_path_factory.mktemp("guides")
+    solid = ["particles", "stripes", "weave_solid", "wood_solid"]
+    planar = [name for name in samples.names() if name not in solid]
+    out = str(folder / "pictures")
+    assert main(["samples", *planar, "-o", out, "--size", "128", "-q"]) == 0
+    assert main(["samples", *solid, *samples.photographs(), "-o", out, "-q"]) == 0
+    # What a reader draws: a mask by each name that guides have for one, and the maps of a material.
+    hole = np.zeros((128, 128), np.uint8)
+    hole[48:80, 44:70] = 255
+    ground = np.full((128, 128), 255, np.uint8)
+    for name, mask in (("hole", hole), ("thing", hole), ("ground", ground)):
+        io.write(folder / f"{name}.png", mask)
+    pebbles = samples.pebbles((96, 96)).image
+    texrs.Material({"albedo": pebbles, "height": pebbles[..., 1].astype("float32")}).save(folder / "rock")
+    return folder
+
+
+@pytest.mark.parametrize("guide", GUIDES)
+def test_commands_of_guides_are_run_as_they_stand(
+    guide: str, examples: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = f"docs/guides/{guide}.md"
+    for each in examples.iterdir():
+        (tmp_path / each.name).symlink_to(each)
+    monkeypatch.chdir(tmp_path)
+    recipes = re.findall(r"^```toml\n(.*?)^```", (ROOT / page).read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    for recipe in recipes:
+        Path("stones.toml").write_text(recipe, encoding="utf-8")
+    for command in list_commands(page):
+        if not command.startswith("texrs samples"):
+            assert main([*shlex.split(command)[1:], "-q"][: None if "info" not in command else -1]) == 0, command
 
 
 def test_the_readme_is_short() -> None:
