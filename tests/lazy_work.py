@@ -38,3 +38,10 @@ def die(number: int) -> np.ndarray:
     if number == 3:
         os.kill(os.getpid(), signal.SIGKILL)
     return np.zeros(1)
+
+
+def end(number: int) -> int:
+    """Ends its worker, while others wait behind it."""
+    if number in (2, 5):
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number * number

@@ -3,6 +3,10 @@
 import errno
 import os
 import re
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -86,6 +90,34 @@ def test_files_by_workers_and_after_a_stop(
     assert "3 chunks, of which 2 were there" in capsys.readouterr().err
     whole = np.fromfile(files / name, np.uint8)[-(24**3) * 3 :].reshape(24, 24, 24, 3)
     assert np.array_equal(whole, texture[0:24, 0:24, 0:24])
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_workers_of_a_run_that_ends_end_too_and_the_store_is_gone_on_with(files: Path, number: int) -> None:
+    """Ctrl-C reaches all processes of a terminal; a run that is killed takes its workers along."""
+    words = ["synthesize", f"{files}/weave.png", "--size", "130", "--chunks", "16", "--seed", "3", "-o"]
+
+    def heed() -> None:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    command = [sys.executable, "-m", "texrs", *words, f"{files}/a.zarr", "--workers", "2", "-q"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, preexec_fn=heed, start_new_session=True) as process:
+        while process.poll() is None and len(list(files.glob("a.zarr/0/c/*/*/*"))) < 3:
+            time.sleep(0.01)
+        if number == signal.SIGINT:
+            os.killpg(process.pid, number)
+        else:
+            process.send_signal(number)
+        assert process.stderr is not None
+        rest = process.stderr.read().decode()  # Ends when the last worker has.
+    assert process.returncode == (130 if number == signal.SIGINT else -9)
+    assert "Traceback" not in rest
+    there = {p: p.stat().st_mtime_ns for p in files.glob("a.zarr/0/c/*/*/*") if p.name.isdigit()}
+    assert 3 <= len(there) < 81
+    assert main([*words, f"{files}/a.zarr", "-q"]) == 0
+    assert {p: p.stat().st_mtime_ns for p in there} == there
+    assert np.array_equal(lazy.open(files / "a.zarr").compute(), texrs.PlaneTexture(WEAVE, seed=3)[0:130, 0:130])
 
 
 def test_what_has_no_room_is_said_before_the_work(

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 import texrs
-from lazy_work import WEAVE, die, kill_once, outer, vary
+from lazy_work import WEAVE, die, end, kill_once, outer, vary
 from texrs import fields, lazy, samples
 from texrs._chunks import store as stores
+from texrs._chunks import workers
 from texrs._chunks.grid import Grid
 from texrs._chunks.pyramid import count_levels, halve_block
 from texrs.errors import FileError, InvalidInput
@@ -331,6 +332,14 @@ def test_results_of_other_shapes_are_named(tmp_path: Path) -> None:
 def test_what_always_ends_its_worker_is_said(tmp_path: Path) -> None:
     with pytest.raises(lazy.WorkerLost, match="ended 3 workers"):
         lazy.map(die, range(5), tmp_path / "d.zarr", scheduler=2)
+
+
+def test_what_ends_its_worker_stops_no_other_where_that_is_asked_for() -> None:
+    """Those that wait at a worker that ends are not to blame, however often it does."""
+    found = dict(workers.run(end, range(8), 1, spare=True))
+    assert {n: r for n, r in found.items() if n not in (2, 5)} == {n: n * n for n in range(8) if n not in (2, 5)}
+    assert all(isinstance(found[n], lazy.WorkerLost) for n in (2, 5))
+    assert "task 2: ended 3 workers" in str(found[2])
 
 
 def test_wrong_arguments(tmp_path: Path) -> None:
