@@ -74,6 +74,7 @@ lint-rust: | requirements
 	cargo fmt --check
 	cargo clippy --all-targets --quiet --features python -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --quiet --features python
+	$(PYTHON) .ci/third-party --check
 
 lint-python: $(VENV)/.built
 	$(BIN)/ruff format --check .
