@@ -82,6 +82,36 @@ def npz(members):
     return file.getvalue()
 
 
+def zeros(count, step=2**20):
+    """So many zeros, deflated, for they are the same piece again and again."""
+    packer = zlib.compressobj(9, zlib.DEFLATED, -15)
+    packer.compress(bytes(step)), packer.flush(zlib.Z_FULL_FLUSH)
+    piece = packer.compress(bytes(step)) + packer.flush(zlib.Z_FULL_FLUSH)
+    return piece * (count // step) + packer.compress(bytes(count % step)) + packer.flush()
+
+
+def npz_bomb(members, packing=zipfile.ZIP_DEFLATED):
+    """An archive of zeros, of shape and dtype by name, that unfold to whatever these say; its checksums are wrong."""
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w") as archive:
+        for name, (shape, dtype) in members.items():
+            head = npy(f"{{'descr': {np.dtype(dtype).str!r}, 'fortran_order': False, 'shape': {shape}}}")
+            size = int(np.prod(shape, dtype=object)) * np.dtype(dtype).itemsize
+            # The first bytes lie in a block of deflate of their own that is not compressed.
+            stored = b"\0" + struct.pack("<HH", len(head), len(head) ^ 0xFFFF) + head
+            data = stored + zeros(size)
+            info = zipfile.ZipInfo(f"{name}.npy")
+            at = file.tell()
+            archive.writestr(info, data)
+            info.compress_type, info.file_size = packing, len(head) + size
+            # What the archive says of it before it, too.
+            end = file.tell()
+            file.seek(at)
+            file.write(info.FileHeader(False))
+            file.seek(end)
+    return file.getvalue()
+
+
 def mutations(file, count, rng):
     """Return corrupt versions of a file: changed, cut, doubled, blanked; half in the header."""
     for _ in range(count):

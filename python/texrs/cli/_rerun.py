@@ -345,10 +345,10 @@ def describe_elements(file: str) -> list[str]:
 
 def describe_arrays(file: str) -> list[str]:
     """Return a line an array; a single one with two axes, or with three, is a picture."""
-    arrays = io.read_arrays(file)
+    arrays = io.read_headers(file)
     if len(arrays) == 1 or "image" in arrays:
         raise FileError(f"{file}: holds one array")
-    return [f"{name}: {' x '.join(map(str, array.shape))}, {array.dtype}" for name, array in arrays.items()]
+    return [f"{name}: {' x '.join(map(str, array.shape or (1,)))}, {array.dtype}" for name, array in arrays.items()]
 
 
 COMMANDS: dict[str, Callable[..., None]] = {"info": info_command, "rerun": rerun_command}

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import prod
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_image, as_wrap
+from texrs._arrays import MAX_PIXELS, as_image, as_wrap
 from texrs._engine.coherence import Similarity
 from texrs._show import as_png
 from texrs._typing import Array, Labels, Path
@@ -24,12 +25,16 @@ from texrs.elements._layout import Layout, LayoutName
 from texrs.errors import FileError, InvalidInput
 from texrs.exemplar import Exemplar
 from texrs.exemplar.shapes import mark_outlines
-from texrs.io import atomic, read_arrays
+from texrs.io import Header, atomic, read_arrays
 from texrs.samples import Sample
 
 FORMAT = 2
 """Of the file, and of what the analysis finds: an entry of another version is refused, and remade by a database."""
 MARK = "texrs_elements"
+WORDS = (MARK, "hash", "box", "layout", "directions", "wrap", "report", "numbers")
+"""What a file says beside arrays as large as the image."""
+LONGEST, CHANNELS, SIMILAR = 2**26, 64, 16
+"""Bytes of one of them, channels of an image, and members of a similarity set, at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -311,9 +316,13 @@ def load(path: Path) -> Elements:
         Not there, no entry, of another version, or damaged.
 
     """
-    parts = read_arrays(path)
-    if MARK not in parts:
-        raise FileError(f"{path}: is no entry of a texture's elements")
+
+    def choose(headers: Mapping[str, Header]) -> list[str]:
+        if MARK not in headers:
+            raise FileError(f"{path}: is no entry of a texture's elements")
+        return choose_parts(headers, path)
+
+    parts = read_arrays(path, choose=choose)
     version = parts[MARK].ravel().tolist()
     if version != [FORMAT]:
         raise FileError(
@@ -364,6 +373,22 @@ def load(path: Path) -> Elements:
         )
     except (InvalidInput, KeyError, TypeError, ValueError, OverflowError) as error:
         raise FileError(f"{path}: is damaged ({' '.join(str(error).split())})") from None
+
+
+def choose_parts(headers: Mapping[str, Header], path: Path) -> list[str]:
+    """Return which arrays of a file make an entry, none of which is larger than the image says, before any is read."""
+    shape = headers["image"].shape if "image" in headers else ()
+    pixels = prod(shape[:2])
+    if len(shape) not in (2, 3) or not 0 < pixels <= MAX_PIXELS or prod(shape[2:]) > CHANNELS:
+        raise FileError(f"{path}: is damaged (an image of shape {shape})")
+    # No more elements than pixels; and what is said in words.
+    one = {"mask": 1, "points": 16, "scores": 8, "angles": 8, "scales": 8, "known": 8, "sets": 8 * SIMILAR}
+    most = {name: size * pixels for name, size in one.items()} | {"image": headers["image"].size}
+    chosen = [name for name in headers if name in most or name in WORDS]
+    for name in chosen:
+        if headers[name].size > most.get(name, LONGEST):
+            raise FileError(f"{path}: is damaged ({name} of {headers[name].dtype}, shape {headers[name].shape})")
+    return chosen
 
 
 def _encode_text(words: str) -> Array:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import cached_property
+from math import prod
 from pathlib import Path as FilePath
-from typing import Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
-from texrs._arrays import as_image, as_int, as_ndarray, as_wrap, guidance, to_unit
+from texrs._arrays import MAX_PIXELS, as_image, as_int, as_ndarray, as_wrap, guidance, to_unit
 from texrs._cache import Cache, content_hash
 from texrs._engine.coherence import Similarity, find_similar
 from texrs._engine.stitcher import Stitcher
@@ -33,12 +34,17 @@ from texrs.exemplar.segmentation import ElementOptions, Segmentation, segment
 from texrs.exemplar.stitching import guess_instances, make_stitcher
 from texrs.exemplar.symmetry import SUSPECT, Flip, find_mirrors
 
+if TYPE_CHECKING:
+    from texrs.io import Header
+
 T = TypeVar("T")
 
 FORMAT = 2
 CACHED = 256 << 20
 """Bytes of facts that are kept by content; one that is larger is kept alone."""
 _SMALL = 1 << 12
+_ANALYSED, _SAID = 256, 1 << 24
+"""Bytes that the analysis in a file may take a sample, and beside them."""
 
 
 class Exemplar:
@@ -369,7 +375,17 @@ class Exemplar:
         """
         from texrs.io import read_arrays
 
-        arrays = read_arrays(path)
+        def choose(headers: Mapping[str, Header]) -> list[str]:
+            # An analysis takes tens of bytes a sample, of all levels together.
+            size = sum(header.size for name, header in headers.items() if "/" in name)
+            if any(name not in headers for name in ("format", "image", "said")):
+                raise FileError(f"{path}: is no exemplar that was saved")
+            samples, few = prod(headers["image"].shape), max(headers[name].size for name in ("format", "said"))
+            if samples > 4 * MAX_PIXELS or size > _ANALYSED * samples + _SAID or few > _SMALL:
+                raise FileError(f"{path}: is damaged ({samples} samples, {size} bytes of analysis)")
+            return [name for name in headers if "/" in name or name in ("format", "image", "said")]
+
+        arrays = read_arrays(path, choose=choose)
         try:
             if int(arrays.get("format", np.array(-1)).reshape(())) != FORMAT:
                 raise FileError(f"{path}: not an exemplar of this version of texrs")

@@ -60,11 +60,12 @@ from texrs.io._files import atomic, find_suffix
 from texrs.io._formats import FORMATS, STORE, VOLUMES, as_spacing, check, detect_kind
 from texrs.io._grids import READERS, read_numpy, read_spacing
 from texrs.io._notes import Notes
-from texrs.io._npy import read_arrays
+from texrs.io._npy import Header, read_arrays, read_headers
 from texrs.io._stores import is_store
 from texrs.io._vectors import read_vectors
 
 __all__ = [
+    "Header",
     "Notes",
     "annotate",
     "atomic",
@@ -73,6 +74,7 @@ __all__ = [
     "read_arrays",
     "read_description",
     "read_fov",
+    "read_headers",
     "read_notes",
     "read_spacing",
     "read_vectors",

@@ -15,6 +15,8 @@ from texrs.io._formats import detect_kind
 
 __all__ = ["READERS", "VECTORS", "read_numpy", "read_spacing"]
 
+_MOST_CHANNELS = 4096
+
 Reader = Callable[[Path, int], Array]
 """Returns what a file holds, if it is within a limit of samples."""
 
@@ -26,14 +28,19 @@ def _read_tiff(name: Path, limit: int) -> Array:
 
 def read_numpy(name: Path, kind: str, limit: int, axes: int) -> Array:
     """Return an image or a volume from a file of NumPy."""
-    array = _npy.read_npy(name, limit) if kind == "npy" else _npy.read_npz(name, limit)
-    if array.ndim not in (axes, axes + 1):
-        what = ("an image is (H, W) or (H, W, C)", "a volume is (D, H, W) or (D, H, W, C)")[axes - 2]
-        hint = "; texrs.io.read_volume reads volumes" if axes == 2 and array.ndim == 4 else ""
-        raise FileError(f"{name}: holds an array of shape {array.shape}; {what}{hint}")
-    channels = array.shape[axes] if array.ndim > axes else 1
-    _files.check_size(name, array.shape[:axes], channels, array.itemsize, limit)
-    return array
+
+    def check(header: _npy.Header) -> None:
+        shape = header.shape
+        if len(shape) not in (axes, axes + 1):
+            what = ("an image is (H, W) or (H, W, C)", "a volume is (D, H, W) or (D, H, W, C)")[axes - 2]
+            hint = "; texrs.io.read_volume reads volumes" if axes == 2 and len(shape) == 4 else ""
+            raise FileError(f"{name}: holds an array of shape {shape}; {what}{hint}")
+        channels = shape[axes] if len(shape) > axes else 1
+        if channels > _MOST_CHANNELS:
+            raise FileError(f"{name}: shape {shape} has {channels} channels, up to {_MOST_CHANNELS} are read")
+        _files.check_size(name, shape[:axes], channels, header.dtype.itemsize, limit)
+
+    return (_npy.read_npy if kind == "npy" else _npy.read_npz)(name, limit, check)
 
 
 READERS: dict[str, Reader] = {

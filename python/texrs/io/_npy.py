@@ -1,18 +1,20 @@
-"""NumPy's own files, by a reader that never unpickles and checks the header before using memory."""
+"""NumPy's own files, by a reader that never unpickles and checks the headers before using memory."""
 
 from __future__ import annotations
 
 import ast
 import re
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from math import prod
 from pathlib import Path
 from typing import BinaryIO, cast
 
 import numpy as np
 
-from texrs._checks import MAX_PIXELS
+from texrs._checks import MAX_PIXELS, check_memory
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, LimitExceeded
@@ -24,48 +26,109 @@ MAGIC = b"\x93NUMPY"
 _LONGEST_HEADER = 10_000
 _NUMBERS = re.compile(r"[<>=|]?(b1|[ui][1248]|f[248])")
 _KEY = "image"
+_PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+"""How NumPy packs arrays. What is packed otherwise Python unpacks whole, however little of it is asked for."""
 
 
-def read_npy(path: Path, limit: int) -> Array:
-    """Read an .npy file."""
+@dataclass(frozen=True, slots=True)
+class Header:
+    """What a file of NumPy says of an array."""
+
+    shape: tuple[int, ...]
+    dtype: np.dtype[np.generic]
+    fortran: bool
+    """Whether the first axis runs fastest."""
+    start: int
+    """Where the samples begin."""
+
+    @property
+    def size(self) -> int:
+        """Bytes of the samples."""
+        return prod(self.shape) * self.dtype.itemsize
+
+
+Choice = Callable[[Mapping[str, Header]], Iterable[str]]
+"""Says which arrays are to be read, by what all are; or raises."""
+
+
+def read_npy(path: Path, limit: int, check: Callable[[Header], object] | None = None) -> Array:
+    """Read an .npy file whose header passes a check."""
     length = check_file(path)
     with translate_errors(path, "reading the array"), path.open("rb") as file:
-        return _read_array(path, file, length, limit)
+        return _read_array(path, file, length, limit, check)
 
 
-def read_npz(path: Path, limit: int) -> Array:
-    """Read the only array of an .npz file, or the one with the key "image"."""
+def read_npz(path: Path, limit: int, check: Callable[[Header], object] | None = None) -> Array:
+    """Read the only array of an .npz file, or the one with the key "image", whose header passes a check."""
     with translate_errors(path, "reading the archive"), zipfile.ZipFile(path) as archive:
         members = [m for m in archive.infolist() if m.filename.endswith(".npy")]
         chosen = [m for m in members if m.filename == f"{_KEY}.npy"] or members
         if len(chosen) != 1:
             keys = ", ".join(m.filename.removesuffix(".npy") for m in members[:8])
             raise FileError(f"{path}: needs a single array, or one with the key {_KEY!r}; has {keys or 'no arrays'}")
-        with archive.open(chosen[0]) as file:
-            return _read_array(path, cast(BinaryIO, file), chosen[0].file_size, limit)
+        with _open_member(path, archive, chosen[0]) as file:
+            return _read_array(path, file, chosen[0].file_size, limit, check)
 
 
-def read_arrays(path: PathLike, *, limit: int = MAX_PIXELS) -> dict[str, Array]:
-    """Return all arrays of an .npz file.
+def read_headers(path: PathLike) -> dict[str, Header]:
+    """Return what the arrays of an .npz file are, without their samples.
 
     Parameters
     ----------
     path : path_like
-        An archive of arrays of numbers, as `numpy.savez` writes it; what would have to be unpickled is refused.
-    limit : int
-        Pixels that each array may have, and a sixteenth of the bytes.
+        An archive of arrays, as `numpy.savez` writes it.
 
     Returns
     -------
-    dict of str to ndarray
+    dict of str to Header
         By key, in the order of the file.
 
     Raises
     ------
     FileError
         Not there, not an archive of arrays, or damaged.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import numpy as np
+    >>> from texrs import io
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "layers.npz")
+    ...     np.savez(path, albedo=np.zeros((2, 2, 3), np.uint8), height=np.ones((2, 2)))
+    ...     {name: (header.shape, str(header.dtype)) for name, header in io.read_headers(path).items()}
+    {'albedo': ((2, 2, 3), 'uint8'), 'height': ((2, 2), 'float64')}
+
+    """
+    place = as_path(path)
+    with _open_archive(place) as archive:
+        return {name: header for name, (_, header) in _find_members(place, archive).items()}
+
+
+def read_arrays(path: PathLike, *, limit: int = MAX_PIXELS, choose: Choice | None = None) -> dict[str, Array]:
+    """Return the arrays of an .npz file.
+
+    Parameters
+    ----------
+    path : path_like
+        An archive of arrays of numbers, as `numpy.savez` writes it; what would have to be unpickled is refused.
+    limit : int
+        Pixels that each array may have, and a sixteenth of the bytes of all.
+    choose : callable, optional
+        Called with the headers (see `read_headers`) before any samples are read; returns the keys of the arrays to be read,
+        and raises whatever it likes of a file that is not what it should be. It may let all of them together have more bytes.
+
+    Returns
+    -------
+    dict of str to ndarray
+        By key, in the order of the file, or in that of the choice.
+
+    Raises
+    ------
+    FileError
+        Not there, not an archive of arrays, or damaged.
     LimitExceeded
-        An array of more than ``limit`` pixels.
+        More bytes than ``limit`` allows, or than the machine has.
 
     Examples
     --------
@@ -80,19 +143,47 @@ def read_arrays(path: PathLike, *, limit: int = MAX_PIXELS) -> dict[str, Array]:
 
     """
     place = as_path(path)
-    length = check_file(place)
-    with translate_errors(place, "reading the archive"), place.open("rb") as file:
+    with _open_archive(place) as archive:
+        members = _find_members(place, archive)
+        headers = {name: header for name, (_, header) in members.items()}
+        names = list(headers if choose is None else choose(headers))
+        size, most = sum(headers[name].size for name in names), limit * BYTES_PER_PIXEL
+        if choose is None and size > most:
+            raise LimitExceeded(f"{place}: its arrays need {size} bytes, more than the limit of {most}")
+        check_memory(size, str(place))
+        arrays = {}
+        for name in names:
+            with _open_member(place, archive, members[name][0]) as stream:
+                arrays[name] = _read_array(place, stream, members[name][0].file_size, limit)
+        return arrays
+
+
+@contextmanager
+def _open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
+    length = check_file(path)
+    with translate_errors(path, "reading the archive"), path.open("rb") as file:
         if file.read(4) != b"PK\x03\x04":
-            raise FileError(f"{place}: is not an .npz file of {length} bytes")
+            raise FileError(f"{path}: is not an .npz file of {length} bytes")
         with zipfile.ZipFile(file) as archive:
-            arrays = {}
-            for member in archive.infolist():
-                if member.filename == MEMBER:
-                    continue
-                with archive.open(member) as stream:
-                    array = _read_array(place, cast(BinaryIO, stream), member.file_size, limit)
-                    arrays[member.filename.removesuffix(".npy")] = array
-            return arrays
+            yield archive
+
+
+@contextmanager
+def _open_member(path: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Iterator[BinaryIO]:
+    if member.compress_type not in _PACKINGS:
+        raise FileError(f"{path}: {member.filename} is not packed as NumPy packs arrays, by deflate or not at all")
+    with archive.open(member) as stream:
+        yield cast(BinaryIO, stream)
+
+
+def _find_members(path: Path, archive: zipfile.ZipFile) -> dict[str, tuple[zipfile.ZipInfo, Header]]:
+    """Return the arrays of an archive by key, none of whose samples have been read."""
+    found = {}
+    for member in archive.infolist():
+        if member.filename != MEMBER:
+            with _open_member(path, archive, member) as stream:
+                found[member.filename.removesuffix(".npy")] = member, _read_header(path, stream)
+    return found
 
 
 def write_npy(path: Path, array: Array) -> None:
@@ -116,19 +207,24 @@ def write_npz(path: Path, array: Array) -> None:
         np.savez_compressed(file, allow_pickle=False, **{_KEY: array})
 
 
-def _read_array(path: Path, file: BinaryIO, length: int, limit: int) -> Array:
+def _read_array(
+    path: Path, file: BinaryIO, length: int, limit: int, check: Callable[[Header], object] | None = None
+) -> Array:
     """Read what lies in a stream of ``length`` bytes."""
-    shape, fortran, dtype, start = _read_header(path, file)
-    count = prod(shape)
-    if count == 0:
+    header = _read_header(path, file)
+    shape, dtype, size, start = header.shape, header.dtype, header.size, header.start
+    if size == 0:
         raise FileError(f"{path}: holds an empty array of shape {shape}")
+    if check is not None:
+        check(header)
     # Which axis is the channels is not known here, so only bytes can be compared.
-    size, most = count * dtype.itemsize, limit * BYTES_PER_PIXEL
+    most = limit * BYTES_PER_PIXEL
     if size > most:
         raise LimitExceeded(f"{path}: shape {shape} of {dtype} needs {size} bytes, more than the limit of {most}")
     if size > length - start:
         raise FileError(f"{path}: is cut off; shape {shape} of {dtype} needs {size} bytes, {length - start} are there")
-    flat = np.empty(count, dtype)
+    check_memory(size, str(path))
+    flat = np.empty(prod(shape), dtype)
     room, filled = flat.view(np.uint8).data, 0
     while filled < size:
         part = file.read(min(size - filled, 2**24))
@@ -136,14 +232,14 @@ def _read_array(path: Path, file: BinaryIO, length: int, limit: int) -> Array:
             raise FileError(f"{path}: is cut off after {filled} of {size} bytes")
         room[filled : filled + len(part)] = part
         filled += len(part)
-    array = flat.reshape(shape, order="F" if fortran else "C")
+    array = flat.reshape(shape, order="F" if header.fortran else "C")
     if dtype == np.bool_ and (flat.view(np.uint8) > 1).any():
         raise FileError(f"{path}: is corrupt; booleans other than 0 and 1")
     return np.ascontiguousarray(array, dtype=dtype.newbyteorder("="))
 
 
-def _read_header(path: Path, file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[np.generic], int]:
-    """Return shape, whether columns come first, dtype and where the data starts."""
+def _read_header(path: Path, file: BinaryIO) -> Header:
+    """Read what comes before the samples."""
     start = file.read(8)
     if len(start) < 8 or not start.startswith(MAGIC) or start[6] not in (1, 2, 3):
         raise FileError(f"{path}: is not a NumPy file of version 1, 2 or 3")
@@ -169,4 +265,4 @@ def _read_header(path: Path, file: BinaryIO) -> tuple[tuple[int, ...], bool, np.
         or not isinstance(fortran, bool)
     ):
         raise FileError(f"{path}: its NumPy header announces the shape {shape!r}")
-    return shape, fortran, np.dtype(kind), 8 + width + length
+    return Header(shape, np.dtype(kind), fortran, 8 + width + length)

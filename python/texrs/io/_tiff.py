@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+import lzma
 import threading
+import zlib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from math import prod
@@ -18,6 +20,11 @@ from texrs.io import _image_io
 from texrs.io._files import check_file, check_size, load, translate_errors, turn_upright
 
 _LZW, _JPEG = 5, 7
+_DEFLATE, _LZMA = frozenset({8, 32946}), frozenset({34925})
+_HARMLESS = 2**26
+"""Bytes that a strip may unfold to, at most, without being looked at: deflate makes a byte into 1032."""
+_DICTIONARY = 2**28
+"""Bytes that may be kept while LZMA unfolds."""
 _ORIENTATION = 274
 _SHAPING = frozenset({256, 257, 258, 259, 262, 266, 273, 277, 278, 279, 284, 317, 320, 322, 323, 324, 325, 338, 339})
 """Tags that say how the pixels lie. tifffile goes on without a tag that it cannot read."""
@@ -54,6 +61,7 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
                 return array.reshape(*sides, channels), orientation
             scheme = getattr(first.compression, "name", first.compression)
             raise FileError(f"{path}: is compressed by {scheme}; to read it, install the package imagecodecs")
+        _check_unfolded(path, tif.filehandle, series)
         array = series.asarray(maxworkers=1)
         if array.shape != series.shape:
             raise FileError(f"{path}: is cut off or corrupt; not all of its pixels are there")
@@ -130,6 +138,29 @@ def _check_segments(path: Path, series: Any, length: int) -> None:
         for offset, count in zip(offsets, counts, strict=True):
             if offset <= 0 or count <= 0 or offset + count > length:
                 raise cut
+
+
+def _check_unfolded(path: Path, file: Any, series: Any) -> None:
+    """Check that no strip or tile unfolds to far more than its pixels need, which tifffile without imagecodecs does first."""
+    for page in series.pages:
+        key = None if page is None else page.keyframe
+        if key is None or not (key.compression in _DEFLATE or key.compression in _LZMA):
+            continue
+        # Careless writers fill up.
+        most = 2 * prod(key.chunks) * max(key.dtype.itemsize, 1) + 2**16
+        for offset, count in zip(page.dataoffsets, page.databytecounts, strict=True):
+            if key.compression in _DEFLATE and count * 1032 <= max(most, _HARMLESS):
+                continue
+            file.seek(offset)
+            data = file.read(count)
+            if key.compression in _DEFLATE:
+                size = len(zlib.decompressobj().decompress(data, most + 1))
+            else:
+                size = len(lzma.LZMADecompressor(memlimit=_DICTIONARY).decompress(data, most + 1))
+            if size > most:
+                raise FileError(
+                    f"{path}: is corrupt; a strip unfolds to more than {most} bytes, which its pixels do not need"
+                )
 
 
 def _apply_colours(path: Path, array: Array, page: Any) -> Array:

@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from collections.abc import Mapping
+from math import prod
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from texrs._checks import MAX_PIXELS
 from texrs._typing import Path
-from texrs.errors import FileError, InvalidInput
+from texrs.errors import FileError, InvalidInput, LimitExceeded
 from texrs.source_map._finish import Finish
 from texrs.source_map._parts import Parted
+
+if TYPE_CHECKING:
+    from texrs.io import Header
 
 __all__ = ["read_map", "write_map"]
 
 FORMAT = 1
 """Version of the file layout."""
+NAMES = ("texrs_source_map", "coordinates", "exemplar", "label", "shapes")
+LEAST = 2**26
+"""Bytes that a table of frames may have, however small the map."""
 
 Map = TypeVar("Map", bound=Parted)
 
@@ -42,10 +51,10 @@ def read_map(path: Path, make: type[Map]) -> Map:
     """Return the map that a file holds, made of its parts."""
     from texrs.io import read_arrays
 
-    parts = read_arrays(path)
-    names = ("texrs_source_map", "coordinates", "exemplar", "label", "shapes")
-    if any(name not in parts for name in names):
-        raise FileError(f"{path}: is not a source map")
+    def choose(headers: Mapping[str, Header]) -> list[str]:
+        return choose_parts(headers, path)
+
+    parts = read_arrays(path, choose=choose)
     if parts["texrs_source_map"].ravel().tolist() != [FORMAT]:
         raise FileError(f"{path}: has another layout than {FORMAT}, which this version of texrs reads")
     try:
@@ -58,3 +67,36 @@ def read_map(path: Path, make: type[Map]) -> Map:
         return make(parts["coordinates"], parts["exemplar"], *rest, finish)
     except (InvalidInput, TypeError, ValueError) as error:
         raise FileError(f"{path}: is damaged ({error})") from None
+
+
+def choose_parts(headers: Mapping[str, Header], path: Path) -> list[str]:
+    """Return which arrays of a file make a map, none of which is larger than the map says, before any is read."""
+    if any(name not in headers for name in NAMES):
+        raise FileError(f"{path}: is not a source map")
+    shape = headers["coordinates"].shape[:-1]
+    pixels = prod(shape)
+    if pixels > MAX_PIXELS:
+        raise LimitExceeded(f"{path}: has {pixels} pixels, more than the limit of {MAX_PIXELS}")
+    wanted = {"coordinates": (*shape, len(shape)), "exemplar": shape, "label": shape}
+    for name, shaped in wanted.items():
+        if headers[name].shape != shaped or len(shape) not in (2, 3):
+            raise FileError(f"{path}: is damaged ({name} of shape {headers[name].shape})")
+    most = {
+        "texrs_source_map": 8,
+        "coordinates": 4 * len(shape) * pixels,
+        "exemplar": 2 * pixels,
+        "label": 4 * pixels,
+        "shapes": 8 * 3 * 2**16,
+        "frame": max(4 * len(shape) ** 2 * pixels, LEAST),
+        "finish": 2**20,
+        "finish/within": pixels,
+        "finish/parts": 2 * pixels,
+    }
+    known = [name for name in headers if name.startswith("finish/known/")]
+    chosen = [name for name in most if name in headers]
+    for name in chosen:
+        if headers[name].size > most[name]:
+            raise FileError(f"{path}: is damaged ({name} of {headers[name].dtype}, shape {headers[name].shape})")
+    if sum(headers[name].size for name in known) > MAX_PIXELS:
+        raise LimitExceeded(f"{path}: its masks of exemplars have more than {MAX_PIXELS} pixels")
+    return [*chosen, *known]
