@@ -17,12 +17,13 @@ NOTICE = "% Made by docs/pages.py.\n\n"
 def write_pages(docs: Path) -> None:
     """Write all such pages anew, to the folder ``generated``."""
     out = docs / "generated"
-    for each in ("api", "commands.md", "words.md"):
+    for each in ("api", "commands.md", "performance.md", "words.md"):
         if (out / each).is_dir():
             shutil.rmtree(out / each)
     (out / "api").mkdir(parents=True, exist_ok=True)
     write_api(out / "api")
     (out / "commands.md").write_text(list_commands(), encoding="utf-8")
+    (out / "performance.md").write_text(list_benches(docs.parent / "benches"), encoding="utf-8")
     write_comparison(out)
     (out / "words.md").write_text(list_words(docs.parent / "ARCHITECTURE.md"), encoding="utf-8")
 
@@ -161,3 +162,36 @@ def write_comparison(out: Path) -> None:
     text += "".join(f"- {each.method} ({TASKS[each.task].title.lower()}): {each.get}\n" for each in found.missing)
     page.write_text(text, encoding="utf-8")
     shown.write_text(found.page(), encoding="utf-8")
+
+
+# --- performance -----------------------------------------------------------------------------------------------------
+
+MEASURED = """
+No figure stands here that a command did not give on the machine where this page was made: times hang on the processor, on what
+else it does, and on the picture. How long each method took on ten pictures, in processor seconds, says
+[the comparison](comparison.md); for yours, `texrs compare photo.jpg -o compared.html` says it.
+
+What is measured, and by which command, from a checkout of the sources. Each prints a table; most interleave rounds and take
+medians, since a machine that does other things shows in the mean. Those with `_vs_peers` compare with other libraries, which
+`pip install --group bench` brings. `make bench` measures the kernels in Rust alone.
+"""
+
+
+def list_benches(folder: Path) -> str:
+    """Return a page of what each bench measures, as its own first words say it."""
+    import ast
+
+    text = f"{NOTICE}# Performance\n{MEASURED}\n"
+    groups = {"How fast": "_speed", "Beside other libraries": "_vs_peers", "How well": ""}
+    files = sorted(folder.glob("*.py"))
+    for title, ending in groups.items():
+        some = [file for file in files if file.stem.endswith(ending)]
+        files = [file for file in files if file not in some]
+        rows = []
+        for file in some:
+            said = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
+            # What is no command is a helper of those that are.
+            if f"benches/{file.name}" in said:
+                rows.append(f"| `python benches/{file.name}` | {said.splitlines()[0]} |")
+        text += f"## {title}\n\n| command | what it measures |\n|---|---|\n" + "\n".join(rows) + "\n\n"
+    return text

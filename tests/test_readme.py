@@ -72,6 +72,21 @@ def test_commands_of_guides_are_run_as_they_stand(
             assert main([*shlex.split(command)[1:], "-q"][: None if "info" not in command else -1]) == 0, command
 
 
+def test_commands_for_those_who_come_from_elsewhere_are_run(
+    examples: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for each in examples.iterdir():
+        (tmp_path / each.name).symlink_to(each)
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "docs" / "coming-from.md").read_text(encoding="utf-8")
+    commands = [
+        c for c in re.findall(r"`(texrs [a-z]+ [^`]+ -o [^`]+)`", text) if c.count("pictures/") or c.count("rock")
+    ]
+    assert len(commands) > 10
+    for command in dict.fromkeys(commands):
+        assert main([*shlex.split(command)[1:], "-q", "--force"]) == 0, command
+
+
 def test_the_readme_is_short() -> None:
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 120
 
