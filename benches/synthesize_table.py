@@ -1,13 +1,14 @@
-"""`texrs.synthesize` or `texrs.design` over many pictures, beside plain quilting and the Resynthesizer, judged by evaluators.
+"""Verbs over many pictures, beside plain quilting and the Resynthesizer, judged by evaluators.
 
     python benches/synthesize_table.py OUT --evaluator FILE.py ... [--verb synthesize] [--seeds 3] [--whole] [--size 768]
         [--shown 768] [--quality preserve] [--only NAME] [--resynthesizer PROGRAM] PICTURE ...
 
-The exemplar is the middle 256 a side of each picture, or the whole of it; results are twice as large, or of the size that is
-asked for, and kept in OUT. Evaluators are shown the middle of them where they are larger than `--shown`. A result is fine where
-every score of every evaluator is in its bounds, or no worse than 1.1 times that of a second crop of the same photograph, as
-far from the exemplar as can be. Quilting is `texrs.design` with nothing deformed, mirrored or blended. The Resynthesizer is an
-external program (`completion_vs_peers.py` says how it is built); it is given the exemplar with the rest to fill, once.
+The verbs: `texrs.synthesize`, `texrs.design`, and windows of `texrs.TileSet`. The exemplar is the middle 256 a side of each
+picture, or the whole of it; results are twice as large, or of the size that is asked for, and kept in OUT. Evaluators are shown
+the middle of them where they are larger than `--shown`. A result is fine where every score of every evaluator is in its bounds,
+or no worse than 1.1 times that of a second crop of the same photograph, as far from the exemplar as can be. Quilting is
+`texrs.design` with nothing deformed, mirrored or blended. The Resynthesizer is an external program (`completion_vs_peers.py`
+says how it is built); it is given the exemplar with the rest to fill, once.
 """
 
 from __future__ import annotations
@@ -65,10 +66,12 @@ def results(image: np.ndarray, options: argparse.Namespace) -> Iterator[tuple[st
     size = (options.size, options.size) if options.size else (2 * image.shape[0], 2 * image.shape[1])
     for seed in range(1, options.seeds + 1):
         if options.verb == "design":
-            made = texrs.design(image, size, seed=seed)
+            made = texrs.design(image, size, seed=seed).image
+        elif options.verb == "tiles":
+            made = texrs.TileSet(image, seed=seed)[0 : size[0], 0 : size[1]]
         else:
-            made = texrs.synthesize(image, size, seed=seed, quality=options.quality)
-        yield "texrs", seed, made.image
+            made = texrs.synthesize(image, size, seed=seed, quality=options.quality).image
+        yield "texrs", seed, made
         if options.peers:
             plain = texrs.design(image, size, seed=seed, tiles=1, deformation=STILL, blend=None)
             yield "quilting", seed, plain.image
@@ -87,7 +90,7 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("pictures", type=Path, nargs="+")
     parser.add_argument("--evaluator", type=Path, action="append", required=True)
-    parser.add_argument("--verb", default="synthesize", choices=("synthesize", "design"))
+    parser.add_argument("--verb", default="synthesize", choices=("synthesize", "design", "tiles"))
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--whole", action="store_true", help="the whole pictures are the exemplars")
     parser.add_argument("--size", type=int, help="side of the results")
