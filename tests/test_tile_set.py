@@ -8,7 +8,9 @@ import pytest
 
 import texrs
 from texrs import io, samples
+from texrs.exemplar.regularity import Lattice
 from texrs.tile_set._corners import COLOURS, TILES, TORUS, draw_colours, number_tiles
+from texrs.tile_set._step import Draw, choose_side, find_step
 
 DOTS = samples.dots((64, 64)).image
 FAR = 10**12
@@ -156,3 +158,36 @@ def test_wrong_arguments(tiles: texrs.TileSet) -> None:
     ):
         with pytest.raises(texrs.errors.InvalidInput, match=message):
             call()
+
+
+def test_what_repeats_does_so_in_whole_periods() -> None:
+    """Each tile lies as those beside it do, though no two show the same."""
+    tiles = texrs.TileSet(samples.weave((96, 96)).image, seed=1, variants=2)
+    light = tiles[0 : 4 * tiles.side, 0 : 4 * tiles.side].mean(axis=-1)
+    for axis in (0, 1):
+        after, before = np.split(light, [tiles.side], axis)[1], np.split(light, [-tiles.side], axis)[0]
+        assert np.corrcoef(after.ravel(), before.ravel())[0, 1] > 0.6
+        assert not np.array_equal(after, before)
+
+
+def test_phases_of_pictures_are_found() -> None:
+    image = np.random.default_rng(1).random((12, 16, 3))
+    wall = np.tile(image, (4, 3, 1))
+    lattice = Lattice((12, 0), (0, 16), 1.0)
+    step = find_step([wall, np.roll(wall, (5, 7), (0, 1))], lattice, 24)
+    assert step is None  # A tile holds one period and a half.
+    step = find_step([wall, np.roll(wall, (5, 7), (0, 1)), -wall], lattice, 48)
+    assert step is not None
+    assert step.shifts.tolist() == [[row, column] for row in range(0, 48, 12) for column in range(0, 48, 16)]
+    assert step.phases[:2].tolist() == [[0, 0], [5, 7]]
+    draw = Draw(np.random.default_rng(2), 2, (48, 48), step)
+    for row, column in ((0, 0), (-4, 3)):
+        which, y, x = draw(row, column)
+        shown = (wall, np.roll(wall, (5, 7), (0, 1)))[which]
+        assert np.array_equal(shown[y % 48, x % 48], image[row % 12, column % 16])
+
+
+def test_a_side_is_chosen_on_which_a_lattice_closes() -> None:
+    assert choose_side(None, 256) == 256
+    assert choose_side(Lattice((12, 0), (0, 16), 1.0), 256) == 240
+    assert choose_side(Lattice((0, 200), (200, 0), 1.0), 64) == 64

@@ -7,7 +7,8 @@ wherever it is.
 
 The flow: several cyclic pictures are designed (`texrs.design_variants`); strips between each two corners are cut from them,
 and the inside of each tile is cut into its ring of strips, once along all edges (`texrs.tile_set._cutting`). Of several
-places those are taken whose cuts show least; cuts through elements cost more.
+places those are taken whose cuts show least; cuts through elements cost more. Where the exemplar repeats on a lattice, tiles
+hold whole periods of it, and all their pieces are cut in step, which the paper does not have.
 
 In the atlas the tiles lie on a torus of 9 x 9, in which each is there once and fits its neighbours: it can be filtered, and
 is a cyclic texture itself.
@@ -42,6 +43,7 @@ from texrs.synthesis import Synthesis
 from texrs.tile_set._corners import TILES, TORUS, draw_colours, number_tiles
 from texrs.tile_set._cutting import Pictures, cut_tiles
 from texrs.tile_set._shaders import write_shaders
+from texrs.tile_set._step import choose_side, find_step
 
 __all__ = ["TileSet"]
 
@@ -63,7 +65,8 @@ class TileSet(InParts):
     exemplar : (H, W) or (H, W, C) array, Exemplar or Material
         The example, as `texrs.design` takes it.
     side : int, optional
-        Of a tile, 32 to 1024 and a multiple of 4; that of the exemplar's shorter side, 64 to 256, by default.
+        Of a tile, 32 to 1024 and a multiple of 4; that of the exemplar's shorter side, 64 to 256, by default, or less so that
+        what repeats does so in whole periods.
     seed : int
         Chooses the tiles and where they lie, 0 to 2^64 - 1.
     variants : int
@@ -106,7 +109,7 @@ class TileSet(InParts):
         shown = exemplar.guide if isinstance(exemplar, Material) else exemplar
         known = as_exemplar(shown)
         if side is None:
-            side = int(np.clip(min(known.shape), 64, 256)) // 4 * 4
+            side = choose_side(known.segment().lattice, int(np.clip(min(known.shape), 64, 256)) // 4 * 4)
         if as_int(side, "side", 32, 1024) % 4:
             raise InvalidInput(f"side: needs a multiple of 4, got {side}")
         self._side, self._seed = side, as_seed(seed)
@@ -122,7 +125,8 @@ class TileSet(InParts):
             [np.asarray(KEEP * each.source.render(depth, interpolation="linear"), np.float32) for each in made],
         )
         advance = stage(watch, "tiles")
-        tiles = cut_tiles(pictures, side, self._seed, advance or (lambda share: None))
+        step = find_step(pictures.images, known.segment().lattice, side)
+        tiles = cut_tiles(pictures, side, step, self._seed, advance or (lambda share: None))
         around = np.pad(TORUS, (0, 1), mode="wrap")
         order = number_tiles(around)
         self._place: NDArray[np.intp] = np.empty(TILES, np.intp)

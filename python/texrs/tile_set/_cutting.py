@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from texrs._typing import Array, Floats
 from texrs.kernels.seam import cut, cut_strip
 from texrs.tile_set._corners import COLOURS, TILES
+from texrs.tile_set._step import Draw, Step
 
 __all__ = ["Pictures", "cut_tiles"]
 
@@ -55,25 +56,21 @@ def _pick(arrays: Sequence[Array], places: Places) -> Array:
     return out
 
 
-def cut_tiles(pictures: Pictures, side: int, seed: int, advance: Callable[[float], object]) -> Places:
-    """Return the places of all tiles, (81, side, side, 3).
+def cut_tiles(
+    pictures: Pictures, side: int, step: Step | None, seed: int, advance: Callable[[float], object]
+) -> Places:
+    """Return the places of all tiles, (81, side, side, 3); in step, where pictures repeat.
 
     1. Corners: a window of a picture for each colour.
     2. Edges: between two corners a strip, that is a window cut into both; one for each pair, across and down.
     3. Tiles: what four strips show within their border is the ring; the inside is cut into it, once along all edges.
     """
     half = side // 4
-    rng = np.random.default_rng(np.random.PCG64(seed))
     count, (rows, columns) = len(pictures.images), pictures.images[0].shape[:2]
+    draw = Draw(np.random.default_rng(np.random.PCG64(seed)), count, (rows, columns), step)
 
-    def draw() -> tuple[int, int, int]:
-        return int(rng.integers(count)), int(rng.integers(rows)), int(rng.integers(columns))
-
-    corners = []
-    for colour in range(COLOURS):
-        _, row, column = draw()
-        # Windows of 2 half x 2 half and what goes on around them, the corner in their middle.
-        corners.append((colour % count, row, column))
+    # Windows of 2 half x 2 half and what goes on around them, the corner in their middle.
+    corners = [draw(which=colour % count) for colour in range(COLOURS)]
 
     def show_corner(colour: int, top: int, left: int, shape: tuple[int, int]) -> Places:
         which, row, column = corners[colour]
@@ -105,7 +102,7 @@ def _make_edge(
     axis: int,
     first: int,
     second: int,
-    draw: Callable[[], tuple[int, int, int]],
+    draw: Draw,
     show_corner: Callable[[int, int, int, tuple[int, int]], Places],
 ) -> Places:
     """Return the strip between two corners, of a side's length and twice half a width."""
@@ -113,7 +110,7 @@ def _make_edge(
     best: tuple[float, Places] | None = None
     shape = (2 * half, side) if axis else (side, 2 * half)
     for _ in range(STRIPS):
-        strip = pictures.at(*draw(), shape)
+        strip = pictures.at(*(draw(row=-half) if axis else draw(column=-half)), shape)
         total = 0.0
         for colour, start in ((first, half), (second, side - half - reach)):
             # Within half of a corner all is the corner's; then comes the overlap.
@@ -144,7 +141,7 @@ def _make_edge(
     return best[1]
 
 
-def _fill(pictures: Pictures, ring: Places, side: int, half: int, draw: Callable[[], tuple[int, int, int]]) -> Places:
+def _fill(pictures: Pictures, ring: Places, side: int, half: int, draw: Draw) -> Places:
     """Return a tile: an inside cut into its ring; the outermost pixels are the ring's."""
     band = np.ones((side, side), bool)
     band[half:-half, half:-half] = False

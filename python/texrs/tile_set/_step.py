@@ -1,0 +1,93 @@
+"""Tiles in step: where an exemplar repeats on a lattice, all pieces of all tiles are cut at places that are alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Array
+from texrs.exemplar.regularity import Lattice
+
+__all__ = ["Draw", "choose_side", "find_step"]
+
+SMALLER = 0.7
+"""Least side of a tile, as a share of the usual one, that is chosen so that a lattice closes on it."""
+WHOLE = 0.01
+"""How far from whole the number of periods in a side may be."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Where cyclic pictures show the same part of a period."""
+
+    shifts: NDArray[np.intp]
+    """Those of the lattice within a picture, (n, 2): after each it is like itself."""
+    phases: NDArray[np.intp]
+    """Where each picture shows what the first one does at its first pixel, (pictures, 2)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Draw:
+    """Places in pictures, drawn by chance."""
+
+    rng: np.random.Generator
+    count: int
+    """Of the pictures."""
+    size: tuple[int, int]
+    """Of each."""
+    step: Step | None
+    """How places are to be alike, if they are."""
+
+    def __call__(self, row: int = 0, column: int = 0, which: int | None = None) -> tuple[int, int, int]:
+        """Return a picture, or which was said, and a place there, of what lies so many pixels beyond the corner of a tile."""
+        drawn = int(self.rng.integers(self.count))
+        picture = drawn if which is None else which
+        if self.step is None:
+            return picture, int(self.rng.integers(self.size[0])), int(self.rng.integers(self.size[1]))
+        shift = self.step.shifts[self.rng.integers(len(self.step.shifts))] + self.step.phases[picture]
+        return picture, row + int(shift[0]), column + int(shift[1])
+
+
+def choose_side(lattice: Lattice | None, usual: int) -> int:
+    """Return the side of a tile: a multiple of 4 on which a lattice closes with the least change, or else the usual one."""
+    if lattice is None:
+        return usual
+    changes = []
+    for side in range(usual, max(32, round(SMALLER * usual) // 4 * 4) - 1, -4):
+        closing = lattice.close((side, side), (True, True))
+        if closing is not None:
+            changes.append((float(np.abs(closing - np.eye(2)).max()), -side))
+    return -min(changes)[1] if changes else usual
+
+
+def find_step(images: Sequence[Array], lattice: Lattice | None, side: int) -> Step | None:
+    """Return how places in cyclic pictures of a lattice are alike, if tiles of a side hold whole periods of it."""
+    size = (images[0].shape[0], images[0].shape[1])
+    closing = None if lattice is None else lattice.close(size, (True, True))
+    if lattice is None or closing is None:
+        return None
+    vectors = closing @ lattice.vectors
+    turns = np.linalg.solve(vectors, np.diag(np.array(size, np.float64)))
+    within = turns * side / np.array(size, np.float64)
+    if np.abs(within - np.rint(within)).max() > WHOLE:
+        return None
+    most = int(np.abs(np.rint(turns)).sum()) + 1
+    steps = np.stack(np.meshgrid(*(np.arange(-most, most + 1),) * 2, indexing="ij"), axis=-1).reshape(-1, 2)
+    places = np.rint(steps @ vectors.T).astype(np.intp)
+    shifts = np.unique(places[((places >= 0) & (places < size)).all(axis=1)], axis=0)
+    return Step(shifts, np.stack([_find_phase(images[0], image, shifts) for image in images]))
+
+
+def _find_phase(first: Array, other: Array, shifts: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return by how much a picture is shifted against another one, by how alike they are on the mean over all periods."""
+    comb = np.zeros(first.shape[:2])
+    comb[tuple(shifts.T)] = 1 / len(shifts)
+    pictures = (image.reshape(*comb.shape, -1)[..., :3].mean(axis=-1, dtype=np.float64) for image in (first, other))
+    light, beside, periods = (np.fft.fft2(each) for each in (*pictures, comb))
+    alike = np.fft.ifft2(np.conj(light) * beside * np.conj(periods)).real
+    # Where the best are as good but for their last bits, the first counts.
+    best = np.rint(alike / max(float(np.abs(alike).max()), 1e-300) * 2**24).argmax()
+    return np.array(np.unravel_index(best, alike.shape), np.intp)
