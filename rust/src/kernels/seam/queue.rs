@@ -4,13 +4,16 @@
 /// Most buckets that are worth their memory.
 const MOST: u32 = 4096;
 
-/// Buckets on a ring. Within a bucket the order is arbitrary but fixed, so that a node may be taken before its distance
-/// is final; it is then pushed again, and its old entry is stale.
+/// Buckets on a ring. Within a bucket those that came first are taken first, so that a node may be taken before its distance
+/// is final; it is then pushed again, and its old entry is stale. Were the last taken first, nodes of a plain where every step
+/// costs next to nothing would be taken over and over.
 #[derive(Debug, Default)]
 pub(super) struct Queue {
     buckets: Vec<Vec<(u32, u32)>>,
     shift: u32,
     current: u32,
+    /// Entries of the current bucket that have been taken.
+    taken: usize,
     entries: usize,
 }
 
@@ -29,6 +32,7 @@ impl Queue {
         self.buckets.resize_with(buckets, Vec::new);
         self.shift = shift;
         self.current = 0;
+        self.taken = 0;
         self.entries = 0;
     }
 
@@ -56,10 +60,14 @@ impl Queue {
                 return None;
             }
             let at = self.current as usize & (self.buckets.len() - 1);
-            if let Some(entry) = self.buckets[at].pop() {
+            let bucket = &mut self.buckets[at];
+            if let Some(&entry) = bucket.get(self.taken) {
+                self.taken += 1;
                 self.entries -= 1;
                 return Some(entry);
             }
+            bucket.clear();
+            self.taken = 0;
             self.current += 1;
         }
     }
