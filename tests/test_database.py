@@ -108,7 +108,13 @@ def test_an_entry_of_another_version_is_remade(textures: TextureDatabase, said: 
     assert textures.list()[0].version == texrs.elements.FORMAT
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", '{"version": 2}', '{"version": 2, "textures": {"../x": {}}}', None])
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "{", "[]", '{"version": 2}', '{"version": 2, "textures": {"../x": {}}}', None),
+        *('{"version": 1e999, "textures": {}}', '{"version": NaN}', "[" * 100_000),
+    ],
+)
 def test_a_damaged_manifest_is_remade_from_the_entries(
     textures: TextureDatabase, said: list[str], text: str | None
 ) -> None:
@@ -118,6 +124,34 @@ def test_a_damaged_manifest_is_remade_from_the_entries(
     assert list(textures) == ["dots"]
     assert "made anew from 1 entries" in said[0]
     assert manifest.read_text() == before
+
+
+@pytest.mark.parametrize("key", ["file", "image", "hash", "version", "layout", "box", "elements", "options"])
+@pytest.mark.parametrize(
+    "value",
+    [
+        "1e999",
+        "-1e999",
+        "NaN",
+        "null",
+        "[[]]",
+        "{}",
+        "true",
+        '".."',
+        '"."',
+        '"/etc/passwd"',
+        '"a\\u0000"',
+        '"../x.npz"',
+    ],
+)
+def test_a_manifest_whose_values_are_hostile(textures: TextureDatabase, said: list[str], key: str, value: str) -> None:
+    manifest = textures.path / "manifest.json"
+    table = json.loads(manifest.read_text())
+    table["textures"]["dots"][key] = "@"
+    manifest.write_text(json.dumps(table).replace('"@"', value))
+    (record,) = textures.list()
+    assert record.file == "dots.npz"
+    assert len(textures["dots"].points) > 3
 
 
 def test_a_warning_where_nobody_listens(textures: TextureDatabase) -> None:

@@ -96,6 +96,40 @@ def test_saved_and_loaded_it_is_the_same(tmp_path):
         assert [p.name for p in tmp_path.iterdir()].count(path.name) == 1
 
 
+ARRAYS = {
+    "coordinates": np.zeros((4, 4, 2), np.float32),
+    "exemplar": np.zeros((4, 4), np.uint16),
+    "label": np.zeros((4, 4), np.uint32),
+    "frame": None,
+    "shapes": ((4, 4),),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *(
+            ("shapes", s)
+            for s in (((0, 0),), ((4, 0),), ((4, -1),), ((4, 4.5),), ((4,),), (4, 4), 4, None, ("44",), ())
+        ),
+        *((name, None) for name in ("coordinates", "exemplar", "label")),
+        *((name, array.tolist()) for name, array in ARRAYS.items() if isinstance(array, np.ndarray)),
+        *((name, array.astype(np.int64)) for name, array in ARRAYS.items() if isinstance(array, np.ndarray)),
+        *((name, array[:0]) for name, array in ARRAYS.items() if isinstance(array, np.ndarray)),
+        *((name, array[..., 0]) for name, array in ARRAYS.items() if isinstance(array, np.ndarray)),
+        *((name, array[..., np.newaxis]) for name, array in ARRAYS.items() if isinstance(array, np.ndarray)),
+        ("exemplar", np.ones((4, 4), np.uint16)),
+        *(("frame", f) for f in (1.5, [[1, 0], [0, 1]], np.eye(2), np.zeros((0, 2, 2), np.float32))),
+    ],
+)
+def test_parts_that_make_no_map(name, value):
+    """What is made of such parts would fail later, as where a share of an exemplar's area is asked for."""
+    with pytest.raises(InvalidInput, match=name):
+        SourceMap(**(ARRAYS | {name: value}))
+    with pytest.raises(InvalidInput):
+        SourceMap(*(a[:0] if isinstance(a, np.ndarray) else a for a in ARRAYS.values()))
+
+
 def test_files_that_are_not_source_maps(tmp_path):
     bad = tmp_path / "bad.npz"
     for content in (b"", b"text", b"PK\x03\x04 truncated"):

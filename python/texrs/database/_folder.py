@@ -129,7 +129,7 @@ class Folder:
                     "add the textures to a new folder"
                 )
             return {name: _read_record(name, item) for name, item in table["textures"].items()}
-        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError):
             return None
 
     def _scan(self) -> dict[str, Record]:
@@ -208,7 +208,8 @@ def _record_of(name: str, file: str, entry: Elements) -> Record:
 
 
 def _read_record(name: str, item: Mapping[str, Any]) -> Record:
-    if not NAME.fullmatch(name) or FilePath(item["file"]).name != item["file"]:
+    # A file of the folder: neither a path nor "..".
+    if not NAME.fullmatch(name) or not re.fullmatch(rf"{NAME.pattern}\.npz", item["file"]):
         raise ValueError(name)
     return Record(
         name,

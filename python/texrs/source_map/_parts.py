@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from numbers import Integral
 from typing import Any, Self
 
 import numpy as np
@@ -37,11 +38,14 @@ class Parted:
 
     def __post_init__(self) -> None:
         """Check that the parts agree."""
+        for name in ("coordinates", "exemplar", "label"):
+            if not isinstance(getattr(self, name), np.ndarray):
+                raise InvalidInput(f"{name}: needs a NumPy array, got {type(getattr(self, name)).__name__}")
         shape = self.coordinates.shape[:-1]
         axes = self.coordinates.shape[-1] if self.coordinates.ndim else 0
-        if len(shape) != axes or axes not in (2, 3):
+        if len(shape) != axes or axes not in (2, 3) or 0 in shape:
             raise InvalidInput(
-                "coordinates: needs shape (rows, columns, 2) or (planes, rows, columns, 3), "
+                "coordinates: needs shape (rows, columns, 2) or (planes, rows, columns, 3), not empty, "
                 f"got {self.coordinates.shape}"
             )
         for name, array, dtype in (
@@ -49,8 +53,11 @@ class Parted:
             ("exemplar", self.exemplar, np.uint16),
             ("label", self.label, np.uint32),
         ):
-            if array.dtype != dtype or array.shape[:axes] != shape:
+            extent = array.shape[:-1] if name == "coordinates" else array.shape
+            if array.dtype != dtype or extent != shape:
                 raise InvalidInput(f"{name}: needs {np.dtype(dtype)} over {shape}, got {array.dtype} {array.shape}")
+        if not isinstance(self.frame, Frames | np.ndarray | None):
+            raise InvalidInput(f"frame: needs a NumPy array, a field or None, got {type(self.frame).__name__}")
         if isinstance(self.frame, Frames):
             if self.frame.axes != axes:
                 raise InvalidInput(f"frame: the field has {self.frame.axes} axes, the map {axes}")
@@ -63,8 +70,8 @@ class Parted:
                 )
             if table and self.label.size and int(self.label.max()) >= len(self.frame):
                 raise InvalidInput(f"frame: has {len(self.frame)} rows, but labels reach {int(self.label.max())}")
-        if any(len(s) != axes for s in self.shapes):
-            raise InvalidInput(f"shapes: each needs {axes} sides, got {self.shapes}")
+        if not isinstance(self.shapes, Sequence) or not all(_is_shape(s, axes) for s in self.shapes):
+            raise InvalidInput(f"shapes: each needs {axes} sides, integers of at least 1, got {self.shapes}")
         if self.exemplar.size and int(self.exemplar.max()) >= len(self.shapes):
             raise InvalidInput(f"exemplar: reaches {int(self.exemplar.max())}, but there are {len(self.shapes)} shapes")
 
@@ -268,6 +275,15 @@ class Parted:
             overwrite=overwrite,
             progress=progress,
         )
+
+
+def _is_shape(value: object, axes: int) -> bool:
+    """Return whether a value is the shape of an exemplar."""
+    return (
+        isinstance(value, Sequence | np.ndarray)
+        and len(value) == axes
+        and all(isinstance(n, Integral) and int(n) >= 1 for n in value)
+    )
 
 
 @dataclass(frozen=True)
