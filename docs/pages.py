@@ -152,7 +152,7 @@ def write_comparison(out: Path) -> None:
     if shown.exists() and page.exists() and shown.stat().st_mtime > newest:
         return
     shown.parent.mkdir(parents=True, exist_ok=True)
-    side = 112
+    side = 96
     found = compare({name: samples.load(name).image for name in USUAL}, side=side)
     text = f"{NOTICE}# Compared with others\n{COMPARED.format(side=side)}\n```{{raw}} html\n{explain(True)}\n```\n"
     for task, about in TASKS.items():

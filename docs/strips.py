@@ -157,7 +157,7 @@ def perspective() -> Iterator[Strip]:
     yield (
         "vary",
         "A step of `scale_maps.edit`: how much sizes differ, where 1 is as in the example.",
-        several([-1, 0, 0.5, 1, 1.5], vary),
+        several([-1, 0, 0.5, 1, 1.2], vary),
     )
 
 
@@ -263,8 +263,8 @@ def write_strips(out: Path) -> None:
                 iio.imwrite(file, image.astype(np.uint8), quality=QUALITY)
                 height, width = image.shape[:2]
                 text += (
-                    f'<figure><img src="../strips/{file.name}" width="{width}" height="{height}" loading="lazy" '
-                    f'alt="{guide.__name__} with {name} {said}"><figcaption>{said}</figcaption></figure>\n'
+                    f'<figure><a href="../strips/{file.name}"><img src="../strips/{file.name}" width="{width}" '
+                    f'height="{height}" loading="lazy" alt="{guide.__name__} with {name} {said}"></a><figcaption>{said}</figcaption></figure>\n'
                 )
             text += "</div>\n```\n\n"
         page.write_text(text, encoding="utf-8")

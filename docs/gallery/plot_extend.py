@@ -1,6 +1,6 @@
 """
-More of the floor
-=================
+More of the wall
+================
 
 A photograph of a plane goes on to both sides, in its own perspective. Nothing that was there changes.
 """
@@ -10,10 +10,10 @@ import numpy as np
 
 import texrs
 
-floor = texrs.samples.tilted_bricks((224, 256)).image
-wider = texrs.extend(floor, left=48, right=144, seed=1).image
+wall = texrs.samples.tilted_bricks((224, 256)).image
+wider = texrs.extend(wall, left=48, right=144, seed=1).image
 frame = np.full(wider.shape, 255, np.uint8)
-frame[:, 48:304] = floor
+frame[:, 48:304] = wall
 
 figure, row = plt.subplots(1, 2, figsize=(11, 3.5), layout="constrained")
 shown = {

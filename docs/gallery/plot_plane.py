@@ -1,6 +1,6 @@
 """
-How a floor lies
-================
+How a wall lies
+===============
 
 A plane is found in a single picture by its patterns, which must be alike all over it. Drawn on the picture: a grid of
 the plane, and how large things are seen.
@@ -11,8 +11,8 @@ import numpy as np
 
 import texrs
 
-floor = texrs.samples.tilted_bricks((256, 320)).image
-plane = texrs.planes.find(floor)
+wall = texrs.samples.tilted_bricks((256, 320)).image
+plane = texrs.planes.find(wall)
 corners = np.array([[60, 40], [60, 280], [250, 20], [250, 300]], float)
 flat = plane.flatten(corners)
 low, high = flat.min(axis=0), flat.max(axis=0)
@@ -25,8 +25,8 @@ for axis in range(2):
 
 figure, row = plt.subplots(1, 3, width_ratios=[320, 320, 390], figsize=(11, 3), layout="constrained")
 shown = {
-    "as it was seen": floor,
-    "a grid on the plane that was found": floor,
+    "as it was seen": wall,
+    "a grid on the plane that was found": wall,
     "how large things are": texrs.scale_maps.picture(plane.scale_map()),
 }
 for line in lines:
