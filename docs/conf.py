@@ -40,7 +40,10 @@ html_static_path = ["static"]
 html_extra_path = ["generated/extra"]
 html_css_files = ["texrs.css"]
 html_show_sourcelink = False
-html_sidebars = {"index": [], "install": [], "five-minutes": [], "promises": [], "glossary": []}
+# Pages that no section holds.
+ALONE = ("index", "install", "five-minutes", "promises", "coming-from", "genindex", "search")
+MADE = ("words", "comparison", "performance", "commands")
+html_sidebars = {name: [] for name in (*ALONE, *(f"generated/{name}" for name in MADE))}
 html_theme_options = {
     "navigation_with_keys": False,
     "show_toc_level": 2,

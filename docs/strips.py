@@ -262,9 +262,12 @@ def write_strips(out: Path) -> None:
                     image = 255 - (255 - image[..., :3].astype(int)) * image[..., 3:] // 255
                 iio.imwrite(file, image.astype(np.uint8), quality=QUALITY)
                 height, width = image.shape[:2]
+                alt = f"{guide.__name__} with {name} {said}"
+                picture = (
+                    f'<img src="../strips/{file.name}" width="{width}" height="{height}" loading="lazy" alt="{alt}">'
+                )
                 text += (
-                    f'<figure><a href="../strips/{file.name}"><img src="../strips/{file.name}" width="{width}" '
-                    f'height="{height}" loading="lazy" alt="{guide.__name__} with {name} {said}"></a><figcaption>{said}</figcaption></figure>\n'
+                    f'<figure><a href="../strips/{file.name}">{picture}</a><figcaption>{said}</figcaption></figure>\n'
                 )
             text += "</div>\n```\n\n"
         page.write_text(text, encoding="utf-8")
