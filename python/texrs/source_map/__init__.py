@@ -13,39 +13,20 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_image, as_list, as_ndarray, power_single
+from texrs._arrays import as_image, as_list, as_ndarray
 from texrs._show import as_png
 from texrs._typing import Array, Bools, Frames, Interpolation, Path
 from texrs.errors import InvalidInput
 from texrs.kernels.gather import gather
-from texrs.source_map._antialias import gather_smoothed
+from texrs.source_map._antialias import find_shrinking, gather_smoothed
 from texrs.source_map._files import read_map, write_map
 from texrs.source_map._finish import Finish
 from texrs.source_map._parts import Parted
-from texrs.source_map._pixels import Pixels, divide_bands, label_pieces
-from texrs.source_map._vectors import turn_vectors
+from texrs.source_map._pixels import Pixels, divide_bands
+from texrs.source_map._reuse import Reuse, find_continued, measure_reuse
+from texrs.source_map._vectors import turn_all
 
 __all__ = ["Finish", "Reuse", "SourceMap"]
-
-
-@dataclass(frozen=True, slots=True)
-class Reuse:
-    """How much of a synthesis is copied verbatim (see `SourceMap.reuse`).
-
-    Attributes
-    ----------
-    verbatim : float
-        Share of the output pixels that are exemplar samples, unchanged: whole coordinates.
-    largest : float
-        Area of the largest connected region copied in one piece, as a share of the exemplar's area.
-    regions : int
-        Number of such regions.
-
-    """
-
-    verbatim: float
-    largest: float
-    regions: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -264,7 +245,7 @@ class SourceMap(Parted):
                 raise InvalidInput(f"exemplars: number {i} needs size {shape}, got {image.shape[: self.axes]}")
         out = gather(several, self.coordinates, self.exemplar, interpolation=interpolation)
         if antialias and interpolation != "nearest":
-            out = gather_smoothed(out, several, self.coordinates, self.exemplar, self._shrunk(), interpolation)
+            out = gather_smoothed(out, several, self.coordinates, self.exemplar, find_shrinking(self), interpolation)
         if kind == "colour":
             return out
         if kind not in ("normal", "vector", "slope") or green not in ("up", "down"):
@@ -273,36 +254,7 @@ class SourceMap(Parted):
             )
         # Asked of the exemplars, for a part of them that a picture shows may have no negative value.
         channels = 3 if kind == "normal" or self.axes == 3 else 2
-        return self._turn(out, kind, green, any(float(e[..., :channels].min()) < 0 for e in images))
-
-    def _shrunk(self) -> NDArray[np.float32]:
-        """Return by how much each pixel's surroundings are smaller than in the exemplar, as a length."""
-        frame = self.frame_array()
-        if frame is None:
-            return np.ones(self.shape, np.float32)
-        shrunk = power_single(np.abs(np.linalg.det(frame.astype(np.float64))), 1 / self.axes)
-        return np.asarray(shrunk[self.label] if frame.ndim == 3 else shrunk, np.float32)
-
-    def _turn(self, vectors: Array, kind: str, green: str, signed: bool) -> Array:
-        """Turn vectors with the frame: a surface h(S(p)) has the slope J^T grad h, and a step J^-1 v shows the step v."""
-        count = 3 if kind == "normal" or self.axes == 3 else 2
-        what = "a normal map" if kind == "normal" else "a map of vectors"
-        if vectors.ndim != self.axes + 1 or vectors.shape[-1] < count:
-            sides = ("rows, columns", "planes, rows, columns")[self.axes - 2]
-            raise InvalidInput(f"exemplars: {what} needs shape ({sides}, {count}), got {vectors.shape}")
-        if vectors.dtype == np.bool_:
-            raise InvalidInput(f"exemplars: {what} cannot be bool")
-        frame = self.frame_array()
-        if frame is None:
-            return vectors
-        out = vectors.copy()
-        # A band at a time, for what is computed of a pixel takes many times its size.
-        for band in divide_bands(self.shape):
-            frames = frame[self.label[band]] if frame.ndim == 3 else frame[band]
-            out[band] = turn_vectors(
-                vectors[band], frames.astype(np.float64), kind, down=green == "down", signed=signed
-            )
-        return out
+        return turn_all(self, out, kind, green, any(float(e[..., :channels].min()) < 0 for e in images))
 
     def compose(self, inner: SourceMap | Sequence[SourceMap]) -> SourceMap:
         """Return the map of a picture made from pictures that were made from exemplars.
@@ -414,19 +366,7 @@ class SourceMap(Parted):
                [ True,  True, False]])
 
         """
-        joined = self.exemplar == np.roll(self.exemplar, -1, axis)
-        frame = self.frame_array()
-        # One coordinate at a time, for a dense frame of a large picture is many times its size.
-        for a in range(self.axes):
-            place = self.coordinates[..., a]
-            step: Any = np.float32(a == axis)
-            if frame is not None:
-                step = frame[:, a, axis][self.label] if frame.ndim == 3 else frame[..., a, axis]
-            joined &= np.abs(place + step - np.roll(place, -1, axis)) < 0.1
-        if not wrap:
-            joined[tuple(slice(None) if a != axis else -1 for a in range(self.axes))] = False
-        result: Bools = joined
-        return result
+        return find_continued(self, axis, wrap=wrap)
 
     def reuse(self) -> Reuse:
         """Return how much is copied verbatim from the exemplars, and in how large pieces.
@@ -443,11 +383,7 @@ class SourceMap(Parted):
         Reuse(verbatim=1.0, largest=1.0, regions=1)
 
         """
-        joined = [np.delete(self.continues(axis), -1, axis) for axis in range(self.axes)]
-        regions, region = label_pieces(joined, self.shape)
-        largest = int(np.bincount(region).max())
-        whole = (self.coordinates == np.rint(self.coordinates)).all(axis=-1)
-        return Reuse(float(whole.mean()), largest / max(int(np.prod(s)) for s in self.shapes), regions)
+        return measure_reuse(self)
 
     def save(self, path: Path) -> None:
         """Write the map to an ``.npz`` file, whole or not at all.

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import log_single
+from texrs._arrays import log_single, power_single
 from texrs._typing import Array, Floats, Interpolation
 from texrs.kernels.gather import gather
+from texrs.source_map._parts import Parted
 
-__all__ = ["gather_smoothed"]
+__all__ = ["find_shrinking", "gather_smoothed"]
 
 LEVELS = 2
 """Smoothed pictures for each octave by which it is shrunk; between two of them what they show is mixed."""
@@ -83,3 +84,12 @@ def gather_smoothed(
         mixed = mixed > 0.5
     out.reshape(-1, *channels)[here] = mixed.astype(out.dtype)
     return out
+
+
+def find_shrinking(source: Parted) -> NDArray[np.float32]:
+    """Return by how much each pixel's surroundings are smaller than in the exemplar, as a length."""
+    frame = source.frame_array()
+    if frame is None:
+        return np.ones(source.shape, np.float32)
+    shrunk = power_single(np.abs(np.linalg.det(frame.astype(np.float64))), 1 / source.axes)
+    return np.asarray(shrunk[source.label] if frame.ndim == 3 else shrunk, np.float32)

@@ -6,8 +6,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Array
+from texrs.errors import InvalidInput
+from texrs.source_map._parts import Parted
+from texrs.source_map._pixels import divide_bands
 
-__all__ = ["turn_vectors"]
+__all__ = ["turn_all", "turn_vectors"]
+
+
+def turn_all(source: Parted, vectors: Array, kind: str, green: str, signed: bool) -> Array:
+    """Turn what was looked up through a map with its frames; ``signed`` as for `turn_vectors`."""
+    count = 3 if kind == "normal" or source.axes == 3 else 2
+    what = "a normal map" if kind == "normal" else "a map of vectors"
+    if vectors.ndim != source.axes + 1 or vectors.shape[-1] < count:
+        sides = ("rows, columns", "planes, rows, columns")[source.axes - 2]
+        raise InvalidInput(f"exemplars: {what} needs shape ({sides}, {count}), got {vectors.shape}")
+    if vectors.dtype == np.bool_:
+        raise InvalidInput(f"exemplars: {what} cannot be bool")
+    frame = source.frame_array()
+    if frame is None:
+        return vectors
+    out = vectors.copy()
+    # A band at a time, for what is computed of a pixel takes many times its size.
+    for band in divide_bands(source.shape):
+        frames = frame[source.label[band]] if frame.ndim == 3 else frame[band]
+        out[band] = turn_vectors(vectors[band], frames.astype(np.float64), kind, down=green == "down", signed=signed)
+    return out
 
 
 def turn_vectors(vectors: Array, frames: NDArray[np.float64], kind: str, *, down: bool, signed: bool) -> Array:

@@ -1,0 +1,60 @@
+"""How much of a synthesis is copied from its exemplars as it stands, and in how large pieces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from texrs._typing import Bools
+from texrs.source_map._parts import Parted
+from texrs.source_map._pixels import label_pieces
+
+__all__ = ["Reuse", "find_continued", "measure_reuse"]
+
+
+@dataclass(frozen=True, slots=True)
+class Reuse:
+    """How much of a synthesis is copied verbatim (see `SourceMap.reuse`).
+
+    Attributes
+    ----------
+    verbatim : float
+        Share of the output pixels that are exemplar samples, unchanged: whole coordinates.
+    largest : float
+        Area of the largest connected region copied in one piece, as a share of the exemplar's area.
+    regions : int
+        Number of such regions.
+
+    """
+
+    verbatim: float
+    largest: float
+    regions: int
+
+
+def find_continued(source: Parted, axis: int, *, wrap: bool = False) -> Bools:
+    """Return where a pixel and the next one along an axis come from one piece of the exemplar."""
+    joined = source.exemplar == np.roll(source.exemplar, -1, axis)
+    frame = source.frame_array()
+    # One coordinate at a time, for a dense frame of a large picture is many times its size.
+    for a in range(source.axes):
+        place = source.coordinates[..., a]
+        step: Any = np.float32(a == axis)
+        if frame is not None:
+            step = frame[:, a, axis][source.label] if frame.ndim == 3 else frame[..., a, axis]
+        joined &= np.abs(place + step - np.roll(place, -1, axis)) < 0.1
+    if not wrap:
+        joined[tuple(slice(None) if a != axis else -1 for a in range(source.axes))] = False
+    result: Bools = joined
+    return result
+
+
+def measure_reuse(source: Parted) -> Reuse:
+    """Return how much is copied verbatim from the exemplars, and in how large pieces."""
+    joined = [np.delete(find_continued(source, axis), -1, axis) for axis in range(source.axes)]
+    regions, region = label_pieces(joined, source.shape)
+    largest = int(np.bincount(region).max())
+    whole = (source.coordinates == np.rint(source.coordinates)).all(axis=-1)
+    return Reuse(float(whole.mean()), largest / max(int(np.prod(s)) for s in source.shapes), regions)
