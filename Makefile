@@ -45,15 +45,15 @@ demo: $(VENV)/.built
 	@echo "Open demo/index.html in a browser."
 
 # All Rust tests are in the library: to build it once more for others would take a minute. Workers share the processors: were
-# each to have threads for matrices too, these would wait for each other. Dozens of processes start: byte code is kept for them,
-# whatever the environment says.
+# each to have threads too, for matrices or for kernels, these would wait for each other; tests of threads ask for some. Dozens
+# of processes start: byte code is kept for them, whatever the environment says.
 test: test-rust test-python
 
 test-rust: | requirements
 	cargo test --quiet --lib
 
 test-python: $(VENV)/.built
-	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal -q
+	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 RAYON_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal -q
 
 # Rounds with a seed each, until one fails or the time is up; with a SEED, the round of that seed.
 fuzz: $(VENV)/.built
