@@ -24,6 +24,8 @@ exclude_patterns = [
     "generated/gallery/*.py",
 ]
 default_role = "py:obj"
+# Options begin with two dashes.
+smartquotes = False
 nb_execution_mode = "off"
 myst_enable_extensions = ["deflist", "colon_fence"]
 myst_heading_anchors = 3
