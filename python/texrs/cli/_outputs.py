@@ -25,6 +25,7 @@ from texrs.errors import FileError, InvalidInput, TexrsError
 from texrs.io._annotation import name_sidecar, needs_sidecar
 from texrs.io._files import find_suffix
 from texrs.io._formats import RAW, STORE, keeps_spacing
+from texrs.io._temporary import name_prefix, put, sweep
 from texrs.synthesis import Synthesis
 
 SAMPLE = "sample:"
@@ -284,7 +285,8 @@ def write_output(
 def write_folder(path: str, option: str, *, suffix: str = "", made: _provenance.Record | None = None) -> Iterator[Path]:
     """Return a temporary folder whose files go to the folder ``path`` at the end; each says how it was made."""
     os.makedirs(path, exist_ok=True)
-    temporary = Path(tempfile.mkdtemp(prefix=".texrs-", dir=path))
+    sweep(os.path.realpath(path))
+    temporary = Path(tempfile.mkdtemp(prefix=name_prefix(), dir=path))
     try:
         yield temporary
         running = made or RUNNING.get()
@@ -294,8 +296,8 @@ def write_folder(path: str, option: str, *, suffix: str = "", made: _provenance.
             if running is not None:
                 io.annotate(file, io.Notes(made=running.tell(target, output=option, inside=True, suffix=suffix)))
             if (beside := name_sidecar(file)).exists():
-                os.replace(beside, name_sidecar(Path(target)))
-            os.replace(file, target)
+                put(beside, name_sidecar(Path(target)))
+            put(file, Path(target))
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
 

@@ -22,6 +22,7 @@ from texrs.cli._readers import read_volume
 from texrs.cli._stacks import Roles, read_roles
 from texrs.cli._texts import About
 from texrs.errors import InvalidInput
+from texrs.io._temporary import name_prefix
 from texrs.materials import Material
 from texrs.painting import choose_scale, follow, paint
 from texrs.painting._files import check_suffix
@@ -93,7 +94,7 @@ def paint_command(
         painted["atlas"] = None if corners else painted.get("atlas", given["atlas"])
         made = paint(mesh, texture, **painted, progress=progress)
     depth: Any = bits
-    with TemporaryDirectory(prefix=".texrs-", dir=folder) as beside:
+    with TemporaryDirectory(prefix=name_prefix(), dir=folder) as beside:
         # Files name each other, so they are written under their own names first.
         *others, last = reversed(made.save(Path(beside, os.path.basename(out)), depth=depth))
         targets = [os.path.join(folder, file.name) for file in others]

@@ -24,6 +24,7 @@ from texrs.cli._provenance import CHANGED, ORIGINAL, RUNNING
 from texrs.cli._stacks import is_stack
 from texrs.errors import FileError, InvalidInput
 from texrs.io._annotation import hash_file, is_unchanged, name_sidecar, needs_sidecar
+from texrs.io._temporary import name_prefix
 from texrs.materials import Map, Material
 from texrs.source_map import SourceMap
 
@@ -148,7 +149,7 @@ def rerun_command(
         raise InvalidInput(f"{output}: was made by texrs {recipe.verb}, which this version does not know")
     names = recipe.find_inputs()
     beside = os.path.dirname(os.path.dirname(os.path.realpath(recipe.path))) if None in recipe.arguments else None
-    folder = tempfile.mkdtemp(prefix=".texrs-", dir=beside)
+    folder = tempfile.mkdtemp(prefix=name_prefix(), dir=beside)
     token = ORIGINAL.set({place: name for name, place in names.items()})
     try:
         with hush():

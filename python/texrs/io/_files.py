@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import secrets
 import shutil
 import stat
 from collections.abc import Iterator
@@ -16,6 +15,7 @@ import numpy as np
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput, LimitExceeded, TexrsError
+from texrs.io._temporary import name_temporary, put
 
 BYTES_PER_PIXEL = 16
 """Bytes that what is read may have for each pixel of the limit: four floats."""
@@ -123,8 +123,9 @@ def atomic(path: PathLike, *, overwrite: bool = True) -> Iterator[Path]:
     ------
     pathlib.Path
         A name in the same folder, with the same suffix, to write to. When the block ends, what lies
-        there takes the place of ``path`` in one step; when it raises, it is removed, and a former
-        file stays as it was.
+        there takes the place of ``path`` in one step, also if the power goes; when it raises, it is
+        removed, and a former file stays as it was. What a process that was killed left of it goes
+        when the next one writes to the folder.
 
     Raises
     ------
@@ -161,15 +162,14 @@ def atomic(path: PathLike, *, overwrite: bool = True) -> Iterator[Path]:
         if isinstance(error, FileError):
             raise
         raise FileError(f"{target}: cannot be written ({describe_error(error)})") from None
-    # A fixed, short stem: the target's own name may already be as long as names can be.
-    temporary = final.with_name(f".texrs-{secrets.token_hex(8)}{find_suffix(final)}")
+    temporary = name_temporary(final, find_suffix(final))
     try:
         yield temporary
         if exists:
             shutil.copymode(final, temporary)
         elif not overwrite and os.path.lexists(final):
             raise FileError(f"{target}: exists already; overwrite=True replaces it")
-        os.replace(temporary, final)
+        put(temporary, final)
     except OSError as error:
         if isinstance(error, TexrsError):
             raise

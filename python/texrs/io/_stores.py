@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import secrets
 import shutil
 from collections.abc import Mapping, Sequence
 from math import prod
@@ -16,6 +15,7 @@ from texrs._typing import Array
 from texrs.errors import FileError
 from texrs.io._files import BYTES_PER_PIXEL, check_size, translate_errors
 from texrs.io._ome import describe_image
+from texrs.io._temporary import name_temporary, put, settle
 
 MARKS = ("zarr.json", ".zarray", ".zgroup")
 """One of these lies in the folder of every array and group."""
@@ -85,7 +85,7 @@ def write_store(path: Path, array: Array, axes: int, spacing: Sequence[float], *
     channels = array.shape[axes] if array.ndim > axes else None
     values = array if channels is None else np.moveaxis(array, -1, 0)
     chunks = (*values.shape[: values.ndim - axes], *(min(_CHUNK[axes], n) for n in array.shape[:axes]))
-    temporary = final.with_name(f".texrs-{secrets.token_hex(8)}.zarr")
+    temporary = name_temporary(final, ".zarr")
     with translate_errors(path, "writing the store"):
         try:
             said = describe_image("image", axes, 1, channels, (0,) * axes, spacing, None)
@@ -96,11 +96,16 @@ def write_store(path: Path, array: Array, axes: int, spacing: Sequence[float], *
             )
             stored[...] = values
             if final.exists():
+                settle(temporary)  # Now, so that the moment without either is short.
                 os.replace(final, former := temporary.with_suffix(".former"))
-                os.replace(temporary, final)
+                try:
+                    put(temporary, final)
+                except BaseException:
+                    os.replace(former, final)
+                    raise
                 shutil.rmtree(former, ignore_errors=True)
             else:
-                os.replace(temporary, final)
+                put(temporary, final)
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
 
