@@ -52,19 +52,29 @@ def test_labels_and_everything_else_follow():
 
 
 def test_boxes_are_around_what_is_seen_of_them():
-    made = AUGMENT(IMAGE, LABELS, BOXES, seed=3)
-    assert len(made.boxes) > 3
-    assert np.array_equal(BOXES[made.which, 4], made.boxes[:, 4])
-    whole = 0
-    for left, top, right, bottom, label in made.boxes:
-        assert 0 <= left < right <= SIDE
-        assert 0 <= top < bottom <= SIDE
-        own = made.mask[int(top) : int(bottom), int(left) : int(right)] == label
-        size = (BOXES[int(label) - 1, 2:4] - BOXES[int(label) - 1, :2])[::-1]
-        whole += own.shape == tuple(size) and own.sum() == (label == LABELS).sum()
-        assert own.any()
+    whole, seen = 0, 0
+    for seed in range(3, 7):
+        made = AUGMENT(IMAGE, LABELS, BOXES, seed=seed)
+        assert len(made.boxes) > 3
+        assert np.array_equal(BOXES[made.which, 4], made.boxes[:, 4])
+        seen += len(made.boxes)
+        for left, top, right, bottom, label in made.boxes:
+            assert 0 <= left < right <= SIDE
+            assert 0 <= top < bottom <= SIDE
+            own = made.mask[int(top) : int(bottom), int(left) : int(right)] == label
+            size = (BOXES[int(label) - 1, 2:4] - BOXES[int(label) - 1, :2])[::-1]
+            whole += own.shape == tuple(size) and own.sum() == (label == LABELS).sum()
+            assert own.any()
     # Most are whole things, in boxes as tight as theirs.
-    assert whole >= len(made.boxes) / 2
+    assert whole >= seen / 2
+
+
+@pytest.mark.parametrize("name", ["bricks", "pebbles", "weave"])
+def test_the_picture_itself_is_no_other_one(name):
+    image = getattr(texrs.samples, name)((64, 64)).image
+    found = [AUGMENT(image, seed=seed).image for seed in range(3)]
+    assert all((made == image).all(axis=-1).mean() < 0.5 for made in found)
+    assert not np.array_equal(found[0], found[1])
 
 
 def test_a_box_is_left_out_where_too_little_of_it_is_seen():

@@ -26,8 +26,8 @@ class Span:
 
 
 def divide_axis(length: int, side: int, patch: int, overlap: int, wrap: bool) -> list[Span]:
-    """Divide an axis evenly into overlapping patches, none longer than ``side``."""
-    if not wrap and length <= side:
+    """Divide an axis evenly into overlapping patches, none longer than ``side``; what one patch covers is one."""
+    if not wrap and length <= patch:
         return [Span(0, length, 0, 0)]
     step = max(1, patch - overlap)
     if wrap:
