@@ -12,6 +12,7 @@ PACKAGE = ROOT / "python" / "texrs"
 
 LAYERS = (
     ("_rust", "errors", "_typing"),
+    ("_memory",),
     ("_cache", "_checks", "_digits", "_progress", "_version"),
     ("io",),
     ("_conversion",),

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 import numbers
-import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
+from texrs._memory import find_memory
 from texrs.errors import InvalidInput, LimitExceeded
 
 MAX_PIXELS = 2**28
 """Pixels or voxels that an array made by texrs may have, unless a limit is given."""
+FREE = 2**20
+"""Bytes that may be taken without asking how many there are, which takes as long as to fill them."""
 
 
 def as_list(value: object) -> list[Any]:
@@ -52,23 +54,20 @@ def as_size(
 
 
 def check_memory(needed: int, name: str = "size", *, way: str = "") -> None:
-    """Refuse what needs more bytes than the machine has; ``way`` says what needs less.
+    """Refuse what needs more bytes than this process may take (see `texrs._memory`); ``way`` says what needs less.
 
     Raises
     ------
     LimitExceeded
-        More bytes than the machine has, where it tells.
+        More bytes than there are, where anything tells.
 
     """
-    try:
-        there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):
+    if needed <= FREE:
         return
-    if needed > there > 0:
+    there = find_memory()
+    if there is not None and needed > there:
         more = f"; {way}" if way else ""
-        raise LimitExceeded(
-            f"{name}: needs {needed / 1e9:.1f} GB of memory, this machine has {there / 1e9:.1f} GB{more}"
-        )
+        raise LimitExceeded(f"{name}: needs {needed / 1e9:.1f} GB of memory, {there / 1e9:.1f} GB may be taken{more}")
 
 
 def as_tuple(value: object, name: str, length: int, what: str) -> tuple[Any, ...]:
