@@ -118,11 +118,9 @@ def remove(
     if not marked.any():
         raise InvalidInput("mask: marks nothing, so there is nothing to remove")
     wide = max(1, round(MARGIN * min(shape))) if margin is None else as_int(margin, "margin", 0, 64)
-    rim, things = (
-        (round(RIM * min(shape)), min(64, round(THINGS * min(shape))))
-        if boundary is None
-        else (as_int(boundary, "boundary", 0, 64),) * 2
-    )
+    rim, things = round(RIM * min(shape)), min(64, round(THINGS * min(shape)))
+    if boundary is not None:
+        rim = things = as_int(boundary, "boundary", 0, 64)
     screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
     number, follow = as_seed(seed), as_bool(light, "light")
     watch = progress or (lambda stage, share: None)
