@@ -55,8 +55,8 @@ def extend(
     top, bottom, left, right : int
         Pixels that are added there, 0 to 8192; some somewhere. Towards the horizon only as far as it.
     to : int or (rows, columns), optional
-        Size of the larger picture: what the sides above do not add to it is added evenly, but towards the horizon only as far
-        as the plane goes, and on the other side then.
+        Size of the larger picture, in pixels: what the sides above do not add to it is added evenly, but towards the horizon
+        only as far as the plane goes, and on the other side then.
     view : View or Plane, or a sequence of them, optional
         How the photograph shows the plane, as far as that is to be said; what is not is found. Where that is not sure, or the
         plane is seen from the front, things are as large as they are seen anywhere. What is no ground, as the sky above a

@@ -71,6 +71,13 @@ class Judgement:
     share : float
         Share of the exemplar that is shown, 0 to 1, as far as there is room for it.
 
+    Examples
+    --------
+    >>> from texrs.judging import Judgement
+    >>> bad, good = Judgement(0.2, 0.1, 0.0, 0.5, 0.9), Judgement(0.0, 0.0, 0.0, 0.1, 0.9)
+    >>> good.score < bad.score
+    True
+
     """
 
     torn: float
@@ -86,7 +93,20 @@ class Judgement:
         return flaws + REPETITION * self.repetition + UNUSED * (1 - self.share)
 
     def report(self) -> dict[str, float]:
-        """Return the figures and the score as JSON types."""
+        """Return the figures and the score as JSON types.
+
+        Returns
+        -------
+        dict of str to float
+            Rounded to four places.
+
+        Examples
+        --------
+        >>> from texrs.judging import Judgement
+        >>> sorted(Judgement(0.2, 0.1, 0.0, 0.5, 0.9).report())
+        ['broken', 'fog', 'repetition', 'score', 'share', 'torn']
+
+        """
         return {name: round(value, 4) for name, value in {"score": self.score, **asdict(self)}.items()}
 
 

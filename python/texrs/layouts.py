@@ -47,6 +47,11 @@ def points(places: object, size: int | Sequence[int], *, wrap: bool | Sequence[b
     wrap : bool or (bool, bool)
         Whether the layout repeats along rows and columns.
 
+    Returns
+    -------
+    Elements
+        Disjoint, on a drawing (rows, columns) uint8.
+
     Raises
     ------
     InvalidInput
@@ -97,6 +102,11 @@ def lattice(
     origin : (row, column), optional
         One of the points; the middle of the drawing by default.
 
+    Returns
+    -------
+    Elements
+        Disjoint, on a drawing (rows, columns) uint8.
+
     Raises
     ------
     InvalidInput
@@ -137,6 +147,11 @@ def cells(labels: Array, *, wrap: bool | Sequence[bool] = False) -> Elements:
         The cell of each pixel, any positive numbers; 0 is joint. Three cells or more, sides of at least 16.
     wrap : bool or (bool, bool)
         Whether it repeats along rows and columns.
+
+    Returns
+    -------
+    Elements
+        Jointed, one a label, on a drawing (H, W) uint8.
 
     Raises
     ------
@@ -192,6 +207,11 @@ def courses(
     seed : int
         Chooses lengths that vary.
 
+    Returns
+    -------
+    Elements
+        Jointed, on a drawing (rows, columns) uint8.
+
     Raises
     ------
     InvalidInput
@@ -238,6 +258,10 @@ def make(description: Mapping[str, Any]) -> Elements:
     description : mapping
         ``{"layout": "points", "places": [[row, column], ...], "size": [128, 128]}``, or ``"lattice"``, ``"cells"`` or
         ``"courses"`` with the arguments of the function of that name.
+
+    Returns
+    -------
+    Elements
 
     Raises
     ------

@@ -26,7 +26,7 @@ class Synthesis:
 
     Attributes
     ----------
-    image : array
+    image : (rows, columns[, C]) or (planes, rows, columns[, C]) array
         The result, in the dtype and with the channels of the exemplar.
     source : SourceMap
         Where each pixel comes from; ``source.render(exemplar)`` is ``stages["composite"]``, exactly.
@@ -37,6 +37,14 @@ class Synthesis:
         What was decided and measured: JSON types only.
     material : Material, optional
         All maps of the result, where the exemplar was a `texrs.Material`; ``image`` is the one that shows it then.
+
+    Examples
+    --------
+    >>> import texrs
+    >>> pebbles = texrs.samples.pebbles((64, 64)).image
+    >>> made = texrs.design(pebbles, 96, seed=1)
+    >>> made.image.shape, made.source.shape, made.image.dtype == pebbles.dtype
+    ((96, 96, 3), (96, 96), True)
 
     """
 
@@ -118,8 +126,8 @@ class Gallery(list[Any]):
 
     Parameters
     ----------
-    results : iterable of Synthesis, Exemplar, Elements, SourceMap, Field or array
-        What shows itself, or arrays of pictures.
+    iterable : iterable of Synthesis, Exemplar, Elements, SourceMap, Field or array
+        What shows itself, or pictures (H, W[, C]).
 
     Raises
     ------

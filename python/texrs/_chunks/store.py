@@ -44,9 +44,15 @@ class Stored:
     chunks : int
         How many there are, of all maps and levels.
     made : int
-        Those that were made now; the others were there.
+        Number of those that were made now; the others were there.
     seconds : float
-        How long it took.
+        How long it took, in seconds.
+
+    Examples
+    --------
+    >>> from texrs.lazy import Stored
+    >>> Stored("large.zarr", (4096, 4096, 3), 64, 64, 12.5).made
+    64
 
     """
 

@@ -209,7 +209,7 @@ def apply(
     ----------
     source : SourceMap
         Of a picture or a volume.
-    exemplars : array, or a sequence of one an exemplar
+    exemplars : (H, W[, C]) or (D, H, W[, C]) array, or a sequence of one an exemplar
         Any map of the exemplar's height and width (and depth), any dtype and channels.
     kind : {"colour", "normal", "vector", "label"}
         "colour": also heights and whatever else may be mixed; where the finish takes uneven light out, it does so of them too.

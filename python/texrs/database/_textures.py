@@ -130,7 +130,23 @@ class TextureDatabase:
         return self.analyse(name)
 
     def list(self) -> list[Record]:
-        """Return what the manifest says of all textures, by name."""
+        """Return what the manifest says of all textures, by name.
+
+        Returns
+        -------
+        list of Record
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import texrs
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     shelf = texrs.TextureDatabase(folder)
+        ...     _ = shelf.add(texrs.samples.dots((96, 96)).image, "dots", layout="disjoint")
+        ...     [record.name for record in shelf.list()]
+        ['dots']
+
+        """
         found = self._folder.read()
         return [found[name] for name in sorted(found)]
 
@@ -148,7 +164,7 @@ class TextureDatabase:
 
         Parameters
         ----------
-        image : path_like or array
+        image : path_like or (H, W[, C]) array
             A file, which stays where it is, or pixels, of which a copy is kept.
         name : str, optional
             Letters, digits, ``.``, ``_`` and ``-``; by default that of the file.
@@ -175,6 +191,15 @@ class TextureDatabase:
             A name that is taken or cannot be that of a file, or what `texrs.elements.analyse` refuses.
         FileError
             The file cannot be read, or the entry not written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import texrs
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     shelf = texrs.TextureDatabase(folder)
+        ...     str(shelf.add(texrs.samples.dots((96, 96)).image, "dots", layout="disjoint").layout)
+        'disjoint'
 
         """
         progress = listen(progress)
@@ -244,12 +269,33 @@ class TextureDatabase:
     def analyse(self, name: str, *, progress: Progress | bool | None = None) -> Elements:
         """Return an entry, made anew if its image or the version is another one, or if it is damaged.
 
+        Parameters
+        ----------
+        name : str
+            Of the texture.
+        progress : callable or True, optional
+            Called as ``progress(stage, share)``; raising stops the work. True shows a bar.
+
+        Returns
+        -------
+        Elements
+
         Raises
         ------
         InvalidInput
             There is no such texture.
         FileError
             The entry cannot be made anew either, because its image is gone.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import texrs
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     shelf = texrs.TextureDatabase(folder)
+        ...     _ = shelf.add(texrs.samples.dots((96, 96)).image, "dots", layout="disjoint")
+        ...     shelf.analyse("dots").image.shape
+        (96, 96, 3)
 
         """
         progress = listen(progress)
@@ -308,6 +354,17 @@ class TextureDatabase:
         InvalidInput
             There is no such texture, or what `texrs.splice` refuses.
 
+        Examples
+        --------
+        >>> import tempfile
+        >>> import texrs
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     shelf = texrs.TextureDatabase(folder)
+        ...     for name in ("dots", "pebbles"):
+        ...         _ = shelf.add(texrs.samples.load(name, size=(96, 96)).image, name, layout="disjoint")
+        ...     shelf.splice("dots", "pebbles", seed=1).image.shape
+        (96, 96, 3)
+
         """
         progress = listen(progress)
         return splice(self.analyse(a), self.analyse(b), size, progress=progress, **options)
@@ -346,6 +403,24 @@ class TextureDatabase:
         -------
         Matrix
             What could not be spliced is named with the reason, and grey on the sheet.
+
+        Raises
+        ------
+        InvalidInput
+            There is no such texture, or an option that `texrs.splice` has not.
+        Cancelled
+            The work was stopped.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import texrs
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     shelf = texrs.TextureDatabase(folder)
+        ...     for name in ("dots", "pebbles"):
+        ...         _ = shelf.add(texrs.samples.load(name, size=(96, 96)).image, name, layout="disjoint")
+        ...     sorted(shelf.matrix(["dots"], ["pebbles"], cell=32, seed=1).results)
+        [('dots', 'pebbles')]
 
         """
         progress = listen(progress)

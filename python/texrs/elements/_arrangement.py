@@ -31,6 +31,14 @@ class Arrangement:
     darker : bool
         Whether what is not foreground, the ground, the joints or what is seen through a net, is darker than what is.
 
+    Examples
+    --------
+    >>> from texrs import elements, samples
+    >>> sample = samples.load("dots", size=(96, 96))
+    >>> found = elements.analyse(sample.image, mask=sample.mask, layout="disjoint")
+    >>> found.arrangement.darker
+    False
+
     """
 
     spacing: float
@@ -39,7 +47,29 @@ class Arrangement:
     darker: bool
 
     def describe(self, layout: Layout) -> str:
-        """Return it in words."""
+        """Return it in words.
+
+        Parameters
+        ----------
+        layout : Layout
+            How the elements hang together, which names what lies between them.
+
+        Returns
+        -------
+        str
+
+        Raises
+        ------
+        KeyError
+            No such layout.
+
+        Examples
+        --------
+        >>> from texrs.elements import Arrangement, Layout
+        >>> Arrangement(24.0, None, None, True).describe(Layout.DISJOINT)
+        '24 pixels apart; ground darker'
+
+        """
         words = [f"{self.spacing:.0f} pixels apart"]
         if self.lattice is not None:
             words.append(

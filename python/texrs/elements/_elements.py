@@ -70,6 +70,15 @@ class Elements:
     known : ndarray of shape (height, width), int32, optional
         The element of each pixel, from 1 in the order of the points, where that is known at once: given, as to `of_labels`, or
         of cells beyond doubt. Numbers after those of all points are of elements that only enter the picture.
+
+    Examples
+    --------
+    >>> from texrs import elements, samples
+    >>> sample = samples.load("dots", size=(96, 96))
+    >>> found = elements.analyse(sample.image, mask=sample.mask, layout="disjoint")
+    >>> found.points.shape[1], found.mask.dtype, str(found.layout)
+    (2, dtype('bool'), 'disjoint')
+
     """
 
     image: NDArray[Any]
@@ -107,6 +116,11 @@ class Elements:
             One of `texrs.samples` with centres and a mask.
         wrap : (bool, bool)
             Whether it was generated to repeat without a seam along rows and columns.
+
+        Returns
+        -------
+        Elements
+            With the sample's centres and mask, each element as alike to the chosen one as can be.
 
         Raises
         ------
@@ -152,6 +166,11 @@ class Elements:
             How the elements hang together; cells, as bricks and stones, are jointed, and need no joint between them.
         wrap : bool or (bool, bool)
             Whether the texture repeats without a seam along rows and columns.
+
+        Returns
+        -------
+        Elements
+            One point a label, at its centroid.
 
         Raises
         ------
@@ -248,6 +267,23 @@ class Elements:
 
         The nearest by appearance vectors of 5 x 5 windows, more than 3 pixels apart; made when first asked for, and kept.
 
+        Parameters
+        ----------
+        k : int
+            How many samples each pixel has, itself among them, 1 to 16.
+        progress : callable, optional
+            Called as ``progress(share)`` with the share that is done; raising stops the work.
+
+        Returns
+        -------
+        Similarity
+            Its ``sets`` are (H W, k): the flat indices of samples, the pixel's own first.
+
+        Raises
+        ------
+        InvalidInput
+            No such number.
+
         Examples
         --------
         >>> from texrs import elements, samples
@@ -261,16 +297,59 @@ class Elements:
         return Exemplar(self.image, repeat=self.wrap).similarity(-1, k=k, progress=progress)
 
     def with_similarity(self, *, k: int = 3, progress: Callable[[float], object] | None = None) -> Elements:
-        """Return the entry with its similarity sets, so that they are saved with it."""
+        """Return the entry with its similarity sets, so that they are saved with it.
+
+        Parameters
+        ----------
+        k : int
+            How many samples each pixel has, itself among them, 1 to 16.
+        progress : callable, optional
+            Called as ``progress(share)`` with the share that is done; raising stops the work.
+
+        Returns
+        -------
+        Elements
+            The same but for `sets`.
+
+        Raises
+        ------
+        InvalidInput
+            No such number.
+
+        Examples
+        --------
+        >>> from texrs import elements, samples
+        >>> sample = samples.load("dots", size=(64, 64))
+        >>> found = elements.analyse(sample.image, mask=sample.mask, layout="disjoint")
+        >>> found.sets is None, found.with_similarity(k=2).sets.k
+        (True, 2)
+
+        """
         return replace(self, sets=self.similarity(k=k, progress=progress))
 
     def save(self, path: Path) -> None:
         """Write the entry to an ``.npz`` file, whole or not at all; `texrs.elements.load` reads it.
 
+        Parameters
+        ----------
+        path : path_like
+            With the suffix .npz; a former file is replaced when all is written.
+
         Raises
         ------
         FileError
             It cannot be written.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> from texrs import elements, samples
+        >>> found = elements.Elements.of_sample(samples.dots((96, 96)))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     path = pathlib.Path(folder, "dots.npz")
+        ...     found.save(path)
+        ...     elements.load(path)
+        Elements(8 of box (19, 19) in 96 x 96, disjoint)
 
         """
         parts: dict[str, Any] = {
@@ -299,7 +378,31 @@ class Elements:
 
 
 def digest(image: Array) -> str:
-    """Return a hash of an image: its shape, dtype and values."""
+    """Return a hash of an image: its shape, dtype and values.
+
+    Parameters
+    ----------
+    image : (H, W) or (H, W, C) array
+        In any dtype that a picture may have.
+
+    Returns
+    -------
+    str
+        32 hexadecimal digits.
+
+    Raises
+    ------
+    InvalidInput
+        Not an image.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs import elements
+    >>> len(elements.digest(np.zeros((8, 8), np.uint8)))
+    32
+
+    """
     pixels = as_image(image)
     made = hashlib.blake2b(digest_size=16, person=b"texrs.elements")
     made.update(repr((pixels.shape, pixels.dtype.str)).encode())
@@ -310,10 +413,29 @@ def digest(image: Array) -> str:
 def load(path: Path) -> Elements:
     """Read an entry that `save` wrote.
 
+    Parameters
+    ----------
+    path : path_like
+        The .npz file.
+
+    Returns
+    -------
+    Elements
+
     Raises
     ------
     FileError
         Not there, no entry, of another version, or damaged.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from texrs import elements, samples
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "wall.npz")
+    ...     elements.Elements.of_sample(samples.bricks((96, 96))).save(path)
+    ...     elements.load(path).layout
+    <Layout.JOINTED: 'jointed'>
 
     """
 

@@ -59,6 +59,13 @@ class Instance:
     mask : (h, w) array of bool
         Its pixels, within the box that they fill. Of a cyclic texture the box may go on beyond the last row or column.
 
+    Examples
+    --------
+    >>> from texrs import elements, samples
+    >>> one = elements.Elements.of_sample(samples.dots((96, 96))).instances[0]
+    >>> len(one.centre), one.mask.ndim, one.mask.dtype
+    (2, 2, dtype('bool'))
+
     """
 
     centre: tuple[float, float]

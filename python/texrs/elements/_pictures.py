@@ -17,6 +17,11 @@ DIM = 0.65
 def pictures(entry: Elements) -> dict[str, Picture]:
     """Draw an entry: its points on the texture, and its mask.
 
+    Parameters
+    ----------
+    entry : Elements
+        As it was found.
+
     Returns
     -------
     dict of (H, W, 3) uint8

@@ -173,7 +173,7 @@ class Exemplar:
         radii : sequence of int
             Radius of the windows, 1 to 8, from the coarsest level on; the last one serves all that follow.
         coarsest : int
-            Least side of the coarsest level.
+            Least side of the coarsest level, in samples.
 
         Returns
         -------
@@ -217,7 +217,7 @@ class Exemplar:
         level : int
             Of the analysis with windows of radius 2; 0 is the coarsest, -1 the finest.
         coarsest : int
-            Of that analysis.
+            Of that analysis, in samples.
         k : int
             Samples of a set, 1 to 16.
         n : int
@@ -342,6 +342,24 @@ class Exemplar:
             A name and all options that it depends on.
         make : callable
             Works the fact out. A result with ``nbytes`` is counted by them.
+
+        Returns
+        -------
+        object
+            What ``make`` returned, now or earlier.
+
+        Raises
+        ------
+        TypeError
+            A fact that is not hashable. What ``make`` raises goes through, and nothing is kept.
+
+        Examples
+        --------
+        >>> from texrs import Exemplar, samples
+        >>> known = Exemplar(samples.dots((64, 64)).image)
+        >>> known.remember(("brightest",), lambda: int(known.image.max())) <= 255
+        True
+
         """
         if fact not in self._facts:
             self._facts[fact] = _FACTS.get_or_make((self.key, fact), make)
@@ -350,10 +368,25 @@ class Exemplar:
     def save(self, path: Path) -> None:
         """Write the exemplar and its analysis to a .npz file; a former file is replaced only when all is written.
 
+        Parameters
+        ----------
+        path : path_like
+            With the suffix .npz.
+
         Raises
         ------
         FileError
             It cannot be written.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> from texrs import Exemplar, samples
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     path = pathlib.Path(folder, "dots.npz")
+        ...     Exemplar(samples.dots((64, 64)).image).save(path)
+        ...     Exemplar.load(path).shape
+        (64, 64)
 
         """
         from texrs.io import atomic
@@ -367,10 +400,29 @@ class Exemplar:
     def load(cls, path: Path) -> Exemplar:
         """Return the exemplar that `save` wrote, with its analysis.
 
+        Parameters
+        ----------
+        path : path_like
+            The .npz file.
+
+        Returns
+        -------
+        Exemplar
+
         Raises
         ------
         FileError
             The file cannot be read, is of another version, or is damaged.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> from texrs import Exemplar, samples
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     path = pathlib.Path(folder, "stripes.npz")
+        ...     Exemplar(samples.stripes((32, 32, 32)).image, axes=3).save(path)
+        ...     Exemplar.load(path).axes
+        3
 
         """
         from texrs.io import read_arrays
@@ -436,7 +488,12 @@ def as_exemplar(value: object, name: str = "exemplar", *, axes: int = 2, minimum
     axes : int
         2 or 3, as the verb needs.
     minimum : int
-        The least length of an axis.
+        The least length of an axis, in samples.
+
+    Returns
+    -------
+    Exemplar
+        The one that was given, or a new one; what is known of equal pixels is shared.
 
     Raises
     ------
@@ -444,6 +501,14 @@ def as_exemplar(value: object, name: str = "exemplar", *, axes: int = 2, minimum
         An exemplar of other axes, not an array, or too small.
     FileError
         A path that cannot be read.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs.exemplar import as_exemplar
+    >>> known = as_exemplar(np.zeros((8, 8), np.uint8))
+    >>> as_exemplar(known) is known
+    True
 
     """
     if isinstance(value, Exemplar):

@@ -32,6 +32,12 @@ class Analysis:
     levels : tuple of Appearance
         From the coarsest to the exemplar's own resolution, each twice as fine as the one before.
 
+    Examples
+    --------
+    >>> from texrs import Exemplar, samples
+    >>> len(Exemplar(samples.dots((64, 64)).image).analyse().levels)
+    3
+
     """
 
     levels: tuple[Appearance, ...]
@@ -54,17 +60,47 @@ class Analysis:
         return sum(int(np.prod(level.shape)) * 56 for level in self.levels)
 
     def arrays(self) -> dict[str, Array]:
-        """Return the analysis as plain arrays, to be kept; `from_arrays` takes them back."""
+        """Return the analysis as plain arrays, to be kept; `from_arrays` takes them back.
+
+        Returns
+        -------
+        dict of str to array
+            By level and name, as ``"0/basis"``.
+
+        Examples
+        --------
+        >>> from texrs import Exemplar, samples
+        >>> sorted(Exemplar(samples.dots((64, 64)).image).analyse().arrays())[:3]
+        ['0/basis', '0/bias', '0/channels']
+
+        """
         return {f"{i}/{name}": value for i, level in enumerate(self.levels) for name, value in level.arrays().items()}
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, Array]) -> Analysis:
         """Return the analysis whose arrays are among these.
 
+        Parameters
+        ----------
+        arrays : mapping of str to array
+            As `arrays` returns them; those whose name has no slash are left alone.
+
+        Returns
+        -------
+        Analysis
+
         Raises
         ------
         InvalidInput
             Arrays that are missing or do not belong together.
+
+        Examples
+        --------
+        >>> from texrs import Exemplar, samples
+        >>> from texrs.exemplar import Analysis
+        >>> known = Exemplar(samples.dots((64, 64)).image).analyse()
+        >>> len(Analysis.from_arrays(known.arrays()).levels) == len(known.levels)
+        True
 
         """
         # Single numbers come back from a file as arrays of one.

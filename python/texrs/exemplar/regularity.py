@@ -53,7 +53,24 @@ is known from."""
 
 @dataclass(frozen=True, slots=True)
 class Lattice:
-    """The shifts by which an image repeats itself: all sums of multiples of two vectors (row, column) in pixels."""
+    """The shifts by which an image repeats itself: all sums of multiples of two vectors.
+
+    Attributes
+    ----------
+    a, b : (int, int)
+        The vectors, (row, column) in pixels.
+    correlation : float
+        Mean over the lattice of the correlation of the image with itself, shifted; -1 to 1.
+    exact : ((float, float), (float, float)), optional
+        The two vectors to parts of a pixel, from how far their multiples go.
+
+    Examples
+    --------
+    >>> from texrs.exemplar import Lattice
+    >>> print(Lattice((0, 8), (6, 4), 0.9))
+    a lattice of periods (0, 8) and (6, 4) (correlation 0.90)
+
+    """
 
     a: Vector
     b: Vector
@@ -73,7 +90,30 @@ class Lattice:
         return np.array(self.exact or (self.a, self.b), np.float64).T
 
     def shifts(self, reach: float) -> list[Vector]:
-        """Return the shifts within ``reach`` pixels, and those to the next places in any case; the shortest first."""
+        """Return the shifts within a distance, and those to the next places in any case; the shortest first.
+
+        Parameters
+        ----------
+        reach : float
+            The distance, in pixels.
+
+        Returns
+        -------
+        list of (int, int)
+            Rows and columns, in pixels, each shift with its opposite.
+
+        Raises
+        ------
+        TypeError
+            Not a number.
+
+        Examples
+        --------
+        >>> from texrs.exemplar import Lattice
+        >>> Lattice((0, 8), (8, 0), 1.0).shifts(8)[:4]
+        [(-8, 0), (0, -8), (0, 8), (8, 0)]
+
+        """
         a, b = np.array(self.a), np.array(self.b)
         reach = max(reach, *(float(np.hypot(*v)) for v in (a, b, a + b, a - b)))
         most = int(max(reach / np.hypot(*a), reach / np.hypot(*b)) * 2) + 2
@@ -98,6 +138,17 @@ class Lattice:
         -------
         (2, 2) float64, or None
             None where the lattice would have to be changed by more than `BENT`.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            Vectors along one line.
+
+        Examples
+        --------
+        >>> from texrs.exemplar import Lattice
+        >>> Lattice((0, 8), (8, 0), 1.0).close((32, 32), (True, True)).tolist()
+        [[1.0, 0.0], [0.0, 1.0]]
 
         """
         vectors = self.vectors

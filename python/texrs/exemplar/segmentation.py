@@ -90,7 +90,32 @@ class ElementOptions:
         return self.layers, self.kind, None if self.labels is None else content_hash(np.asarray(self.labels))
 
     def select(self, number: int) -> ElementOptions:
-        """Return the options of one of several exemplars, which may each have labels of its own."""
+        """Return the options of one of several exemplars, which may each have labels of its own.
+
+        Parameters
+        ----------
+        number : int
+            Which of the exemplars, from 0.
+
+        Returns
+        -------
+        ElementOptions
+            With its labels alone; the same where labels are not a list.
+
+        Raises
+        ------
+        IndexError
+            The list has no such entry.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from texrs import ElementOptions
+        >>> marks = [np.zeros((4, 4), int), np.ones((4, 4), int)]
+        >>> int(ElementOptions(labels=marks).select(1).labels.sum())
+        16
+
+        """
         return replace(self, labels=self.labels[number]) if isinstance(self.labels, list | tuple) else self
 
 
@@ -114,6 +139,13 @@ class Segmentation:
     courses : Courses, optional
         The courses that it lies in, if any, where it does not repeat along them; there is no lattice then.
 
+    Examples
+    --------
+    >>> from texrs import Exemplar, samples
+    >>> found = Exemplar(samples.dots((96, 96)).image).segment()
+    >>> found.kind, found.elements.shape, found.elements.dtype
+    ('components', (96, 96), dtype('int32'))
+
     """
 
     layers: Labels
@@ -136,12 +168,44 @@ class Segmentation:
         return self.layers.nbytes + self.elements.nbytes
 
     def freeze(self) -> Segmentation:
-        """Make the arrays read-only, so that the segmentation can be shared, and return it."""
+        """Make the arrays read-only, so that the segmentation can be shared, and return it.
+
+        Returns
+        -------
+        Segmentation
+            Itself.
+
+        Examples
+        --------
+        >>> from texrs import Exemplar, samples
+        >>> Exemplar(samples.dots((96, 96)).image).segment().freeze().layers.flags.writeable
+        False
+
+        """
         self.layers.flags.writeable = self.elements.flags.writeable = False
         return self
 
     def measure_depth(self, reach: float) -> Floats:
-        """Return how deep inside an element each pixel is: 0 at its outline and outside, 1 from ``reach`` pixels on."""
+        """Return how deep inside an element each pixel is.
+
+        Parameters
+        ----------
+        reach : float
+            The distance from the outline, in pixels, from which on it is 1.
+
+        Returns
+        -------
+        (H, W) float32
+            0 at the outlines of elements and outside, 1 from ``reach`` pixels on.
+
+        Examples
+        --------
+        >>> from texrs import Exemplar, samples
+        >>> depth = Exemplar(samples.dots((96, 96)).image).segment().measure_depth(4.0)
+        >>> float(depth.min()), float(depth.max())
+        (0.0, 1.0)
+
+        """
         from scipy.ndimage import distance_transform_edt
 
         labels = np.pad(self.elements, 1, mode="edge")

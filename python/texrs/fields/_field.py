@@ -50,6 +50,13 @@ class Field(ABC):
     axes : int
         2 or 3.
 
+    Examples
+    --------
+    >>> import texrs
+    >>> twice = texrs.fields.constant([[2, 0], [0, 2]])
+    >>> twice.axes, twice.frames([[0, 0]]).tolist()
+    (2, [[[2.0, 0.0], [0.0, 2.0]]])
+
     """
 
     axes: int

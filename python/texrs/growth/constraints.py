@@ -34,7 +34,7 @@ class Constraints:
 
     Attributes
     ----------
-    mask : (size) bool or int array
+    mask : (rows, columns) or (planes, rows, columns) bool or int array
         The points that are given: those that are not 0.
     values : (size[, C]) array, optional
         What given points show, exactly, in the exemplar's dtype and channels; those of other points are ignored.
@@ -81,9 +81,9 @@ class Guide:
 
     Attributes
     ----------
-    exemplar : array_like
+    exemplar : (H, W[, C]) or (D, H, W[, C]) array_like
         Finite numbers that broadcast to the exemplar's axes: what there is at each sample, such as how deep it lies.
-    output : array_like
+    output : (rows, columns[, C]) or (planes, rows, columns[, C]) array_like
         Finite numbers, in the same units, that broadcast to the size of the output: what each point is to look for.
     weight : float
         How much that counts beside looking like the exemplar, 0 to 100: at 1 a third of the range of the exemplar's

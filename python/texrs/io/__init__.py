@@ -167,6 +167,11 @@ def read_fov(path: PathLike) -> float | None:
     float or None
         Degrees that the longer side spans, of the whole picture that the camera took; None where the file does not say.
 
+    Raises
+    ------
+    InvalidInput
+        Not a path.
+
     Examples
     --------
     >>> import pathlib, tempfile
@@ -194,6 +199,11 @@ def read_description(path: PathLike) -> str | None:
     -------
     str or None
         None where the file does not say anything.
+
+    Raises
+    ------
+    InvalidInput
+        Not a path.
 
     Examples
     --------

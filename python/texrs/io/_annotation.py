@@ -90,6 +90,11 @@ def read_notes(path: PathLike) -> Notes:
         How its colours and its pixels are to be understood, and how texrs made it, where that is so: from the file, or
         from the file of the same name and ``.json`` beside it.
 
+    Raises
+    ------
+    InvalidInput
+        Not a path.
+
     Examples
     --------
     >>> import pathlib, tempfile

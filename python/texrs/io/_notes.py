@@ -24,6 +24,12 @@ class Notes:
     made : str, optional
         JSON: how texrs made the file.
 
+    Examples
+    --------
+    >>> from texrs.io import Notes
+    >>> Notes(density=(11811.0, 11811.0), srgb=True).srgb
+    True
+
     """
 
     profile: bytes | None = None
@@ -34,7 +40,26 @@ class Notes:
     made: str | None = None
 
     def fit(self, channels: int) -> Notes:
-        """Return what is true of a picture of so many channels: a profile is of grey or of colours."""
+        """Return what is true of a picture of so many channels: a profile is of grey or of colours.
+
+        Parameters
+        ----------
+        channels : int
+            1 or 2 of grey, 3 or 4 of colours, alpha counted.
+
+        Returns
+        -------
+        texrs.io.Notes
+            Without the profile where that is of the other kind.
+
+        Examples
+        --------
+        >>> from texrs.io import Notes
+        >>> colours = Notes(profile=bytes(16) + b"RGB " + bytes(108))
+        >>> colours.fit(3).profile is None, colours.fit(1).profile is None
+        (False, True)
+
+        """
         space = b"RGB " if channels in (3, 4) else b"GRAY" if channels in (1, 2) else b""
         fits = self.profile is not None and self.profile[16:20] == space
         return replace(self, profile=self.profile if fits else None)

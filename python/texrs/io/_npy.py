@@ -32,7 +32,27 @@ _PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """What a file of NumPy says of an array."""
+    """What a file of NumPy says of an array.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Of the array.
+    dtype : numpy.dtype
+        Of its samples.
+    fortran : bool
+        Whether the first axis runs fastest.
+    start : int
+        Where the samples begin, in bytes.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs.io import Header
+    >>> Header((4, 5), np.dtype("u2"), False, 128).size
+    40
+
+    """
 
     shape: tuple[int, ...]
     dtype: np.dtype[np.generic]

@@ -28,6 +28,20 @@ _CHUNK = {2: 512, 3: 128}
 def is_store(path: str | os.PathLike[str]) -> bool:
     """Return whether a folder is an array or a group of Zarr.
 
+    Parameters
+    ----------
+    path : path_like
+        Of a folder; it need not exist.
+
+    Returns
+    -------
+    bool
+
+    Raises
+    ------
+    TypeError
+        Not a path.
+
     Examples
     --------
     >>> is_store("/")

@@ -36,6 +36,18 @@ class Completion:
     coordinates : (H, W, 2) float32
         The place in that exemplar, (row, column); 0 where the picture was kept.
 
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs.kernels.complete import complete
+    >>> from texrs.kernels.patch_search import PatchIndex
+    >>> stripes = np.tile(np.float32([0, 0, 1, 1]), (24, 6))[..., np.newaxis]
+    >>> known = np.ones((24, 24), bool)
+    >>> known[8:14, 9:16] = False
+    >>> filled = complete(stripes * known[..., np.newaxis], known, PatchIndex([stripes]), patch=12)
+    >>> filled.label.shape, int(filled.label[0, 0]), bool((filled.label[~known] >= 0).all())
+    ((24, 24), -1, True)
+
     """
 
     colours: Floats
@@ -93,8 +105,8 @@ def complete(
         the best share of known pixels, all known pixels of one weight instead of more beside the hole, the exact best
         matches, all of them cut, and plain cut costs. With ``count=1`` that is their completion.
     shown : int, optional
-        The image of ``index`` that the picture shows in place, if it does: what lies beside a hole is then not repeated
-        or mirrored in it. Patches know of each other in any case, and which images of ``index`` are mirrors of others.
+        The image of ``index``, from 0, that the picture shows in place, if it does: what lies beside a hole is then not
+        repeated or mirrored in it. Patches know of each other in any case, and which images of ``index`` are mirrors of others.
     progress : callable, optional
         Called with the share of the holes that is filled, 0 to 1; raising stops the work.
 

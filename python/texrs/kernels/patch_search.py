@@ -42,11 +42,17 @@ class Match:
     Attributes
     ----------
     cost : float
-        Weighted sum of squared differences, in the units of the images.
+        Weighted sum of squared differences, in the units of the images; at least 0.
     exemplar : int
         Which of the images, counted from 0.
     row, column : int
-        Of the top-left corner of the patch in that image.
+        Of the top-left corner of the patch in that image, in pixels.
+
+    Examples
+    --------
+    >>> from texrs.kernels.patch_search import Match
+    >>> min(Match(2.0, 0, 1, 1), Match(0.5, 0, 3, 2))
+    Match(cost=0.5, exemplar=0, row=3, column=2)
 
     """
 

@@ -34,9 +34,16 @@ class Cut:
     mask : (H, W) or (D, H, W) bool
         True where a pixel takes B. Elsewhere it takes A where A covers it, and else neither.
     value : float
-        Sum of the costs of the edges of the seam inside the overlap, old seams that stay included.
+        Sum of the costs of the edges of the seam inside the overlap, old seams that stay included; at least 0.
     edges : int
         Number of pairs of neighbours in the overlap that the seam parts.
+
+    Examples
+    --------
+    >>> from texrs.kernels import seam
+    >>> found = seam.cut_strip([[0, 0.5, 0.9, 0.8]] * 2, [[0.6, 0.5, 0.2, 0.3]] * 2, cost="paper")
+    >>> isinstance(found, seam.Cut), found.edges
+    (True, 2)
 
     """
 
@@ -63,6 +70,14 @@ class OldSeams:
     ba : sequence of array_like
         ``M(p, q, B, T)``, at least 0, paid where ``p`` takes B and ``q`` keeps A.
 
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs.kernels.seam import OldSeams
+    >>> nothing = [np.zeros((4, 5)), np.zeros((4, 5))]  # an array an axis
+    >>> len(OldSeams(kept=nothing, ab=nothing, ba=nothing).kept)
+    2
+
     """
 
     kept: Sequence[ArrayLike]
@@ -79,7 +94,15 @@ class Labels:
     mask : (H, W) or (D, H, W) bool
         The labels; of all best labellings, that with the fewest True.
     energy : float
-        Sum of the costs of all points and pairs.
+        Sum of the costs of all points and pairs, in their units.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs.kernels import seam
+    >>> found = seam.binary_labels(np.array([[[0.0, 1.0], [1.0, 0.0]]]), 0.25)
+    >>> found.mask.tolist(), round(found.energy, 3)
+    ([[False, True]], 0.25)
 
     """
 
@@ -274,6 +297,13 @@ class Strip:
         The axis that the seam crosses.
     penalty : float or (H, W) array_like of float, optional
         At least 0, as in `cut`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs.kernels.seam import Strip
+    >>> Strip(np.zeros((8, 4, 3)), np.ones((8, 4, 3)), axis=1).axis
+    1
 
     """
 

@@ -31,8 +31,16 @@ class Warp:
     covered : (rows, columns) bool
         Where a triangle was drawn; the others are holes.
     triangles, flipped, flipped_heavy : int
-        Triangles that were drawn; those of them that were turned over, or flattened; and those turned over whose
+        Number of triangles that were drawn; those of them that were turned over, or flattened; and those turned over whose
         three corners weigh something.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs.kernels.warp import mesh
+    >>> warp = mesh(np.moveaxis(np.indices((8, 8)), 0, -1).astype(float))
+    >>> warp.triangles, warp.flipped, bool(warp.covered.all())
+    (98, 0, True)
 
     """
 
@@ -123,6 +131,15 @@ class Triangles:
     frames : (triangles + 1, 2, 2) float32
         The Jacobian of the coordinates in each triangle; the first is the identity.
 
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs.kernels.warp import from_points
+    >>> corners = np.array([[0, 0], [0, 31], [31, 0], [31, 31], [15, 15]])
+    >>> warped = from_points(corners, corners + 0.0, (32, 32))
+    >>> warped.coordinates.shape, len(warped.frames) == int(warped.triangle.max()) + 1
+    ((32, 32, 2), True)
+
     """
 
     coordinates: Floats
@@ -143,7 +160,7 @@ def from_points(
         Where the points are in the picture, and where they go; (row, column) in pixels. Any real dtype, finite; three
         points or more.
     shape : int or (rows, columns)
-        Of the picture.
+        Of the picture, in pixels.
     size : int or (rows, columns), optional
         Of the output, up to 2^28 pixels; that of the picture by default.
 

@@ -26,6 +26,14 @@ class Map:
     space : {"srgb", "linear"}
         How its values encode light: integers of colours are sRGB, all else is linear, unless something else is said.
 
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import texrs
+    >>> one = texrs.Material({"height": np.zeros((8, 8), np.float32)})["height"]
+    >>> one.role.value, one.space
+    ('height', 'linear')
+
     """
 
     pixels: Array

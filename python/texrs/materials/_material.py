@@ -245,6 +245,11 @@ class Material(Exports):
         -------
         str or None
 
+        Raises
+        ------
+        InvalidInput
+            No such role.
+
         Examples
         --------
         >>> import numpy as np
@@ -261,7 +266,7 @@ class Material(Exports):
 
         Parameters
         ----------
-        **maps : array
+        **maps : (H, W), (H, W, C), (D, H, W) or (D, H, W, C) array
             By name; roles stay.
 
         Returns
@@ -339,7 +344,22 @@ class Material(Exports):
         return guide_materials([self])[0]
 
     def features(self) -> list[Floats]:
-        """Return what each map tells, times its weight: of one size, on scales that can be compared."""
+        """Return what each map tells, times its weight: of one size, on scales that can be compared.
+
+        Returns
+        -------
+        list of (..., F) float32
+            One array a map that weighs something, of the material's rows and columns.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import texrs
+        >>> flat = np.full((8, 8, 3), 128, np.uint8)
+        >>> [f.shape for f in texrs.Material({"albedo": flat, "normal": flat}).features()]
+        [(8, 8, 3), (8, 8, 2)]
+
+        """
         found = []
         for name, each in self.items():
             weight = self._weights.get(name, WEIGHTS[each.role])

@@ -34,7 +34,20 @@ __all__ = ["Role", "as_role", "guess_role"]
 
 
 class Role(Enum):
-    """What a map is for; how it is looked up, blended, turned and written follows from it."""
+    """What a map is for; how it is looked up, blended, turned and written follows from it.
+
+    Parameters
+    ----------
+    value : str
+        As "colour", "normal" (y up), "normal-dx" (y down), "height" and so on.
+
+    Examples
+    --------
+    >>> from texrs.materials import Role
+    >>> Role("normal-dx").normal, Role.LABELS.labelled
+    (True, True)
+
+    """
 
     COLOUR = "colour"
     NORMAL = "normal"
@@ -92,6 +105,20 @@ def guess_role(name: str) -> Role | None:
     """Return the role that a name says a map has; None where it says none.
 
     The last words count, longer ones first: ``ambient_occlusion`` is one, ``wood_diff`` is by its end.
+
+    Parameters
+    ----------
+    name : str
+        Of a map or of its file, without the suffix.
+
+    Returns
+    -------
+    Role or None
+
+    Raises
+    ------
+    TypeError
+        Not a text.
 
     Examples
     --------

@@ -56,6 +56,15 @@ class Painted:
     relief : (size, size, 3) float32, optional
         Normals over the atlas, x to its right, y up, z out of the surface: those of a material, or else those of its heights.
 
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs.painting import Painted
+    >>> corners = np.eye(3)
+    >>> painted = Painted(corners, np.array([[0, 1, 2]]), {"image": np.zeros((3, 3), np.uint8)}, None)
+    >>> painted.maps["image"].shape
+    (3, 3)
+
     """
 
     vertices: NDArray[np.float64]
@@ -88,6 +97,16 @@ class Painted:
         ------
         FileError
             Another suffix, or a file cannot be written.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import numpy as np
+        >>> from texrs.painting import Painted
+        >>> painted = Painted(np.eye(3), np.array([[0, 1, 2]]), {"image": np.zeros((3, 3), np.uint8)}, None)
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     [path.name for path in painted.save(pathlib.Path(folder, "triangle.ply"))]
+        ['triangle.ply']
 
         """
         usual = dict.fromkeys(self.maps, Role.COLOUR)

@@ -112,6 +112,10 @@ class Plane:
         fov : float, optional
             Degrees that the longer side spans; `FOV` by default.
 
+        Returns
+        -------
+        Plane
+
         Raises
         ------
         InvalidInput
@@ -267,7 +271,31 @@ class Plane:
 
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> Plane:
-        """Return the plane that `as_dict` told."""
+        """Return the plane that `as_dict` told.
+
+        Parameters
+        ----------
+        given : mapping
+            ``shape`` (rows, columns) in pixels and ``slant`` in degrees; where they are not the usual ones, ``tilt``, ``fov``
+            and ``turn`` in degrees, and ``confidence``, 0 to 1.
+
+        Returns
+        -------
+        Plane
+
+        Raises
+        ------
+        InvalidInput
+            Not such a mapping, or a value out of its range.
+
+        Examples
+        --------
+        >>> from texrs import Plane
+        >>> plane = Plane((64, 96), slant=50)
+        >>> Plane.of(plane.as_dict()) == plane
+        True
+
+        """
         if not isinstance(given, Mapping) or not {"shape", "slant"} <= set(given) <= set(cls.__dataclass_fields__):
             raise InvalidInput(
                 f"plane: needs a mapping with shape, slant, tilt, fov, turn and confidence, got {given!r}"
@@ -359,7 +387,30 @@ class Plane:
         return np.asarray(ways[:, :2] / tiny, np.float64)
 
     def width(self, points: Array | Sequence[Sequence[float]]) -> NDArray[np.float64]:
-        """Return how wide things are seen at points (..., 2), across the slope: 1 in the middle, 0 at the horizon."""
+        """Return how wide things are seen at points, across the slope.
+
+        Parameters
+        ----------
+        points : (..., 2) array_like
+            Rows and columns, in pixels of the picture.
+
+        Returns
+        -------
+        (...) float64
+            1 in the middle of the picture, 0 at the horizon, less beyond it.
+
+        Raises
+        ------
+        ValueError
+            Not numbers, or not pairs of them.
+
+        Examples
+        --------
+        >>> from texrs import Plane
+        >>> round(float(Plane((65, 97), slant=50).width([32, 48])), 3)
+        1.0
+
+        """
         return 1 + along(np.asarray(points, np.float64) - self.middle, self._rise)
 
     def scale_map(self, kind: Literal["width", "area"] = "width") -> ScaleMap:
@@ -376,6 +427,11 @@ class Plane:
         (H, W) ScaleMap
             Float32, 1 in the picture's middle; held at .001 at the horizon and beyond.
 
+        Raises
+        ------
+        InvalidInput
+            No such kind.
+
         Examples
         --------
         >>> from texrs import Plane
@@ -388,13 +444,60 @@ class Plane:
         return ScaleMap(np.maximum(wide if what == "width" else wide ** (1 / AREAS), LEAST).astype(np.float32), what)
 
     def flatten(self, points: Array | Sequence[Sequence[float]]) -> NDArray[np.float64]:
-        """Return where points (..., 2) of the picture lie on the flat plane; far away beyond the horizon."""
+        """Return where points of the picture lie on the flat plane.
+
+        Parameters
+        ----------
+        points : (..., 2) array_like
+            Rows and columns, in pixels of the picture.
+
+        Returns
+        -------
+        (..., 2) float64
+            In pixels as the middle of the picture shows them, which is the origin; far away beyond the horizon.
+
+        Raises
+        ------
+        ValueError
+            Not numbers, or not pairs of them.
+
+        Examples
+        --------
+        >>> from texrs import Plane
+        >>> Plane((65, 97), slant=50).flatten([32, 48]).tolist()
+        [0.0, 0.0]
+
+        """
         given = np.asarray(points, np.float64)
         wide = np.maximum(self.width(given), LEAST)
         return transform(self._affine, given - self.middle) / wide[..., np.newaxis]
 
     def project(self, points: Array | Sequence[Sequence[float]]) -> NDArray[np.float64]:
-        """Return where points (..., 2) of the flat plane are seen, (row, column); nan for what lies behind the camera."""
+        """Return where points of the flat plane are seen.
+
+        Parameters
+        ----------
+        points : (..., 2) array_like
+            Rows and columns on the plane, as `flatten` returns them.
+
+        Returns
+        -------
+        (..., 2) float64
+            Rows and columns in the picture, in pixels; nan for what lies behind the camera.
+
+        Raises
+        ------
+        ValueError
+            Not numbers, or not pairs of them.
+
+        Examples
+        --------
+        >>> from texrs import Plane
+        >>> plane = Plane((65, 97), slant=50)
+        >>> plane.project(plane.flatten([[10.0, 20.0]])).round(6).tolist()
+        [[10.0, 20.0]]
+
+        """
         given = transform(self._inverse, np.asarray(points, np.float64))
         nearness = 1 - along(given, self._rise)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -402,7 +505,30 @@ class Plane:
         return np.asarray(seen + self.middle, np.float64)
 
     def unfold(self, points: Array | Sequence[Sequence[float]]) -> NDArray[np.float64]:
-        """Return the Jacobians of `project` at points (..., 2) of the flat plane: (..., 2, 2)."""
+        """Return the Jacobians of `project` at points of the flat plane.
+
+        Parameters
+        ----------
+        points : (..., 2) array_like
+            Rows and columns on the plane, as `flatten` returns them.
+
+        Returns
+        -------
+        (..., 2, 2) float64
+            Pixels of the picture for one of the plane.
+
+        Raises
+        ------
+        ValueError
+            Not numbers, or not pairs of them.
+
+        Examples
+        --------
+        >>> from texrs import Plane
+        >>> Plane((65, 97), slant=60).unfold([0, 0]).round(3).tolist()
+        [[0.5, 0.0], [0.0, 1.0]]
+
+        """
         given = transform(self._inverse, np.asarray(points, np.float64))
         wide = (1 / (1 - along(given, self._rise)))[..., np.newaxis, np.newaxis]
         bent = np.eye(2) + wide * given[..., :, np.newaxis] * self._rise
@@ -430,12 +556,38 @@ class Plane:
         return np.asarray(self._affine / wide - flat[..., :, np.newaxis] * self._rise / (wide * wide), np.float64)
 
     def as_slope(self) -> Slope | None:
-        """Return it as a map of widths tells it, with what that does not; none where it is seen from the front."""
+        """Return it as a map of widths tells it, with what that does not; none where it is seen from the front.
+
+        Returns
+        -------
+        Slope or None
+            Of `texrs.scale_maps`; None of a plane seen from the front.
+
+        Examples
+        --------
+        >>> from texrs import Plane
+        >>> Plane((65, 97), slant=0).as_slope() is None
+        True
+
+        """
         found = Slope.fit(self.scale_map())
         return None if found is None else replace(found, lean=cos(radians(self.slant)), turn=self.turn)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what makes it anew, as JSON types: `Plane.of` takes it."""
+        """Return what makes it anew, as JSON types: `Plane.of` takes it.
+
+        Returns
+        -------
+        dict
+            ``shape`` in pixels, ``slant``, ``tilt``, ``fov`` and ``turn`` in degrees, ``confidence`` from 0 to 1.
+
+        Examples
+        --------
+        >>> from texrs import Plane
+        >>> Plane((64, 96), slant=50).as_dict()["shape"]
+        [64, 96]
+
+        """
         return {name: getattr(self, name) for name in self.__dataclass_fields__} | {"shape": list(self.shape)}
 
     @property

@@ -73,6 +73,13 @@ class Sizes:
     confidence : float
         From 0 to 1: how much what was measured in several ways is alike. 0 of pictures that are too small for more than one.
 
+    Examples
+    --------
+    >>> from texrs import planes, samples
+    >>> found = planes.measure(samples.tilted_discs((128, 128)).image)
+    >>> found.scale.shape, found.shape
+    ((128, 128), 'plane')
+
     """
 
     scale: ScaleMap
@@ -81,7 +88,20 @@ class Sizes:
     confidence: float
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what is known beside the map, as JSON types: shape, what the map holds, confidence, and the plane or None."""
+        """Return what is known beside the map, as JSON types: shape, what the map holds, confidence, and the plane or None.
+
+        Returns
+        -------
+        dict
+            ``shape``, ``kind``, ``confidence`` from 0 to 1 and ``plane``.
+
+        Examples
+        --------
+        >>> from texrs import planes, samples
+        >>> sorted(planes.measure(samples.tilted_discs((128, 128)).image).as_dict())
+        ['confidence', 'kind', 'plane', 'shape']
+
+        """
         plane = None if self.plane is None else self.plane.as_dict()
         return {"shape": self.shape, "kind": self.scale.kind, "confidence": self.confidence, "plane": plane}
 

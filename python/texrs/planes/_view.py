@@ -82,7 +82,29 @@ class View:
 
     @classmethod
     def of(cls, given: View | Plane | Sequence[View | Plane] | None) -> View:
-        """Return a view as it is, one of a plane, or one of which nothing is said."""
+        """Return a view as it is, one of a plane, or one of which nothing is said.
+
+        Parameters
+        ----------
+        given : View or Plane, optional
+            What is known of the photograph.
+
+        Returns
+        -------
+        View
+
+        Raises
+        ------
+        InvalidInput
+            Something else, or several planes: one is made flat at a time.
+
+        Examples
+        --------
+        >>> from texrs import Plane, View
+        >>> View.of(Plane((64, 96), slant=50)).plane.slant
+        50.0
+
+        """
         if given is None or isinstance(given, Plane):
             return cls(plane=given)
         if isinstance(given, list | tuple):
@@ -92,12 +114,31 @@ class View:
         return given
 
     def settle(self, shape: Sequence[int]) -> tuple[Plane | None, Bools | None]:
-        """Return the plane that is said, and the ground, in a photograph of (rows, columns); None for what is to be found.
+        """Return the plane and the ground that are said of a photograph.
+
+        Parameters
+        ----------
+        shape : (rows, columns)
+            Of the photograph, in pixels.
+
+        Returns
+        -------
+        plane : Plane or None
+            None: it is to be found.
+        ground : (rows, columns) bool or None
+            Where the plane is seen. None: that is to be found.
 
         Raises
         ------
         InvalidInput
             A plane or a ground of another shape, a ground that marks nothing, or corners of no convex shape.
+
+        Examples
+        --------
+        >>> from texrs import View
+        >>> plane, ground = View(slant=40, tilt=90).settle((64, 96))
+        >>> plane.shape, ground is None
+        ((64, 96), True)
 
         """
         size = shape[0], shape[1]

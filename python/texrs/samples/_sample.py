@@ -52,6 +52,14 @@ class Sample:
     frames : float32 array, (H, W, 2, 2) or (D, H, W, 3, 3), or None
         The Jacobian J = dS/dp of the map from the picture to the undistorted texture;
         ``frames[..., i, j]`` is dS_i / dp_j.
+
+    Examples
+    --------
+    >>> from texrs import samples
+    >>> buttons = samples.load("dots", size=(96, 96))
+    >>> buttons.image.dtype, buttons.centres.shape, buttons.labels.shape
+    (dtype('uint8'), (8, 2), (96, 96))
+
     """
 
     name: str

@@ -112,7 +112,30 @@ class ScaleMap(np.ndarray[tuple[int, ...], np.dtype[np.float32]]):
         self.kind = state[-1]
 
     def as_kind(self, kind: Kind) -> ScaleMap:
-        """Return the map as one of another kind, of a plane seen aslant."""
+        """Return the map as one of another kind, of a plane seen aslant.
+
+        Parameters
+        ----------
+        kind : {"width", "area"}
+            What the map is to hold: widths across the slope, or square roots of areas.
+
+        Returns
+        -------
+        (H, W) ScaleMap
+            Float32; the same values where the kind was not known.
+
+        Raises
+        ------
+        InvalidInput
+            No such kind.
+
+        Examples
+        --------
+        >>> from texrs import Plane
+        >>> Plane((64, 96), slant=50).scale_map().as_kind("area").kind
+        'area'
+
+        """
         wanted = as_kind(kind)
         if self.kind is None or self.kind == wanted:
             return ScaleMap(self, wanted)

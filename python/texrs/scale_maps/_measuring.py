@@ -72,6 +72,13 @@ class Measuring:
         InvalidInput
             A picture without features, or too small for the detail.
 
+        Examples
+        --------
+        >>> from texrs import samples
+        >>> from texrs.scale_maps import Measuring
+        >>> Measuring().measure(samples.tilted_discs((96, 96)).image).shape
+        (96, 96)
+
         """
         mask = auto_mask(image, detail=self.detail, trend=self.trend, known=known)
         return from_mask(mask, trend=self.trend, foreshortened=self.foreshortened, known=known)

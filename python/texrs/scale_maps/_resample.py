@@ -41,7 +41,7 @@ def resample(
     pattern : array_like, optional
         Scales of any shape (R, C), for ``"user"``.
     slant, tilt, fov : float, optional
-        For ``"angles"``.
+        For ``"angles"``, in degrees.
 
     Returns
     -------

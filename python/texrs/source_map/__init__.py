@@ -52,6 +52,15 @@ class SourceMap(Parted):
         How the verb that made the map finished its picture, which `texrs.apply` does with other maps; none of maps that are
         put together by hand.
 
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs import SourceMap
+    >>> turned = np.stack(np.meshgrid([0, 1], [2, 1, 0]), axis=-1).astype(np.float32)  # what was a column is a row
+    >>> source = SourceMap.from_coordinates(turned, (2, 3))
+    >>> source.render(np.array([[1, 2, 3], [4, 5, 6]], np.uint8), interpolation="nearest").tolist()
+    [[3, 6], [2, 5], [1, 4]]
+
     """
 
     def __repr__(self) -> str:
@@ -118,9 +127,9 @@ class SourceMap(Parted):
             Where each pixel comes from, in pixels of the exemplar.
         shape : tuple of int
             Sides of the exemplar, without channels.
-        label : uint32 array, optional
+        label : (...) uint32 array, optional
             The patch of each pixel; one patch by default.
-        frame : float32 array or field, optional
+        frame : (L, A, A) or (..., A, A) float32 array, or field, optional
             As the attribute; nothing is turned by default.
 
         Returns
@@ -160,6 +169,11 @@ class SourceMap(Parted):
         Returns
         -------
         SourceMap
+
+        Raises
+        ------
+        TypeError
+            What is no attribute of a `Finish`.
 
         Examples
         --------
@@ -203,7 +217,7 @@ class SourceMap(Parted):
 
         Parameters
         ----------
-        exemplars : array, or a sequence of one an exemplar
+        exemplars : (H, W[, C]) or (D, H, W[, C]) array, or a sequence of one an exemplar
             Any map of the exemplar's height and width (and depth), any dtype and channels.
         interpolation : {"cubic", "linear", "nearest"}
             Between samples; use "nearest" for labels. Samples at whole coordinates are copied bit for bit.
@@ -328,6 +342,11 @@ class SourceMap(Parted):
         SourceMap
             It looks into the exemplars.
 
+        Raises
+        ------
+        IndexError
+            A pixel that none of the pictures has, or no pictures.
+
         Examples
         --------
         >>> import numpy as np
@@ -357,6 +376,11 @@ class SourceMap(Parted):
         -------
         (...) bool
             Of the shape of the output.
+
+        Raises
+        ------
+        numpy.exceptions.AxisError
+            It has no such axis.
 
         Examples
         --------

@@ -36,7 +36,7 @@ class Finish:
     antialias : bool
         Whether the exemplar is smoothed where it is shrunk.
     screening : float, optional
-        Weight of the values when seams are made to disappear, see `texrs.blend`. None: they stay as they are.
+        Weight of the values when seams are made to disappear, above 0, see `texrs.blend`. None: they stay as they are.
     band : int, optional
         Correct only what is at most this many pixels from a seam; all else keeps its values. None: everything.
     across : bool
@@ -56,6 +56,13 @@ class Finish:
         pixel lies at. Slow light of each part is divided out of what is looked up, and that of where it is shown multiplied on.
         None: it brings its own light along.
 
+    Examples
+    --------
+    >>> import texrs
+    >>> made = texrs.synthesize(texrs.samples.pebbles((48, 48)).image, 48)
+    >>> isinstance(made.source.finish, texrs.Finish), made.source.finish.wrap
+    (True, (False, False))
+
     """
 
     wrap: tuple[bool, ...]
@@ -74,7 +81,21 @@ class Finish:
     __repr__ = brief
 
     def arrays(self) -> dict[str, Array]:
-        """Return what is written to a file: the words as the bytes of a JSON text, and the masks."""
+        """Return what is written to a file: the words as the bytes of a JSON text, and the masks.
+
+        Returns
+        -------
+        dict of str to array
+            ``"finish"`` is (n,) uint8; where there are any, ``"finish/within"`` and ``"finish/known/0"`` are bool, and
+            ``"finish/parts"`` is uint16.
+
+        Examples
+        --------
+        >>> from texrs import Finish
+        >>> sorted(Finish((True, True)).arrays())
+        ['finish']
+
+        """
         words = json.dumps({name: getattr(self, name) for name in PLAIN})
         parts: dict[str, Array] = {"finish": np.frombuffer(words.encode(), np.uint8)}
         if self.within is not None:
@@ -90,12 +111,31 @@ class Finish:
     ) -> Finish:
         """Return what `arrays` wrote of a map of a shape, which looks into exemplars of other shapes.
 
+        Parameters
+        ----------
+        parts : mapping of str to array
+            As `arrays` returns them; others are left alone.
+        shape : tuple of int
+            Of the map, in pixels.
+        shapes : tuple of tuple of int
+            Of its exemplars, in pixels.
+
+        Returns
+        -------
+        Finish
+
         Raises
         ------
         InvalidInput
             Something else, or masks of other shapes.
         ValueError
             Not the text that is expected.
+
+        Examples
+        --------
+        >>> from texrs import Finish
+        >>> Finish.from_arrays(Finish((True, False)).arrays(), (8, 8), ((4, 4),)).wrap
+        (True, False)
 
         """
         words: dict[str, Any] = json.loads(parts["finish"].tobytes())

@@ -27,6 +27,12 @@ class Reuse:
     regions : int
         Number of such regions.
 
+    Examples
+    --------
+    >>> from texrs import SourceMap
+    >>> SourceMap.identity((8, 8)).reuse()
+    Reuse(verbatim=1.0, largest=1.0, regions=1)
+
     """
 
     verbatim: float

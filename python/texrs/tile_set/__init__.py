@@ -191,12 +191,24 @@ class TileSet(InParts):
         origin : int or (int, int)
             First cell: cell (i, j) begins at pixel (i side, j side).
         size : int or (rows, columns)
-            Cells.
+            How many cells, down and across.
 
         Returns
         -------
         (rows, columns) uint8
             Where the tile is in the atlas: 9 times its row, and its column.
+
+        Raises
+        ------
+        InvalidInput
+            Not such an origin or size.
+
+        Examples
+        --------
+        >>> import texrs
+        >>> tiles = texrs.TileSet(texrs.samples.pebbles((96, 96)).image, 32, seed=1)
+        >>> tiles.index((0, 0), (2, 3)).shape
+        (2, 3)
 
         """
         first, sides = self._as_origin(origin), as_size(size)
@@ -237,6 +249,13 @@ class TileSet(InParts):
         InvalidInput
             Not such an origin or size.
 
+        Examples
+        --------
+        >>> import texrs
+        >>> tiles = texrs.TileSet(texrs.samples.pebbles((96, 96)).image, 32, seed=1)
+        >>> tiles.window((-10, 10**9), (40, 50)).image.shape
+        (40, 50, 3)
+
         """
         watch = stage(listen(progress), "window")
         start, sides = self._as_origin(origin), as_size(size, way=LARGER)
@@ -275,7 +294,33 @@ class TileSet(InParts):
         return out
 
     def read_part(self, origin: int | Sequence[int], shape: int | Sequence[int]) -> Part:
-        """Check where a part begins, and that it lies within the world; return what reads it."""
+        """Return what reads a part of the world, once it was checked to lie within.
+
+        Parameters
+        ----------
+        origin : int or (int, int)
+            First pixel, of the world; any integers within 10^15.
+        shape : int or (rows, columns)
+            Of the part, in pixels.
+
+        Returns
+        -------
+        Part
+            What `texrs.lazy` makes chunks of.
+
+        Raises
+        ------
+        InvalidInput
+            Not such an origin or size.
+
+        Examples
+        --------
+        >>> import texrs
+        >>> tiles = texrs.TileSet(texrs.samples.pebbles((96, 96)).image, 32, seed=1)
+        >>> tiles.read_part((5, 5), (64, 64)) is not None
+        True
+
+        """
         as_sides(shape, "shape", 2)
         start = self._as_origin(origin)
         return Part(_Reader(self, start), start, self._base)
@@ -288,7 +333,7 @@ class TileSet(InParts):
         folder : path_like
             Made where it is missing; files of these names are replaced.
         cells : int or (rows, columns)
-            Of the index texture. A shader goes around at its ends.
+            Of the index texture, in cells. A shader goes around at its ends.
 
         Returns
         -------

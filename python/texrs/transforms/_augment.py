@@ -24,7 +24,30 @@ the time."""
 
 
 class Augmented(NamedTuple):
-    """What `TextureAugment` returns."""
+    """What `TextureAugment` returns.
+
+    Attributes
+    ----------
+    image : (H, W) or (H, W, C) array
+        In the shape and dtype of the picture.
+    mask : (H, W) or (H, W, C) array, or None
+        Looked up at the nearest pixel: no label that was not there.
+    boxes : (n, 4) float64, or None
+        Those that survive, (left, top, right, bottom) in pixels, see `follow_boxes`.
+    which : (n,) int, or None
+        Which of the boxes that were given each follows from, from 0.
+    source : SourceMap
+        Where each pixel comes from: whatever else is in register follows with ``source.render``.
+
+    Examples
+    --------
+    >>> import texrs
+    >>> sample = texrs.samples.dots((96, 96))
+    >>> made = texrs.transforms.TextureAugment()(sample.image, sample.labels, seed=1)
+    >>> made.mask.shape, made.boxes is None
+    ((96, 96), True)
+
+    """
 
     image: Array
     """In the shape and dtype of the picture."""

@@ -59,6 +59,14 @@ class Comparison:
     integrity : Integrity or None
         How whole the elements are. None without a source map, or without separate elements.
 
+    Examples
+    --------
+    >>> from texrs import samples, volume
+    >>> one, other = (samples.particles((32, 32, 32), seed=s).image for s in (0, 1))
+    >>> found = volume.compare(one, other)
+    >>> found.shares.shape, found.reuse is None
+    ((2, 4), True)
+
     """
 
     shares: NDArray[np.float64]

@@ -46,6 +46,13 @@ class Integrity:
     crumbs : float
         Pieces with less than 0.3 of their element, in 100 000 points.
 
+    Examples
+    --------
+    >>> from texrs import SourceMap, samples, volume
+    >>> stone = samples.particles((48, 48, 48)).image
+    >>> volume.integrity(stone, SourceMap.identity((48, 48, 48))).torn
+    0.0
+
     """
 
     contacts: tuple[float, float]
@@ -63,7 +70,7 @@ def integrity(exemplar: Array | Exemplar, source: SourceMap, *, axes: int = 3) -
 
     Parameters
     ----------
-    exemplar : array or Exemplar
+    exemplar : (D, H, W), (D, H, W, C), (H, W) or (H, W, C) array, or Exemplar
         What was looked up.
     source : SourceMap
         Of the picture or the volume that was made from it alone.

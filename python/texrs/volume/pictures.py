@@ -106,7 +106,7 @@ def oblique(
     axes : (2, 3) array_like, optional
         Instead of ``normal``: the steps of the picture's rows and of its columns, in voxels.
     size : int or (rows, columns), optional
-        Of the picture, whose middle is the point; by default all of the volume that is cut.
+        Of the picture, in pixels, whose middle is the point; by default all of the volume that is cut.
     interpolation : {"linear", "cubic", "nearest"}
         "nearest" for labels.
 
@@ -236,7 +236,7 @@ def turntable(
     elevation : float
         Degrees that the eye is above, within 90 either way.
     seconds : float
-        Length of a turn.
+        Length of a turn, in seconds.
     background : sequence of 3 int
         Colour around, 0 to 255 each.
     interpolation : {"linear", "cubic", "nearest"}

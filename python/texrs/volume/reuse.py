@@ -33,9 +33,15 @@ class CellReuse:
     largest : float
         Largest connected patch of such neighbours, as a share of the output.
     most_used : float
-        Use of the most used cell of the exemplar over the mean of all.
+        Use of the most used cell of the exemplar over the mean of all, 1 or more.
     unused : float
         Share of the cells that are not used at all.
+
+    Examples
+    --------
+    >>> from texrs import SourceMap, volume
+    >>> volume.cell_reuse(SourceMap.identity((16, 16, 16))).coherent
+    1.0
 
     """
 
@@ -55,7 +61,7 @@ def coherence(source: SourceMap, axis: int, field: Field | None = None) -> Bools
     source : SourceMap
         Of a picture or a volume.
     axis : int
-        Along which.
+        Along which, from 0.
     field : Field, optional
         Where J is taken from; by default from the map's own frames.
 

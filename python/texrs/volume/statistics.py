@@ -33,6 +33,13 @@ class Classes:
     centres : (K, C) float32
         The mean colour of each, in [0, 1].
 
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs import volume
+    >>> volume.classes(np.array([[0, 255], [255, 250]], np.uint8), 2).centres.shape
+    (2, 1)
+
     """
 
     centres: Floats
@@ -123,13 +130,23 @@ class Particles:
     Attributes
     ----------
     count : int
-        Pieces of at least the least size.
+        Number of pieces of at least the least size.
     density : float
         Pieces for each 100 000 pixels or voxels.
     mean, median : float
         Size, in pixels or voxels; NaN where there are none.
     deciles : tuple of float
         The nine sizes that 10 %, 20 % ... of the pieces are not above.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texrs import volume
+    >>> mask = np.zeros((12, 12), bool)
+    >>> mask[1:5, 1:5] = mask[7:11, 7:11] = True
+    >>> found = volume.particles(mask)
+    >>> found.count, found.mean
+    (2, 16.0)
 
     """
 
@@ -147,7 +164,7 @@ def lightness(image: ArrayLike, *, axes: int | None = None) -> Floats:
 
     Parameters
     ----------
-    image : array_like
+    image : (H, W[, C]) or (D, H, W[, C]) array_like
         A picture or a volume, with or without channels.
     axes : int, optional
         2 for a picture, 3 for a volume; by default by its shape: up to 4 along the last axis are channels.
@@ -179,7 +196,7 @@ def classes(exemplar: ArrayLike, count: int = 4, *, axes: int | None = None) -> 
 
     Parameters
     ----------
-    exemplar : array_like
+    exemplar : (H, W[, C]) or (D, H, W[, C]) array_like
         A picture or a volume, with or without channels.
     count : int
         How many, 2 to 16. An exemplar of fewer colours has as many classes as colours.

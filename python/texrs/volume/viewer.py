@@ -77,6 +77,16 @@ class Viewer:
         FileError
             Another suffix, or the file cannot be written.
 
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> from texrs import samples, volume
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     path = pathlib.Path(folder, "stone.html")
+        ...     volume.viewer(samples.particles((32, 32, 32)).image).save(path)
+        ...     path.stat().st_size > 10_000
+        True
+
         """
         if not str(path).lower().endswith((".html", ".htm")):
             raise FileError(f"{path}: needs a name that ends in .html")

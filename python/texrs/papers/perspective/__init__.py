@@ -92,7 +92,7 @@ def perspective(
         or its words ``"plane:slant=50,tilt=90,fov=60"``: those of a plane. "auto": those of the plane that is found in it
         (`texrs.planes.find`), or else measured (`texrs.planes.measure`). "front": all alike.
     size : int or (int, int), optional
-        Rows and columns of the result: by default those of the ``target``, else twice the exemplar's.
+        Rows and columns of the result, in pixels: by default those of the ``target``, else twice the exemplar's.
     target : array or Plane, optional
         How large they are to be at each pixel of the result, in the units of ``scale_map``: a map (rows, columns); or a surface
         that the texture is to lie on. A `texrs.Plane`, or its words: another plane, with elements of size 1 in its middle.

@@ -100,7 +100,7 @@ def solid(
         Any real dtype and channels; each side at least 16. `texrs.Exemplar`, with ``axes=3``, says whether its values
         are labels and along which axes it repeats, which are measured otherwise.
     size : int or (int, int, int)
-        Planes, rows and columns of the result.
+        Planes, rows and columns of the result, in voxels.
     field : Field, str, array_like or path_like, optional
         How the texture is turned and scaled at each voxel (`texrs.fields`), with three axes: a field, its words, or
         directions (P, R, C, 3) or frames (P, R, C, 3, 3), spread over the output, as an array or
@@ -214,7 +214,7 @@ def synthesize(
         Any real dtype and channels; each side at least 16. `texrs.Exemplar` says whether its values are labels and
         along which axes it repeats, which are measured otherwise.
     size : int or (int, int)
-        Rows and columns of the result.
+        Rows and columns of the result, in pixels.
     field : Field, str, array_like or path_like, optional
         How the texture is turned and scaled at each pixel (`texrs.fields`), with two axes: a field, its words, or
         directions (R, C, 2) or frames (R, C, 2, 2), spread over the output, as an array or

@@ -140,7 +140,7 @@ class SolidTexture(Texture):
         axes : (2, 3) array_like, optional
             Instead of ``normal``: the steps of the picture's rows and of its columns, in voxels.
         size : int or (rows, columns)
-            Of the picture.
+            Of the picture, in pixels.
         progress : callable or True, optional
             Called with the stage and the share of it that is done; raising stops the work. True shows a bar.
 
@@ -155,6 +155,13 @@ class SolidTexture(Texture):
             Not a point, a direction or a size.
         Cancelled
             The work was stopped.
+
+        Examples
+        --------
+        >>> import texrs
+        >>> texture = texrs.SolidTexture(texrs.samples.stripes((32, 32, 32)).image, quality="fast")
+        >>> texture.slice((0, 0, 0), (1, 1, 0), size=(8, 12)).shape
+        (8, 12, 3)
 
         """
         progress = listen(progress)
