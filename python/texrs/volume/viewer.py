@@ -83,7 +83,7 @@ class Viewer:
         >>> from texrs import samples, volume
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     path = pathlib.Path(folder, "stone.html")
-        ...     volume.viewer(samples.particles((32, 32, 32)).image).save(path)
+        ...     volume.Viewer(samples.particles((32, 32, 32)).image).save(path)
         ...     path.stat().st_size > 10_000
         True
 
