@@ -12,11 +12,11 @@ from texrs._show import preview
 from texrs._typing import Array
 from texrs._version import __version__
 
-QUALITY = 90
-"""Of the JPEG pictures."""
+QUALITY, LARGE_QUALITY = 90, 75
+"""Of the JPEG pictures, and of those of millions of pixels."""
 
 
-def encode_uri(image: Array, *, exact: bool = False) -> str:
+def encode_uri(image: Array, *, exact: bool = False, quality: int = QUALITY) -> str:
     """Put a picture into a data URI: PNG where it must be exact or has an alpha channel, else JPEG."""
     seen = preview(image)
     if seen.ndim == 3 and seen.shape[2] == 1:
@@ -24,7 +24,7 @@ def encode_uri(image: Array, *, exact: bool = False) -> str:
     if exact or (seen.ndim == 3 and seen.shape[2] == 4):
         kind, file = "png", iio.imwrite("<bytes>", seen, extension=".png", plugin="pillow")
     else:
-        kind, file = "jpeg", iio.imwrite("<bytes>", seen, extension=".jpg", plugin="pillow", quality=QUALITY)
+        kind, file = "jpeg", iio.imwrite("<bytes>", seen, extension=".jpg", plugin="pillow", quality=quality)
     return f"data:image/{kind};base64,{base64.b64encode(file or b'').decode('ascii')}"
 
 
@@ -54,9 +54,30 @@ def row(*parts: str) -> str:
     return f'<div class="row">{"".join(parts)}</div>'
 
 
-def grid(parts: Sequence[str], *, least: int = 150) -> str:
-    """Put pictures of one size beside each other, each at least so many pixels wide."""
-    return f'<div class="grid" style="--least:{least}px">{"".join(parts)}</div>'
+def grid(parts: Sequence[str], *, least: int = 150, columns: int = 12) -> str:
+    """Put pictures of one size beside each other, each at least so many pixels wide, so many in a row at most."""
+    return f'<div class="grid" style="--least:{least}px;--most:{columns}">{"".join(parts)}</div>'
+
+
+def card(given: Sequence[str], made: str) -> str:
+    """Put what was given and what was made of it together; nothing parts them, however narrow the window is."""
+    return f'<div class="card"><div class="given">{"".join(given)}</div>{made}</div>'
+
+
+def cards(parts: Sequence[str]) -> str:
+    """Put cards beside each other, two in a row where there is room."""
+    return f'<div class="cards">{"".join(parts)}</div>'
+
+
+def opening(image: Array, example: str, caption: str, detail: str, *, note: str = "") -> str:
+    """Show a large picture as it is, pixel by pixel, and below it the example and the whole of it, from the same data."""
+    height, width = image.shape[:2]
+    seen = f'<div class="ground" role="img" aria-label="{escape(caption)}" style="aspect-ratio:{width}/{height}"></div>'
+    return (
+        f'<div class="opening" style="--picture:url({encode_uri(image, quality=LARGE_QUALITY)});--wide:{width}px">'
+        f'<figure><div class="ground detail" role="img" aria-label="{escape(detail)}"></div>{_caption(detail)}</figure>'
+        f'<div class="row">{example}<figure>{seen}{_caption(caption, note)}</figure></div></div>'
+    )
 
 
 def code(text: str) -> str:
@@ -134,13 +155,26 @@ img, .ground { display: block; width: 100%; height: auto; border-radius: 6px; }
 .ground { background: var(--picture) 0 0 / 100% 100%; }
 .ground.four { background-size: 50% 50%; }
 figcaption { padding-top: .4rem; font-size: .875rem; line-height: 1.35; }
+figcaption { overflow-wrap: anywhere; }
 small { display: block; color: var(--soft); font-size: .8rem; }
-.row { display: grid; grid-template-columns: 1fr 4fr; gap: 1rem; margin-bottom: 1rem; padding: 1rem;
+.row { display: grid; grid-template-columns: minmax(0, 1fr) minmax(0, 4fr); gap: 1rem; margin-bottom: 1rem; padding: 1rem;
   border: 1px solid var(--line); border-radius: 12px; background: var(--card); }
-.pair { display: grid; grid-template-columns: 1fr 1fr; gap: 1rem; }
-.grid { display: grid; grid-template-columns: repeat(auto-fit, minmax(var(--least), 1fr)); gap: 1rem;
+.pair { display: grid; grid-template-columns: repeat(2, minmax(0, 1fr)); gap: 1rem; }
+.grid { display: grid; gap: 1rem; margin-bottom: 1rem;
+  grid-template-columns: repeat(auto-fill, minmax(max(var(--least), 100% / var(--most) - 1rem), 1fr)); }
+.cards { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 26rem), 1fr)); gap: 1rem;
   margin-bottom: 1rem; }
-@media (max-width: 620px) { .row, .pair { grid-template-columns: 1fr; } .row > figure { width: 50%; } }
+.card { display: grid; grid-template-columns: minmax(0, 2fr) minmax(0, 5fr); gap: .9rem; padding: .9rem;
+  border: 1px solid var(--line); border-radius: 12px; background: var(--card); }
+.given { display: grid; gap: .9rem; align-content: start; }
+.opening { margin-bottom: 1rem; }
+.opening .detail { height: min(26rem, 70vw); background-size: var(--wide) auto; background-position: center; }
+.opening .row { margin-top: 1rem; }
+@media (max-width: 620px) {
+  .row, .pair, .card { grid-template-columns: minmax(0, 1fr); }
+  .row > figure:first-child, .given > figure:only-child { width: 50%; }
+  .given { grid-auto-flow: column; grid-auto-columns: minmax(0, 1fr); }
+}
 footer { margin-top: 2.5rem; padding-top: 1rem; padding-bottom: 3rem; border-top: 1px solid var(--line);
   color: var(--soft); font-size: .875rem; }
 """

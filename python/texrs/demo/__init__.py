@@ -12,7 +12,8 @@ from collections.abc import Sequence
 from texrs._html import document, section
 from texrs._typing import Progress
 from texrs.demo._design import RESULTS, SEEDS, STAGES
-from texrs.demo._maps import MAPS
+from texrs.demo._limits import LIMITS
+from texrs.demo._maps import MAPS, OPENING
 from texrs.demo._perspective import PERSPECTIVE
 from texrs.demo._pictures import COMPLETE, TILE
 from texrs.demo._samples import SAMPLES
@@ -22,7 +23,20 @@ from texrs.demo._workshop import Section, Workshop
 
 __all__ = ["SECTIONS", "Section", "Workshop", "page"]
 
-SECTIONS: tuple[Section, ...] = (MAPS, RESULTS, STAGES, SEEDS, TILE, COMPLETE, SPLICE, PERSPECTIVE, SOLID, SAMPLES)
+SECTIONS: tuple[Section, ...] = (
+    OPENING,
+    MAPS,
+    RESULTS,
+    STAGES,
+    SEEDS,
+    TILE,
+    COMPLETE,
+    SPLICE,
+    PERSPECTIVE,
+    SOLID,
+    LIMITS,
+    SAMPLES,
+)
 
 
 def page(sections: Sequence[Section] = SECTIONS, *, progress: Progress | None = None) -> str:

@@ -53,24 +53,24 @@ def _results(workshop: Workshop) -> str:
 
 
 def _stages(workshop: Workshop) -> str:
-    name, _, options = SHOWN[0]
+    name, _, options = SHOWN[1]
     made = workshop.design(name, **options)
     pictures = [figure(made.sample.image, "Example", note=_format_size(made.sample.image))]
     for stage, image in made.result.stages.items():
         caption, note = CAPTIONS.get(stage, (stage.capitalize(), ""))
         pictures.append(figure(preview(image), caption, note=note, exact=image.ndim == 2))
-    return code("texrs design example.png -o result.png --stages stages") + grid(pictures)
+    return code("texrs design example.png -o result.png --stages stages") + grid(pictures, columns=3)
 
 
 def _seeds(workshop: Workshop) -> str:
     pictures: list[str] = []
     for seed in range(1, 6):
         workshop.watch((seed - 1) / 5)
-        made = workshop.design("dots", 160, 200, seed=seed)
+        made = workshop.design("pebbles", 160, 200, seed=seed)
         if not pictures:
             pictures.append(figure(made.sample.image, "Example", share=160 / 200))
         pictures.append(figure(made.result.image, f"Seed {seed}"))
-    return code("texrs design example.png -o result.png --size 200 --seed 1") + grid(pictures)
+    return code("texrs design example.png -o result.png --size 200 --seed 1") + grid(pictures, columns=3)
 
 
 def _format_size(image: Array) -> str:
@@ -87,7 +87,7 @@ RESULTS = Section(
 STAGES = Section(
     "stages",
     "How it is made",
-    "The stages of one of the variants that the first result was stitched from, and the result.",
+    "The stages of one of the variants that the second result was stitched from, and the result.",
     _stages,
 )
 SEEDS = Section(

@@ -7,7 +7,7 @@ from html import escape
 import numpy as np
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 
-from texrs._html import code, figure, grid, pair, row
+from texrs._html import code, figure, grid, opening, pair, row
 from texrs._typing import Array, Labels
 from texrs.demo._workshop import Section, Workshop, load_sample
 from texrs.materials import Material
@@ -18,8 +18,22 @@ RELIEF = 12.0
 """Height of the relief, in pixels."""
 
 
-SIZE, MAP = 320, 170
-"""Side of what is designed, and of a map at least: the five of a material stand in one row."""
+SIZE, LARGE, MAP = 320, 2048, 150
+"""Side of what is designed, and of what the page opens with; of a map at least: the five of a material stand in one row."""
+
+
+def _open(workshop: Workshop) -> str:
+    side = LARGE // 8
+    example = make_material("pebbles", side)
+    made = design(example, LARGE, seed=7).material
+    assert made is not None
+    return code(f"texrs design STONES -o NEW --size {LARGE}x{LARGE} --seed 7 --preview lit.png") + opening(
+        made.preview(tiles=(1, 1)),
+        figure(example.preview(tiles=(1, 1)), "The example, lit", note=f"{side} × {side}"),
+        "The result, lit",
+        "The middle of the result, pixel by pixel",
+        note=f"{LARGE} × {LARGE}, of albedo, normal, height, roughness and labels; it repeats without a seam",
+    )
 
 
 def _maps(workshop: Workshop) -> str:
@@ -33,10 +47,10 @@ def _maps(workshop: Workshop) -> str:
             f"<h3>{escape(caption)}</h3>"
             + row(
                 figure(example.preview(tiles=(1, 1)), "The example, lit"),
-                pair(result.material.preview(tiles=(1, 1)), "The result, lit", "Tiled 2 x 2"),
+                pair(result.material.preview(tiles=(1, 1)), "The result, lit", "Tiled 2 × 2"),
             )
-            + grid(show(example, "of the example"), least=MAP)
-            + grid(show(result.material, "of the result"), least=MAP)
+            + grid(show(example, "of the example"), least=MAP, columns=5)
+            + grid(show(result.material, "of the result"), least=MAP, columns=5)
         )
     return code(
         "texrs design STONES -o NEW --size 2048x2048 --preview lit.png   # a folder of maps, and a folder of maps\n"
@@ -92,12 +106,19 @@ def derive_normals(height: Array) -> Array:
     return np.rint(127.5 * (normals + 1)).astype(np.uint8)
 
 
-MATERIALS = (("pebbles", "Stones"), ("leaves_and_flowers", "Flowers on leaves"))
+MATERIALS = (("leaves_and_flowers", "Flowers on leaves"),)
 """Samples that are shown, and what they are."""
 
+OPENING = Section(
+    "material",
+    "A material, as large as you need",
+    "From a small example with all its maps: every stone keeps its height and its roughness, and the light falls on all of "
+    "them from one side.",
+    _open,
+)
 MAPS = Section(
     "maps",
-    "Materials",
+    "Every map in register",
     "A result is a source map: where in the example each pixel comes from, and in which frame. So a whole material comes of "
     "one: decisions are made on what all its maps tell, and each map is looked up in its own dtype, blended by its role; "
     "normals turn with what they belong to, so that the light stays where it is.",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from texrs._html import code, figure, grid, pair, row
+from texrs._html import card, cards, code, figure, pair, row
 from texrs._typing import Bools
 from texrs.completion import complete
 from texrs.demo._workshop import Section, Workshop, load_sample
@@ -17,7 +17,7 @@ TILED = (
     ("leaves_and_flowers", "Flowers on leaves"),
     ("gravel", "A grey photograph"),
 )
-FILLED = (("scales", "Scales of a fish"), ("net", "A rope net"), ("gravel", "Gravel"))
+FILLED = (("scales", "Scales of a fish"), ("net", "A rope net"), ("gravel", "Gravel"), ("weave", "Cloth"))
 
 
 def _tile(workshop: Workshop) -> str:
@@ -42,11 +42,9 @@ def _complete(workshop: Workshop) -> str:
         workshop.watch(i / len(FILLED))
         picture = load_sample(name, SIDE).image
         made = complete(picture, mark_scratches((SIDE, SIDE)))
-        pictures += [
-            figure(made.stages["known"], f"{caption}, with holes"),
-            figure(made.image, "Filled", note=f"{made.report['patches']} patches"),
-        ]
-    return code("texrs complete picture.png holes.png -o whole.png") + grid(pictures, least=300)
+        filled = figure(made.image, "Filled", note=f"{made.report['patches']} patches")
+        pictures.append(card([figure(made.stages["known"], f"{caption}, with holes")], filled))
+    return code("texrs complete picture.png holes.png -o whole.png") + cards(pictures)
 
 
 def mark_scratches(shape: tuple[int, int]) -> Bools:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from texrs import fields, samples
-from texrs._html import code, figure, grid
+from texrs._html import card, cards, code, figure
 from texrs.demo._workshop import Section, Workshop, load_sample
 from texrs.papers.solid import solid, synthesize
 from texrs.volume import cube
@@ -16,36 +16,39 @@ CUBE = 320
 """Pixels a side of the cubes."""
 
 VOLUMES = (
-    ("stripes", "circular:axis=y,radial=z"),
     ("stripes", "slant_3d"),
     ("stripes", "zigzag:period=64,plane=xz"),
     ("wood_solid", "zigzag:period=64"),
     ("particles", "identity"),
 )
-PICTURES = (("weave", "zigzag:period=128,angle=30"), ("scales", "circular"), ("bark", "spiral:angle=35"))
+PICTURES = (
+    ("weave", "zigzag:period=128,angle=30"),
+    ("scales", "circular"),
+    ("bark", "spiral:angle=35"),
+    ("dots", "scale_ramp:axis=x,start=0.7,stop=1.8"),
+)
 
 
 def _solid(workshop: Workshop) -> str:
     grown, drawn = [], []
-    total, seen = len(VOLUMES) + len(PICTURES), set()
+    total = len(VOLUMES) + len(PICTURES)
     for i, (name, words) in enumerate(VOLUMES):
         workshop.watch(i / total)
         example = samples.load(name, size=(EDGE,) * 3).image
-        if name not in seen:
-            grown.append(figure(cube(example, CUBE), "Example", note=name.replace("_", " "), share=EDGE / SIZE))
-            seen.add(name)
         made = solid(example, SIZE, field=fields.parse(words), seed=3)
-        grown.append(figure(cube(made.image, CUBE), words.partition(":")[0], note=f"--field {words}"))
+        given = figure(cube(example, CUBE), name.replace("_", " ").capitalize(), note="the example")
+        grown.append(card([given], figure(cube(made.image, CUBE), words.partition(":")[0], note=f"--field {words}")))
     for i, (name, words) in enumerate(PICTURES, start=len(VOLUMES)):
         workshop.watch(i / total)
         picture = load_sample(name, SIDE).image
         made = synthesize(picture, WIDTH, field=fields.parse(words, 2), seed=3)
-        drawn += [figure(picture, "Example", share=SIDE / WIDTH), figure(made.image, name, note=f"--field {words}")]
+        given = figure(picture, name.capitalize(), note="the example")
+        drawn.append(card([given], figure(made.image, words.partition(":")[0], note=f"--field {words}")))
     return (
-        code("texrs solid volume.tif -o result.tif --size 80 --field circular:axis=y,radial=z --seed 3")
-        + grid(grown, least=200)
+        code("texrs solid volume.tif -o result.tif --size 80 --field zigzag:period=64,plane=xz --seed 3")
+        + cards(grown)
         + code("texrs synthesize weave.png -o result.png --size 256 --field zigzag:period=128,angle=30")
-        + grid(drawn, least=220)
+        + cards(drawn)
     )
 
 

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from texrs._html import code, figure, grid
+from texrs._html import card, cards, code, figure
 from texrs.demo._workshop import Section, Workshop, load_sample
 from texrs.elements import Elements
 from texrs.layouts import courses, lattice
 from texrs.papers.splice import self_splice, splice
 
 SIDE = 192
-SPLICES = (("dots", "net"), ("dots", "bricks"), ("pebbles", "dots"))
+SPLICES = (("dots", "net"), ("dots", "bricks"))
 EDITS: tuple[tuple[str, dict[str, Any], str], ...] = (
     ("dots", {"op": "regularise"}, "--edit regularise"),
-    ("dots", {"op": "scale", "factor": 1.25}, "the layout, not the elements, 1.25 times as large"),
     ("bricks", {"op": "rows", "by": 8}, "rows shifted by 8 pixels; the joints stay upright"),
 )
 
@@ -31,31 +30,30 @@ def _splice(workshop: Workshop) -> str:
         workshop.watch(i / total)
         elements, layout = _load_entry(a), _load_entry(b)
         made = splice(elements, layout, seed=1)
-        spliced += [figure(elements.image, a), figure(layout.image, b), figure(made.image, f"{a} laid out as {b}")]
+        given = [figure(elements.image, a), figure(layout.image, b)]
+        spliced.append(card(given, figure(made.image, f"{a} laid out as {b}")))
     for i, (a, edit, note) in enumerate(EDITS, start=len(SPLICES)):
         workshop.watch(i / total)
         elements = _load_entry(a)
         made = self_splice(elements, edit, seed=1)
-        edited += [figure(elements.image, a), figure(made.image, str(edit["op"]), note=note)]
+        edited.append(card([figure(elements.image, a)], figure(made.image, str(edit["op"]), note=note)))
     for a, layout, words in (
         ("bricks", courses(SIDE, [24, 40], 60, shift=1 / 3, vary=0.4, seed=2), "courses"),
         ("dots", lattice(SIDE, (0, 40), (34, 14)), "a lattice"),
     ):
         made = splice(_load_entry(a), layout, seed=1, layout_scale=1)
-        drawn += [
-            figure(layout.image, f"{words}, drawn"),
-            figure(made.image, f"{a} in them" if a == "bricks" else f"{a} on it"),
-        ]
+        given = [figure(_load_entry(a).image, a), figure(layout.image, f"{words}, drawn")]
+        drawn.append(card(given, figure(made.image, f"{a} in them" if a == "bricks" else f"{a} on it")))
     return (
         code("texrs splice sample:dots sample:net -o result.png --seed 1")
-        + grid(spliced, least=180)
+        + cards(spliced)
         + code(
             'texrs splice sample:bricks \'{"layout": "courses", "size": 192, "height": [24, 40], "length": 60}\''
             " -o result.png --layout-scale 1"
         )
-        + grid(drawn, least=180)
+        + cards(drawn)
         + code("texrs self-splice sample:dots --edit regularise -o result.png --seed 1")
-        + grid(edited, least=180)
+        + cards(edited)
     )
 
 
