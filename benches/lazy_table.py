@@ -56,7 +56,7 @@ def digest(array: np.ndarray) -> str:
 
 def volume(given: argparse.Namespace, folder: str) -> None:
     """Fill a volume, and compare it with windows made alone."""
-    texture = texrs.SolidTexture(samples.particles((48, 48, 48)).image, seed=1)
+    texture = texrs.SolidTexture(samples.particles((48, 48, 48)).image, seed=1, cache_bytes=given.cache << 20)
     stated = texture.estimate_memory(given.chunks) / 2**30
     first = None
     for workers in map(int, given.workers.split(",")):
@@ -106,7 +106,8 @@ def compute(given: argparse.Namespace, folder: str, function: functools.partial,
     from distributed import Client, LocalCluster
 
     spent, found = {}, {}
-    for workers in (0, 2):
+    counts = {0: min(given.alone or len(items), len(items)), 2: len(items)}
+    for workers, count in counts.items():
         log = f"{folder}/log{workers}"
         os.makedirs(log)
         work = functools.partial(function.func, *function.args, log)
@@ -119,17 +120,24 @@ def compute(given: argparse.Namespace, folder: str, function: functools.partial,
                 ):
                     lazy.map(work, items, path, shape=shape, key="bench", scheduler=client)
             else:
-                lazy.map(work, items, path, shape=shape, key="bench", threads=1)
-        found[workers] = digest(lazy.open(path, "image").compute())
+                lazy.map(
+                    work, items[:count], path, shape=shape if count == len(items) else None, key="bench", threads=1
+                )
+        made = lazy.open(path, "image")
+        found[workers] = digest(made.reshape(-1, *made.shape[-3:])[: counts[0]].compute())
         lines = [line for each in Path(log).iterdir() for line in each.read_text().splitlines()]
         print(
-            f"{len(items)} items, {workers or 'no'} workers: {spent[workers].wall:.1f} s of the wall, "
-            f"{spent[workers].processor:.1f} processor seconds, {spent[workers].processor / len(items):.4f} an item; "
+            f"{count} items, {workers or 'no'} workers: {spent[workers].wall:.1f} s of the wall, "
+            f"{spent[workers].processor:.1f} processor seconds, {spent[workers].processor / count:.4f} an item; "
             f"computed {len(lines)} times, {len(set(lines))} different; {found[workers]}",
             flush=True,
         )
-    print(f"  of ideal {spent[0].processor / spent[2].processor:.2f} by processor seconds", flush=True)
-    print(f"  the same: {found[0] == found[2]}", flush=True)
+    each = {workers: (spent[workers].processor / n, spent[workers].wall / n) for workers, n in counts.items()}
+    print(
+        f"  of ideal {each[0][0] / each[2][0]:.2f} by processor seconds, {each[0][1] / each[2][1] / 2:.2f} by the wall; "
+        f"the first {counts[0]} the same: {found[0] == found[2]}",
+        flush=True,
+    )
 
 
 def items(given: argparse.Namespace, folder: str) -> None:
@@ -169,10 +177,14 @@ def main() -> None:
     parser.add_argument("part", choices=("volume", "items", "matrix", "tiles"))
     parser.add_argument("--side", type=int, default=256)
     parser.add_argument("--chunks", type=int, default=128)
+    parser.add_argument("--cache", type=int, default=256, help="MiB of finished parts that each worker keeps.")
     parser.add_argument("--levels", type=int, default=1)
     parser.add_argument("--windows", type=int, default=4)
     parser.add_argument("--workers", default="1,2")
     parser.add_argument("--count", type=int, default=1000)
+    parser.add_argument(
+        "--alone", type=int, help="How many items one process computes to compare with; all by default."
+    )
     parser.add_argument("--size", type=int, default=256)
     parser.add_argument("--rows", type=int, default=20)
     parser.add_argument("--folder", help="For the stores; a temporary one by default.")

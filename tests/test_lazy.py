@@ -4,6 +4,8 @@ import errno
 import hashlib
 import json
 import os
+import shutil
+import subprocess
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -266,6 +268,36 @@ def test_a_full_disk_leaves_no_half_chunk(tmp_path: Path, monkeypatch: pytest.Mo
     assert PLANE.to_zarr(tmp_path / "a.zarr", 100, 32).made == 21 - 2
     PLANE.to_zarr(tmp_path / "b.zarr", 100, 32)
     assert digest(tmp_path / "a.zarr") == digest(tmp_path / "b.zarr")
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A disk of 160 kB."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    if shutil.which("mount") is None or subprocess.run([*_mount("size=160k"), folder], capture_output=True).returncode:
+        pytest.skip("a disk of its own is mounted by the administrator alone")
+    yield folder
+    subprocess.run(["umount", "--lazy", folder], check=True)
+
+
+def _mount(options: str) -> list[str]:
+    return ["mount", "-t", "tmpfs", "-o", options, "tmpfs"]
+
+
+@pytest.mark.parametrize("how", [None, 2])
+def test_a_disk_that_was_full_is_gone_on_with(how: int | None, tmp_path: Path, small_disk: Path) -> None:
+    with pytest.raises(FileError, match="No space left"):
+        PLANE.to_zarr(small_disk / "a.zarr", 256, 32, levels=1, scheduler=how)
+    there = len(list((small_disk / "a.zarr" / "0" / "c").rglob("*")))
+    assert there > 9
+    with pytest.raises(FileError, match=r"no room for its 0.00 GiB; nothing was begun"):
+        PLANE.to_file(small_disk / "a.npy", 256, 32, scheduler=how)
+    subprocess.run([*_mount("remount,size=4m"), small_disk], check=True)
+    made = PLANE.to_zarr(small_disk / "a.zarr", 256, 32, levels=1, scheduler=how).made
+    assert 0 < made < 64
+    PLANE.to_zarr(tmp_path / "b.zarr", 256, 32, levels=1)
+    assert digest(small_disk / "a.zarr") == digest(tmp_path / "b.zarr")
 
 
 def _full(*given: Any, **more: Any) -> int:
