@@ -6,9 +6,10 @@ there. So neighbours agree along their edges and at their corners, nothing repea
 wherever it is.
 
 The flow: several cyclic pictures are designed (`texrs.design_variants`); strips between each two corners are cut from them,
-and the inside of each tile is cut into its ring of strips, once along all edges (`texrs.tile_set._cutting`). Of several
-places those are taken whose cuts show least; cuts through elements cost more. Where the exemplar repeats on a lattice, tiles
-hold whole periods of it, and all their pieces are cut in step, which the paper does not have.
+and the inside of each tile is cut into its ring of strips, once along all edges (`texrs.tile_set._cutting`). Of the places
+most like what is known (`texrs.tile_set._fitting`) those are taken whose cuts show least; cuts through elements cost more.
+Where the exemplar repeats on a lattice, tiles hold whole periods of it, and all their pieces are cut in step. The paper has
+neither the search nor the step, and strips twice as wide, in which more is seen again.
 
 In the atlas the tiles lie on a torus of 9 x 9, in which each is there once and fits its neighbours: it can be filtered, and
 is a cyclic texture itself.
@@ -41,7 +42,8 @@ from texrs.papers.design import design_variants
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
 from texrs.tile_set._corners import TILES, TORUS, draw_colours, number_tiles
-from texrs.tile_set._cutting import Pictures, cut_tiles
+from texrs.tile_set._cutting import cut_tiles
+from texrs.tile_set._fitting import Pictures, look_up
 from texrs.tile_set._shaders import write_shaders
 from texrs.tile_set._step import choose_side, find_step
 
@@ -120,12 +122,10 @@ class TileSet(InParts):
             design_variants(given, as_int(variants, "variants", 1, 64), 2 * side, seed=seed, progress=watch, **options)
         )
         depth = _measure_depth(known)
-        pictures = Pictures(
-            [each.image for each in made],
-            [np.asarray(KEEP * each.source.render(depth, interpolation="linear"), np.float32) for each in made],
-        )
+        costs = [np.asarray(KEEP * each.source.render(depth, interpolation="linear"), np.float32) for each in made]
+        pictures = Pictures(np.stack([each.image for each in made]), np.stack(costs))
         advance = stage(watch, "tiles")
-        step = find_step(pictures.images, known.segment().lattice, side)
+        step = find_step(list(pictures.images), known.segment().lattice, side)
         tiles = cut_tiles(pictures, side, step, self._seed, advance or (lambda share: None))
         around = np.pad(TORUS, (0, 1), mode="wrap")
         order = number_tiles(around)
@@ -136,8 +136,7 @@ class TileSet(InParts):
         self._maps: dict[str, Array] = {}
         if materials:
             for name in materials[0]:
-                images = [each[name].pixels for each in materials]
-                self._maps[name] = Pictures(images, []).look(laid)
+                self._maps[name] = look_up(np.stack([each[name].pixels for each in materials]), laid)
         else:
             self._maps[IMAGE] = pictures.look(laid)
         self._like = materials[0] if materials else None

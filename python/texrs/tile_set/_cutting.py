@@ -2,58 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._typing import Array, Floats
 from texrs.kernels.seam import cut, cut_strip
 from texrs.tile_set._corners import COLOURS, TILES
+from texrs.tile_set._fitting import Fit, Pictures, Place, Places
 from texrs.tile_set._step import Draw, Step
 
-__all__ = ["Pictures", "cut_tiles"]
+__all__ = ["cut_tiles"]
 
 STRIPS, INSIDES = 24, 6
 """Places that are tried for each strip and each inside; the one whose cut costs least is taken. Strips are seen nine times as
 often."""
-
-Places = NDArray[np.int32]
-"""Which picture each pixel is from, and its row and column there: (..., 3)."""
-
-
-@dataclass(frozen=True, slots=True)
-class Pictures:
-    """Cyclic pictures of one size, and what cuts through their elements cost."""
-
-    images: Sequence[Array]
-    penalties: Sequence[Floats]
-
-    def at(self, which: int, row: int, column: int, shape: tuple[int, int]) -> Places:
-        """Return the places of a window, which goes around."""
-        rows, columns = self.images[0].shape[:2]
-        out = np.empty((*shape, 3), np.int32)
-        out[..., 0] = which
-        out[..., 1] = ((row + np.arange(shape[0])) % rows)[:, np.newaxis]
-        out[..., 2] = (column + np.arange(shape[1])) % columns
-        return out
-
-    def look(self, places: Places) -> Array:
-        """Return the pixels at places."""
-        return _pick(self.images, places)
-
-    def weigh(self, places: Places) -> Floats:
-        """Return what cuts cost more there."""
-        return np.asarray(_pick(self.penalties, places), np.float32)
-
-
-def _pick(arrays: Sequence[Array], places: Places) -> Array:
-    out = np.empty((*places.shape[:-1], *arrays[0].shape[2:]), arrays[0].dtype)
-    for which, array in enumerate(arrays):
-        here = places[..., 0] == which
-        out[here] = array[places[here][:, 1], places[here][:, 2]]
-    return out
+BORDER = 3 / 16
+"""Half the width of a strip, as a share of a tile's side: what corners and strips show comes again in many tiles, so that
+wider ones repeat more; narrower ones leave cuts less room."""
 
 
 def cut_tiles(
@@ -65,22 +33,14 @@ def cut_tiles(
     2. Edges: between two corners a strip, that is a window cut into both; one for each pair, across and down.
     3. Tiles: what four strips show within their border is the ring; the inside is cut into it, once along all edges.
     """
-    half = side // 4
-    count, (rows, columns) = len(pictures.images), pictures.images[0].shape[:2]
-    draw = Draw(np.random.default_rng(np.random.PCG64(seed)), count, (rows, columns), step)
-
-    # Windows of 2 half x 2 half and what goes on around them, the corner in their middle.
-    corners = [draw(which=colour % count) for colour in range(COLOURS)]
-
-    def show_corner(colour: int, top: int, left: int, shape: tuple[int, int]) -> Places:
-        which, row, column = corners[colour]
-        return pictures.at(which, row + top, column + left, shape)
-
-    edges: dict[tuple[int, int, int], Places] = {}
-    for axis in (0, 1):
-        for first in range(COLOURS):
-            for second in range(COLOURS):
-                edges[axis, first, second] = _make_edge(pictures, side, half, axis, first, second, draw, show_corner)
+    half = round(BORDER * side)
+    draw = Draw(np.random.default_rng(np.random.PCG64(seed)), len(pictures.images), pictures.size, step)
+    corners = [draw(which=colour % len(pictures.images)) for colour in range(COLOURS)]
+    fit = Fit(pictures, side, draw)
+    edges = {
+        (axis, first, second): _make_edge(pictures, fit, side, half, axis, (corners[first], corners[second]))
+        for axis, first, second in product((0, 1), range(COLOURS), range(COLOURS))
+    }
     tiles = np.empty((TILES, side, side, 3), np.int32)
     for number in range(TILES):
         nw, ne, sw, se = number // 27, number // 9 % 3, number // 3 % 3, number % 3
@@ -90,72 +50,61 @@ def cut_tiles(
         ring[-half:] = edges[1, sw, se][:half]
         ring[half:-half, :half] = edges[0, nw, sw][half:-half, half:]
         ring[half:-half, -half:] = edges[0, ne, se][half:-half, :half]
-        tiles[number] = _fill(pictures, ring, side, half, draw)
+        tiles[number] = _fill(pictures, fit, ring, half)
         advance((number + 1) / TILES)
     return tiles
 
 
-def _make_edge(
-    pictures: Pictures,
-    side: int,
-    half: int,
-    axis: int,
-    first: int,
-    second: int,
-    draw: Draw,
-    show_corner: Callable[[int, int, int, tuple[int, int]], Places],
-) -> Places:
-    """Return the strip between two corners, of a side's length and twice half a width."""
-    reach = side // 2 - half
+def _make_edge(pictures: Pictures, fit: Fit, side: int, half: int, axis: int, corners: tuple[Place, Place]) -> Places:
+    """Return the strip between two corners, of a side's length and twice half a width; axis 1 runs across."""
+
+    def look(place: Place, along: int, length: int) -> Places:
+        """Return a part of a strip as one that runs across, of what lies so far along from a corner's middle."""
+        which, row, column = place
+        if axis:
+            return pictures.at((which, row - half, column + along), (2 * half, length))
+        return turn(pictures.at((which, row + along, column - half), (length, 2 * half)))
+
+    def turn(values: NDArray[Any]) -> NDArray[Any]:
+        return values if axis else values.swapaxes(0, 1)
+
+    middle = side // 2
+    # Near a corner all is the corner's; then come the parts in which a window is cut into both.
+    ends = np.concatenate([look(corners[0], 0, middle), look(corners[1], -middle, middle)], axis=1)
+    known = np.zeros(ends.shape[:2], bool)
+    known[:, half : side - half] = True
     best: tuple[float, Places] | None = None
-    shape = (2 * half, side) if axis else (side, 2 * half)
-    for _ in range(STRIPS):
-        strip = pictures.at(*(draw(row=-half) if axis else draw(column=-half)), shape)
-        total = 0.0
-        for colour, start in ((first, half), (second, side - half - reach)):
-            # Within half of a corner all is the corner's; then comes the overlap.
-            near = start == half
-            there = slice(start, start + reach)
-            whole = slice(0, half + reach) if near else slice(start, side)
-            length = whole.stop - whole.start
-            offset = 0 if near else start - side
-            corner = (
-                show_corner(colour, -half, offset, (2 * half, length))
-                if axis
-                else show_corner(colour, offset, -half, (length, 2 * half))
-            )
-            at = (slice(None), whole) if axis else (whole, slice(None))
-            inner = slice(half, half + reach) if near else slice(0, reach)
-            part = corner[:, inner] if axis else corner[inner]
-            below = strip[:, there] if axis else strip[there]
-            a, b = (part, below) if near else (below, part)
+    for place in fit.find(turn(ends), turn(known), STRIPS, ahead=(-half, 0) if axis else (0, -half)):
+        window, made, total = turn(pictures.at(place, turn(known).shape)), ends.copy(), 0.0
+        for part, parts in ((slice(half, middle), (ends, window)), (slice(middle, side - half), (window, ends))):
+            a, b = (each[:, part] for each in parts)
             penalty = np.maximum(pictures.weigh(a), pictures.weigh(b))
-            found = cut_strip(pictures.look(a), pictures.look(b), axis=axis, penalty=penalty)
+            found = cut_strip(pictures.look(a), pictures.look(b), axis=1, penalty=penalty)
+            made[:, part] = np.where(found.mask[..., np.newaxis], b, a)
             total += found.value
-            kept = corner.copy()
-            (kept[:, inner] if axis else kept[inner])[...] = np.where(found.mask[..., np.newaxis], b, a)
-            strip[at] = kept
         if best is None or total < best[0]:
-            best = total, strip
+            best = total, made
     assert best is not None
-    return best[1]
+    return turn(best[1])
 
 
-def _fill(pictures: Pictures, ring: Places, side: int, half: int, draw: Draw) -> Places:
+def _fill(pictures: Pictures, fit: Fit, ring: Places, half: int) -> Places:
     """Return a tile: an inside cut into its ring; the outermost pixels are the ring's."""
-    band = np.ones((side, side), bool)
+    shape = (ring.shape[0], ring.shape[1])
+    band = np.ones(shape, bool)
     band[half:-half, half:-half] = False
-    inside = np.zeros((side, side), bool)
+    inside = np.zeros(shape, bool)
     inside[2:-2, 2:-2] = True
-    shown, best = pictures.look(ring), None
-    weights = pictures.weigh(ring)
-    for _ in range(INSIDES):
-        inner = pictures.at(*draw(), (side, side))
+    shown, weights = pictures.look(ring), pictures.weigh(ring)
+    best: tuple[float, Place, Places] | None = None
+    for place in fit.find(ring, band, INSIDES):
+        inner = pictures.at(place, shape)
         there = pictures.look(inner)
         penalty = np.where(band, np.maximum(weights, pictures.weigh(inner)), 0).astype(np.float32)
         known = np.where(band[(..., *(np.newaxis,) * (there.ndim - 2))], shown, there)
         found = cut(known, there, band, inside, penalty=penalty)
         if best is None or found.value < best[0]:
-            best = found.value, np.where(found.mask[..., np.newaxis], inner, ring)
+            best = found.value, place, np.where(found.mask[..., np.newaxis], inner, ring)
     assert best is not None
-    return np.asarray(best[1])
+    fit.take(best[1])
+    return best[2]
