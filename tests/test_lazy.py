@@ -172,6 +172,16 @@ def test_materials_are_a_group_each_and_classes_are_not_mixed(tmp_path: Path) ->
         lazy.open(done.path, "gloss")
 
 
+def test_chunks_that_follow_each_other_lie_together() -> None:
+    grid = Grid.of((100, 300, 260), 64, 3)
+    order = grid.sort(range(len(grid)))
+    assert sorted(order) == list(range(len(grid)))
+    assert [grid.index(n) for n in order[:4]] == [(0, 0, 0), (0, 0, 1), (0, 1, 0), (0, 1, 1)]
+    assert grid.sort([7, 3, 40]) == [n for n in order if n in (3, 7, 40)]
+    assert Grid.of((9, 2**30), (9, 1)).sort([2**29, 5]) == [5, 2**29]
+    assert grid.sort([]) == []
+
+
 def test_levels_of_odd_sizes_and_of_classes() -> None:
     assert count_levels(Grid.of((100, 300), 128)) == 3
     rng = np.random.default_rng(0)

@@ -218,7 +218,7 @@ def fill(
             raise FileError(f"{target}: the disk has no room for its {size:.2f} GiB; nothing was begun") from None
         raise FileError(f"{target}: cannot be written ({error.strerror or error})") from None
     work = _Place(reader, name, grid, str(part), len(header), shape, dtype.str)
-    todo = [number for number in range(len(grid)) if number not in done]
+    todo = grid.sort(number for number in range(len(grid)) if number not in done)
     made = 0
     try:
         with _name_journal(part).open("a", encoding="utf-8") as journal:

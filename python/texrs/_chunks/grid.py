@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from texrs._checks import as_tuple
 from texrs.errors import InvalidInput
@@ -73,6 +75,20 @@ class Grid:
             number, rest = divmod(number, count)
             found.append(rest)
         return tuple(reversed(found))
+
+    def sort(self, numbers: Iterable[int]) -> list[int]:
+        """Return chunks in the order of a Z-curve: those that follow each other lie together, however many of them are taken.
+
+        So workers repeat less along the sides of what they make than by rows, and what they keep is used sooner.
+        """
+        given = np.array(list(numbers), np.int64)
+        index, key, place = np.unravel_index(given, self.counts), np.zeros(len(given), np.uint64), 0
+        for bit in range(max(self.counts).bit_length()):
+            for along, count in zip(reversed(index), reversed(self.counts), strict=True):
+                if count >> bit:
+                    key |= (along.astype(np.uint64) >> np.uint64(bit) & np.uint64(1)) << np.uint64(place)
+                    place += 1
+        return [int(number) for number in given[np.argsort(key, kind="stable")]]
 
     def __getitem__(self, number: int) -> Box:
         """Return the part of the array that a chunk holds."""

@@ -243,7 +243,7 @@ def write_image(
     clock = _Clock(watch, total)
     for level, each in enumerate(grids):
         missing = {n: _find_missing(store, _place(n, level, alone), c, each) for n, c in reader.maps.items()}
-        todo = sorted(set().union(*missing.values()))
+        todo = each.sort(set().union(*missing.values()))
         there = len(each) * len(reader.maps) - sum(map(len, missing.values()))
         clock.skip(there)
         work: Any = (
