@@ -1,7 +1,8 @@
 """How fast workers fill a store, what memory they take, and whether all is the same.
 
-Run ``python benches/lazy_table.py volume|items|matrix|tiles [--side 512] [--workers 1,2]``. Processor seconds are said beside
-those of the wall, which count only where nothing else runs: their ratio is the efficiency that a quiet machine would show.
+Run ``python benches/lazy_table.py volume|items|matrix|tiles|model [--side 512] [--workers 1,2]``. Processor seconds are said
+beside those of the wall, which count only where nothing else runs: their ratio is the efficiency that a quiet machine would
+show.
 """
 
 import argparse
@@ -18,11 +19,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 
 import texrs
 from texrs import lazy, samples
+from texrs._chunks.grid import Grid
+from texrs._engine.pyramid import Region
+
+CLOSED = (False, False, False)
 
 
 @dataclass
@@ -85,6 +91,40 @@ def volume(given: argparse.Namespace, folder: str) -> None:
             print(f"  efficiency by processor seconds {share:.2f}, by the wall {first[1].wall / spent.wall:.2f}")
         if not given.keep:
             shutil.rmtree(path)
+
+
+def model(given: argparse.Namespace, folder: str) -> None:
+    """Count the boxes that workers make, in place of making them: those along the sides of what each makes are made twice."""
+    texture = texrs.SolidTexture(samples.particles((48, 48, 48)).image, seed=1, cache_bytes=given.cache << 20)
+    world, made = texture._world, 0
+    texture.window(0, 1)
+    size = world.cached // len(world._kept._kept)
+
+    def make(*_: object) -> SimpleNamespace:
+        nonlocal made
+        made += 1
+        return SimpleNamespace(nbytes=size)
+
+    world._make = make
+    grid, first = Grid.of(given.side, given.chunks, 3), None
+    order = grid.sort(range(len(grid)))
+    for workers in map(int, given.workers.split(",")):
+        made = 0
+        for k in range(workers):
+            world.clear()
+            for number in order[len(order) * k // workers : len(order) * (k + 1) // workers]:
+                box = Region(
+                    tuple(s.stop - s.start for s in grid[number]), tuple(s.start for s in grid[number]), CLOSED
+                )
+                for _ in world._make_all(world._meeting(len(world.shifts) - 1, box), None):
+                    pass
+        first = first or (made, workers)
+        least = (len(world.shifts) - 1) * (given.side / world.side) ** 3
+        print(
+            f"{given.side}^3 in chunks of {given.chunks}^3, {workers} workers: {made} boxes of {world.side}^3, "
+            f"{made / least:.2f} times as many as fill it; efficiency {first[0] / made:.2f}",
+            flush=True,
+        )
 
 
 def make_variant(image: np.ndarray, size: int, folder: str | None, seed: int) -> texrs.Synthesis:
@@ -174,7 +214,7 @@ def tiles(given: argparse.Namespace, folder: str) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("part", choices=("volume", "items", "matrix", "tiles"))
+    parser.add_argument("part", choices=("volume", "items", "matrix", "tiles", "model"))
     parser.add_argument("--side", type=int, default=256)
     parser.add_argument("--chunks", type=int, default=128)
     parser.add_argument("--cache", type=int, default=256, help="MiB of finished parts that each worker keeps.")
@@ -190,7 +230,7 @@ def main() -> None:
     parser.add_argument("--folder", help="For the stores; a temporary one by default.")
     parser.add_argument("--keep", action="store_true", help="Keep the volumes.")
     given = parser.parse_args()
-    part = {"volume": volume, "items": items, "matrix": matrix, "tiles": tiles}[given.part]
+    part = {"volume": volume, "items": items, "matrix": matrix, "tiles": tiles, "model": model}[given.part]
     with tempfile.TemporaryDirectory(dir=given.folder) as folder:
         part(given, given.folder if given.keep else folder)
 

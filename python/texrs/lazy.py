@@ -7,16 +7,16 @@ takes (`texrs.SolidTexture.estimate_memory`).
 
 Notes
 -----
-What a volume costs, measured by ``benches/lazy_table.py`` on particles of 48^3 in chunks of 128^3: about 6.5 to 8.5 processor
-seconds a million voxels, under 0.5 GiB a worker (0.8 is stated beforehand). A worker repeats work along the sides of the row of
-chunks that it makes, so that few chunks a worker are dear: of 256^3, 4 chunks each, two workers took 1.3 times the processor
-seconds of one.
-An estimate, which nobody has measured: 64 workers of 1024^3 would have 8 chunks each, take about 1.2 times the processor
-seconds of one worker, 7000 to 9000 in all, and so two to three minutes each. It rests on the measurements above, of one
-machine with two cores and up to two workers, and on what was not seen there: that cores of a cluster are as fast and have the
-memory to themselves, that work repeated by 8 chunks is a little less than by 4, that a shared disk takes 3 GB meanwhile, and
-that the scheduler hands out 512 tasks of about 15 seconds without delay. The repeated work is then the limit; larger chunks
-lessen it, for more memory.
+What a volume costs, by ``benches/lazy_table.py`` (``volume``, ``model``), on particles of 48^3 in chunks of 128^3: it is put
+together from boxes, here of 39^3, of about 0.06 processor seconds each, and a worker makes those twice that lie along the
+sides of what it makes. So the cost is how many boxes there are: for 1024^3 and ``cache_bytes=512 << 20`` 1.35 times as many
+as fill it by 1, 2 or 8 workers (1.49 times with half the cache), and 1.83 times by 64, which have 8 chunks each; for 512^3
+1.35, 1.49, 1.83 and 3.13 times. 1024^3 was made by two workers of 0.77 GiB at most (1.06 are stated beforehand), with chunks
+row by row, in 3331 processor seconds for 58 thousand boxes; along the curve that they follow now there are 49 thousand.
+An estimate, which nobody has measured: 64 workers make 1024^3 in 3900 processor seconds, a minute each, at three quarters of
+the efficiency of one. It supposes that cores of a cluster are as fast and have the memory to themselves, that a shared disk
+takes 3 GB in that minute, and that the scheduler hands out 512 tasks of 8 seconds without delay. What limits it are the boxes
+that are made twice; 4096^3, of which 64 workers have 512 chunks each, takes 1.35 times as many as fill it again.
 
 See Also
 --------
