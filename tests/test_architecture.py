@@ -13,6 +13,7 @@ PACKAGE = ROOT / "python" / "texrs"
 LAYERS = (
     ("_rust", "errors", "_typing"),
     ("_memory",),
+    ("limits",),
     ("_cache", "_checks", "_digits", "_progress", "_version"),
     ("io",),
     ("_conversion",),

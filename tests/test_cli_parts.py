@@ -205,7 +205,10 @@ def test_python_is_told_in_its_own_words() -> None:
     ):
         with pytest.raises(LimitExceeded, match=words):
             verb(WEAVE, size=40_000)
-    with pytest.raises(LimitExceeded, match=r"texrs\.SolidTexture\.to_zarr and to_dask"):
+    with (
+        texrs.limits.within(memory=4e9),
+        pytest.raises(LimitExceeded, match=r"texrs\.SolidTexture\.to_zarr and to_dask"),
+    ):
         texrs.solid(STRIPES, 600)
     with pytest.raises(LimitExceeded, match=r"texrs\.PlaneTexture\.to_zarr"):
         texrs.PlaneTexture(WEAVE)[0:20_000, 0:20_000]

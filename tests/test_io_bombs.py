@@ -132,6 +132,7 @@ def bombs():
         "lzma.npz": other_packing(zipfile.ZIP_LZMA),
         "deflate.tif": tiff(b"\x78\xda" + make.zeros(10**9) + bytes(4), 8),
         "lzma.tif": tiff(lzma_of_zeros(2**29), 34925),
+        "packbits.tif": tiff(b"\x81\0" * 1_500_000, 32773),
     }
 
 
@@ -158,6 +159,9 @@ def test_strips_that_are_filled_up_are_read(tmp_path):
     path = tmp_path / "a.tif"
     pixels = make.picture((16, 16))
     path.write_bytes(tiff(zlib.compress(pixels.tobytes() + bytes(100)), 8))
+    np.testing.assert_array_equal(tio.read(path), pixels)
+    runs = b"\x80".join(b"\x7f" + half for half in (pixels.tobytes()[:128], pixels.tobytes()[128:]))
+    path.write_bytes(tiff(runs, 32773))
     np.testing.assert_array_equal(tio.read(path), pixels)
     for compression in ("zlib", "lzma"):
         large = make.picture((700, 400, 3))

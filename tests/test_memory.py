@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import texrs
-from texrs import _memory
+from texrs import _memory, limits
 from texrs._checks import check_memory
 from texrs.errors import InvalidInput, LimitExceeded
 
@@ -38,9 +38,9 @@ def test_what_control_groups_allow(tmp_path, own, files, found):
 
 def test_a_limit_in_the_environment(monkeypatch):
     monkeypatch.setenv("TEXRS_MEMORY", "2e6")
-    assert _memory.find_memory() == 2_000_000
+    assert limits.current().memory == 2_000_000
     check_memory(2_000_000)
-    with pytest.raises(LimitExceeded, match=r"size: needs 0.0 GB of memory, 0.0 GB may be taken; smaller"):
+    with pytest.raises(LimitExceeded, match=r"size: needs 2.0 MB of memory, 2.0 MB may be taken; smaller"):
         check_memory(2_000_001, way="smaller")
     with pytest.raises(LimitExceeded, match="size"):
         texrs.perspective(np.zeros((32, 32), np.uint8), np.ones((32, 32)), (400, 400))
@@ -49,7 +49,7 @@ def test_a_limit_in_the_environment(monkeypatch):
     for text in ("much", "-1", "nan", "inf", "0"):
         monkeypatch.setenv("TEXRS_MEMORY", text)
         with pytest.raises(InvalidInput, match="TEXRS_MEMORY"):
-            _memory.find_memory()
+            limits.current()
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of a process are set as Linux has them")

@@ -133,7 +133,7 @@ WRONG = [
     ("solid v.npy -o out.tif --size 20x20", "--size: needs WIDTHxHEIGHTxDEPTH, as in 128x96x64, or one number"),
     ("solid v.npy -o out.tif --size 0", "--size: each side must be at least 1"),
     ("solid v.npy -o out.tif --size 10000", "--size: 10000 x 10000 x 10000 has 1000000000000 pixels"),
-    ("solid v.npy -o out.tif --size 64 --memory-limit 9M", "--size: 64 x 64 x 64 would take"),
+    ("solid v.npy -o out.tif --size 64 --memory-limit 9M", "MB of memory, 9.4 MB may be taken; to OUT.zarr"),
     ("solid v.npy -o out.tif --memory-limit lots", "--memory-limit: needs a number of bytes, as in 900M"),
     ("solid v.npy -o out.tif --field circles", "--field: there is no 'circles'; did you mean circular?"),
     ("solid v.npy -o out.tif --field zigzag:angle=x", "--field: angle needs a number"),

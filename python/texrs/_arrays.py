@@ -26,6 +26,7 @@ from texrs._checks import (
     as_tuple,
     as_wrap,
     check_memory,
+    check_work,
 )
 from texrs._conversion import as_ndarray
 from texrs._typing import Array, Bools, Floats
@@ -52,6 +53,7 @@ __all__ = [
     "as_wrap",
     "check_finite",
     "check_memory",
+    "check_work",
     "exp_single",
     "guidance",
     "log_single",

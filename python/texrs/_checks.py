@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from texrs._memory import find_memory
 from texrs.errors import InvalidInput, LimitExceeded
+from texrs.limits._estimates import memory
+from texrs.limits._now import MAX_PIXELS as MAX_PIXELS
+from texrs.limits._now import find
 
-MAX_PIXELS = 2**28
-"""Pixels or voxels that an array made by texrs may have, unless a limit is given."""
 FREE = 2**20
 """Bytes that may be taken without asking how many there are, which takes as long as to fill them."""
 
@@ -25,7 +25,7 @@ def as_list(value: object) -> list[Any]:
 
 
 def as_size(
-    value: object, name: str = "size", *, axes: int = 2, minimum: int = 1, limit: int = MAX_PIXELS, way: str = ""
+    value: object, name: str = "size", *, axes: int = 2, minimum: int = 1, limit: int | None = None, way: str = ""
 ) -> tuple[int, ...]:
     """Check a size: an int for a square, or one int an axis (rows, columns); ``way`` says what makes larger ones.
 
@@ -34,7 +34,7 @@ def as_size(
     InvalidInput
         Not integers, too few or too many, or below ``minimum``.
     LimitExceeded
-        More than ``limit`` pixels.
+        More than ``limit`` pixels, by default those that `texrs.limits` allows.
 
     """
     order = ("(rows, columns)", "(planes, rows, columns)")[axes - 2]
@@ -47,14 +47,28 @@ def as_size(
     result = tuple(int(s) for s in sides)
     if min(result) < minimum:
         raise InvalidInput(f"{name}: each side must be at least {minimum}, got {result}")
-    pixels = math.prod(result)
-    if pixels > limit:
-        raise LimitExceeded(f"{name}: {result} has {pixels} pixels, more than the limit of {limit}{way and '; ' + way}")
+    check_pixels(result, name, limit=limit, way=way)
     return result
 
 
-def check_memory(needed: int, name: str = "size", *, way: str = "") -> None:
-    """Refuse what needs more bytes than this process may take (see `texrs._memory`); ``way`` says what needs less.
+def check_pixels(shape: Sequence[int], name: str = "size", *, limit: int | None = None, way: str = "") -> None:
+    """Refuse what has more pixels or voxels than ``limit``, by default than `texrs.limits` allows; ``way`` says what else is.
+
+    Raises
+    ------
+    LimitExceeded
+        More of them.
+
+    """
+    count = math.prod(shape)
+    most = find("voxels" if len(shape) == 3 else "pixels") if limit is None else limit
+    if most is not None and count > most:
+        more = f"; {way}" if way else ""
+        raise LimitExceeded(f"{name}: {tuple(shape)} has {count} pixels, more than the limit of {most}{more}")
+
+
+def check_memory(needed: int, name: str = "size", *, limit: int | None = None, way: str = "") -> None:
+    """Refuse what needs more bytes than ``limit``, or than `texrs.limits` allows; ``way`` says what needs less.
 
     Raises
     ------
@@ -62,12 +76,54 @@ def check_memory(needed: int, name: str = "size", *, way: str = "") -> None:
         More bytes than there are, where anything tells.
 
     """
-    if needed <= FREE:
+    if needed <= FREE and limit is None:
         return
-    there = find_memory()
-    if there is not None and needed > there:
+    both = [most for most in (limit, find("memory")) if most is not None]
+    if both and needed > min(both):
         more = f"; {way}" if way else ""
-        raise LimitExceeded(f"{name}: needs {needed / 1e9:.1f} GB of memory, {there / 1e9:.1f} GB may be taken{more}")
+        raise LimitExceeded(f"{name}: needs {_spell(needed)} of memory, {_spell(min(both))} may be taken{more}")
+
+
+def _spell(count: int) -> str:
+    return f"{count / 1e9:.1f} GB" if count >= 1e9 else f"{count / 1e6:.1f} MB"
+
+
+def check_work(
+    verb: str,
+    examples: Sequence[np.ndarray[Any, Any]],
+    size: Sequence[int],
+    name: str = "size",
+    *,
+    limit: int | None = None,
+    way: str = "",
+    **more: Any,
+) -> None:
+    """Refuse work that would make, or take, more than `texrs.limits` allows, before it begins.
+
+    Parameters
+    ----------
+    verb : str
+        As `texrs.limits.memory` knows it.
+    examples : sequence of (..., C) array
+        What is looked into.
+    size : sequence of int
+        Of the result.
+    name, way : str
+        The argument that asks for so much, and what takes less.
+    limit : int, optional
+        Bytes that are allowed for this alone.
+    **more
+        Options that `texrs.limits.memory` takes.
+
+    Raises
+    ------
+    LimitExceeded
+        More pixels or bytes than are allowed.
+
+    """
+    check_pixels(size, name, way=way)
+    needed = memory(verb, [each.shape for each in examples], size, dtype=examples[0].dtype, **more)
+    check_memory(needed, name, limit=limit, way=way)
 
 
 def as_tuple(value: object, name: str, length: int, what: str) -> tuple[Any, ...]:
@@ -146,6 +202,13 @@ def as_float(value: object, name: str, low: float, high: float) -> float:
     if not low <= number <= high:
         raise InvalidInput(f"{name}: needs a number from {low} to {high}, got {value!r}")
     return number
+
+
+def as_limit(value: object, name: str = "limit", *, axes: int = 2) -> int:
+    """Check a limit of pixels, or with ``axes=3`` of voxels; None is what `texrs.limits` allows."""
+    if value is None:
+        return find("voxels" if axes == 3 else "pixels") or MAX_PIXELS
+    return as_int(value, name, 1, 2**40)
 
 
 def as_seed(value: object, name: str = "seed") -> int:

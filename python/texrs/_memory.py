@@ -1,4 +1,7 @@
-"""How much memory this process may take: the least of what the machine has, its container allows, and its limits say."""
+"""How much memory this process may take: the least of what the machine has, its container allows, and its limits say.
+
+What is said in the environment, and by the process itself, is in `texrs.limits`.
+"""
 
 from __future__ import annotations
 
@@ -6,23 +9,14 @@ import os
 from contextlib import suppress
 from pathlib import Path, PurePosixPath
 
-from texrs.errors import InvalidInput
-
 __all__ = ["find_memory"]
 
-VARIABLE = "TEXRS_MEMORY"
-"""Environment variable of a smaller limit, in bytes; 8e9 is as good as 8000000000."""
 GROUPS = Path("/sys/fs/cgroup")
 OWN = Path("/proc/self/cgroup")
 
 
 def find_memory() -> int | None:
     """Return the bytes that this process may take in all, as far as anything tells.
-
-    Raises
-    ------
-    InvalidInput
-        The environment variable is no number of bytes.
 
     Examples
     --------
@@ -31,21 +25,8 @@ def find_memory() -> int | None:
     True
 
     """
-    found = [*_read_variable(), *_read_machine(), *_read_limits(), *_read_groups(GROUPS, OWN)]
+    found = [*_read_machine(), *_read_limits(), *_read_groups(GROUPS, OWN)]
     return min(found, default=None)
-
-
-def _read_variable() -> list[int]:
-    text = os.environ.get(VARIABLE, "").strip()
-    if not text:
-        return []
-    try:
-        value = int(float(text))
-    except (ValueError, OverflowError):
-        value = 0
-    if value < 1:
-        raise InvalidInput(f"{VARIABLE}: needs a number of bytes, got {text!r}")
-    return [value]
 
 
 def _read_machine() -> list[int]:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from texrs.errors import InvalidInput
+from texrs.limits._now import check_time, find_end
 
 if TYPE_CHECKING:
     # Numpy would come with it.
@@ -26,7 +27,7 @@ def stage(progress: Progress | None, name: str) -> Callable[[float], object] | N
 
 
 def listen(progress: Progress | bool | None) -> Progress | None:
-    """Return who listens to a verb: what the caller gave; a bar, for True; or nobody.
+    """Return who listens to a verb: what the caller gave; a bar, for True; or nobody, unless the time is limited.
 
     Parameters
     ----------
@@ -40,6 +41,20 @@ def listen(progress: Progress | bool | None) -> Progress | None:
         Neither a function nor True, False or None.
 
     """
+    watch = _choose(progress)
+    end = find_end()
+    if end is None:
+        return watch
+
+    def heed(stage: str, share: float) -> None:
+        check_time(end, stage, share)
+        if watch is not None:
+            watch(stage, share)
+
+    return heed
+
+
+def _choose(progress: Progress | bool | None) -> Progress | None:
     if progress is None or progress is False:
         return None
     if progress is True:

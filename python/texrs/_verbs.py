@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast
 from texrs._arrays import as_image
 from texrs._progress import listen
 from texrs._typing import Array, Progress
-from texrs.errors import InvalidInput
+from texrs.errors import InvalidInput, LimitExceeded
 from texrs.materials._material import Material, apply_materials, guide_materials
 from texrs.source_map import SourceMap
 from texrs.synthesis import Synthesis
@@ -117,6 +117,8 @@ def _analyse(material: object, guide: Array, name: str, progress: Progress | Non
 
     try:
         return replace(analyse(material, progress=progress), image=as_image(guide))
+    except LimitExceeded:
+        raise
     except InvalidInput as error:
         raise InvalidInput(f"{name}: {error}; texrs.elements.analyse takes a box, points and a mask") from None
 

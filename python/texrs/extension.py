@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from texrs._arrays import as_bool, as_float, as_image, as_int, as_ndarray, as_seed, as_size, check_memory
+from texrs._arrays import as_bool, as_float, as_image, as_int, as_ndarray, as_seed, as_size, check_work
 from texrs._progress import listen
 from texrs._typing import Array, Progress
 from texrs._verbs import takes_materials
@@ -116,7 +116,7 @@ def extend(
         )
     if size == (rows, columns):
         raise InvalidInput("top, bottom, left, right: all are 0, so there is nothing to add")
-    check_memory(size[0] * size[1] * (64 + pixels.shape[2] * pixels.itemsize), "top, bottom, left, right")
+    check_work("extend", [pixels], size, "top, bottom, left, right" if to is None else "to")
     screening = as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
     rim, number, follow = as_int(boundary, "boundary", 0, 64), as_seed(seed), as_bool(light, "light")
     watch = progress or (lambda stage, share: None)

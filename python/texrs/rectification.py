@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float, as_image, as_ndarray, as_seed, as_size, as_wrap, check_memory, guidance
+from texrs._arrays import as_float, as_image, as_ndarray, as_seed, as_size, as_wrap, check_work, guidance
 from texrs._progress import listen
 from texrs._typing import Array, Bools, Interpolation, Progress
 from texrs._verbs import takes_materials
@@ -115,6 +115,7 @@ def rectify(
     cyclic, number = as_wrap(wrap, usual=False), as_seed(seed)
     asked = None if size is None else as_size(size, minimum=SMALLEST)
     fine = None if resolution is None else as_float(resolution, "resolution", 0.05, 8)
+    check_work("rectify", [pixels], asked or pixels.shape[:2], "image" if asked is None else "size")
     watch("plane", 0.0)
     seen = see(pixels, View.of(view))
     watch("plane", 1.0)
@@ -242,7 +243,6 @@ def cross(one: Array, other: Array) -> Array:
 
 def lay(plane: Plane, low: NDArray[np.float64], sides: tuple[int, int], resolution: float) -> tuple[SourceMap, Bools]:
     """Return the map of a rectangle of a plane from a point on, and where it lies within the photograph."""
-    check_memory(sides[0] * sides[1] * 128, "resolution")
     most = np.array(plane.shape) - 1
     flat = low + np.moveaxis(np.indices(sides), 0, -1) / resolution
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from texrs._arrays import as_bool, as_float, as_image, as_int, as_mask, as_ndarray, as_seed
+from texrs._arrays import as_bool, as_float, as_image, as_int, as_mask, as_ndarray, as_seed, check_work
 from texrs._progress import listen
 from texrs._typing import Array, Progress
 from texrs._verbs import takes_materials
@@ -130,6 +130,7 @@ def remove(
     hole = widen(marked, wide)
     if hole.all():
         raise InvalidInput("mask: with its margin it covers the whole photograph, so nothing is left to fill it from")
+    check_work("remove", [pixels], shape, "image")
     watch("plane", 0.0)
     grounds = find_grounds(pixels, settled, ~hole, everywhere=False)
     planes = [

@@ -20,6 +20,7 @@ from texrs._cache import content_hash
 from texrs._checks import as_int
 from texrs._threads import threads
 from texrs.errors import InvalidInput, TexrsError
+from texrs.limits._now import said, use
 
 __all__ = ["Scheduler", "WorkerLost", "run"]
 
@@ -102,12 +103,13 @@ _THREADS: int | None = None
 _LEAVING = False
 
 
-def _begin(payload: bytes, count: int, stop: Any) -> None:
+def _begin(payload: bytes, count: int, stop: Any, most: dict[str, Any]) -> None:
     """Take what a worker is to do, once, and heed who started it."""
     global _WORK, _THREADS
     # Ctrl-C goes to all processes of a terminal; who started this one says what is to be done.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _WORK, _THREADS = pickle.loads(payload), count
+    use(**most)
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), _leave)
@@ -163,7 +165,9 @@ class _Process:
         # Spawned: a fork would inherit the locks of threads that it does not have.
         context = multiprocessing.get_context("spawn")
         heard, self._stop = context.Pipe(duplex=False)
-        self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_begin, initargs=(payload, count, heard))
+        self._pool = ProcessPoolExecutor(
+            1, mp_context=context, initializer=_begin, initargs=(payload, count, heard, said())
+        )
         self.tasks: dict[Future[Any], int] = {}
 
     def submit(self, number: int) -> None:

@@ -109,19 +109,23 @@ def load(name: str) -> Callable[..., None]:
 
 
 def make_command(name: str) -> Any:
-    """Return a command; one that writes can also be told to replace whatever is there."""
+    """Return a command, which can be limited; one that writes can also be told to replace whatever is there."""
+    from texrs.cli._limits import limit, list_parameters
     from texrs.cli._options import as_command, make_parameter
     from texrs.cli._outputs import OUTPUTS, Command, Force
 
-    function = work = load(name)
+    work = load(name)
     parameters = list(inspect.signature(work, eval_str=True).parameters.values())
-    if any(p.name in OUTPUTS for p in parameters):
+    limits = list_parameters(parameters)
+    forced = [make_parameter("force", Force, False)] if any(p.name in OUTPUTS for p in parameters) else []
+    ours = {p.name for p in (*limits, *forced)}
 
-        def forced(*, force: bool, **given: Any) -> None:
-            # The command itself sees to it, before the work.
-            work(**given)
+    def limited(**given: Any) -> None:
+        # The command itself sees to what may be replaced, before the work.
+        with limit(**{p.name: given[p.name] for p in limits}):
+            work(**{name: value for name, value in given.items() if name not in ours})
 
-        function = as_command(forced, [*parameters, make_parameter("force", Force, False)])
+    function = as_command(limited, [*parameters, *limits, *forced])
     alone = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
     alone.command(name, cls=Command, help=COMMANDS[name])(function)
     return typer.main.get_command(alone)

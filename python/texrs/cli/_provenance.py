@@ -29,6 +29,9 @@ from texrs.materials._files import SUFFIXES
 LEFT = (
     "count",
     "quiet",
+    "memory_limit",
+    "pixel_limit",
+    "time_limit",
     "force",
     "each",
     "out",

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from texrs._arrays import as_size
-from texrs._checks import MAX_PIXELS
 from texrs._typing import Array
 from texrs.errors import FileError, InvalidInput
 
@@ -38,7 +37,7 @@ class About:
     """What maps of materials are for."""
 
 
-def parse_size(text: str, option: str = "--size", *, axes: int = 2, limit: int = MAX_PIXELS) -> tuple[int, ...]:
+def parse_size(text: str, option: str = "--size", *, axes: int = 2, limit: int | None = None) -> tuple[int, ...]:
     """Return (rows, columns) of ``1024x512``, which is the width and the height, or of ``512`` a square.
 
     With three axes the depth comes last in the text, and the planes first in what is returned.

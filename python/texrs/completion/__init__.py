@@ -14,7 +14,18 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_bool, as_float, as_image, as_int, as_mask, as_method, as_ndarray, as_seed, as_wrap
+from texrs._arrays import (
+    as_bool,
+    as_float,
+    as_image,
+    as_int,
+    as_mask,
+    as_method,
+    as_ndarray,
+    as_seed,
+    as_wrap,
+    check_work,
+)
 from texrs._progress import listen
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs._verbs import takes_materials
@@ -168,6 +179,7 @@ def complete(
     chosen = None if patch is None else as_int(patch, "patch", LEAST, min(n for shape in shapes for n in shape))
     watch = progress or (lambda stage, share: None)
 
+    check_work("complete", pictures, shapes[0], "image", method=method)
     watch("complete", 0.0)
     made = Filling(map_untouched(shapes), 0.0, 0, [], True)
     scales: list[Floats] | None = None

@@ -50,7 +50,7 @@ class Folder:
     """The manifest of a folder, and how entries get into it."""
 
     def __init__(self, path: FilePath, say: Callable[[str], object] | None) -> None:
-        self.path, self._say = path, say
+        self.path, self._say, self._made = path, say, False
         if not path.is_dir() and (path.exists() or not path.parent.is_dir()):
             raise FileError(f"{path}: no folder can be made there")
 
@@ -154,20 +154,45 @@ class Folder:
     @contextmanager
     def _lock_manifest(self) -> Iterator[None]:
         """Keep other processes, and threads, from changing the manifest."""
+        number, end = self._open_lock(), time.monotonic() + PATIENCE
         try:
-            self.path.mkdir(exist_ok=True)
-            number = os.open(self.path / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
-        except OSError as error:
-            raise FileError(f"{self.path}: cannot be written to ({error.strerror})") from None
-        try:
-            end = time.monotonic() + PATIENCE
-            while not _lock_file(number):
+            while not (_lock_file(number) and self._is_lock(number)):
                 if time.monotonic() > end:
                     raise FileError(f"{self.path}: another process has kept it locked for {PATIENCE:g} s")
                 time.sleep(PAUSE)
+                if not self._is_lock(number):
+                    # Whoever had it found nothing to keep, and took the folder away.
+                    os.close(number)
+                    number = self._open_lock()
             yield
         finally:
+            # What failed leaves no folder that it made, and that holds nothing.
+            if self._made and os.name == "posix" and self._is_lock(number) and os.listdir(self.path) == [LOCK]:
+                with suppress(OSError):
+                    (self.path / LOCK).unlink()
+                    self.path.rmdir()
             os.close(number)
+
+    def _open_lock(self) -> int:
+        """Open the file that is locked, in the folder, which is made where it is missing."""
+        for _ in range(100):
+            try:
+                with suppress(FileExistsError):
+                    self.path.mkdir()
+                    self._made = True
+                return os.open(self.path / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
+            except FileNotFoundError:
+                # Taken away in between.
+                continue
+            except OSError as error:
+                raise FileError(f"{self.path}: cannot be written to ({error.strerror})") from None
+        raise FileError(f"{self.path}: is made and taken away by other processes")
+
+    def _is_lock(self, number: int) -> bool:
+        """Return whether the file that was opened is the one that lies there."""
+        with suppress(OSError):
+            return os.path.samestat(os.fstat(number), os.stat(self.path / LOCK))
+        return False
 
     def warn(self, sentence: str) -> None:
         """Report what had to be remade."""

@@ -20,7 +20,7 @@ from texrs._typing import Array, Path, Progress
 from texrs.database._folder import NAME, Folder, Record, check_free, restore_option
 from texrs.database._sheet import Sheet
 from texrs.elements import FORMAT, Elements, ElementSearch, Layout, LayoutName, analyse, digest, load
-from texrs.errors import FileError, InvalidInput, TexrsError
+from texrs.errors import FileError, InvalidInput, LimitExceeded, TexrsError
 from texrs.papers.splice import splice
 from texrs.synthesis import Synthesis
 
@@ -213,6 +213,11 @@ class TextureDatabase:
             if file is None:
                 raise InvalidInput("name: is needed for an array")
             name = FilePath(file).stem
+            if not NAME.fullmatch(name):
+                raise InvalidInput(
+                    f"image: {name!r} cannot be the name of a texture, which has letters, digits, '.', '_' and '-'; "
+                    "give a name"
+                )
         if not isinstance(name, str) or not NAME.fullmatch(name):
             raise InvalidInput(f"name: letters, digits, '.', '_' and '-' are allowed, up to 100; got {name!r}")
         pixels = as_image(image) if file is None else io.read(file)
@@ -440,6 +445,8 @@ class TextureDatabase:
                     progress("matrix", ((i - 1) * len(across) + j - 1) / (len(down) * len(across)))
                 try:
                     made = splice(read(a), read(b), size, **options)
+                except LimitExceeded:
+                    raise
                 except InvalidInput as error:
                     failed[a, b] = str(error)
                     sheet.put(i, j, None)

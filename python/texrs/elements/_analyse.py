@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_image, check_memory, guidance
+from texrs._arrays import as_image, check_work, guidance
 from texrs._progress import listen
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.elements import _mask
@@ -34,8 +34,6 @@ SHORTEST = 16
 """Least side of an image."""
 AGAIN = 0.8
 """Share of the elements of a proposed box that those of a better one must be."""
-BYTES = 500
-"""Of memory for a pixel, at the most: vectors, spectra and running sums of eight channels, and colour models."""
 SURE = 0.9
 """Confidence of what is proposed of the colours of a material, from which on its other maps are not asked."""
 LITTLE, MUCH = 0.02, 0.95
@@ -124,7 +122,7 @@ def analyse(
         return _choose_map(image, partial(analyse, **rest, progress=progress))
     pixels, steps = as_image(image, "image", minimum=SHORTEST), read_steps(() if corrections is None else corrections)
     size = (pixels.shape[0], pixels.shape[1])
-    check_memory(BYTES * size[0] * size[1], "image")
+    check_work("analyse", [pixels], size, "image")
     how = Settings.of(search, method, wrap, seed)
     given = Arguments.of(size, how.wrap, box=box, layout=layout, background=background, mask=mask, points=points)
     watch = progress or (lambda stage, share: None)

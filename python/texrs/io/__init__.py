@@ -50,7 +50,7 @@ from math import atan, degrees, prod
 
 import numpy as np
 
-from texrs._checks import MAX_PIXELS, as_int
+from texrs._checks import as_limit
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput
@@ -94,7 +94,7 @@ def __dir__() -> list[str]:
     return __all__
 
 
-def read(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
+def read(path: PathLike, *, limit: int | None = None) -> Array:
     """Return the image of a file.
 
     Parameters
@@ -102,8 +102,8 @@ def read(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
     path : path_like
         PNG, TIFF, EXR, HDR, WebP, JPEG, GIF (the first frame), BMP, .npy, .npz or the folder of a Zarr store, whichever
         its content says it is.
-    limit : int
-        Pixels that the image may have, and a sixteenth of the bytes.
+    limit : int, optional
+        Pixels that the image may have, and a sixteenth of the bytes; by default those that `texrs.limits` allows.
 
     Returns
     -------
@@ -132,7 +132,7 @@ def read(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
            [ 8,  9, 10, 11]], dtype=uint16)
 
     """
-    name, limit = _files.as_path(path), as_int(limit, "limit", 1, 2**40)
+    name, limit = _files.as_path(path), as_limit(limit)
     kind = detect_kind(name)
     if kind == "tiff":
         planes, orientation = _tiff.read_tiff(name, limit)
@@ -219,7 +219,7 @@ def read_description(path: PathLike) -> str | None:
     return _descriptions.read(_files.as_path(path))
 
 
-def read_volume(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
+def read_volume(path: PathLike, *, limit: int | None = None) -> Array:
     """Return the volume of a file.
 
     Parameters
@@ -228,8 +228,8 @@ def read_volume(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
         A TIFF stack (a single image is a volume of one plane), .npy, .npz, .vti, .vtk, NRRD or NIfTI (these with the extra
         ``vol``), or the folder of a Zarr store (extra ``dask``), whichever its content says it is. A NIfTI file that
         scales its samples gives float32. Of OME-Zarr the finest level is read; a path inside the store names another.
-    limit : int
-        Voxels that the volume may have, and a sixteenth of the bytes.
+    limit : int, optional
+        Voxels that the volume may have, and a sixteenth of the bytes; by default those that `texrs.limits` allows.
 
     Returns
     -------
@@ -254,7 +254,7 @@ def read_volume(path: PathLike, *, limit: int = MAX_PIXELS) -> Array:
     (5, 4, 3)
 
     """
-    name, limit = _files.as_path(path), as_int(limit, "limit", 1, 2**40)
+    name, limit = _files.as_path(path), as_limit(limit, axes=3)
     kind = detect_kind(name)
     if kind not in READERS:
         raise FileError(

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from texrs._checks import MAX_PIXELS
+from texrs._checks import as_limit
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, LimitExceeded
@@ -26,7 +26,7 @@ ALONE = 0
 """Threads beside the caller's: none, for a pool of threads does not outlive a fork."""
 
 
-def read_layers(path: PathLike, *, limit: int = MAX_PIXELS) -> tuple[dict[str, Array], str | None]:
+def read_layers(path: PathLike, *, limit: int | None = None) -> tuple[dict[str, Array], str | None]:
     """Return the channels of a file by their full names, (H, W) each, and what the file says of itself.
 
     The picture is the display window: data outside it is left out, and 0 where it has none. In a file of several parts the
@@ -40,7 +40,7 @@ def read_layers(path: PathLike, *, limit: int = MAX_PIXELS) -> tuple[dict[str, A
         More pixels than the limit.
 
     """
-    name = as_path(path)
+    name, limit = as_path(path), as_limit(limit)
     check_file(name)
     library = import_library(name)
     with translate_errors(name, "reading"):

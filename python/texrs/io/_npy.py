@@ -14,7 +14,7 @@ from typing import BinaryIO, cast
 
 import numpy as np
 
-from texrs._checks import MAX_PIXELS, check_memory
+from texrs._checks import as_limit, check_memory
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, LimitExceeded
@@ -125,15 +125,15 @@ def read_headers(path: PathLike) -> dict[str, Header]:
         return {name: header for name, (_, header) in _find_members(place, archive).items()}
 
 
-def read_arrays(path: PathLike, *, limit: int = MAX_PIXELS, choose: Choice | None = None) -> dict[str, Array]:
+def read_arrays(path: PathLike, *, limit: int | None = None, choose: Choice | None = None) -> dict[str, Array]:
     """Return the arrays of an .npz file.
 
     Parameters
     ----------
     path : path_like
         An archive of arrays of numbers, as `numpy.savez` writes it; what would have to be unpickled is refused.
-    limit : int
-        Pixels that each array may have, and a sixteenth of the bytes of all.
+    limit : int, optional
+        Pixels that each array may have, and a sixteenth of the bytes of all; by default those that `texrs.limits` allows.
     choose : callable, optional
         Called with the headers (see `read_headers`) before any samples are read; returns the keys of the arrays to be read,
         and raises whatever it likes of a file that is not what it should be. It may let all of them together have more bytes.
@@ -162,7 +162,7 @@ def read_arrays(path: PathLike, *, limit: int = MAX_PIXELS, choose: Choice | Non
     {'albedo': (2, 2, 3), 'height': (2, 2)}
 
     """
-    place = as_path(path)
+    place, limit = as_path(path), as_limit(limit)
     with _open_archive(place) as archive:
         members = _find_members(place, archive)
         headers = {name: header for name, (_, header) in members.items()}

@@ -8,7 +8,8 @@ import threading
 import zlib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from math import prod
+from importlib import import_module
+from math import inf, prod
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +21,16 @@ from texrs.io import _image_io
 from texrs.io._files import check_file, check_size, load, translate_errors, turn_upright
 
 _LZW, _JPEG = 5, 7
-_DEFLATE, _LZMA = frozenset({8, 32946}), frozenset({34925})
+_DEFLATE, _LZMA, _PACKBITS, _ZSTD = frozenset({8, 32946}), 34925, 32773, frozenset({34926, 50000})
+_UNFOLDING: dict[int, float] = {
+    **dict.fromkeys(_DEFLATE, 1032),
+    _PACKBITS: 64 * 9,
+    _LZMA: inf,
+    **dict.fromkeys(_ZSTD, inf),
+}
+"""By compression, into how many bytes one is made at most; those of PackBits are collected in a list, at nine bytes each."""
 _HARMLESS = 2**26
-"""Bytes that a strip may unfold to, at most, without being looked at: deflate makes a byte into 1032."""
+"""Bytes that a strip may unfold to, at most, without being looked at."""
 _DICTIONARY = 2**28
 """Bytes that may be kept while LZMA unfolds."""
 _ORIENTATION = 274
@@ -144,23 +152,47 @@ def _check_unfolded(path: Path, file: Any, series: Any) -> None:
     """Check that no strip or tile unfolds to far more than its pixels need, which tifffile without imagecodecs does first."""
     for page in series.pages:
         key = None if page is None else page.keyframe
-        if key is None or not (key.compression in _DEFLATE or key.compression in _LZMA):
+        if key is None or key.compression not in _UNFOLDING:
             continue
         # Careless writers fill up.
         most = 2 * prod(key.chunks) * max(key.dtype.itemsize, 1) + 2**16
         for offset, count in zip(page.dataoffsets, page.databytecounts, strict=True):
-            if key.compression in _DEFLATE and count * 1032 <= max(most, _HARMLESS):
+            if count * _UNFOLDING[key.compression] <= max(most, _HARMLESS):
                 continue
             file.seek(offset)
             data = file.read(count)
-            if key.compression in _DEFLATE:
-                size = len(zlib.decompressobj().decompress(data, most + 1))
-            else:
-                size = len(lzma.LZMADecompressor(memlimit=_DICTIONARY).decompress(data, most + 1))
+            size = _measure(key.compression, data, most)
             if size > most:
                 raise FileError(
                     f"{path}: is corrupt; a strip unfolds to more than {most} bytes, which its pixels do not need"
                 )
+
+
+def _measure(compression: int, data: bytes, most: int) -> int:
+    """Return how many bytes data unfold to, or more than ``most`` where they are more."""
+    if compression in _DEFLATE:
+        return len(zlib.decompressobj().decompress(data, most + 1))
+    if compression == _LZMA:
+        return len(lzma.LZMADecompressor(memlimit=_DICTIONARY).decompress(data, most + 1))
+    if compression == _PACKBITS:
+        return _measure_packbits(data, most)
+    try:
+        # That of Python 3.14, which tifffile takes too; without it nothing is unfolded.
+        zstd: Any = import_module("compression.zstd")
+    except ImportError:
+        return 0
+    return len(zstd.ZstdDecompressor().decompress(data, most + 1))
+
+
+def _measure_packbits(data: bytes, most: int) -> int:
+    """Return how many bytes runs unfold to, or how many there are beyond ``most``."""
+    size = at = 0
+    while at < len(data) and size <= most:
+        step = data[at]
+        # Bytes as they are, nothing, or one byte many times.
+        run, length = (step + 1, step + 2) if step < 128 else (0, 1) if step == 128 else (257 - step, 2)
+        size, at = size + run, at + length
+    return size
 
 
 def _apply_colours(path: Path, array: Array, page: Any) -> Array:

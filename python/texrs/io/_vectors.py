@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from texrs._checks import MAX_PIXELS, as_int
+from texrs._checks import as_limit
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError
@@ -14,7 +14,7 @@ SPATIAL = ("nrrd", "nii", "nii.gz", "vti", "vtk")
 """Files of programs whose vectors are x, y, z."""
 
 
-def read_vectors(path: PathLike, *, limit: int = MAX_PIXELS) -> tuple[Array, bool]:
+def read_vectors(path: PathLike, *, limit: int | None = None) -> tuple[Array, bool]:
     """Return an array of numbers at places, such as directions or frames, with all its axes.
 
     Parameters
@@ -22,8 +22,8 @@ def read_vectors(path: PathLike, *, limit: int = MAX_PIXELS) -> tuple[Array, boo
     path : path_like
         .npy, .npz (of a single array), a Zarr store, NRRD, NIfTI, .vti or .vtk (their vectors, where there are several
         arrays), or a TIFF of so many channels.
-    limit : int
-        Sixteenth of the bytes that it may need.
+    limit : int, optional
+        Sixteenth of the bytes that it may need; by default the voxels that `texrs.limits` allows.
 
     Returns
     -------
@@ -52,7 +52,7 @@ def read_vectors(path: PathLike, *, limit: int = MAX_PIXELS) -> tuple[Array, boo
     ((4, 5, 6, 3), False)
 
     """
-    name, most = _files.as_path(path), as_int(limit, "limit", 1, 2**40)
+    name, most = _files.as_path(path), as_limit(limit, axes=3)
     kind = detect_kind(name)
     if kind not in VECTORS:
         raise FileError(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from texrs._checks import MAX_PIXELS
+from texrs._checks import as_limit
 from texrs._typing import Path
 from texrs.errors import FileError, InvalidInput, LimitExceeded
 from texrs.source_map._finish import Finish
@@ -74,9 +74,9 @@ def choose_parts(headers: Mapping[str, Header], path: Path) -> list[str]:
     if any(name not in headers for name in NAMES):
         raise FileError(f"{path}: is not a source map")
     shape = headers["coordinates"].shape[:-1]
-    pixels = prod(shape)
-    if pixels > MAX_PIXELS:
-        raise LimitExceeded(f"{path}: has {pixels} pixels, more than the limit of {MAX_PIXELS}")
+    pixels, limit = prod(shape), as_limit(None, axes=len(shape))
+    if pixels > limit:
+        raise LimitExceeded(f"{path}: has {pixels} pixels, more than the limit of {limit}")
     wanted = {"coordinates": (*shape, len(shape)), "exemplar": shape, "label": shape}
     for name, shaped in wanted.items():
         if headers[name].shape != shaped or len(shape) not in (2, 3):
@@ -97,6 +97,6 @@ def choose_parts(headers: Mapping[str, Header], path: Path) -> list[str]:
     for name in chosen:
         if headers[name].size > most[name]:
             raise FileError(f"{path}: is damaged ({name} of {headers[name].dtype}, shape {headers[name].shape})")
-    if sum(headers[name].size for name in known) > MAX_PIXELS:
-        raise LimitExceeded(f"{path}: its masks of exemplars have more than {MAX_PIXELS} pixels")
+    if sum(headers[name].size for name in known) > limit:
+        raise LimitExceeded(f"{path}: its masks of exemplars have more than {limit} pixels")
     return [*chosen, *known]

@@ -28,7 +28,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_bool, as_float, as_int, as_size, as_wrap
+from texrs._arrays import as_bool, as_float, as_int, as_size, as_wrap, check_work
 from texrs._evening import flatten as even_light
 from texrs._progress import listen
 from texrs._typing import Array, Floats, Progress
@@ -133,6 +133,7 @@ def tile(
     wanted, weight = as_sides(size, shape, cyclic), as_float(0.0 if blend is None else blend, "blend", 0, 1e6)
     choices = as_choices(overlap, size is None, shape, wanted, cyclic)
     watch = progress or (lambda stage, share: None)
+    check_work("tile", [exemplar.pixels], wanted, "image" if size is None else "size", way=LARGER)
     watch("segment", 0.0)
     found: dict[int, Joined] = {}
     if any(n > m for n, m in zip(wanted, shape, strict=True)):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
@@ -19,7 +18,7 @@ from texrs._arrays import (
     as_seed,
     as_size,
     as_wrap,
-    check_memory,
+    check_work,
     to_unit,
     try_array,
 )
@@ -43,8 +42,6 @@ MINIMUM_SIDE = 16
 """An exemplar with a shorter side holds no texture to speak of."""
 LARGER = "texrs.TileSet makes an endless design, and gives it in parts"
 """How larger ones are made."""
-SPARE = 500_000_000
-"""Bytes that do not grow with the result."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,7 +132,7 @@ def check_arguments(
         method == "paper",
         progress or (lambda stage, share: None),
     )
-    check_memory(count_bytes(arguments), way=LARGER)
+    check_work("design", [e.pixels for e in exemplars], (rows, columns), way=LARGER, method=method)
     return arguments
 
 
@@ -167,20 +164,6 @@ def part_at_borders(entry: Elements) -> NDArray[np.integer[Any]]:
         return entry.labels
     pieces, count = label(entry.labels > 0)
     return np.asarray(entry.labels * (int(count) + 1) + pieces)
-
-
-def count_bytes(arguments: Arguments) -> int:
-    """Return the bytes that a texture takes: the source map is 14 a pixel, 18 while it is made; the picture is kept twice.
-
-    Several exemplars are each stitched to the full size, and mixed by a cut.
-    """
-    pixels = arguments.exemplars[0].pixels
-    kept = 14 + 2 * pixels.shape[-1] * pixels.itemsize
-    count = len(arguments.exemplars)
-    mixed = 100 + 75 * count if count > 1 else 0
-    each = max(18, kept) + 24 * arguments.literal + mixed
-    maps = arguments.shares.nbytes + (0 if arguments.density is None else arguments.density.nbytes)
-    return int(math.prod(arguments.size) * each + maps + SPARE)
 
 
 def check_together(exemplars: Sequence[Exemplar], labels: object) -> None:

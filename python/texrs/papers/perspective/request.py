@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from texrs import scale_maps
-from texrs._arrays import as_choice, as_float, as_method, as_seed, as_size, as_wrap, check_memory, power_single
+from texrs._arrays import as_choice, as_float, as_method, as_seed, as_size, as_wrap, check_work, power_single
 from texrs._typing import Array, Floats, Interpolation
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
@@ -29,8 +29,6 @@ __all__ = ["Method", "Request"]
 
 Method: TypeAlias = Literal["paper"] | None
 
-KEPT = 14 + 16 + 4
-"""Bytes of a pixel that a result takes at least, beside its colours: its source, its frame and its size."""
 LEAST = 16
 """Least side of an exemplar."""
 
@@ -126,7 +124,7 @@ class Request:
             size = find_size(asked) or [2 * n for n in known.shape]
         sides = as_size(size)
         shape = (sides[0], sides[1])
-        check_memory(shape[0] * shape[1] * (KEPT + known.pixels.shape[-1] * known.pixels.itemsize))
+        check_work("perspective", [known.pixels], shape, method=method)
         surface = None if asked is None or is_map(asked) else as_surface(asked, shape)
         turn = None if direction is None else as_turn(direction, shape, closed)
         if method == "paper" and (surface is not None or turn is not None):

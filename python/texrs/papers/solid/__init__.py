@@ -128,7 +128,7 @@ def solid(
         Between the exemplar's samples, in the last look-up. None is "cubic". Labels are looked up at the nearest
         sample whatever it says.
     memory_limit : int, optional
-        Bytes that the work may take; None is 8 GiB.
+        Bytes that the work may take; None is what `texrs.limits` allows.
     progress : callable or True, optional
         Called as ``progress(stage, share)`` with the stage and the share of it that is done; raising stops the work.
         True shows a bar.
@@ -246,7 +246,7 @@ def synthesize(
         Between the exemplar's samples, in the last look-up. None is "cubic". Labels are looked up at the nearest
         sample whatever it says.
     memory_limit : int, optional
-        Bytes that the work may take; None is 8 GiB.
+        Bytes that the work may take; None is what `texrs.limits` allows.
     progress : callable or True, optional
         Called as ``progress(stage, share)`` with the stage and the share of it that is done; raising stops the work.
         True shows a bar.

@@ -18,7 +18,7 @@ from texrs.fields import Field, FieldLike
 from texrs.fields import as_field as make_field
 from texrs.growth import Conditions, Constraints, Guide
 from texrs.materials import Material
-from texrs.papers.solid.limits import LARGER, check_memory
+from texrs.papers.solid.limits import LARGER, check_region
 from texrs.papers.solid.plans import Choice, check_plan
 from texrs.papers.solid.settings import Quality, as_quality
 
@@ -100,7 +100,7 @@ class Request:
         turned = as_field(field, axes, region.shape)
         if turned is not None:
             turned = turned.over(region.shape)
-        check_memory(known.pixels, region, turned, memory_limit)
+        check_region(known.pixels, region, turned, as_quality(quality), memory_limit)
         conditions = Conditions.of(known.pixels, region.shape, constraints, guide)
         return cls(known, region, turned, as_seed(seed), as_quality(quality), bend, chosen, method, conditions, how)
 

@@ -26,7 +26,7 @@ from texrs.kernels.gather import gather
 from texrs.materials import Material
 from texrs.materials._material import apply_materials
 from texrs.papers.solid.layers import WORK, Layers
-from texrs.papers.solid.limits import LARGER, check_memory, estimate_bytes
+from texrs.papers.solid.limits import LARGER, check_region, estimate_bytes
 from texrs.papers.solid.parts import Endless
 from texrs.papers.solid.ranges import FAR, as_origin, as_region
 from texrs.papers.solid.request import as_field, as_interpolation
@@ -332,7 +332,7 @@ class Texture(Endless):
         """
         region = Region.whole(as_size(size, axes=self.axes))
         beside = 0 if self._quality == "fast" else WORK
-        return estimate_bytes(self._exemplar.pixels, region, self._field) + beside + self._cache_bytes
+        return estimate_bytes(self._exemplar.pixels, region, self._field, self._quality) + beside + self._cache_bytes
 
     def look_up(
         self, origin: Sequence[int], size: Sequence[int], names: Sequence[str], progress: Progress | None = None
@@ -407,7 +407,7 @@ class Texture(Endless):
 
     def _check(self, region: Region) -> None:
         beside = 0 if self._quality == "fast" else WORK
-        check_memory(self._exemplar.pixels, region, self._field, self._memory_limit, beside)
+        check_region(self._exemplar.pixels, region, self._field, self._quality, self._memory_limit, beside)
 
     def _show(self, places: Places) -> Array:
         """Look the exemplar up, a band of points at a time."""

@@ -57,7 +57,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal, TypeAlias
 
-from texrs._arrays import as_bool, as_float, as_method, as_seed, as_size
+from texrs._arrays import as_bool, as_float, as_method, as_seed, as_size, check_work
 from texrs._progress import listen
 from texrs._typing import Array, Progress
 from texrs._verbs import takes_materials
@@ -215,6 +215,7 @@ def splice(
     watch, shape = progress or (lambda stage, share: None), None if size is None else as_size(size, minimum=16)
     mine, theirs = as_elements(a, "a", watch), as_elements(b, "b", watch)
     rows, columns = shape or as_size(mine.mask.shape, minimum=16)
+    check_work("splice", [mine.image, theirs.image], (rows, columns))
     if net and not has_knots(mine):
         raise InvalidInput(f"nets: {'separate elements are no net' if mine.layout == Layout.DISJOINT else NO_NET}")
     found = find_entry_cells(mine, watch) if method is None and wanted is not False and not net else None
@@ -349,6 +350,7 @@ def self_splice(
     steps, screening = as_steps(() if edit is None else edit, number), _as_screening(blend)
     watch = progress or (lambda stage, share: None)
     mine = as_elements(a, "a", watch)
+    check_work("self_splice", [mine.image], asked or mine.mask.shape, "a" if asked is None else "size")
     if asked is not None and asked != mine.mask.shape:
         rest: dict[str, Any] = {"seed": number, "method": method, "refine": refine, "blend": blend, "progress": watch}
         inside = all(n <= m for n, m in zip(asked, mine.mask.shape, strict=True))

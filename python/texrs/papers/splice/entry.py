@@ -14,7 +14,7 @@ from texrs._cache import Cache, content_hash
 from texrs._typing import Progress
 from texrs.elements import Elements, analyse
 from texrs.elements._arguments import as_points
-from texrs.errors import InvalidInput
+from texrs.errors import InvalidInput, LimitExceeded
 
 __all__ = ["as_elements", "remember"]
 
@@ -37,6 +37,8 @@ def as_elements(value: object, name: str, progress: Progress) -> Elements:
             found = analyse(given, progress=progress)
             # In the shape that it came in.
             return check_entry(replace(found, image=given), name)
+        except LimitExceeded:
+            raise
         except InvalidInput as error:
             raise InvalidInput(f"{name}: {error}; texrs.elements.analyse takes a box, points and a mask") from None
     return check_entry(value, name)

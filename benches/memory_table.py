@@ -1,0 +1,113 @@
+"""What each verb takes, as `texrs.limits.memory` predicts it, beside the peak that is measured.
+
+    python benches/memory_table.py [VERB ...]
+
+A process for each: its peak of resident memory while the verb works, less what it had before, when the verb had worked on
+something small, so that its libraries were there. Linux only.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import re
+import subprocess
+import sys
+import time
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import texrs
+
+SIZES: dict[str, list[tuple[int, int]]] = {
+    "design": [(256, 512), (128, 1024), (512, 1024)],
+    "splice": [(256, 256), (256, 512), (512, 512)],
+    "self_splice": [(256, 256), (256, 512), (512, 512)],
+    "perspective": [(256, 512), (512, 512), (256, 1024)],
+    "synthesize": [(256, 512), (128, 1024), (512, 1024)],
+    "solid": [(32, 64), (32, 96), (48, 96)],
+    "tile": [(512, 512), (1024, 1024), (512, 1024)],
+    "complete": [(512, 512), (1024, 1024), (1536, 1536)],
+    "extend": [(256, 384), (512, 768), (256, 768)],
+    "rectify": [(512, 512), (1024, 1024), (1536, 1536)],
+    "remove": [(256, 256), (512, 512), (1024, 1024)],
+    "analyse": [(256, 256), (512, 512), (768, 768)],
+}
+"""Sides of the example and of the result."""
+
+
+def make_call(verb: str, picture: np.ndarray[Any, Any], size: int) -> Callable[[], object]:
+    """Return what is measured."""
+    side = picture.shape[0]
+    hole = np.zeros(picture.shape[:2], np.bool_)
+    hole[side // 3 : side * 2 // 3, side // 3 : side * 2 // 3] = True
+    calls: dict[str, Callable[[], object]] = {
+        "design": lambda: texrs.design(picture, size),
+        "splice": lambda: texrs.splice(picture, np.rot90(picture).copy(), size),
+        "self_splice": lambda: texrs.self_splice(picture, "randomise", size),
+        "perspective": lambda: texrs.perspective(picture, size=size),
+        "synthesize": lambda: texrs.synthesize(picture, size),
+        "solid": lambda: texrs.solid(picture, size),
+        "tile": lambda: texrs.tile(picture, size=size if size != side else None),
+        "complete": lambda: texrs.complete(picture, hole),
+        "extend": lambda: texrs.extend(picture, right=size - side, bottom=size - side),
+        "rectify": lambda: texrs.rectify(picture, view=texrs.View(slant=40)),
+        "remove": lambda: texrs.remove(picture, hole),
+        "analyse": lambda: texrs.elements.analyse(picture),
+    }
+    return calls[verb]
+
+
+def make_picture(verb: str, side: int) -> np.ndarray[Any, Any]:
+    """Return an example: a volume, a floor that is seen aslant, or stones."""
+    if verb == "solid":
+        return texrs.samples.particles((side,) * 3).image
+    aslant = verb in ("extend", "rectify", "remove")
+    return (texrs.samples.tilted_discs if aslant else texrs.samples.pebbles)((side, side)).image
+
+
+def measure(name: str) -> int:
+    """Return what the system says of the memory of this process, in bytes."""
+    return int(re.findall(rf"{name}:\s+(\d+)", Path("/proc/self/status").read_text())[0]) * 1024
+
+
+def run(verb: str, side: int, size: int) -> None:
+    """Measure one, and print its line."""
+    warnings.simplefilter("ignore")
+    small, larger = (32, 40) if verb == "solid" else (96, 128)
+    make_call(verb, make_picture(verb, small), larger)()
+    picture = make_picture(verb, side)
+    call, result = make_call(verb, picture, size), (size,) * (3 if verb == "solid" else 2)
+    several = [picture.shape] * (2 if verb == "splice" else 1)
+    predicted = texrs.limits.memory(verb, several, result, dtype=picture.dtype)
+    gc.collect()
+    # What the C library keeps for later is no memory of the verb.
+    ctypes.CDLL(None).malloc_trim(0)
+    Path("/proc/self/clear_refs").write_text("5")
+    before, start = measure("VmRSS"), time.process_time()
+    call()
+    taken = measure("VmHWM") - before
+    seconds = time.process_time() - start
+    row = f"| {verb} | {side} | {size} | {predicted / 1e6:.0f} | {taken / 1e6:.0f} | {predicted / taken:.2f} | {seconds:.1f} |"
+    print(row, flush=True)
+
+
+def main(words: list[str]) -> None:
+    """Measure all, or the verbs that are named."""
+    if words[:1] == ["--one"]:
+        run(words[1], int(words[2]), int(words[3]))
+        return
+    print(
+        "| verb | example | result | predicted, MB | measured, MB | ratio | processor s |\n|---|---|---|---|---|---|---|"
+    )
+    for verb in words or SIZES:
+        for side, size in SIZES[verb]:
+            subprocess.run([sys.executable, __file__, "--one", verb, str(side), str(size)], check=False)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

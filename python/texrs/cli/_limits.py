@@ -1,0 +1,48 @@
+"""What every command may take: options, in force while it works."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Annotated, Any
+
+import typer
+
+from texrs import limits
+from texrs.cli._options import make_parameter
+from texrs.cli._outputs import name_arguments
+from texrs.cli._texts import parse_bytes
+
+__all__ = ["limit", "list_parameters"]
+
+OPTIONS: dict[str, tuple[Any, str, str, str]] = {
+    "memory_limit": (str, "BYTES", "Memory that it may take, as in 900M or 16G.", "what there is"),
+    "pixel_limit": (int, "N", "Pixels, or voxels, that may be made or read at once.", "268435456"),
+    "time_limit": (float, "SECONDS", "How long it may take.", "no limit"),
+}
+
+
+def list_parameters(there: list[inspect.Parameter]) -> list[inspect.Parameter]:
+    """Return the options of limits that a command does not have itself."""
+    own = {p.name for p in there}
+    made = []
+    for name, (kind, metavar, text, usual) in OPTIONS.items():
+        if name not in own:
+            info = typer.Option(metavar=metavar, help=text, show_default=usual)
+            made.append(make_parameter(name, Annotated[kind | None, info], None))
+    return made
+
+
+@contextmanager
+def limit(
+    *, memory_limit: str | None = None, pixel_limit: int | None = None, time_limit: float | None = None
+) -> Iterator[None]:
+    """Hold a command to its limits; what is not given is not limited here."""
+    memory = None if memory_limit is None else parse_bytes(memory_limit)
+    with ExitStack() as stack:
+        with name_arguments(pixels="--pixel-limit", seconds="--time-limit", memory="--memory-limit"):
+            stack.enter_context(
+                limits.within(pixels=pixel_limit, voxels=pixel_limit, memory=memory, seconds=time_limit)
+            )
+        yield

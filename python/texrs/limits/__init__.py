@@ -1,0 +1,31 @@
+"""Limits of what a call may take: pixels, voxels, bytes of memory and seconds, in one place.
+
+Every verb compares what it needs with them before it begins, and stops with `texrs.errors.LimitExceeded` when its time is up.
+Where nothing is said, an array may have 2^28 pixels or voxels, memory is what the machine, the container and the limits of the
+process allow (`ulimit -v`, control groups), and there is no limit to the time.
+
+They are said in three ways, of which the least holds:
+
+- in a block of code, for what this thread, or this asynchronous task, does in it: `within`;
+- for the whole process: `use`;
+- from outside, in the environment: ``TEXRS_PIXELS``, ``TEXRS_VOXELS``, ``TEXRS_MEMORY`` (bytes) and ``TEXRS_SECONDS``.
+
+`memory` tells beforehand what a verb takes.
+
+>>> import texrs
+>>> dots = texrs.samples.dots((64, 64)).image
+>>> with texrs.limits.within(pixels=500_000):
+...     texrs.design(dots, 1024)
+Traceback (most recent call last):
+    ...
+texrs.errors.LimitExceeded: size: (1024, 1024) has 1048576 pixels, more than the limit of 500000; texrs.TileSet makes ...
+"""
+
+from texrs.limits._estimates import memory
+from texrs.limits._now import Limits, current, use, within
+
+__all__ = ["Limits", "current", "memory", "use", "within"]
+
+
+def __dir__() -> list[str]:
+    return __all__

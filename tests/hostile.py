@@ -1,0 +1,282 @@
+"""Values that no argument is meant to be, and calls that are right, as the examples of the documentation make them."""
+
+from __future__ import annotations
+
+import contextlib
+import doctest
+import inspect
+import io
+import math
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array
+
+import texrs
+
+NUMBERS: tuple[object, ...] = (
+    *(True, -1, 0, 1, 2, 7, 2**31 - 1, 2**31, 2**32, 2**63, 2**64, 10**400),
+    *(0.5, -0.5, 1e-300, 1e300, math.nan, math.inf, -math.inf),
+    *(np.int8(-1), np.uint64(2**64 - 1), np.float16(np.inf), np.float32(np.nan), np.array(3)),
+    *(1j, Fraction(1, 3), Decimal(1)),
+)
+OTHERS: tuple[object, ...] = (
+    *("", "nearest", "free", "\0", b"paper", object(), slice(None), range(2**60)),
+    *([], (), {}, {0: 1}, [[1], [1, 2]], [None], [[]], ["a", "b"], [[[]]], csr_array((0, 3)), csr_array((3, 4))),
+    *(
+        coo_array((2**40, 2**40)),
+        np.ma.masked_all((9, 10)),
+        np.recarray((3,), dtype=[("x", "f4")]),
+        np.datetime64(0, "s"),
+    ),
+)
+DTYPES = (
+    "?",
+    "u1",
+    "i1",
+    "u2",
+    "i4",
+    "i8",
+    "u8",
+    "f2",
+    "f4",
+    "f8",
+    "g",
+    "c16",
+    "O",
+    "U2",
+    "S2",
+    "M8[s]",
+    "V4",
+    "f4,f4",
+)
+VALUES = (0, 1, -1, 0.5, -0.5, 255, 2**31, -(2**31), 2**63, 1e-45, 1e300, math.nan, math.inf, -math.inf)
+LAYOUTS = ("plain", "fortran", "strided", "reversed", "swapped", "read-only", "unaligned", "broadcast")
+MORE: tuple[object, ...] = (
+    None,
+    *((1, 2), (1, 2, 3), [0.5, math.nan], (0, 0), (10**9, 10**9), (-1, 5), "auto", "paper", "no such word", "x" * 5000),
+    *(
+        Path("nowhere"),
+        Path(),
+        {"a": np.zeros(3)},
+        {1, 2},
+        frozenset(),
+        iter([1]),
+        Ellipsis,
+        NotImplemented,
+        bytearray(3),
+    ),
+    *(
+        int,
+        np.float32,
+        len,
+        lambda: None,
+        lambda one: None,
+        lambda a, b, c: None,
+        type("Odd", (), {"__len__": lambda s: -1})(),
+    ),
+    *(
+        np.zeros((0, 3)),
+        np.zeros((2, 2, 2, 2, 2)),
+        np.zeros(()),
+        np.array(["a"]),
+        np.array([None]),
+        np.matrix([[1, 2]]),
+    ),
+    *(memoryview(b"abc"), np.dtype("f4"), Exception("no"), texrs, sys),
+)
+
+
+def lay_out(array: np.ndarray[Any, Any], layout: str) -> np.ndarray[Any, Any]:
+    """Return the same values, lying otherwise in memory."""
+    if layout == "fortran":
+        return np.asfortranarray(array)
+    if layout == "strided":
+        return np.repeat(array[..., np.newaxis], 2, axis=-1)[..., 0]
+    if layout == "reversed":
+        return np.ascontiguousarray(array[::-1])[::-1] if array.ndim else array
+    if layout == "swapped":
+        return array.astype(array.dtype.newbyteorder())
+    if layout == "read-only":
+        array = array.copy()
+        array.flags.writeable = False
+    if layout == "unaligned":
+        raw = np.zeros(array.nbytes + 1, np.uint8)[1:]
+        raw[:] = np.frombuffer(array.tobytes(), np.uint8)
+        return raw.view(array.dtype).reshape(array.shape)
+    return array
+
+
+def distort(array: np.ndarray[Any, Any]) -> Iterator[object]:
+    """Yield what comes near to an array that is right: its values in every dtype and layout, other shapes, other values."""
+    for dtype in map(np.dtype, DTYPES):
+        with np.errstate(all="ignore"):
+            yield array.astype(dtype) if dtype.kind in "buifcO" else np.zeros(array.shape, dtype)
+    yield from (lay_out(array, layout) for layout in LAYOUTS if array.size)
+    yield from (array[:0], array[..., np.newaxis], array[np.newaxis], array[..., :1], array.ravel(), array.tolist())
+    yield from (array[0] if len(array) else array, array[:1], np.broadcast_to(array.dtype.type(0), (2**20,) * 2))
+    yield np.broadcast_to(array[:1], (2**30, *array.shape[1:])) if array.ndim and len(array) else array
+    yield np.ma.masked_array(array, True)
+    if array.dtype.kind == "f" and array.size:
+        for value in (math.nan, math.inf, -1.0, 1e30):
+            changed = array.copy()
+            changed.flat[0] = value
+            yield changed
+
+
+def list_hostile(valid: object) -> Iterator[object]:
+    """Yield what is given in place of a value that is right."""
+    yield from NUMBERS
+    yield from OTHERS
+    yield from MORE
+    if isinstance(valid, np.ndarray) and valid.ndim:
+        yield from distort(valid)
+    if isinstance(valid, list | tuple):
+        yield from (type(valid)([each]) for each in (None, "a", math.nan, object(), 2**70))
+        yield from (type(valid)([each] * len(valid)) for each in (None, "a", math.nan, 10**9, -1))
+        if valid and isinstance(valid[0], np.ndarray):
+            yield from ([each] for each in distort(valid[0]))
+
+
+# --- calls that are right ----------------------------------------------------------------------------------------------
+
+
+def public_modules() -> list[ModuleType]:
+    """Return all modules that are public."""
+    found, left = [], [texrs]
+    while left:
+        module = left.pop()
+        found.append(module)
+        left += [m for m in (getattr(module, n) for n in module.__all__) if isinstance(m, ModuleType)]
+    return sorted(found, key=lambda m: m.__name__)
+
+
+@cache
+def public_calls() -> dict[str, tuple[Callable[..., Any], Callable[..., Any]]]:
+    """Return what can be called by name, and the function of it that has the code: functions, classes and their methods."""
+    found: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {}
+    seen = set()
+    for module in public_modules():
+        for name in module.__all__:
+            thing, full = getattr(module, name), f"{module.__name__}.{name}"
+            if id(thing) in seen or (inspect.isclass(thing) and issubclass(thing, BaseException | type)):
+                continue
+            seen.add(id(thing))
+            if inspect.isfunction(thing):
+                found[full] = thing, inspect.unwrap(thing)
+            elif inspect.isclass(thing):
+                if inspect.isfunction(vars(thing).get("__init__")):
+                    found[full] = thing, vars(thing)["__init__"]
+                for method, value in inspect.getmembers(thing):
+                    own = inspect.getattr_static(thing, method)
+                    if method.startswith("_") or not inspect.isroutine(value) or not inspect.isroutine(own):
+                        continue
+                    call = own.__func__ if isinstance(own, classmethod | staticmethod) else value
+                    if inspect.isfunction(call):
+                        found[f"{full}.{method}"] = value, inspect.unwrap(call)
+    return found
+
+
+@contextlib.contextmanager
+def keep_folders(place: Path) -> Iterator[None]:
+    """Let temporary folders stay, in another place."""
+
+    class Folder:
+        def __init__(self, *args: object, **options: object) -> None:
+            self.name = tempfile.mkdtemp(dir=place)
+
+        def __enter__(self) -> str:
+            return self.name
+
+        def __exit__(self, *failure: object) -> None:
+            pass
+
+        def cleanup(self) -> None:
+            pass
+
+    before, tempfile.TemporaryDirectory = tempfile.TemporaryDirectory, Folder  # type: ignore[assignment,misc]
+    try:
+        yield
+    finally:
+        tempfile.TemporaryDirectory = before  # type: ignore[misc]
+
+
+@dataclass(frozen=True)
+class Call:
+    """A call that is right."""
+
+    name: str
+    function: Callable[..., Any]
+    arguments: dict[str, Any]
+
+    def change(self, name: str, value: object) -> object:
+        """Call it with another value of one argument."""
+        return self._call(self.arguments | {name: value})
+
+    def _call(self, given: dict[str, Any]) -> object:
+        positional, named = [], {}
+        for p in inspect.signature(self.function).parameters.values():
+            if p.name not in given:
+                continue
+            if p.kind is p.VAR_POSITIONAL:
+                positional += given[p.name]
+            elif p.kind is p.VAR_KEYWORD:
+                named |= given[p.name]
+            elif p.kind is p.KEYWORD_ONLY:
+                named[p.name] = given[p.name]
+            else:
+                positional.append(given[p.name])
+        made = self.function(*positional, **named)
+        if inspect.isgenerator(made):
+            # What is made one by one is made when it is asked for.
+            made = next(made, None)
+        if isinstance(made, contextlib.AbstractContextManager) and hasattr(made, "gen"):
+            with made:
+                pass
+        return made
+
+
+def record(name: str, place: Path) -> Call | None:
+    """Run the examples of a function, and return their last call of it; None where there is none."""
+    thing, function = public_calls()[name]
+    found: dict[str, Any] = {}
+
+    def note(frame: Any, event: str, argument: object) -> None:
+        if event == "call" and frame.f_code is function.__code__:
+            found.clear()
+            found.update(frame.f_locals)
+
+    # Those of a method may stand where its class is described.
+    owner = public_calls().get(name.rpartition(".")[0], (None, None))[0]
+    space: dict[str, Any] = {**function.__globals__, "__name__": "__main__"}
+    for text in (inspect.getdoc(thing), inspect.getdoc(owner) if owner is not None else None):
+        with keep_folders(place), contextlib.redirect_stdout(io.StringIO()):
+            for example in doctest.DocTestParser().get_examples(text or ""):
+                code = compile(example.source, "<example>", "single")
+                # Examples may show an error.
+                with contextlib.suppress(texrs.errors.TexrsError):
+                    sys.setprofile(note)
+                    try:
+                        exec(code, space)
+                    finally:
+                        sys.setprofile(None)
+        if found:
+            break
+    else:
+        return None
+    if inspect.isclass(thing):
+        found.pop("self", None)
+    elif "self" in found:
+        thing = getattr(found.pop("self"), function.__name__)
+    found.pop("cls", None)
+    known = inspect.signature(thing).parameters
+    return Call(name, thing, {n: value for n, value in found.items() if n in known})

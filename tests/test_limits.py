@@ -1,0 +1,202 @@
+"""Limits in one place: of a block, of the process, from outside; every verb is held to them before, and while, it works."""
+
+import asyncio
+import contextvars
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import texrs
+import texrs.cli
+from texrs import limits
+from texrs._progress import listen
+from texrs.errors import InvalidInput, LimitExceeded, TexrsError
+
+DOTS = texrs.samples.dots((64, 64)).image
+HOLE = np.pad(np.ones((16, 16), bool), 24)
+VOLUME = texrs.samples.stripes((32, 32, 32)).image
+ENTRY = texrs.Elements.of_sample(texrs.samples.dots((96, 96)))
+VERBS = {
+    "design": lambda: texrs.design(DOTS, 96),
+    "design_variants": lambda: list(texrs.design_variants(DOTS, 2, 96)),
+    "splice": lambda: texrs.splice(ENTRY, ENTRY, 128),
+    "self_splice": lambda: texrs.self_splice(ENTRY, "randomise", 128),
+    "perspective": lambda: texrs.perspective(DOTS, "front", 96),
+    "synthesize": lambda: texrs.synthesize(DOTS, 96),
+    "solid": lambda: texrs.solid(VOLUME, 40),
+    "tile": lambda: texrs.tile(DOTS),
+    "complete": lambda: texrs.complete(DOTS, HOLE),
+    "extend": lambda: texrs.extend(DOTS, right=32),
+    "rectify": lambda: texrs.rectify(DOTS, view=texrs.View(slant=10, fov=50)),
+    "remove": lambda: texrs.remove(DOTS, HOLE, view=texrs.View(slant=10, fov=50)),
+    "analyse": lambda: texrs.elements.analyse(DOTS),
+}
+
+
+@pytest.fixture(autouse=True)
+def _nothing_is_said(monkeypatch):
+    for name in ("PIXELS", "VOXELS", "MEMORY", "SECONDS"):
+        monkeypatch.delenv(f"TEXRS_{name}", raising=False)
+    yield
+    limits.use()
+
+
+def test_every_verb_that_makes_something_is_here():
+    made = {n for n in texrs.__all__ if "progress" in getattr(getattr(texrs, n), "__annotations__", {})}
+    assert made - {"apply", "blend"} <= set(VERBS)
+
+
+@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("said", [{"pixels": 4000, "voxels": 60_000}, {"memory": 500_000}], ids=["pixels", "memory"])
+def test_every_verb_compares_what_it_needs_before_it_begins(verb, said, monkeypatch):
+    if said.get("pixels") and verb == "analyse":
+        pytest.skip("makes no pixels but those it is given")
+    with limits.within(**said), pytest.raises(LimitExceeded, match="limit of|may be taken") as told:
+        VERBS[verb]()
+    assert ":" in str(told.value)
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_stops_when_its_time_is_up(verb):
+    with (
+        limits.within(seconds=1e-9),
+        pytest.raises(LimitExceeded, match=r"the limit of 1e-09 s was reached in the stage"),
+    ):
+        VERBS[verb]()
+
+
+def test_the_least_of_what_is_said_holds(monkeypatch):
+    assert limits.current() == limits.Limits(memory=limits.current().memory)
+    monkeypatch.setenv("TEXRS_PIXELS", "1e6")
+    assert limits.current().pixels == 1_000_000
+    limits.use(pixels=2_000_000, voxels=5)
+    assert (limits.current().pixels, limits.current().voxels) == (1_000_000, 5)
+    with limits.within(pixels=1000, memory=1e6):
+        with limits.within(pixels=5000, seconds=9):
+            # No block allows more than the one around it.
+            assert limits.current().pixels == 1000
+            assert limits.current().memory == 1_000_000
+            assert 0 < limits.current().seconds <= 9
+            with limits.within(seconds=100):
+                assert limits.current().seconds <= 9
+        assert limits.current().seconds is None
+    limits.use(pixels=2**30)
+    monkeypatch.delenv("TEXRS_PIXELS")
+    # More than usual can be asked for.
+    assert limits.current().pixels == 2**30
+
+
+@pytest.mark.parametrize("name", ["pixels", "voxels", "memory", "seconds"])
+@pytest.mark.parametrize("value", [0, -1, True, "2", float("nan"), float("inf"), 10**400, 1j, [1]])
+def test_what_is_no_limit_is_refused(name, value, monkeypatch):
+    for call in (limits.within(**{name: value}).__enter__, lambda: limits.use(**{name: value})):
+        with pytest.raises(InvalidInput, match=f"^{name}: needs a number of"):
+            call()
+    if isinstance(value, float | int) and not isinstance(value, bool):
+        monkeypatch.setenv(f"TEXRS_{name.upper()}", str(value))
+        with pytest.raises(InvalidInput, match=f"^TEXRS_{name.upper()}: needs a number of"):
+            limits.current()
+
+
+def test_blocks_are_those_of_a_thread_or_a_task():
+    seen = {}
+
+    def look(name):
+        seen[name] = limits.current().pixels
+
+    with limits.within(pixels=1000):
+        for name, run in {"bare": look, "copied": contextvars.copy_context().run}.items():
+            arguments = (name,) if run is look else (look, name)
+            thread = threading.Thread(target=run, args=arguments)
+            thread.start()
+            thread.join()
+
+    async def one(pixels):
+        with limits.within(pixels=pixels):
+            await asyncio.sleep(0.01)
+            return limits.current().pixels
+
+    async def both():
+        return await asyncio.gather(one(10), one(20))
+
+    assert seen == {"bare": 2**28, "copied": 1000}
+    assert asyncio.run(both()) == [10, 20]
+
+
+def test_seconds_of_the_environment_are_those_of_each_call(monkeypatch):
+    monkeypatch.setenv("TEXRS_SECONDS", "0.05")
+    for _ in range(2):
+        heed = listen(None)
+        heed("begin", 0.0)
+        time.sleep(0.06)
+        with pytest.raises(LimitExceeded, match="0.05 s was reached in the stage 'end', at 50% of it"):
+            heed("end", 0.5)
+
+
+def test_files_are_held_to_the_limits(tmp_path):
+    texrs.io.write(tmp_path / "a.png", DOTS)
+    texrs.io.write_volume(tmp_path / "v.tif", VOLUME)
+    source = texrs.SourceMap.identity((64, 64))
+    source.save(tmp_path / "map.npz")
+    with limits.within(pixels=4095, voxels=32767):
+        for read in (
+            lambda: texrs.io.read(tmp_path / "a.png"),
+            lambda: texrs.io.read_volume(tmp_path / "v.tif"),
+            lambda: texrs.SourceMap.load(tmp_path / "map.npz"),
+        ):
+            with pytest.raises(LimitExceeded, match="more than the limit of"):
+                read()
+        assert texrs.io.read(tmp_path / "a.png", limit=4096).shape == DOTS.shape
+
+
+def test_more_takes_more():
+    base = limits.memory("design", (256, 256, 3), (512, 512))
+    assert limits.memory("design", (256, 256, 3), (1024, 1024)) > base
+    assert limits.memory("design", [(256, 256, 3)] * 2, (512, 512)) > base
+    assert limits.memory("design", (256, 256, 3), (2048, 2048), dtype="f4") > limits.memory(
+        "design", (256, 256, 3), (2048, 2048)
+    )
+    assert limits.memory("solid", (64, 64, 64), field=True) > limits.memory("solid", (64, 64, 64, 1))
+    assert limits.memory("tile", np.shape(DOTS)) == limits.memory("tile", [list(DOTS.shape)], (64, 64))
+    # A picture of 16384 x 16000 is not begun with on a machine of 32 GB.
+    assert limits.memory("perspective", (512, 512, 3), (16384, 16000)) > 32e9
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        ("weave", (9, 9)),
+        (3, (9, 9)),
+        ("tile", 3),
+        ("tile", "ab"),
+        ("tile", (0, 3)),
+        ("solid", (9, 9)),
+        ("tile", (9, 9), 4),
+    ],
+)
+def test_what_has_no_estimate_is_refused(wrong):
+    with pytest.raises(TexrsError, match="^(verb|exemplar|size): "):
+        limits.memory(*wrong)
+    with pytest.raises(TexrsError, match="^dtype: "):
+        limits.memory("tile", (9, 9), dtype="no such")
+
+
+@pytest.mark.parametrize(
+    ("option", "said"),
+    [
+        ("--pixel-limit 9000", "--size: 96 x 96 has 9216 pixels, more than the limit of 9000"),
+        ("--memory-limit 1M", "--size: needs"),
+        ("--time-limit 1e-9", "the limit of 1e-09 s was reached"),
+        ("--time-limit 0", "--time-limit: needs a number of seconds above 0, got 0"),
+        ("--pixel-limit 0", "--pixel-limit: needs a number of pixels"),
+        ("--memory-limit some", "--memory-limit: needs a number of bytes"),
+    ],
+)
+def test_commands_have_options_of_them(option, said, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    command = ["design", "sample:dots", "-o", "out.png", "--size", "96"]
+    assert texrs.cli.main([*command, *option.split()]) == 2
+    assert said in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
