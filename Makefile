@@ -1,5 +1,5 @@
 # Each goal sets up all it needs in this folder: a virtual environment in .venv and a release build.
-# make demo | test | fuzz | lint | bench | wheel | docs | format | clean
+# make demo | test | fuzz | levels | lint | bench | wheel | docs | format | clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -8,7 +8,7 @@ JOBS ?= $(shell getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2)
 MINUTES ?= 10
 RUST := Cargo.toml $(shell find rust -name '*.rs')
 
-.PHONY: help demo test test-rust test-python fuzz lint lint-rust lint-python format bench wheel docs clean requirements
+.PHONY: help demo test test-rust test-python fuzz levels lint lint-rust lint-python format bench wheel docs clean requirements
 .DELETE_ON_ERROR:
 # Compilers count the processors themselves: what make says of its own jobs is not for them.
 unexport MAKEFLAGS
@@ -17,6 +17,7 @@ help:
 	@echo "make demo    pictures of every system at work on built-in examples: demo/index.html"
 	@echo "make test    all tests, Rust and Python"
 	@echo "make fuzz    property tests with new random cases, for about ten minutes (MINUTES=10)"
+	@echo "make levels  stored results on lesser processors, some of them emulated (qemu-user)"
 	@echo "make lint    formatting, clippy, rustdoc, ruff, mypy, stubtest"
 	@echo "make format  rewrite the sources in the house's format"
 	@echo "make bench   criterion benches of the kernels"
@@ -65,6 +66,10 @@ fuzz: $(VENV)/.built
 			{ echo "make fuzz SEED=$$seed repeats this" >&2; exit 1; }; \
 		[ -z "$(SEED)" ] && [ $$(date +%s) -lt $$end ] || break; \
 	done
+
+# About ten minutes on a quiet machine. MINUTES bounds each level.
+levels: $(VENV)/.built
+	MINUTES=$(MINUTES) $(BIN)/python .ci/levels
 
 # Side by side with `make -j2 lint`: the checks of either language leave a processor idle.
 lint: lint-rust lint-python

@@ -24,8 +24,8 @@ WITHIN = {
 """What modules use of their own layer. The foundation and the bindings are of one piece."""
 HOMES = {
     "rayon": ("foundation/par",),
+    "libm": ("foundation/functions",),
     "rustfft": ("foundation/fft",),
-    "realfft": ("foundation/fft",),
     "pulp": ("foundation/wide",),
     "faer": ("kernels/sparse",),
     "spade": ("kernels/warp",),

@@ -11,6 +11,7 @@
 //! | [`par`] | the process-local thread pool, fixed chunks, progress and cancellation |
 //! | [`hash`] | counter-based noise: randomness belongs to the position, never to a stream |
 //! | [`fixed`] | coordinates and frames in fixed point |
+//! | `functions` | exponentials, sines and roots, the same on every machine |
 //! | `fft` | Fourier transforms of lines and of images |
 //! | [`pca`] | principal components |
 //! | `wide` | wide registers, chosen at run time |

@@ -67,13 +67,13 @@ def design_mixed_by_a_map_of_weights() -> Parts:
     ramp = np.linspace(0, 1, size[1]) * np.ones((size[0], 1))
     weights = np.stack([1 - ramp, ramp], axis=-1)
     result = texrs.design(several, size, weights=weights, wrap=(False, True), tiles=2, seed=5)
-    return parts_of(result, report=DESIGNED, stages=("composite",), exact=False)
+    return parts_of(result, report=DESIGNED, stages=("composite",))
 
 
 @case
 def design_with_things_scattered() -> Parts:
     result = texrs.design([clear("grit", 80, 80), clear("pebbles", 80, 96)], (112, 128), density=0.2, tiles=1, seed=3)
-    return parts_of(result, report=(*DESIGNED, "density"), exact=False)
+    return parts_of(result, report=(*DESIGNED, "density"))
 
 
 @case

@@ -1,8 +1,4 @@
-"""Exemplars of all types, from the generated samples alone. They are made once and are not to be changed.
-
-NumPy's exp and sin may end in another bit where a processor has AVX-512, which turns a value of some samples by one.
-Those that the cases use are the same with it and without.
-"""
+"""Exemplars of all types, from the generated samples alone. They are made once and are not to be changed."""
 
 from __future__ import annotations
 

@@ -10,6 +10,19 @@ from texrs.blending import blend
 from truth.exemplars import box, channels, clear, colour, deep, floats, grey, normals, sample
 from truth.table import Parts, case, parts_of, rounded
 
+# --- Samples ---------------------------------------------------------------------------------------------------------
+
+
+@case
+def samples_of_each_kind() -> Parts:
+    solid = ("particles", "stripes", "weave_solid", "wood_solid")
+    made = {
+        name: sample(name, *((32, 36, 40) if name in solid else (56, 72)), seed=7) for name in texrs.samples.names()
+    }
+    answers = ("image", "centres", "labels", "mask", "scale_map", "frames")
+    return {f"{name} {part}": getattr(each, part) for name, each in made.items() for part in answers}
+
+
 # --- PERSPECTIVE -----------------------------------------------------------------------------------------------------
 
 SCALED = ("sheet", "outside", "scale_error", "stitched")
@@ -195,7 +208,7 @@ def complete_with_a_source() -> Parts:
     hole = box((96, 112), (20, 70), (30, 80))
     other = floats("pebbles", 80, 96, seed=5)
     result = texrs.complete(floats("grit", 96, 112), hole, exemplar=other, blend=0.001, boundary=2, seed=1)
-    return parts_of(result, report=COMPLETED, stages=("patches", "composite"), exact=False)
+    return parts_of(result, report=COMPLETED, stages=("patches", "composite"))
 
 
 # --- colours and source maps -----------------------------------------------------------------------------------------
@@ -214,10 +227,10 @@ def blends() -> Parts:
     args = ("pebbles", 96, 96)
     heights, slopes = floats(*args, seed=7), normals(*args, seed=7)
     return {
-        "floats": rounded(blend(source, heights, wrap=True)),
-        "paper": rounded(blend(source, heights, wrap=False, screening=0, outlines=False)),
+        "floats": blend(source, heights, wrap=True),
+        "paper": blend(source, heights, wrap=False, screening=0, outlines=False),
         "near seams": blend(source, grey(*args, seed=7), wrap=(True, False), band=6),
-        "within": rounded(blend(source, heights, wrap=False, screening=0.01, within=within, known=known)),
+        "within": blend(source, heights, wrap=False, screening=0.01, within=within, known=known),
         "normals": blend(source, slopes, wrap=True, kind="normal", green="down", interpolation="linear"),
     }
 

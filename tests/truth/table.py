@@ -33,17 +33,11 @@ def case(make: Callable[[], Parts]) -> Callable[[], Parts]:
     return make
 
 
-def parts_of(
-    result: Synthesis, *, report: Sequence[str] = (), stages: Sequence[str] = (), exact: bool = True
-) -> dict[str, Any]:
-    """Return the parts of what a verb returns: the image, the source map, and the stages and figures that are named.
-
-    An image that is not ``exact`` is one of floats that a Fourier transform had a part in. Its plan follows the
-    instructions that the processor knows, so the last bits do, too.
-    """
+def parts_of(result: Synthesis, *, report: Sequence[str] = (), stages: Sequence[str] = ()) -> dict[str, Any]:
+    """Return the parts of what a verb returns: the image, the source map, and the stages and figures that are named."""
     source = result.source
     return {
-        "image": result.image if exact else rounded(result.image),
+        "image": result.image,
         "coordinates": source.coordinates,
         "exemplar": source.exemplar,
         "label": source.label,

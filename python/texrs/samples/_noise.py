@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import cos, log2, radians, sin, sqrt, tan
 from typing import Any
 
@@ -14,6 +14,20 @@ Floats = NDArray[np.floating[Any]]
 # The sun stands towards the upper left; the sky fills the shadows with a cooler light.
 _SUN = np.array([1.06, 1.0, 0.90], np.float32)
 _SKY = np.array([0.90, 0.98, 1.12], np.float32)
+
+
+def single(function: Callable[..., Any], *values: object) -> Floats:
+    """Return what a function of NumPy makes of numbers, in single precision and of the same bits on any processor.
+
+    Single precision has code of its own for each of them, which ends in other bits; that of double, rounded, does not.
+    """
+    return np.asarray(function(*values, dtype=np.float64), np.float32)
+
+
+def transform(points: NDArray[Any], matrix: NDArray[Any]) -> NDArray[Any]:
+    """Return ``points @ matrix`` of points (..., n) and a matrix (n, m), summed in the same order on any processor."""
+    terms = [points[..., k, None] * matrix[k] for k in range(len(matrix))]
+    return np.asarray(sum(terms[1:], terms[0]))
 
 
 def clouds(
@@ -60,9 +74,9 @@ def clouds(
     # An octave of `axes`-dimensional frequencies holds f**axes of them.
     power = -(axes / 2 - log2(gain)) / 2
     weight = np.zeros_like(square)
-    weight[inside] = square[inside] ** np.float32(power)
+    weight[inside] = single(np.power, square[inside], power)
     noise = fft.irfftn(spectrum * weight, tuple(shape))
-    return np.asarray(noise / max(float(noise.std()), 1e-12), np.float32)
+    return np.asarray(noise / np.float32(max(float(noise.std(dtype=np.float64)), 1e-12)), np.float32)
 
 
 def blur(field: Floats, sigma: float) -> Floats:
@@ -85,20 +99,20 @@ def mix(a: Floats, b: Floats, weight: Floats) -> Floats:
 
 def decode(srgb: Floats) -> Floats:
     """Return linear light of sRGB values in 0..1."""
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    return np.where(srgb <= 0.04045, srgb / 12.92, single(np.power, (srgb + 0.055) / 1.055, 2.4)).astype(np.float32)
 
 
 def encode(linear: Floats) -> Floats:
     """Return sRGB values in 0..1 of linear light, whose highlights are rolled off, not clipped."""
     x = np.maximum(linear, 0)
-    x = np.where(x > 0.7, 0.7 + 0.3 * np.tanh((x - 0.7) / 0.3), x)
-    return np.where(x <= 0.0031308, x * 12.92, 1.055 * x ** np.float32(1 / 2.4) - 0.055).astype(np.float32)
+    x = np.where(x > 0.7, 0.7 + 0.3 * single(np.tanh, (x - 0.7) / 0.3), x)
+    return np.where(x <= 0.0031308, x * 12.92, 1.055 * single(np.power, x, 1 / 2.4) - 0.055).astype(np.float32)
 
 
 def soft_minimum(values: Sequence[Floats], hardness: float) -> Floats:
     """Return the smooth minimum of some fields; never above the true one."""
-    total = sum(np.exp(np.float32(-hardness) * v) for v in values)
-    return np.asarray(-np.log(total) / np.float32(hardness), np.float32)
+    total = sum(single(np.exp, np.float32(-hardness) * v) for v in values)
+    return np.asarray(-single(np.log, total) / np.float32(hardness), np.float32)
 
 
 def palette(*colours: str) -> Floats:
@@ -236,7 +250,7 @@ def light(
     half = np.array([*(to_sun * cos(up)), sin(up) + 1])
     half /= sqrt(float((half**2).sum()))
     facing = np.maximum((half[2] - slopes[0] * half[0] - slopes[1] * half[1]) * normal_up, 0)
-    shine = gloss * facing.astype(np.float32) ** 40 * np.minimum(sun * 2, 1)
+    shine = gloss * single(np.power, facing.astype(np.float32), 40) * np.minimum(sun * 2, 1)
 
     lit = sun[..., None] * (_SUN * np.float32(1.25)) + sky[..., None] * (_SKY * np.float32(ambient))
     return np.asarray((albedo * lit + shine[..., None]) * np.float32(exposure), np.float32)

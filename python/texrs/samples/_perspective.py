@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_size
-from texrs.samples._noise import Floats, mix, palette, ramp
+from texrs.samples._noise import Floats, mix, palette, ramp, single, transform
 from texrs.samples._regular import lay_bricks
 from texrs.samples._sample import MIN_SIDE, LayoutName, Sample, make_generator
 from texrs.samples._scene import Scene, relabel
@@ -145,7 +145,8 @@ class _Plane:
         slope = along * tan(lean) / (1.5 * max(size))
         stretch = np.eye(2) + (1 / cos(lean) - 1) * np.outer(along, along)
         plane = cls((size[0], size[1]), slope, stretch, zoom, np.zeros(2), np.zeros(2))
-        mean = float(np.exp(np.log(plane.scale()).mean()))
+        # The last bits of a mean hang on how the processor sums it.
+        mean = float(np.float32(np.exp(np.log(plane.scale()).mean())))
         plane = replace(plane, stretch=stretch * mean)
         ends = [(r, c) for r in (-1, size[0]) for c in (-1, size[1])]
         corners = plane.source(np.array(ends, np.float64))
@@ -161,23 +162,26 @@ class _Plane:
         """Return p and w."""
         p = at - (np.array(self.size) - 1) / 2
         # Depth grows along a, and what is far is small: the ray meets the plane at p / w.
-        return p, 1 - p @ self.slope
+        return p, 1 - transform(p, self.slope[:, None])[..., 0]
 
     def source(self, at: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return where on the plane's texture the pixels `at` (..., 2) look."""
         p, w = self._offset(at)
-        return (p / w[..., None]) @ (self.zoom * self.stretch.T) + self.corner
+        return transform(p / w[..., None], self.zoom * self.stretch.T) + self.corner
 
     def picture(self, on_plane: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the pixels that look at `on_plane` (..., 2), the inverse of `source`."""
-        x = (on_plane - self.corner) @ np.linalg.inv(self.zoom * self.stretch).T
-        p = x / (1 + x @ self.slope)[..., None]
+        (a, b), (c, d) = self.zoom * self.stretch
+        inverse = np.array([[d, -c], [-b, a]]) / (a * d - b * c)
+        x = transform(on_plane - self.corner, inverse)
+        p = x / (1 + transform(x, self.slope[:, None]))
         return np.asarray(p + (np.array(self.size) - 1) / 2)
 
     def scale(self) -> NDArray[np.float64]:
         """Return the scale at every pixel, (H, W)."""
         _, w = self._offset(self.pixels())
-        return np.asarray(w**1.5 / sqrt(float(np.linalg.det(self.stretch))))
+        (a, b), (c, d) = self.stretch
+        return np.asarray(w**1.5 / sqrt(a * d - b * c))
 
     def jacobian(self) -> NDArray[np.float64]:
         """Return dS/dp at every pixel, (H, W, 2, 2)."""
@@ -201,7 +205,7 @@ def _lay_tiles(scene: Scene, rows_of: int, cols_of: int) -> None:
             middle = ((row + 0.5) * pitch[0], (k + 0.5 * (row % 2)) * pitch[1])
             window = scene.window(middle, _RADIUS + 1.5)
             rows, cols = window.where
-            r = np.hypot(window.y, window.x) / np.float32(_RADIUS)
+            r = single(np.hypot, window.y, window.x) / np.float32(_RADIUS)
             edge = np.sqrt(np.clip(1 - np.clip((r - 0.72) / 0.28, 0, 1) ** 2, 0, 1))
             lean = rng.uniform(-0.02, 0.02, 2)
             height = 0.2 + 1.5 * edge + lean[0] * window.y + lean[1] * window.x

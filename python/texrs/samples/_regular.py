@@ -8,7 +8,7 @@ from math import pi
 import numpy as np
 
 from texrs._arrays import as_size
-from texrs.samples._noise import Floats, mix, palette, ramp, shades
+from texrs.samples._noise import Floats, mix, palette, ramp, shades, single
 from texrs.samples._sample import MIN_SIDE, Sample, make_generator
 from texrs.samples._scene import Scene
 
@@ -93,7 +93,7 @@ def lay_bricks(scene: Scene, courses: int, across: int) -> None:
             dx = np.abs(window.x + bend[1][rows, cols] + rng.uniform(-0.5, 0.5))
             ey, ex = (np.float32(half[0]) - dy), (np.float32(half[1]) - dx)
             # A box with corners of 2.5 pixels.
-            out = np.hypot(np.maximum(2.5 - ey, 0), np.maximum(2.5 - ex, 0))
+            out = single(np.hypot, np.maximum(2.5 - ey, 0), np.maximum(2.5 - ex, 0))
             edge = np.where((ey < 2.5) | (ex < 2.5), 2.5 - out, np.minimum(ey, ex))
             edge = edge.astype(np.float32)
             lean = rng.uniform(-0.008, 0.008, 2)
@@ -158,9 +158,9 @@ def scales(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fals
             y = window.y / np.float32(1.12 * tall)
             x = window.x / np.float32(0.56 * wide)
             r = np.sqrt(x**2 + np.where(y > 0, y, 0.62 * y) ** 2)
-            angle = np.arctan2(x, y + 1.3)
-            rings = np.sin(r * 21 + 0.8 * cloud[rows, cols])
-            ridges = np.sin(angle * 26)
+            angle = single(np.arctan2, x, y + 1.3)
+            rings = single(np.sin, r * 21 + 0.8 * cloud[rows, cols])
+            ridges = single(np.sin, angle * 26)
             rim = ramp(r, 0.86, 1.0)
             height = 0.16 * window.y - 1.5 * x**2 + 0.12 * rings - 0.8 * rim
             height = height + 0.13 * ridges * ramp(r, 0.3, 0.9) + 0.06 * grain[rows, cols]
@@ -237,8 +237,8 @@ def net(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False) 
                 _lay_strand(scene, knot, span, rope * rng.uniform(0.85, 1.12), fray, wear)
             window = scene.window((knot[0], knot[1]), 7)
             rows, cols = window.where
-            rho = np.hypot(window.y / 5.2, window.x / 4.4) + np.float32(0.05) * fray[rows, cols]
-            turns = np.sin(window.y * 1.5 + window.x * 0.9)
+            rho = single(np.hypot, window.y / 5.2, window.x / 4.4) + np.float32(0.05) * fray[rows, cols]
+            turns = single(np.sin, window.y * 1.5 + window.x * 0.9)
             height = 2.5 + 5.6 * np.sqrt(np.clip(1 - rho**2, 0, 1)) + 0.8 * turns
             albedo = rope * (1 + 0.12 * turns + 0.12 * wear[rows, cols])[..., None]
             scene.paint(window, rho < 1, height.astype(np.float32), albedo, label=-1)
@@ -295,9 +295,9 @@ def weave(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False
         thick = rng.uniform(0.92, 1.06, counts[axis])[yarn]
         off = (across - at[axis] - 0.5) / (0.46 * thick)
         # The weft (axis 0) is up where the numbers of row and column add up to even.
-        up = np.cos(pi * (along - 0.5 + at[axis] + axis))
+        up = single(np.cos, pi * (along - 0.5 + at[axis] + axis))
         long = np.float32(pitch[axis])
-        twist = np.sin(2 * pi * (along * 1.9 + off * 0.55 + rng.uniform(0, 1, counts[axis])[yarn]))
+        twist = single(np.sin, 2 * pi * (along * 1.9 + off * 0.55 + rng.uniform(0, 1, counts[axis])[yarn]))
         stretch = (1.0, 6.0) if axis == 0 else (6.0, 1.0)
         fibre = scene.noise(5, 1, gain=0.9, stretch=stretch)
         height = 0.20 * long * up + 0.30 * long * np.sqrt(np.clip(1 - off**2, 0, 1))
@@ -326,7 +326,7 @@ def _lay_strand(scene: Scene, knot: Floats, span: Floats, tone: Floats, fray: Fl
     along = window.y * np.float32(d[0]) + window.x * np.float32(d[1])
     sag = np.float32(scene.rng.uniform(-1.4, 1.4)) * (1 - (2 * along / length) ** 2)
     off = window.x * np.float32(d[0]) - window.y * np.float32(d[1]) - sag
-    twist = np.sin(along * 1.55 + off * 0.9 + scene.rng.uniform(0, 2 * pi))
+    twist = single(np.sin, along * 1.55 + off * 0.9 + scene.rng.uniform(0, 2 * pi))
     off = off / (2.7 + 0.22 * twist) + np.float32(0.06) * fray[rows, cols]
     inside = (np.abs(off) < 1) & (np.abs(along) <= length / 2 + 1)
     height = 1.5 + 2.9 * np.sqrt(np.clip(1 - off**2, 0, 1)) + 0.55 * twist

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_size
-from texrs.samples._noise import Floats, mix, palette, ramp, scatter, shades, soft_minimum, spread
+from texrs.samples._noise import Floats, mix, palette, ramp, scatter, shades, single, soft_minimum, spread
 from texrs.samples._sample import MIN_SIDE, Sample, make_generator
 from texrs.samples._scene import Scene, Window
 
@@ -70,7 +70,7 @@ def pebbles(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fal
         inner = edge - np.float32(1.5)
         core = max(float(inner.max()), 2.0)
         t = np.clip(inner / np.float32(0.85 * core), 0, 1)
-        dome = np.sqrt(1 - (1 - t) ** 2.3)
+        dome = np.sqrt(1 - single(np.power, 1 - t, 2.3))
         tilt = rng.uniform(-0.1, 0.1, 2)
         height = 0.5 + dome * (0.58 * core + tilt[0] * window.y + tilt[1] * window.x)
         height = height + t * np.float32(0.22) * bumps[rows, cols]
@@ -137,7 +137,7 @@ def dots(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
         radius = rng.uniform(9.0, 13.0)
         window = scene.window((centre[0], centre[1]), 15)
         rows, cols = window.where
-        r = np.hypot(window.y, window.x) / np.float32(radius)
+        r = single(np.hypot, window.y, window.x) / np.float32(radius)
         rim = ramp(r, 0.62, 0.74)
         edge = np.sqrt(np.clip(1 - np.clip((r - 0.86) / 0.14, 0, 1) ** 2, 0, 1))
         height = 0.4 + 1.1 * edge + 1.0 * rim * (0.4 + 0.6 * edge) - 0.12 * (1 - rim) * (1 - r)
@@ -147,7 +147,7 @@ def dots(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False)
         turn, count = rng.uniform(0, pi), int(rng.choice([2, 4, 4]))
         for k in range(count):
             angle = turn + 2 * pi * k / count
-            hole = np.hypot(window.y - 0.27 * radius * sin(angle), window.x - 0.27 * radius * cos(angle))
+            hole = single(np.hypot, window.y - 0.27 * radius * sin(angle), window.x - 0.27 * radius * cos(angle))
             depth = 1 - ramp(hole, 0.085 * radius, 0.15 * radius)
             height = height - 1.1 * depth
             albedo = mix(albedo, palette("3a332b")[0], 0.9 * depth)
@@ -262,12 +262,12 @@ def beans(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = False
                 continue
             rho, along, across = shapes[least]
             lean = rng.uniform(-0.1, 0.1, 2)
-            height = 8.2 * np.sqrt(np.clip(1 - rho, 0, 1)) ** 0.9 - depth
+            height = 8.2 * single(np.power, np.clip(1 - rho, 0, 1), 0.45) - depth
             height = height + lean[0] * window.y + lean[1] * window.x + rng.uniform(0, 1)
             shade = 1 + np.float32(0.13) * skin[rows, cols]
             albedo = tone * rng.uniform(0.9, 1.1) * shade[..., None]
-            scar = np.exp(-((along / 2.6) ** 2) - ((across + 5.2) / 0.9) ** 2)
-            albedo = mix(albedo, palette("d8c3a4")[0], 0.8 * scar.astype(np.float32))
+            scar = single(np.exp, -((along / 2.6) ** 2) - ((across + 5.2) / 0.9) ** 2)
+            albedo = mix(albedo, palette("d8c3a4")[0], 0.8 * scar)
             label = scene.add((dart[0], dart[1]))
             scene.paint(window, rho < 1, height, albedo, label=label, gloss=0.4)
     return scene.finish("beans", layout="disjoint", reach=12.0, exposure=0.95)
@@ -308,7 +308,7 @@ def _lay_leaf(
     v = (cos(angle) * window.x - sin(angle) * window.y) / np.float32(length)
     v = v + 0.12 * (u - 0.5) ** 2
     inside = (u > 0) & (u < 1)
-    half = 0.34 * np.sin(np.float32(pi) * np.clip(u, 0, 1) ** 0.8)
+    half = 0.34 * single(np.sin, np.float32(pi) * single(np.power, np.clip(u, 0, 1), 0.8))
     side = np.abs(v) / np.maximum(half, 1e-3)
     inside &= side < 1
     veins = np.abs((u - 0.7 * np.abs(v)) * 7 % 1 - 0.5)
@@ -335,19 +335,20 @@ def _lay_flower(scene: Scene, centre: tuple[float, float], radius: float, tone: 
         reach = radius * rng.uniform(0.9, 1.06)
         u = (sin(angle) * window.y + cos(angle) * window.x) / np.float32(reach)
         v = (cos(angle) * window.y - sin(angle) * window.x) / np.float32(reach)
-        half = wide * 0.62 * np.maximum(np.sin(pi * np.clip(u * 0.93 + 0.05, 0, 1) ** 1.25), 0) ** 0.6
+        outline = single(np.sin, pi * single(np.power, np.clip(u * 0.93 + 0.05, 0, 1), 1.25))
+        half = wide * 0.62 * single(np.power, np.maximum(outline, 0), 0.6)
         side = np.abs(v) / np.maximum(half, 1e-3)
         petal = (u > 0) & (u < 1.015) & (side < 1)
         lift = 8.0 + 0.8 * k / count + 2.0 * u - 2.6 * u**2 + 1.0 * side**2 * u
-        ridges = np.sin(np.arctan2(v, u + 0.25) * 34)
+        ridges = single(np.sin, single(np.arctan2, v, u + 0.25) * 34)
         lift = lift + 0.22 * crinkle[rows, cols] + 0.1 * ridges
         shade = 1 + 0.07 * ridges - 0.1 * ramp(side.astype(np.float32), 0.7, 1.0)
         albedo = mix(throat, tone, ramp(u, 0.12, 0.6)) * shade[..., None]
         petal &= lift > top
         top[petal] = lift[petal]
         scene.paint(window, petal, lift.astype(np.float32), albedo, label=label, gloss=0.05, over=True)
-    r = np.hypot(window.y, window.x) / np.float32(0.24 * radius)
-    stamens = np.sin(window.y * 3.1 + 1.5 * crinkle[rows, cols]) * np.sin(window.x * 3.1)
+    r = single(np.hypot, window.y, window.x) / np.float32(0.24 * radius)
+    stamens = single(np.sin, window.y * 3.1 + 1.5 * crinkle[rows, cols]) * single(np.sin, window.x * 3.1)
     heart = 9.0 + 2.2 * np.sqrt(np.clip(1 - r**2, 0, 1)) + 0.35 * stamens
     yellow = palette("b9862f", "7d5a24", "8c8a3c")[rng.integers(3)]
     albedo = yellow * (1 + 0.3 * stamens)[..., None]

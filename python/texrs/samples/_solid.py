@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_size
-from texrs.samples._noise import Floats, clouds, encode, mix, palette, ramp, shades
+from texrs.samples._noise import Floats, clouds, encode, mix, palette, ramp, shades, single, transform
 from texrs.samples._sample import MIN_SIDE, Sample, make_generator
 
 _CUBE = (64, 64, 64)
@@ -53,11 +53,11 @@ def stripes(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     frames[:] = np.eye(3)
     for _ in range(4):
         way = rng.standard_normal(3)
-        wave = 2 * pi / rng.uniform(52, 90) * way / np.linalg.norm(way)
+        wave = 2 * pi / rng.uniform(52, 90) * way / np.sqrt((way * way).sum())
         shift = rng.uniform(0.7, 1.0, 3) * np.array([1.9, 0.8, 0.8]) * rng.choice([-1, 1], 3)
-        phase = p @ wave.astype(np.float32) + np.float32(rng.uniform(0, 2 * pi))
-        source += np.sin(phase)[..., None] * shift.astype(np.float32)
-        frames += np.cos(phase)[..., None, None] * np.outer(shift, wave).astype(np.float32)
+        phase = transform(p, wave.astype(np.float32)[:, None])[..., 0] + np.float32(rng.uniform(0, 2 * pi))
+        source += single(np.sin, phase)[..., None] * shift.astype(np.float32)
+        frames += single(np.cos, phase)[..., None, None] * np.outer(shift, wave).astype(np.float32)
     turn = source[..., 0] / np.float32(_STRIPE) % 1
     dark = ramp(turn, -0.03, 0.05) * (1 - ramp(turn, 0.45, 0.53)) + ramp(turn, 0.97, 1.05)
     layer = np.floor(source[..., 0] / np.float32(_STRIPE)).astype(int)
@@ -65,7 +65,7 @@ def stripes(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     grain, cloud = clouds(shape, rng, coarse=5, gain=0.9), clouds(shape, rng, coarse=30)
     albedo = shades(dark, "c0a581", "6b4335")
     albedo *= (tint * (1 + np.float32(0.10) * grain + np.float32(0.08) * cloud))[..., None]
-    hair = np.exp(-(((turn - 0.74) / 0.05) ** 2))
+    hair = single(np.exp, -(((turn - 0.74) / 0.05) ** 2))
     albedo = mix(albedo, palette("8f6b4b")[0], np.float32(0.55) * hair)
     return Sample("stripes", _quantise(albedo, rng), mask=turn < 0.5, frames=frames)
 
@@ -175,7 +175,7 @@ def weave_solid(size: Sequence[int] = _CUBE, *, seed: int = 0, wrap: bool = Fals
         sign = 3 - 2 * axis
         number = np.floor(across)
         # Odd layers are shifted by a yarn, so that the cloth nests.
-        rise = 0.24 * sign * np.cos(pi * (along - 0.5 + number + layer))
+        rise = 0.24 * sign * single(np.cos, pi * (along - 0.5 + number + layer))
         off = ((across - number - 0.5) / 0.44) ** 2 + ((z - layer - 0.5 - rise) / 0.235) ** 2
         off = off.astype(np.float32)
         stretch = (1, 1, 7) if sign > 0 else (1, 7, 1)
@@ -227,12 +227,12 @@ def wood_solid(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     wander = clouds(shape, rng, coarse=60, fine=10, stretch=(1, 3, 1))
     lean = rng.uniform(-0.06, 0.06, 2).astype(np.float32)
     dz, dx = z + 26 + lean[0] * y, x + 14 + lean[1] * y
-    radius = np.hypot(dz, dx) + np.float32(1.1) * wander
+    radius = single(np.hypot, dz, dx) + np.float32(1.1) * wander
     # Rings of unequal years: a smooth, growing function of the radius.
     years = np.cumsum(rng.uniform(6.5, 12.5, 8 + int(radius.max()) // 6))
     ring = np.interp(radius, years, np.arange(len(years))).astype(np.float32)
     turn = ring % 1
-    late = ramp(turn, 0.35, 0.9) ** 1.5 * (1 - ramp(turn, 0.94, 1.0))
+    late = single(np.power, ramp(turn, 0.35, 0.9), 1.5) * (1 - ramp(turn, 0.94, 1.0))
     fibre = clouds(shape, rng, coarse=5, gain=0.9, stretch=(1, 12, 1))
     cloud = clouds(shape, rng, coarse=40, stretch=(1, 4, 1))
     albedo = shades(np.clip(late, 0, 1), "c29a68", "7d4f2d")
@@ -240,7 +240,7 @@ def wood_solid(size: Sequence[int] = _CUBE, *, seed: int = 0) -> Sample:
     # Vessels of the early wood, and rays that run from the pith.
     pores = ramp(clouds(shape, rng, coarse=4, fine=2, stretch=(1, 14, 1)), 1.3, 2.1)
     albedo = mix(albedo, palette("5a3a22")[0], 0.6 * pores * (1 - ramp(turn, 0.2, 0.5)))
-    angle = np.arctan2(dz, dx)
+    angle = single(np.arctan2, dz, dx)
     ray = clouds((512, shape[1]), rng, coarse=24, fine=4, stretch=(1, 3))
     at = (angle / np.float32(2 * pi) * 2048).astype(int) % 512
     streak = ramp(ray[at, np.broadcast_to(y.astype(int), at.shape)], 1.2, 2.0)
@@ -255,7 +255,7 @@ def _measure_ellipsoid(
     turn, _ = np.linalg.qr(rng.standard_normal((3, 3)))
     axes = [np.arange(int(np.floor(c)) - 7, int(np.floor(c)) + 9) for c in centre]
     p = np.stack(np.meshgrid(*axes, indexing="ij"), -1) - centre
-    rho = np.sqrt((((p @ turn) / half_axes) ** 2).sum(-1)).astype(np.float32)
+    rho = np.sqrt(((transform(p, turn) / half_axes) ** 2).sum(-1)).astype(np.float32)
     return rho, np.ix_(*(a % n for a, n in zip(axes, shape, strict=True)))
 
 

@@ -3,6 +3,7 @@
 pub mod error;
 pub(crate) mod fft;
 pub mod fixed;
+pub(crate) mod functions;
 pub mod grid;
 pub mod hash;
 pub(crate) mod memory;

@@ -13,6 +13,7 @@ mod projection;
 mod table;
 
 use crate::foundation::fixed::{BITS, ONE, Place};
+use crate::foundation::functions::exp;
 use crate::foundation::grid::Grid;
 use crate::foundation::hash::Noise;
 use crate::foundation::par;
@@ -290,7 +291,7 @@ impl<const D: usize> Appearance<D> {
             .iter()
             .map(|o| {
                 let square: i32 = o.iter().map(|x| x * x).sum();
-                (-f64::from(square) / (2.0 * SIGMA * SIGMA)).exp() as f32
+                exp(-f64::from(square) / (2.0 * SIGMA * SIGMA)) as f32
             })
             .collect();
         let noise = Noise::new(0x5EED);

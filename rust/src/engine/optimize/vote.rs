@@ -3,6 +3,7 @@
 use super::Level;
 use crate::engine::appearance::{CHANNELS, Colour, UNIT};
 use crate::foundation::fixed::{Place, add, apply, nearest};
+use crate::foundation::functions::exp;
 
 /// Standard deviation of a proposal's weight over the distance of its window, in points.
 const SIGMA: f64 = 2.0;
@@ -43,7 +44,7 @@ impl<const D: usize> Level<'_, D> {
             .filter(|o| o.iter().all(|x| x.abs() <= radius))
             .map(|&step| {
                 let square: i32 = step.iter().map(|x| x * x).sum();
-                let weight = (-f64::from(square) / (2.0 * SIGMA * SIGMA)).exp();
+                let weight = exp(-f64::from(square) / (2.0 * SIGMA * SIGMA));
                 Voter {
                     step,
                     weight: (256.0 * weight).round() as i32,

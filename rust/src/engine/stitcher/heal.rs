@@ -12,6 +12,7 @@ use super::cut::{Cutting, widen};
 use super::{Patch, Stitching};
 use crate::Result;
 use crate::foundation::fixed::{Frames, Place};
+use crate::foundation::functions::root;
 use crate::foundation::par;
 
 /// What a missing point of an instance costs.
@@ -243,7 +244,7 @@ impl<const D: usize> Stitching<'_, D> {
     ) -> Result<Option<Move<D>>> {
         let margin = if grow {
             // As far as the rest of it may lie.
-            let reach = self.size(instance.key).powf(1.0 / D as f64) * 1.4;
+            let reach = root::<D>(self.size(instance.key)) * 1.4;
             let longest = (0..D)
                 .map(|a| instance.high[a] - instance.low[a])
                 .max()

@@ -32,6 +32,7 @@ use std::collections::HashMap;
 
 use crate::engine::guide::Guide;
 use crate::foundation::fixed::{Frame, Frames, ONE, Place, apply};
+use crate::foundation::functions::root;
 use crate::foundation::grid::{Grid, Region};
 use crate::foundation::hash::Noise;
 use crate::foundation::par::Monitor;
@@ -311,7 +312,7 @@ fn inside<const D: usize>(grid: &Grid<D>, place: Place<D>) -> bool {
 
 /// How much features are enlarged by a frame, by length.
 fn enlargement<const D: usize>(frame: &Frame<D>) -> f32 {
-    (determinant(frame).abs().max(1e-6) as f32).powf(-1.0 / D as f32)
+    (1.0 / root::<D>(determinant(frame).abs().max(1e-6))) as f32
 }
 
 /// The determinant of a Jacobian.

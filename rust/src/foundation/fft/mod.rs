@@ -1,19 +1,28 @@
 //! Fourier transforms: of lines of complex numbers, and of images and volumes of real ones. The only folder that names the
-//! FFT crates.
+//! FFT crate.
 //!
-//! None is normalised: there and back multiplies by the number of points.
+//! None is normalised: there and back multiplies by the number of points. Real lines go two at a time, as one complex line
+//! (Press et al., *Numerical Recipes*, 12.3).
 
 mod volumes;
 
 use std::sync::Arc;
 
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 pub(crate) use rustfft::num_complex::Complex;
-use rustfft::{Fft, FftNum, FftPlanner};
+use rustfft::{Fft, FftDirection, FftNum, FftPlanner, FftPlannerScalar};
 pub(crate) use volumes::Volumes;
 
 /// Rows of an image that are transposed at a time.
 const GROUP: usize = 8;
+
+/// How transforms are computed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Code {
+    /// By the same sums on every machine.
+    Same,
+    /// By what the processor does fastest, in half the time. Its last bits hang on that, so no result may hang on them.
+    Fastest,
+}
 
 /// Transforms of lines of one length, in place.
 pub(crate) struct Lines<T> {
@@ -23,11 +32,14 @@ pub(crate) struct Lines<T> {
 
 impl<T: FftNum + Default> Lines<T> {
     /// Plans the transforms of `len` points.
-    pub(crate) fn new(len: usize) -> Self {
-        let mut planner = FftPlanner::new();
+    pub(crate) fn new(len: usize, code: Code) -> Self {
+        let plan = |way| match code {
+            Code::Same => FftPlannerScalar::new().plan_fft(len, way),
+            Code::Fastest => FftPlanner::new().plan_fft(len, way),
+        };
         Self {
-            forward: planner.plan_fft_forward(len),
-            inverse: planner.plan_fft_inverse(len),
+            forward: plan(FftDirection::Forward),
+            inverse: plan(FftDirection::Inverse),
         }
     }
 
@@ -44,12 +56,37 @@ impl<T: FftNum + Default> Lines<T> {
     }
 }
 
+/// Spectra of the real and of the imaginary part, from a frequency of both and its mirror.
+#[inline(always)]
+pub(crate) fn split<T: FftNum>(z: Complex<T>, mirror: Complex<T>) -> (Complex<T>, Complex<T>) {
+    let half = T::one() / (T::one() + T::one());
+    (
+        Complex::new(half * (z.re + mirror.re), half * (z.im - mirror.im)),
+        Complex::new(half * (z.im + mirror.im), half * (mirror.re - z.re)),
+    )
+}
+
+/// Writes the spectrum of `a + i b` from the halves that tell the rest of those of `a` and of `b`, which are real.
+#[inline(always)]
+fn join<T: FftNum>(line: &mut [Complex<T>], half: impl Fn(usize) -> (Complex<T>, Complex<T>)) {
+    let n = line.len();
+    for k in 0..=n / 2 {
+        let (a, b) = half(k);
+        if k == 0 || 2 * k == n {
+            // Of a real line these are real but for a trace of rounding.
+            line[k] = Complex::new(a.re, b.re);
+        } else {
+            line[k] = Complex::new(a.re - b.im, a.im + b.re);
+            line[n - k] = Complex::new(a.re + b.im, b.re - a.im);
+        }
+    }
+}
+
 /// Transforms of real images of one size. A spectrum is the half that tells the rest, transposed, frequency of the
 /// columns first, so that both passes run over contiguous memory.
 pub(crate) struct Images<T> {
     size: [usize; 2],
-    rows_forward: Arc<dyn RealToComplex<T>>,
-    rows_inverse: Arc<dyn ComplexToReal<T>>,
+    rows: Lines<T>,
     columns: Lines<T>,
 }
 
@@ -57,19 +94,17 @@ pub(crate) struct Images<T> {
 #[derive(Default)]
 pub(crate) struct Scratch<T> {
     real: Vec<T>,
-    rows: Vec<Complex<T>>,
+    lines: Vec<Complex<T>>,
     work: Vec<Complex<T>>,
 }
 
 impl<T: FftNum + Default> Images<T> {
-    /// Plans the transforms of images of `size` rows and columns; these must be even.
-    pub(crate) fn new(size: [usize; 2]) -> Self {
-        let mut planner = RealFftPlanner::new();
+    /// Plans the transforms of images of `size` rows and columns.
+    pub(crate) fn new(size: [usize; 2], code: Code) -> Self {
         Self {
             size,
-            rows_forward: planner.plan_fft_forward(size[1]),
-            rows_inverse: planner.plan_fft_inverse(size[1]),
-            columns: Lines::new(size[0]),
+            rows: Lines::new(size[1], code),
+            columns: Lines::new(size[0], code),
         }
     }
 
@@ -92,18 +127,26 @@ impl<T: FftNum + Default> Images<T> {
         scratch: &mut Scratch<T>,
     ) {
         let [height, width] = self.size;
-        let real = grow(&mut scratch.real, width);
-        let out = grow(&mut scratch.rows, width / 2 + 1);
-        let work = grow(&mut scratch.work, self.rows_forward.get_scratch_len());
+        let rows = rows.min(height);
+        let real = grow(&mut scratch.real, 2 * width);
+        let line = grow(&mut scratch.lines, width);
         spectrum.clear();
         spectrum.resize(self.len(), Complex::default());
-        for r in 0..rows.min(height) {
+        for first in (0..rows).step_by(2) {
             real.fill(T::default());
-            row(r, real);
-            // The lengths are those of the plan, so the transform cannot refuse them.
-            let _ = self.rows_forward.process_with_scratch(real, out, work);
-            for (k, &value) in out.iter().enumerate() {
-                spectrum[k * height + r] = value;
+            let pair = 2.min(rows - first);
+            for (r, out) in real.chunks_exact_mut(width).take(pair).enumerate() {
+                row(first + r, out);
+            }
+            let (a, b) = real.split_at(width);
+            for ((z, &a), &b) in line.iter_mut().zip(a).zip(b) {
+                *z = Complex::new(a, b);
+            }
+            self.rows.forward(line, &mut scratch.work);
+            for k in 0..=width / 2 {
+                let (a, b) = split(line[k], line[(width - k) % width]);
+                let out = &mut spectrum[k * height + first..][..pair];
+                out.copy_from_slice(&[a, b][..pair]);
             }
         }
         self.columns.forward(spectrum, &mut scratch.work);
@@ -118,24 +161,26 @@ impl<T: FftNum + Default> Images<T> {
         scratch: &mut Scratch<T>,
     ) {
         let [height, width] = self.size;
-        let half = width / 2 + 1;
         self.columns.inverse(spectrum, &mut scratch.work);
         let real = grow(&mut scratch.real, width);
-        let lines = grow(&mut scratch.rows, half * GROUP);
-        let work = grow(&mut scratch.work, self.rows_inverse.get_scratch_len());
+        let lines = grow(&mut scratch.lines, width * GROUP / 2);
         for first in (0..rows).step_by(GROUP) {
             let group = GROUP.min(rows - first);
-            for k in 0..half {
-                let column = &spectrum[k * height + first..][..group];
-                for (r, &z) in column.iter().enumerate() {
-                    lines[r * half + k] = z;
-                }
+            let lines = &mut lines[..width * group.div_ceil(2)];
+            for (pair, line) in lines.chunks_exact_mut(width).enumerate() {
+                let at = first + 2 * pair;
+                join(line, |k| {
+                    let column = &spectrum[k * height..][..height];
+                    let b = column.get(at + 1).copied().unwrap_or_default();
+                    (column[at], b)
+                });
             }
-            for (r, line) in lines.chunks_exact_mut(half).take(group).enumerate() {
-                // Of a real row these are real; rounding left a trace that the transform would refuse.
-                line[0].im = T::default();
-                line[half - 1].im = T::default();
-                let _ = self.rows_inverse.process_with_scratch(line, real, work);
+            self.rows.inverse(lines, &mut scratch.work);
+            for r in 0..group {
+                let line = &lines[r / 2 * width..][..width];
+                for (x, z) in real.iter_mut().zip(line) {
+                    *x = if r % 2 == 0 { z.re } else { z.im };
+                }
                 take(first + r, real);
             }
         }
@@ -158,8 +203,12 @@ mod tests {
     #[test]
     fn there_and_back_multiplies_by_the_points() {
         let noise = Noise::new(2);
-        for size in [[1, 2], [7, 6], [12, 40], [20, 10]] {
-            let plan = Images::<f64>::new(size);
+        let sizes = [[1, 2], [7, 6], [12, 40], [20, 10], [9, 5], [1, 1]];
+        for (size, code) in sizes
+            .iter()
+            .flat_map(|&size| [(size, Code::Same), (size, Code::Fastest)])
+        {
+            let plan = Images::<f64>::new(size, code);
             let image = |r: usize, c: usize| noise.uniform([r as u32, c as u32, 0, 0]) - 0.5;
             let (mut spectrum, mut scratch) = (Vec::new(), Scratch::default());
             let rows = size[0].div_ceil(2);

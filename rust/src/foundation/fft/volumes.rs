@@ -1,10 +1,6 @@
 //! Transforms of real volumes, by all threads; an image is a volume of one row a plane.
 
-use std::sync::Arc;
-
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
-
-use super::{Complex, Lines};
+use super::{Code, Complex, Lines, join, split};
 use crate::foundation::par;
 
 /// Transforms of real volumes of one size, of `f32`.
@@ -12,21 +8,16 @@ use crate::foundation::par;
 /// A spectrum is the half that tells the rest, with its axes reversed: each pass then reads and writes whole planes.
 pub(crate) struct Volumes {
     size: [usize; 3],
-    real: Arc<dyn RealToComplex<f32>>,
-    back: Arc<dyn ComplexToReal<f32>>,
-    /// Along the first axis and the second one.
-    lines: [Lines<f32>; 2],
+    /// Along each axis.
+    lines: [Lines<f32>; 3],
 }
 
 impl Volumes {
     /// Plans the transforms of volumes of so many planes, rows and columns.
     pub(crate) fn new(size: [usize; 3]) -> Self {
-        let mut planner = RealFftPlanner::new();
         Self {
             size,
-            real: planner.plan_fft_forward(size[2]),
-            back: planner.plan_fft_inverse(size[2]),
-            lines: [Lines::new(size[0]), Lines::new(size[1])],
+            lines: size.map(|n| Lines::new(n, Code::Same)),
         }
     }
 
@@ -52,20 +43,24 @@ impl Volumes {
     pub(crate) fn forward(&self, volume: &[f32]) -> Vec<Complex<f32>> {
         let ([planes, rows, columns], half) = (self.size, self.half());
         let zero = Complex::default();
-        // Plane by plane: columns, then rows.
+        // Two planes at a time: columns, then rows.
         let mut middle = vec![zero; planes * half * rows];
-        par::chunks_mut(&mut middle, half * rows, |plane, out| {
-            let mut line = vec![0.0; columns];
-            let mut spectrum = vec![zero; half];
-            let mut work = vec![zero; self.real.get_scratch_len()];
+        par::chunks_mut(&mut middle, 2 * half * rows, |pair, out| {
+            let (mut line, mut work) = (vec![zero; columns], Vec::new());
+            let first = &volume[2 * pair * rows * columns..];
+            let second = first.get(rows * columns..).unwrap_or_default();
             for row in 0..rows {
-                line.copy_from_slice(&volume[(plane * rows + row) * columns..][..columns]);
-                // The lengths are those of the plan, so the transform cannot refuse them.
-                let _ = self
-                    .real
-                    .process_with_scratch(&mut line, &mut spectrum, &mut work);
-                for (column, &value) in spectrum.iter().enumerate() {
-                    out[column * rows + row] = value;
+                for (column, z) in line.iter_mut().enumerate() {
+                    let at = row * columns + column;
+                    *z = Complex::new(first[at], second.get(at).copied().unwrap_or(0.0));
+                }
+                self.lines[2].forward(&mut line, &mut work);
+                for column in 0..half {
+                    let (a, b) = split(line[column], line[(columns - column) % columns]);
+                    out[column * rows + row] = a;
+                    if let Some(out) = out.get_mut((half + column) * rows + row) {
+                        *out = b;
+                    }
                 }
             }
             if rows > 1 {
@@ -101,28 +96,30 @@ impl Volumes {
             }
         });
         let mut volume = vec![0.0; planes * rows * columns];
-        par::chunks_mut(&mut volume, rows * columns, |plane, out| {
-            let mut lines = vec![zero; half * rows];
-            let mut line = vec![zero; half];
-            let mut work = vec![zero; self.back.get_scratch_len()];
-            for column in 0..half {
-                let from = &spectrum[(column * planes + plane) * rows..][..rows];
-                lines[column * rows..][..rows].copy_from_slice(from);
+        par::chunks_mut(&mut volume, 2 * rows * columns, |pair, out| {
+            // Of an odd number of planes the last goes with zeros.
+            let (mut lines, mut work) = (vec![zero; 2 * half * rows], Vec::new());
+            for (plane, lines) in (2 * pair..planes).zip(lines.chunks_exact_mut(half * rows)) {
+                for column in 0..half {
+                    let from = &spectrum[(column * planes + plane) * rows..][..rows];
+                    lines[column * rows..][..rows].copy_from_slice(from);
+                }
             }
             if rows > 1 {
                 self.lines[1].inverse(&mut lines, &mut work);
             }
+            let mut line = vec![zero; columns];
             for row in 0..rows {
-                for (column, value) in line.iter_mut().enumerate() {
-                    *value = lines[column * rows + row];
+                join(&mut line, |k| {
+                    (lines[k * rows + row], lines[(half + k) * rows + row])
+                });
+                self.lines[2].inverse(&mut line, &mut work);
+                for (column, z) in line.iter().enumerate() {
+                    out[row * columns + column] = z.re;
+                    if let Some(out) = out.get_mut((rows + row) * columns + column) {
+                        *out = z.im;
+                    }
                 }
-                // Of a real line these are real; rounding left a trace that the transform would refuse.
-                line[0].im = 0.0;
-                if columns % 2 == 0 {
-                    line[half - 1].im = 0.0;
-                }
-                let out = &mut out[row * columns..][..columns];
-                let _ = self.back.process_with_scratch(&mut line, out, &mut work);
             }
         });
         volume
@@ -136,7 +133,7 @@ mod tests {
 
     #[test]
     fn there_and_back_multiplies_by_the_points() {
-        for size in [[1, 1, 1], [6, 1, 7], [4, 5, 6], [7, 8, 9]] {
+        for size in [[1, 1, 1], [6, 1, 7], [7, 1, 6], [4, 5, 6], [7, 8, 9]] {
             let points: usize = size.iter().product();
             let noise = Noise::new(1);
             let volume: Vec<f32> = (0..points)

@@ -2,6 +2,7 @@
 
 use super::{Canvas, Completion, FAR_WEIGHT, FLAT, KEPT_WEIGHT, Patch};
 use crate::Result;
+use crate::foundation::functions::exp;
 use crate::foundation::grid::Grid;
 use crate::foundation::par::Monitor;
 use crate::kernels::patch_search::{Index, Match, Query};
@@ -80,10 +81,11 @@ impl Window {
         let reach = self.shape[0].min(self.shape[1]) as f32 / 4.0;
         for (i, weight) in self.weight.iter_mut().enumerate() {
             let d = distance[i] / reach;
+            let near = |steep: f32| exp(f64::from(-steep * d * d)) as f32;
             *weight = match (self.known[i], self.keep[i]) {
                 (false, _) => 0.0,
-                (true, false) => (-d * d).exp() + FAR_WEIGHT,
-                (true, true) => KEPT_WEIGHT * (-4.0 * d * d).exp() + FAR_WEIGHT,
+                (true, false) => near(1.0) + FAR_WEIGHT,
+                (true, true) => KEPT_WEIGHT * near(4.0) + FAR_WEIGHT,
             };
         }
     }

@@ -17,6 +17,7 @@ mod score;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, OnceLock};
 
+use crate::foundation::functions::power_below;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 use filter::{Plan, Scratch};
@@ -445,7 +446,9 @@ fn moments(exemplars: &[Exemplar], channels: usize) -> (Vec<f64>, f64) {
         .flat_map(|(m, r)| r.map(|x| (f64::from(x) - m).abs()));
     let far = far.fold(0.0, f64::max);
     let scale = if far > 0.0 {
-        far.log2().ceil().exp2()
+        // The smallest power of two that is no less.
+        let below = power_below(far);
+        if below < far { 2.0 * below } else { below }
     } else {
         1.0
     };

@@ -7,7 +7,8 @@
 use std::f64::consts::PI;
 
 use super::Edge;
-use crate::foundation::fft::{Complex, Lines};
+use crate::foundation::fft::{Code, Complex, Lines, split};
+use crate::foundation::functions::sincos;
 
 /// The transform of an axis of `len` unknowns.
 pub(super) struct Transform {
@@ -34,11 +35,11 @@ impl Transform {
         let n = size as f64;
         let twiddles = match edge {
             Edge::Fixed => (0..size)
-                .map(|j| Complex::new((PI * j as f64 / n).sin() as f32, 0.0))
+                .map(|j| Complex::new(sincos(PI * j as f64 / n).0 as f32, 0.0))
                 .collect(),
             Edge::Free => (0..size)
                 .map(|k| {
-                    let (sin, cos) = (PI * k as f64 / (2.0 * n)).sin_cos();
+                    let (sin, cos) = sincos(PI * k as f64 / (2.0 * n));
                     Complex::new(cos as f32, sin as f32)
                 })
                 .collect(),
@@ -51,13 +52,13 @@ impl Transform {
                     Edge::Free => PI * slot as f64 / n,
                     Edge::Wrap => 2.0 * PI * slot.div_ceil(2) as f64 / n,
                 };
-                4.0 * (turn / 2.0).sin().powi(2)
+                4.0 * sincos(turn / 2.0).0.powi(2)
             })
             .collect();
         Self {
             edge,
             len,
-            lines: Lines::new(size),
+            lines: Lines::new(size, Code::Same),
             twiddles,
             eigenvalues,
         }
@@ -197,15 +198,6 @@ impl Transform {
             *b = v.re * t.re + v.im * t.im;
         }
     }
-}
-
-/// Spectra of the real and of the imaginary part, from a frequency of both and its mirror.
-#[inline]
-fn split(z: Complex<f32>, mirror: Complex<f32>) -> (Complex<f32>, Complex<f32>) {
-    (
-        Complex::new(0.5 * (z.re + mirror.re), 0.5 * (z.im - mirror.im)),
-        Complex::new(0.5 * (z.im + mirror.im), 0.5 * (mirror.re - z.re)),
-    )
 }
 
 #[cfg(test)]

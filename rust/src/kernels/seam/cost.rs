@@ -2,6 +2,7 @@
 //!
 //! Kwatra, Schödl, Essa, Turk, Bobick, *Graphcut textures: image and video synthesis using graph cuts*, SIGGRAPH 2003.
 
+use crate::foundation::functions::power_below;
 use crate::{Error, Result};
 
 /// How visible a seam between two neighbours is.
@@ -117,7 +118,7 @@ pub(super) fn finest(largest: f64) -> f64 {
         return 1.0;
     }
     // 1e-300 is far below any `f32`; powers of two stay finite.
-    let mut scale = (LARGEST / largest.max(1e-300)).log2().floor().exp2();
+    let mut scale = power_below(LARGEST / largest.max(1e-300));
     while largest * scale > LARGEST {
         scale *= 0.5;
     }
