@@ -8,7 +8,7 @@ JOBS ?= $(shell getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2)
 MINUTES ?= 10
 RUST := Cargo.toml $(shell find rust -name '*.rs')
 
-.PHONY: help demo test test-rust test-python fuzz levels lint lint-rust lint-python format bench wheel docs clean requirements
+.PHONY: help demo test test-rust test-python fuzz levels lint lint-rust lint-python format bench peers wheel docs docs-check clean requirements
 .DELETE_ON_ERROR:
 # Compilers count the processors themselves: what make says of its own jobs is not for them.
 unexport MAKEFLAGS
@@ -23,6 +23,8 @@ help:
 	@echo "make bench   criterion benches of the kernels"
 	@echo "make wheel   a wheel and a source distribution in dist/, tried in clean environments"
 	@echo "make docs    documentation, gallery and reference: docs/_build/html/index.html"
+	@echo "make docs-check  these pages in a browser: accessibility, weight, links"
+	@echo "make peers   kernels beside other libraries: benches/peers.json"
 	@echo "make clean   remove what the other goals made"
 
 requirements:
@@ -112,6 +114,16 @@ docs: $(VENV)/.documented
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
 	rm -rf docs/_build/html/rust && cp -r target/doc docs/_build/html/rust
 	@echo "Open docs/_build/html/index.html in a browser."
+
+# In a browser: accessibility, weight, what moves, links; needs Chromium, and `make docs` before it.
+docs-check: $(VENV)/.tools
+	$(BIN)/python -m pip install --quiet --group pages
+	$(BIN)/python .ci/pages
+
+# Kernels beside other libraries, as the page on performance shows them.
+peers: $(VENV)/.built
+	$(BIN)/python -m pip install --quiet --group bench
+	$(BIN)/python benches/peers.py
 
 clean:
 	rm -rf $(VENV) target demo dist docs/_build docs/generated .pytest_cache .mypy_cache .ruff_cache .hypothesis

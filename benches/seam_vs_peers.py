@@ -16,7 +16,6 @@ import statistics
 import time
 from collections.abc import Callable, Iterator
 
-import maxflow
 import numpy as np
 import scipy.ndimage
 from scipy.sparse import csr_array
@@ -25,6 +24,11 @@ from skimage import data
 
 from texrs import _rust
 from texrs.kernels import seam
+
+try:
+    import maxflow
+except ImportError:
+    maxflow = None
 
 SCALE = 65536
 FORWARD = [

@@ -6,6 +6,8 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
+from drawings import write_drawings  # noqa: E402
+from finish import finish  # noqa: E402
 from pages import write_pages  # noqa: E402
 from strips import write_strips  # noqa: E402
 
@@ -14,10 +16,12 @@ import texrs  # noqa: E402
 project = "texrs"
 author = "the texrs developers"
 version = release = texrs.__version__
-extensions = ["sphinx.ext.autodoc", "sphinx.ext.extlinks", "numpydoc", "myst_nb", "sphinx_gallery.gen_gallery"]
+extensions = ["sphinx.ext.autodoc", "sphinx.ext.extlinks", "numpydoc", "myst_parser", "sphinx_gallery.gen_gallery"]
 exclude_patterns = [
     "_build",
     "pictures",
+    "generated/drawings/*.md",
+    "generated/strips/*.md",
     "generated/extra",
     "gallery/README.rst",
     "generated/gallery/*.ipynb",
@@ -26,7 +30,6 @@ exclude_patterns = [
 default_role = "py:obj"
 # Options begin with two dashes.
 smartquotes = False
-nb_execution_mode = "off"
 myst_enable_extensions = ["deflist", "colon_fence"]
 myst_heading_anchors = 3
 
@@ -74,5 +77,10 @@ sphinx_gallery_conf = {
     "abort_on_example_error": True,
 }
 
+write_drawings(HERE / "generated")
 write_strips(HERE / "generated")
 write_pages(HERE)
+
+
+def setup(app: object) -> None:
+    app.connect("build-finished", finish)  # type: ignore[attr-defined]

@@ -59,16 +59,22 @@ def write_api(folder: Path) -> None:
             if not some:
                 continue
             title = "Functions" if kind == "autofunction" else "Classes"
-            lines += [title, "-" * len(title), ""]
+            if module is texrs and kind == "autoclass":
+                # Both together are a page of more than a megabyte.
+                (folder / f"{name}.rst").write_text("\n".join(lines) + "\n", encoding="utf-8")
+                title = f"{name}: classes"
+                lines = [title, "=" * len(title), ""]
+                names.append(f"{name}.classes")
+            else:
+                lines += [title, "-" * len(title), ""]
             for n in some:
                 lines += [f".. {kind}:: {name}.{n}"]
                 if kind == "autoclass":
                     lines += ["   :members:"]
                 lines += [""]
-        (folder / f"{name}.rst").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    listed = [
-        f"- [{name}]({name}.rst): {_first_line(module)}" for name, module in zip(names, list_modules(), strict=True)
-    ]
+        (folder / f"{names[-1]}.rst").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    listed = [f"- [{m.__name__}]({m.__name__}.rst): {_first_line(m)}" for m in list_modules()]
+    listed.insert(1, "- [texrs: classes](texrs.classes.rst)")
     text = f"{NOTICE}# API reference\n\nAll that is public, by module.\n\n" + "\n".join(listed)
     text += '\n\nThe kernels in Rust have <a href="../../rust/texrs/index.html">a reference of their own</a>.'
     text += "\n\n```{toctree}\n:hidden:\n\n" + "\n".join(names) + "\n```\n"
@@ -167,9 +173,11 @@ def write_comparison(out: Path) -> None:
 # --- performance -----------------------------------------------------------------------------------------------------
 
 MEASURED = """
-No figure stands here that a command did not give on the machine where this page was made: times hang on the processor, on what
-else it does, and on the picture. How long each method took on ten pictures, in processor seconds, says
-[the comparison](comparison.md); for yours, `texrs compare photo.jpg -o compared.html` says it.
+No figure stands here that a command did not give: times hang on the processor, on what else it does, and on the picture. How
+long each method took on ten pictures, in processor seconds, says [the comparison](comparison.md); for yours, it is said by
+`texrs compare photo.jpg -o compared.html`.
+{peers}
+## The commands
 
 What is measured, and by which command, from a checkout of the sources. Each prints a table; most interleave rounds and take
 medians, since a machine that does other things shows in the mean. Those with `_vs_peers` compare with other libraries, which
@@ -177,11 +185,46 @@ medians, since a machine that does other things shows in the mean. Those with `_
 """
 
 
+PEERS = """
+## Kernels beside others
+
+What `make peers` wrote: {processor}, {cores} cores, {system}, Python {python}, {date}, while the machine did {load:.0f} things
+at once. Milliseconds of the processor, in one thread, the median of {rounds} rounds in which all took turns, and the least and
+the most; how many times as long as texrs; megabytes that a process took at most, beyond what loading takes. Results were
+compared first, as it says. The floor is what copying input and output once takes.
+
+| work | who | ms | spread | ratio | MB |
+|---|---|---|---|---|---|
+{rows}
+"""
+
+
+def tabulate_peers(file: Path) -> str:
+    """Return a table of what was measured, or nothing where nothing was."""
+    import json
+
+    if not file.exists():
+        return ""
+    found = json.loads(file.read_text(encoding="utf-8"))
+    rows = []
+    for case in found["cases"]:
+        said = f"{case['case']}: {case['check']}"
+        for each in case["rows"]:
+            spread = f"{each['least']:.1f} to {each['most']:.1f}"
+            bold = "**" if each["ratio"] <= min(r["ratio"] for r in case["rows"]) else ""
+            shown = (said, each["who"], f"{bold}{each['ms']:.1f}{bold}", spread, f"{each['ratio']:.1f}")
+            rows.append(f"| {' | '.join(shown)} | {each['megabytes']:.0f} |")
+            said = ""
+        rows += [f"| | {each['who']} | not installed: `{each['get']}` | | | |" for each in case["absent"]]
+        rows.append(f"| | *floor* | {case['floor']:.2f} | | | |")
+    return PEERS.format(rows="\n".join(rows), rounds=found["rounds"], **found["machine"])
+
+
 def list_benches(folder: Path) -> str:
     """Return a page of what each bench measures, as its own first words say it."""
     import ast
 
-    text = f"{NOTICE}# Performance\n{MEASURED}\n"
+    text = f"{NOTICE}# Performance\n{MEASURED.format(peers=tabulate_peers(folder / 'peers.json'))}\n"
     groups = {"How fast": "_speed", "Beside other libraries": "_vs_peers", "How well": ""}
     files = sorted(folder.glob("*.py"))
     for title, ending in groups.items():
@@ -193,5 +236,5 @@ def list_benches(folder: Path) -> str:
             # What is no command is a helper of those that are.
             if f"benches/{file.name}" in said:
                 rows.append(f"| `python benches/{file.name}` | {said.splitlines()[0]} |")
-        text += f"## {title}\n\n| command | what it measures |\n|---|---|\n" + "\n".join(rows) + "\n\n"
+        text += f"### {title}\n\n| command | what it measures |\n|---|---|\n" + "\n".join(rows) + "\n\n"
     return text

@@ -236,7 +236,95 @@ def materials() -> Iterator[Strip]:
     yield ("mipmaps", "Smaller copies: how often a map is halved.", several([0, 1, 2, 3, 4], shrink))
 
 
-GUIDES = (design, tile, complete, splice, perspective, rectify, solid, materials)
+def augment() -> Iterator[Strip]:
+    buttons = samples.dots((128, 128))
+    boxes = np.array(
+        [
+            [*(np.argwhere(buttons.labels == n).min(0)[::-1]), *(np.argwhere(buttons.labels == n).max(0)[::-1] + 1)]
+            for n in range(1, len(buttons.centres) + 1)
+        ]
+    )
+
+    def draw(seed: int, visible: float = 0.5) -> Picture:
+        made = texrs.transforms.TextureAugment(visible)(buttons.image, boxes=boxes, seed=seed)
+        image = np.kron(made.image, np.ones((2, 2, 1), np.uint8))
+        for left, top, right, bottom in np.rint(2 * made.boxes).astype(int):
+            for rows, columns in (
+                (slice(top, bottom), [left, right - 1]),
+                ([top, bottom - 1], slice(left, right)),
+            ):
+                image[rows, columns] = (0, 230, 60)
+        return image
+
+    def label(seed: int) -> Picture:
+        return volume.paint(texrs.transforms.TextureAugment()(buttons.image, buttons.labels, seed=seed).mask)
+
+    yield ("seed", "Another picture each, and its boxes.", several([0, 1, 2, 3, 4], draw))
+    yield ("seed, with labels", "The labels of the same pictures.", several([0, 1, 2, 3, 4], label))
+    yield (
+        "visible",
+        "How much of a box a piece must show for it to have one.",
+        several([0.1, 0.3, 0.5, 0.7, 0.95], lambda share: draw(3, share)),
+    )
+
+
+def source_map() -> Iterator[Strip]:
+    grit, weave = samples.grit((144, 144)).image, samples.weave((96, 96)).image
+    uneven = (grit * np.linspace(0.4, 1, 144)[:, np.newaxis, np.newaxis]).astype(np.uint8)
+    # Sixteen squares from anywhere, so that there is something to hide.
+    corner = np.random.default_rng(4).integers(0, 144 - 44, (4, 4, 2)).repeat(44, axis=0).repeat(44, axis=1)
+    places = np.moveaxis(np.indices((176, 176)) % 44, 0, -1) + corner
+    patches = (np.indices((176, 176)) // 44 * [[[4]], [[1]]]).sum(axis=0).astype(np.uint32)
+    squares = texrs.SourceMap.from_coordinates(places.astype(np.float32), (144, 144), label=patches)
+    field = {"large": "scale_ramp:start=5,stop=5", "small": "scale_ramp:start=0.3,stop=0.3"}
+    grown = {name: texrs.synthesize(weave, 144, field=words, seed=2).source for name, words in field.items()}
+
+    def blend(screening: float | str) -> Picture:
+        return (
+            squares.render(uneven)
+            if screening == "none"
+            else texrs.blend(squares, uneven, wrap=False, screening=screening)
+        )
+
+    def smooth(antialias: bool) -> Picture:
+        return grown["small"].render(weave, interpolation="cubic", antialias=antialias)
+
+    yield (
+        "screening",
+        "How firmly values stay where seams are made to disappear: here of squares from an example that is darker above.",
+        several(["none", 1.0, 0.15, 0.05, 0.01], blend),
+    )
+    yield (
+        "interpolation",
+        "Between samples of the example, here five times as large.",
+        several(["nearest", "linear", "cubic"], lambda how: grown["large"].render(weave, interpolation=how)),
+    )
+    yield (
+        "antialias",
+        "Whether the example is smoothed where it is shrunk, here to a third.",
+        several([True, False], smooth),
+    )
+
+
+def batch() -> Iterator[Strip]:
+    pebbles = samples.pebbles((144, 144)).image
+    presets = {
+        "calm": {"rotate": 0.0},
+        "turned": {"rotate": 180.0, "mirror": False},
+        "mixed sizes": {"rotate": 180.0, "scale": (0.6, 1.5)},
+    }
+
+    def make(seed: int, preset: str) -> Picture:
+        return texrs.design(
+            pebbles, 160, deformation=texrs.DeformationOptions(**presets[preset]), plan="move", seed=seed
+        ).image
+
+    for preset, options in presets.items():
+        said = ", ".join(f"{name} = {value}" for name, value in options.items())
+        yield (f"presets.{preset}", f"{said}; a seed each.", several([0, 1, 2, 3, 4], lambda s, p=preset: make(s, p)))
+
+
+GUIDES = (design, tile, complete, splice, perspective, rectify, solid, materials, augment, source_map, batch)
 
 # --- writing ---------------------------------------------------------------------------------------------------------
 

@@ -1,0 +1,120 @@
+"""The last hand on the built pages: images with sizes, in copies as small as a window needs, and no script that nothing uses.
+
+Beside a picture of the sources stand copies in WebP, as wide as a phone and as the text column; browsers take what fits. All
+but the first of a page are loaded when they come near. The theme loads the index of the search on every page, icons twice, as a
+font and as a script, and rules for two thousand of them: the search page keeps its own, the font stays, and the icons in use.
+Some marks of docutils and of the gallery are put right for readers that do not see: links without words, lists without items.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from html import escape
+from pathlib import Path
+from urllib.parse import unquote
+
+from PIL import Image
+
+WIDTHS = (480, 960)
+"""Of the copies, in pixels: a phone or half a column, and a column."""
+QUALITY = 74
+SIZES = "(max-width: 720px) 94vw, (max-width: 1200px) 66vw, 820px"
+THUMBNAIL = "16rem"
+
+
+def finish(app: object, error: Exception | None) -> None:
+    """Rewrite all pages, and the theme's rules: what Sphinx calls when it has built them."""
+    root = Path(app.outdir)  # type: ignore[attr-defined]
+    if error is None and app.builder.format == "html":  # type: ignore[attr-defined]
+        icons: set[str] = set()
+        for page in root.rglob("*.html"):
+            if not {"rust", "shown"} & set(page.relative_to(root).parts):
+                text = page.read_text(encoding="utf-8")
+                made = name_parts(rewrite(drop_scripts(text, page.name), page.parent))
+                icons.update(re.findall(r"\bfa-[a-z0-9-]+", made))
+                if made != text:
+                    page.write_text(made, encoding="utf-8")
+        for script in (root / "_static" / "scripts").glob("pydata-sphinx-theme.js"):
+            icons.update(re.findall(r"\bfa-[a-z0-9-]+", script.read_text(encoding="utf-8")))
+        for sheet in (root / "_static" / "styles").glob("pydata-sphinx-theme.css"):
+            sheet.write_text(drop_icons(sheet.read_text(encoding="utf-8"), icons), encoding="utf-8")
+
+
+def drop_scripts(text: str, name: str) -> str:
+    """Leave out the script that draws icons, and, but of the search page, those of the search."""
+    unused = ["scripts/fontawesome"]
+    if name != "search.html":
+        unused += ["searchtools", "language_data", "searchindex"]
+    return re.sub(rf'<script[^>]* src="[^"]*(?:{"|".join(unused)})\.js[^"]*"></script>\n?', "", text)
+
+
+def name_parts(text: str) -> str:
+    """Name the links below thumbnails, whose words are hidden, and make the entries of a list of references its items."""
+    text = re.sub(
+        r'<p><a class="reference internal" (href="[^"]*")><span class="doc">([^<]*)</span></a></p>',
+        r'<p><a class="reference internal" \1 aria-label="\2"><span class="doc">\2</span></a></p>',
+        text,
+    )
+    return text.replace(' role="doc-biblioentry"', ' role="listitem"')
+
+
+def drop_icons(sheet: str, used: set[str]) -> str:
+    """Leave out the rules of icons that no page shows."""
+
+    def keep(found: re.Match[str]) -> str:
+        return found.group(0) if used & set(re.findall(r"fa-[a-z0-9-]+", found.group(0).partition("{")[0])) else ""
+
+    return re.sub(r"\.fa-[a-z0-9-]+(?:,\.fa-[a-z0-9-]+)*\{--fa:[^}]*\}", keep, sheet)
+
+
+def rewrite(text: str, folder: Path) -> str:
+    """Give each image of a page in a folder its size, its copies, and when it is loaded."""
+    count = 0
+
+    def mend(found: re.Match[str]) -> str:
+        nonlocal count
+        tag = found.group(0)
+        source = re.search(r' src="([^":?]+)"', tag)
+        if source is None:
+            return tag
+        file = folder / unquote(source.group(1))
+        if file.suffix.lower() not in (".png", ".jpg", ".webp") or not file.is_file():
+            return tag
+        added = ""
+        width, height, copies = make_copies(file)
+        if " width=" not in tag:
+            added += f' width="{width}" height="{height}"'
+        if copies and " srcset=" not in tag:
+            near = source.group(1).rpartition("/")[0]
+            listed = ", ".join(f"{near}/{name} {wide}w" for name, wide in copies)
+            sizes = THUMBNAIL if "thumb" in file.name or "strips" in file.parts else SIZES
+            added += f' srcset="{escape(listed)}" sizes="{sizes}"'
+        count += 1
+        if " loading=" not in tag and count > 1:
+            added += ' loading="lazy"'
+        elif count == 1:
+            tag = tag.replace(' loading="lazy"', "")
+        return tag.removesuffix(">").removesuffix("/").rstrip() + f"{added}>"
+
+    return re.sub(r"<img [^>]*>", mend, text)
+
+
+@cache
+def make_copies(file: Path) -> tuple[int, int, list[tuple[str, int]]]:
+    """Write the copies of a picture that are smaller than it is; return its size, and their names and widths."""
+    with Image.open(file) as picture:
+        width, height = picture.size
+        copies = []
+        for wide in sorted({min(wide, width) for wide in WIDTHS}):
+            copy = file.with_name(f"{file.stem}-{wide}.webp")
+            if not copy.exists() or copy.stat().st_mtime < file.stat().st_mtime:
+                shown = picture.convert(
+                    "RGBA" if "A" in picture.getbands() or "transparency" in picture.info else "RGB"
+                )
+                shown.resize((wide, max(1, round(height * wide / width))), Image.Resampling.LANCZOS).save(
+                    copy, quality=QUALITY, method=6
+                )
+            if copy.stat().st_size < file.stat().st_size:
+                copies.append((copy.name, wide))
+    return width, height, copies
