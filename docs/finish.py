@@ -31,10 +31,13 @@ def finish(app: object, error: Exception | None) -> None:
         for page in root.rglob("*.html"):
             if not {"rust", "shown"} & set(page.relative_to(root).parts):
                 text = page.read_text(encoding="utf-8")
+                if 'bd-sidebar-secondary"' in text or "bd-sidebar-secondary " in text:
+                    text = text.replace("<body data-", '<body class="beside" data-', 1).replace(
+                        "<body>", '<body class="beside">', 1
+                    )
                 made = name_parts(rewrite(drop_scripts(text, page.name), page.parent))
                 icons.update(re.findall(r"\bfa-[a-z0-9-]+", made))
-                if made != text:
-                    page.write_text(made, encoding="utf-8")
+                page.write_text(made, encoding="utf-8")
         for script in (root / "_static" / "scripts").glob("pydata-sphinx-theme.js"):
             icons.update(re.findall(r"\bfa-[a-z0-9-]+", script.read_text(encoding="utf-8")))
         for sheet in (root / "_static" / "styles").glob("pydata-sphinx-theme.css"):
