@@ -59,6 +59,8 @@ def name_parts(text: str) -> str:
         r'<p><a class="reference internal" \1 aria-label="\2"><span class="doc">\2</span></a></p>',
         text,
     )
+    # What scrolls on a phone must be reached by keys.
+    text = re.sub(r'<figure class="([^"]*\bdrawing\b[^"]*)"', r'<figure tabindex="0" class="\1"', text)
     return text.replace(' role="doc-biblioentry"', ' role="listitem"')
 
 
