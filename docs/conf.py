@@ -22,6 +22,7 @@ exclude_patterns = [
     "pictures",
     "generated/drawings/*.md",
     "generated/strips/*.md",
+    "generated/install.md",
     "generated/extra",
     "gallery/README.rst",
     "generated/gallery/*.ipynb",

@@ -24,6 +24,7 @@ def write_pages(docs: Path) -> None:
     write_api(out / "api")
     (out / "commands.md").write_text(list_commands(), encoding="utf-8")
     (out / "performance.md").write_text(list_benches(docs.parent / "benches"), encoding="utf-8")
+    (out / "install.md").write_text(tabulate_installs(docs / "install.json"), encoding="utf-8")
     write_comparison(out)
     (out / "words.md").write_text(list_words(docs.parent / "ARCHITECTURE.md"), encoding="utf-8")
 
@@ -168,6 +169,34 @@ def write_comparison(out: Path) -> None:
     text += "".join(f"- {each.method} ({TASKS[each.task].title.lower()}): {each.get}\n" for each in found.missing)
     page.write_text(text, encoding="utf-8")
     shown.write_text(found.page(), encoding="utf-8")
+
+
+# --- installation ----------------------------------------------------------------------------------------------------
+
+INSTALLED = """
+## What it takes
+
+From an empty environment of Python {python} to a first picture, as `benches/install_table.py` measured on {date} with a wheel
+of {wheel} MB: seconds of the processor, and what the environment takes beyond an empty one.
+
+| | packages | MB | to install, s | first picture, s | which shows |
+|---|---|---|---|---|---|
+{rows}
+"""
+
+
+def tabulate_installs(file: Path) -> str:
+    """Return a table of what installations take, or nothing where nothing was measured."""
+    import json
+
+    if not file.exists():
+        return ""
+    found = json.loads(file.read_text(encoding="utf-8"))
+    rows = []
+    for name, each in found.pop("rows").items():
+        figures = [str(each.get(key, "")) for key in ("packages", "megabytes", "install", "picture")]
+        rows.append(f"| {name} | {' | '.join(figures)} | {each.get('wrong', each['shows'])} |")
+    return INSTALLED.format(rows="\n".join(rows), **found)
 
 
 # --- performance -----------------------------------------------------------------------------------------------------
