@@ -7,6 +7,7 @@ use pyo3::prelude::*;
 use super::patch_search::PatchIndex;
 use super::run;
 use crate::foundation::grid::Grid;
+use crate::foundation::memory;
 use crate::kernels::complete::{Canvas, Options, complete as fill};
 use crate::kernels::patch_search::Pick;
 
@@ -37,10 +38,10 @@ pub(super) fn complete<'py>(
         unreachable!("three axes by type")
     };
     let grid = Grid::new([rows, columns], wrap)?;
-    let mut colours = colours.as_slice()?.to_vec();
-    let mut known = known.as_slice()?.to_vec();
+    let mut colours = memory::copied("colours", colours.as_slice()?)?;
+    let mut known = memory::copied("known", known.as_slice()?)?;
     let keep = match &keep {
-        Some(keep) => Some(keep.as_slice()?.to_vec()),
+        Some(keep) => Some(memory::copied("keep", keep.as_slice()?)?),
         None => None,
     };
     let options = Options {

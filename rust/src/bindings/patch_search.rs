@@ -4,6 +4,7 @@ use numpy::{
 use pyo3::prelude::*;
 
 use super::run;
+use crate::foundation::memory;
 use crate::kernels::patch_search::{Exemplar, Index, Match, Pick, Query};
 
 /// Cost, exemplar, row, column.
@@ -27,9 +28,12 @@ impl PatchIndex {
         for (i, e) in exemplars.iter().enumerate() {
             let mask = allowed.get(i).and_then(Option::as_ref);
             all.push(Exemplar {
-                data: e.as_slice()?.to_vec(),
+                data: memory::copied("exemplars", e.as_slice()?)?,
                 shape: [e.shape()[0], e.shape()[1]],
-                allowed: mask.map(|m| m.as_slice().map(<[_]>::to_vec)).transpose()?,
+                allowed: match mask {
+                    Some(mask) => Some(memory::copied("allowed", mask.as_slice()?)?),
+                    None => None,
+                },
             });
         }
         run(py, None, |_| Index::new(all, channels, max_patch)).map(Self)

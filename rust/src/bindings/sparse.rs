@@ -2,6 +2,7 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 
 use super::run;
+use crate::foundation::memory;
 use crate::foundation::par;
 use crate::kernels::sparse::{self, Lower};
 
@@ -75,7 +76,7 @@ impl Cholesky {
         py: Python<'py>,
         sides: PyReadonlyArray1<'py, f64>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let mut found = sides.as_slice()?.to_vec();
+        let mut found = memory::copied("sides", sides.as_slice()?)?;
         run(py, None, |_| self.0.solve(&mut found))?;
         Ok(PyArray1::from_vec(py, found))
     }

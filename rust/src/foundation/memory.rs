@@ -10,6 +10,12 @@ pub(crate) fn filled<T: Clone>(what: &str, value: T, len: usize) -> Result<Vec<T
     Ok(vec![value; len])
 }
 
+/// A copy of values, for what is named `what`.
+pub(crate) fn copied<T: Copy>(what: &str, values: &[T]) -> Result<Vec<T>> {
+    check::<T>(what, values.len())?;
+    Ok(values.to_vec())
+}
+
 /// An error where there is no room for `len` values.
 pub(crate) fn check<T>(what: &str, len: usize) -> Result<()> {
     Vec::<T>::new()
@@ -19,6 +25,20 @@ pub(crate) fn check<T>(what: &str, len: usize) -> Result<()> {
             needed: format!("{} bytes", len as u128 * size_of::<T>() as u128),
             limit: "memory that there is".into(),
         })
+}
+
+/// Less than this is not asked for: where so little is not there, nothing goes on.
+const LITTLE: usize = 1 << 20;
+
+/// An error where there is no room for what a kernel takes in all, `each` bytes for each of `count` things.
+///
+/// What it takes is asked for at once and given back, before any work: of its parts, some of which are made in other crates, each
+/// would end the process where it did not fit. The bytes are measured ones (`tests/test_kernels_memory.py` limits each kernel).
+pub(crate) fn room(what: &str, count: usize, each: usize) -> Result<()> {
+    match count.saturating_mul(each) {
+        0..LITTLE => Ok(()),
+        bytes => check::<u8>(what, bytes),
+    }
 }
 
 /// The product of sizes, an error where it is more than can be counted.
@@ -42,6 +62,11 @@ mod tests {
                 Err(Error::Limit { .. })
             ));
         }
+        assert!(room("pixels", 100, 40).is_ok() && room("pixels", 1 << 21, 4).is_ok());
+        assert!(matches!(
+            room("pixels", usize::MAX / 2, 40),
+            Err(Error::Limit { .. })
+        ));
         assert_eq!(product("sides", &[3, 0, 5]).unwrap(), 0);
         assert!(product("sides", &[1 << 40, 1 << 40]).is_err());
     }

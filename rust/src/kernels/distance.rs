@@ -4,6 +4,7 @@
 //! nearest mark along each column, then the lower envelope of parabolas along each row. Squares are whole numbers, so the
 //! distances are exact.
 
+use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
@@ -46,6 +47,9 @@ pub fn outlines(
             format!("1 to {MOST} pixels a side, got {:?}", piece.shape),
         ));
     }
+    let pixels = |p: &Piece| p.shape[0].saturating_mul(p.shape[1]);
+    let all = pieces.iter().map(pixels).fold(0, usize::saturating_add);
+    memory::room("the distances", all, 16)?;
     par::map(pieces.len(), |k| {
         monitor.check()?;
         Ok(measure(

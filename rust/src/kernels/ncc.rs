@@ -11,6 +11,7 @@
 //! bits, so that what a threshold decides hangs on no transform's last bits.
 
 use crate::foundation::fft::{Code, Complex, Images, Scratch};
+use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
@@ -45,6 +46,7 @@ impl Correlation {
             });
         }
         finite(image, "image")?;
+        memory::room("the correlation", image.len(), 48)?;
         // Windows that lie inside the image meet nothing of what comes round, so its own size is enough.
         let plan = Images::new(shape.map(quick), Code::Same);
         let channels = par::map(image.len() / points, |c| {
@@ -91,6 +93,8 @@ impl Correlation {
             ));
         }
         finite(template, "template")?;
+        let image = self.shape[0] * self.shape[1] * self.channels.len();
+        memory::room("the correlation", image, 40)?;
         monitor.expect(self.channels.len() as u64);
         let maps = par::map(self.channels.len(), |c| {
             monitor.check()?;

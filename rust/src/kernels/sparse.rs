@@ -13,6 +13,7 @@ use faer::sparse::linalg::cholesky::{
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 
+use crate::foundation::memory;
 use crate::foundation::par::Monitor;
 use crate::{Error, Result};
 
@@ -75,6 +76,8 @@ impl Cholesky {
     /// Factors a positive definite matrix whose factor takes at most `limit` bytes.
     pub fn new(matrix: &Lower<'_>, limit: usize, monitor: &Monitor) -> Result<Self> {
         let size = matrix.check()?;
+        // Of the pattern of the factor, beside its numbers.
+        memory::room("the order of the matrix", matrix.rows.len(), 64)?;
         let pattern =
             SymbolicSparseColMatRef::new_checked(size, size, matrix.starts, None, matrix.rows);
         let symbolic = factorize_symbolic_cholesky(
@@ -90,7 +93,7 @@ impl Cholesky {
         if needed > limit {
             return Err(too_large(&format!("{:.2} GB", needed as f64 / 1e9), limit));
         }
-        let mut values = vec![0.0; symbolic.len_val()];
+        let mut values = memory::filled("the factor of the matrix", 0.0, symbolic.len_val())?;
         let mut memory =
             MemBuffer::try_new(scratch).map_err(|_| too_large("more than there is", limit))?;
         symbolic

@@ -16,6 +16,7 @@ use crate::foundation::fixed::{BITS, ONE, Place};
 use crate::foundation::functions::exp;
 use crate::foundation::grid::Grid;
 use crate::foundation::hash::Noise;
+use crate::foundation::memory;
 use crate::foundation::par;
 use crate::foundation::pca::principal;
 use crate::{Error, Result};
@@ -89,6 +90,7 @@ impl<const D: usize> Appearance<D> {
                 got: vec![colours.len()],
             });
         }
+        memory::room("the appearance of the exemplar", grid.len(), 96)?;
         if let Some(bad) = colours.iter().find(|x| !x.is_finite()) {
             return Err(Error::value("colours", format!("{bad} is not finite")));
         }

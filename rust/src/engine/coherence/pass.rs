@@ -4,6 +4,7 @@ use super::{CHUNK, FEW, LARGEST, Similarity, Table};
 use crate::engine::appearance::{Appearance, KEEP};
 use crate::foundation::fixed::{Frame, Frames, ONE, Place, add, apply, inverse, nearest, sub};
 use crate::foundation::grid::Region;
+use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
@@ -62,6 +63,7 @@ pub fn correct<const D: usize>(
     let points = region.grid.len();
     let samples = appearance.grid().len();
     frames.check(points)?;
+    memory::room("the corrected coordinates", points, 32 * D)?;
     if !(1..=LARGEST).contains(&similarity.k) {
         let message = format!("needs sets of 1 to {LARGEST}, got {}", similarity.k);
         return Err(Error::value("similarity", message));

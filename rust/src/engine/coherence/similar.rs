@@ -3,6 +3,7 @@
 use super::tree::{Place, Tree};
 use super::{FEW, LARGEST, first};
 use crate::engine::appearance::{Appearance, KEEP};
+use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 
@@ -38,6 +39,7 @@ pub fn similar<const D: usize>(
             format!("{:?} has too many samples", appearance.grid().shape()),
         ));
     }
+    memory::room("the similarity sets", appearance.grid().len(), 128 + 8 * k)?;
     let sets = match numbers {
         FEW => search::<D, FEW>(appearance, k, n, monitor)?,
         KEEP => search::<D, KEEP>(appearance, k, n, monitor)?,

@@ -35,6 +35,7 @@ use crate::foundation::fixed::{Frame, Frames, ONE, Place, apply};
 use crate::foundation::functions::root;
 use crate::foundation::grid::{Grid, Region};
 use crate::foundation::hash::Noise;
+use crate::foundation::memory;
 use crate::foundation::par::Monitor;
 use crate::{Error, Result};
 
@@ -164,6 +165,10 @@ pub fn stitch<const D: usize>(
     monitor: &Monitor,
 ) -> Result<Stitched<D>> {
     check(region, frames, given, options)?;
+    // Spectra of the exemplar, and of templates of its size.
+    let spectra = source.grid().len().saturating_mul(source.channels() + 4);
+    memory::room("what patches are searched in", spectra, 24)?;
+    memory::room("the stitched region", region.grid.len(), 24 * D)?;
     let mut canvas = Canvas::new(region.grid, matches!(frames, Frames::Dense(_)))?;
     for (p, _) in given.points.iter().enumerate().filter(|(_, held)| **held) {
         let stays = !given.loose.get(p).is_some_and(|&loose| loose);

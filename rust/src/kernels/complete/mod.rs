@@ -22,6 +22,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use crate::foundation::grid::Grid;
+use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::kernels::patch_search::{Index, Pick};
 use crate::kernels::seam::stitch::Stitcher;
@@ -101,6 +102,7 @@ pub fn complete(
 ) -> Result<Completion> {
     let [rows, columns] = canvas.grid.shape();
     let Options { patch, paper, .. } = *options;
+    memory::room("the completion", canvas.grid.len(), 32)?;
     if canvas.channels != index.channels() {
         let message = format!(
             "has {} channels, the exemplars have {}",

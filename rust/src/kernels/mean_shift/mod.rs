@@ -10,6 +10,7 @@
 mod window;
 
 use crate::foundation::grid::Grid;
+use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 #[cfg(target_arch = "x86_64")]
 use crate::foundation::wide::{V3, wide_fn};
@@ -59,6 +60,7 @@ pub fn filter(
             got: vec![image.len()],
         });
     }
+    memory::room("the image and its filtered copy", image.len(), 16)?;
     if options.radius > MAX_RADIUS {
         let message = format!("up to {MAX_RADIUS} pixels, got {}", options.radius);
         return Err(Error::value("radius", message));

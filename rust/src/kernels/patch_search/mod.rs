@@ -18,6 +18,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, OnceLock};
 
 use crate::foundation::functions::power_below;
+use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 use filter::{Plan, Scratch};
@@ -169,6 +170,8 @@ impl Index {
         for exemplar in &exemplars {
             check_exemplar(exemplar, channels)?;
         }
+        let samples = exemplars.iter().map(|e| e.data.len()).sum();
+        memory::room("what patches are searched in", samples, 24)?;
         let longest = |axis: usize| exemplars.iter().map(|e| e.shape[axis]).max().unwrap_or(1);
         let max_patch = [max_patch[0].min(longest(0)), max_patch[1].min(longest(1))];
         let shapes: Vec<_> = exemplars.iter().map(|e| e.shape).collect();

@@ -12,6 +12,7 @@ mod multigrid;
 mod sweep;
 mod transform;
 
+use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::foundation::wide::wide;
 use crate::{Error, Result};
@@ -69,6 +70,7 @@ pub fn solve(problem: &Problem<'_>, monitor: &Monitor) -> Result<Vec<f32>> {
             problem.domain.check(argument, gradients[axis].len())?;
         }
     }
+    memory::room("the solution", problem.image.len(), 4)?;
     let width = columns * channels;
     let mut out = vec![0.0; problem.image.len()];
     par::chunks_mut(&mut out, ROWS * width, |chunk, out| {
@@ -93,7 +95,9 @@ pub fn solve(problem: &Problem<'_>, monitor: &Monitor) -> Result<Vec<f32>> {
 /// the sum of the differences to the neighbours; 0 where values are kept.
 pub fn spread(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) -> Result<()> {
     domain.check("flow", flow.len())?;
-    let [rows, columns, _] = domain.shape;
+    let [rows, columns, channels] = domain.shape;
+    // A transposed copy, or levels of a pyramid.
+    memory::room("the solution", rows * columns, 12 * channels + 32)?;
     if !flow.is_empty() {
         match domain.mask {
             Some(mask) if !mask.iter().all(|&m| m) => {

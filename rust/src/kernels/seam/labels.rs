@@ -6,6 +6,7 @@ use super::cost::{capacity, check_costs, check_len, finest};
 use super::links;
 use super::maxflow::{Graph, Solver};
 use crate::foundation::grid::Grid;
+use crate::foundation::memory;
 use crate::foundation::par::Monitor;
 use crate::{Error, Result};
 
@@ -42,6 +43,7 @@ pub struct Labels {
 pub fn least_energy<const D: usize>(energy: &Energy<'_, D>, monitor: &Monitor) -> Result<Labels> {
     let n = energy.grid.len();
     check_len("unary", n, energy.unary.len())?;
+    memory::room("the graph of the labels", n, 64 * D)?;
     let mut largest = 0.0f32;
     for costs in energy.forward.iter().chain(&energy.backward) {
         check_len("pairwise", n, costs.len())?;

@@ -21,6 +21,7 @@ use super::overlap::Window;
 pub use super::overlap::{OldSeams, Overlap};
 use super::planar::ring::{Ring, Side, least_ring};
 use crate::foundation::grid::Grid;
+use crate::foundation::memory;
 use crate::foundation::par::Monitor;
 use crate::{Error, Result};
 
@@ -88,6 +89,7 @@ impl<const D: usize> Stitcher<D> {
     /// outside the overlap's images or contradict each other, values that are not finite in the overlap.
     pub fn cut(&mut self, overlap: &Overlap<'_, D>, monitor: &Monitor) -> Result<Stitched> {
         overlap.check()?;
+        memory::room("the graph of the seam", overlap.grid.len(), 80 * D)?;
         let mut b: Vec<bool> = overlap
             .mask_b
             .iter()

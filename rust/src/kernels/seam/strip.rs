@@ -7,6 +7,7 @@ use super::cost::{Cost, Pair, check_costs, check_len};
 use super::planar::{LONGEST, Strip, least_seam, longest};
 use super::stitch::Stitched;
 use crate::foundation::grid::Grid;
+use crate::foundation::memory;
 use crate::foundation::par::Monitor;
 use crate::{Error, Result};
 use std::borrow::Cow;
@@ -42,6 +43,8 @@ pub struct Pasted<'a> {
 /// # Errors
 /// Arrays that do not fit, fewer than two pixels along `axis`, values or penalties that are not finite, negative penalties.
 pub fn cut(pasted: &Pasted<'_>, monitor: &Monitor) -> Result<Stitched> {
+    let pixels = pasted.shape[0].saturating_mul(pasted.shape[1]);
+    memory::room("the costs of the seam", pixels, 64)?;
     let costs = match pasted.channels {
         1 => weigh::<1>(pasted),
         3 => weigh::<3>(pasted),
