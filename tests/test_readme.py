@@ -91,8 +91,20 @@ def test_the_readme_is_short() -> None:
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 120
 
 
+def test_commands_of_concepts_are_there() -> None:
+    from texrs.cli import GROUPS
+
+    known = {name for commands in GROUPS.values() for name in commands}
+    for page in (ROOT / "docs" / "concepts").glob("*.md"):
+        used = set(re.findall(r"`texrs ([a-z-]+) ", page.read_text(encoding="utf-8")))
+        assert used <= known, f"{page.name}: {used - known}"
+
+
 def test_links_lead_somewhere() -> None:
-    for page in [ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "guides").glob("*.md")]:
+    written = [
+        page for folder in (".", "guides", "concepts", "papers") for page in (ROOT / "docs" / folder).glob("*.md")
+    ]
+    for page in [ROOT / "README.md", *written]:
         for link in re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8")):
             if "://" not in link and "generated" not in link:
                 assert (page.parent / link).exists(), f"{page.name}: {link}"
