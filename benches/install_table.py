@@ -75,7 +75,9 @@ def spend(command: list[str], place: Path) -> tuple[float, str]:
     done = subprocess.run(command, cwd=place, env=environment, capture_output=True, text=True, check=False, timeout=900)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return spent, "" if done.returncode == 0 else (done.stderr.strip().splitlines() or ["failed"])[-1]
+    return spent, "" if done.returncode == 0 else (done.stderr.strip().splitlines() or ["failed"])[-1].partition(", ")[
+        0
+    ]
 
 
 def try_out(packages: list[str], picture: list[str], python: str) -> dict[str, Any]:
