@@ -16,7 +16,7 @@ unexport MAKEFLAGS
 help:
 	@echo "make demo    pictures of every system at work on built-in examples: demo/index.html"
 	@echo "make test    all tests, Rust and Python"
-	@echo "make fuzz    property tests with new random cases, for about ten minutes (MINUTES=10)"
+	@echo "make fuzz    random cases, hostile values, damaged files, for about ten minutes (MINUTES=10)"
 	@echo "make levels  stored results on lesser processors, some of them emulated (qemu-user)"
 	@echo "make lint    formatting, clippy, rustdoc, ruff, mypy, stubtest"
 	@echo "make format  rewrite the sources in the house's format"
@@ -58,13 +58,15 @@ test-rust: | requirements
 test-python: $(VENV)/.built
 	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 RAYON_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal -q
 
-# Rounds with a seed each, until one fails or the time is up; with a SEED, the round of that seed.
+# Property tests, all hostile values of all arguments, and damaged files. Rounds with a seed each, until one fails or the time is
+# up; with a SEED, the round of that seed.
 fuzz: $(VENV)/.built
 	@end=$$(($$(date +%s) + 60 * $(MINUTES))); \
 	while seed=$(or $(SEED),$$(od -An -N4 -tu4 /dev/urandom | tr -d ' ')); do \
 		echo "make fuzz SEED=$$seed"; \
 		PROPTEST_RNG_SEED=$$seed cargo test --quiet --lib && \
-		$(BIN)/python -m pytest tests -n $(JOBS) --dist worksteal -q -m hypothesis --hypothesis-profile fuzz --hypothesis-seed $$seed || \
+		$(BIN)/python -m pytest tests -n $(JOBS) --dist worksteal -q -m 'hypothesis or fuzz' --hypothesis-profile fuzz --hypothesis-seed $$seed && \
+		$(BIN)/python tests/fuzz_files.py --seed $$seed --seconds 300 || \
 			{ echo "make fuzz SEED=$$seed repeats this" >&2; exit 1; }; \
 		[ -z "$(SEED)" ] && [ $$(date +%s) -lt $$end ] || break; \
 	done

@@ -13,6 +13,7 @@ import pytest
 import tifffile
 
 import image_files as make
+import texrs
 from texrs import io as tio
 from texrs.errors import FileError, LimitExceeded, TexrsError
 
@@ -249,3 +250,26 @@ def test_reading_in_threads(files, tmp_path):
         thread.join(30)
     assert not wrong
     assert not any(thread.is_alive() for thread in threads)
+
+
+def test_damaged_stores_and_encodings_are_refused_in_a_sentence(tmp_path):
+    pytest.importorskip("zarr")
+    store = tmp_path / "a.zarr"
+    texrs.PlaneTexture(texrs.samples.dots((64, 64)).image).to_zarr(store, (32, 32), (32, 32))
+    head = store / "zarr.json"
+    whole = head.read_bytes()
+    for damaged in (whole[:-20], whole.replace(b'"', b"\xff"), b"[]"):
+        head.write_bytes(damaged)
+        for read in (tio.read, texrs.lazy.open):
+            with pytest.raises(TexrsError):
+                read(store)
+    path = tmp_path / "v.tif"
+    tio.write_volume(path, make.picture((6, 7, 8)))
+    data, chain = bytearray(path.read_bytes()), [4]
+    while at := int.from_bytes(data[chain[-1] : chain[-1] + 4], "little"):
+        chain.append(at + 2 + 12 * int.from_bytes(data[at : at + 2], "little"))
+    # The last page leads to the third, round and round.
+    data[chain[-1] : chain[-1] + 4] = data[chain[2] : chain[2] + 4]
+    path.write_bytes(data)
+    with pytest.raises(FileError, match="in a circle"):
+        tio.read_volume(path)

@@ -16,6 +16,7 @@ from texrs._checks import (
     as_bool,
     as_choice,
     as_float,
+    as_instance,
     as_int,
     as_items,
     as_list,
@@ -30,7 +31,7 @@ from texrs._checks import (
 )
 from texrs._conversion import as_ndarray
 from texrs._typing import Array, Bools, Floats
-from texrs.errors import InvalidInput
+from texrs.errors import InvalidInput, LimitExceeded
 
 __all__ = [
     "MAX_PIXELS",
@@ -39,6 +40,7 @@ __all__ = [
     "as_choice",
     "as_float",
     "as_image",
+    "as_instance",
     "as_int",
     "as_items",
     "as_list",
@@ -202,7 +204,7 @@ def try_array(value: object, dtype: DTypeLike | None = None) -> Array:
     """Return an array of a value; one of no entries, of objects by default, where it is none."""
     try:
         return np.asarray(value, dtype)
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, OverflowError, MemoryError):
         return np.empty(0, np.object_ if dtype is None else dtype)
 
 
@@ -211,8 +213,11 @@ def _make_contiguous(array: Array, name: str, dtype: np.dtype[Any]) -> Array:
     if array.dtype == dtype and array.flags.c_contiguous and array.flags.aligned:
         return array
     check_memory(array.size * dtype.itemsize, name)
-    with np.errstate(over="ignore"):
-        return np.require(array, dtype, ("C", "A"))
+    try:
+        with np.errstate(over="ignore"):
+            return np.require(array, dtype, ("C", "A"))
+    except MemoryError:
+        raise LimitExceeded(f"{name}: needs more memory than there is") from None
 
 
 def check_finite(array: Array, name: str) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from texrs._calls import check_call
 from texrs.errors import InvalidInput, LimitExceeded
 from texrs.limits._estimates import memory
 from texrs.limits._now import MAX_PIXELS as MAX_PIXELS
@@ -126,6 +127,14 @@ def check_work(
     check_memory(needed, name, limit=limit, way=way)
 
 
+def as_instance(value: object, name: str, *kinds: type) -> Any:
+    """Check that a value is of one of some classes."""
+    if not isinstance(value, kinds):
+        needed = " or a ".join(kind.__name__ for kind in kinds)
+        raise InvalidInput(f"{name}: needs a {needed}, got {type(value).__name__}")
+    return value
+
+
 def as_tuple(value: object, name: str, length: int, what: str) -> tuple[Any, ...]:
     """Check a sequence of so many entries; its length is looked at first, for it may be anything."""
     if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
@@ -174,15 +183,18 @@ def as_choice(value: object, name: str, allowed: Sequence[str]) -> str:
 
 def as_method(value: object, *allowed: str | None) -> None:
     """Check the name of an algorithm; None is the usual one."""
-    if value not in allowed:
+    if not isinstance(value, str | None) or value not in allowed:
         names = [repr(name) for name in allowed]
         raise InvalidInput(f"method: allowed are {', '.join(names[:-1])} and {names[-1]}, got {value!r}")
 
 
-def as_progress(value: object, name: str = "progress") -> Callable[..., object] | None:
-    """Check what is called while work goes on."""
-    if value is not None and not callable(value):
+def as_progress(value: object, name: str = "progress", *, stages: bool = False) -> Callable[..., object] | None:
+    """Check what is called while work goes on, with the share that is done, or with the ``stages`` too."""
+    if value is None:
+        return None
+    if not callable(value):
         raise InvalidInput(f"{name}: needs a function to call, or None; got {value!r}")
+    check_call(value, name, *(("stage", "share") if stages else ("share",)))
     return value
 
 

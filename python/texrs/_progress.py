@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from texrs._calls import check_call
 from texrs.errors import InvalidInput
 from texrs.limits._now import check_time, find_end
 
@@ -59,8 +60,9 @@ def _choose(progress: Progress | bool | None) -> Progress | None:
         return None
     if progress is True:
         return _make_bar() or show_lines(lambda line: print(line, file=sys.stderr, flush=True))
-    if not callable(progress):
+    if not callable(progress) or isinstance(progress, type):
         raise InvalidInput(f"progress: needs True, a function to call, or None; got {progress!r}")
+    check_call(progress, "progress", "stage", "share")
     return progress
 
 

@@ -18,7 +18,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_image, as_wrap, guidance
+from texrs._arrays import as_image, as_instance, as_wrap, guidance
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.exemplar import ElementOptions, Exemplar
@@ -154,6 +154,8 @@ def judge(
     True
 
     """
+    as_instance(source, "source", SourceMap)
+    as_instance(elements, "elements", ElementOptions)
     known = exemplar if isinstance(exemplar, Exemplar) else Exemplar(exemplar)
     if known.axes != 2 or source.shapes != (known.shape,):
         raise InvalidInput(f"source: needs one into a picture of {known.shape}, got one into {source.shapes}")

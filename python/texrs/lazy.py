@@ -30,12 +30,14 @@ import os
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from texrs._checks import as_int
 from texrs._chunks.items import Failed, map_items
 from texrs._chunks.store import Stored, import_zarr
 from texrs._chunks.words import share_words
 from texrs._chunks.workers import WorkerLost
 from texrs._typing import Path, Progress
 from texrs.errors import FileError, InvalidInput
+from texrs.io._files import as_path, translate_errors
 
 __all__ = ["Failed", "Stored", "WorkerLost", "map", "open"]
 
@@ -163,11 +165,17 @@ def open(path: Path, name: str | None = None, *, level: int = 0) -> Any:
     """
     from texrs._chunks.dasks import import_dask
 
-    zarr, array, where = import_zarr(), import_dask(), os.fspath(path)
+    zarr, array, where = import_zarr(), import_dask(), os.fspath(as_path(path))
     try:
         group = zarr.open_group(where, mode="r")
     except Exception as error:
         raise FileError(f"{where}: is no Zarr store ({error})") from None
+    with translate_errors(as_path(path), "opening the store"):
+        return _find_array(group, array, where, name, level)
+
+
+def _find_array(group: Any, array: Any, where: str, name: str | None, level: int) -> Any:
+    """Return the array of a map, of one level."""
     names = [*group.group_keys(), *group.array_keys()]
     if "ome" not in group.attrs and "multiscales" not in group.attrs:
         if name is None and len(names) != 1:
@@ -179,8 +187,7 @@ def open(path: Path, name: str | None = None, *, level: int = 0) -> Any:
             return array.from_array(group, chunks=group.chunks)
     said = group.attrs.get("ome", group.attrs).get("multiscales", [{}])[0]
     paths = [each["path"] for each in said.get("datasets", [])]
-    if not 0 <= level < len(paths):
-        raise InvalidInput(f"level: there are {len(paths)}, got {level}")
+    level = as_int(level, "level", 0, max(0, len(paths) - 1))
     found = array.from_array(group[paths[level]], chunks=group[paths[level]].chunks)
     kinds = [axis.get("type") for axis in said.get("axes", [])]
     return array.moveaxis(found, kinds.index("channel"), -1) if "channel" in kinds else found

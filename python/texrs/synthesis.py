@@ -90,8 +90,9 @@ class Synthesis:
 
         """
         from texrs.io import atomic, write
+        from texrs.io._files import as_path
 
-        directory = FilePath(folder)
+        directory = as_path(folder)
         directory.mkdir(parents=True, exist_ok=True)
         paths = []
         for i, (name, stage) in enumerate(self.stages.items(), start=1):

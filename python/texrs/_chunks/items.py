@@ -22,6 +22,7 @@ from texrs._progress import listen
 from texrs._typing import Array, Path, Progress
 from texrs._version import __version__
 from texrs.errors import FileError, InvalidInput, TexrsError
+from texrs.io._files import as_path
 
 __all__ = ["Failed", "map_items"]
 
@@ -72,7 +73,7 @@ def map_items(
     lattice = (len(given),) if shape is None else _as_lattice(shape, len(given))
     record = {"version": __version__, "of": key or _digest(function, given), "items": list(lattice)}
     group = open_group(path, record, {}, overwrite=overwrite)
-    store, work = os.fspath(path), _Item(function, given, os.fspath(path), lattice)
+    store, work = os.fspath(as_path(path)), _Item(function, given, os.fspath(path), lattice)
     todo = _find_missing(group, lattice)
     total, made, reasons = len(given), 0, dict[int, str]()
     there = total - len(todo)

@@ -44,7 +44,7 @@ class Part:
 
     def name(self, map: str | None) -> str:
         """Check the name of a map; None is the one that shows what it is."""
-        if map is not None and map not in self.reader.maps:
+        if map is not None and (not isinstance(map, str) or map not in self.reader.maps):
             raise InvalidInput(f"map: there is no {map!r}; there are {', '.join(self.reader.maps)}")
         return map or self.base
 

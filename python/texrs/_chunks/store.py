@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from texrs._checks import as_int
+from texrs._checks import as_float, as_instance, as_int, as_tuple
 from texrs._chunks import workers
 from texrs._chunks.grid import Box, Grid
 from texrs._chunks.pyramid import count_levels, halve_block
@@ -21,6 +21,7 @@ from texrs._progress import listen
 from texrs._typing import Array, Path, Progress
 from texrs._version import __version__
 from texrs.errors import FileError, InvalidInput
+from texrs.io._files import as_path
 from texrs.io._ome import describe_image
 
 __all__ = ["Stored", "import_zarr", "list_done", "open_group", "write_image"]
@@ -90,7 +91,7 @@ def open_group(path: Path, record: Mapping[str, Any], attributes: Mapping[str, A
         Something else is there, and is not to be replaced.
 
     """
-    zarr, name = import_zarr(), os.fspath(path)
+    zarr, name = import_zarr(), os.fspath(as_path(path))
     # As it comes back from JSON.
     said = json.loads(json.dumps(dict(record)))
     try:
@@ -199,7 +200,12 @@ def write_image(
     grids = [grid]
     while len(grids) < count:
         grids.append(grids[-1].halved())
-    start, apart = tuple(origin or (0,) * axes), tuple(spacing or (1.0,) * axes)
+    start, apart = tuple(origin or (0,) * axes), (1.0,) * axes
+    if spacing is not None:
+        steps = as_tuple(spacing, "spacing", axes, f"{axes} numbers, one an axis")
+        apart = tuple(as_float(s, "spacing", 1e-12, 1e12) for s in steps)
+    if unit is not None:
+        as_instance(unit, "unit", str)
     record = {
         "version": __version__,
         "of": reader.key,

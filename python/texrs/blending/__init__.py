@@ -23,6 +23,7 @@ from texrs._arrays import (
     as_choice,
     as_float,
     as_image,
+    as_instance,
     as_int,
     as_list,
     as_mask,
@@ -153,6 +154,7 @@ def blend(
 
     """
     progress = listen(progress)
+    as_instance(source, "source", SourceMap)
     if source.axes != 2:
         raise InvalidInput("source: a picture is needed, got the source map of a volume")
     cyclic, across, outlines = as_wrap(wrap), as_bool(across, "across"), as_bool(outlines, "outlines")
@@ -250,7 +252,10 @@ def apply(
 
     """
     progress = listen(progress)
+    as_instance(source, "source", SourceMap)
     as_choice(kind, "kind", ("colour", "normal", "vector", "label"))
+    if finish is not None:
+        as_instance(finish, "finish", Finish)
     if kind == "label":
         return source.render(exemplars, interpolation="nearest")
     how = finish or source.finish

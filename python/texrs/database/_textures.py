@@ -123,7 +123,7 @@ class TextureDatabase:
         return iter(sorted(self._folder.read()))
 
     def __contains__(self, name: object) -> bool:
-        return name in self._folder.read()
+        return isinstance(name, str) and name in self._folder.read()
 
     def __getitem__(self, name: str) -> Elements:
         """Return an entry, remade if it has to be."""
@@ -462,7 +462,7 @@ class TextureDatabase:
 
     def _find_record(self, name: str) -> Record:
         found = self._folder.read()
-        if name not in found:
+        if not isinstance(name, str) or name not in found:
             there = ", ".join(sorted(found)[:8]) or "none"
             raise InvalidInput(f"name: there is no texture {name!r} in {self.path}; there are {there}")
         return found[name]

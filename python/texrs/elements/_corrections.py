@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float, as_int
+from texrs._arrays import as_float, as_instance, as_int
 from texrs._typing import Bools
 from texrs.elements._arguments import as_points, find_contradiction
 from texrs.elements._elements import Elements
@@ -75,6 +75,7 @@ def correct(entry: Elements, steps: object) -> Elements:
     1
 
     """
+    as_instance(entry, "entry", Elements)
     known = read_steps(steps)
     for number, step in enumerate(known):
         try:

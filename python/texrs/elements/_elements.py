@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import MAX_PIXELS, as_image, as_wrap
+from texrs._arrays import MAX_PIXELS, as_image, as_instance, as_wrap
 from texrs._engine.coherence import Similarity
 from texrs._show import as_png
 from texrs._typing import Array, Labels, Path
@@ -135,6 +135,7 @@ class Elements:
         Elements(3 of box (25, 47) in 96 x 96, jointed)
 
         """
+        as_instance(sample, "sample", Sample)
         if sample.centres is None or sample.labels is None or sample.image.ndim > 3 or len(sample.centres) < 3:
             raise InvalidInput(f"sample: needs a picture with three known elements or more, got {sample!r}")
         mask = sample.labels > 0 if sample.mask is None else sample.mask

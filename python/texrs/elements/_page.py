@@ -8,6 +8,7 @@ from html import escape
 
 import imageio.v3 as iio
 
+from texrs._checks import as_instance
 from texrs._version import __version__
 from texrs.elements._drawing import Picture, draw_plain
 from texrs.elements._elements import Elements
@@ -41,6 +42,8 @@ def page(entry: Elements, title: str = "elements") -> str:
     '<!doctype html>'
 
     """
+    as_instance(entry, "entry", Elements)
+    as_instance(title, "title", str)
     drawn, report = pictures(entry), entry.report
     height, width = entry.image.shape[:2]
     rows = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from texrs._checks import as_instance
 from texrs._digits import write_number
 from texrs.elements._drawing import Picture, draw_dot, draw_plain, mark_points
 from texrs.elements._elements import Elements
@@ -36,6 +37,7 @@ def pictures(entry: Elements) -> dict[str, Picture]:
     ['mask', 'numbers', 'points']
 
     """
+    as_instance(entry, "entry", Elements)
     plain = draw_plain(entry.image)
     dimmed = np.where(entry.mask[..., np.newaxis], plain, (1 - DIM) * plain + DIM * GROUND)
     drawn = mark_points(plain, entry.points, entry.box)

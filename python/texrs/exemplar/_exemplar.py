@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
-from texrs._arrays import MAX_PIXELS, as_image, as_int, as_ndarray, as_wrap, guidance, to_unit
+from texrs._arrays import MAX_PIXELS, as_image, as_instance, as_int, as_items, as_ndarray, as_wrap, guidance, to_unit
 from texrs._cache import Cache, content_hash
 from texrs._engine.coherence import Similarity, find_similar
 from texrs._engine.stitcher import Stitcher
@@ -193,7 +193,9 @@ class Exemplar:
 
         """
         _check_sides(self.shape, "exemplar", COARSEST)
-        near = tuple(as_int(r, "radii", 1, 8) for r in radii)
+        near = tuple(as_int(r, "radii", 1, 8) for r in as_items(radii, "radii"))
+        if not near:
+            raise InvalidInput("radii: needs at least one")
         least = as_int(coarsest, "coarsest", 2 * max(near) + 2, 1 << 16)
         count = count_levels(self.shape, least)
         return self.remember(
@@ -247,6 +249,7 @@ class Exemplar:
         """
         levels = self.analyse(coarsest=coarsest).levels
         number = as_int(level, "level", -len(levels), len(levels) - 1) % len(levels)
+        k, n, numbers = as_int(k, "k", 1, 16), as_int(n, "n", 1, 1 << 16), as_int(numbers, "numbers", 1, 1 << 16)
         return self.remember(
             ("similarity", coarsest, number, k, n, numbers),
             lambda: find_similar(levels[number], k=k, n=n, numbers=numbers, progress=progress),
@@ -313,6 +316,7 @@ class Exemplar:
 
         """
         progress = listen(progress)
+        as_instance(options, "options", ElementOptions)
         return self.remember(
             ("segmentation", options.key), lambda: segment(self._pixels, options, progress=progress).freeze()
         )

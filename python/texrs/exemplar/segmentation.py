@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_choice, as_image, as_int, as_list, as_rgb, to_unit
+from texrs._arrays import as_choice, as_image, as_instance, as_int, as_list, as_rgb, to_unit
 from texrs._cache import content_hash
 from texrs._engine.noise import uniform
 from texrs._progress import listen
@@ -252,6 +252,7 @@ def segment(
     18
 
     """
+    as_instance(options, "options", ElementOptions)
     progress = listen(progress)
     pixels = as_image(image)
     height, width = pixels.shape[:2]

@@ -89,6 +89,8 @@ def make(array: Any, extent: Sequence[int] | None = None, *, axes: int | None = 
     """Return the field of an array of directions, (R, C, 2) or (P, R, C, 3), or of frames, (..., A, A)."""
     given = try_array(array)
     count = given.shape[-1] if given.ndim else 0
+    if extent is not None and not isinstance(extent, Sequence):
+        raise InvalidInput(f"extent: needs the sides of the output, got {extent!r}")
     if count in (2, 3) and given.ndim == count + 1:
         field = from_directions(given, extent if extent is None or len(extent) == count else None, **options)
     elif count in (2, 3) and given.ndim == count + 2:

@@ -50,7 +50,7 @@ from math import atan, degrees, prod
 
 import numpy as np
 
-from texrs._checks import as_limit
+from texrs._checks import as_items, as_limit
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput
@@ -379,7 +379,7 @@ def write_slabs(path: PathLike, slabs: Iterable[Array], shape: Sequence[int], *,
     sides = _slabs.as_shape(shape)
     with atomic(target, overwrite=overwrite) as temporary:
         # What a slab's maker raises is its own affair and passes as it is.
-        parts = _slabs.check((check(slab, suffix, 3) for slab in slabs), sides)
+        parts = _slabs.check((check(slab, suffix, 3) for slab in as_items(slabs, "slabs")), sides)
         first = next(parts)
         whole = chain((first,), parts)
         if suffix == ".npy":

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from texrs._checks import as_bool
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput, LimitExceeded, TexrsError
@@ -21,12 +22,20 @@ BYTES_PER_PIXEL = 16
 """Bytes that what is read may have for each pixel of the limit: four floats."""
 
 
+_LONGEST = 255
+"""Bytes that the name of a file or of a folder may have."""
+
+
 def as_path(path: PathLike) -> Path:
     """Check that a path was given."""
     if not isinstance(path, str | os.PathLike) or not isinstance(os.fspath(path), str):
         raise InvalidInput(f"path: needs a str or a pathlib.Path, got {type(path).__name__}")
     if "\0" in os.fspath(path):
         raise FileError(f"{os.fspath(path)!r}: a path cannot contain the null character")
+    if any(len(os.fsencode(part)) > _LONGEST for part in Path(path).parts):
+        raise FileError(
+            f"{os.fspath(path)[:40]}...: cannot be read and cannot be written; a name has up to {_LONGEST} bytes"
+        )
     return Path(path)
 
 
@@ -152,7 +161,7 @@ def atomic(path: PathLike, *, overwrite: bool = True) -> Iterator[Path]:
         exists = os.path.lexists(final)
         if exists and not final.is_file():
             raise FileError(f"{target}: is not a regular file and is not replaced")
-        if exists and not overwrite:
+        if not as_bool(overwrite, "overwrite") and exists:
             raise FileError(f"{target}: exists already; overwrite=True replaces it")
         if exists and not os.access(final, os.W_OK):
             raise FileError(f"{target}: is write-protected")

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from numbers import Integral
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,9 @@ from texrs.errors import InvalidInput
 
 def as_shape(shape: object) -> tuple[int, ...]:
     """Check the shape of a volume, with or without channels."""
-    sides = tuple(shape) if isinstance(shape, Sequence | np.ndarray) and not isinstance(shape, str) else ()
+    sides: tuple[Any, ...] = ()
+    if isinstance(shape, list | tuple) or (isinstance(shape, np.ndarray) and shape.ndim == 1):
+        sides = tuple(shape[:5])
     if len(sides) not in (3, 4) or not all(isinstance(n, Integral) and 1 <= int(n) < 2**40 for n in sides):
         raise InvalidInput(f"shape: needs (D, H, W) or (D, H, W, C) as integers of at least 1, got {shape!r}")
     return tuple(int(n) for n in sides)

@@ -49,6 +49,7 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
     length = check_file(path)
     # OME files can name other files to read; this one is all that was asked for.
     with translate_errors(path, "decoding"), _mute(), tifffile.TiffFile(path, is_ome=False) as tif:
+        _check_chain(path, tif, length)
         if not tif.series or not tif.pages:
             raise FileError(f"{path}: holds no image")
         series, first = tif.series[0], tif.pages.first
@@ -118,6 +119,21 @@ def _read_sides(path: Path, axes: str, shape: tuple[int, ...]) -> tuple[tuple[in
     channels = size.get("S", 1) * size.get("C", 1)
     planes = prod(n for axis, n in size.items() if axis not in "YXSC")
     return (planes, size["Y"], size["X"]), channels
+
+
+def _check_chain(path: Path, tif: Any, length: int) -> None:
+    """Check that the pages of a file, each of which says where the next is, end, and lie beside each other."""
+    layout, file, at = tif.tiff, tif.filehandle, tif.pages.first.offset if tif.pages else 0
+    order: Any = "big" if tif.byteorder == ">" else "little"
+    least, seen = layout.tagnosize + layout.tagsize + layout.offsetsize, set()
+    while 0 < at < length:
+        seen.add(at)
+        file.seek(at)
+        count = int.from_bytes(file.read(layout.tagnosize), order)
+        file.seek(at + layout.tagnosize + count * layout.tagsize)
+        at = int.from_bytes(file.read(layout.offsetsize), order)
+        if at in seen or len(seen) * least > length:
+            raise FileError(f"{path}: is corrupt; its pages lead to each other in a circle")
 
 
 def _check_tags(path: Path, tif: Any, page: Any) -> None:

@@ -314,11 +314,16 @@ def read_vti(path: Path, limit: int) -> Array:
             raise FileError(f"{path}: is cut off; not all of its samples are there")
         out, filled = bytearray(size + 8), 0
         while filled < size + 8:
-            part = base64.b64decode(file.read(min(2**22, -(-(size + 8 - filled) // 3) * 4)), validate=True)
+            with translate_errors(path, "decoding"):
+                part = base64.b64decode(file.read(min(2**22, -(-(size + 8 - filled) // 3) * 4)), validate=True)
+            if not part:
+                raise FileError(f"{path}: is cut off; not all of its samples are there")
             out[filled : filled + len(part)] = part
             filled += len(part)
         if int.from_bytes(out[:8], "little") != size:
             raise FileError(f"{path}: says that its samples are of another length than its extent")
+    if len(out) != size + 8:
+        raise FileError(f"{path}: is corrupt; its samples are not encoded as they should be")
     return _tidy(np.frombuffer(out, dtype, offset=8).reshape(*sizes[::-1], channels))
 
 

@@ -99,7 +99,7 @@ def mean_shift(
         as_int(max_iterations, "max_iterations", 0, 2**31 - 1),
         near,
         as_wrap(wrap),
-        stage(as_progress(progress), "mean shift"),
+        stage(as_progress(progress, stages=True), "mean shift"),
     )
     if given.dtype.kind in "bui":
         found = np.rint(found)

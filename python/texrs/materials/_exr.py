@@ -28,6 +28,7 @@ from texrs._checks import as_float
 from texrs._colours import encode_srgb, to_light, to_pixels
 from texrs._typing import Array, Path
 from texrs.errors import FileError, InvalidInput
+from texrs.io._files import as_path
 from texrs.io._layers import read_layers, write_layers
 from texrs.materials._files import shorten
 from texrs.materials._map import Map
@@ -45,7 +46,7 @@ PICTURE = "colour"
 
 def write_exr(maps: Mapping[str, Map], path: Path, depth: int | None, weights: Mapping[str, float]) -> FilePath:
     """Write each map as a layer, and in the header what values cannot say."""
-    target = FilePath(path)
+    target = as_path(path)
     if target.suffix.lower() != ".exr":
         raise FileError(f"{path}: layers are written to .exr, not to {target.suffix!r}")
     channels: dict[str, Array] = {}

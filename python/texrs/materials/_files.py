@@ -14,6 +14,7 @@ from texrs._arrays import to_unit
 from texrs._threads import SideBySide
 from texrs._typing import Array, Path
 from texrs.errors import FileError, InvalidInput
+from texrs.io._files import as_path
 from texrs.materials._map import Map
 from texrs.materials._mipmaps import halve
 from texrs.materials._roles import Role, as_role, guess_role
@@ -47,7 +48,7 @@ SMALLER = "mipmaps"
 
 def read_maps(path: Path, roles: dict[str, Role | str], axes: int) -> tuple[dict[str, Array], dict[str, Role]]:
     """Return the maps of a folder and their roles, by the names that they have without what is common to all."""
-    folder = FilePath(path)
+    folder = as_path(path)
     if not folder.is_dir():
         raise FileError(f"{path}: is not a folder of maps")
     files = {f.name: f for f in sorted(folder.iterdir()) if f.is_file() and f.name.lower().endswith(SUFFIXES)}
@@ -110,7 +111,7 @@ def write_maps(
     mipmaps: bool = False,
 ) -> list[FilePath]:
     """Write each map under its name; all files take their names when all are written."""
-    place = FilePath(folder)
+    place = as_path(folder)
     smaller = place / SMALLER
     for needed in (place, smaller) if mipmaps else (place,):
         if needed.exists() and not needed.is_dir():

@@ -23,6 +23,7 @@ from texrs._colours import encode_srgb
 from texrs._typing import Array, Floats, Path
 from texrs._version import __version__
 from texrs.errors import FileError, InvalidInput
+from texrs.io._files import as_path
 from texrs.io._image_io import encode
 from texrs.materials._light import find_map
 from texrs.materials._map import Map
@@ -53,7 +54,7 @@ WORDS = {"VEC2": 2, "VEC3": 3, "VEC4": 4, "SCALAR": 1}
 
 def write_gltf(maps: Mapping[str, Map], path: Path, shapes: Sequence[str], repeat: int, depth: int) -> list[FilePath]:
     """Write a material on shapes, and return the files."""
-    target = FilePath(path)
+    target = as_path(path)
     suffix = target.suffix.lower()
     if suffix not in (".gltf", ".glb"):
         raise FileError(f"{path}: the suffix {target.suffix!r} is not one of glTF: .gltf, .glb")

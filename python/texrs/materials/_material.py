@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from pathlib import Path as FilePath
 from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 
-from texrs._arrays import as_choice, as_float, as_image, as_int
+from texrs._arrays import as_choice, as_float, as_image, as_instance, as_int
 from texrs._cache import content_hash
 from texrs._progress import listen
 from texrs._show import as_png
@@ -19,6 +18,7 @@ from texrs._threads import SideBySide
 from texrs._typing import Array, Floats, Path, Progress
 from texrs.blending import apply
 from texrs.errors import InvalidInput
+from texrs.io._files import as_path
 from texrs.materials._exports import Exports
 from texrs.materials._guide import WEIGHTS, make_guides, take_features
 from texrs.materials._map import Map, Space
@@ -86,6 +86,9 @@ class Material(Exports):
         if not isinstance(maps, Mapping) or not maps:
             raise InvalidInput("maps: needs a mapping of names to arrays, with at least one")
         self._axes = as_int(axes, "axes", 2, 3)
+        for option, given in (("roles", roles), ("spaces", spaces), ("weights", weights)):
+            if given is not None and not isinstance(given, Mapping):
+                raise InvalidInput(f"{option}: needs a mapping by the names of maps, got {given!r}")
         said, how, share = dict(roles or {}), dict(spaces or {}), dict(weights or {})
         for option, given in (("roles", said), ("spaces", how), ("weights", share)):
             if unknown := given.keys() - maps.keys():
@@ -169,7 +172,10 @@ class Material(Exports):
         from texrs.materials._exr import read_exr
         from texrs.materials._files import read_maps
 
-        if FilePath(path).suffix.lower() == ".exr" and not FilePath(path).is_dir():
+        place = as_path(path)
+        if roles is not None and not isinstance(roles, Mapping):
+            raise InvalidInput(f"roles: needs a mapping of names to roles, got {roles!r}")
+        if place.suffix.lower() == ".exr" and not place.is_dir():
             if axes != 2:
                 raise InvalidInput(f"axes: the layers of {path} are pictures, got {axes}")
             layers, found, weights = read_exr(path, dict(roles or {}))
@@ -397,7 +403,7 @@ class Material(Exports):
 
         """
         progress = listen(progress)
-        return apply_materials([self], source, progress)
+        return apply_materials([self], as_instance(source, "source", SourceMap), progress)
 
 
 def guide_materials(materials: Sequence[Material]) -> list[Array]:

@@ -15,6 +15,7 @@ import numpy as np
 from texrs import io
 from texrs._typing import Array, Path
 from texrs.errors import FileError, InvalidInput
+from texrs.io._files import as_path
 from texrs.materials._files import choose_suffix, convert, write_maps
 from texrs.materials._light import find_map
 from texrs.materials._map import Map
@@ -42,7 +43,7 @@ USED = (
 
 def write_materialx(maps: Mapping[str, Map], path: Path, depth: int | None) -> list[FilePath]:
     """Write a document and the maps that it names, and return the files."""
-    target = FilePath(path)
+    target = as_path(path)
     if target.suffix.lower() != ".mtlx":
         raise FileError(f"{path}: the suffix {target.suffix!r} is not that of MaterialX: .mtlx")
     chosen = {role: name for role in USED for name, each in maps.items() if each is find_map(maps, role)}

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_array, as_float, as_size
 from texrs._typing import Array
 from texrs.errors import InvalidInput
-from texrs.planes._projective import along, find_focal, lift, to_digits, to_grid, transform
+from texrs.planes._projective import along, as_places, find_focal, lift, to_digits, to_grid, transform
 from texrs.scale_maps._kinds import AREAS, ScaleMap, as_kind, find_kind
 from texrs.scale_maps._maps import LEAST, as_map
 from texrs.scale_maps._plane import Plane as Slope
@@ -411,7 +411,7 @@ class Plane:
         1.0
 
         """
-        return 1 + along(np.asarray(points, np.float64) - self.middle, self._rise)
+        return 1 + along(as_places(points) - self.middle, self._rise)
 
     def scale_map(self, kind: Literal["width", "area"] = "width") -> ScaleMap:
         """Return how large things are at each pixel.
@@ -468,7 +468,7 @@ class Plane:
         [0.0, 0.0]
 
         """
-        given = np.asarray(points, np.float64)
+        given = as_places(points)
         wide = np.maximum(self.width(given), LEAST)
         return transform(self._affine, given - self.middle) / wide[..., np.newaxis]
 
@@ -498,7 +498,7 @@ class Plane:
         [[10.0, 20.0]]
 
         """
-        given = transform(self._inverse, np.asarray(points, np.float64))
+        given = transform(self._inverse, as_places(points))
         nearness = 1 - along(given, self._rise)
         with np.errstate(divide="ignore", invalid="ignore"):
             seen = given / np.where(nearness > 0, nearness, np.nan)[..., np.newaxis]
@@ -529,7 +529,7 @@ class Plane:
         [[0.5, 0.0], [0.0, 1.0]]
 
         """
-        given = transform(self._inverse, np.asarray(points, np.float64))
+        given = transform(self._inverse, as_places(points))
         wide = (1 / (1 - along(given, self._rise)))[..., np.newaxis, np.newaxis]
         bent = np.eye(2) + wide * given[..., :, np.newaxis] * self._rise
         return np.asarray(wide * np.einsum("...ij,jk->...ik", bent, self._inverse), np.float64)

@@ -9,6 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import try_array
+from texrs.errors import InvalidInput
+
 DIGITS = 12
 """Significant digits of what is found: the last bits hang on the processor."""
 GRID = 2.0**40
@@ -29,6 +32,16 @@ def lift(points: NDArray[np.float64], size: tuple[int, ...]) -> NDArray[np.float
 def to_grid(values: Any) -> NDArray[np.float64]:
     """Return values with their last bits off, which hang on the processor."""
     return np.asarray(np.rint(np.multiply(values, GRID)) / GRID, np.float64)
+
+
+def as_places(points: object) -> NDArray[np.float64]:
+    """Check points (..., 2) of a picture or of a plane."""
+    given = try_array(points)
+    if given.dtype.kind not in "buif" or given.shape[-1:] != (2,):
+        raise InvalidInput(
+            f"points: needs numbers (..., 2), rows and columns, got {given.dtype} of shape {given.shape}"
+        )
+    return np.asarray(given, np.float64)
 
 
 def along(points: NDArray[np.float64], way: NDArray[np.float64]) -> NDArray[np.float64]:

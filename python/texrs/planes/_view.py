@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from texrs._arrays import as_array, as_float, as_mask
+from texrs._arrays import as_array, as_float, as_items, as_mask, as_size
 from texrs._typing import Array, Bools
 from texrs.errors import InvalidInput
 from texrs.planes._plane import FOV, STEEPEST, Plane
@@ -141,7 +141,8 @@ class View:
         ((64, 96), True)
 
         """
-        size = shape[0], shape[1]
+        rows, columns = as_size(list(as_items(shape, "shape"))[:2], "shape")
+        size = rows, columns
         ground = None if self.ground is None else as_mask(self.ground, "ground", size)
         if ground is not None and not ground.any():
             raise InvalidInput("ground: marks nothing, so the plane is nowhere seen")

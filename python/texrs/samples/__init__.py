@@ -168,9 +168,9 @@ def load(name: str, **options: Any) -> Sample:
     >>> samples.load("weave", size=(64, 96), seed=2).image.shape
     (64, 96, 3)
     """
-    if name in _GENERATORS:
+    if isinstance(name, str) and name in _GENERATORS:
         return _GENERATORS[name](**options)
-    if name in PHOTOGRAPHS:
+    if isinstance(name, str) and name in PHOTOGRAPHS:
         if options:
             raise InvalidInput(f"a photograph takes no options, {name!r} got {', '.join(options)}")
         return photograph(name)

@@ -41,7 +41,7 @@ def photograph(name: str) -> Sample:
     >>> samples.photograph("brick").image.shape
     (512, 512)
     """
-    if name not in PHOTOGRAPHS:
+    if not isinstance(name, str) or name not in PHOTOGRAPHS:
         raise InvalidInput(f"name must be one of {', '.join(PHOTOGRAPHS)}, got {name!r}")
     from skimage import data
 

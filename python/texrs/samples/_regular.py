@@ -7,7 +7,7 @@ from math import pi
 
 import numpy as np
 
-from texrs._arrays import as_size
+from texrs._arrays import as_bool, as_size
 from texrs.samples._noise import Floats, mix, palette, ramp, shades, single
 from texrs.samples._sample import MIN_SIDE, Sample, make_generator
 from texrs.samples._scene import Scene
@@ -50,7 +50,7 @@ def bricks(size: Sequence[int] = (256, 256), *, seed: int = 0, wrap: bool = Fals
     """
     rng = make_generator("bricks", seed)
     rows, cols = as_size(size, minimum=MIN_SIDE)
-    if wrap:
+    if as_bool(wrap, "wrap"):
         scene = Scene((rows, cols), rng)
         courses = 2 * max(round(rows / (2 * _COURSE)), 1)
         across = max(round(cols / _BRICK), 1)

@@ -14,6 +14,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import as_bool
 from texrs.samples._noise import Floats, blur, clouds, encode, fold, light
 from texrs.samples._sample import LayoutName, Sample
 
@@ -66,7 +67,7 @@ class Scene:
     @classmethod
     def around(cls, size: tuple[int, ...], rng: np.random.Generator, *, wrap: bool, margin: int) -> Scene:
         """Return a scene of the picture alone (`wrap`) or with `margin` pixels around it."""
-        if wrap:
+        if as_bool(wrap, "wrap"):
             return cls(size, rng)
         period = (size[0] + 2 * margin, size[1] + 2 * margin)
         return cls(size, rng, period=period, origin=(margin, margin))

@@ -8,7 +8,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_size
+from texrs._arrays import as_bool, as_size
 from texrs.samples._noise import Floats, clouds, encode, mix, palette, ramp, shades, single, transform
 from texrs.samples._sample import MIN_SIDE, Sample, make_generator
 
@@ -160,7 +160,7 @@ def weave_solid(size: Sequence[int] = _CUBE, *, seed: int = 0, wrap: bool = Fals
     """
     rng = make_generator("weave_solid", seed)
     shape = as_size(size, axes=3, minimum=MIN_SIDE)
-    period = shape if wrap else tuple(32 * -(-n // 32) for n in shape)
+    period = shape if as_bool(wrap, "wrap") else tuple(32 * -(-n // 32) for n in shape)
     counts = [2 * max(round(n / 32), 1) for n in period]
     z, y, x = (
         at * np.float32(c / n) + np.float32(0.05) * clouds(period, rng, coarse=40, fine=12)

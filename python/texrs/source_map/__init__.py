@@ -13,7 +13,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_image, as_list, as_ndarray
+from texrs._arrays import as_bool, as_image, as_instance, as_int, as_items, as_list, as_ndarray, as_wrap
+from texrs._checks import check_pixels
 from texrs._show import as_png
 from texrs._typing import Array, Bools, Frames, Interpolation, Path
 from texrs.errors import InvalidInput
@@ -107,8 +108,12 @@ class SourceMap(Parted):
         array([1., 2.], dtype=float32)
 
         """
-        grid = np.stack(np.meshgrid(*(np.arange(n, dtype=np.float32) for n in shape), indexing="ij"), axis=-1)
-        return cls.from_coordinates(grid, tuple(shape))
+        sides = tuple(as_int(n, "shape", 1, 2**31 - 1) for n in as_items(shape, "shape"))
+        if len(sides) not in (2, 3):
+            raise InvalidInput(f"shape: needs (rows, columns) or (planes, rows, columns), got {shape!r}")
+        check_pixels(sides, "shape")
+        grid = np.stack(np.meshgrid(*(np.arange(n, dtype=np.float32) for n in sides), indexing="ij"), axis=-1)
+        return cls.from_coordinates(grid, sides)
 
     @classmethod
     def from_coordinates(
@@ -152,6 +157,11 @@ class SourceMap(Parted):
                [5, 4, 3]], dtype=uint8)
 
         """
+        if not isinstance(coordinates, np.ndarray) or coordinates.shape[-1:] not in ((2,), (3,)):
+            what = getattr(coordinates, "shape", type(coordinates).__name__)
+            raise InvalidInput(
+                f"coordinates: needs an array (rows, columns, 2) or (planes, rows, columns, 3), got {what}"
+            )
         sides = coordinates.shape[:-1]
         patches = np.zeros(sides, np.uint32) if label is None else label
         return cls(coordinates, np.zeros(sides, np.uint16), patches, frame, (shape,))
@@ -182,7 +192,7 @@ class SourceMap(Parted):
         0.15
 
         """
-        return replace(self, finish=Finish(tuple(wrap), **how))
+        return replace(self, finish=Finish(as_wrap(wrap, axes=self.axes), **how))
 
     def frames(self) -> NDArray[np.float32]:
         """Return the Jacobian J of every pixel.
@@ -258,7 +268,7 @@ class SourceMap(Parted):
             if image.shape[: self.axes] != shape:
                 raise InvalidInput(f"exemplars: number {i} needs size {shape}, got {image.shape[: self.axes]}")
         out = gather(several, self.coordinates, self.exemplar, interpolation=interpolation)
-        if antialias and interpolation != "nearest":
+        if as_bool(antialias, "antialias") and interpolation != "nearest":
             out = gather_smoothed(out, several, self.coordinates, self.exemplar, find_shrinking(self), interpolation)
         if kind == "colour":
             return out
@@ -300,7 +310,9 @@ class SourceMap(Parted):
         True
 
         """
-        maps = [inner] if isinstance(inner, SourceMap) else list(inner)
+        maps = [inner] if isinstance(inner, SourceMap) else list(as_items(inner, "inner"))
+        for each in maps:
+            as_instance(each, "inner", SourceMap)
         if tuple(m.shape for m in maps) != self.shapes:
             raise InvalidInput(f"inner: needs outputs of sizes {self.shapes}, got {[m.shape for m in maps]}")
         if any(m.shapes != maps[0].shapes for m in maps):
@@ -390,7 +402,7 @@ class SourceMap(Parted):
                [ True,  True, False]])
 
         """
-        return find_continued(self, axis, wrap=wrap)
+        return find_continued(self, as_int(axis, "axis", 0, self.axes - 1), wrap=as_bool(wrap, "wrap"))
 
     def reuse(self) -> Reuse:
         """Return how much is copied verbatim from the exemplars, and in how large pieces.

@@ -132,9 +132,13 @@ class Parted:
         <SourceMap of 4 x 20 into 20 x 30>
 
         """
-        fits = len(box) == self.axes and all(
-            isinstance(s, slice) and s.step is None and 0 <= (s.start or 0) < (s.stop or 0) <= n
-            for s, n in zip(box, self.shape, strict=False)
+        fits = (
+            isinstance(box, tuple | list)
+            and len(box) == self.axes
+            and all(
+                isinstance(s, slice) and s.step is None and 0 <= (s.start or 0) < (s.stop or 0) <= n
+                for s, n in zip(box, self.shape, strict=False)
+            )
         )
         if not fits:
             raise InvalidInput(f"box: needs {self.axes} ranges within {self.shape}, got {box!r}")
@@ -281,6 +285,7 @@ def _is_shape(value: object, axes: int) -> bool:
     """Return whether a value is the shape of an exemplar."""
     return (
         isinstance(value, Sequence | np.ndarray)
+        and getattr(value, "ndim", 1) > 0
         and len(value) == axes
         and all(isinstance(n, Integral) and int(n) >= 1 for n in value)
     )

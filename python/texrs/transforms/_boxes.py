@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_array, as_float, check_finite
+from texrs._arrays import as_array, as_float, as_instance, check_finite
 from texrs._typing import Array
 from texrs.errors import InvalidInput
 from texrs.source_map import SourceMap
@@ -57,6 +57,7 @@ def follow_boxes(source: SourceMap, boxes: Array, visible: float = 0.5) -> tuple
     (array([[5., 1., 9., 5., 7.]]), array([0]))
 
     """
+    as_instance(source, "source", SourceMap)
     if source.axes != 2 or len(source.shapes) != 1:
         raise InvalidInput("source: needs the map of a picture from one exemplar")
     given = as_array(boxes, "boxes", np.float64)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._checks import as_instance, as_int
 from texrs._show import brief
 from texrs._typing import Array, Floats
 from texrs.exemplar import Exemplar, as_exemplar
@@ -97,6 +98,8 @@ def integrity(exemplar: Array | Exemplar, source: SourceMap, *, axes: int = 3) -
     (True, True)
 
     """
+    as_instance(source, "source", SourceMap)
+    as_int(axes, "axes", 2, 3)
     known = as_exemplar(exemplar, axes=axes)
     found = known.instances
     if found is None:

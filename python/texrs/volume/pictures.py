@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_float, as_image, as_int, as_size, guidance, try_array
+from texrs._arrays import as_float, as_image, as_int, as_items, as_size, guidance, try_array
 from texrs._conversion import as_ndarray
 from texrs._progress import listen
 from texrs._typing import Array, Floats, Interpolation, Path, Progress
@@ -66,7 +66,7 @@ def slices(volume: ArrayLike, at: Sequence[int] | None = None, *, gap: int = 2) 
     """
     volume = as_ndarray(volume, "volume", axes=3)
     v = as_image(volume, "volume", axes=3)
-    places = [n // 2 for n in v.shape[:3]] if at is None else list(at)
+    places = [n // 2 for n in v.shape[:3]] if at is None else list(as_items(at, "at"))
     if len(places) != 3:
         raise InvalidInput(f"at: needs plane, row and column, got {at!r}")
     places = [as_int(p, "at", -n, n - 1) for p, n in zip(places, v.shape[:3], strict=True)]

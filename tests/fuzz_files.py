@@ -1,0 +1,199 @@
+"""Files that are damaged at random, of every format that is read: an array, an entry, or a sentence comes out, and soon.
+
+    python tests/fuzz_files.py [--count 100000] [--seed 1] [--seconds 600]
+
+Prints how many were read, refused, and what else came out; what did is kept beside, named after seed and number. All in this
+process, of which the memory is limited, so that what would take all there is fails here.
+"""
+
+from __future__ import annotations
+
+import argparse
+import collections
+import os
+import shutil
+import signal
+import sys
+import tempfile
+import time
+import traceback
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import image_files as make
+import texrs
+from texrs import io as tio
+from texrs.cli._recipes import check_recipe, read_recipe
+from texrs.errors import TexrsError
+
+Reader = Callable[[Path], object]
+MOST = 100_000
+"""Pixels that a file may have here."""
+SLOW = 5.0
+"""Seconds of this process after which a file took too long."""
+MEMORY = 2 << 30
+"""Bytes beside what there is at the beginning."""
+WRITABLE = (".png", ".tif", ".webp", ".bmp", ".npy", ".npz", ".exr", ".hdr")
+VOLUMES = (".tif", ".npy", ".npz", ".nrrd", ".nii", ".nii.gz", ".vti")
+RECIPE = (
+    'command = "design"\ninputs = ["*.png"]\nout = "out"\nseeds = "0-3"\n[presets.one]\nrotate = 0\nsize = "64x64"\n'
+)
+
+
+class Late(BaseException):
+    """A file took too long."""
+
+
+def limited(read: Callable[..., object]) -> Reader:
+    """Return a reader that allows few pixels."""
+    return lambda path: read(path, limit=MOST)
+
+
+def make_files(folder: Path) -> Iterator[tuple[Path, list[Reader]]]:
+    """Write a small file of every kind, and yield how each is read."""
+    image, floats = make.picture((24, 20, 3)), np.abs(make.picture((24, 20, 3), "float32"))
+    either = [limited(tio.read), limited(tio.read_volume), tio.read_notes]
+    for suffix in WRITABLE:
+        path = folder / f"a{suffix}"
+        tio.write(path, floats if suffix in (".exr", ".hdr") else image)
+        yield path, either
+    for suffix in VOLUMES:
+        path = folder / f"v{suffix}"
+        tio.write_volume(path, make.picture((6, 7, 8)))
+        yield path, [limited(tio.read_volume), tio.read_spacing]
+    for name, content in {
+        "a.gif": make.pillow(image, "GIF"),
+        "a.jpg": make.pillow(image, "JPEG", exif=b"Exif\0\0" + make.exif(6)),
+        "lzw.tif": make.pillow(image, "TIFF", compression="tiff_lzw"),
+        "packbits.tif": make.pillow(image, "TIFF", compression="packbits"),
+        "deflate.tif": make.pillow(image, "TIFF", compression="tiff_adobe_deflate"),
+        "v.vtk": b"# vtk DataFile Version 3.0\nv\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 4 3 2\nSPACING 1 1 1\n"
+        b"ORIGIN 0 0 0\nPOINT_DATA 24\nSCALARS s unsigned_char 1\nLOOKUP_TABLE default\n" + b"7 " * 24,
+    }.items():
+        (folder / name).write_bytes(content)
+        yield folder / name, either
+    sample = texrs.samples.dots((64, 64))
+    source = texrs.synthesize(sample.image, 32).source.finished((True, False), screening=0.1)
+    source.save(folder / "map.npz")
+    yield folder / "map.npz", [texrs.SourceMap.load, limited(tio.read_arrays)]
+    texrs.elements.analyse(sample.image, mask=sample.mask, layout="disjoint").save(folder / "entry.npz")
+    yield folder / "entry.npz", [texrs.elements.load]
+    known = texrs.Exemplar(sample.image)
+    known.analyse()
+    known.save(folder / "known.npz")
+    yield folder / "known.npz", [texrs.Exemplar.load]
+    texrs.scale_maps.from_angles((16, 16), 40, 90, fov=50)
+    (folder / "recipe.toml").write_text(RECIPE)
+    yield folder / "recipe.toml", [lambda path: check_recipe(read_recipe(str(path)), str(path))]
+
+
+def make_folders(folder: Path) -> Iterator[tuple[Path, Path, list[Reader]]]:
+    """Make a database, a material and a store, and yield which of their files are damaged, and how they are read."""
+    sample = texrs.samples.dots((64, 64))
+    database = folder / "database"
+    texrs.TextureDatabase(database).add(sample.image, "dots", mask=sample.mask, layout="disjoint")
+    for file in ("manifest.json", "dots.npz"):
+        yield (
+            database,
+            database / file,
+            [lambda path: texrs.TextureDatabase(path, say=lambda text: None).analyse("dots")],
+        )
+    material = folder / "material"
+    texrs.Material({"albedo": sample.image, "height": sample.image[..., 0]}).save(material)
+    for file in sorted(material.glob("*.png")):
+        yield material, file, [texrs.Material.read]
+    with suppress(ImportError, TexrsError):
+        texrs.PlaneTexture(sample.image).to_zarr(folder / "store.zarr", (64, 64), (32, 32))
+        store = folder / "store.zarr"
+        for file in sorted(p for p in store.rglob("*") if p.is_file())[:6]:
+            yield store, file, [limited(tio.read), texrs.lazy.open]
+
+
+def limit_memory() -> None:
+    """Let this process take little more than it has."""
+    if sys.platform == "linux":
+        import resource
+
+        taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (taken + MEMORY, resource.getrlimit(resource.RLIMIT_AS)[1]))
+
+
+def try_one(readers: list[Reader], path: Path, counts: collections.Counter[str]) -> str:
+    """Read a damaged file by all its readers, and return what went wrong."""
+    wrong = ""
+    for read in readers:
+        start = time.process_time()
+        signal.setitimer(signal.ITIMER_VIRTUAL, SLOW)
+        try:
+            read(path)
+            counts["read"] += 1
+        except TexrsError:
+            counts["refused"] += 1
+        except BaseException as error:
+            if isinstance(error, KeyboardInterrupt):
+                raise
+            counts["wrong"] += 1
+            ours = [
+                f"{Path(f.filename).name}:{f.lineno}"
+                for f in traceback.extract_tb(error.__traceback__)
+                if "texrs" in f.filename
+            ]
+            wrong = f"{type(error).__name__}: {error} ({', '.join(ours[-2:])})"
+        finally:
+            signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+        counts["slowest, ms"] = max(counts["slowest, ms"], round(1000 * (time.process_time() - start)))
+    return wrong
+
+
+def main() -> int:
+    """Damage files until there are enough of them, or the time is up."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--count", type=int, default=100_000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seconds", type=float, default=600)
+    asked = parser.parse_args()
+    warnings.simplefilter("ignore")
+
+    def late(number: int, frame: Any) -> None:
+        raise Late(f"more than {SLOW} s")
+
+    signal.signal(signal.SIGVTALRM, late)
+    place = Path(tempfile.mkdtemp(prefix="texrs-fuzz-", dir="/dev/shm" if os.path.isdir("/dev/shm") else None))
+    kept = Path(f"fuzz-{asked.seed}")
+    counts: collections.Counter[str] = collections.Counter()
+    begun, end = time.process_time(), time.monotonic() + asked.seconds
+    try:
+        cases = [(path, path, readers) for path, readers in make_files(place)]
+        cases += list(make_folders(place))
+        contents = [file.read_bytes() for _, file, _ in cases]
+        limit_memory()
+        rng: np.random.Generator = np.random.default_rng(asked.seed)
+        order: NDArray[np.intp] = np.arange(len(cases))
+        while counts["files"] < asked.count and time.monotonic() < end:
+            for number in order.tolist():
+                (target, file, readers), content = cases[number], contents[number]
+                for data in make.mutations(content, 10, rng):
+                    file.write_bytes(data)
+                    counts["files"] += 1
+                    if wrong := try_one(readers, target, counts):
+                        kept.mkdir(exist_ok=True)
+                        name = f"{counts['files']}-{file.name}"
+                        (kept / name).write_bytes(data)
+                        print(f"{kept / name}: {wrong}", file=sys.stderr, flush=True)
+                if target is not file:
+                    file.write_bytes(content)
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
+    said = ", ".join(f"{name} {count}" for name, count in counts.items())
+    print(f"seed {asked.seed}: {said}; kinds {len(cases)}, {time.process_time() - begun:.0f} s of processor time")
+    return 1 if counts["wrong"] else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
