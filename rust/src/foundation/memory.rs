@@ -10,7 +10,8 @@ pub(crate) fn filled<T: Clone>(what: &str, value: T, len: usize) -> Result<Vec<T
     Ok(vec![value; len])
 }
 
-/// A copy of values, for what is named `what`.
+/// A copy of values, for what is named `what`: of what the bindings may not keep.
+#[cfg(feature = "python")]
 pub(crate) fn copied<T: Copy>(what: &str, values: &[T]) -> Result<Vec<T>> {
     check::<T>(what, values.len())?;
     Ok(values.to_vec())
