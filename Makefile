@@ -8,7 +8,7 @@ JOBS ?= $(shell getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2)
 MINUTES ?= 10
 RUST := Cargo.toml $(shell find rust -name '*.rs')
 
-.PHONY: help demo test test-rust test-python fuzz levels lint lint-rust lint-python format bench peers wheel docs docs-check clean requirements
+.PHONY: help demo test test-rust test-python fuzz levels lint lint-rust lint-python format bench bench-guard peers wheel docs docs-check clean requirements
 .DELETE_ON_ERROR:
 # Compilers count the processors themselves: what make says of its own jobs is not for them.
 unexport MAKEFLAGS
@@ -21,6 +21,7 @@ help:
 	@echo "make lint    formatting, clippy, rustdoc, ruff, mypy, stubtest"
 	@echo "make format  rewrite the sources in the house's format"
 	@echo "make bench   criterion benches of the kernels"
+	@echo "make bench-guard  instructions of the hottest kernels against those stored (valgrind)"
 	@echo "make wheel   a wheel and a source distribution in dist/, tried in clean environments"
 	@echo "make docs    documentation, gallery and reference: docs/_build/html/index.html"
 	@echo "make docs-check  these pages in a browser: accessibility, weight, links"
@@ -98,6 +99,10 @@ format: $(VENV)/.tools
 
 bench: | requirements
 	cargo bench
+
+# Instructions hang on nothing else that runs. REGENERATE=1 stores them anew.
+bench-guard: | requirements
+	.ci/counts
 
 # Built for this machine, and used in clean environments by each Python that is here.
 wheel: $(VENV)/.tools
