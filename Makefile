@@ -8,7 +8,7 @@ JOBS ?= $(shell getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2)
 MINUTES ?= 10
 RUST := Cargo.toml $(shell find rust -name '*.rs')
 
-.PHONY: help demo test test-rust test-python fuzz levels lint lint-rust lint-python format bench bench-guard peers wheel docs docs-check clean requirements
+.PHONY: help demo test test-rust test-python fuzz kills levels lint lint-rust lint-python format bench bench-guard peers wheel docs docs-check clean requirements
 .DELETE_ON_ERROR:
 # Compilers count the processors themselves: what make says of its own jobs is not for them.
 unexport MAKEFLAGS
@@ -17,6 +17,7 @@ help:
 	@echo "make demo    pictures of every system at work on built-in examples: demo/index.html"
 	@echo "make test    all tests, Rust and Python"
 	@echo "make fuzz    random cases, hostile values, damaged files, for about ten minutes (MINUTES=10)"
+	@echo "make kills   commands killed at random moments (COUNT=200)"
 	@echo "make levels  stored results on lesser processors, some of them emulated (qemu-user)"
 	@echo "make lint    formatting, clippy, rustdoc, ruff, mypy, stubtest"
 	@echo "make format  rewrite the sources in the house's format"
@@ -75,6 +76,10 @@ fuzz: $(VENV)/.built
 # About ten minutes on a quiet machine. MINUTES bounds each level.
 levels: $(VENV)/.built
 	MINUTES=$(MINUTES) $(BIN)/python .ci/levels
+
+# Commands killed at random moments, and several that write to one place at once.
+kills: $(VENV)/.built
+	$(BIN)/python tests/kill_commands.py --count $(or $(COUNT),200)
 
 # Side by side with `make -j2 lint`: the checks of either language leave a processor idle.
 lint: lint-rust lint-python

@@ -41,9 +41,7 @@ MEMORY = 2 << 30
 """Bytes beside what there is at the beginning."""
 WRITABLE = (".png", ".tif", ".webp", ".bmp", ".npy", ".npz", ".exr", ".hdr")
 VOLUMES = (".tif", ".npy", ".npz", ".nrrd", ".nii", ".nii.gz", ".vti")
-RECIPE = (
-    'command = "design"\ninputs = ["*.png"]\nout = "out"\nseeds = "0-3"\n[presets.one]\nrotate = 0\nsize = "64x64"\n'
-)
+RECIPE = 'verb = "design"\ninputs = ["*.png"]\nout = "out"\nseeds = "0-3"\n[presets.one]\nrotate = 0\nsize = "64x64"\n'
 
 
 class Late(BaseException):
