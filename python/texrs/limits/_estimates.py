@@ -56,8 +56,8 @@ COSTS: dict[str, dict[str | None, Cost]] = {
     "complete": {None: Cost(0, 0, 60, fixed=14e6)},
     "extend": {None: Cost(0, 0, 384, fixed=20e6)},
     "rectify": {None: Cost(0, 0, 100)},
-    "remove": {None: Cost(0, 0, 458, fixed=12e6)},
-    "analyse": {None: Cost(500, 0, 0)},
+    "remove": {None: Cost(0, 0, 400, fixed=12e6)},
+    "analyse": {None: Cost(440, 0, 0, fixed=16e6)},
 }
 """By verb, and by the ``method`` or the ``quality`` that takes another amount than the others."""
 
