@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -233,6 +234,17 @@ def test_what_is_there_is_not_made_again(tmp_path: Path, monkeypatch: pytest.Mon
     assert PLANE.to_zarr(tmp_path / "a.zarr", 100, 32).made == 1
     PLANE.to_zarr(tmp_path / "b.zarr", 100, 32)
     assert digest(tmp_path / "a.zarr") == digest(tmp_path / "b.zarr")
+
+
+def test_several_make_one_store(tmp_path: Path) -> None:
+    def make(number: int) -> tuple[int, int]:
+        path = tmp_path / f"{number // 6}.zarr"
+        group = stores.open_group(path, {"of": "a"}, {}, overwrite=False)
+        inner = stores._make_group(group, "height")
+        return stores.make_array(inner, "0", (4, 4), (2, 2), np.dtype("u1")).shape
+
+    with ThreadPoolExecutor(6) as pool:
+        assert set(pool.map(make, range(120))) == {(4, 4)}
 
 
 def test_another_thing_is_not_written_over(tmp_path: Path) -> None:

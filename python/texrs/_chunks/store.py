@@ -28,6 +28,8 @@ __all__ = ["Stored", "import_zarr", "list_done", "open_group", "write_image"]
 
 RECORD = "texrs"
 """The attribute that says what a store holds."""
+BEGINNING = 0.5
+"""Seconds in which a folder that is there becomes a store, where another process is making it."""
 IMAGE = "image"
 """Name of the map of what has one alone: it lies at the root."""
 
@@ -95,26 +97,37 @@ def open_group(path: Path, record: Mapping[str, Any], attributes: Mapping[str, A
     # As it comes back from JSON.
     said = json.loads(json.dumps(dict(record)))
     try:
-        if not overwrite:
-            try:
-                group = zarr.open_group(name, mode="r+")
-            except (FileNotFoundError, KeyError):
-                group = None
-            if group is not None:
-                if group.attrs.get(RECORD) != said:
-                    raise FileError(
-                        f"{name}: holds something else, or was made with other options; overwrite=True replaces it"
-                    )
-                return group
-            if os.path.lexists(name) and (not os.path.isdir(name) or os.listdir(name)):
-                raise FileError(f"{name}: is there, and is no Zarr store; overwrite=True replaces it")
-        elif os.path.isfile(name):
+        if overwrite and os.path.isfile(name):
             os.remove(name)
-        return zarr.create_group(name, zarr_format=3, overwrite=overwrite, attributes={**attributes, RECORD: said})
+        group = None if overwrite else _open_if_there(name)
+        if group is None:
+            try:
+                return zarr.create_group(
+                    name, zarr_format=3, overwrite=overwrite, attributes={**attributes, RECORD: said}
+                )
+            except zarr.errors.ContainsGroupError:  # Another process was faster.
+                group = zarr.open_group(name, mode="r+")
+        if group.attrs.get(RECORD) != said:
+            raise FileError(f"{name}: holds something else, or was made with other options; overwrite=True replaces it")
+        return group
     except FileError:
         raise
     except Exception as error:
         raise FileError(f"{name}: the store cannot be opened ({error})") from error
+
+
+def _open_if_there(name: str) -> Any:
+    """Return the group of a store, or None where there is nothing yet."""
+    end = time.monotonic() + BEGINNING
+    while True:
+        try:
+            return import_zarr().open_group(name, mode="r+")
+        except (FileNotFoundError, KeyError):
+            if not os.path.lexists(name) or (os.path.isdir(name) and not os.listdir(name)):
+                return None
+        if time.monotonic() > end:
+            raise FileError(f"{name}: is there, and is no Zarr store; overwrite=True replaces it")
+        time.sleep(BEGINNING / 10)
 
 
 def make_array(
@@ -128,16 +141,27 @@ def make_array(
     """Return an array of a group, made if it is not there; chunks of nothing but zeros are written too."""
     if name in group:
         return group[name]
-    return group.create_array(
-        name,
-        shape=tuple(shape),
-        chunks=tuple(chunks),
-        dtype=dtype,
-        fill_value=0,
-        dimension_names=None if axes is None else list(axes),
-        # What is not there has not been made.
-        config={"write_empty_chunks": True},
-    )
+    try:
+        return group.create_array(
+            name,
+            shape=tuple(shape),
+            chunks=tuple(chunks),
+            dtype=dtype,
+            fill_value=0,
+            dimension_names=None if axes is None else list(axes),
+            # What is not there has not been made.
+            config={"write_empty_chunks": True},
+        )
+    except import_zarr().errors.ContainsArrayError:  # Another process was faster.
+        return group[name]
+
+
+def _make_group(group: Any, name: str) -> Any:
+    """Return a group of a group, made if it is not there."""
+    try:
+        return group.require_group(name)
+    except import_zarr().errors.ContainsGroupError:
+        return group[name]
 
 
 def open_array(path: str, name: str) -> Any:
@@ -229,7 +253,7 @@ def write_image(
     letters = "zyx"[3 - axes :]
     try:
         for name, channel in reader.maps.items():
-            inner = group if alone else group.require_group(name)
+            inner = group if alone else _make_group(group, name)
             if not alone:
                 inner.attrs.update(says[name])
             for level, each in enumerate(grids):
