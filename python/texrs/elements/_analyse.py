@@ -140,13 +140,16 @@ def analyse(
     # 3. What belongs to the elements.
     watch("separate", 0.0)
     parted = _separate(guide, given, start, seen, how) if cellular is None else cellular.parted
+    watch("separate", 0.2)
     start, parted = _extend(guide, given, start, parted, how) if cellular is None else (start, parted)
     if len(parted.points) < FEWEST:
         raise InvalidInput(
             f"image: {len(parted.points)} elements were found, at least {FEWEST} are needed; try another box, more "
             f"rotations or scales, a lower threshold (it was {seen.threshold:.2f}), or give the points"
         )
-    entry = _reanalyse(pixels, given, start, parted, how) or _make_entry(pixels, given, start, seen, parted, how)
+    watch("separate", 0.3)
+    again = _reanalyse(pixels, given, start, parted, how, lambda name, share: watch("separate", 0.3))
+    entry = again or _make_entry(pixels, given, start, seen, parted, how)
     entry = entry if cellular is None else replace(entry, known=cellular.labels)
     watch("separate", 1.0)
     unsure = [
@@ -268,7 +271,9 @@ def _cut(guide: Floats, given: Arguments, start: Start, found: Detections, how: 
     return _mask.tidy_mask(mask, area, net=start.layout != Layout.DISJOINT)
 
 
-def _reanalyse(pixels: Array, given: Arguments, start: Start, parted: Separation, how: Settings) -> Elements | None:
+def _reanalyse(
+    pixels: Array, given: Arguments, start: Start, parted: Separation, how: Settings, progress: Progress
+) -> Elements | None:
     """Analyse again from the box of a usual piece of the mask: what was proposed may lie beside the middle of an element.
 
     Return None where the box was said, or where that finds far fewer elements.
@@ -286,6 +291,7 @@ def _reanalyse(pixels: Array, given: Arguments, start: Start, parted: Separation
             search=how.search,
             wrap=how.wrap,
             seed=how.seed,
+            progress=progress,
         )
     except InvalidInput:
         return None

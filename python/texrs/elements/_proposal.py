@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,11 +106,13 @@ def propose(guide: Floats, given: Arguments, wrap: tuple[bool, bool], progress: 
         else:
             box, sure["box"] = _choose_box(guide, wrap, progress)
     if points is None:
-        points = search_similar(guide, box.centre, box.size, wrap=wrap).points
+        rest = partial(_report_part, progress, 0.8, 0.9)
+        points = search_similar(guide, box.centre, box.size, wrap=wrap, progress=rest).points
     progress(0.9)
     away = measure_distance(size, points, box.size, wrap)
     if layout is None:
         layout, sure["layout"] = _choose_layout(guide, away, points, given.whole)
+        progress(0.95)
     if blind and "layout" in sure and layout == Layout.CONNECTED:
         # What repeats are the openings of the net: ground lies in the middle of each but the chosen one.
         middle = np.array(box.centre)
@@ -121,7 +124,12 @@ def propose(guide: Floats, given: Arguments, wrap: tuple[bool, bool], progress: 
         background, sure["background"] = _choose_background(guide, away, box)
     if blind and background is not None and given.mask is not None:
         background = background & ~given.mask
+    progress(1.0)
     return Start(box, layout, background, [name for name, lacks in missing if lacks], sure)
+
+
+def _report_part(progress: Callable[[float], object], low: float, high: float, share: float) -> None:
+    progress(low + (high - low) * share)
 
 
 # --- the element -------------------------------------------------------------------------------------------------------
@@ -136,6 +144,7 @@ def _choose_box(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[floa
         raise InvalidInput("box: none could be proposed for this image; give one, or the points")
     light, features = to_lab(small)[..., 0], describe_appearance(small, wrap)[0]
     best: tuple[float, Box] | None = None
+    reached = 0.0
     tried: list[tuple[float, Box, Detections]] = []
 
     def attempt(box: Box) -> float:
@@ -146,13 +155,14 @@ def _choose_box(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[floa
         found = search_similar(small, box.centre, box.size, wrap=wrap, features=features)
         value = _score(light, found, box)
         tried.append((value, box, found))
+        progress(reached)
         if best is None or value > best[0] + 1e-6:
             best = (value, box)
         return value
 
     for number, box in enumerate(boxes):
         attempt(box)
-        progress(0.5 * (number + 1) / len(boxes))
+        reached = 0.5 * (number + 1) / len(boxes)
     for _, box, found in sorted(tried, key=lambda t: -t[0])[:AGAIN]:
         moved = _recentre(light, found, box)
         if moved is not None:
@@ -164,7 +174,7 @@ def _choose_box(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[floa
             if top[0] <= value:
                 break
             value, box = top
-        progress(0.5 + 0.3 * (number + 1) / GROWN)
+        reached = 0.5 + 0.3 * (number + 1) / GROWN
     assert best is not None
     sure = _measure_confidence(light, best[1], next(f for _, b, f in tried if b == best[1]))
     row, column = (float(c * step + (step - 1) / 2) for c in best[1].centre)

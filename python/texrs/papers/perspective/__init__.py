@@ -42,7 +42,7 @@ from typing import Any
 import numpy as np
 
 from texrs._engine.pyramid import Region
-from texrs._progress import listen
+from texrs._progress import listen, stage
 from texrs._typing import Array, Interpolation, Progress
 from texrs._verbs import takes_materials
 from texrs.exemplar import Exemplar
@@ -180,6 +180,7 @@ def perspective(
 
     """
     progress = listen(progress)
+    stage(progress, "scale map")
     asked = Request.check(
         exemplar,
         scale_map,
@@ -198,6 +199,7 @@ def perspective(
     )
     if asked.method == "paper":
         return average_windows(asked, progress)
+    stage(progress, "sheet")
     laid = lay_out(asked)
     if laid.outside.share > 0 and asked.strength > 0:
         warnings.warn(laid.outside.describe(laid.sizes), stacklevel=2)
