@@ -45,3 +45,9 @@ def end(number: int) -> int:
     if number in (2, 5):
         os.kill(os.getpid(), signal.SIGKILL)
     return number * number
+
+
+def end_late(number: int) -> int:
+    if number == 44:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number * number

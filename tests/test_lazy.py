@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import texrs
-from lazy_work import WEAVE, die, end, kill_once, outer, vary
+from lazy_work import WEAVE, die, end, end_late, kill_once, outer, vary
 from texrs import fields, lazy, samples
 from texrs._chunks import store as stores
 from texrs._chunks import workers
@@ -394,6 +394,13 @@ def test_what_ends_its_worker_stops_no_other_where_that_is_asked_for() -> None:
     assert {n: r for n, r in found.items() if n not in (2, 5)} == {n: n * n for n in range(8) if n not in (2, 5)}
     assert all(isinstance(found[n], lazy.WorkerLost) for n in (2, 5))
     assert "task 2: ended 3 workers" in str(found[2])
+
+
+def test_short_tasks_of_a_cluster_are_handed_out_together(client: Client) -> None:
+    """One that ends its workers is found among those that it was handed out with."""
+    found = dict(workers.run(end_late, range(90), client, spare=True))
+    assert {n: r for n, r in found.items() if n != 44} == {n: n * n for n in range(90) if n != 44}
+    assert isinstance(found[44], lazy.WorkerLost)
 
 
 def test_wrong_arguments(tmp_path: Path) -> None:

@@ -32,6 +32,10 @@ TRIES = 3
 """Times that a task may end its worker."""
 AHEAD = 2
 """Tasks that wait at each worker while it does another, so that it need not wait for the next."""
+SHORT = 1.0
+"""Seconds that tasks of a cluster take, about, which are handed out as one: the scheduler and each worker take some
+milliseconds for each that they are told of."""
+MOST_AT_ONCE = 32
 GRACE = 5.0
 """Seconds that a worker has to remove what is half-written, when it is to end."""
 
@@ -306,46 +310,55 @@ def _run_cluster(
     rows = [
         deque(numbers[len(numbers) * i // len(slots) : len(numbers) * (i + 1) // len(slots)]) for i in range(len(slots))
     ]
-    known: dict[Any, tuple[int, int]] = {}
+    known: dict[Any, tuple[int, list[int]]] = {}
+    at_once = 1
 
-    def submit(slot: int) -> Any:
+    def take(slot: int) -> list[int]:
+        """Take some tasks from the row of a worker, or of the one that has most left."""
         row = rows[slot] or max(rows, key=len)
-        if not row:
-            return None
-        number = row.popleft() if row is rows[slot] else row.pop()
+        return [row.popleft() if row is rows[slot] else row.pop() for _ in range(min(at_once, -(-len(row) // 2)))]
+
+    def submit(slot: int, some: list[int]) -> Any:
         future = client.submit(
             _do_there,
             there,
-            number,
+            some,
             threads_each,
-            key=f"texrs-{name}-{number}",
+            key=f"texrs-{name}-{some[0]}-{len(some)}",
             workers=[slots[slot]],
             allow_other_workers=True,
             pure=False,
         )
-        known[future] = slot, number
+        known[future] = slot, some
         return future
 
-    first = [future for _ in range(AHEAD) for slot in range(len(slots)) if (future := submit(slot)) is not None]
+    first = [submit(slot, some) for _ in range(AHEAD) for slot in range(len(slots)) if (some := take(slot))]
     queue = as_completed(first, loop=client.loop)
     try:
         for future in queue:
-            slot, number = known.pop(future)
+            slot, some = known.pop(future)
             try:
-                result = future.result()
+                results, seconds = future.result()
+                at_once = max(1, min(MOST_AT_ONCE, int(len(some) * SHORT / max(seconds, 1e-6))))
             except KilledWorker as error:
-                result = WorkerLost(f"task {number}: {error}")
+                if len(some) > 1:  # Which of them it was is seen one by one.
+                    for number in some:
+                        queue.add(submit(slot, [number]))
+                    continue
+                results = [WorkerLost(f"task {some[0]}: {error}")]
                 if not spare:
-                    raise result from None
-            if (more := submit(slot)) is not None:
-                queue.add(more)
-            yield number, result
+                    raise results[0] from None
+            if more := take(slot):
+                queue.add(submit(slot, more))
+            yield from zip(some, results, strict=True)
     finally:
         client.cancel([there, *known])
 
 
-def _do_there(work: Work, number: int, count: int | None) -> Any:
+def _do_there(work: Work, some: Sequence[int], count: int | None) -> tuple[list[Any], float]:
+    """Do some tasks; return what they return, and the seconds that it took."""
     from distributed import get_worker
 
+    begun = time.monotonic()
     with threads(count or max(1, get_worker().state.nthreads)):
-        return work(number)
+        return [work(number) for number in some], time.monotonic() - begun
