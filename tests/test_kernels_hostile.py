@@ -9,8 +9,6 @@ import math
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from decimal import Decimal
-from fractions import Fraction
 from functools import cache
 from typing import Any, TypeAlias
 
@@ -19,8 +17,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array, eye_array
+from scipy.sparse import eye_array
 
+from hostile import DTYPES, LAYOUTS, NUMBERS, OTHERS, VALUES, lay_out
 from texrs import kernels
 from texrs.errors import TexrsError
 from texrs.kernels.complete import complete
@@ -212,65 +211,6 @@ def test_no_argument_of_a_kernel_is_left_out() -> None:
 
 
 # --- hostile values --------------------------------------------------------------------------------------------------
-
-NUMBERS: tuple[object, ...] = (
-    *(True, -1, 0, 1, 2, 7, 2**31 - 1, 2**31, 2**32, 2**63, 2**64, 10**400),
-    *(0.5, -0.5, 1e-300, 1e300, math.nan, math.inf, -math.inf),
-    *(np.int8(-1), np.uint64(2**64 - 1), np.float16(np.inf), np.float32(np.nan), np.array(3)),
-    *(1j, Fraction(1, 3), Decimal(1)),
-)
-OTHERS: tuple[object, ...] = (
-    *("", "nearest", "free", "\0", b"paper", object(), slice(None), range(2**60)),
-    *([], (), {}, {0: 1}, [[1], [1, 2]], [None], [[]], ["a", "b"], [[[]]], csr_array((0, 3)), csr_array((3, 4))),
-    *(
-        coo_array((2**40, 2**40)),
-        np.ma.masked_all((9, 10)),
-        np.recarray((3,), dtype=[("x", "f4")]),
-        np.datetime64(0, "s"),
-    ),
-)
-DTYPES = (
-    "?",
-    "u1",
-    "i1",
-    "u2",
-    "i4",
-    "i8",
-    "u8",
-    "f2",
-    "f4",
-    "f8",
-    "g",
-    "c16",
-    "O",
-    "U2",
-    "S2",
-    "M8[s]",
-    "V4",
-    "f4,f4",
-)
-VALUES = (0, 1, -1, 0.5, -0.5, 255, 2**31, -(2**31), 2**63, 1e-45, 1e300, math.nan, math.inf, -math.inf)
-LAYOUTS = ("plain", "fortran", "strided", "reversed", "swapped", "read-only", "unaligned", "broadcast")
-
-
-def lay_out(array: Array, layout: str) -> Array:
-    """Return the same values, lying otherwise in memory."""
-    if layout == "fortran":
-        return np.asfortranarray(array)
-    if layout == "strided":
-        return np.repeat(array[..., np.newaxis], 2, axis=-1)[..., 0]
-    if layout == "reversed":
-        return np.ascontiguousarray(array[::-1])[::-1] if array.ndim else array
-    if layout == "swapped":
-        return array.astype(array.dtype.newbyteorder())
-    if layout == "read-only":
-        array = array.copy()
-        array.flags.writeable = False
-    if layout == "unaligned":
-        raw = np.zeros(array.nbytes + 1, np.uint8)[1:]
-        raw[:] = np.frombuffer(array.tobytes(), np.uint8)
-        return raw.view(array.dtype).reshape(array.shape)
-    return array
 
 
 @st.composite
