@@ -396,6 +396,21 @@ def test_what_ends_its_worker_stops_no_other_where_that_is_asked_for() -> None:
     assert "task 2: ended 3 workers" in str(found[2])
 
 
+def test_a_worker_that_is_to_stop_raises_only_in_its_task(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Elsewhere the pool would tell of an exception, as where it begins."""
+    left: list[int] = []
+    monkeypatch.setattr(os, "_exit", left.append)
+    monkeypatch.setattr(workers, "_LEAVING", True)
+    workers._leave(15, None)
+    assert left == [1]
+    monkeypatch.setattr(workers, "_LEAVING", False)
+    monkeypatch.setattr(workers, "_WORK", lambda number: workers._leave(number, None))
+    with pytest.raises(SystemExit):
+        workers._do(15)
+    assert left == [1]
+    assert not workers._BUSY
+
+
 def test_short_tasks_of_a_cluster_are_handed_out_together(client: Client) -> None:
     """One that ends its workers is found among those that it was handed out with."""
     found = dict(workers.run(end_late, range(90), client, spare=True))

@@ -104,6 +104,7 @@ def run(
 
 _WORK: Work | None = None
 _THREADS: int | None = None
+_BUSY = False
 _LEAVING = False
 
 
@@ -135,18 +136,26 @@ def _heed(stop: Any) -> None:
 def _leave(number: int, frame: Any) -> None:
     """End what is being done, so that all that is half-written is removed; only once, for that is not to be ended."""
     global _LEAVING
+    if not _BUSY:
+        # Nothing is half-written; an exception would be told of, as one of the pool.
+        os._exit(1)
     if not _LEAVING:
         _LEAVING = True
         raise SystemExit(1)
 
 
 def _do(number: int) -> Any:
+    global _BUSY
     assert _WORK is not None
     if _LEAVING:
         # What was begun has been cleared away, and nobody waits for an answer.
         os._exit(1)
-    with threads(_THREADS):
-        return _WORK(number)
+    _BUSY = True
+    try:
+        with threads(_THREADS):
+            return _WORK(number)
+    finally:
+        _BUSY = False
 
 
 @contextmanager
