@@ -20,10 +20,17 @@ INK, ACCENT, BLUE = "#1c1b19", "#c2410c", "#1d4ed8"
 Panels = Any
 
 
-def lay(count: int, width: float = 11.0, share: float = 1.0) -> tuple[Any, Panels]:
+def lay(count: int, width: float = 11.0) -> tuple[Any, Panels]:
     """Return a figure and its panels, side by side."""
-    figure, panels = plt.subplots(1, count, figsize=(width, share * width / count + 0.45), layout="constrained")
+    figure, panels = plt.subplots(1, count, figsize=(width, width / count + 0.45), layout="constrained")
     return figure, np.atleast_1d(panels)
+
+
+def stack(figure: Any) -> None:
+    """Put its panels below each other, for a phone."""
+    for panel, place in zip(figure.axes, figure.add_gridspec(len(figure.axes), 1), strict=True):
+        panel.set_subplotspec(place)
+    figure.set_size_inches(3.2, 3.4 * len(figure.axes))
 
 
 def show(panel: Any, image: Any, title: str, **options: Any) -> None:
@@ -44,12 +51,12 @@ def colour_places(coordinates: Any, shape: tuple[int, ...]) -> Any:
 
 def source_map() -> Any:
     sample = samples.dots((112, 112))
-    made = texrs.design(sample.image, (112, 160), seed=3)
+    made = texrs.design(sample.image, (112, 160), seed=6)
     source = made.source
-    figure, panels = lay(4, share=0.9)
+    figure, panels = lay(4)
     show(panels[0], sample.image, "the example")
     show(panels[1], made.image, "the result: three of its pixels")
-    for row, column in ((30, 40), (62, 108), (92, 62)):
+    for row, column in ((26, 59), (57, 89), (84, 70)):
         there = source.coordinates[row, column][::-1]
         panels[0].plot(*there, "o", ms=6, mfc="none", mec=ACCENT, mew=2)
         panels[1].plot(column, row, "o", ms=6, mfc="none", mec=ACCENT, mew=2)
@@ -290,7 +297,7 @@ PAPERS: tuple[Callable[[], tuple[Any, Measured]], ...] = (design, splice, perspe
 
 
 def write_drawings(out: Path) -> None:
-    """Write the drawings, and a table a paper to be included; nothing is made again while the package is as it was."""
+    """Write each drawing twice, and a table a paper to be included; nothing is made again while the package is as it was."""
     folder = out / "drawings"
     folder.mkdir(parents=True, exist_ok=True)
     newest = max(f.stat().st_mtime for f in [Path(__file__), *Path(texrs.__file__).parent.rglob("*.py")])
@@ -305,6 +312,8 @@ def write_drawings(out: Path) -> None:
                 table = f"| | `{PRINTED}` | {OURS} |\n|---|---|---|\n" + "".join(f"| {' | '.join(r)} |\n" for r in rows)
                 file.with_suffix(".md").write_text(table, encoding="utf-8")
             figure.savefig(file, dpi=120)
+            stack(figure)
+            figure.savefig(file.with_stem(f"{file.stem}-narrow"), dpi=240)
             plt.close(figure)
 
 

@@ -1,6 +1,7 @@
 """The last hand on the built pages: images with sizes, in copies as small as a window needs, and no script that nothing uses.
 
-Beside a picture of the sources stand copies in WebP, as wide as a phone and as the text column; browsers take what fits. All
+Beside a picture of the sources stand copies in WebP, as wide as a phone and as the text column; browsers take what fits.
+Of drawings there is one for phones. All
 but the first of a page are loaded when they come near. The theme loads the index of the search on every page, icons twice, as a
 font and as a script, and rules for two thousand of them: the search page keeps its own, the font stays, and the icons in use.
 Some marks of docutils and of the gallery are put right for readers that do not see: links without words, lists without items.
@@ -9,6 +10,7 @@ Some marks of docutils and of the gallery are put right for readers that do not 
 from __future__ import annotations
 
 import re
+import shutil
 from functools import cache
 from html import escape
 from pathlib import Path
@@ -21,6 +23,8 @@ WIDTHS = (480, 960)
 QUALITY = 74
 SIZES = "(max-width: 720px) 94vw, (max-width: 1200px) 66vw, 820px"
 THUMBNAIL = "16rem"
+NARROW = "(max-width: 720px)"
+"""Where drawings stand with their panels below each other: what `drawings.py` calls -narrow."""
 
 
 def finish(app: object, error: Exception | None) -> None:
@@ -35,7 +39,8 @@ def finish(app: object, error: Exception | None) -> None:
                     text = text.replace("<body data-", '<body class="beside" data-', 1).replace(
                         "<body>", '<body class="beside">', 1
                     )
-                made = name_parts(rewrite(drop_scripts(text, page.name), page.parent))
+                drawings = Path(app.srcdir) / "generated" / "drawings"  # type: ignore[attr-defined]
+                made = name_parts(rewrite(drop_scripts(text, page.name), page.parent, drawings))
                 icons.update(re.findall(r"\bfa-[a-z0-9-]+", made))
                 page.write_text(made, encoding="utf-8")
         for script in (root / "_static" / "scripts").glob("pydata-sphinx-theme.js"):
@@ -59,8 +64,6 @@ def name_parts(text: str) -> str:
         r'<p><a class="reference internal" \1 aria-label="\2"><span class="doc">\2</span></a></p>',
         text,
     )
-    # What scrolls on a phone must be reached by keys.
-    text = re.sub(r'<figure class="([^"]*\bdrawing\b[^"]*)"', r'<figure tabindex="0" class="\1"', text)
     return text.replace(' role="doc-biblioentry"', ' role="listitem"')
 
 
@@ -73,9 +76,12 @@ def drop_icons(sheet: str, used: set[str]) -> str:
     return re.sub(r"\.fa-[a-z0-9-]+(?:,\.fa-[a-z0-9-]+)*\{--fa:[^}]*\}", keep, sheet)
 
 
-def rewrite(text: str, folder: Path) -> str:
+def rewrite(text: str, folder: Path, drawings: Path) -> str:
     """Give each image of a page in a folder its size, its copies, and when it is loaded."""
     count = 0
+
+    def list_copies(near: str, copies: list[tuple[str, int]]) -> str:
+        return escape(", ".join(f"{near}/{name} {wide}w" for name, wide in copies))
 
     def mend(found: re.Match[str]) -> str:
         nonlocal count
@@ -86,21 +92,29 @@ def rewrite(text: str, folder: Path) -> str:
         file = folder / unquote(source.group(1))
         if file.suffix.lower() not in (".png", ".jpg", ".webp") or not file.is_file():
             return tag
-        added = ""
+        added, before, after = "", "", ""
+        near = source.group(1).rpartition("/")[0]
         width, height, copies = make_copies(file)
+        narrow = file.with_stem(f"{file.stem}-narrow")
+        if (drawings / narrow.name).exists():
+            shutil.copyfile(drawings / narrow.name, narrow)
+            wide, high, smaller = make_copies(narrow)
+            before = (
+                f'<picture><source media="{NARROW}" srcset="{list_copies(near, smaller)}" sizes="94vw"'
+                f' width="{wide}" height="{high}">'
+            )
+            after = "</picture>"
         if " width=" not in tag:
             added += f' width="{width}" height="{height}"'
         if copies and " srcset=" not in tag:
-            near = source.group(1).rpartition("/")[0]
-            listed = ", ".join(f"{near}/{name} {wide}w" for name, wide in copies)
             sizes = THUMBNAIL if "thumb" in file.name or "strips" in file.parts else SIZES
-            added += f' srcset="{escape(listed)}" sizes="{sizes}"'
+            added += f' srcset="{list_copies(near, copies)}" sizes="{sizes}"'
         count += 1
         if " loading=" not in tag and count > 1:
             added += ' loading="lazy"'
         elif count == 1:
             tag = tag.replace(' loading="lazy"', "")
-        return tag.removesuffix(">").removesuffix("/").rstrip() + f"{added}>"
+        return before + tag.removesuffix(">").removesuffix("/").rstrip() + f"{added}>" + after
 
     return re.sub(r"<img [^>]*>", mend, text)
 
