@@ -3,12 +3,13 @@
 
 PYTHON ?= python3
 VENV := .venv
+PEERS := .venv-peers
 BIN := $(VENV)/bin
 JOBS ?= $(shell getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2)
 MINUTES ?= 10
 RUST := Cargo.toml $(shell find rust -name '*.rs')
 
-.PHONY: help demo test test-rust test-python fuzz kills levels lint lint-rust lint-python format bench bench-guard peers wheel docs docs-check clean requirements
+.PHONY: help demo test test-rust test-python fuzz kills levels lint lint-rust lint-python format bench bench-kernels bench-guard wheel docs docs-check clean requirements
 .DELETE_ON_ERROR:
 # Compilers count the processors themselves: what make says of its own jobs is not for them.
 unexport MAKEFLAGS
@@ -21,12 +22,12 @@ help:
 	@echo "make levels  stored results on lesser processors, some of them emulated (qemu-user)"
 	@echo "make lint    formatting, clippy, rustdoc, ruff, mypy, stubtest"
 	@echo "make format  rewrite the sources in the house's format"
-	@echo "make bench   criterion benches of the kernels"
+	@echo "make bench   texrs beside other libraries and programs: benches/peers.json"
+	@echo "make bench-kernels  criterion benches of the kernels"
 	@echo "make bench-guard  instructions of the hottest kernels against those stored (valgrind)"
 	@echo "make wheel   a wheel and a source distribution in dist/, tried in clean environments"
 	@echo "make docs    documentation, gallery and reference: docs/_build/html/index.html"
 	@echo "make docs-check  these pages in a browser: accessibility, weight, links"
-	@echo "make peers   kernels beside other libraries: benches/peers.json"
 	@echo "make clean   remove what the other goals made"
 
 requirements:
@@ -102,7 +103,18 @@ format: $(VENV)/.tools
 	$(BIN)/ruff check --fix --quiet . || true
 	$(BIN)/ruff format .
 
-bench: | requirements
+# Beside other libraries and programs, as the page on performance shows them; these live in an environment of their own, for
+# some are under the GPL. ROWS="strip-512 ring-512" measures these again.
+bench: $(VENV)/.built $(PEERS)/.tools
+	$(BIN)/python benches/peers $(if $(ROWS),--only $(ROWS)) --rounds $(or $(ROUNDS),5)
+
+$(PEERS)/.tools: pyproject.toml | requirements
+	@[ -x $(PEERS)/bin/python ] || $(PYTHON) -m venv $(PEERS)
+	$(PEERS)/bin/python -m pip install --quiet --upgrade 'pip>=25.1'
+	$(PEERS)/bin/python -m pip install --quiet --group peers
+	@touch $@
+
+bench-kernels: | requirements
 	cargo bench
 
 # Instructions hang on nothing else that runs. REGENERATE=1 stores them anew.
@@ -132,11 +144,6 @@ docs-check: $(VENV)/.tools
 	$(BIN)/python -m pip install --quiet --group pages
 	$(BIN)/python .ci/pages
 
-# Kernels beside other libraries, as the page on performance shows them.
-peers: $(VENV)/.built
-	$(BIN)/python -m pip install --quiet --group bench
-	$(BIN)/python benches/peers.py
-
 clean:
-	rm -rf $(VENV) target demo dist docs/_build docs/generated .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(PEERS) target demo dist docs/_build docs/generated .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find python -name '*.so' -delete

@@ -1,13 +1,11 @@
-"""How long a splice takes, its factorisation against other solvers, and how time and memory grow.
+"""How long a splice takes, and how time and memory grow.
 
     python benches/splice_speed.py [SIDE ...]
     python benches/splice_speed.py growth [SIDE ...]
 
 The similarity sets are made beforehand. "cold": nothing else is kept; "cached": the factor and the elements' parts are. The
-system's side includes the margin. Other solvers get the same matrix, in turns with ours: SciPy's splu in its symmetric mode,
-and CHOLMOD where it is installed (pip install cvxopt; it is GPL, so a peer of this comparison and nothing else). "growth"
-analyses and splices ever larger pictures, of disjoint elements and a wall, each in a process of its own, whose peak of
-memory is told; there the similarity sets are part of a splice.
+system's side includes the margin. "growth" analyses and splices ever larger pictures, of disjoint elements and a wall, each in
+a process of its own, whose peak of memory is told; there the similarity sets are part of a splice.
 """
 
 from __future__ import annotations
@@ -20,23 +18,13 @@ from collections.abc import Callable
 
 import numpy as np
 from scipy.ndimage import binary_erosion
-from scipy.sparse import tril
-from scipy.sparse.linalg import splu
 
 import texrs
 from texrs import samples
 from texrs.elements import Elements, analyse
-from texrs.kernels.sparse import Cholesky
 from texrs.kernels.warp import mesh
 from texrs.papers.splice import factors
-from texrs.papers.splice.energy import make_energy_matrix
 from texrs.papers.splice.entry import CACHES
-
-try:
-    import cvxopt
-    from cvxopt import cholmod
-except ImportError:
-    cholmod = None
 
 ROUNDS = 5
 
@@ -84,41 +72,6 @@ def splices(sides: list[int]) -> None:
             print(f"{a + '/' + b:16s} {side:5d}  {system[0]:4d}^2  {times}", flush=True)
 
 
-def solvers(sides: list[int]) -> None:
-    print("\nEq. 5, 13 points: factor + two solves, ms of a processor   ours     splu   ratio  CHOLMOD   ratio")
-    for side in sides:
-        sample = samples.load("net", size=(side, side))
-        assert sample.mask is not None
-        assert sample.centres is not None
-        at = np.rint(sample.centres).astype(np.intp)
-        matrix = make_energy_matrix(sample.mask, at[:, 0] * side + at[:, 1], 1, upright=False)
-        right = np.random.default_rng(0).standard_normal((side * side, 2))
-        options = {"SymmetricMode": True}
-        tasks: dict[str, Callable[[], object]] = {
-            "ours": lambda: Cholesky(matrix).solve(right),
-            "splu": lambda: splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0, options=options).solve(right),
-        }
-        if cholmod is not None:
-            lower = tril(matrix).tocoo()
-            parts = (lower.data, lower.row.astype(np.int64), lower.col.astype(np.int64))
-            other = cvxopt.spmatrix(*map(cvxopt.matrix, parts), matrix.shape)
-
-            def peer() -> None:
-                sides = cvxopt.matrix(right)
-                factor = cholmod.symbolic(other)
-                cholmod.numeric(other, factor)
-                cholmod.solve(factor, sides)
-
-            tasks["CHOLMOD"] = peer
-        spent: dict[str, list[float]] = {name: [] for name in tasks}
-        for _ in range(3 if side > 300 else ROUNDS):
-            for name, task in tasks.items():
-                spent[name].append(best(task, rounds=1)[1])
-        least = {name: min(times) for name, times in spent.items()}
-        rest = "".join(f" {least[n]:8.1f} {least[n] / least['ours']:7.2f}" for n in list(tasks)[1:])
-        print(f"{side:4d}^2 {least['ours']:47.1f}{rest}", flush=True)
-
-
 def warps() -> None:
     side = 512
     grid = np.moveaxis(np.indices((side, side)), 0, -1) * 1.0
@@ -157,5 +110,4 @@ if __name__ == "__main__":
     else:
         asked = [int(x) for x in words] or [128, 192, 256, 512]
         splices(asked)
-        solvers(asked)
         warps()

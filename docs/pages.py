@@ -209,21 +209,22 @@ long each method took on ten pictures, in processor seconds, says [the compariso
 ## The commands
 
 What is measured, and by which command, from a checkout of the sources. Each prints a table; most interleave rounds and take
-medians, since a machine that does other things shows in the mean. Those with `_vs_peers` compare with other libraries, which
-`pip install --group bench` brings. `make bench` measures the kernels in Rust alone.
+medians, since a machine that does other things shows in the mean. `make bench-kernels` measures the kernels in Rust alone, and
+`make bench-guard` counts the instructions of eight of them.
 """
 
 
 PEERS = """
-## Kernels beside others
+## Beside others
 
-What `make peers` wrote: {processor}, {cores} cores, {system}, Python {python}, {date}, while the machine did {load:.0f} things
+What `make bench` wrote: {processor}, {cores} cores, {system}, Python {python}, {date}, while the machine did {load:.0f} things
 at once. Milliseconds of the processor, in one thread, the median of {rounds} rounds in which all took turns, and the least and
-the most; how many times as long as texrs; megabytes that a process took at most, beyond what loading takes. Results were
-compared first, as it says. The floor is what copying input and output once takes.
+the most; how many times as long as texrs, with what was asked for before it was measured (*not reached* where it fell short);
+megabytes that the work took beyond what was there when all was ready. Results were compared first, as it says. The floor is
+what copying what is given once takes. What is *published* was measured by others, on their hardware.
 
-| work | who | ms | spread | ratio | MB |
-|---|---|---|---|---|---|
+| work | who | ms | spread | ratio | asked | MB |
+|---|---|---|---|---|---|---|
 {rows}
 """
 
@@ -237,16 +238,34 @@ def tabulate_peers(file: Path) -> str:
     found = json.loads(file.read_text(encoding="utf-8"))
     rows = []
     for case in found["cases"]:
-        said = f"{case['case']}: {case['check']}"
+        said = f"{case['case']}{' (seconds that pass)' if case['wall'] else ''}: {case['check']}"
         for each in case["rows"]:
-            spread = f"{each['least']:.1f} to {each['most']:.1f}"
-            bold = "**" if each["ratio"] <= min(r["ratio"] for r in case["rows"]) else ""
-            shown = (said, each["who"], f"{bold}{each['ms']:.1f}{bold}", spread, f"{each['ratio']:.1f}")
-            rows.append(f"| {' | '.join(shown)} | {each['megabytes']:.0f} |")
+            own = each is case["rows"][0]
+            asked = f"at most {case['most_ms']:g} ms" if own and case["most_ms"] else ""
+            missed = own and each["ms"] > (case["most_ms"] or float("inf"))
+            if own and case["most_mb"]:
+                asked += f"{', ' * bool(asked)}at most {case['most_mb']:g} MB"
+                missed = missed or each["megabytes"] > case["most_mb"]
+            if each["asked"]:
+                asked, missed = f"{each['asked']:g}", each["ratio"] < each["asked"]
+            if each.get("published"):
+                figures = (_figure(each["ms"]), "*published*")
+            else:
+                figures = (_figure(each["ms"]), f"{_figure(each['least'])} to {_figure(each['most'])}")
+            who = each["who"] + (f", {case['shown']} {each['shown']:g}" if case["shown"] and "shown" in each else "")
+            asked += ", *not reached*" * missed
+            size = f"{each['megabytes']:.0f}" if "megabytes" in each else ""
+            rows.append(f"| {said} | {who} | {' | '.join(figures)} | {each['ratio']:.3g} | {asked} | {size} |")
             said = ""
-        rows += [f"| | {each['who']} | not installed: `{each['get']}` | | | |" for each in case["absent"]]
-        rows.append(f"| | *floor* | {case['floor']:.2f} | | | |")
+        for each in case["absent"]:
+            rows.append(f"| | {each['who']} | not here: {each['get']} | | | {each['asked'] or ''} | |")
+        rows.append(f"| | *floor* | {_figure(case['floor'])} | | | | |")
     return PEERS.format(rows="\n".join(rows), rounds=found["rounds"], **found["machine"])
+
+
+def _figure(ms: float) -> str:
+    """Return milliseconds to three digits, without an exponent."""
+    return f"{ms:.0f}" if ms >= 100 else f"{ms:.3g}"
 
 
 def list_benches(folder: Path) -> str:
@@ -254,7 +273,7 @@ def list_benches(folder: Path) -> str:
     import ast
 
     text = f"{NOTICE}# Performance\n{MEASURED.format(peers=tabulate_peers(folder / 'peers.json'))}\n"
-    groups = {"How fast": "_speed", "Beside other libraries": "_vs_peers", "How well": ""}
+    groups = {"How fast": "_speed", "Beside others": "_vs_peers", "How well": ""}
     files = sorted(folder.glob("*.py"))
     for title, ending in groups.items():
         some = [file for file in files if file.stem.endswith(ending)]

@@ -1,0 +1,183 @@
+"""texrs beside others: the same work, results compared first, rounds in turn; written as JSON.
+
+    make bench
+    python benches/peers [--rounds 5] [--only strip-512 ...] [--out benches/peers.json] [--python .venv-peers/bin/python]
+
+Each side of a row works in a process of its own, in one thread, and takes its turn when it is told to: what the machine does
+besides falls on all alike. Seconds are those of the processor, but where threads are compared. Megabytes are those that the
+first time of the work took beyond what was there when all was ready. The floor is what copying the input once takes: nothing
+can be faster. The libraries of others live in an environment of their own (`make bench` makes .venv-peers): some are under the
+GPL, none is ever loaded beside texrs. Programs of others are found by a variable or on the PATH: RESYNTHESIZER and QUILTING,
+which `holes.py` and `synthesis.py` describe. Who is missing is named with how to get it. Figures of papers are of
+other hardware, and say so. The page "Performance" of the documentation is drawn from what is written.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from frame import Row, find_rows
+
+HERE = Path(__file__).resolve().parent
+ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "RAYON_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+PIP = "make bench"
+PROGRAMS = {
+    "Resynthesizer": ("RESYNTHESIZER", "built by hand, as benches/peers/holes.py says"),
+    "MarH19's quilting in C": ("QUILTING", "built by hand, as benches/peers/synthesis.py says"),
+}
+NEEDS = {
+    "PyMaxflow": "maxflow",
+    "OpenCV": "cv2",
+    "OpenCV shift maps": "cv2.xphoto",
+    "OpenCV graph segmentation": "cv2.ximgproc",
+    "FAISS": "faiss",
+    "CHOLMOD": "cvxopt",
+    "scikit-image": "skimage",
+}
+"""What is not here alone; NumPy and SciPy are in both environments."""
+
+
+def look_for(who: str, python: Path) -> str:
+    """Return how to get a side that is missing, or nothing."""
+    if who.startswith("texrs"):
+        return ""
+    if who in PROGRAMS:
+        variable, how = PROGRAMS[who]
+        return "" if os.access(os.environ.get(variable, ""), os.X_OK) else f"{variable}=PROGRAM, {how}"
+    module = NEEDS.get(who, "scipy")
+    try:
+        found = subprocess.run([python, "-c", f"import {module}"], capture_output=True, check=False).returncode == 0
+    except OSError:
+        found = False
+    return "" if found else PIP
+
+
+def measure(name: str, row: Row, rounds: int, python: Path) -> dict[str, Any]:
+    """Let all sides of a row that are here take turns; return what is written of it."""
+    absent = {who: get for who in row.sides if (get := look_for(who, python))}
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "arrays.npz")
+        np.savez(file, **row.make())
+        sides = {
+            who: subprocess.Popen(
+                [sys.executable if who.startswith("texrs") else python, HERE / "frame.py", name, who, file],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+                env={**os.environ, **ONE_THREAD},
+            )
+            for who in row.sides
+            if who not in absent
+        }
+        first: dict[str, Any] = {}
+        times: dict[str, list[float]] = {who: [] for who in sides}
+        for who, side in sides.items():
+            first[who] = _hear(name, who, side)
+        compare(name, row, {who: np.array(said["result"]) for who, said in first.items()})
+        for _ in range(rounds):
+            for who, side in sides.items():
+                side.stdin.write("go\n")  # type: ignore[union-attr]
+                side.stdin.flush()  # type: ignore[union-attr]
+                times[who].append(_hear(name, who, side))
+        for side in sides.values():
+            side.communicate()
+    return describe(row, first, times, absent)
+
+
+def _hear(name: str, who: str, side: subprocess.Popen[str]) -> Any:
+    said = side.stdout.readline()  # type: ignore[union-attr]
+    if not said:
+        raise SystemExit(f"{name}: {who} ended before it was done")
+    return json.loads(said)
+
+
+def compare(name: str, row: Row, results: dict[str, np.ndarray]) -> None:
+    """Refuse to measure what does not do the same."""
+    mine = results[next(iter(row.sides))]
+    for who, theirs in results.items():
+        apart = row.apart(mine, theirs)
+        if not apart <= row.tolerance:
+            raise SystemExit(f"{name}: {who} gives something else, {apart} apart; {row.check}")
+
+
+def describe(row: Row, first: dict[str, Any], times: dict[str, list[float]], absent: dict[str, str]) -> dict[str, Any]:
+    """Return a row as it is written."""
+    middle: Callable[[list[float]], float] = lambda taken: float(np.median(taken))  # noqa: E731
+    base = middle(next(iter(times.values())))
+    rows = [
+        {
+            "who": who,
+            "ms": round(1e3 * middle(taken), 4),
+            "least": round(1e3 * min(taken), 4),
+            "most": round(1e3 * max(taken), 4),
+            "ratio": round(middle(taken) / base, 2),
+            "asked": row.asked.get(who),
+            "megabytes": round(max(first[who]["megabytes"], 0.0), 1),
+            "shown": round(first[who]["result"][0], 3) if row.shown else None,
+        }
+        for who, taken in times.items()
+    ]
+    rows += [
+        {"who": who, "ms": ms, "ratio": round(ms / 1e3 / base, 1), "asked": row.asked.get(who), "published": True}
+        for who, ms in row.published.items()
+    ]
+    return {
+        "number": row.number,
+        "case": row.title,
+        "check": row.check,
+        "shown": row.shown,
+        "most_ms": row.most_ms,
+        "most_mb": row.most_mb,
+        "wall": row.wall,
+        "floor": round(1e3 * min(said["floor"] for said in first.values()), 3),
+        "rows": rows,
+        "absent": [{"who": who, "get": get, "asked": row.asked.get(who)} for who, get in absent.items()],
+    }
+
+
+def describe_machine() -> dict[str, Any]:
+    cpu = Path("/proc/cpuinfo")
+    lines = cpu.read_text(encoding="utf-8").splitlines() if cpu.exists() else []
+    model = [line.partition(": ")[2].strip() for line in lines if line.startswith("model name")]
+    return {
+        "processor": model[0] if model else platform.processor(),
+        "cores": os.cpu_count(),
+        "system": f"{platform.system()} {platform.machine()}",
+        "python": platform.python_version(),
+        "date": date.today().isoformat(),
+        "load": round(os.getloadavg()[0], 1),
+    }
+
+
+def main() -> None:
+    rows = find_rows()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--out", type=Path, default=HERE.parent / "peers.json")
+    parser.add_argument("--python", type=Path, default=HERE.parents[1] / ".venv-peers" / "bin" / "python")
+    parser.add_argument("--only", nargs="*", choices=rows, metavar="ROW", help=f"these alone: {', '.join(rows)}")
+    options = parser.parse_args()
+    found: dict[str, Any] = {"machine": describe_machine(), "rounds": options.rounds, "cases": []}
+    if options.only and options.out.exists():
+        found = json.loads(options.out.read_text(encoding="utf-8"))
+    cases = {case["name"]: case for case in found["cases"] if case.get("name") in rows}
+    for name in options.only or rows:
+        cases[name] = {"name": name, **measure(name, rows[name], options.rounds, options.python)}
+        print(json.dumps(cases[name]), flush=True)
+        found["cases"] = [cases[each] for each in rows if each in cases]
+        options.out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
