@@ -3,9 +3,12 @@
 import functools
 from collections.abc import Callable
 from dataclasses import fields, replace
+from pathlib import Path
 from typing import Any
 
+import imageio.v3 as iio
 import numpy as np
+import pytest
 from hypothesis import settings
 
 from texrs import samples
@@ -36,3 +39,12 @@ def draw_once(make: Callable[..., samples.Sample]) -> Callable[..., samples.Samp
 for name, generator in samples._GENERATORS.items():
     samples._GENERATORS[name] = draw_once(generator)
     setattr(samples, name, samples._GENERATORS[name])
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in a folder that holds an exemplar, and an empty file, which any command may replace."""
+    monkeypatch.chdir(tmp_path)
+    iio.imwrite("in.png", samples.load("dots", size=(64, 64)).image)
+    Path("out.png").touch()
+    return tmp_path

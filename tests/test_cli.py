@@ -1,71 +1,25 @@
-"""The command line, end to end: results, exit codes, one-line errors, and files that stay whole."""
+"""The command line, end to end: results, small commands, and files that stay whole."""
 
 from __future__ import annotations
 
-import functools
 import importlib
-import inspect
 import io
-import os
 import re
 import signal
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import imageio.v3 as iio
 import numpy as np
 import pytest
-import typer
 
 import texrs
+from commands import COLOURS, GREY, TINY, Capture, complaint, files, npy, png
 from reference.look_up import view
 from texrs import SourceMap, samples
-from texrs.cli import COMMANDS, app, main
+from texrs.cli import main
 from texrs.cli._console import Stopped
-from texrs.cli._outputs import OUTPUTS
 from texrs.elements import Elements
-from texrs.errors import InvalidInput
-
-Capture = pytest.CaptureFixture[str]
-COLOURS = samples.load("dots", size=(64, 64)).image
-GREY = np.ascontiguousarray(COLOURS[..., 1])
-TINY = ("--size", "48", "--tiles", "1")
-
-
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in a folder that holds an exemplar, and an empty file, which any command may replace."""
-    monkeypatch.chdir(tmp_path)
-    iio.imwrite("in.png", COLOURS)
-    Path("out.png").touch()
-    return tmp_path
-
-
-def files(folder: Path) -> dict[str, bytes]:
-    return {str(p.relative_to(folder)): p.read_bytes() if p.is_file() else b"" for p in folder.rglob("*")}
-
-
-def replace_design(monkeypatch: pytest.MonkeyPatch, error: BaseException | None) -> None:
-    """Let the work of texrs design fail; its options are those of the function."""
-    module = importlib.import_module("texrs.papers.design")
-
-    @functools.wraps(module.design)
-    def fail(*arguments: object, **options: object) -> None:
-        raise error or RuntimeError("the work has begun")
-
-    monkeypatch.setattr(module, "design", fail)
-
-
-def complaint(capture: Capture) -> str:
-    """Return the one line on stderr, and nothing on stdout."""
-    out, err = capture.readouterr()
-    assert out == ""
-    assert re.fullmatch(r"texrs: [^\n]+\n", err), err
-    assert "Traceback" not in err
-    return err
-
 
 # --- design ----------------------------------------------------------------------------------------------------------
 
@@ -225,16 +179,6 @@ def palette() -> bytes:
     return buffer.getvalue()
 
 
-def npy(array: object, *, pickle: bool = False) -> bytes:
-    buffer = io.BytesIO()
-    np.save(buffer, np.asarray(array), allow_pickle=pickle)
-    return buffer.getvalue()
-
-
-def png(array: np.ndarray) -> bytes:
-    return iio.imwrite("<bytes>", array, extension=".png")
-
-
 ALPHA = np.dstack([COLOURS, 255 - GREY])
 HONEST: dict[str, tuple[bytes, str, tuple[int, ...], type]] = {
     "rgba": (png(ALPHA), "o.png", (48, 48, 4), np.uint8),
@@ -258,196 +202,6 @@ def test_any_image_goes_out_as_it_came(here: Path, name: str) -> None:
     assert main(["design", "image", *TINY, "-o", out, "-q"]) == 0
     result = texrs.io.read(out)
     assert (result.shape, result.dtype) == (shape, dtype)
-
-
-# --- what is refused -------------------------------------------------------------------------------------------------
-
-
-NAN = np.where(GREY > 128, np.nan, np.float32(1))
-INPUTS: dict[str, tuple[bytes | None, str]] = {
-    "missing": (None, "no such file"),
-    "empty": (b"", "empty"),
-    "text": (b"hello, this is no picture\n" * 9, "content is none of"),
-    "truncated": (png(COLOURS)[:-900], "bad.png"),
-    "NaN": (npy(NAN), "NaN or infinite"),
-    "objects": (npy(np.array([[{}, 1], [2, 3]], object), pickle=True), "bad.png"),
-    "complex": (npy(COLOURS[..., 0] * 1j), "bad.png"),
-    "words": (npy(np.array([["a", "b"]])), "bad.png"),
-    "volume": (npy(np.zeros((20, 20, 70), np.uint8)), "bad.png"),
-    "four axes": (npy(np.zeros((20, 20, 20, 3), np.uint8)), "bad.png"),
-    "one axis": (npy(np.zeros(400, np.uint8)), "bad.png"),
-    "1 x 1": (npy(GREY[:1, :1]), "at least 16"),
-    "7 x 3": (npy(GREY[:7, :3]), "at least 16"),
-    "20000 x 1": (npy(np.ones((20000, 1), np.uint8)), "at least 16"),
-    "no pixels": (npy(GREY[:0]), "bad.png"),
-}
-
-
-@pytest.mark.parametrize("name", INPUTS)
-def test_hostile_inputs(here: Path, capsys: Capture, name: str) -> None:
-    content, words = INPUTS[name]
-    if content is not None:
-        Path("bad.png").write_bytes(content)
-    before = files(here)
-    assert main(["design", "bad.png", "-o", "out.png", "-q", "--map", "s.npz", "--stages", "st"]) == 2
-    line = complaint(capsys)
-    assert words in line
-    assert "bad.png" in line
-    assert files(here) == before
-
-
-ARGUMENTS: dict[str, str] = {
-    "folder": "design .",
-    "empty name": "design ",
-    "unknown sample": "design sample:nowhere",
-    "a volume": "design sample:stripes",
-    **{f"size {s}": f"design in.png --size {s}" for s in ("0", "-5", "axb", "x", "1.5", "1e3", "8x8x8", "５x５", "9")},
-    "size nothing": "design in.png --size ",
-    "size huge": "design in.png --size 1000000000x1000000000",
-    "size of many digits": f"design in.png --size {'9' * 5000}",
-    "size too much": "design in.png --size 20000x20000",
-    "seed negative": "design in.png --seed -1",
-    "seed too large": f"design in.png --seed {2**64}",
-    "seed a word": "design in.png --seed many",
-    "wrap": "design in.png --wrap z",
-    "scale reversed": "design in.png --scale 1.2:0.8",
-    "scale words": "design in.png --scale a:b",
-    "scale three": "design in.png --scale 0.8:1:1.2",
-    "scale NaN": "design in.png --scale nan:1",
-    "growth rate": "design in.png --growth-rate inf",
-    "fixed point": "design in.png --start 0.5",
-    "start": "design in.png --start 1",
-    "tiles": "design in.png --tiles 0",
-    "threads": "design in.png --threads 0",
-    "threads many": "design in.png --threads 99999",
-    "element kind": "design in.png --element-kind some",
-    "layers": "design in.png --element-layers 99",
-    "patch": "design in.png --patch 3",
-    "blend": "design in.png --blend -1",
-    "method": "design in.png --method best",
-    "rotate": "design in.png --rotate 181",
-    "translate": "design in.png --translate -0.1",
-    "operations": "design in.png --operations 9",
-    "labels missing": "design in.png --element-labels no.png",
-    "map suffix": "design in.png --map s.png",
-    "map folder": "design in.png --map no/s.npz",
-    "stages are a file": "design in.png --stages in.png",
-    "stages below a file": "design in.png --stages in.png/st",
-    "stages the result": "design in.png --stages out.png",
-    "unknown option": "design in.png --colour red",
-    "examples that do not agree": "design in.png sample:grass",
-    "no example": "design",
-    "unknown command": "desing in.png",
-    "apply to no map": "apply in.png",
-    "apply no source": "apply in.png in.png",
-    "apply a missing source": "apply no.npz in.png",
-    "apply kind": "apply no.npz in.png --kind bump",
-    "apply blend": "apply no.npz in.png --blend -1",
-    "apply wrap": "apply no.npz in.png --wrap z",
-    "apply green": "apply no.npz in.png --green left",
-    "apply interpolation": "apply no.npz in.png --interpolation best",
-    "demo in a file": "demo",
-    "samples to a file": "samples dots",
-    "samples unknown": "samples nowhere",
-    "info of nothing": "info no.png",
-}
-
-
-@pytest.mark.parametrize("name", ARGUMENTS)
-def test_hostile_arguments(here: Path, capsys: Capture, name: str) -> None:
-    words = ARGUMENTS[name].split(" ")
-    arguments = [*words, "-o", "out.png"] if words[0] in ("design", "apply", "demo", "samples") else words
-    before = files(here)
-    assert main([w for w in arguments if w or name in ("empty name", "size nothing")]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    # Some of these are found out by the work itself, after its first line of progress.
-    lines = [line for line in err.splitlines() if line != "texrs: segment"]
-    assert len(lines) == 1, err
-    assert lines[0].startswith("texrs: ")
-    assert files(here) == before
-
-
-NAMES = {
-    "out.xyz": ".png",
-    "out": ".png",
-    "no/out.png": "no folder",
-    ".": "folder",
-    "folder.png": "folder",
-    "in.png/out.png": "in.png",
-    "out.hdr": "uint8",
-    "out.exr": "uint8",
-    "/dev/null": "",
-    f"{'n' * 300}.png": "name",
-}
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_outputs_are_checked_before_the_work(
-    here: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
-    Path("folder.png").mkdir()
-    before = files(here)
-    replace_design(monkeypatch, None)  # Would be an internal error.
-    assert main(["design", "in.png", "-o", name]) == 2
-    assert NAMES[name] in complaint(capsys)
-    assert main(["design", "in.png", "-o", "out.jpg", "--size", "16x65501"]) == 2
-    assert "65500" in complaint(capsys)
-    assert main(["design", "in.png", "-o", "s.npz", "--map", "./s.npz"]) == 2
-    assert "--out" in complaint(capsys)
-    assert files(here) == before
-
-
-class Panic(BaseException):
-    """What a panic of the compiled part looks like from here: no Exception."""
-
-
-@pytest.mark.parametrize(
-    ("error", "code", "words"),
-    [
-        (MemoryError(), 2, "memory"),
-        (RuntimeError("one\ntwo \x1b[31m"), 1, r"internal error: RuntimeError: one two \x1b[31m"),
-        (Panic("boom"), 1, "internal error: Panic: boom"),
-        (PermissionError(13, "Permission denied", "some.png"), 2, "some.png: permission denied"),
-        (BrokenPipeError(), 141, None),
-    ],
-    ids=lambda value: type(value).__name__ if isinstance(value, BaseException) else "",
-)
-def test_failures_in_the_work(
-    here: Path,
-    capsys: Capture,
-    monkeypatch: pytest.MonkeyPatch,
-    error: BaseException,
-    code: int,
-    words: str | None,
-) -> None:
-    replace_design(monkeypatch, error)
-    monkeypatch.setattr("texrs.cli._console.os.dup2", lambda *descriptors: None)
-    before = files(here)
-    assert main(["design", "in.png", "-o", "out.png", "--map", "s.npz", "--stages", "st"]) == code
-    if words is None:
-        assert capsys.readouterr() == ("", "")
-    else:
-        assert words in complaint(capsys)
-    assert files(here) == before
-
-
-def test_traceback_on_request(here: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
-    replace_design(monkeypatch, None)
-    monkeypatch.setenv("TEXRS_TRACEBACK", "1")
-    assert main(["design", "in.png", "-o", "out.png"]) == 1
-    assert "Traceback" in capsys.readouterr().err
-
-
-def test_failed_writing_leaves_what_was_there(here: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(*args: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(SourceMap, "save", full)
-    before = files(here)
-    assert main(["design", "in.png", "-q", *TINY, "-o", "out.png", "--map", "s.npz"]) == 2
-    assert "no space left on device" in complaint(capsys)
-    assert files(here) == before
 
 
 # --- apply -----------------------------------------------------------------------------------------------------------
@@ -539,106 +293,6 @@ def test_apply_to_a_volume(here: Path) -> None:
     assert (texrs.io.read_volume("w.tif") == volume).all()
 
 
-# --- outputs that are inputs -----------------------------------------------------------------------------------------
-
-COMMAND: Any = typer.main.get_command(app)
-
-
-@functools.cache
-def find_command(command: str) -> Any:
-    return COMMAND.get_command(None, command)
-
-
-def parameters(command: str) -> list[Any]:
-    found: list[Any] = find_command(command).params
-    return found
-
-
-def writes(parameter: Any) -> bool:
-    return parameter.name in OUTPUTS and parameter.param_type_name == "option"
-
-
-def pairs() -> list[tuple[str, str, str]]:
-    """Return each command with each of its texts that may name a file that is read, and each of its outputs."""
-    found = []
-    for command in COMMANDS:
-        given = parameters(command)
-        kinds = inspect.signature(find_command(command).callback, eval_str=True).parameters
-        texts = [p.name for p in given if "str" in str(kinds[p.name].annotation).split(", <")[0] and not writes(p)]
-        found += [(command, read, p.name) for read in texts for p in given if writes(p)]
-    return found
-
-
-def test_all_commands_are_known_to_read_and_write() -> None:
-    both = {command for command, _, _ in pairs()}
-    assert both >= {"design", "apply", "tile", "complete", "scale-map", "perspective", "solid", "synthesize", "slice"}
-    assert both >= {"splice", "self-splice", "analyse", "database"}
-    assert ("apply", "source", "out") in pairs()
-    assert any(command == "solid" and "guide" in read and written == "map" for command, read, written in pairs())
-    assert any(command == "design" and "labels" in read and written == "stages" for command, read, written in pairs())
-
-
-@pytest.mark.parametrize(("command", "read", "written"), pairs(), ids="-".join)
-def test_no_command_writes_over_what_it_reads(here: Path, command: str, read: str, written: str) -> None:
-    Path("st").mkdir()
-    target = "st/01-known.png" if written == "stages" else "there.npz" if written == "map" else "there.png"
-    Path(target).write_bytes(b"dear")
-    Path("symbolic.png").symlink_to(target)
-    os.link(target, "hard.png")
-    before = files(here)
-    for name in (target, "symbolic.png", "hard.png"):
-        arguments, options = [], []
-        for p in parameters(command):
-            value = name if p.name == read else ("st" if p.name == "stages" else target) if p.name == written else None
-            if value is not None or p.required:
-                values = [value or ("new.png" if p.name == "out" else "in.png")] * max(p.nargs, 1)
-                if p.param_type_name == "argument":
-                    arguments += values
-                else:
-                    options += [max(p.opts, key=len), *values]
-        with pytest.raises(InvalidInput, match=f"--{written}: {target} is read"):
-            find_command(command).main([*arguments, *options], standalone_mode=False)
-        assert files(here) == before
-
-
-@pytest.mark.parametrize(
-    "command",
-    [
-        "apply map.npz in.png -o in.png",
-        "apply map.npz in.png -o map.npz",
-        "design in.png -o ./in.png",
-        "design many-1.png -o many.png --variants 2",
-        "design in.png --element-labels s-1/report.json -o many.png --variants 2 --stages s",
-        "apply map.npz in.png s-1/in.png -o s-1",
-        "database db matrix -o in.png",
-        "database db matrix -o db/dots.npz",
-        "database db add db/dots.npz",
-        "self-splice in.png --edit s-1/report.json -o new.png --stages s-1",
-    ],
-)
-def test_no_name_that_a_command_makes_is_read(here: Path, capsys: Capture, command: str) -> None:
-    Path("s-1").mkdir()
-    Path("s-1/report.json").write_text("{}")
-    iio.imwrite("s-1/in.png", COLOURS)
-    SourceMap.identity((64, 64)).save("map.npz")
-    iio.imwrite("many-1.png", COLOURS)
-    mask = samples.load("dots", size=(64, 64)).mask
-    texrs.TextureDatabase("db").add("in.png", "dots", mask=mask, layout="disjoint")
-    before = files(here)
-    assert main(command.split()) == 2
-    assert "is read" in complaint(capsys)
-    assert files(here) == before
-
-
-def test_a_folder_of_inputs_may_take_what_replaces_none(here: Path, capsys: Capture) -> None:
-    assert main(["tile", "in.png", "-o", "out.png", "-q", "--stages", "."]) == 0
-    assert (iio.imread("in.png") == COLOURS).all()
-    Path("gravel").mkdir()
-    assert main(["samples", "gravel", "-o", "gravel", "-q"]) == 0
-    assert main(["design", "in.png", *TINY, "-o", "many.png", "--variants", "2", "--stages", "."]) == 2
-    assert "--stages: needs a name" in complaint(capsys)
-
-
 # --- the small commands ----------------------------------------------------------------------------------------------
 
 
@@ -672,69 +326,3 @@ def test_info(here: Path, capsys: Capture) -> None:
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "source map: 30 x 20, made from 30 x 20"
     assert lines[1] == "copied unchanged: 100.0% of the pixels, in 1 regions"
-
-
-# --- processes: signals, terminals, pipes ----------------------------------------------------------------------------
-
-posix = pytest.mark.skipif(os.name != "posix", reason="signals, pipes and terminals of POSIX")
-LONG = ["design", "in.png", "-o", "out.png", "--size", "3000", "--map", "s.npz", "--stages", "st"]
-
-
-def start(*arguments: str, **options: object) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "texrs", *arguments]
-
-    def heed() -> None:
-        """Take interrupts, which a shell lets its background jobs ignore."""
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-    return subprocess.Popen(command, stderr=subprocess.PIPE, preexec_fn=heed, **options)  # type: ignore[call-overload, no-any-return]
-
-
-@posix
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_signals_leave_nothing_half_written(here: Path, number: int, code: int) -> None:
-    before = files(here)
-    with start(*LONG) as process:
-        assert process.stderr is not None
-        while b"stitch" not in (line := process.stderr.readline()):
-            assert line.startswith(b"texrs: ")
-        process.send_signal(number)
-        rest = process.stderr.read()
-    assert process.returncode == code
-    assert rest.splitlines()[-1] == b"texrs: stopped; nothing was left half-written"
-    assert b"Traceback" not in rest
-    assert files(here) == before
-
-
-@posix
-def test_a_bar_on_a_terminal(here: Path) -> None:
-    import pty
-
-    mine, theirs = pty.openpty()
-    command = [sys.executable, "-m", "texrs", "design", "in.png", *TINY, "-o", "out.png"]
-    environment = os.environ | {"TERM": "xterm"}
-    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=theirs, env=environment, check=True)
-    os.close(theirs)
-    shown = b""
-    # A terminal without a writer ends with an error on Linux and with nothing elsewhere.
-    try:
-        while part := os.read(mine, 4096):
-            shown += part
-    except OSError:
-        pass
-    os.close(mine)
-    assert done.stdout == b""
-    assert b"\x1b[" in shown
-    assert b"100 %" in shown
-    assert b"texrs: wrote out.png" in shown
-
-
-@posix
-def test_nobody_reads(here: Path) -> None:
-    read, write = os.pipe()
-    os.close(read)
-    with start("samples", stdout=write) as process:
-        os.close(write)
-        assert process.stderr is not None
-        assert process.stderr.read() == b""
-    assert process.returncode == 141
