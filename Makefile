@@ -9,7 +9,7 @@ JOBS ?= $(shell getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2)
 MINUTES ?= 10
 RUST := Cargo.toml $(shell find rust -name '*.rs')
 
-.PHONY: help demo test test-rust test-python fuzz kills levels lint lint-rust lint-python format bench bench-kernels bench-guard wheel docs docs-check clean requirements
+.PHONY: help demo test test-rust test-python fuzz kills levels audit lint lint-rust lint-python format bench bench-kernels bench-guard wheel docs docs-check clean requirements
 .DELETE_ON_ERROR:
 # Compilers count the processors themselves: what make says of its own jobs is not for them.
 unexport MAKEFLAGS
@@ -21,6 +21,7 @@ help:
 	@echo "make kills   commands killed at random moments (COUNT=200)"
 	@echo "make levels  stored results on lesser processors, some of them emulated (qemu-user)"
 	@echo "make lint    formatting, clippy, rustdoc, ruff, mypy, stubtest"
+	@echo "make audit   licences of all that texrs needs, and its known defects (cargo-deny, where it is installed)"
 	@echo "make format  rewrite the sources in the house's format"
 	@echo "make bench   texrs beside other libraries and programs: benches/peers.json"
 	@echo "make bench-kernels  criterion benches of the kernels"
@@ -83,7 +84,13 @@ kills: $(VENV)/.built
 	$(BIN)/python tests/kill_commands.py --count $(or $(COUNT),200)
 
 # Side by side with `make -j2 lint`: the checks of either language leave a processor idle.
-lint: lint-rust lint-python
+lint: lint-rust lint-python audit
+
+# What texrs is built on. The database of advisories is cargo-deny's, which fetches it: CI has it, a quiet machine may not.
+audit: $(VENV)/.tools
+	$(BIN)/python .ci/licences
+	@if command -v cargo-deny >/dev/null; then cargo deny check; \
+		else echo "advisories: not looked at, cargo-deny is not installed (cargo install cargo-deny)"; fi
 
 # With the same features, dependencies are checked once.
 lint-rust: | requirements
