@@ -9,7 +9,7 @@ JOBS ?= $(shell getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2)
 MINUTES ?= 10
 RUST := Cargo.toml $(shell find rust -name '*.rs')
 
-.PHONY: help demo test test-rust test-python fuzz kills levels audit lint lint-rust lint-python format bench bench-kernels bench-guard wheel docs docs-check clean requirements
+.PHONY: help demo test test-rust test-python fuzz fuzz-kernels sanitize kills levels audit lint lint-rust lint-python format bench bench-kernels bench-guard wheel docs docs-check clean requirements
 .DELETE_ON_ERROR:
 # Compilers count the processors themselves: what make says of its own jobs is not for them.
 unexport MAKEFLAGS
@@ -18,6 +18,8 @@ help:
 	@echo "make demo    pictures of every system at work on built-in examples: demo/index.html"
 	@echo "make test    all tests, Rust and Python"
 	@echo "make fuzz    random cases, hostile values, damaged files, for about ten minutes (MINUTES=10)"
+	@echo "make fuzz-kernels  the targets in fuzz/ alone, which share MINUTES (a nightly compiler)"
+	@echo "make sanitize  the Rust tests with checked addresses (a nightly compiler)"
 	@echo "make kills   commands killed at random moments (COUNT=200)"
 	@echo "make levels  stored results on lesser processors, some of them emulated (qemu-user)"
 	@echo "make lint    formatting, clippy, rustdoc, ruff, mypy, stubtest"
@@ -62,18 +64,28 @@ test-rust: | requirements
 test-python: $(VENV)/.built
 	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 RAYON_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal -q
 
-# Property tests, all hostile values of all arguments, and damaged files. Rounds with a seed each, until one fails or the time is
-# up; with a SEED, the round of that seed.
+# Property tests, all hostile values of all arguments, damaged files, and the targets in fuzz/, where there is a nightly compiler.
+# Rounds with a seed each, until one fails or the time is up; with a SEED, the round of that seed.
 fuzz: $(VENV)/.built
 	@end=$$(($$(date +%s) + 60 * $(MINUTES))); \
 	while seed=$(or $(SEED),$$(od -An -N4 -tu4 /dev/urandom | tr -d ' ')); do \
 		echo "make fuzz SEED=$$seed"; \
 		PROPTEST_RNG_SEED=$$seed cargo test --quiet --lib && \
 		$(BIN)/python -m pytest tests -n $(JOBS) --dist worksteal -q -m 'hypothesis or fuzz' --hypothesis-profile fuzz --hypothesis-seed $$seed && \
-		$(BIN)/python tests/fuzz_files.py --seed $$seed --seconds 300 || \
+		$(BIN)/python tests/fuzz_files.py --seed $$seed --seconds 300 && \
+		$(BIN)/python .ci/fuzz --seed $$seed --seconds 300 || \
 			{ echo "make fuzz SEED=$$seed repeats this" >&2; exit 1; }; \
 		[ -z "$(SEED)" ] && [ $$(date +%s) -lt $$end ] || break; \
 	done
+
+# From where the last run came to: what covered more of the code stays in fuzz/corpus.
+fuzz-kernels: $(VENV)/.tools
+	$(BIN)/python .ci/fuzz --seconds $$((60 * $(MINUTES))) $(TARGETS)
+
+# What reads or writes beside an array ends the test that does. Stacks are larger where addresses are checked.
+sanitize: | requirements
+	RUSTFLAGS=-Zsanitizer=address RUST_MIN_STACK=33554432 cargo +nightly test --quiet --lib \
+		--target $$(rustc -vV | sed -n 's/^host: //p')
 
 # About ten minutes on a quiet machine. MINUTES bounds each level.
 levels: $(VENV)/.built
@@ -152,5 +164,5 @@ docs-check: $(VENV)/.tools
 	$(BIN)/python .ci/pages
 
 clean:
-	rm -rf $(VENV) $(PEERS) target demo dist docs/_build docs/generated .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(PEERS) target fuzz/target fuzz/corpus fuzz/artifacts demo dist docs/_build docs/generated .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find python -name '*.so' -delete

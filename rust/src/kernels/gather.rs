@@ -222,7 +222,8 @@ fn look_up<T: Element, const D: usize>(
     taps.at[0] = (0, 1.0);
     for axis in 0..D {
         let base = floor(f64::from(at[axis]));
-        let t = f64::from(at[axis]) - base as f64;
+        // Beyond what can be counted the base is not below it.
+        let t = (f64::from(at[axis]) - base as f64).clamp(0.0, 1.0);
         let (weights, first): (&[f64], isize) = if clip {
             (&catmull_rom(t), -1)
         } else {
@@ -319,6 +320,18 @@ mod tests {
                     at(&data, [2, 2], false, [(i / 2) as f32, (i % 2) as f32], how),
                     value
                 );
+            }
+        }
+    }
+
+    #[test]
+    fn far_beyond_what_is_counted_lies_a_sample_too() {
+        let data = [1.0f32, 2.0, 4.0, 8.0];
+        for how in [Interpolation::Linear, Interpolation::Cubic] {
+            for (far, row) in [(3e38, [4.0, 8.0]), (-3e38, [1.0, 2.0]), (1e19, [4.0, 8.0])] {
+                // One axis between samples, the other where a row cannot be told from the next.
+                let found = at(&data, [2, 2], false, [far, 0.5], how);
+                assert!((row[0]..=row[1]).contains(&found), "{found} at {far}");
             }
         }
     }

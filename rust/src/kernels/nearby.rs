@@ -47,6 +47,10 @@ pub fn sums(
     let around =
         |at: i64, step: i64, n: usize| (at + margin as i64 + step).rem_euclid(n as i64) as usize;
 
+    if window.is_empty() {
+        return memory::filled("sums", 0.0, points.len());
+    }
+
     let mut added = memory::filled("sums", 0.0f64, size)?;
     for (far, step) in steps(reach) {
         monitor.check()?;
@@ -62,8 +66,9 @@ pub fn sums(
             // As many digits as what is summed up has.
             let look = |step| f64::from(added[line + around(column, step, width)] as f32);
             let beside = |far: usize| (look(-(far as i64)) + look(far as i64)) * window[far];
-            let own = window.first().map_or(0.0, |w| w * look(0));
-            *sum = (1..=reach).rev().fold(own, |all, far| all + beside(far)) as f32;
+            *sum = (1..=reach)
+                .rev()
+                .fold(window[0] * look(0), |all, far| all + beside(far)) as f32;
         }
     });
     Ok(found)
@@ -104,6 +109,12 @@ mod tests {
                 prop_assert!((f64::from(sum) - expected).abs() < 1e-4, "{sum} for {expected}");
             }
         }
+    }
+
+    #[test]
+    fn under_no_window_nothing_is_summed() {
+        let found = sums(&[[1, 2]], &[3.0], [2, 3], true, &[], &Monitor::default());
+        assert_eq!(found.unwrap(), [0.0]);
     }
 
     #[test]

@@ -1,0 +1,64 @@
+//! Readers of image files: of any bytes, and of files that the writers made, damaged in a few places.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use texrs::image_io::{BYTES_PER_PIXEL, Decoded, Format, Sample, decode, encode};
+use texrs_fuzz::{Draw, speaks};
+
+const FORMATS: [Format; 5] = [
+    Format::Png,
+    Format::WebP,
+    Format::Tiff,
+    Format::Hdr,
+    Format::Exr,
+];
+const SAMPLES: [Sample; 4] = [Sample::U8, Sample::U16, Sample::F16, Sample::F32];
+
+/// What comes out is whole, and no more than was allowed.
+fn read(file: &[u8], limit: u64) -> Option<Decoded> {
+    let found = decode("file", file, limit).inspect_err(speaks).ok()?;
+    let [rows, columns, channels] = found.shape;
+    assert!((rows * columns) as u64 <= limit && rows * columns * channels > 0);
+    assert_eq!(
+        found.bytes.len(),
+        rows * columns * channels * found.sample.size()
+    );
+    assert!(found.bytes.len() as u64 <= limit * BYTES_PER_PIXEL);
+    assert!((1..=8).contains(&found.orientation));
+    Some(found)
+}
+
+fuzz_target!(|bytes: &[u8]| {
+    // Most of a corpus is files as they are: their first bytes say that they are none of the other inputs.
+    if Format::of_content(bytes).is_some() {
+        read(bytes, 1 << 12);
+        read(bytes, 16);
+        return;
+    }
+    let mut draw = Draw::new(bytes);
+    let format = FORMATS[draw.within(0..=4)];
+    let sample = SAMPLES[draw.within(0..=3)];
+    let shape = [draw.within(1..=9), draw.within(1..=9), draw.within(1..=4)];
+    let size = shape.iter().product::<usize>() * sample.size();
+    let pixels: Vec<u8> = draw.words(size).map(|x| x as u8).collect();
+    let mut file = match encode("file", format, sample, shape, &pixels) {
+        Ok(file) => file,
+        Err(error) => return speaks(&error),
+    };
+    let whole = read(&file, 81).expect("what was written can be read");
+    assert_eq!(whole.shape, shape);
+    if format != Format::Hdr {
+        assert_eq!((whole.sample, &whole.bytes), (sample, &pixels));
+    }
+    for _ in 0..draw.within(0..=6) {
+        let at = draw.within(0..=file.len() - 1);
+        match draw.within(0..=3) {
+            0 => file[at] = draw.any(),
+            1 => file[at] ^= 1 << draw.within(0..=7),
+            2 => file.truncate(at.max(1)),
+            _ => file.insert(at, draw.any()),
+        }
+    }
+    read(&file, 1 << 12);
+});

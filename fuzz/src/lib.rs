@@ -1,0 +1,144 @@
+//! What the targets share: small inputs drawn from bytes, and work that is done by one thread and by two.
+
+use std::fmt::Debug;
+use std::ops::RangeInclusive;
+
+use arbitrary::{Arbitrary, Unstructured};
+use texrs::hash::Noise;
+use texrs::par::{self, Monitor};
+use texrs::{Error, Result};
+
+/// Numbers that no kernel is meant for, or only just.
+const ODD: [f32; 10] = [
+    f32::NAN,
+    f32::INFINITY,
+    f32::NEG_INFINITY,
+    f32::MAX,
+    f32::MIN,
+    f32::MIN_POSITIVE,
+    1e-40,
+    -0.0,
+    -1.0,
+    1e15,
+];
+
+/// Values drawn from the bytes of an input; where these end all are the least.
+pub struct Draw<'a>(Unstructured<'a>);
+
+impl<'a> Draw<'a> {
+    pub fn new(bytes: &'a [u8]) -> Self {
+        Self(Unstructured::new(bytes))
+    }
+
+    pub fn any<T: Arbitrary<'a> + Default>(&mut self) -> T {
+        self.0.arbitrary().unwrap_or_default()
+    }
+
+    pub fn flag(&mut self) -> bool {
+        self.any()
+    }
+
+    /// Once in `n` times.
+    pub fn seldom(&mut self, n: u8) -> bool {
+        self.any::<u8>() % n == n - 1
+    }
+
+    pub fn within(&mut self, range: RangeInclusive<usize>) -> usize {
+        let low = *range.start();
+        self.0.int_in_range(range).unwrap_or(low)
+    }
+
+    pub fn shape<const D: usize>(&mut self, range: RangeInclusive<usize>) -> [usize; D] {
+        std::array::from_fn(|_| self.within(range.clone()))
+    }
+
+    pub fn flags<const D: usize>(&mut self) -> [bool; D] {
+        std::array::from_fn(|_| self.flag())
+    }
+
+    /// From 0 to 1, seldom something odd.
+    pub fn real(&mut self) -> f32 {
+        if self.seldom(32) {
+            ODD[self.within(0..=ODD.len() - 1)]
+        } else {
+            f32::from(self.any::<u8>()) / 255.0
+        }
+    }
+
+    /// Values of `levels` levels from 0 to 1: of the bytes themselves, or noise of a seed. Few levels tie often.
+    pub fn values(&mut self, n: usize) -> Vec<f32> {
+        let levels = [1u32, 2, 5, 255][self.within(0..=3)];
+        let level = |x: u32| (x % (levels + 1)) as f32 / levels as f32;
+        self.words(n).map(level).collect()
+    }
+
+    /// As [`Self::values`], seldom with a few that are odd.
+    pub fn reals(&mut self, n: usize) -> Vec<f32> {
+        let mut values = self.values(n);
+        if n > 0 && self.seldom(16) {
+            for _ in 0..self.within(1..=3) {
+                values[self.within(0..=n - 1)] = ODD[self.within(0..=ODD.len() - 1)];
+            }
+        }
+        values
+    }
+
+    /// Flags, one in two, one in eight or seven in eight of them set.
+    pub fn mask(&mut self, n: usize) -> Vec<bool> {
+        let set = [128, 32, 224, 256][self.within(0..=3)];
+        self.words(n).map(|x| x % 256 < set).collect()
+    }
+
+    /// Numbers below `most`.
+    pub fn numbers(&mut self, n: usize, most: u32) -> impl Iterator<Item = u32> + use<'a> {
+        self.words(n).map(move |x| x % most.max(1))
+    }
+
+    /// Words: of the bytes, or of a seed, so that few bytes make much.
+    pub fn words(&mut self, n: usize) -> impl Iterator<Item = u32> + use<'a> {
+        let words: Vec<u32> = if self.flag() {
+            (0..n).map(|_| u32::from(self.any::<u8>())).collect()
+        } else {
+            let noise = Noise::new(u64::from(self.any::<u16>()));
+            (0..n)
+                .map(|i| noise.words([i as u32, 0, 0, 0])[0] >> 8)
+                .collect()
+        };
+        words.into_iter()
+    }
+
+    /// What is left.
+    pub fn rest(self) -> &'a [u8] {
+        self.0.take_rest()
+    }
+}
+
+/// What work returns: the same of one thread and of two, in the very bits, or an error that speaks.
+pub fn agreed<T: Debug + Send>(work: impl Fn(&Monitor) -> Result<T> + Sync) -> Option<T> {
+    let [one, two] =
+        [1, 2].map(|threads| par::install(threads, || work(&Monitor::default())).unwrap());
+    match (one, two) {
+        (Ok(one), Ok(two)) => {
+            // Floats are printed to the last bit, and one NaN is as good as another.
+            assert_eq!(format!("{one:?}"), format!("{two:?}"), "one thread and two");
+            Some(one)
+        }
+        (Err(one), Err(two)) => {
+            speaks(&one);
+            speaks(&two);
+            None
+        }
+        (one, two) => panic!("one thread: {one:?}; two: {two:?}"),
+    }
+}
+
+/// Errors name an argument and say something of it, and nothing was cancelled.
+pub fn speaks(error: &Error) {
+    assert!(!matches!(error, Error::Cancelled(_)), "{error}");
+    assert!(error.to_string().contains(' '), "{error:?}");
+}
+
+/// Near, for sums in another order.
+pub fn near(a: f64, b: f64, share: f64) -> bool {
+    a == b || (a - b).abs() <= share * (a.abs() + b.abs() + 1.0)
+}
