@@ -20,12 +20,31 @@ KERNELS = {
     "labels": "_rust.seam_labels(two, (one, one), (one, one), (False, False))",
     "strip": "_rust.seam_strips([(image, other, 1, None)], False, 'gradient')",
     "distance": "_rust.outlines(disc.astype(np.int32), [(1, (0, 0), (1024, 1024))])",
+    "complete": "_rust.complete(image, holes, None, patches, (False, False), (16, 16), (3, 2, 3.0), 0, False, None, None)",
+    "complete as printed": "_rust.complete(image, holes, None, patches, (True,) * 2, (16, 16), (1, 0, 9), 0, True, None, None)",
+    "appearance": "_rust.Appearance(small, (256, 256), (False, False), 2)",
+    "blocks": "looks.blocks(region, still, 16, 1, 1, 0.5, 0.5, 0.1, 1, 0, none, no_places, None, None)",
+    "optimize": "looks.correct(start, region, still, none, 1, 0, False, 1, 0.1, 0.1, 1, 0.0, 1, None, None)",
+    "coherence": "_rust.similar(_rust.Appearance(small, (256, 256), (False, False), 1), 2, 7, 8, None)",
+    "coherence, a pass": "_rust.cohere(looks, sets, 2, start, region, still, none, (bytes_, bytes_), 1, 8, False, None)",
+    "pyramid": "_rust.upsample(start, region, ((2 * side, 2 * side), (0, 0), (False, False)), still)",
+    "jitter": "_rust.jitter(start, region, none, 4096, 1, 0)",
+    "stitcher's source": "_rust.Stitcher(flat, (side, side), (False, False), numbers, depth, bytes_, no_costs)",
+    "stitcher": "source.stitch(half, still, patch, weights, (0.1, 4.0, 1.0), 1, none, no_places, none, None, None)",
+    "stitcher of samples": "_rust.PatchSamples(flat, np.zeros(side * side, np.float32), (0.1, 0.1))",
+    "sparse": "_rust.Cholesky(*matrix, 1 << 32)",
+    "gather": "_rust.gather([image], (False, False), np.zeros(0, np.uint16), points, 'linear')",
+    "nearby": "_rust.sum_nearby(corner, np.ones(1, np.float32), (side, side), True, (1.0, 0.5))",
+    "place": "_rust.place(one, (0, 0), (512, 512), ((1, 0.1), (0, 1)), (0.5, 0), (side, side), 1.0)",
+    "points": "_rust.warp_points(corners, corners, (side, side))",
     "warp": "_rust.warp_mesh((side, side), places.reshape(-1, 2), np.zeros(side * side, np.uint8), (side, side), None)",
 }
 SCRIPT = """
 import os, re, resource, sys
 import numpy as np, texrs
+from scipy.sparse import diags_array
 from texrs import _rust
+from texrs.kernels.sparse import _list_entries
 from texrs.errors import TexrsError
 
 side = 1024
@@ -36,6 +55,23 @@ row, column = np.mgrid[:side, :side]
 disc = (row - side / 2) ** 2 + (column - side / 2) ** 2 < (0.4 * side) ** 2
 whole = np.ones((side, side), bool)
 places = np.stack([row, column], -1).astype(np.float64)
+points = places.reshape(-1, 2).astype(np.float32)
+holes = np.ones((side, side), bool)
+holes[40:60, 40:60] = False
+patches = _rust.PatchIndex([image[:64, :64].copy()], [None], (16, 16))
+flat = image.reshape(-1, 3)
+small = image[:256, :256].reshape(-1, 3)
+looks = _rust.Appearance(image[:32, :32].reshape(-1, 3), (32, 32), (False, False), 2)
+region, still = ((side, side), (0, 0), (False, False)), np.array([[[4096, 0], [0, 4096]]], np.int16)
+half = ((512, 512), (0, 0), (False, False))
+none, no_places, bytes_ = np.zeros(0, bool), np.zeros(0, np.int32), np.zeros(0, np.uint8)
+no_costs, numbers, depth = np.zeros(0, np.float32), np.zeros(0, np.uint32), np.zeros(0, np.float32)
+start = (rng.random(side * side * 2) * 32 * 4096).astype(np.int32)
+sets = _rust.similar(looks, 2, 7, 8, None)
+source = _rust.Stitcher(image[:96, :96].reshape(-1, 3), (96, 96), (False, False), numbers, depth, bytes_, no_costs)
+patch, weights = (64.0, 0.2, 1, 0.0, False, False), (0.1, 1.0, 1.0, 0.15, 0.5, 0.0, 0.0, 0.03, 0.5)
+corner, corners = np.zeros((1, 2), np.int64), np.array([(0, 0), (0, side - 1), (side - 1, 0), (side - 1, side - 1.0)])
+matrix = [each for each in _list_entries(diags_array([-1.0, 4.1, -1.0], offsets=[-128, 0, 128], shape=(side * 64,) * 2))]
 clean = (TexrsError, MemoryError)
 _rust.poisson(image[:16, :16].copy(), None, 0.01, ('free', 'free'), None, None)
 
@@ -70,6 +106,8 @@ for call in sys.argv[2:]:
 
 def run(calls: dict[str, str], sizes: tuple[int, ...]) -> list[list[str]]:
     plain = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "RAYON_NUM_THREADS": "1", "MALLOC_ARENA_MAX": "1"}
+    # What was freed before goes back to the system, and is not there to be taken again.
+    plain |= {"MALLOC_MMAP_THRESHOLD_": "131072", "MALLOC_TRIM_THRESHOLD_": "131072"}
     given = [" ".join(map(str, sizes)), *(f"{name}|{call}" for name, call in calls.items())]
     ran = subprocess.run([sys.executable, "-c", SCRIPT, *given], env=plain, capture_output=True, text=True, timeout=600)
     assert ran.returncode == 0, ran.stderr[-3000:]

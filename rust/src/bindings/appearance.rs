@@ -9,6 +9,7 @@ use crate::engine::guide::Guide;
 use crate::engine::{appearance, blocks, optimize, pyramid};
 use crate::foundation::fixed::{Frame, Frames};
 use crate::foundation::grid::{Grid, Region};
+use crate::foundation::memory;
 use crate::{Error, Result};
 
 /// An exemplar at one resolution, analysed.
@@ -204,8 +205,14 @@ impl Appearance {
                     grid: Grid::new(fixed("shape", &shape)?, fixed("wrap", &wrap)?)?,
                     radius,
                     channels,
-                    colours: grouped::<_, CHANNELS>("colours", colours.as_slice()?)?.to_vec(),
-                    features: grouped::<_, KEEP>("features", features.as_slice()?)?.to_vec(),
+                    colours: memory::copied(
+                        "colours",
+                        grouped::<_, CHANNELS>("colours", colours.as_slice()?)?,
+                    )?,
+                    features: memory::copied(
+                        "features",
+                        grouped::<_, KEEP>("features", features.as_slice()?)?,
+                    )?,
                     basis: basis.as_slice()?.to_vec(),
                     bias: fixed("bias", bias.as_slice()?)?,
                     gain,

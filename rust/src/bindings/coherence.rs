@@ -6,6 +6,7 @@ use super::{grouped, run};
 use crate::Result;
 use crate::engine::coherence::{self, Kinds, Options, Similarity};
 use crate::foundation::fixed::Place;
+use crate::foundation::memory;
 
 /// Similarity sets: `k` samples for each of the exemplar's.
 #[pyfunction]
@@ -47,7 +48,7 @@ pub(super) fn cohere<'py>(
 ) -> PyResult<PlacesOut<'py>> {
     let similarity = Similarity {
         k,
-        sets: sets.as_slice()?.to_vec(),
+        sets: memory::copied("similarity", sets.as_slice()?)?,
     };
     let options = Options {
         passes,
@@ -63,7 +64,7 @@ pub(super) fn cohere<'py>(
         either!(&appearance.0, a, {
             let region = region::<D>(&place)?;
             let frames = self::frames(values)?;
-            let mut places: Vec<Place<D>> = grouped("places", places)?.to_vec();
+            let mut places: Vec<Place<D>> = memory::copied("places", grouped("places", places)?)?;
             coherence::correct(
                 a,
                 &similarity,
@@ -100,7 +101,7 @@ pub(super) fn jitter<'py>(
         seed: u64,
         level: u32,
     ) -> Result<Vec<i32>> {
-        let mut places: Vec<Place<D>> = grouped("places", places)?.to_vec();
+        let mut places: Vec<Place<D>> = memory::copied("places", grouped("places", places)?)?;
         coherence::jitter(&mut places, &region::<D>(place)?, held, reach, seed, level)?;
         Ok(places.into_flattened())
     }

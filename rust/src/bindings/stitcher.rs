@@ -12,6 +12,7 @@ use crate::engine::stitcher::{
 };
 use crate::foundation::fixed::{Frame, ONE};
 use crate::foundation::grid::Grid;
+use crate::foundation::memory;
 
 /// An exemplar that patches are cut from.
 #[pyclass(frozen)]
@@ -205,10 +206,10 @@ impl Stitcher {
                 run(py, progress, |monitor| -> Result<_> {
                     let rows: &[[i32; $columns]] = grouped("table", table)?;
                     let shown = Shown {
-                        places: grouped("places", places)?.to_vec(),
-                        patches: patches.to_vec(),
-                        seams: grouped("seams", seams)?.to_vec(),
-                        distortion: distortion.to_vec(),
+                        places: memory::copied("places", grouped("places", places)?)?,
+                        patches: memory::copied("patches", patches)?,
+                        seams: memory::copied("seams", grouped("seams", seams)?)?,
+                        distortion: memory::copied("distortion", distortion)?,
                         table: rows.iter().map(|row| read(row)).collect(),
                     };
                     let made = stitcher::cover(

@@ -49,7 +49,7 @@ pub fn outlines(
     }
     let pixels = |p: &Piece| p.shape[0].saturating_mul(p.shape[1]);
     let all = pieces.iter().map(pixels).fold(0, usize::saturating_add);
-    memory::room("the distances", all, 16)?;
+    memory::room("the distances", all, 24)?;
     par::map(pieces.len(), |k| {
         monitor.check()?;
         Ok(measure(

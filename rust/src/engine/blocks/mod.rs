@@ -110,6 +110,9 @@ pub fn blocks<const D: usize>(
             });
         }
     }
+    // Lists grow by doubling; small cells have as many points around them as in them.
+    let listed = 4 * D + 24 + 16 * D * (D + 1) / options.cell;
+    memory::room("the cells of a region", region.grid.len(), listed)?;
     let mut places = memory::filled("the places of a region", [0; D], region.grid.len())?;
     let cells = Cells::new(region, options)?;
     let noise = Noise::new(options.seed).part(1);

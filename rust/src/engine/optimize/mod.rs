@@ -116,7 +116,7 @@ pub fn correct<const D: usize>(
     }
     frames.check(points)?;
     let copies = if options.vote > 0 { 2 * points } else { points };
-    memory::check::<Place<D>>("the matches of a region", copies)?;
+    memory::room("the matches of a region", copies, 4 * D + 4)?;
     par::chunks_mut(places, CHUNK, |_, places| {
         for place in places {
             *place = appearance.bring_inside(*place);

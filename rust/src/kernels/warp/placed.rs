@@ -2,6 +2,7 @@
 
 use super::Point;
 use crate::foundation::grid::Grid;
+use crate::foundation::memory;
 use crate::foundation::par::Monitor;
 use crate::kernels::gather::{Exemplar, Interpolation, gather};
 use crate::{Error, Result};
@@ -116,7 +117,7 @@ impl Motion {
     /// Moves a shape: what each pixel of a window shows of it.
     ///
     /// # Errors
-    /// A shape whose distances do not fit its box, or a monitor that was cancelled.
+    /// A shape whose distances do not fit its box, a window larger than memory, or a monitor that was cancelled.
     pub fn place(
         &self,
         shape: &Shape<'_>,
@@ -125,13 +126,15 @@ impl Motion {
         depth: f32,
         monitor: &Monitor,
     ) -> Result<Placed> {
+        let pixels = memory::product("window", &window.shape)?;
+        memory::room("the moved shape", pixels, 24)?;
         let away = |axis: usize, i: usize| {
             (window.low[axis] + i) as f64 - self.centre[axis] - self.shift[axis]
         };
         let whole = self.is_whole();
         let inverse = &self.inverse;
         let columns: Vec<f64> = (0..window.shape[1]).map(|i| away(1, i)).collect();
-        let mut places = Vec::with_capacity(window.shape[0] * window.shape[1]);
+        let mut places = Vec::with_capacity(pixels);
         for row in (0..window.shape[0]).map(|i| away(0, i)) {
             places.extend(columns.iter().map(|&column| -> [f32; 2] {
                 std::array::from_fn(|axis| {
