@@ -53,3 +53,44 @@ macro_rules! wide_fn {
     };
 }
 pub(crate) use wide_fn;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[inline(always)]
+    fn scale(values: &mut [f32], by: f32) -> f32 {
+        // Neither a power of two nor few values: a fused or reordered operation would round otherwise.
+        values.iter_mut().fold(0.1, |sum, value| {
+            *value = *value * by + 0.3;
+            sum + *value
+        })
+    }
+
+    wide_fn! {
+        fn scale_wide<const N: usize>(values: &mut [f32], by: f32) -> f32 {
+            scale(&mut values[..N], by)
+        }
+    }
+
+    #[test]
+    fn wide_code_gives_what_plain_code_gives() {
+        let start: Vec<f32> = (0..67).map(|i| (i as f32).sin()).collect();
+        let [mut plain, mut closed, mut called] = [(); 3].map(|()| start.clone());
+        let sum = scale(&mut plain, 1.7);
+        let within = wide(
+            #[inline(always)]
+            || scale(&mut closed, 1.7),
+        );
+        let without = scale_wide::<67>(&mut called, 1.7);
+        assert_eq!([within.to_bits(), without.to_bits()], [sum.to_bits(); 2]);
+        assert_eq!((&closed, &called), (&plain, &plain));
+    }
+
+    #[test]
+    fn a_panic_passes_through() {
+        let caught = std::panic::catch_unwind(|| scale_wide::<9>(&mut [0.0; 8], 1.0));
+        assert!(caught.is_err());
+        assert!(std::panic::catch_unwind(|| wide(|| panic!("inside"))).is_err());
+    }
+}
