@@ -125,7 +125,7 @@ fn inner_rectangle(mask: &[bool], shape: [usize; 2]) -> Option<[(usize, usize); 
         row.iter().enumerate().all(|(x, &m)| m == expected(x))
     };
     let is_one = inside && mask.chunks_exact(columns).enumerate().all(whole);
-    is_one.then_some([(top, bottom + 1 - top), (left, right + 1 - left)])
+    is_one.then(|| [(top, bottom + 1 - top), (left, right + 1 - left)])
 }
 
 /// Solves a rectangle within the image as an image of its own, with a ring of fixed pixels around it.

@@ -115,6 +115,14 @@ proptest! {
 }
 
 #[test]
+fn pixels_that_end_left_of_where_they_begin_are_no_rectangle() {
+    let mask: Vec<bool> = (0..25).map(|p| [8, 16].contains(&p)).collect();
+    assert_eq!(inner_rectangle(&mask, [5, 5]), None);
+    let mask: Vec<bool> = (0..25).map(|p| [7, 8, 12, 13].contains(&p)).collect();
+    assert_eq!(inner_rectangle(&mask, [5, 5]), Some([(1, 2), (2, 2)]));
+}
+
+#[test]
 fn the_differences_of_an_image_give_it_back() {
     let mut owned = Owned::new([50, 64, 2], [Edge::Free, Edge::Fixed], 0.0, false, 1);
     let target = Owned::new([50, 64, 2], [Edge::Free, Edge::Fixed], 0.0, false, 2).image;
