@@ -33,7 +33,46 @@ def shift_by_opencv(given: Arrays) -> Work:
     return lambda: cv2.pyrMeanShiftFiltering(given["image"], RADIUS, RANGE, maxLevel=0)
 
 
+def merge_by_texrs(given: Arrays) -> Work:
+    """Layers and elements: mean shift, scikit-image's own merge, clusters and components."""
+    import texrs
+    from texrs.exemplar._exemplar import _FACTS
+
+    def work() -> np.ndarray:
+        _FACTS.clear()
+        return texrs.Exemplar(given["image"]).segment().layers
+
+    return work
+
+
+def merge_by_skimage(given: Arrays) -> Work:
+    """The merge of Felzenszwalb and Huttenlocher alone."""
+    from skimage.segmentation import felzenszwalb
+
+    return lambda: felzenszwalb(given["image"], 60, 0.4, 24)
+
+
+def merge_by_opencv(given: Arrays) -> Work:
+    """The same merge by its contributed module."""
+    import cv2
+    import cv2.ximgproc
+
+    cv2.setNumThreads(1)
+    segmenter = cv2.ximgproc.segmentation.createGraphSegmentation(0.4, 60, 24)
+    return lambda: segmenter.processImage(given["image"])
+
+
 ROWS = {
+    "segment-512": Row(
+        "14",
+        "segmentation, 512² RGB: texrs finds layers and elements, of which the merge is scikit-image's own",
+        "of one size",
+        make_picture,
+        {"texrs": merge_by_texrs, "scikit-image": merge_by_skimage, "OpenCV graph segmentation": merge_by_opencv},
+        lambda result: [float(n) for n in np.shape(result)],
+        asked={"scikit-image": 10, "OpenCV graph segmentation": 4},
+        most_ms=31,
+    ),
     "shift-512": Row(
         "14",
         f"mean shift, 512² RGB, radius {RADIUS}, range {RANGE}",

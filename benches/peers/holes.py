@@ -1,0 +1,132 @@
+"""Row 9: square holes in textures, filled by example.
+
+Results are compared by the patch error over each hole: how far 9 x 9 patches that touch it are, in the mean, from the nearest
+one of the picture around it. It is shown beside the times.
+
+The Resynthesizer (github.com/bootchk/resynthesizer, GPL) is an external program, named by the variable RESYNTHESIZER, which
+`completion_vs_peers.py` says how to build.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from frame import Arrays, Row, Side, Timed, Work
+
+PATCH = 9
+TEXTURES = ("brick", "grass", "gravel")
+
+
+def make_holes(side: int) -> dict[str, Any]:
+    """A quarter of the side is missing in the middle of each of three textures."""
+    from skimage import data
+
+    truth = np.stack([np.stack([getattr(data, name)()[:side, :side]] * 3, axis=-1) for name in TEXTURES])
+    hole = np.zeros((side, side), bool)
+    hole[side * 3 // 8 : side * 5 // 8, side * 3 // 8 : side * 5 // 8] = True
+    return {"images": np.where(hole[..., None], np.uint8(0), truth), "hole": hole, "truth": truth}
+
+
+def fill_by_texrs(given: Arrays) -> Work:
+    """All that the verb does."""
+    import texrs
+
+    return lambda: [texrs.complete(image, given["hole"]).image for image in given["images"]]
+
+
+def fill_by_opencv(given: Arrays) -> Work:
+    """Shifted pieces, in Lab as its documentation asks."""
+    import cv2
+    import cv2.xphoto
+
+    cv2.setNumThreads(1)
+    known = np.where(given["hole"], 0, 255).astype(np.uint8)
+
+    def fill(image: np.ndarray) -> np.ndarray:
+        made, lab = np.zeros_like(image), cv2.cvtColor(image, cv2.COLOR_RGB2Lab)
+        cv2.xphoto.inpaint(lab, known, made, cv2.xphoto.INPAINT_SHIFTMAP)
+        return cv2.cvtColor(made, cv2.COLOR_Lab2RGB)
+
+    return lambda: [fill(image) for image in given["images"]]
+
+
+def fill_by_program(given: Arrays) -> Work:
+    """One thread, its default parameters; it says how long it took."""
+    from skimage import io
+
+    hole = given["hole"]
+
+    def fill(image: np.ndarray) -> Timed:
+        with tempfile.TemporaryDirectory() as folder:
+            names = [Path(folder) / n for n in ("image.ppm", "mask.pgm", "out.ppm")]
+            names[0].write_bytes(b"P6\n%d %d\n255\n" % hole.shape[::-1] + image.tobytes())
+            names[1].write_bytes(b"P5\n%d %d\n255\n" % hole.shape[::-1] + (hole * np.uint8(255)).tobytes())
+            command = [os.environ["RESYNTHESIZER"], *map(str, names)]
+            done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=600)
+            return Timed(io.imread(names[2]), float(done.stdout))
+
+    def work() -> Timed:
+        made, seconds = zip(*map(fill, given["images"]), strict=True)
+        return Timed(made, sum(seconds))
+
+    return work
+
+
+def measure_patches(truth: np.ndarray, made: np.ndarray, hole: np.ndarray) -> float:
+    """Return the mean distance of patches that touch the hole from the nearest known one, over a fixed sample of both."""
+    from numpy.lib.stride_tricks import sliding_window_view
+
+    touched = sliding_window_view(hole, (PATCH, PATCH)).any((2, 3))
+    rng = np.random.default_rng(0)
+
+    def some(picture: np.ndarray, where: np.ndarray, count: int) -> np.ndarray:
+        at = rng.permutation(np.argwhere(where))[:count]
+        patches = sliding_window_view(picture, (PATCH, PATCH), (0, 1))[at[:, 0], at[:, 1]]
+        return patches.reshape(len(at), -1).astype(np.float32)
+
+    known, new = some(truth, ~touched, 20000), some(made, touched, 1000)
+    squares = (new**2).sum(1)[:, None] - 2 * new @ known.T + (known**2).sum(1)
+    return float(np.sqrt(np.maximum(squares.min(1), 0) / known.shape[1]).mean())
+
+
+def _with(side: Side) -> Side:
+    def ready(given: Arrays) -> Work:
+        work = side(given)
+
+        def done() -> Any:
+            made = work()
+            return Timed((given, made.result), made.seconds) if isinstance(made, Timed) else (given, made)
+
+        return done
+
+    return ready
+
+
+def _error(result: Any) -> list[float]:
+    given, made = result
+    return [float(np.mean([measure_patches(t, m, given["hole"]) for t, m in zip(given["truth"], made, strict=True)]))]
+
+
+ROWS = {
+    f"holes-{side}": Row(
+        "9",
+        f"three holes of {side // 4}² filled in {side}² RGB",
+        "the mean patch error over the holes, in grey levels; texrs is to have none larger",
+        lambda side=side: make_holes(side),
+        {
+            "texrs": _with(fill_by_texrs),
+            "Resynthesizer": _with(fill_by_program),
+            "OpenCV shift maps": _with(fill_by_opencv),
+        },
+        _error,
+        asked={"Resynthesizer": 20, "OpenCV shift maps": 40},
+        most_ms=most,
+        shown="patch error",
+    )
+    for side, most in ((256, 69), (512, 420))
+}

@@ -1,0 +1,181 @@
+"""Rows 10, 11 and 13: textures from patches, from coordinates, and in three dimensions.
+
+Results are textures of their own, which nothing makes equal: compared is that each is of the size.
+
+Two programs of others take part where a variable names them. Their sources have no licence, so they are neither part of texrs
+nor linked to it, and whoever builds them does that for themselves:
+
+- QUILTING IN.ppm OUT.png BLOCK OVERLAP COUNT makes COUNT x COUNT blocks and prints the processor seconds that `image_quilting`
+  of github.com/MarH19/fast-image-quilting-for-texture-synthesis took, with a tolerance of 3/10: a `main` of ten lines,
+  compiled with all of its folder src, `gcc -O3 -mfma -fno-tree-vectorize -march=native -Iinclude`.
+- LEFEBVRE IN.ppm OUT.ppm makes a texture of twice the side and prints the processor seconds that `synthesize` of
+  github.com/Nanored4498/Texture-Synthesis took, without its `-c`, two passes: its `main` less what it writes, compiled without
+  OpenMP and with `stbi_write_png` replaced by nothing.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from frame import Arrays, Row, Side, Timed, Work
+
+BLOCK, OVERLAP, COUNT = 32, 8, 21
+
+
+def make_bricks() -> dict[str, Any]:
+    """A picture, 128²."""
+    from skimage import data
+
+    grey = data.brick()[:128, :128]
+    return {"image": np.stack([grey, grey * 0.9, grey * 0.7], axis=-1).astype(np.uint8)}
+
+
+def run_program(variable: str, given: Arrays, ending: str, *words: object) -> Timed:
+    """Let a program make a picture; it says how long that took."""
+    from skimage import io
+
+    image = given["image"]
+    with tempfile.TemporaryDirectory() as folder:
+        names = [Path(folder, "in.ppm"), Path(folder, f"out.{ending}")]
+        names[0].write_bytes(b"P6\n%d %d\n255\n" % image.shape[1::-1] + image.tobytes())
+        command = [os.environ[variable], *map(str, names), *map(str, words)]
+        done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=600)
+        return Timed(io.imread(names[1]), float(done.stdout))
+
+
+def quilt_by_texrs(given: Arrays) -> Work:
+    """The same blocks, each cut in by a minimum cut, of several that fit."""
+    from texrs.quilting import Picture, quilt
+    from texrs.source_map import SourceMap
+
+    image = given["image"]
+    depth = np.zeros(image.shape[:2], np.float32)
+    picture = Picture(image.astype(np.float32) / 255, SourceMap.identity(image.shape[:2]), depth)
+    size = (COUNT * (BLOCK - OVERLAP) + OVERLAP,) * 2
+    options = {"patch": BLOCK, "overlap": OVERLAP, "wrap": (False, False), "seed": 1, "progress": lambda share: None}
+    return lambda: quilt([picture], size, **options).render([image])
+
+
+def quilt_by_program(given: Arrays) -> Work:
+    """Blocks in raster order, cut by dynamic programming."""
+    return lambda: run_program("QUILTING", given, "png", BLOCK, OVERLAP, COUNT)
+
+
+def correct_by_texrs(given: Arrays) -> Work:
+    """Similarity sets are made beforehand, by the first time."""
+    import texrs
+
+    exemplar = texrs.Exemplar(given["image"])
+    texrs.synthesize(exemplar, 256, method="paper-compensated")
+    return lambda: texrs.synthesize(exemplar, 256, method="paper-compensated").image
+
+
+def correct_by_program(given: Arrays) -> Work:
+    """Windows of colours, each candidate the neighbours' alone (k = 1)."""
+    return lambda: run_program("LEFEBVRE", given, "ppm")
+
+
+def make_particles() -> dict[str, Any]:
+    """A volume, 64³."""
+    from texrs import samples
+
+    return {"image": samples.particles().image}
+
+
+def grow_by_texrs(given: Arrays) -> Work:
+    """Wound around an axis; analysis and similarity sets are made beforehand."""
+    import texrs
+    from texrs import fields
+
+    exemplar = texrs.Exemplar(given["image"], axes=3)
+    exemplar.analyse()
+    for level in range(len(exemplar.analyse().levels)):
+        exemplar.similarity(level, k=3, n=7, numbers=8)
+    return lambda: texrs.solid(exemplar, 128, method="paper", field=fields.circular(axis="x")).image
+
+
+def make_small_particles() -> dict[str, Any]:
+    """What the slow twin can do: a pass over 12³ voxels from 64³."""
+    return make_particles()
+
+
+def _ready(given: Arrays) -> tuple[Any, Any, Any, Any]:
+    import texrs
+    from texrs import fields
+    from texrs._engine.pyramid import Region, to_fixed
+
+    level = texrs.Exemplar(given["image"], axes=3).analyse().levels[0]
+    region = Region.whole((12, 12, 12))
+    frames = to_fixed(fields.circular(axis="x").over(region.shape), region)
+    return level, region, frames, level.blocks(region, frames)
+
+
+def correct_small_by_texrs(given: Arrays) -> Work:
+    """The kernel."""
+    level, region, frames, start = _ready(given)
+    return lambda: level.correct(start, region, frames, passes=2, coherence=0.2).places
+
+
+def correct_small_by_twin(given: Arrays) -> Work:
+    """The tests' slow twin, in NumPy."""
+    import sys
+
+    sys.path.append(str(Path(__file__).resolve().parents[2] / "tests" / "reference"))
+    from solid import Twin
+
+    level, region, frames, start = _ready(given)
+    return lambda: Twin(level.arrays(), region, frames).correct(start, passes=2, coherence=0.2)[-1]
+
+
+def _size(result: Any) -> list[float]:
+    return [float(n) for n in np.shape(result)]
+
+
+QUILTING = "MarH19's quilting in C"
+CORRECTING = "Nanored4498's C++ of Lefebvre and Hoppe 2005"
+PATCHES: dict[str, Side] = {"texrs": quilt_by_texrs, QUILTING: quilt_by_program}
+ROWS = {
+    "quilt-512": Row(
+        "10",
+        f"quilting, 128² to 512², blocks of {BLOCK} that overlap by {OVERLAP}",
+        "of one size; texrs cuts whole overlaps and tries several blocks, the program cuts strips",
+        make_bricks,
+        PATCHES,
+        _size,
+        asked={QUILTING: 3},
+        most_ms=60,
+    ),
+    "correct-256": Row(
+        "11",
+        'appearance-space synthesis, 128² to 256², k = 3, two passes (method="paper-compensated")',
+        "of one size; the program compares windows of colours and takes k = 1",
+        make_bricks,
+        {"texrs": correct_by_texrs, CORRECTING: correct_by_program},
+        _size,
+        asked={CORRECTING: 60},
+        most_ms=16,
+    ),
+    "solid-128": Row(
+        "13",
+        'solid synthesis, 64³ to 128³ under a field, k = 3, two passes (method="paper")',
+        "of the size",
+        make_particles,
+        {"texrs": grow_by_texrs},
+        _size,
+        most_ms=2900,
+        most_mb=200,
+    ),
+    "solid-twin": Row(
+        "13",
+        "two passes over 12³ voxels of windows from 64³",
+        "the same places",
+        make_small_particles,
+        {"texrs": correct_small_by_texrs, "texrs' twin in NumPy": correct_small_by_twin},
+        asked={"texrs' twin in NumPy": 3},
+    ),
+}
