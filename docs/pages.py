@@ -219,9 +219,10 @@ PEERS = """
 
 What `make bench` wrote: {processor}, {cores} cores, {system}, Python {python}, {date}, while the machine did {load:.0f} things
 at once. Milliseconds of the processor, in one thread, the median of {rounds} rounds in which all took turns, and the least and
-the most; how many times as long as texrs, with what was asked for before it was measured (*not reached* where it fell short);
+the most; how many times as long as texrs, and how many were asked for before it was measured (*not reached* where it fell short);
 megabytes that the work took beyond what was there when all was ready. Results were compared first, as it says. The floor is
-what copying what is given once takes. What is *published* was measured by others, on their hardware.
+what copying what is given once takes. What is *published* was measured by others, on other hardware, as their paper says. Where
+threads are compared, what counts is the least time that passed; a machine that is busy has no second core to give.
 
 | work | who | ms | spread | ratio | asked | MB |
 |---|---|---|---|---|---|---|
@@ -238,7 +239,7 @@ def tabulate_peers(file: Path) -> str:
     found = json.loads(file.read_text(encoding="utf-8"))
     rows = []
     for case in found["cases"]:
-        said = f"{case['case']}{' (seconds that pass)' if case['wall'] else ''}: {case['check']}"
+        said = f"**{case['case']}**{' (time that passes)' if case['wall'] else ''}: {case['check']}"
         for each in case["rows"]:
             own = each is case["rows"][0]
             asked = f"at most {case['most_ms']:g} ms" if own and case["most_ms"] else ""
@@ -255,7 +256,7 @@ def tabulate_peers(file: Path) -> str:
             who = each["who"] + (f", {case['shown']} {each['shown']:g}" if case["shown"] and "shown" in each else "")
             asked += ", *not reached*" * missed
             size = f"{each['megabytes']:.0f}" if "megabytes" in each else ""
-            rows.append(f"| {said} | {who} | {' | '.join(figures)} | {each['ratio']:.3g} | {asked} | {size} |")
+            rows.append(f"| {said} | {who} | {' | '.join(figures)} | {_figure(each['ratio'])} | {asked} | {size} |")
             said = ""
         for each in case["absent"]:
             rows.append(f"| | {each['who']} | not here: {each['get']} | | | {each['asked'] or ''} | |")
