@@ -219,10 +219,10 @@ PEERS = """
 
 What `make bench` wrote: {processor}, {cores} cores, {system}, Python {python}, {date}, while the machine did {load:.0f} things
 at once. Milliseconds of the processor, in one thread, the median of {rounds} rounds in which all took turns, and the least and
-the most; how many times as long as texrs, and how many were asked for before it was measured (*not reached* where it fell short);
-megabytes that the work took beyond what was there when all was ready. Results were compared first, as it says. The floor is
-what copying what is given once takes. What is *published* was measured by others, on other hardware, as their paper says. Where
-threads are compared, what counts is the least time that passed; a machine that is busy has no second core to give.
+the most; how many times as long as texrs, and how many were asked for before that was measured (*not reached* where it fell
+short); megabytes that the work took beyond what was there when all was ready. Results were compared first, as it says.
+The floor is what copying what is given once takes. What is *published* was measured by others, on other hardware, as their
+paper says. Where threads are compared, the least time that passed counts; a busy machine has no second core to give.
 
 | work | who | ms | spread | ratio | asked | MB |
 |---|---|---|---|---|---|---|
