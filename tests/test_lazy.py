@@ -418,6 +418,22 @@ def test_short_tasks_of_a_cluster_are_handed_out_together(client: Client) -> Non
     assert isinstance(found[44], lazy.WorkerLost)
 
 
+def read_limits(number: int) -> texrs.limits.Limits:
+    """Return the limits that a worker goes by."""
+    return texrs.limits.current()
+
+
+@pytest.mark.parametrize("scheduler", [None, 1, "cluster"])
+def test_workers_go_by_the_limits_of_who_asks(scheduler: int | str | None, request: pytest.FixtureRequest) -> None:
+    where = request.getfixturevalue("client") if scheduler == "cluster" else scheduler
+    with texrs.limits.within(pixels=1000, voxels=2000, memory=3e8, seconds=60):
+        ((_, found),) = workers.run(read_limits, [0], where)
+    assert (found.pixels, found.voxels, found.memory) == (1000, 2000, 3 * 10**8)
+    # What is done for others is not held to them.
+    ((_, found),) = workers.run(read_limits, [0], where)
+    assert (found.pixels, found.voxels) == (2**28, 2**28)
+
+
 def test_wrong_arguments(tmp_path: Path) -> None:
     for call, message in (
         (lambda: PLANE.to_zarr(tmp_path / "x.zarr", (0, 4)), "shape: needs an integer or 2"),

@@ -20,7 +20,7 @@ from texrs._cache import content_hash
 from texrs._checks import as_int
 from texrs._threads import threads
 from texrs.errors import InvalidInput, TexrsError
-from texrs.limits._now import said, use
+from texrs.limits._now import said, use, within
 
 __all__ = ["Scheduler", "WorkerLost", "run"]
 
@@ -320,7 +320,7 @@ def _run_cluster(
         deque(numbers[len(numbers) * i // len(slots) : len(numbers) * (i + 1) // len(slots)]) for i in range(len(slots))
     ]
     known: dict[Any, tuple[int, list[int]]] = {}
-    at_once = 1
+    at_once, most = 1, said()
 
     def take(slot: int) -> list[int]:
         """Take some tasks from the row of a worker, or of the one that has most left."""
@@ -333,6 +333,7 @@ def _run_cluster(
             there,
             some,
             threads_each,
+            most,
             key=f"texrs-{name}-{some[0]}-{len(some)}",
             workers=[slots[slot]],
             allow_other_workers=True,
@@ -364,10 +365,10 @@ def _run_cluster(
         client.cancel([there, *known])
 
 
-def _do_there(work: Work, some: Sequence[int], count: int | None) -> tuple[list[Any], float]:
-    """Do some tasks; return what they return, and the seconds that it took."""
+def _do_there(work: Work, some: Sequence[int], count: int | None, most: dict[str, Any]) -> tuple[list[Any], float]:
+    """Do some tasks within the limits of who asked for them; return what they return, and the seconds that it took."""
     from distributed import get_worker
 
     begun = time.monotonic()
-    with threads(count or max(1, get_worker().state.nthreads)):
+    with within(**most), threads(count or max(1, get_worker().state.nthreads)):
         return [work(number) for number in some], time.monotonic() - begun

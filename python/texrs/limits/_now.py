@@ -220,7 +220,7 @@ def check_time(end: tuple[float, float] | None, stage: str, share: float) -> Non
 
 
 def said() -> dict[str, Any]:
-    """Return what `use` takes in another process that works for this block, which itself ends what takes too long."""
+    """Return what `use` and `within` take in a process that works for this block, which itself ends what takes too long."""
     found = {}
     for name in ("pixels", "voxels", "memory"):
         several = [getattr(each, name) for each in (_BLOCK.get(), _PROCESS)]
