@@ -3,48 +3,150 @@
     python benches/cancel_table.py [VERB ...]
 
 In seconds of processor time, for wall time hangs on what else the machine does; with one thread, so that the two are alike.
+Last comes the longest that a verb went on once it was told to stop, where each of its stages had begun. Pictures are new to
+a verb that is measured, for what was found of one is kept.
 """
 
 from __future__ import annotations
 
+import functools
 import sys
+import tempfile
 import time
 import warnings
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import texrs
 
 SIDE, SIZE = 192, 384
-PICTURE = texrs.samples.pebbles((SIDE, SIDE)).image
-FLOOR = texrs.samples.tilted_discs((SIDE, SIDE)).image
-VOLUME = texrs.samples.particles((48, 48, 48)).image
-HOLE = np.zeros((SIDE, SIDE), np.bool_)
-HOLE[64:128, 64:128] = True
-VERBS: dict[str, Callable[[Any], object]] = {
-    "design": lambda watch: texrs.design(PICTURE, SIZE, progress=watch),
-    "design, as printed": lambda watch: texrs.design(PICTURE, SIZE, method="paper", progress=watch),
-    "splice": lambda watch: texrs.splice(PICTURE, np.rot90(PICTURE).copy(), progress=watch),
-    "self_splice": lambda watch: texrs.self_splice(PICTURE, "randomise", progress=watch),
-    "perspective": lambda watch: texrs.perspective(PICTURE, size=SIZE, progress=watch),
-    "synthesize": lambda watch: texrs.synthesize(PICTURE, SIZE, progress=watch),
-    "synthesize, fast": lambda watch: texrs.synthesize(PICTURE, SIZE, quality="fast", progress=watch),
-    "solid": lambda watch: texrs.solid(VOLUME, 80, progress=watch),
-    "tile": lambda watch: texrs.tile(PICTURE, progress=watch),
-    "complete": lambda watch: texrs.complete(PICTURE, HOLE, progress=watch),
-    "complete, optimise": lambda watch: texrs.complete(PICTURE, HOLE, method="optimise", progress=watch),
-    "extend": lambda watch: texrs.extend(FLOOR, right=96, bottom=96, progress=watch),
-    "rectify": lambda watch: texrs.rectify(FLOOR, progress=watch),
-    "remove": lambda watch: texrs.remove(FLOOR, HOLE, progress=watch),
-    "analyse": lambda watch: texrs.elements.analyse(PICTURE, progress=watch),
+SHOWN = 0.05
+"""Seconds below which a gap has no row of its own."""
+Call = Callable[[Any], object]
+
+
+class Given:
+    """What verbs are given: pictures of a number, of which nothing is known yet."""
+
+    def __init__(self, number: int) -> None:
+        self.picture = np.roll(texrs.samples.pebbles((SIDE, SIDE)).image, 3 * number, (0, 1))
+        # What stands aslant may not go up or down.
+        self.floor = np.roll(texrs.samples.tilted_discs((SIDE, SIDE)).image, 3 * number, 1)
+        self.volume = np.roll(texrs.samples.particles((48, 48, 48)).image, number, (0, 1, 2))
+        self.hole = np.zeros((SIDE, SIDE), np.bool_)
+        self.hole[64:128, 64:128] = True
+        self.folder = tempfile.mkdtemp()
+
+    @functools.cached_property
+    def base(self) -> texrs.TextureDatabase:
+        """A database of two."""
+        base = texrs.TextureDatabase(f"{self.folder}/two")
+        base.add(self.picture, "a")
+        base.add(self.turned, "b")
+        return base
+
+    @functools.cached_property
+    def made(self) -> texrs.Synthesis:
+        """A result, of seams."""
+        return texrs.synthesize(self.picture, SIZE)
+
+    @functools.cached_property
+    def material(self) -> texrs.Material:
+        """Two maps."""
+        return texrs.Material({"albedo": self.picture, "height": self.picture[..., 0].copy()})
+
+    @functools.cached_property
+    def ball(self) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Corners and triangles."""
+        import trimesh
+
+        ball = trimesh.creation.icosphere(subdivisions=4)
+        return np.asarray(ball.vertices), np.asarray(ball.faces)
+
+    @functools.cached_property
+    def light(self) -> NDArray[np.float32]:
+        """The picture in single precision, larger."""
+        return (np.tile(self.picture, (4, 4, 1)) / np.float32(255)).astype(np.float32)
+
+    @functools.cached_property
+    def turned(self) -> NDArray[np.uint8]:
+        """The picture, by a quarter."""
+        return np.rot90(self.picture).copy()
+
+    @functools.cached_property
+    def seeds(self) -> list[dict[str, int]]:
+        """Items to make."""
+        return [{"seed": seed} for seed in range(3)]
+
+
+def bind(function: Callable[..., Any], *arguments: object, **options: object) -> Call:
+    """Return a call that lacks its progress alone."""
+    return lambda watch: function(*arguments, progress=watch, **options)
+
+
+def list_variants(*arguments: Any, **options: Any) -> list[texrs.Synthesis]:
+    """Make variants, which come one by one."""
+    return list(texrs.design_variants(*arguments, **options))
+
+
+VERBS: dict[str, Callable[[Given], Call]] = {
+    "design": lambda g: bind(texrs.design, g.picture, SIZE),
+    "design, as printed": lambda g: bind(texrs.design, g.picture, SIZE, method="paper"),
+    "design_variants": lambda g: bind(list_variants, g.picture, 3, SIDE),
+    "splice": lambda g: bind(texrs.splice, g.picture, g.turned),
+    "self_splice": lambda g: bind(texrs.self_splice, g.picture, "randomise"),
+    "perspective": lambda g: bind(texrs.perspective, g.picture, size=SIZE),
+    "perspective, a floor": lambda g: bind(texrs.perspective, g.floor, size=SIZE),
+    "perspective, as printed": lambda g: bind(texrs.perspective, g.floor, method="paper"),
+    "synthesize": lambda g: bind(texrs.synthesize, g.picture, SIZE),
+    "synthesize, fast": lambda g: bind(texrs.synthesize, g.picture, SIZE, quality="fast"),
+    "solid": lambda g: bind(texrs.solid, g.volume, 80),
+    "solid, fast": lambda g: bind(texrs.solid, g.volume, 64, quality="fast"),
+    "tile": lambda g: bind(texrs.tile, g.picture),
+    "complete": lambda g: bind(texrs.complete, g.picture, g.hole),
+    "complete, optimise": lambda g: bind(texrs.complete, g.picture, g.hole, method="optimise"),
+    "extend": lambda g: bind(texrs.extend, g.floor, right=96, bottom=96),
+    "rectify": lambda g: bind(texrs.rectify, g.floor),
+    "remove": lambda g: bind(texrs.remove, g.floor, g.hole),
+    "blend": lambda g: bind(texrs.blend, g.made.source, g.picture, wrap=False),
+    "apply": lambda g: bind(texrs.apply, g.made.source, g.picture),
+    "Material.apply": lambda g: bind(g.material.apply, g.made.source),
+    "analyse": lambda g: bind(texrs.elements.analyse, g.picture),
+    "segment": lambda g: bind(texrs.Exemplar(g.picture).segment),
+    "similarity": lambda g: lambda watch: texrs.Exemplar(g.picture).similarity(-1, progress=in_one_stage(watch)),
+    "TextureDatabase.add": lambda g: bind(g.base.add, g.picture[:, ::-1].copy(), "c"),
+    "TextureDatabase.splice": lambda g: bind(g.base.splice, "a", "b"),
+    "TextureDatabase.matrix": lambda g: bind(g.base.matrix),
+    "TileSet": lambda g: bind(texrs.TileSet, g.picture, 96),
+    "TileSet.window": lambda g: bind(texrs.TileSet(g.picture, 64).window, (0, 0), SIZE),
+    "TileSet.to_zarr": lambda g: bind(texrs.TileSet(g.picture, 64).to_zarr, g.folder + "/tiles.zarr", 2 * SIZE),
+    "PlaneTexture.window": lambda g: bind(texrs.PlaneTexture(g.picture).window, (0, 0), SIZE),
+    "PlaneTexture.to_zarr": lambda g: bind(texrs.PlaneTexture(g.picture).to_zarr, g.folder + "/plane.zarr", SIZE),
+    "PlaneTexture.to_file": lambda g: bind(texrs.PlaneTexture(g.picture).to_file, g.folder + "/plane.tif", SIZE),
+    "SolidTexture.window": lambda g: bind(texrs.SolidTexture(g.volume).window, (0, 0, 0), 64),
+    "SolidTexture.slice": lambda g: bind(texrs.SolidTexture(g.volume).slice, (0, 0, 0), (1, 1, 0), size=96),
+    "SourceMap.to_zarr": lambda g: bind(g.made.source.to_zarr, g.folder + "/map.zarr", g.picture),
+    "lazy.map": lambda g: bind(
+        texrs.lazy.map, functools.partial(texrs.synthesize, g.picture, SIDE), g.seeds, g.folder + "/many.zarr"
+    ),
+    "paint": lambda g: bind(texrs.painting.paint, g.ball, texrs.SolidTexture(g.volume), scale=40, atlas=256),
+    "turntable": lambda g: bind(texrs.volume.turntable, g.volume, g.folder + "/turn.gif", frames=8),
+    "kernels.mean_shift": lambda g: bind(texrs.kernels.mean_shift.mean_shift, g.light, 7, 0.1),
 }
 
 
-def measure(call: Callable[[Any], object]) -> dict[str, float]:
-    """Return the longest gap that ended in each stage."""
+def in_one_stage(watch: Callable[[str, float], object] | None) -> Callable[[float], object] | None:
+    """Return what is called with a share alone."""
+    return None if watch is None else lambda share: watch("all", share)
+
+
+def measure(call: Call) -> tuple[dict[str, float], list[str]]:
+    """Return the longest gap that ended in each stage, and the stages."""
     longest: dict[str, float] = {}
+    stages: list[str] = []
     last, before = time.process_time(), "begin"
 
     def watch(stage: str, share: float) -> None:
@@ -53,10 +155,30 @@ def measure(call: Callable[[Any], object]) -> dict[str, float]:
         name = stage if stage == before else f"{before} > {stage}"
         longest[name] = max(longest.get(name, 0.0), now - last)
         last, before = now, stage
+        if stage not in stages:
+            stages.append(stage)
 
     call(watch)
     longest[f"{before} > end"] = time.process_time() - last
-    return longest
+    return longest, stages
+
+
+def measure_stop(call: Call, stage: str) -> float:
+    """Return for how long a call goes on that is told to stop the second time that a stage says where it is, if it does."""
+    seen, told = 0, 0.0
+
+    def watch(now: str, share: float) -> None:
+        nonlocal seen, told
+        seen += now == stage
+        if seen == 2:
+            told = time.process_time()
+            raise KeyboardInterrupt
+
+    try:
+        call(watch)
+    except KeyboardInterrupt:
+        return time.process_time() - told
+    return 0.0
 
 
 def main(words: list[str]) -> None:
@@ -65,13 +187,16 @@ def main(words: list[str]) -> None:
     print("| verb | stage | longest gap, processor s |\n|---|---|---|")
     for name in words or VERBS:
         with texrs.threads(1):
-            VERBS[name](None)  # So that its libraries are loaded.
-            found = measure(VERBS[name])
+            VERBS[name](Given(0))(None)  # So that its libraries are loaded.
+            found, stages = measure(VERBS[name](Given(1)))
+            told = [(measure_stop(VERBS[name](Given(2 + n)), stage), stage) for n, stage in enumerate(stages)]
+            stop = max(told, default=(0.0, "none"))
         for stage, gap in sorted(found.items(), key=lambda item: -item[1]):
-            if gap >= 0.05:
+            if gap >= SHOWN:
                 print(f"| {name} | {stage} | {gap:.2f} |", flush=True)
-        if max(found.values()) < 0.05:
-            print(f"| {name} | all | below 0.05 |", flush=True)
+        if max(found.values()) < SHOWN:
+            print(f"| {name} | all | below {SHOWN} |", flush=True)
+        print(f"| {name} | told to stop in {stop[1]} | {stop[0]:.2f} |", flush=True)
 
 
 if __name__ == "__main__":

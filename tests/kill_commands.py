@@ -33,6 +33,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "tile": ("tile in.png -o out.png --map map.npz --stages stages", "out.png map.npz"),
     "design": ("design in.png -o out.png --size 96 --plan still --map map.npz", "out.png map.npz"),
     "synthesize": ("synthesize in.png -o out.zarr --size 128 --chunks 64", ""),
+    "synthesize, to a file": ("synthesize in.png -o out.tif --size 128 --chunks 64", "out.tif"),
+    "tiles": ("tiles in.png -o tiles --side 32 --pictures 1 --plan still", ""),
     "database": ("database base add in.png --box 41,78,21,23 --layout disjoint", ""),
     "batch": ("batch recipe.toml", ""),
 }
@@ -73,7 +75,7 @@ def read_all(place: Path) -> dict[str, bytes]:
 
 def is_temporary(name: str) -> bool:
     """Return whether a name is that of something half-written."""
-    return any(part.startswith(".texrs-") for part in Path(name).parts)
+    return any(part.startswith(".") and ".texrs-" in part for part in Path(name).parts)
 
 
 def kill_often(name: str, count: int, rng: random.Random, end: float, counts: collections.Counter[str]) -> list[str]:

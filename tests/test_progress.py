@@ -3,12 +3,15 @@
 import builtins
 import inspect
 import sys
+from collections import Counter
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import texrs
-from texrs._progress import listen, show_lines
+from texrs._progress import answering, ask, listen, show_lines
 from texrs.errors import InvalidInput
 from texrs.materials import Material
 
@@ -75,3 +78,70 @@ def test_materials_are_shown_by_one_bar(capsys: pytest.CaptureFixture[str]):
     stack = Material({"colour": STRIPES, "height": STRIPES.astype(np.float32)})
     assert np.array_equal(texrs.tile(stack, progress=True).image, texrs.tile(stack).image)
     assert "join rows" in capsys.readouterr().err
+
+
+def test_who_knows_of_no_progress_asks_who_listens():
+    told: list[tuple[object, ...]] = []
+    ask()
+    with answering(lambda *place: told.append(place), "stage", 0.5):
+        ask()
+        with answering(None, "inner", 0.0):
+            ask()
+        with answering(lambda share: told.append((share,)), 0.25):
+            ask()
+        listen(None)("its own", 1.0)
+    ask()
+    assert listen(None) is None
+    assert told == [("stage", 0.5), ("stage", 0.5), (0.25,), ("stage", 0.5)]
+
+
+def test_who_listens_is_not_asked_by_what_it_does_itself():
+    told = []
+
+    def look(stage: str, share: float) -> None:
+        told.append(stage)
+        ask()
+
+    with answering(look, "stage", 0.5):
+        ask()
+    assert told == ["stage"]
+
+
+class Stop(Exception):
+    """Raised to stop the work."""
+
+
+def stop(*place: object) -> None:
+    raise Stop
+
+
+def test_a_kernel_without_progress_is_stopped_by_who_watches_the_call_around_it():
+    # It would take minutes.
+    noise = np.random.default_rng(0).random((512, 512, 3)).astype(np.float32)
+    with answering(stop, "stage", 0.0), pytest.raises(Stop):
+        texrs.kernels.mean_shift.mean_shift(noise, 200, 0.5)
+
+
+@pytest.mark.filterwarnings("ignore:scale_map")
+def test_long_stages_are_asked_again_and_again():
+    told: Counter[str] = Counter()
+    floor = texrs.samples.tilted_discs((96, 96)).image
+    texrs.perspective(floor, size=64, progress=lambda stage, share: told.update([stage]))
+    assert told["scale map"] > 20
+    assert told["sheet"] > 5
+    told.clear()
+    texrs.elements.analyse(texrs.samples.pebbles((96, 96)).image, progress=lambda stage, share: told.update([stage]))
+    assert told["propose"] > 20
+    assert told["separate"] > 20
+
+
+def test_items_that_are_stopped_have_not_failed(tmp_path: Path):
+    pytest.importorskip("zarr")
+    make = partial(texrs.synthesize, texrs.samples.dots((64, 64)).image, 64)
+    with pytest.raises(Stop):
+        texrs.lazy.map(make, [{"seed": 1}, {"seed": 2}], tmp_path / "a.zarr", progress=stop)
+    told: list[float] = []
+    texrs.lazy.map(make, [{"seed": 1}], tmp_path / "b.zarr", progress=lambda stage, share: told.append(share))
+    # While it is made, and when it is.
+    assert told.count(0.0) > 1
+    assert told[-1] == 1.0

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any
 
 from texrs._calls import check_call
@@ -17,6 +19,44 @@ if TYPE_CHECKING:
 
 PAUSE = 5.0
 """Least seconds between two lines of one stage."""
+_ASKED: ContextVar[Callable[[], object] | None] = ContextVar("asked", default=None)
+
+
+@contextmanager
+def answering(progress: Callable[..., object] | None, *place: str | float) -> Iterator[None]:
+    """Let what is called in the block, and is told of no progress, ask by `ask` whether it is to stop.
+
+    Parameters
+    ----------
+    progress : callable or None
+        Who listens.
+    *place
+        What it is told each time: the stage and the share of it, or the share alone.
+
+    Yields
+    ------
+    None
+
+    """
+    # Where nobody listens to this, who listens to what it is part of is asked.
+    token = _ASKED.set(_ASKED.get() if progress is None else lambda: progress(*place))
+    try:
+        yield
+    finally:
+        _ASKED.reset(token)
+
+
+def ask() -> None:
+    """Ask who listens, if anyone does, whether to go on; for loops of what is used by many, and knows of no progress."""
+    asked = _ASKED.get()
+    if asked is None:
+        return
+    # What a listener does is not watched itself.
+    token = _ASKED.set(None)
+    try:
+        asked()
+    finally:
+        _ASKED.reset(token)
 
 
 def stage(progress: Progress | None, name: str) -> Callable[[float], object] | None:
@@ -34,7 +74,8 @@ def listen(progress: Progress | bool | None) -> Progress | None:
     ----------
     progress : callable, bool or None
         What a verb was given. True shows a bar of tqdm on stderr, or in the notebook, which goes when the verb ends; where tqdm
-        is not installed, a line a stage, and one each five seconds with the share that is done.
+        is not installed, a line a stage, and one each five seconds with the share that is done. What is called without one in a
+        block of `answering` asks as `ask` does.
 
     Raises
     ------
@@ -57,7 +98,7 @@ def listen(progress: Progress | bool | None) -> Progress | None:
 
 def _choose(progress: Progress | bool | None) -> Progress | None:
     if progress is None or progress is False:
-        return None
+        return None if _ASKED.get() is None else lambda stage, share: ask()
     if progress is True:
         return _make_bar() or show_lines(lambda line: print(line, file=sys.stderr, flush=True))
     if not callable(progress) or isinstance(progress, type):

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from texrs._arrays import as_bool, as_float, as_image, as_int, as_ndarray, as_seed, as_size, check_work
-from texrs._progress import listen
+from texrs._progress import answering, listen
 from texrs._typing import Array, Progress
 from texrs._verbs import takes_materials
 from texrs.blending import apply
@@ -123,10 +123,12 @@ def extend(
     views = as_views(view)
     settled = [v.settle((rows, columns)) for v in views]
     watch("plane", 0.0)
-    grounds = find_grounds(pixels, settled, np.ones((rows, columns), np.bool_), everywhere=True)
-    planes = [
-        follow_plane(pixels, ground, said, v.fov) for v, (said, _), ground in zip(views, settled, grounds, strict=True)
-    ]
+    with answering(progress, "plane", 0.0):
+        grounds = find_grounds(pixels, settled, np.ones((rows, columns), np.bool_), everywhere=True)
+        planes = [
+            follow_plane(pixels, ground, said, v.fov)
+            for v, (said, _), ground in zip(views, settled, grounds, strict=True)
+        ]
     watch("plane", 1.0)
     # Beyond the horizon of a plane that is all there is lies nothing.
     alone = len(add_rest([Part(ground) for ground in grounds], np.zeros((rows, columns), np.bool_), pixels)) == 1

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_image, as_ndarray, as_seed, as_size, as_wrap, check_work, guidance
-from texrs._progress import listen
+from texrs._progress import answering, listen
 from texrs._typing import Array, Bools, Interpolation, Progress
 from texrs._verbs import takes_materials
 from texrs.blending import apply
@@ -117,7 +117,8 @@ def rectify(
     fine = None if resolution is None else as_float(resolution, "resolution", 0.05, 8)
     check_work("rectify", [pixels], asked or pixels.shape[:2], "image" if asked is None else "size")
     watch("plane", 0.0)
-    seen = see(pixels, View.of(view))
+    with answering(progress, "plane", 0.0):
+        seen = see(pixels, View.of(view))
     watch("plane", 1.0)
     plane = seen.plane
     fine = choose_resolution(plane, seen.ground, fine)

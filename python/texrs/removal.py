@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from texrs._arrays import as_bool, as_float, as_image, as_int, as_mask, as_ndarray, as_seed, check_work
-from texrs._progress import listen
+from texrs._progress import answering, listen
 from texrs._typing import Array, Progress
 from texrs._verbs import takes_materials
 from texrs.blending import apply
@@ -132,10 +132,12 @@ def remove(
         raise InvalidInput("mask: with its margin it covers the whole photograph, so nothing is left to fill it from")
     check_work("remove", [pixels], shape, "image")
     watch("plane", 0.0)
-    grounds = find_grounds(pixels, settled, ~hole, everywhere=False)
-    planes = [
-        follow_plane(pixels, ground, said, v.fov) for v, (said, _), ground in zip(views, settled, grounds, strict=True)
-    ]
+    with answering(progress, "plane", 0.0):
+        grounds = find_grounds(pixels, settled, ~hole, everywhere=False)
+        planes = [
+            follow_plane(pixels, ground, said, v.fov)
+            for v, (said, _), ground in zip(views, settled, grounds, strict=True)
+        ]
     watch("plane", 1.0)
     parts = add_rest([Part.of(g, plane) for g, (plane, _) in zip(grounds, planes, strict=True)], hole, pixels)
     made = fill_parts(

@@ -27,7 +27,7 @@ from texrs._chunks.grid import Grid
 from texrs._chunks.reading import Channel, Reader
 from texrs._chunks.store import Stored
 from texrs._chunks.workers import Scheduler
-from texrs._progress import listen
+from texrs._progress import answering, listen
 from texrs._typing import Array, Path, Progress
 from texrs._version import __version__
 from texrs.errors import FileError, InvalidInput
@@ -220,15 +220,19 @@ def fill(
     work = _Place(reader, name, grid, str(part), len(header), shape, dtype.str)
     todo = grid.sort(number for number in range(len(grid)) if number not in done)
     made = 0
+
+    def say() -> None:
+        if watch is not None:
+            watch("chunks", (len(done) + made) / len(grid))
+
     try:
-        with _name_journal(part).open("a", encoding="utf-8") as journal:
+        with _name_journal(part).open("a", encoding="utf-8") as journal, answering(say):
             for number, _ in workers.run(work, todo, scheduler, threads_each=threads):
                 journal.write(f"{number}\n")
                 journal.flush()
                 os.fsync(journal.fileno())
                 made += 1
-                if watch is not None:
-                    watch("chunks", (len(done) + made) / len(grid))
+                say()
     except InvalidInput:
         if not done and not made:
             # Refused before anything was made, as workers that do not answer are: there is nothing to go on with.

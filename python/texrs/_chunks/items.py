@@ -18,7 +18,7 @@ from texrs._chunks import workers
 from texrs._chunks.grid import as_sides
 from texrs._chunks.store import Stored, list_done, make_array, open_array, open_group
 from texrs._chunks.workers import Scheduler
-from texrs._progress import listen
+from texrs._progress import answering, listen
 from texrs._typing import Array, Path, Progress
 from texrs._version import __version__
 from texrs.errors import FileError, InvalidInput, TexrsError
@@ -76,21 +76,34 @@ def map_items(
     store, work = os.fspath(as_path(path)), _Item(function, given, os.fspath(path), lattice)
     todo = _find_missing(group, lattice)
     total, made, reasons = len(given), 0, dict[int, str]()
-    there = total - len(todo)
-    while todo and not list(group.array_keys()):
-        # The first result says what the arrays are like, before several workers write to them.
-        number = todo.pop(0)
-        reason = work(number, group)
-        made += reason is None
-        if reason is not None:
-            reasons[number] = reason
-    for number, reason in workers.run(work, todo, scheduler, threads_each=threads):
+    there, stopped = total - len(todo), list[BaseException]()
+
+    def say() -> None:
+        try:
+            if watch is not None:
+                watch("items", (there + made + len(reasons)) / total)
+        except BaseException as error:
+            stopped.append(error)
+            raise
+
+    def count(number: int, reason: str | None) -> None:
+        nonlocal made
+        if stopped:
+            # It was no item that failed.
+            raise stopped[0]
         if reason is None:
             made += 1
         else:
             reasons[number] = reason
-        if watch is not None:
-            watch("items", (there + made + len(reasons)) / total)
+        say()
+
+    with answering(say):
+        while todo and not list(group.array_keys()):
+            # The first result says what the arrays are like, before several workers write to them.
+            number = todo.pop(0)
+            count(number, work(number, group))
+        for number, reason in workers.run(work, todo, scheduler, threads_each=threads):
+            count(number, reason)
     if reasons:
         raise Failed(dict(sorted(reasons.items())))
     return Stored(store, lattice, total, made, time.monotonic() - begun)

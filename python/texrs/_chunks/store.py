@@ -17,7 +17,7 @@ from texrs._chunks.grid import Box, Grid
 from texrs._chunks.pyramid import count_levels, halve_block
 from texrs._chunks.reading import Channel, Reader
 from texrs._chunks.workers import Scheduler
-from texrs._progress import listen
+from texrs._progress import answering, listen
 from texrs._typing import Array, Path, Progress
 from texrs._version import __version__
 from texrs.errors import FileError, InvalidInput
@@ -279,10 +279,12 @@ def write_image(
         work: Any = (
             _Fill(reader, each, store, alone) if level == 0 else _Halve(dict(reader.maps), each, level, store, alone)
         )
-        for number, _ in workers.run(work, todo, scheduler, threads_each=threads):
-            new = sum(number in missing[name] for name in reader.maps)
-            made += new
-            clock.advance(new, f"level {level}" if level else "chunks")
+        stage = f"level {level}" if level else "chunks"
+        with answering(clock.say, stage):
+            for number, _ in workers.run(work, todo, scheduler, threads_each=threads):
+                new = sum(number in missing[name] for name in reader.maps)
+                made += new
+                clock.advance(new, stage)
     channels = next(iter(reader.maps.values())).channels if alone else ()
     return Stored(store, (*grid.shape, *channels), total, made, time.monotonic() - begun)
 
@@ -360,5 +362,9 @@ class _Clock:
         """Count what was made."""
         self.done += count
         self.new += count
+        self.say(stage)
+
+    def say(self, stage: str) -> None:
+        """Say how far it is."""
         if self.watch is not None:
             self.watch(stage, min(1.0, self.done / self.total))

@@ -12,6 +12,7 @@ import numpy as np
 from scipy import ndimage
 
 from texrs._arrays import guidance
+from texrs._progress import answering
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.completion._holes import look_around, paint_over
 from texrs.exemplar.sheet import Flattened, find_plane
@@ -84,8 +85,9 @@ def fill_in_depth(
     sheet = Flattened.of(guidance(paint_over(picture, open_)), plane, asked, whole)
     if not sheet.free.any():
         return None
-    if far is not None and sheet.elements is not None:
-        wide = far
+    with answering(progress, "sheet", 0.0):
+        if far is not None and sheet.elements is not None:
+            wide = far
     own = SIDE * sheet.side(asked) if side is None else side * sheet.steps_at(float(np.median(asked)))
     region = look_around(wide, ceil(AROUND * own * float(asked.max()) / sheet.resolution), 1, wrap)
     part = tuple(slice(o, o + n) for o, n in zip(region.origin, region.shape, strict=True))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from texrs import io
 from texrs._arrays import as_image, as_int
 from texrs._cache import Cache
-from texrs._progress import listen
+from texrs._progress import answering, listen
 from texrs._typing import Array, Path, Progress
 from texrs.database._folder import NAME, Folder, Record, check_free, restore_option
 from texrs.database._sheet import Sheet
@@ -437,14 +437,18 @@ class TextureDatabase:
         failed: dict[tuple[str, str], str] = {}
         sheet = Sheet(len(down), len(across), side)
         for j, b in enumerate(across, start=1):
-            sheet.put(0, j, read(b).image)
+            with answering(progress, "matrix", 0.0):
+                sheet.put(0, j, read(b).image)
         for i, a in enumerate(down, start=1):
-            sheet.put(i, 0, read(a).image)
+            with answering(progress, "matrix", (i - 1) / len(down)):
+                sheet.put(i, 0, read(a).image)
             for j, b in enumerate(across, start=1):
+                share = ((i - 1) * len(across) + j - 1) / (len(down) * len(across))
                 if progress is not None:
-                    progress("matrix", ((i - 1) * len(across) + j - 1) / (len(down) * len(across)))
+                    progress("matrix", share)
                 try:
-                    made = splice(read(a), read(b), size, **options)
+                    with answering(progress, "matrix", share):
+                        made = splice(read(a), read(b), size, **options)
                 except LimitExceeded:
                     raise
                 except InvalidInput as error:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_image, check_work, guidance
-from texrs._progress import listen
+from texrs._progress import answering, listen
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.elements import _mask
 from texrs.elements._arguments import Arguments, Box, check_consistency, choose_usual_box, find_contradiction
@@ -139,7 +139,8 @@ def analyse(
 
     # 3. What belongs to the elements.
     watch("separate", 0.0)
-    parted = _separate(guide, given, start, seen, how) if cellular is None else cellular.parted
+    with answering(watch, "separate", 0.0):
+        parted = _separate(guide, given, start, seen, how) if cellular is None else cellular.parted
     watch("separate", 0.2)
     start, parted = _extend(guide, given, start, parted, how) if cellular is None else (start, parted)
     if len(parted.points) < FEWEST:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._engine.noise import uniform
+from texrs._progress import ask
 
 Doubles = NDArray[np.float64]
 
@@ -46,6 +47,7 @@ class Mixture:
         floor = max(FLOOR * float(samples.var(axis=0).mean()), LEAST)
         model = cls._estimate(samples, share, floor)
         for _ in range(ROUNDS):
+            ask()
             logs = model._measure_logs(samples)
             share = np.exp(logs - logs.max(axis=1, keepdims=True))
             share /= share.sum(axis=1, keepdims=True)

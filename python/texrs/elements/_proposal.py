@@ -16,6 +16,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._progress import answering
 from texrs._typing import Bools, Floats
 from texrs.elements._arguments import LEAST, Arguments, Box, as_box
 from texrs.elements._boxes import propose_boxes, resize_box
@@ -111,7 +112,8 @@ def propose(guide: Floats, given: Arguments, wrap: tuple[bool, bool], progress: 
     progress(0.9)
     away = measure_distance(size, points, box.size, wrap)
     if layout is None:
-        layout, sure["layout"] = _choose_layout(guide, away, points, given.whole)
+        with answering(progress, 0.9):
+            layout, sure["layout"] = _choose_layout(guide, away, points, given.whole)
         progress(0.95)
     if blind and "layout" in sure and layout == Layout.CONNECTED:
         # What repeats are the openings of the net: ground lies in the middle of each but the chosen one.
@@ -139,7 +141,8 @@ def _choose_box(guide: Floats, wrap: tuple[bool, bool], progress: Callable[[floa
     """Try boxes in a small picture and take the one that explains most of it."""
     step = max(1, -(-max(guide.shape[:2]) // SMALL))
     small = downscale(guide, step)
-    boxes = propose_boxes(small)
+    with answering(progress, 0.0):
+        boxes = propose_boxes(small)
     if not boxes:
         raise InvalidInput("box: none could be proposed for this image; give one, or the points")
     light, features = to_lab(small)[..., 0], describe_appearance(small, wrap)[0]

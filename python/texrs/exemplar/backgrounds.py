@@ -62,6 +62,7 @@ def find_foreground(
     found, elements, fault = choose_background(regions.layers(layers or USUAL_LAYERS), features, watch)
     if layers is None:
         smooth = None if fault or (elements > 0).mean() > APART else add_smooth(rgb, features, found, elements)
+        watch()
         if smooth is not None:
             return *smooth, ""
         return add_layers(regions, features, found, elements, fault, watch)

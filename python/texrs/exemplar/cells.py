@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_image, as_rgb, guidance
+from texrs._progress import ask
 from texrs._show import brief
 from texrs._typing import Array, Bools, Floats, Labels, Progress
 from texrs.errors import InvalidInput
@@ -187,7 +188,7 @@ def find_cells(
     if joints is not None and joints.any() and not joints.all():
         seen = _project(lab, joints)
         trials += [partial(_tessellate_mask, joints, seen), *(partial(_tessellate, seen, s, 1) for s in sizes)]
-    watch, best = progress or (lambda stage, share: None), None
+    watch, best = progress or (lambda stage, share: ask()), None
     for done, trial in enumerate(trials):
         watch("cells", done / len(trials))
         found = trial()

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._progress import ask
 from texrs._show import brief
 from texrs._typing import Array, Bools, Floats
 from texrs.exemplar.adjacency import classify
@@ -126,6 +127,7 @@ def _try_background(palette: NDArray[np.uint8], colours: list[int], wrap: Sequen
     """Return the pieces that are left without some colours: as they are, or apart where they touch by a sample."""
     from scipy import ndimage
 
+    ask()
     mask = ~np.isin(palette, colours)
     ground = np.bincount(label_components(~mask, wrap).ravel())[1:]
     whole = ground.max(initial=0) / max(ground.sum(), 1)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._progress import ask
 from texrs._show import brief
 from texrs._typing import Floats
 from texrs.source_map import SourceMap
@@ -172,7 +173,10 @@ def find_lattice(guide: Floats) -> Lattice | None:
         return None
     rows, columns = np.gradient(gaussian_filter(light, 1.0))
     edges = np.hypot(rows, columns)
-    found = [_fit_lattice(correlate(picture)) for picture in (light, np.minimum(edges, np.quantile(edges, 0.95)))]
+    found = []
+    for picture in (light, np.minimum(edges, np.quantile(edges, 0.95))):
+        ask()
+        found.append(_fit_lattice(correlate(picture)))
     believed = [each for each in found if each is not None and each.correlation >= REGULAR]
     # Edges are told apart less well than colours: two of them may be half a period apart.
     return believed[0] if believed else None

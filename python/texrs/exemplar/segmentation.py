@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_choice, as_image, as_instance, as_int, as_list, as_rgb, to_unit
 from texrs._cache import content_hash
 from texrs._engine.noise import uniform
-from texrs._progress import listen
+from texrs._progress import ask, listen
 from texrs._show import brief
 from texrs._typing import Array, Floats, Labels, Progress
 from texrs.errors import InvalidInput
@@ -265,6 +265,7 @@ def segment(
         whole = regions.layers(options.layers or USUAL_LAYERS)
         return Segmentation(whole, whole.copy(), "none", "")
     lattice = find_lattice(rgb)
+    watch()
     courses = find_courses(rgb, lattice)
     lattice = None if courses else lattice
     reasons = [f"elements keep to {kept}" for kept in (lattice, courses) if kept]
@@ -287,7 +288,9 @@ class Steps:
     def __call__(self) -> None:
         """Report a step."""
         self.left *= 0.9
-        if self.progress is not None:
+        if self.progress is None:
+            ask()
+        else:
             self.progress("segment", 1 - self.left)
 
 

@@ -11,7 +11,7 @@ from texrs._arrays import log_single
 from texrs._engine.appearance import Demand
 from texrs._engine.pyramid import ONE, Region
 from texrs._engine.stitcher import Stitched, Weights
-from texrs._progress import stage
+from texrs._progress import answering, stage
 from texrs._typing import Floats, Progress
 from texrs.exemplar.sheet import Sheet, code
 
@@ -107,7 +107,8 @@ def stitch_sheet(
     FromSheet
 
     """
-    stitcher, elements = sheet.stitcher
+    with answering(progress, "sheet", 0.0):
+        stitcher, elements = sheet.stitcher
     wanted = sheet.side(target) if side is None else side
     patch = float(max(min(wanted, FITS * min(sheet.free.shape), MOST), LEAST))
     frames = sheet.frames(target, region.wrap) if frames is None else frames

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from texrs._engine.pyramid import ONE, Region
 from texrs._engine.stitcher import Weights
-from texrs._progress import stage
+from texrs._progress import answering, stage
 from texrs._typing import Progress
 from texrs.exemplar import Exemplar
 from texrs.growth.constraints import Asked
@@ -73,8 +73,9 @@ def from_patches(
     def make(
         region: Region, frames: NDArray[np.int16], asked: Asked, progress: Progress | None
     ) -> tuple[Places, Patches]:
-        stitcher = exemplar.stitcher
-        bent = bends_with(exemplar, len(frames) > 1, bend)
+        with answering(progress, "exemplar", 0.0):
+            stitcher = exemplar.stitcher
+            bent = bends_with(exemplar, len(frames) > 1, bend)
         made = stitcher.stitch(
             region,
             frames,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_float, as_int, to_unit
-from texrs._progress import listen
+from texrs._progress import answering, listen
 from texrs._typing import Array, Floats, Path, Progress
 from texrs.errors import InvalidInput
 from texrs.materials import Map, Role
@@ -177,9 +177,10 @@ def paint(
     if atlas is None:
         return Painted(vertices, faces, _sample(texture, vertices * size, watch), None, roles)
     side, more = as_int(atlas, "atlas", 16, 16384), as_int(padding, "padding", 0, 64)
-    if uv is None:
-        vertices, faces, uv = unwrap(vertices, faces, side, more)
-    points, there = bake_points(vertices, faces, uv, side, more)
+    with answering(watch, "atlas", 0.0):
+        if uv is None:
+            vertices, faces, uv = unwrap(vertices, faces, side, more)
+        points, there = bake_points(vertices, faces, uv, side, more)
     if not there.any():
         raise InvalidInput("mesh: its atlas has no area: it lies in one line, or beyond 0 to 1")
     maps, whole = _sample(texture, points[there] * size, watch), {}
@@ -224,7 +225,8 @@ def _sample(texture: SolidTexture, points: NDArray[np.float64], watch: Progress 
     parts = []
     for start in range(0, max(len(at), 1), _BAND):
         some = at[start : start + _BAND]
-        parts.append({"image": texture.sample(some)} if texture.material is None else texture.sample_maps(some))
+        with answering(watch, "sample", start / max(len(at), 1)):
+            parts.append({"image": texture.sample(some)} if texture.material is None else texture.sample_maps(some))
         if watch is not None:
             watch("sample", min(1.0, (start + _BAND) / max(len(at), 1)))
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

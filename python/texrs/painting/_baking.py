@@ -5,11 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._progress import ask
 from texrs._typing import Array, Floats
 from texrs.painting._meshes import Floats64
 
 __all__ = ["bake_points", "bake_values", "fill_between", "lean"]
 
+OFTEN = 256
+"""Triangles that are baked before anyone is asked whether to go on."""
 STEEPNESS = 0.4
 """Root mean square slope that heights are shown with, for nothing says in what units they are."""
 
@@ -31,7 +34,9 @@ def bake_values(
     points = np.zeros((side, side, values.shape[1]))
     away = np.full((side, side), np.inf, np.float32)
     corners = np.stack([uv[..., 0] * side - 0.5, (1 - uv[..., 1]) * side - 0.5], axis=-1)[faces]
-    for triangle, flat in zip(values[faces], corners, strict=True):
+    for number, (triangle, flat) in enumerate(zip(values[faces], corners, strict=True)):
+        if number % OFTEN == 0:
+            ask()
         edge, other = flat[1] - flat[0], flat[2] - flat[0]
         double = edge[0] * other[1] - edge[1] * other[0]
         if abs(double) < 1e-12:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_image, as_mask, guidance
 from texrs._light import Light
+from texrs._progress import ask
 from texrs._typing import Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.planes._step import find_step
@@ -174,6 +175,7 @@ def find_windows(colours: NDArray[np.float64], known: Bools) -> Bools:
     terms = np.stack([np.ones(known.shape), *(2 * p / max(known.shape) - 1 for p in places)], axis=-1)
     best: tuple[float, NDArray[np.float64]] | None = None
     for start in list_starts(thin):
+        ask()
         coefficients, spread = fit(terms[thin], facts[thin], start[thin], least)
         off = np.sqrt(measure_off(facts - terms @ coefficients, spread))
         # How much likelier it is than anything in the range; and what has detail is a ground sooner than what has not.

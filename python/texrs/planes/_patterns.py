@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._progress import ask
 from texrs._typing import Bools, Floats
 from texrs.kernels.gather import gather
 
@@ -76,6 +77,7 @@ def follow(levels: list[Floats], known: Bools, sigma: float, start: Reals, round
     rise, off = start, float("nan")
     last: tuple[Reals, Reals] | None = None
     for _ in range(rounds):
+        ask()
         points, slopes = measure_windows(levels, known, rise, sigma)
         if len(points) < FEWEST:
             break

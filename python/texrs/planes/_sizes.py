@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from texrs import scale_maps
 from texrs._arrays import as_image, as_mask, exp_single, guidance, log_single
+from texrs._progress import ask
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.planes._find import find, prepare
@@ -180,6 +181,7 @@ def list_patterns(pixels: Array, known: Bools, plane: Plane) -> list[Reals]:
     for sigma in BANDS:
         away = np.zeros(len(points))
         for _ in range(SETTLING):
+            ask()
             # On the plane, where all are about as large.
             flat = look_up(sizes, np.log(sigma / LADDER[0]) / np.log(LADDER[1] / LADDER[0]) + away)
             smooth = np.einsum("ni,i->n", terms, fit((rows, columns), flat, size))

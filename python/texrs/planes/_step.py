@@ -12,6 +12,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._progress import ask
 from texrs._typing import Bools
 
 __all__ = ["find_step"]
@@ -48,6 +49,7 @@ def find_step(facts: NDArray[np.float64], reach: float, known: Bools) -> Bools |
     values, size = told[thin], float(max(known.shape))
     best: tuple[float, float, tuple[float, float], float] | None = None
     for angle, share in product(ANGLES, SHARES):
+        ask()
         # To so many digits these, and on which side a pixel lies, are the same on every processor.
         down, right = (round(float(f(np.radians(angle))), 9) for f in (np.sin, np.cos))
         along, aside = rows * down + columns * right, rows * right - columns * down

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from texrs._arrays import as_float, as_image, as_mask, guidance
+from texrs._progress import ask
 from texrs._typing import Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.scale_maps._blur import blur, shrink
@@ -84,6 +85,7 @@ def auto_mask(image: object, *, detail: float | None = None, trend: Trend = "pla
     centre, around = (_Blurs(small, seen, sigma) for sigma in sigmas)
     octaves = np.zeros(small.shape, np.float32)
     for _ in range(_ROUNDS - 1):
+        ask()
         mask = (centre.sample(octaves) > around.sample(octaves)) & seen
         octaves = np.log2(_measure(mask, trend, seen))
     lighter = centre.sample(octaves) - around.sample(octaves)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_choice
+from texrs._progress import ask
 from texrs._typing import Bools, Floats
 from texrs.scale_maps._kinds import AREAS, Kind
 
@@ -103,6 +104,7 @@ def _fit_robustly(basis: NDArray[np.float64], values: NDArray[np.float64]) -> ND
     weights: NDArray[Any] = np.ones_like(values)
     found = np.zeros(basis.shape[1])
     for _ in range(_ROUNDS):
+        ask()
         weighted = basis * weights[:, np.newaxis]
         before = found
         # Sums in one order, whatever number of threads a matrix product would take.

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from texrs._arrays import as_float, as_image, as_int, as_items, as_size, guidance, try_array
 from texrs._conversion import as_ndarray
-from texrs._progress import listen
+from texrs._progress import answering, ask, listen
 from texrs._typing import Array, Floats, Interpolation, Path, Progress
 from texrs.errors import FileError, InvalidInput, LimitExceeded
 from texrs.io import atomic
@@ -285,13 +285,18 @@ def turntable(
         for i in range(count):
             if progress is not None:
                 progress("turning", i / count)
-            seen = _render(colours, _view(360 * i / count, above), (side, side), pixel, interpolation)
+            with answering(progress, "turning", i / count):
+                seen = _render(colours, _view(360 * i / count, above), (side, side), pixel, interpolation)
             alpha = seen[..., 3:] / np.float32(255)
             pictures.append(np.rint(seen[..., :3] * alpha + ground * (1 - alpha)).astype(np.uint8))
         # One palette for all, for colours that change from picture to picture flicker.
         few = Image.fromarray(np.concatenate(pictures[:: max(1, count // 6)]))
         palette = few.quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-        images: list[Any] = [Image.fromarray(p).quantize(palette=palette, dither=Image.Dither.NONE) for p in pictures]
+        images: list[Any] = []
+        for picture in pictures:
+            if progress is not None:
+                progress("turning", 1.0)
+            images.append(Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE))
         duration = max(20, round(1000 * period / count))
         images[0].save(
             temporary, format="GIF", save_all=True, append_images=images[1:], duration=duration, loop=0, optimize=False
@@ -328,6 +333,7 @@ def _render(
     slope = np.where(np.abs(forward) < 1e-6, 1e-6, forward)
     across = ((np.arange(sides[1] * _FINE) + 0.5) / _FINE - sides[1] / 2) * pixel
     for top in range(0, sides[0], _BAND):
+        ask()
         rows = min(_BAND, sides[0] - top)
         along = ((np.arange(rows * _FINE) + 0.5) / _FINE + top - sides[0] / 2) * pixel
         eye = [np.add.outer(along * down[k], across * right[k]).astype(np.float32) for k in range(3)]

@@ -128,14 +128,16 @@ impl Appearance {
         use numpy::PyUntypedArrayMethods;
         let channels = colours.shape()[1];
         let colours = colours.as_slice()?;
-        run(py, None, |_| match shape.len() {
+        run(py, None, |monitor| match shape.len() {
             2 => {
                 let grid = Grid::new(fixed("shape", &shape)?, fixed("wrap", &wrap)?)?;
-                appearance::Appearance::new(colours, grid, channels, radius).map(Analysis::Two)
+                appearance::Appearance::watched(colours, grid, channels, radius, monitor)
+                    .map(Analysis::Two)
             }
             _ => {
                 let grid = Grid::new(fixed("shape", &shape)?, fixed("wrap", &wrap)?)?;
-                appearance::Appearance::new(colours, grid, channels, radius).map(Analysis::Three)
+                appearance::Appearance::watched(colours, grid, channels, radius, monitor)
+                    .map(Analysis::Three)
             }
         })
         .map(Self)

@@ -55,7 +55,7 @@ impl From<Error> for PyErr {
 }
 
 /// Runs a kernel without the interpreter lock, in the pool of this thread's choice. Ctrl-C stops it; `progress`, if
-/// given, is called with the share that is done and stops it by raising.
+/// given, is called with the share that is done and stops it by raising. Without one, who watches the call around it is asked.
 fn run<R: Send>(
     py: Python<'_>,
     progress: Option<Py<PyAny>>,
@@ -66,9 +66,14 @@ fn run<R: Send>(
         par::watch(threads, POLL, work, |monitor| {
             Python::attach(|py| {
                 py.check_signals()?;
-                if let Some(progress) = &progress {
-                    progress.call1(py, (monitor.fraction(),))?;
-                }
+                match &progress {
+                    Some(progress) => progress.call1(py, (monitor.fraction(),))?,
+                    None => py
+                        .import("texrs._progress")?
+                        .getattr("ask")?
+                        .call0()?
+                        .unbind(),
+                };
                 Ok(())
             })
         })

@@ -42,7 +42,7 @@ from typing import Any
 import numpy as np
 
 from texrs._engine.pyramid import Region
-from texrs._progress import listen, stage
+from texrs._progress import answering, listen, stage
 from texrs._typing import Array, Interpolation, Progress
 from texrs._verbs import takes_materials
 from texrs.exemplar import Exemplar
@@ -181,26 +181,28 @@ def perspective(
     """
     progress = listen(progress)
     stage(progress, "scale map")
-    asked = Request.check(
-        exemplar,
-        scale_map,
-        size,
-        target=target,
-        kind=kind,
-        fov=fov,
-        direction=direction,
-        measuring=measuring,
-        method=method,
-        scale_weight=scale_weight,
-        augment_scales=augment_scales,
-        wrap=wrap,
-        seed=seed,
-        interpolation=interpolation,
-    )
+    with answering(progress, "scale map", 0.0):
+        asked = Request.check(
+            exemplar,
+            scale_map,
+            size,
+            target=target,
+            kind=kind,
+            fov=fov,
+            direction=direction,
+            measuring=measuring,
+            method=method,
+            scale_weight=scale_weight,
+            augment_scales=augment_scales,
+            wrap=wrap,
+            seed=seed,
+            interpolation=interpolation,
+        )
     if asked.method == "paper":
         return average_windows(asked, progress)
     stage(progress, "sheet")
-    laid = lay_out(asked)
+    with answering(progress, "sheet", 0.0):
+        laid = lay_out(asked)
     if laid.outside.share > 0 and asked.strength > 0:
         warnings.warn(laid.outside.describe(laid.sizes), stacklevel=2)
     found = stitch_sheet(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from texrs._arrays import to_unit
 from texrs._engine.pyramid import halve
-from texrs._progress import stage
+from texrs._progress import answering, ask, stage
 from texrs._typing import Array, Floats, Progress
 
 if TYPE_CHECKING:
@@ -33,6 +33,8 @@ ROUNDS = (20, 10, 6)
 BINS = 16
 R = 0.8
 """The exponent of Eq. 5."""
+AT_ONCE = 256
+"""Windows that are looked for before anyone is asked whether to go on."""
 NEAREST = 1e-3
 """Squared distances are at least this share of the windows' variance."""
 
@@ -79,12 +81,15 @@ def average(
         e = np.asarray(exemplars[number], np.float64)
         x = scatter(e, scales[number], targets[number], seed) if x is None else double(x, targets[number].shape)
         rounds = ROUNDS[len(exemplars) - 1 - number]
-        report = stage(progress, f"level {len(exemplars) - number} of {len(exemplars)}")
+        name = f"level {len(exemplars) - number} of {len(exemplars)}"
+        report = stage(progress, name)
         spread = weight * e.reshape(-1, e.shape[-1]).std(axis=0).sum() / max(float(scales[number].std()), 1e-6)
-        search = Search.of(e, np.asarray(scales[number], np.float64) * spread)
+        with answering(progress, name, 0.0):
+            search = Search.of(e, np.asarray(scales[number], np.float64) * spread)
         found: list[float] = []
         for turn in range(rounds):
-            x, at, energy = search.step(x, np.asarray(targets[number], np.float64) * spread)
+            with answering(progress, name, turn / rounds):
+                x, at, energy = search.step(x, np.asarray(targets[number], np.float64) * spread)
             found.append(round(energy, 6))
             if report is not None:
                 report((turn + 1) / rounds)
@@ -151,24 +156,36 @@ class Search:
 
         parts, bases, variance = [], [], 0.0
         for values, share in ((e, 0.95), (scale[..., np.newaxis], 0.99)):
+            ask()
             windows = _cut_windows(values, 1)
             mean = windows.mean(axis=0)
-            spread, axes = np.linalg.eigh(np.cov((windows - mean).T))
+            ask()
+            off = windows - mean
+            ask()
+            together = np.cov(off.T)
+            ask()
+            spread, axes = np.linalg.eigh(together)
+            ask()
             total = np.cumsum(spread[::-1])
             keep = int(np.searchsorted(total, share * total[-1])) + 1
             bases.append((mean, axes[:, ::-1][:, :keep]))
-            parts.append((windows - mean) @ bases[-1][1])
+            parts.append(off @ bases[-1][1])
             variance += float(total[-1])
         vectors = np.concatenate(parts, axis=1)
         # Of windows that are the same the first is found.
         first = np.sort(np.unique(vectors, axis=0, return_index=True)[1])
+        ask()
         return cls(e, bases, cKDTree(vectors[first]), first, NEAREST * max(variance, 1e-12), e.shape[1] - SIDE + 1)
 
     def step(self, x: Doubles, scale: Doubles) -> tuple[Doubles, NDArray[np.intp], float]:
         """Search the nearest window for each of the output's, then average them: a round."""
         seen = [_cut_windows(v, SPACING) for v in (x, scale[..., np.newaxis])]
         query = np.concatenate([(w - m) @ b for w, (m, b) in zip(seen, self.bases, strict=True)], axis=1)
-        distance, near = self.tree.query(query)
+        found = []
+        for part in range(0, len(query), AT_ONCE):
+            ask()
+            found.append(self.tree.query(query[part : part + AT_ONCE]))
+        distance, near = (np.concatenate(each) for each in zip(*found, strict=True))
         square = np.maximum(distance**2, self.least)
         energy = float((square ** (R / 2)).mean())  # Eq. 5
         omega = square ** ((R - 2) / 2)  # Eq. 6
@@ -179,6 +196,7 @@ class Search:
         total, weight = np.zeros_like(x), np.zeros(x.shape[:2])
         best, at = np.full(x.shape[:2], -1.0), np.zeros((*x.shape[:2], 2), np.intp)
         for dy in range(SIDE):
+            ask()
             for dx in range(SIDE):
                 colour = self.e[top + dy, left + dx]
                 w = omega / (1 + _add_excess(excess, colour))  # Eq. 8

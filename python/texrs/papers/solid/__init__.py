@@ -57,7 +57,7 @@ from typing import Any
 import numpy as np
 
 from texrs._engine.pyramid import ONE, Region, to_fixed
-from texrs._progress import listen, stage
+from texrs._progress import answering, listen, stage
 from texrs._typing import Array, Interpolation, Progress
 from texrs._verbs import takes_materials
 from texrs.exemplar import Exemplar
@@ -321,7 +321,8 @@ def grow_texture(asked: Request, progress: Progress | None) -> Synthesis:
             progress=progress,
         )
     elif asked.quality == "fast":
-        windows = analyse(asked)
+        with answering(progress, "exemplar", 0.0):
+            windows = analyse(asked)
         grown = windows.grow(asked.region, ask=asked.conditions.at, show=show, progress=progress)
     else:
         grown, said = stitch(asked, show, progress)

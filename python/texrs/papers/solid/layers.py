@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from texrs._cache import Cache
 from texrs._engine.pyramid import ONE, Region, to_fixed
 from texrs._engine.stitcher import Shown
-from texrs._progress import stage
+from texrs._progress import answering, stage
 from texrs._typing import Floats, Progress
 from texrs.exemplar import Exemplar
 from texrs.exemplar.regularity import find_lattice
@@ -187,7 +187,9 @@ class Layers:
         """Cut a patch into what the layer below shows in a box."""
         region = self._region(key)
         frames, last = to_fixed(self.field, region), key[0] == len(self.shifts) - 1
-        shown = self.exemplar.stitcher.cover(
+        with answering(advance, 0.0):
+            stitcher = self.exemplar.stitcher
+        shown = stitcher.cover(
             region,
             frames,
             join(region, below) if below else self._show_ground(region),

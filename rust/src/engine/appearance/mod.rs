@@ -17,7 +17,7 @@ use crate::foundation::functions::exp;
 use crate::foundation::grid::Grid;
 use crate::foundation::hash::Noise;
 use crate::foundation::memory;
-use crate::foundation::par;
+use crate::foundation::par::{self, Monitor};
 use crate::foundation::pca::principal;
 use crate::{Error, Result};
 
@@ -79,6 +79,17 @@ impl<const D: usize> Appearance<D> {
     /// Analyses `colours`: points of `grid` by `channels`. A cyclic axis of the grid is one along which the exemplar
     /// repeats.
     pub fn new(colours: &[f32], grid: Grid<D>, channels: usize, radius: usize) -> Result<Self> {
+        Self::watched(colours, grid, channels, radius, &Monitor::default())
+    }
+
+    /// As [`Appearance::new`], until its caller asks it to stop.
+    pub fn watched(
+        colours: &[f32],
+        grid: Grid<D>,
+        channels: usize,
+        radius: usize,
+        monitor: &Monitor,
+    ) -> Result<Self> {
         if !(1..=CHANNELS).contains(&channels)
             || grid.len().checked_mul(channels) != Some(colours.len())
         {
@@ -117,8 +128,11 @@ impl<const D: usize> Appearance<D> {
             spacing: 0,
         };
         this.projection = this.learn();
-        this.features = this.describe_all();
-        this.spacing = this.measure_spacing();
+        monitor.check()?;
+        this.features = this.describe_all(monitor);
+        monitor.check()?;
+        this.spacing = this.measure_spacing(monitor);
+        monitor.check()?;
         Ok(this)
     }
 
@@ -328,9 +342,12 @@ impl<const D: usize> Appearance<D> {
         }
     }
 
-    fn describe_all(&self) -> Vec<Line> {
+    fn describe_all(&self, monitor: &Monitor) -> Vec<Line> {
         let mut features = vec![Line([0; KEEP]); self.grid.len()];
         par::chunks_mut(&mut features, CHUNK, |chunk, features| {
+            if monitor.check().is_err() {
+                return;
+            }
             let mut window = self.scratch();
             for (i, feature) in features.iter_mut().enumerate() {
                 let centre = self.grid.point(chunk * CHUNK + i).map(|x| x as i32);
@@ -349,7 +366,7 @@ impl<const D: usize> Appearance<D> {
         Centres { ranges }
     }
 
-    fn measure_spacing(&self) -> i32 {
+    fn measure_spacing(&self, monitor: &Monitor) -> i32 {
         let centres = self.valid_centres();
         let count = (60_000_000 / self.grid.len())
             .clamp(60, 400)
@@ -357,6 +374,9 @@ impl<const D: usize> Appearance<D> {
         let noise = Noise::new(0xD157);
         let apart = 2 * self.radius as i32 - 1;
         let mut nearest = par::map(count, |k| {
+            if monitor.check().is_err() {
+                return 0;
+            }
             let me = centres.get(noise.below(centres.len() as u64, [k as u32, 0, 0, 0]) as usize);
             self.nearest_other(me, apart)
         });
