@@ -32,6 +32,7 @@ VERBS = {
     "rectify": lambda: texrs.rectify(DOTS, view=texrs.View(slant=10, fov=50)),
     "remove": lambda: texrs.remove(DOTS, HOLE, view=texrs.View(slant=10, fov=50)),
     "analyse": lambda: texrs.elements.analyse(DOTS),
+    "TileSet": lambda: texrs.TileSet(DOTS, 32),
 }
 
 

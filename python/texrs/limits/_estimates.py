@@ -45,6 +45,8 @@ class Cost:
 
 COPIES = 4
 """How often the colours of a result are there at once."""
+BEYOND = 600
+"""Bytes of a pixel that splice lets a texture go on by, where it gives elements or an arrangement to something larger."""
 COSTS: dict[str, dict[str | None, Cost]] = {
     "design": {None: Cost(1000, 680, 73, several=55)},
     "splice": {None: Cost(0, 350, 100)},
@@ -55,9 +57,10 @@ COSTS: dict[str, dict[str | None, Cost]] = {
     "tile": {None: Cost(0, 40, 80, fixed=6e6)},
     "complete": {None: Cost(0, 0, 60, fixed=14e6)},
     "extend": {None: Cost(0, 0, 384, fixed=20e6)},
-    "rectify": {None: Cost(0, 0, 100)},
-    "remove": {None: Cost(0, 0, 400, fixed=12e6)},
+    "rectify": {None: Cost(0, 0, 78, fixed=12e6)},
+    "remove": {None: Cost(0, 0, 360, fixed=16e6)},
     "analyse": {None: Cost(440, 0, 0, fixed=16e6)},
+    "TileSet": {None: Cost(1000, 680, 90)},
 }
 """By verb, and by the ``method`` or the ``quality`` that takes another amount than the others."""
 
@@ -76,12 +79,12 @@ def memory(
     Parameters
     ----------
     verb : str
-        Its name: design, splice, self_splice, perspective, solid, synthesize, tile, complete, extend, rectify, remove, or
-        analyse (`texrs.elements.analyse`).
+        Its name: design, splice, self_splice, perspective, solid, synthesize, tile, complete, extend, rectify, remove,
+        analyse (`texrs.elements.analyse`), or TileSet (`texrs.TileSet`).
     exemplar : sequence of int, or a sequence of them
         Shape of the example, (H, W), (H, W, C), or for solid (D, H, W[, C]); of several their shapes.
     size : sequence of int, optional
-        Of the result; by default that of the first example.
+        Of the result, which of a TileSet is its atlas, nine tiles a side; by default that of the first example.
     dtype : dtype
         Of the example.
     method : str, optional

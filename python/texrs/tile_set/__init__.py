@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_int, as_seed, as_size
+from texrs._arrays import as_int, as_seed, as_size, check_work
 from texrs._cache import content_hash
 from texrs._checks import as_tuple
 from texrs._chunks.grid import Box, as_sides
@@ -37,6 +37,7 @@ from texrs._progress import listen, stage
 from texrs._typing import Array, Floats, Path, Progress
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
+from texrs.io._files import as_path
 from texrs.materials import Material
 from texrs.papers.design import design_variants
 from texrs.source_map import SourceMap
@@ -117,6 +118,7 @@ class TileSet(InParts):
         self._side, self._seed = side, as_seed(seed)
         if {"size", "wrap", "count"} & options.keys():
             raise InvalidInput(f"{min({'size', 'wrap', 'count'} & options.keys())}: is said by side and variants")
+        check_work("TileSet", [known.pixels], (9 * side, 9 * side), "side")
         given = exemplar if isinstance(exemplar, Material) else known
         made = list(
             design_variants(given, as_int(variants, "variants", 1, 64), 2 * side, seed=seed, progress=watch, **options)
@@ -356,7 +358,7 @@ class TileSet(InParts):
         """
         from texrs.io import write
 
-        where, sides = FilePath(folder), as_size(cells)
+        where, sides = as_path(folder), as_size(cells)
         where.mkdir(parents=True, exist_ok=True)
         written = []
         for name, array in self._maps.items():

@@ -17,6 +17,7 @@ from texrs._arrays import check_memory
 from texrs._typing import Bools, Labels
 from texrs.elements import Elements, Layout
 from texrs.errors import InvalidInput
+from texrs.limits._estimates import BEYOND
 from texrs.papers.splice.entry import remember
 from texrs.papers.splice.foreground import Foreground, split_foreground
 from texrs.papers.splice.sowing import sow_elements
@@ -28,9 +29,6 @@ Points = NDArray[np.float64]
 Places = NDArray[np.int32]
 Copies = tuple[Points, NDArray[np.intp], Bools]
 """Elements of a texture that goes on: where they lie, which of its elements they are, along which axes they are mirrored."""
-
-EACH = 600
-"""Bytes that a pixel of the texture and its surroundings takes, without the factor, which has a limit of its own."""
 
 FREE, SOWN_FREE = 0.9, 0.75
 """Share of an element, with what lies around it, that must be free where it is put; and where it was sown, so that it fits."""
@@ -132,7 +130,7 @@ def sow(entry: Elements, size: tuple[int, int], margin: int) -> Extension | None
 
 def _unfold(layout: PointLayout, low: NDArray[np.intp], high: NDArray[np.intp]) -> tuple[Places, Bools]:
     """Return the pixel of the picture that each one of a box shows, and along which axes it is mirrored."""
-    check_memory(int(np.prod(high - low)) * EACH)
+    check_memory(int(np.prod(high - low)) * BEYOND)
     along = [layout.folds[a].apply(np.arange(low[a], high[a], dtype=float)) for a in range(2)]
     rows, columns = (np.asarray(np.rint(x), np.int32) for x, _ in along)
     pixel = np.stack(np.broadcast_arrays(rows[:, None], columns[None]), axis=-1)
@@ -146,7 +144,7 @@ def count_elements(entry: Elements, size: tuple[int, int], margin: int) -> int:
     places, of, flips = layout.within(low.astype(np.float64), (high - 1).astype(np.float64))
     if entry.layout != Layout.DISJOINT:
         return len(of)
-    check_memory(int(np.prod(high - low)) * EACH)
+    check_memory(int(np.prod(high - low)) * BEYOND)
     instance = np.zeros(high - low, np.int32)
     return len(_place_elements(entry, instance, (places - low, of, flips), None)[0])
 
