@@ -249,14 +249,17 @@ def record(name: str, place: Path) -> Call | None:
     """Run the examples of a function, and return their last call of it; None where there is none."""
     thing, function = public_calls()[name]
     found: dict[str, Any] = {}
+    # Those of a method may stand where its class is described.
+    owner = public_calls().get(name.rpartition(".")[0], (None, None))[0]
 
     def note(frame: Any, event: str, argument: object) -> None:
         if event == "call" and frame.f_code is function.__code__:
-            found.clear()
-            found.update(frame.f_locals)
+            me = frame.f_locals.get("self")
+            if me is None or not inspect.isclass(owner) or isinstance(me, owner):
+                # A method that is inherited is called for others too, as `Mapping.get` for the environment.
+                found.clear()
+                found.update(frame.f_locals)
 
-    # Those of a method may stand where its class is described.
-    owner = public_calls().get(name.rpartition(".")[0], (None, None))[0]
     space: dict[str, Any] = {**function.__globals__, "__name__": "__main__"}
     for text in (inspect.getdoc(thing), inspect.getdoc(owner) if owner is not None else None):
         with keep_folders(place), contextlib.redirect_stdout(io.StringIO()):

@@ -225,3 +225,11 @@ def test_bad_input_is_named(options, sentence):
     image = np.random.default_rng(0).integers(0, 255, (64, 64), np.uint8)
     with pytest.raises(InvalidInput, match=sentence):
         texrs.complete(image, options.pop("hole", hole), **options)
+
+
+def test_pictures_without_an_axis_of_channels_are_filled_in_perspective():
+    floor = texrs.samples.tilted_discs((96, 96)).image
+    hole = np.zeros((96, 96), bool)
+    hole[40:60, 40:60] = True
+    made = texrs.complete(floor[..., 0], hole, scale_map="auto")
+    assert np.array_equal(made.image, texrs.complete(floor[..., :1], hole, scale_map="auto").image[..., 0])

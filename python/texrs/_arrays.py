@@ -13,6 +13,7 @@ from numpy.typing import DTypeLike
 
 from texrs._checks import (
     MAX_PIXELS,
+    as_axes,
     as_bool,
     as_choice,
     as_float,
@@ -21,6 +22,7 @@ from texrs._checks import (
     as_items,
     as_list,
     as_method,
+    as_one,
     as_progress,
     as_seed,
     as_size,
@@ -28,6 +30,7 @@ from texrs._checks import (
     as_wrap,
     check_memory,
     check_work,
+    try_array,
 )
 from texrs._conversion import as_ndarray
 from texrs._typing import Array, Bools, Floats
@@ -36,6 +39,7 @@ from texrs.errors import InvalidInput, LimitExceeded
 __all__ = [
     "MAX_PIXELS",
     "as_array",
+    "as_axes",
     "as_bool",
     "as_choice",
     "as_float",
@@ -47,6 +51,7 @@ __all__ = [
     "as_mask",
     "as_method",
     "as_ndarray",
+    "as_one",
     "as_progress",
     "as_rgb",
     "as_seed",
@@ -198,14 +203,6 @@ def _has_shape(sides: tuple[int, ...], shape: Sequence[int | str]) -> bool:
     return len(sides) == len(shape) and all(
         side > 0 if isinstance(wanted, str) else side == wanted for side, wanted in zip(sides, shape, strict=True)
     )
-
-
-def try_array(value: object, dtype: DTypeLike | None = None) -> Array:
-    """Return an array of a value; one of no entries, of objects by default, where it is none."""
-    try:
-        return np.asarray(value, dtype)
-    except (ValueError, TypeError, OverflowError, MemoryError):
-        return np.empty(0, np.object_ if dtype is None else dtype)
 
 
 def _make_contiguous(array: Array, name: str, dtype: np.dtype[Any]) -> Array:

@@ -9,6 +9,7 @@ from contextlib import suppress
 from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from texrs._calls import check_call
 from texrs.errors import InvalidInput, LimitExceeded
@@ -23,6 +24,14 @@ FREE = 2**20
 def as_list(value: object) -> list[Any]:
     """Return several things as a list, and a single one as a list of it."""
     return list(value) if isinstance(value, list | tuple) else [value]
+
+
+def try_array(value: object, dtype: DTypeLike | None = None) -> NDArray[Any]:
+    """Return an array of a value; one of no entries, of objects by default, where it is none."""
+    try:
+        return np.asarray(value, dtype)
+    except (ValueError, TypeError, OverflowError, MemoryError):
+        return np.empty(0, np.object_ if dtype is None else dtype)
 
 
 def as_size(
@@ -141,7 +150,7 @@ def as_tuple(value: object, name: str, length: int, what: str) -> tuple[Any, ...
         try:
             if len(value) == length:
                 return tuple(value)
-        except (TypeError, OverflowError):  # An array without axes, a range beyond what fits in memory.
+        except (TypeError, OverflowError, MemoryError):  # An array without axes, a range beyond what fits in memory.
             pass
     raise InvalidInput(f"{name}: needs {what}, got {value!r}")
 
@@ -179,6 +188,25 @@ def as_choice(value: object, name: str, allowed: Sequence[str]) -> str:
     if not isinstance(value, str) or value not in allowed:
         raise InvalidInput(f"{name}: allowed are {', '.join(allowed[:-1])} and {allowed[-1]}; got {value!r}")
     return value
+
+
+def as_one(value: Any, name: str, *allowed: str | int | None) -> Any:
+    """Check a choice among words, numbers and None; its type is looked at first, for arrays are compared entry by entry."""
+    if value is not None and (isinstance(value, bool) or not isinstance(value, str | numbers.Integral)):
+        plain = False
+    else:
+        plain = value in allowed
+    if not plain:
+        names = [str(each) if isinstance(each, int) else repr(each) for each in allowed if each is not None]
+        raise InvalidInput(f"{name}: allowed are {', '.join(names[:-1])} and {names[-1]}, got {value!r}")
+    return value
+
+
+def as_axes(value: object, name: str = "axes") -> int:
+    """Check a number of axes, 2 or 3."""
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value not in (2, 3):
+        raise InvalidInput(f"{name}: needs 2 or 3, got {value!r}")
+    return int(value)
 
 
 def as_method(value: object, *allowed: str | None) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float, as_seed, as_size, as_wrap, try_array
+from texrs._arrays import as_float, as_items, as_seed, as_size, as_wrap, check_memory, try_array
 from texrs._typing import Array, Labels
 from texrs.elements import Elements, Layout
 from texrs.errors import InvalidInput
@@ -172,6 +172,7 @@ def cells(labels: Array, *, wrap: bool | Sequence[bool] = False) -> Elements:
     given: NDArray[Any] = try_array(labels, None)
     if given.ndim != 2 or min(given.shape) < SHORTEST:
         raise InvalidInput(f"labels: needs (H, W) with sides of at least {SHORTEST}, got shape {given.shape}")
+    check_memory(4 * given.size, "labels")
     image = np.full(given.shape, GROUND, np.uint8)
     found = Elements.of_labels(image, given, layout=Layout.JOINTED, wrap=wrap)
     image[~found.mask] = THING
@@ -225,7 +226,7 @@ def courses(
 
     """
     shape, number = _as_shape(size), as_seed(seed)
-    listed = height if isinstance(height, Sequence | np.ndarray) else [height]
+    listed = as_items(height, "height") if isinstance(height, Sequence | np.ndarray) else [height]
     heights = [as_float(h, "height", 4, 1e6) for h in listed]
     if not heights:
         raise InvalidInput("height: needs one or more")

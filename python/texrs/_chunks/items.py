@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from texrs._arrays import try_array
+from texrs._arrays import as_instance, as_items, check_memory, try_array
 from texrs._cache import content_hash
 from texrs._chunks import workers
 from texrs._chunks.grid import as_sides
@@ -67,7 +67,12 @@ def map_items(
     begun, watch = time.monotonic(), listen(progress)
     if not callable(function):
         raise InvalidInput(f"function: needs a function, got {type(function).__name__}")
-    given = list(items)
+    as_instance(items, "items", Sequence, np.ndarray)
+    if isinstance(items, range):
+        check_memory(8 * len(items), "items")
+    given = list(as_items(items, "items"))
+    if key is not None:
+        as_instance(key, "key", str)
     if not given:
         raise InvalidInput("items: needs at least one, got none")
     lattice = (len(given),) if shape is None else _as_lattice(shape, len(given))

@@ -11,7 +11,7 @@ from math import ceil
 import numpy as np
 from scipy import ndimage
 
-from texrs._arrays import guidance
+from texrs._arrays import as_image, guidance
 from texrs._progress import answering
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.completion._holes import look_around, paint_over
@@ -33,7 +33,7 @@ AROUND = 2.0
 
 def see_plane(picture: Array, open_: Bools, scale: Floats) -> Plane | None:
     """Return the plane whose scale map that of a picture with holes is, if it is one's."""
-    return find_plane(guidance(paint_over(picture, open_)), np.ascontiguousarray(scale), find_kind(scale))
+    return find_plane(guidance(as_image(paint_over(picture, open_))), np.ascontiguousarray(scale), find_kind(scale))
 
 
 def fill_in_depth(
@@ -82,7 +82,7 @@ def fill_in_depth(
     if not whole.any():
         return None
     asked = plane.scales(np.argwhere(wide)).astype(np.float32)
-    sheet = Flattened.of(guidance(paint_over(picture, open_)), plane, asked, whole)
+    sheet = Flattened.of(guidance(as_image(paint_over(picture, open_))), plane, asked, whole)
     if not sheet.free.any():
         return None
     with answering(progress, "sheet", 0.0):

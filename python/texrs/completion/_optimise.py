@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from texrs import scale_maps
-from texrs._arrays import as_image, guidance
+from texrs._arrays import as_image, guidance, try_array
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.completion._holes import look_around, paint_over
 from texrs.errors import InvalidInput
@@ -52,7 +52,7 @@ def recover_scale(
             raise InvalidInput(f"{name}: 'auto' measures what is known, and the hole covers everything; give a map")
         found = measure_scale(picture, known)
         return found.scale, found
-    scale, holds = np.asarray(given), find_kind(given) or kind
+    scale, holds = try_array(given), find_kind(given) or kind
     if scale.shape == open_.shape and scale.dtype.kind == "f":
         # Where there is a hole, a map may have one too.
         with np.errstate(invalid="ignore"):

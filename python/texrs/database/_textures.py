@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs import io
-from texrs._arrays import as_image, as_int
+from texrs._arrays import as_bool, as_image, as_int
 from texrs._cache import Cache
 from texrs._progress import answering, listen
 from texrs._typing import Array, Path, Progress
@@ -21,6 +21,7 @@ from texrs.database._folder import NAME, Folder, Record, check_free, restore_opt
 from texrs.database._sheet import Sheet
 from texrs.elements import FORMAT, Elements, ElementSearch, Layout, LayoutName, analyse, digest, load
 from texrs.errors import FileError, InvalidInput, LimitExceeded, TexrsError
+from texrs.io._files import as_path
 from texrs.papers.splice import splice
 from texrs.synthesis import Synthesis
 
@@ -107,9 +108,7 @@ class TextureDatabase:
     """
 
     def __init__(self, path: Path, *, say: Callable[[str], object] | None = None) -> None:
-        if not isinstance(path, str | os.PathLike) or not isinstance(os.fspath(path), str):
-            raise InvalidInput(f"path: needs a str or a pathlib.Path, got {type(path).__name__}")
-        self.path = FilePath(path)
+        self.path = as_path(path)
         self._folder = Folder(self.path, say)
         self._folder.read()
 
@@ -221,7 +220,7 @@ class TextureDatabase:
         if not isinstance(name, str) or not NAME.fullmatch(name):
             raise InvalidInput(f"name: letters, digits, '.', '_' and '-' are allowed, up to 100; got {name!r}")
         pixels = as_image(image) if file is None else io.read(file)
-        if not replace:
+        if not as_bool(replace, "replace"):
             check_free(self._folder.read(), name, digest(pixels))
         entry = analyse(pixels, progress=progress, **options)
         if similarity:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_mask, try_array
 from texrs._typing import Bools
-from texrs.elements._layout import Layout
+from texrs.elements._layout import Layout, as_layout
 from texrs.elements._mask import disc, ellipse, round_to_odd, stamp
 from texrs.elements._separation import label_components, rank_pieces
 from texrs.errors import InvalidInput
@@ -81,7 +81,7 @@ class Arguments:
         """Check the arguments of an image of that size."""
         place = None if box is None else as_box(box, size)
         ground = as_background(background, size)
-        kind = None if layout is None else Layout(layout)
+        kind = None if layout is None else as_layout(layout)
         marked = None if mask is None else as_mask(mask, "mask", size)
         listed = None if points is None else as_points(points, size, "points")
         if marked is None:
@@ -118,7 +118,7 @@ def as_points(value: object, shape: Shape, name: str) -> Points:
     wanted = f"{name}: needs points (row, column), shape (n, 2)"
     try:
         points = np.asarray(value, np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError, MemoryError):
         raise InvalidInput(f"{wanted}, got what is no array of numbers") from None
     if points.size == 0:
         return np.zeros((0, 2))
@@ -148,7 +148,7 @@ def as_background(value: object, shape: Shape) -> Bools | None:
     """Check what is known of the background, points or a mask; None where nothing is said."""
     if value is None:
         return None
-    array = np.asarray(value) if not isinstance(value, Sequence) or len(value) else np.zeros((0, 2))
+    array = try_array(value) if not isinstance(value, Sequence) or len(value) else np.zeros((0, 2))
     if array.shape == shape and array.dtype == np.bool_:
         marked = as_mask(array, "background", shape)
     else:

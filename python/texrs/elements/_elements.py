@@ -21,7 +21,7 @@ from texrs.elements._arrangement import Arrangement, describe_arrangement
 from texrs.elements._drawing import draw_plain, mark_points
 from texrs.elements._instances import Instance, Labelled, cut_instances, label_elements, rate_closure
 from texrs.elements._known import as_element_labels, extend_points, measure_box, measure_centres
-from texrs.elements._layout import Layout, LayoutName
+from texrs.elements._layout import Layout, LayoutName, as_layout
 from texrs.errors import FileError, InvalidInput
 from texrs.exemplar import Exemplar
 from texrs.exemplar.shapes import mark_outlines
@@ -187,7 +187,7 @@ class Elements:
         Elements(8 of box (25, 47) in 96 x 96, jointed)
 
         """
-        pixels, around, kind = as_image(image, "image"), as_wrap(wrap, "wrap"), Layout(layout)
+        pixels, around, kind = as_image(image, "image"), as_wrap(wrap, "wrap"), as_layout(layout)
         known = as_element_labels(labels, (pixels.shape[0], pixels.shape[1]), around)
         mask, count = known > 0, int(known.max())
         if count < 3:

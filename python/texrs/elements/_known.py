@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import try_array
 from texrs._typing import Labels
 from texrs.elements._separation import label_components
 from texrs.errors import InvalidInput
@@ -18,7 +19,7 @@ Points = NDArray[np.float64]
 
 def as_element_labels(value: object, shape: tuple[int, int], wrap: tuple[bool, ...]) -> Labels:
     """Check labels of elements, and number them from 1 without gaps, in their order; of a mask the pieces are numbered."""
-    labels: NDArray[Any] = np.asarray(value)
+    labels: NDArray[Any] = try_array(value)
     if labels.shape != shape or labels.dtype.kind not in "biu":
         raise InvalidInput(f"labels: needs whole numbers or bool of shape {shape}, got {labels.dtype} {labels.shape}")
     if labels.dtype == np.bool_:

@@ -40,3 +40,8 @@ class Layout(StrEnum):
             "layout: allowed are disjoint (separate elements), connected (a connected foreground) and jointed "
             f"(elements parted by joints), or the paper's F=d, F=c and B=c; got {value!r}"
         )
+
+
+def as_layout(value: object) -> Layout:
+    """Check a layout; what is no word is not looked up, for it may be an array."""
+    return Layout(value if isinstance(value, str) else repr(value))

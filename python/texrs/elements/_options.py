@@ -56,6 +56,7 @@ class ElementSearch:
     def __post_init__(self) -> None:
         if (
             isinstance(self.scales, str | bytes)
+            or getattr(self.scales, "ndim", 1) != 1
             or not isinstance(self.scales, Sequence | np.ndarray)
             or not 1 <= len(self.scales) <= 16
         ):

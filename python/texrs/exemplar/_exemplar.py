@@ -365,6 +365,10 @@ class Exemplar:
         True
 
         """
+        try:
+            hash(fact)
+        except TypeError:
+            raise InvalidInput(f"fact: needs what can be a key, got a {type(fact).__name__}") from None
         if fact not in self._facts:
             self._facts[fact] = _FACTS.get_or_make((self.key, fact), make)
         return cast(T, self._facts[fact])

@@ -8,7 +8,7 @@ from math import log2
 
 import numpy as np
 
-from texrs._arrays import as_image, to_unit
+from texrs._arrays import as_bool, as_image, to_unit
 from texrs._engine.appearance import Appearance
 from texrs._engine.pyramid import halve
 from texrs._show import brief
@@ -168,7 +168,7 @@ def are_labels(image: Array, labels: bool | None = None) -> bool:
     Between so few values interpolation would invent others.
     """
     if labels is not None:
-        if labels and image.shape[-1] != 1:
+        if as_bool(labels, "labels") and image.shape[-1] != 1:
             raise InvalidInput(f"labels: classes need one channel, got {image.shape[-1]}")
         return labels
     if image.dtype.kind not in "bui" or image.shape[-1] != 1:

@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_choice, as_image, as_instance, as_int, as_list, as_rgb, to_unit
+from texrs._arrays import as_choice, as_image, as_instance, as_int, as_list, as_rgb, to_unit, try_array
 from texrs._cache import content_hash
 from texrs._engine.noise import uniform
 from texrs._progress import ask, listen
@@ -78,7 +78,7 @@ class ElementOptions:
             as_int(self.layers, "layers", 1, 16)
         as_choice(self.kind, "kind", ("auto", "components", "grid", "none"))
         for marks in as_list(self.labels):
-            found = np.asarray(0 if marks is None else marks)
+            found = try_array(0 if marks is None else marks)
             if found.dtype.kind not in "biu":
                 raise InvalidInput(f"labels: needs integers, got {found.dtype} {found.shape}")
             if found.size and int(found.min()) < 0:

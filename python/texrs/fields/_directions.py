@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_choice, as_float, try_array
+from texrs._arrays import as_bool, as_choice, as_float, check_memory, try_array
 from texrs.errors import InvalidInput
 from texrs.fields._field import Field
 from texrs.fields._sampled import make_grid
@@ -84,6 +84,7 @@ def from_directions(
         )
     letters = _LETTERS[axes - 2]
     as_choice(along, "along", tuple(letters))
+    check_memory(8 * given.size, "directions")
     vectors = np.asarray(given, np.float64)
     if not np.isfinite(vectors).all():
         raise InvalidInput(f"directions: {int((~np.isfinite(vectors)).sum())} of {vectors.size} values are not finite")
@@ -91,7 +92,7 @@ def from_directions(
         as_choice(order, "order", (letters, letters[::-1]))
         vectors = vectors if order == letters else vectors[..., ::-1]
     unit = _fill(vectors)
-    if not signed:
+    if not as_bool(signed, "signed"):
         unit = _agree(unit)
     return make_grid(_complete(unit, letters.index(along), up), extent, origin, opposed=True)
 
@@ -129,7 +130,7 @@ def from_gradient(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0, ac
 
     """
     slopes = _slopes(_as_map(volume), sigma)
-    if across:
+    if as_bool(across, "across"):
         if slopes.shape[-1] != 2:
             raise InvalidInput("across: is for pictures; a volume has no one direction along its contours")
         slopes = np.stack([-slopes[..., 1], slopes[..., 0]], axis=-1)
@@ -167,6 +168,7 @@ def from_structure(volume: ArrayLike, *, along: str = "x", sigma: float = 2.0) -
            [0., 1.]], dtype=float32)
 
     """
+    sigma = as_float(sigma, "sigma", 0, 100)
     slopes = _slopes(_as_map(volume), sigma / 2)
     if not np.abs(slopes).max():
         raise InvalidInput("volume: is the same everywhere, so that there is no grain")
@@ -183,6 +185,7 @@ def _as_map(volume: ArrayLike) -> NDArray[np.float64]:
     given = try_array(volume)
     if given.dtype.kind not in "buif" or given.ndim not in (2, 3) or min(given.shape) < 2:
         raise InvalidInput(f"volume: needs numbers of shape (R, C) or (P, R, C), got {given.dtype} of {given.shape}")
+    check_memory(8 * given.size, "volume")
     return np.asarray(given, np.float64)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_float, as_size, try_array
+from texrs._arrays import as_axes, as_bool, as_float, as_size, try_array
 from texrs._cache import content_hash
 from texrs._show import as_png
 from texrs._typing import Floats
@@ -211,15 +211,18 @@ class Field(ABC):
 
         """
         sides = as_size(shape, "shape", axes=self.axes, limit=MOST_BYTES // (4 * self.axes**2))
-        first = np.broadcast_to(np.asarray(origin), (self.axes,) if np.ndim(origin) == 0 else np.shape(origin))
+        first = try_array(origin)
+        first = np.broadcast_to(first, (self.axes,)) if first.ndim == 0 else first
         if first.dtype.kind not in "ui" or first.shape != (self.axes,):
             raise InvalidInput(f"origin: needs an integer, or {self.axes} of them; got {first.dtype} of {first.shape}")
-        spread = as_float(step, "step", 2.0**-20, 2.0**20)
+        if max(map(abs, first.tolist())) > FAR:
+            raise InvalidInput(f"origin: needs integers within {FAR} of 0, got {first.tolist()}")
+        spread, given = as_float(step, "step", 2.0**-20, 2.0**20), as_bool(jacobians, "jacobians")
         out = np.empty((prod(sides), self.axes, self.axes), np.float32)
         for start in range(0, len(out), _BLOCK):
             index = np.unravel_index(np.arange(start, min(start + _BLOCK, len(out))), sides)
             at = np.stack([(i + o + 0.5) * spread - 0.5 for i, o in zip(index, first.tolist(), strict=True)], axis=-1)
-            part = self._evaluate_checked(np.asarray(at, np.float64), jacobians)
+            part = self._evaluate_checked(np.asarray(at, np.float64), given)
             out[start : start + len(at)] = part.transpose(2, 0, 1)
         return out.reshape(*sides, self.axes, self.axes)
 
@@ -320,9 +323,7 @@ def as_points(points: ArrayLike, axes: int, name: str = "points") -> NDArray[np.
 
 def check_axes(axes: object) -> int:
     """Check a number of axes, 2 or 3."""
-    if axes not in (2, 3) or isinstance(axes, bool):
-        raise InvalidInput(f"axes: needs 2 or 3, got {axes!r}")
-    return int(axes)
+    return as_axes(axes)
 
 
 def as_place(place: ArrayLike | None, axes: int, name: str) -> NDArray[np.float64]:

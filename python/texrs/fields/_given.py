@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 from numpy.typing import ArrayLike
 
 from texrs import io
-from texrs._arrays import try_array
+from texrs._arrays import as_axes, try_array
 from texrs._typing import Path
 from texrs.errors import InvalidInput
 from texrs.fields._directions import from_directions
@@ -71,6 +71,8 @@ def read(path: Path, extent: Sequence[int] | None = None, *, axes: int | None = 
     array([0., 1., 0.], dtype=float32)
 
     """
+    if axes is not None:
+        as_axes(axes)
     array, spatial = io.read_vectors(path)
     if axes == 2 and array.ndim >= 3 and array.shape[0] == 1:
         array = array[0]
@@ -100,7 +102,7 @@ def make(array: Any, extent: Sequence[int] | None = None, *, axes: int | None = 
             "needs directions (R, C, 2) or (P, R, C, 3), or frames (R, C, 2, 2) or (P, R, C, 3, 3), "
             f"got {given.dtype} of {given.shape}"
         )
-    if axes is not None and field.axes != axes:
+    if axes is not None and field.axes != as_axes(axes):
         raise InvalidInput(f"holds {given.shape}, a field of {field.axes} axes; {axes} are needed")
     return field
 

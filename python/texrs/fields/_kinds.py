@@ -9,6 +9,7 @@ from math import cos, log, radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import as_size
 from texrs.fields._field import Field
 from texrs.fields._matrices import Matrices, multiply, repeat
 
@@ -63,6 +64,7 @@ class Wound(Field):
 
     def over(self, shape: Sequence[int]) -> Field:
         super().over(shape)
+        shape = as_size(shape, "shape", axes=self.axes)
         return self if self.centre is not None else replace(self, centre=tuple((n - 1) / 2 for n in shape))
 
     def describe(self) -> str:

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_float, as_mask, try_array
+from texrs._arrays import as_float, as_mask, check_memory, try_array
 from texrs._engine.appearance import Demand
 from texrs._engine.pyramid import ONE, Region
 from texrs._show import brief
@@ -119,6 +119,7 @@ class Guide:
         as_float(self.weight, "weight", 0, 100)
         for name, given in (("exemplar", self.exemplar), ("output", self.output)):
             values = try_array(given)
+            check_memory(values.size, "guide")
             if values.dtype.kind not in "biuf" or not np.isfinite(values).all():
                 raise InvalidInput(
                     f"guide: the map of the {name} needs finite numbers, got {values.dtype} {values.shape}"

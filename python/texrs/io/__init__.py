@@ -50,7 +50,7 @@ from math import atan, degrees, prod
 
 import numpy as np
 
-from texrs._checks import as_items, as_limit
+from texrs._checks import as_items, as_limit, try_array
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput
@@ -423,7 +423,7 @@ def write_surface(path: PathLike, vertices: Array, faces: Array, *, overwrite: b
     target = _files.as_path(path)
     if target.suffix.lower() != ".stl":
         raise FileError(f"{target}: the suffix {target.suffix!r} is not one that surfaces are written to: .stl")
-    corners, triangles = np.asarray(vertices), np.asarray(faces)
+    corners, triangles = try_array(vertices), try_array(faces)
     if corners.ndim != 2 or corners.shape[-1] != 3 or corners.dtype.kind not in "uif":
         raise InvalidInput(f"vertices: needs numbers of shape (N, 3), got {corners.dtype} of {corners.shape}")
     if triangles.ndim != 2 or triangles.shape[-1] != 3 or triangles.dtype.kind not in "ui":

@@ -10,6 +10,7 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
+from texrs._checks import as_instance
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError
 from texrs.io import _chunks, _files, _tags, _texts
@@ -159,7 +160,7 @@ def annotate(path: PathLike, notes: Notes, beside: PathLike | None = None) -> Pa
     """
     name = _files.as_path(path)
     kind = _SUFFIXES.get(name.suffix.lower(), "")
-    made = notes.made
+    made = as_instance(notes, "notes", Notes).made
     apart = (
         kind in _SIDECAR
         or (kind == "exr" and not _tags.takes_exr(name))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from texrs._checks import as_float, as_tuple
+from texrs._checks import as_float, as_tuple, check_memory
 from texrs._typing import Array
 from texrs.errors import FileError, InvalidInput
 from texrs.io import _files, _npy, _stores, _volumes, _vtk
@@ -122,13 +122,14 @@ def check(value: object, suffix: str, axes: int) -> Array:
     """Return what is to be written, contiguous and in native byte order."""
     try:
         array = np.asarray(value)
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, MemoryError) as error:
         raise InvalidInput(f"array: not an array of numbers ({_files.describe_error(error)})") from None
     if array.dtype.kind not in "buif" or array.dtype.itemsize > 8:
         raise InvalidInput(f"array: needs bool, integers or floats, got dtype {array.dtype}")
     if array.ndim not in (axes, axes + 1) or array.size == 0:
         shapes = ("(H, W) or (H, W, C)", "(D, H, W) or (D, H, W, C)")[axes - 2]
         raise InvalidInput(f"array: needs shape {shapes}, not empty; got shape {array.shape}")
+    check_memory(array.size * array.itemsize, "array")
     array = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("="))
     form, volume = _NUMPY if suffix == STORE else FORMATS[suffix], axes == 3
     channels = array.shape[axes] if array.ndim > axes else 1

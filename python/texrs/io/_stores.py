@@ -13,7 +13,7 @@ import numpy as np
 
 from texrs._typing import Array
 from texrs.errors import FileError
-from texrs.io._files import BYTES_PER_PIXEL, check_size, translate_errors
+from texrs.io._files import BYTES_PER_PIXEL, as_path, check_size, translate_errors
 from texrs.io._ome import describe_image
 from texrs.io._temporary import name_temporary, put, settle
 
@@ -39,7 +39,7 @@ def is_store(path: str | os.PathLike[str]) -> bool:
 
     Raises
     ------
-    TypeError
+    InvalidInput
         Not a path.
 
     Examples
@@ -48,7 +48,8 @@ def is_store(path: str | os.PathLike[str]) -> bool:
     False
 
     """
-    return any(os.path.isfile(os.path.join(path, mark)) for mark in MARKS)
+    place = as_path(path)
+    return any(os.path.isfile(place / mark) for mark in MARKS)
 
 
 def read_store(path: Path, limit: int, axes: int | None) -> Array:

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import as_one
 from texrs._checks import as_bool
 from texrs._typing import Path
 from texrs.errors import InvalidInput
@@ -126,10 +127,8 @@ class Exports(Mapping[str, Map]):
         from texrs.materials._files import write_maps
         from texrs.materials._packing import pack_maps, unpack_maps
 
-        if depth not in (None, 8, 16, 32):
-            raise InvalidInput(f"depth: allowed are 8, 16 and 32, got {depth!r}")
-        if pack not in (None, "orm", "none"):
-            raise InvalidInput(f"pack: allowed are 'orm' and 'none', got {pack!r}")
+        as_one(depth, "depth", None, 8, 16, 32)
+        as_one(pack, "pack", None, "orm", "none")
         as_bool(mipmaps, "mipmaps")
         maps: Mapping[str, Map] = self
         if pack is not None:
@@ -177,8 +176,7 @@ class Exports(Mapping[str, Map]):
         from texrs.materials._exr import write_exr
 
         self._check_flat()
-        if depth not in (None, 16, 32):
-            raise InvalidInput(f"depth: allowed are 16 and 32, got {depth!r}")
+        as_one(depth, "depth", None, 16, 32)
         return write_exr(self, path, depth, self.weights)
 
     def save_gltf(
@@ -232,8 +230,7 @@ class Exports(Mapping[str, Map]):
         from texrs.materials._gltf import write_gltf
 
         self._check_flat()
-        if depth not in (8, 16):
-            raise InvalidInput(f"depth: allowed are 8 and 16, got {depth!r}")
+        as_one(depth, "depth", 8, 16)
         return write_gltf(self, path, shapes, repeat, depth)
 
     def save_materialx(self, path: Path, *, depth: Literal[8, 16, 32] | None = None) -> list[FilePath]:
@@ -276,8 +273,7 @@ class Exports(Mapping[str, Map]):
         from texrs.materials._materialx import write_materialx
 
         self._check_flat()
-        if depth not in (None, 8, 16, 32):
-            raise InvalidInput(f"depth: allowed are 8, 16 and 32, got {depth!r}")
+        as_one(depth, "depth", None, 8, 16, 32)
         return write_materialx(self, path, depth)
 
     def _check_flat(self) -> None:

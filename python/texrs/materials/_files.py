@@ -11,6 +11,7 @@ import numpy as np
 
 from texrs import io
 from texrs._arrays import to_unit
+from texrs._checks import as_instance
 from texrs._threads import SideBySide
 from texrs._typing import Array, Path
 from texrs.errors import FileError, InvalidInput
@@ -116,6 +117,8 @@ def write_maps(
     for needed in (place, smaller) if mipmaps else (place,):
         if needed.exists() and not needed.is_dir():
             raise FileError(f"{needed}: is not a folder")
+    if suffix is not None:
+        as_instance(suffix, "suffix", str)
     endings = {name: suffix or choose_suffix(each, depth) for name, each in maps.items()}
     write = io.write if axes == 2 else io.write_volume
     files: list[FilePath] = []

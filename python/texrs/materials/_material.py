@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from texrs._arrays import as_choice, as_float, as_image, as_instance, as_int
+from texrs._arrays import as_axes, as_choice, as_float, as_image, as_instance, as_int
 from texrs._cache import content_hash
 from texrs._progress import listen
 from texrs._show import as_png
@@ -172,7 +172,7 @@ class Material(Exports):
         from texrs.materials._exr import read_exr
         from texrs.materials._files import read_maps
 
-        place = as_path(path)
+        place, axes = as_path(path), as_axes(axes)
         if roles is not None and not isinstance(roles, Mapping):
             raise InvalidInput(f"roles: needs a mapping of names to roles, got {roles!r}")
         if place.suffix.lower() == ".exr" and not place.is_dir():

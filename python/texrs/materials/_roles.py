@@ -28,6 +28,7 @@ from __future__ import annotations
 import re
 from enum import Enum
 
+from texrs._checks import as_instance
 from texrs.errors import InvalidInput
 
 __all__ = ["Role", "as_role", "guess_role"]
@@ -126,6 +127,7 @@ def guess_role(name: str) -> Role | None:
     (<Role.NORMAL_DX: 'normal-dx'>, <Role.OCCLUSION: 'occlusion'>, None)
 
     """
+    as_instance(name, "name", str)
     # A run of capitals is a word: NormalDX, fabricAO.
     parted = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", name)
     words = [w for w in re.split(r"[^a-z0-9]+", parted.lower()) if w and not SIZE.fullmatch(w)]
@@ -147,6 +149,7 @@ def as_role(value: object, name: str) -> Role:
     """
     if isinstance(value, Role):
         return value
+    as_instance(value, name, str, Role)
     try:
         return Role(AMERICAN.get(str(value), value))
     except ValueError:

@@ -271,7 +271,9 @@ def _read_strokes(given: Any) -> list[Floats64]:
             raise InvalidInput(f"{where}: is not JSON ({error})") from None
     lists = given.get("strokes") if isinstance(given, dict) else given
     strokes = []
-    for number, stroke in enumerate(lists if isinstance(lists, list | tuple | np.ndarray) else []):
+    plain = isinstance(lists, list | tuple) or (isinstance(lists, np.ndarray) and lists.ndim > 0)
+    several: Any = lists if plain else []
+    for number, stroke in enumerate(several):
         said = stroke.get("points") if isinstance(stroke, dict) else stroke
         try:
             line = np.array(said, np.float64)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import try_array
 from texrs._typing import Floats
 from texrs.errors import FileError, InvalidInput
 
@@ -45,7 +46,7 @@ def read_mesh(mesh: Any) -> tuple[Floats64, NDArray[np.int64], Floats64 | None]:
         mesh = (mesh.vertices, mesh.faces)
     if not isinstance(mesh, tuple | list) or len(mesh) != 2:
         raise InvalidInput(f"mesh: needs a file, a trimesh.Trimesh or (vertices, faces), got {type(mesh).__name__}")
-    vertices, faces = np.asarray(mesh[0], np.float64), np.asarray(mesh[1])
+    vertices, faces = try_array(mesh[0], np.float64), try_array(mesh[1])
     if vertices.ndim != 2 or vertices.shape[1:] != (3,) or not np.isfinite(vertices).all():
         raise InvalidInput(f"mesh: needs finite vertices (N, 3), got shape {vertices.shape}")
     if faces.ndim != 2 or faces.shape[1:] != (3,) or not len(faces) or faces.dtype.kind not in "ui":

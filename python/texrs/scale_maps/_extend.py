@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from texrs._arrays import as_image, as_mask, exp_single, log_single
+from texrs._arrays import as_image, as_mask, exp_single, log_single, try_array
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.kernels import poisson
@@ -51,7 +51,7 @@ def extend(scale: object, known: object, *, trend: Trend = "plane") -> Floats:
     True
 
     """
-    given, holds = np.asarray(scale), find_kind(scale)
+    given, holds = try_array(scale), find_kind(scale)
     there = as_mask(known, "known", given.shape[:2])
     if not there.any():
         raise InvalidInput("known: no pixel of the map is known; there must be some to go on from")

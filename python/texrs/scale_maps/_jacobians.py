@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_array, as_choice
+from texrs._arrays import as_array, as_choice, check_memory, try_array
 from texrs._typing import Array, Bools
 from texrs.errors import InvalidInput
 from texrs.scale_maps._maps import LARGEST, LEAST
@@ -102,7 +102,8 @@ def jacobians_of_normals(normals: Array, *, green: Literal["up", "down"] = "up")
     [1.0, 1.021, 1.091, 1.25, 1.667]
 
     """
-    given = np.asarray(normals)
+    given = try_array(normals)
+    check_memory(8 * given.size, "normals")
     if given.ndim != 3 or given.shape[2] != 3 or given.dtype.kind not in "uif" or 0 in given.shape:
         raise InvalidInput(f"normals: needs numbers of shape (rows, columns, 3), got {given.dtype} of {given.shape}")
     up = as_choice(green, "green", ("up", "down")) == "up"

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from texrs._arrays import as_choice, as_image, as_int, as_mask, exp_single, log_single
+from texrs._arrays import as_bool, as_choice, as_image, as_int, as_mask, exp_single, log_single
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.scale_maps._extend import extend
@@ -107,7 +107,7 @@ def from_mask(
     _refuse_bare(given, there)
     side = None if window is None else as_int(window, "window", SMALLEST, max(SMALLEST, *size))
     logs = _measure_as_printed(given, there, side) if what == "area" else _measure(given, there, what, side)
-    if foreshortened:
+    if as_bool(foreshortened, "foreshortened"):
         logs *= np.float32(AREAS)
     holds: Kind = "width" if foreshortened else "area"
     if kind != "none":

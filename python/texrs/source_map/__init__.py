@@ -6,6 +6,7 @@ map that is in register with the exemplar: colours, normals, heights, labels, in
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -13,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_bool, as_image, as_instance, as_int, as_items, as_list, as_ndarray, as_wrap
+from texrs._arrays import as_bool, as_image, as_instance, as_int, as_items, as_list, as_ndarray, as_wrap, check_memory
 from texrs._checks import check_pixels
 from texrs._show import as_png
 from texrs._typing import Array, Bools, Frames, Interpolation, Path
@@ -163,6 +164,7 @@ class SourceMap(Parted):
                 f"coordinates: needs an array (rows, columns, 2) or (planes, rows, columns, 3), got {what}"
             )
         sides = coordinates.shape[:-1]
+        check_memory(8 * coordinates.size, "coordinates")
         patches = np.zeros(sides, np.uint32) if label is None else label
         return cls(coordinates, np.zeros(sides, np.uint16), patches, frame, (shape,))
 
@@ -270,9 +272,14 @@ class SourceMap(Parted):
         out = gather(several, self.coordinates, self.exemplar, interpolation=interpolation)
         if as_bool(antialias, "antialias") and interpolation != "nearest":
             out = gather_smoothed(out, several, self.coordinates, self.exemplar, find_shrinking(self), interpolation)
-        if kind == "colour":
+        if isinstance(kind, str) and kind == "colour":
             return out
-        if kind not in ("normal", "vector", "slope") or green not in ("up", "down"):
+        if (
+            not isinstance(kind, str)
+            or not isinstance(green, str)
+            or kind not in ("normal", "vector", "slope")
+            or green not in ("up", "down")
+        ):
             raise InvalidInput(
                 f"kind, green: allowed are colour, normal, vector or slope, up or down; got {kind!r}, {green!r}"
             )
@@ -310,9 +317,9 @@ class SourceMap(Parted):
         True
 
         """
-        maps = [inner] if isinstance(inner, SourceMap) else list(as_items(inner, "inner"))
-        for each in maps:
-            as_instance(each, "inner", SourceMap)
+        several = (inner,) if isinstance(inner, SourceMap) else as_items(inner, "inner")
+        # The first that is none ends it, however many there are.
+        maps: list[SourceMap] = [as_instance(each, "inner", SourceMap) for each in several]
         if tuple(m.shape for m in maps) != self.shapes:
             raise InvalidInput(f"inner: needs outputs of sizes {self.shapes}, got {[m.shape for m in maps]}")
         if any(m.shapes != maps[0].shapes for m in maps):
@@ -356,8 +363,8 @@ class SourceMap(Parted):
 
         Raises
         ------
-        IndexError
-            A pixel that none of the pictures has, or no pictures.
+        InvalidInput
+            A pixel that none of the pictures has, no pictures, or arrays of another type or shape.
 
         Examples
         --------
@@ -369,7 +376,25 @@ class SourceMap(Parted):
         [[[1.0, 2.0], [0.0, 0.0]]]
 
         """
-        return cls(*Pixels.chain(maps).pick(place, label, out=label if overwrite else None), maps[0].shapes)
+        several = [as_instance(each, "maps", SourceMap) for each in as_items(maps, "maps")]
+        # Of a masked array its values count.
+        place, label = (np.asarray(v) if isinstance(v, np.ndarray) else v for v in (place, label))
+        if not several:
+            raise InvalidInput("maps: needs at least one, got none")
+        if any(each.shapes != several[0].shapes for each in several):
+            raise InvalidInput(
+                "maps: look into exemplars of different sizes; those of one set of exemplars are allowed"
+            )
+        for name, value in (("place", place), ("label", label)):
+            if not isinstance(value, np.ndarray) or value.dtype.kind != "u" or value.ndim not in (2, 3):
+                what = f"{value.dtype} of {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
+                raise InvalidInput(f"{name}: needs unsigned integers, an array of 2 or 3 axes, got {what}")
+        if label.shape != place.shape or label.dtype != np.uint32:
+            raise InvalidInput(f"label: needs uint32 of shape {place.shape}, got {label.dtype} of {label.shape}")
+        count = sum(math.prod(each.shape) for each in several)
+        if place.size and int(np.asarray(place).max()) >= count:
+            raise InvalidInput(f"place: {int(place.max())} is none of the {count} pixels of all pictures")
+        return cls(*Pixels.chain(several).pick(place, label, out=label if overwrite else None), several[0].shapes)
 
     def continues(self, axis: int, *, wrap: bool = False) -> Bools:
         """Return where a pixel and the next one along ``axis`` come from one piece of the exemplar.

@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_list
+from texrs._arrays import as_list, try_array
 from texrs._cache import content_hash
 from texrs._chunks.dasks import make_dask
 from texrs._chunks.grid import Box
@@ -315,7 +315,7 @@ class _Lookups:
 
 
 def _read_parts(source: Parted, exemplars: Array | Sequence[Array], options: dict[str, Any]) -> _Lookups:
-    images = [np.asarray(each) for each in as_list(exemplars)]
+    images = [try_array(each) for each in as_list(exemplars)]
     # What is wrong is said now, and not when a worker comes to it.
     first = source.part((slice(0, 1),) * source.axes).render(images, **options)
     channel = Channel.of(first, source.axes, labelled=options.get("interpolation") == "nearest")

@@ -7,7 +7,7 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_array, as_image, as_ndarray, check_finite, guidance, try_array
+from texrs._arrays import as_array, as_axes, as_image, as_ndarray, check_finite, guidance, try_array
 from texrs._typing import Array, Bools, Floats
 from texrs.errors import InvalidInput
 from texrs.fields import Field
@@ -53,9 +53,7 @@ def as_colours(image: ArrayLike, name: str, axes: int | None) -> Floats:
             image = as_ndarray(image, name, axes=3)
             axes = guess_axes(image)
     count = 3 if axes is None else axes
-    if count not in (2, 3):
-        raise InvalidInput(f"axes: needs 2 or 3, got {axes!r}")
-    return guidance(as_image(image, name, axes=count))
+    return guidance(as_image(image, name, axes=as_axes(count)))
 
 
 def as_values(values: ArrayLike, name: str = "values") -> Floats:

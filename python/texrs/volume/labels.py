@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_float
+from texrs._arrays import as_bool, as_float, try_array
 from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput, LimitExceeded
 from texrs.volume._values import as_direction
@@ -48,7 +48,7 @@ def paint(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArray[np.uin
     array([200,  30,  20], dtype=uint8)
 
     """
-    array = np.asarray(labels)
+    array = try_array(labels)
     if array.dtype.kind not in "bui" or array.ndim not in (2, 3) or array.size == 0:
         raise InvalidInput(f"labels: needs integers of shape (H, W) or (D, H, W), got {array.dtype} of {array.shape}")
     least, largest = int(array.min()), int(array.max())
@@ -60,7 +60,7 @@ def paint(labels: ArrayLike, colours: ArrayLike | None = None) -> NDArray[np.uin
             # Of very many labels some share a colour, though never that of the ground.
             array = np.where(array < len(table), array, array % (_MOST_COLOURS - 1) + 1)
         return np.ascontiguousarray(table[array.astype(np.intp)])
-    given = np.asarray(colours)
+    given = try_array(colours)
     if given.ndim != 2 or given.shape[1] != 3 or given.dtype.kind not in "ui" or given.min() < 0 or given.max() > 255:
         raise InvalidInput(f"colours: needs numbers from 0 to 255 of shape (K, 3), got {given.dtype} of {given.shape}")
     if largest >= len(given):
@@ -107,14 +107,14 @@ def surface(
     """
     from skimage.measure import marching_cubes
 
-    array = np.asarray(mask)
+    array = try_array(mask)
     if array.dtype.kind not in "bui" or array.ndim != 3 or min(array.shape) < 2:
         raise InvalidInput(f"mask: needs bool (D, H, W) of at least 2 a side, got {array.dtype} of {array.shape}")
     if array.size > 2**28:
         raise LimitExceeded(f"mask: {array.size} voxels are more than the limit of {2**28}")
     steps = [as_float(s, "spacing", 1e-12, 1e12) for s in as_direction(spacing, "spacing").tolist()]
     solid = array != 0
-    if closed:
+    if as_bool(closed, "closed"):
         solid = np.pad(solid, 1)
     if solid.all() or not solid.any():
         raise InvalidInput("mask: is all of one kind, so that there is no surface")

@@ -11,7 +11,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_float, as_int, as_wrap
+from texrs._arrays import as_bool, as_float, as_int, as_wrap, try_array
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
 from texrs.fields import Field
@@ -105,7 +105,7 @@ def frequency(values: ArrayLike, *, window: int | None = None, whole: bool = Fal
     if min(v.shape) < 16:
         raise InvalidInput(f"values: each side must be at least 16, got {v.shape}")
     side = min(64, *v.shape) if window is None else as_int(window, "window", 16, min(v.shape))
-    if whole or v.ndim == 2:
+    if as_bool(whole, "whole") or v.ndim == 2:
         return _average_frequency([v], side)
     return _average_frequency([plane for axis in range(3) for plane in np.moveaxis(v, axis, 0)], side)
 
@@ -259,6 +259,8 @@ def texture_normal(values: ArrayLike) -> NDArray[np.float64]:
 
     """
     tensor = _measure_structure(as_values(values), 0.0)
+    if not np.isfinite(tensor).all():
+        raise InvalidInput("values: are so large that their products are infinite")
     vectors = np.linalg.eigh(tensor.reshape(-1, *tensor.shape[-2:]).mean(axis=0))[1]
     normal: NDArray[np.float64] = vectors[:, -1]
     return normal * (1 if normal[np.abs(normal).argmax()] > 0 else -1)
@@ -309,7 +311,7 @@ def orientation_errors(
     if min(v.shape) <= 2 * edge:
         raise InvalidInput(f"margin: {edge} on both sides leaves nothing of {v.shape}")
     check_field(field, v.ndim)
-    n = texture_normal(v) if normal is None else np.asarray(normal, np.float64)
+    n = texture_normal(v) if normal is None else try_array(normal, np.float64)
     if n.shape != (v.ndim,) or not 1e-12 < float(np.abs(n).max()) < 1e12:
         raise InvalidInput(f"normal: needs {v.ndim} numbers, not all zero, got shape {n.shape}")
     inner = (slice(edge, -edge or None, each),) * v.ndim

@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_float, as_image, as_rgb, guidance, to_unit
+from texrs._arrays import as_bool, as_float, as_image, as_rgb, guidance, to_unit
 from texrs._conversion import as_ndarray
 from texrs._typing import Floats
 from texrs.errors import InvalidInput
@@ -108,7 +108,7 @@ def transparent(
     pixel = 2 * reach.max() / longer
     sides = np.maximum(np.ceil(2 * reach / pixel - 1e-6), 1).astype(int)
     shown = _classify(voxels, stops)
-    if shading:
+    if as_bool(shading, "shading"):
         _shade(shown, view)
     return _look(shown, view, (int(sides[0]), int(sides[1])), float(pixel))
 
@@ -147,7 +147,8 @@ def check_transfer(transfer: str | Sequence[Stop] | None) -> NDArray[np.float64]
 
 def _as_stops(transfer: Sequence[Stop]) -> NDArray[np.float64]:
     """Return value, alpha, share of the stop's own colour, red, green and blue of each stop, (N, 6)."""
-    if not isinstance(transfer, Sequence | np.ndarray) or not 1 <= len(transfer) <= 256:
+    flat = getattr(transfer, "ndim", 1) == 0
+    if flat or not isinstance(transfer, Sequence | np.ndarray) or not 1 <= len(transfer) <= 256:
         raise InvalidInput(f"transfer: needs 1 to 256 stops (value, colour, alpha), got {str(transfer)[:60]}")
     rows = []
     for stop in transfer:

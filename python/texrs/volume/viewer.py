@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from texrs._arrays import as_image
+from texrs._arrays import as_bool, as_image
 from texrs._conversion import as_ndarray
 from texrs._show import measure
 from texrs._typing import Path
@@ -52,7 +52,7 @@ class Viewer:
 
     def __init__(self, volume: ArrayLike | Path, *, labels: bool = False) -> None:
         given = as_ndarray(volume, "volume", axes=3)
-        self._voxels = as_image(paint(given) if labels else given, "volume", axes=3)
+        self._voxels = as_image(paint(given) if as_bool(labels, "labels") else given, "volume", axes=3)
 
     def __repr__(self) -> str:
         """Return the size, the channels and the dtype."""

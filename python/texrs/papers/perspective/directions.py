@@ -8,7 +8,7 @@ from numbers import Real
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float
+from texrs._arrays import as_float, try_array
 from texrs.errors import InvalidInput
 from texrs.fields import Field, parse
 from texrs.papers.perspective.targets import Surface
@@ -44,7 +44,7 @@ def follow_angles(direction: object, size: tuple[int, int]) -> tuple[NDArray[np.
     """Return cosines and sines of one angle, or of angles stretched to a size."""
     if isinstance(direction, Real | np.floating):
         direction = np.full((1, 1), as_float(direction, "direction", -FARTHEST, FARTHEST))
-    given = np.asarray(direction)
+    given = try_array(direction)
     if given.ndim != 2 or given.dtype.kind not in "iuf" or given.size == 0:
         raise InvalidInput(
             f"direction: needs degrees, one number or (rows, columns), or a field; got {given.dtype} of {given.shape}"

@@ -13,7 +13,7 @@ from typing import TypeAlias, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float
+from texrs._arrays import as_float, check_memory, try_array
 from texrs._typing import Array, Floats
 from texrs.errors import InvalidInput
 from texrs.planes import Plane
@@ -41,7 +41,8 @@ def as_target(target: object) -> Plane | str | Floats | Surface | None:
     if isinstance(target, str):
         read_plane(target, (1, 1), "target")
         return target
-    given = np.asarray(target)
+    given = try_array(target)
+    check_memory(8 * given.size, "target")
     if given.ndim == 4:
         return as_jacobians(given, "target")
     if given.ndim == 3 and given.shape[2] in (2, 3):

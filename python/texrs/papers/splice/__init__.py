@@ -205,6 +205,9 @@ def splice(
         raise InvalidInput('layout_scale: method="paper" brings the layout to the spacing of a')
     given = {"cells": cells, "nets": nets, "turns": turns}
     wanted, net, may_turn = (None if v is None else as_bool(v, n) for n, v in given.items())
+    for name, either in (("refine", refine), ("snap_rows", snap_rows)):
+        if either is not None:
+            as_bool(either, name)
     for name, asked in (("cells", wanted), ("nets", net)):
         if asked and method is not None:
             raise InvalidInput(f'{name}: method="{method}" bends figures')
