@@ -226,8 +226,12 @@ def check_finite(array: Array, name: str) -> None:
         Some are.
 
     """
-    if array.dtype.kind == "f" and not (finite := np.isfinite(array)).all():
-        bad = int(array.size - np.count_nonzero(finite))
+    if array.dtype.kind != "f":
+        return
+    # A part at a time, which stays near: a mask of all values takes ten times as long.
+    parts = np.nditer(array, ["external_loop", "buffered", "zerosize_ok"], buffersize=2**15)
+    bad = array.size - sum(int(np.count_nonzero(np.isfinite(part))) for part in parts)
+    if bad:
         raise InvalidInput(
             f"{name}: {bad} of {array.size} values are NaN or infinite as {array.dtype}; all must be finite"
         )
