@@ -54,7 +54,7 @@ impl<const D: usize> Solver<D> {
                     node.terminal -= flow;
                     node.residual[axis][SIDE] -= flow;
                     let next = &mut nodes[q + k];
-                    self.value += i64::from((-next.terminal).clamp(0, flow));
+                    self.value += i64::from(next.terminal.saturating_neg().clamp(0, flow));
                     next.terminal += flow;
                     next.residual[axis][SIDE ^ 1] += flow;
                 }

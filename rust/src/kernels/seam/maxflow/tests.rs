@@ -179,6 +179,23 @@ fn refuses_what_would_overflow_or_does_not_fit() {
 }
 
 #[test]
+fn the_least_number_is_a_capacity() {
+    for shape in [[1, 2], [2, 1]] {
+        let (f, b) = ([i32::MAX; 2], [0; 2]);
+        for terminal in [[i32::MAX, i32::MIN], [5, i32::MIN], [i32::MIN; 2]] {
+            let graph = Graph {
+                grid: Grid::new(shape, [false; 2]).unwrap(),
+                terminal: &terminal,
+                forward: [&f, &f],
+                backward: [&b, &b],
+            };
+            let found = min_cut(&graph, &Monitor::default()).unwrap();
+            assert_eq!(found.value, i64::from(terminal[0].max(0)));
+        }
+    }
+}
+
+#[test]
 fn a_cancelled_monitor_stops_the_search() {
     let grid = Grid::new([1, 2], [false; 2]).unwrap();
     let graph = Graph {

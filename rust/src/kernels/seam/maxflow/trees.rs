@@ -130,7 +130,7 @@ impl<const D: usize> Solver<D> {
             flow = flow.min(self.arc::<TREE>(up, p, axis, side ^ 1));
             p = up;
         }
-        flow.min(self.node(p).terminal.abs())
+        flow.min(self.node(p).terminal.saturating_abs())
     }
 
     /// Moves `flow` along the path between a node and the root of its tree. Those that lose their parent become orphans.
