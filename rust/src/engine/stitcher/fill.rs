@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 
 use super::chart::Chart;
 use super::cut::{Cutting, Proposal};
-use super::{Stitching, enlargement};
+use super::{Patch, Stitching, enlargement};
 use crate::Result;
 use crate::foundation::fixed::{Frames, Place};
 use crate::foundation::grid::Grid;
@@ -145,9 +145,16 @@ impl<const D: usize> Stitching<'_, D> {
                 }
             }
             if self.canvas.free == before || !self.canvas.covered(p as u32) {
-                // A chart that cannot even hold its centre: show any sample there.
-                self.canvas.patches[p] = self.patches.len().saturating_sub(1) as u32;
+                // A chart that cannot even hold its centre: any sample is shown there, as a patch of one point.
+                self.canvas.patches[p] = self.patches.len() as u32;
                 self.canvas.free -= 1;
+                self.patches.push(Patch {
+                    centre: at,
+                    place: self.canvas.places[p],
+                    frame: self.frames.at(p),
+                    rigid: true,
+                    side,
+                });
             }
         }
         Ok(())

@@ -244,7 +244,7 @@ proptest! {
             let options = Options { bend, seed, ..OPTIONS };
             let made = stitch(&source, &region, frames, None, Given::NOTHING, &options, &Monitor::default()).unwrap();
             prop_assert_eq!(made.places.len(), region.grid.len());
-            prop_assert!(made.patches.iter().all(|&p| (p as usize) < made.frames.len().max(1)));
+            prop_assert!(made.patches.iter().all(|&p| (p as usize) < made.frames.len()));
             let shape = source.grid().shape();
             for &place in &made.places {
                 let near = crate::foundation::fixed::nearest(place);
@@ -252,6 +252,27 @@ proptest! {
             }
         }
     }
+}
+
+#[test]
+fn what_no_chart_holds_is_a_patch_of_its_own() {
+    let region = region([1, 1], [false, true]);
+    let options = Options {
+        patch: 5.0,
+        bend: true,
+        ..OPTIONS
+    };
+    let made = stitch(
+        &source([24, 6], [true; 2]),
+        &region,
+        Frames::Dense(&[identity()]),
+        None,
+        Given::NOTHING,
+        &options,
+        &Monitor::default(),
+    )
+    .unwrap();
+    assert_eq!((made.patches, made.frames.len()), (vec![0], 1));
 }
 
 #[test]
