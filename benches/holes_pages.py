@@ -4,7 +4,7 @@
     python benches/holes_pages.py OUT --votes votes.json
 
 The first writes `OUT/NUMBER.png`, each one of the pictures with round holes that one method has filled: `texrs.remove` with
-nothing said, `texrs.complete` without scales, OpenCV (`inpaint`), the Resynthesizer, whose program `completion_vs_peers.py`
+nothing said, `texrs.complete` without scales, OpenCV (`inpaint`), the Resynthesizer, whose program `fillers.py`
 describes; and each picture as it is, on which nothing can be found. Numbers are drawn by chance, and so are the places of the
 holes, anew for each page, so that no page tells of another. `OUT/key.json` is not to be read.
 
@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 import texrs
-from completion_vs_peers import by_program
+from fillers import by_program
 from texrs import io
 
 try:

@@ -5,7 +5,7 @@
 Textures as in `perspective_table.py`; without a folder a generated floor of discs. Three holes are cut into each, one after
 the other, and filled: by both methods of `texrs.complete` with the true scale map, with one that is measured, with blended
 colours, and without regard to scales; by OpenCV (`inpaint`, and xphoto's shift map where its contributed modules are
-installed), and by the Resynthesizer, whose program `completion_vs_peers.py` describes.
+installed), and by the Resynthesizer, whose program `fillers.py` describes.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from texrs import io
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 import perspective_checks as checks
-from completion_vs_peers import by_opencv, by_program
+from fillers import by_opencv, by_program
 from perspective_table import textures
 
 try:

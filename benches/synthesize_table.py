@@ -7,7 +7,7 @@ The verbs: `texrs.synthesize`, `texrs.design`, and windows of `texrs.TileSet`. T
 picture, or the whole of it; results are twice as large, or of the size that is asked for, and kept in OUT. Evaluators are shown
 the middle of them where they are larger than `--shown`. A result is fine where every score of every evaluator is in its bounds,
 or no worse than 1.1 times that of a second crop of the same photograph, as far from the exemplar as can be. Quilting is
-`texrs.design` with nothing deformed, mirrored or blended. The Resynthesizer is an external program (`completion_vs_peers.py`
+`texrs.design` with nothing deformed, mirrored or blended. The Resynthesizer is an external program (`fillers.py`
 says how it is built); it is given the exemplar with the rest to fill, once.
 """
 

@@ -4,20 +4,20 @@ Results are compared by the patch error over each hole: how far 9 x 9 patches th
 one of the picture around it. It is shown beside the times.
 
 The Resynthesizer (github.com/bootchk/resynthesizer, GPL) is an external program, named by the variable RESYNTHESIZER, which
-`completion_vs_peers.py` says how to build.
+`fillers.py` says how to build.
 """
 
 from __future__ import annotations
 
 import os
-import subprocess
-import tempfile
+import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from frame import Arrays, Row, Side, Timed, Work
 
+sys.path.append(str(Path(__file__).resolve().parents[1]))  # For fillers, which tables use too.
 PATCH = 9
 TEXTURES = ("brick", "grass", "gravel")
 
@@ -42,36 +42,21 @@ def fill_by_texrs(given: Arrays) -> Work:
 def fill_by_opencv(given: Arrays) -> Work:
     """Shifted pieces, in Lab as its documentation asks."""
     import cv2
-    import cv2.xphoto
+
+    from fillers import by_opencv
 
     cv2.setNumThreads(1)
-    known = np.where(given["hole"], 0, 255).astype(np.uint8)
-
-    def fill(image: np.ndarray) -> np.ndarray:
-        made, lab = np.zeros_like(image), cv2.cvtColor(image, cv2.COLOR_RGB2Lab)
-        cv2.xphoto.inpaint(lab, known, made, cv2.xphoto.INPAINT_SHIFTMAP)
-        return cv2.cvtColor(made, cv2.COLOR_Lab2RGB)
-
-    return lambda: [fill(image) for image in given["images"]]
+    return lambda: [by_opencv(image, given["hole"])[0] for image in given["images"]]
 
 
 def fill_by_program(given: Arrays) -> Work:
     """One thread, its default parameters; it says how long it took."""
-    from skimage import io
+    from fillers import by_program
 
-    hole = given["hole"]
-
-    def fill(image: np.ndarray) -> Timed:
-        with tempfile.TemporaryDirectory() as folder:
-            names = [Path(folder) / n for n in ("image.ppm", "mask.pgm", "out.ppm")]
-            names[0].write_bytes(b"P6\n%d %d\n255\n" % hole.shape[::-1] + image.tobytes())
-            names[1].write_bytes(b"P5\n%d %d\n255\n" % hole.shape[::-1] + (hole * np.uint8(255)).tobytes())
-            command = [os.environ["RESYNTHESIZER"], *map(str, names)]
-            done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=600)
-            return Timed(io.imread(names[2]), float(done.stdout))
+    fill = by_program(Path(os.environ["RESYNTHESIZER"]).resolve())
 
     def work() -> Timed:
-        made, seconds = zip(*map(fill, given["images"]), strict=True)
+        made, seconds = zip(*(fill(image, given["hole"]) for image in given["images"]), strict=True)
         return Timed(made, sum(seconds))
 
     return work

@@ -52,19 +52,11 @@ fn check<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
         Err(error) => return speaks(&error),
     };
 
-    let grid = Grid::new(draw.shape::<D>(1..=longest), draw.flags()).unwrap();
-    let far = |draw: &mut Draw<'_>| {
-        if draw.seldom(16) {
-            draw.any()
-        } else {
-            draw.within(0..=40) as i32 - 20
-        }
-    };
-    let region = match Region::new(grid, std::array::from_fn(|_| far(draw))) {
+    let region = match draw.region::<D>(longest) {
         Ok(region) => region,
         Err(error) => return speaks(&error),
     };
-    let n = grid.len();
+    let n = region.grid.len();
     let own: Vec<Frame<D>> = if draw.flag() {
         (0..n).map(|_| frame(draw)).collect()
     } else {
@@ -194,8 +186,11 @@ fn check<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
         }
         _ => {
             let finer = Grid::new(
-                grid.shape().map(|s| 2 * s - usize::from(draw.flag())),
-                grid.wrap(),
+                region
+                    .grid
+                    .shape()
+                    .map(|s| 2 * s - usize::from(draw.flag())),
+                region.grid.wrap(),
             )
             .unwrap();
             let origin = region.origin.map(|x| x.saturating_mul(2));

@@ -4,7 +4,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use texrs::fixed::{Frame, Frames, Place, identity};
-use texrs::grid::{Grid, Region};
+use texrs::grid::Grid;
 use texrs::stitcher::{
     Adjacency, Elements, Given, Options, Pasting, Samples, Source, Weights, stitch,
 };
@@ -70,19 +70,11 @@ fn filled<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
         Ok(source) => source,
         Err(error) => return speaks(&error),
     };
-    let grid = Grid::new(draw.shape::<D>(1..=longest), draw.flags()).unwrap();
-    let far = |draw: &mut Draw<'_>| {
-        if draw.seldom(16) {
-            draw.any()
-        } else {
-            draw.within(0..=40) as i32 - 20
-        }
-    };
-    let region = match Region::new(grid, std::array::from_fn(|_| far(draw))) {
+    let region = match draw.region::<D>(longest) {
         Ok(region) => region,
         Err(error) => return speaks(&error),
     };
-    let n = grid.len();
+    let n = region.grid.len();
     // Of a few kinds: a field has no more, and it takes few bytes.
     let kinds: Vec<Frame<D>> = (0..draw.within(1..=3)).map(|_| frame(draw)).collect();
     let own: Vec<Frame<D>> = draw

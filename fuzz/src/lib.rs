@@ -4,6 +4,7 @@ use std::fmt::Debug;
 use std::ops::RangeInclusive;
 
 use arbitrary::{Arbitrary, Unstructured};
+use texrs::grid::{Grid, Region};
 use texrs::hash::Noise;
 use texrs::par::{self, Monitor};
 use texrs::{Error, Result};
@@ -54,6 +55,19 @@ impl<'a> Draw<'a> {
 
     pub fn flags<const D: usize>(&mut self) -> [bool; D] {
         std::array::from_fn(|_| self.flag())
+    }
+
+    /// A small region, about the origin or, seldom, anywhere; refused where it reaches too far.
+    pub fn region<const D: usize>(&mut self, longest: usize) -> Result<Region<D>> {
+        let grid = Grid::new(self.shape(1..=longest), self.flags())?;
+        let origin = std::array::from_fn(|_| {
+            if self.seldom(16) {
+                self.any()
+            } else {
+                self.within(0..=40) as i32 - 20
+            }
+        });
+        Region::new(grid, origin)
     }
 
     /// From 0 to 1, seldom something odd.

@@ -192,11 +192,8 @@ def as_choice(value: object, name: str, allowed: Sequence[str]) -> str:
 
 def as_one(value: Any, name: str, *allowed: str | int | None) -> Any:
     """Check a choice among words, numbers and None; its type is looked at first, for arrays are compared entry by entry."""
-    if value is not None and (isinstance(value, bool) or not isinstance(value, str | numbers.Integral)):
-        plain = False
-    else:
-        plain = value in allowed
-    if not plain:
+    plain = isinstance(value, str | numbers.Integral | None) and not isinstance(value, bool)
+    if not plain or value not in allowed:
         names = [str(each) if isinstance(each, int) else repr(each) for each in allowed if each is not None]
         raise InvalidInput(f"{name}: allowed are {', '.join(names[:-1])} and {names[-1]}, got {value!r}")
     return value

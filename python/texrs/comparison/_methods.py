@@ -172,7 +172,7 @@ EMBARK = "cargo install texture-synthesis-cli, or --program embark=PATH"
 OPENCV = "pip install opencv-python-headless"
 XPHOTO = "pip install opencv-contrib-python-headless"
 RESYNTHESIZER = (
-    "no program of it is published: build one around its engine, as benches/completion_vs_peers.py says, and name it by "
+    "no program of it is published: build one around its engine, as benches/fillers.py says, and name it by "
     "--program resynthesizer=PATH"
 )
 PATCH_MATCH = "build https://github.com/vacancy/PyPatchMatch, which gives the module patch_match"

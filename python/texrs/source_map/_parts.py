@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -26,7 +27,7 @@ __all__ = ["Parted"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Parted:
+class Parted(ABC):
     """The arrays of a source map, which agree, and what it gives in parts."""
 
     coordinates: NDArray[np.float32]
@@ -102,9 +103,9 @@ class Parted:
         """
         return self.frame.lattice(self.shape) if isinstance(self.frame, Frames) else self.frame
 
+    @abstractmethod
     def render(self, *exemplars: Any, **options: Any) -> Array:
         """Return what exemplars look like through the map."""
-        raise NotImplementedError
 
     def part(self, box: tuple[slice, ...]) -> Self:
         """Return the map of a part of the picture.
