@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import subprocess
+import warnings
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
@@ -405,8 +406,13 @@ def test_a_worker_that_is_to_stop_raises_only_in_its_task(monkeypatch: pytest.Mo
     assert left == [1]
     monkeypatch.setattr(workers, "_LEAVING", False)
     monkeypatch.setattr(workers, "_WORK", lambda number: workers._leave(number, None))
-    with pytest.raises(SystemExit):
-        workers._do(15)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(SystemExit):
+            workers._do(15)
+        warnings.warn(
+            "a coroutine was never awaited", RuntimeWarning, stacklevel=1
+        )  # Would be told of, and nobody asked.
     assert left == [1]
     assert not workers._BUSY
 

@@ -9,6 +9,7 @@ import pickle
 import signal
 import threading
 import time
+import warnings
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -141,6 +142,8 @@ def _leave(number: int, frame: Any) -> None:
         os._exit(1)
     if not _LEAVING:
         _LEAVING = True
+        # Libraries warn of what they cannot end, as of coroutines that nobody awaits now.
+        warnings.simplefilter("ignore")
         raise SystemExit(1)
 
 
