@@ -155,7 +155,9 @@ def compute(given: argparse.Namespace, folder: str, function: functools.partial,
         with measure() as spent[workers]:
             if workers:
                 with (
-                    LocalCluster(workers, threads_per_worker=1, processes=True, dashboard_address=":0") as cluster,
+                    LocalCluster(
+                        n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0"
+                    ) as cluster,
                     Client(cluster) as client,
                 ):
                     lazy.map(work, items, path, shape=shape, key="bench", scheduler=client)

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import time
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +44,14 @@ def die(number: int) -> np.ndarray:
 def end(number: int) -> int:
     """Ends its worker, while others wait behind it."""
     if number in (2, 5):
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number * number
+
+
+def end_slowly(number: int) -> int:
+    """End the worker with the first task, but only when others wait for it."""
+    time.sleep(0.5)
+    if number == 0:
         os.kill(os.getpid(), signal.SIGKILL)
     return number * number
 

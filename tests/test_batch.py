@@ -244,7 +244,7 @@ def workers_of(how: str) -> Iterator[list[str]]:
         yield [how, "2"]
         return
     distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(1, threads_per_worker=2, dashboard_address=":0") as cluster:
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=2, dashboard_address=":0") as cluster:
         yield [how, cluster.scheduler_address]
 
 

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import texrs
-from lazy_work import WEAVE, die, end, end_late, kill_once, outer, vary
+from lazy_work import WEAVE, die, end, end_late, end_slowly, kill_once, outer, vary
 from texrs import fields, lazy, samples
 from texrs._chunks import store as stores
 from texrs._chunks import workers
@@ -39,7 +39,7 @@ PLANE = texrs.PlaneTexture(WEAVE, seed=3, field=fields.circular(centre=(-30, 10)
 def client() -> Iterator[Client]:
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 3}),
-        LocalCluster(2, threads_per_worker=1, dashboard_address=":0") as cluster,
+        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster,
         Client(cluster, set_as_default=False) as made,
     ):
         yield made
@@ -422,6 +422,17 @@ def test_short_tasks_of_a_cluster_are_handed_out_together(client: Client) -> Non
     found = dict(workers.run(end_late, range(90), client, spare=True))
     assert {n: r for n, r in found.items() if n != 44} == {n: n * n for n in range(90) if n != 44}
     assert isinstance(found[44], lazy.WorkerLost)
+
+
+def test_a_cluster_blames_no_task_that_waits_behind_the_one_that_ends_its_worker() -> None:
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 3}),
+        LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster,
+        Client(cluster, set_as_default=False) as alone,
+    ):
+        found = dict(workers.run(end_slowly, range(4), alone, spare=True))
+    assert {n: r for n, r in found.items() if n} == {n: n * n for n in range(1, 4)}
+    assert isinstance(found[0], lazy.WorkerLost)
 
 
 def read_limits(number: int) -> texrs.limits.Limits:

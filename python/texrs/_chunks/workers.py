@@ -322,47 +322,61 @@ def _run_cluster(
     rows = [
         deque(numbers[len(numbers) * i // len(slots) : len(numbers) * (i + 1) // len(slots)]) for i in range(len(slots))
     ]
-    known: dict[Any, tuple[int, list[int]]] = {}
+    # What is handed out, and whether nothing else is: the cluster blames all that wait at a worker for its end.
+    known: dict[Any, tuple[int, list[int], bool]] = {}
+    suspects: deque[tuple[int, int]] = deque()
+    waiting = [0] * len(slots)
     at_once, most = 1, said()
+    queue = as_completed(loop=client.loop)
 
     def take(slot: int) -> list[int]:
         """Take some tasks from the row of a worker, or of the one that has most left."""
         row = rows[slot] or max(rows, key=len)
         return [row.popleft() if row is rows[slot] else row.pop() for _ in range(min(at_once, -(-len(row) // 2)))]
 
-    def submit(slot: int, some: list[int]) -> Any:
+    def submit(slot: int, some: list[int], alone: bool) -> None:
         future = client.submit(
             _do_there,
             there,
             some,
             threads_each,
             most,
-            key=f"texrs-{name}-{some[0]}-{len(some)}",
+            key=f"texrs-{name}-{some[0]}-{len(some)}{'-alone' * alone}",
             workers=[slots[slot]],
             allow_other_workers=True,
             pure=False,
         )
-        known[future] = slot, some
-        return future
+        known[future] = slot, some, alone
+        waiting[slot] += 1
+        queue.add(future)
 
-    first = [submit(slot, some) for _ in range(AHEAD) for slot in range(len(slots)) if (some := take(slot))]
-    queue = as_completed(first, loop=client.loop)
+    def feed() -> None:
+        """Let tasks wait at each worker; where some are suspected of ending theirs, first those, one by one."""
+        if not suspects:
+            for ahead in range(AHEAD):
+                for slot in range(len(slots)):
+                    if waiting[slot] == ahead and (some := take(slot)):
+                        submit(slot, some, False)
+        elif not known:
+            slot, number = suspects.popleft()
+            submit(slot, [number], True)
+
     try:
+        feed()
         for future in queue:
-            slot, some = known.pop(future)
+            slot, some, alone = known.pop(future)
+            waiting[slot] -= 1
             try:
                 results, seconds = future.result()
                 at_once = max(1, min(MOST_AT_ONCE, int(len(some) * SHORT / max(seconds, 1e-6))))
             except KilledWorker as error:
-                if len(some) > 1:  # Which of them it was is seen one by one.
-                    for number in some:
-                        queue.add(submit(slot, [number]))
-                    continue
-                results = [WorkerLost(f"task {some[0]}: {error}")]
-                if not spare:
+                if not alone:
+                    suspects.extend((slot, number) for number in some)
+                    some = []
+                results = [WorkerLost(f"task {number}: {error}") for number in some]
+                if results and not spare:
                     raise results[0] from None
-            if more := take(slot):
-                queue.add(submit(slot, more))
+            feed()
             yield from zip(some, results, strict=True)
     finally:
         client.cancel([there, *known])
