@@ -27,7 +27,6 @@ HOMES = {
     "libm": ("foundation/functions",),
     "rustfft": ("foundation/fft",),
     "pulp": ("foundation/wide",),
-    "faer": ("kernels/sparse",),
     "spade": ("kernels/warp",),
     "image": ("kernels/image_io",),
     "exr": ("kernels/image_io",),

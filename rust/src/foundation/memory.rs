@@ -21,11 +21,23 @@ pub(crate) fn copied<T: Copy>(what: &str, values: &[T]) -> Result<Vec<T>> {
 pub(crate) fn check<T>(what: &str, len: usize) -> Result<()> {
     Vec::<T>::new()
         .try_reserve_exact(len)
-        .map_err(|_| Error::Limit {
-            what: what.into(),
-            needed: format!("{} bytes", len as u128 * size_of::<T>() as u128),
-            limit: "memory that there is".into(),
-        })
+        .map_err(|_| too_little::<T>(what, len))
+}
+
+fn too_little<T>(what: &str, len: usize) -> Error {
+    Error::Limit {
+        what: what.into(),
+        needed: format!("{} bytes", len as u128 * size_of::<T>() as u128),
+        limit: "memory that there is".into(),
+    }
+}
+
+/// Room for `more` values after those that are there.
+pub(crate) fn reserve<T>(what: &str, values: &mut Vec<T>, more: usize) -> Result<()> {
+    let len = values.len();
+    values
+        .try_reserve(more)
+        .map_err(|_| too_little::<T>(what, len.saturating_add(more)))
 }
 
 /// Less than this is not asked for: where so little is not there, nothing goes on.
@@ -68,6 +80,9 @@ mod tests {
             room("pixels", usize::MAX / 2, 40),
             Err(Error::Limit { .. })
         ));
+        let mut few = vec![7u8];
+        assert!(reserve("numbers", &mut few, 100).is_ok() && few.capacity() > 100);
+        assert!(reserve("numbers", &mut few, usize::MAX).is_err());
         assert_eq!(product("sides", &[3, 0, 5]).unwrap(), 0);
         assert!(product("sides", &[1 << 40, 1 << 40]).is_err());
     }

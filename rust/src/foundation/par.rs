@@ -183,6 +183,11 @@ pub fn watch<R: Send, E: From<Error>>(
     }
 }
 
+/// Threads of the pool that the caller is in, 1 outside of all: for what is faster in one piece, and no different.
+pub(crate) fn threads() -> usize {
+    rayon::current_thread_index().map_or(1, |_| rayon::current_num_threads())
+}
+
 /// Calls `f(i, chunk)` for each chunk of `size` items. Chunks are fixed by `size`, so results cannot depend on threads.
 pub fn chunks_mut<T: Send>(data: &mut [T], size: usize, f: impl Fn(usize, &mut [T]) + Sync + Send) {
     if data.len() <= size {
@@ -216,11 +221,13 @@ mod tests {
 
     #[test]
     fn pools_have_the_threads_asked_for() {
+        assert_eq!(threads(), 1);
         for threads in [1, 2, 7] {
             assert_eq!(
                 install(threads, rayon::current_num_threads).unwrap(),
                 threads
             );
+            assert_eq!(install(threads, super::threads).unwrap(), threads);
         }
     }
 

@@ -54,6 +54,45 @@ macro_rules! wide_fn {
 }
 pub(crate) use wide_fn;
 
+/// A function as of [`wide_fn`], for what goes by columns of double precision: also for registers of eight. Its constant is how
+/// many rows two registers hold; nothing may hang on that but time.
+macro_rules! widest_fn {
+    (
+        $(#[$attribute:meta])*
+        $access:vis fn $name:ident <const $rows:ident: usize> ($($argument:ident: $type:ty),* $(,)?)
+        $(-> $out:ty)? $body:block
+    ) => {
+        $(#[$attribute])*
+        #[allow(unsafe_code)] // behind the question whether the CPU has the feature
+        #[inline]
+        $access fn $name($($argument: $type),*) $(-> $out)? {
+            #[inline(always)]
+            fn any<const $rows: usize>($($argument: $type),*) $(-> $out)? $body
+            #[cfg(target_arch = "x86_64")]
+            {
+                #[target_feature(enable = "avx512f")]
+                fn avx512($($argument: $type),*) $(-> $out)? {
+                    any::<16>($($argument),*)
+                }
+                #[target_feature(enable = "avx2")]
+                fn avx2($($argument: $type),*) $(-> $out)? {
+                    any::<8>($($argument),*)
+                }
+                if is_x86_feature_detected!("avx512f") {
+                    // SAFETY: the CPU has the feature that the function is compiled for.
+                    return unsafe { avx512($($argument),*) };
+                }
+                if is_x86_feature_detected!("avx2") {
+                    // SAFETY: the CPU has the feature that the function is compiled for.
+                    return unsafe { avx2($($argument),*) };
+                }
+            }
+            any::<4>($($argument),*)
+        }
+    };
+}
+pub(crate) use widest_fn;
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -85,6 +124,22 @@ mod tests {
         let without = scale_wide::<67>(&mut called, 1.7);
         assert_eq!([within.to_bits(), without.to_bits()], [sum.to_bits(); 2]);
         assert_eq!((&closed, &called), (&plain, &plain));
+    }
+
+    widest_fn! {
+        fn scale_by_rows<const ROWS: usize>(values: &mut [f32], by: f32) -> (f32, usize) {
+            (scale(values, by), ROWS)
+        }
+    }
+
+    #[test]
+    fn the_widest_code_gives_what_plain_code_gives() {
+        let start: Vec<f32> = (0..67).map(|i| (i as f32).sin()).collect();
+        let [mut plain, mut called] = [(); 2].map(|()| start.clone());
+        let sum = scale(&mut plain, 1.7);
+        let (found, rows) = scale_by_rows(&mut called, 1.7);
+        assert_eq!((found.to_bits(), &called), (sum.to_bits(), &plain));
+        assert!([4, 8, 16].contains(&rows));
     }
 
     #[test]

@@ -1,0 +1,132 @@
+//! What unknowns have to do with which: of a grid by how far apart they lie, of all else by a list.
+
+use super::Checked;
+use crate::Result;
+use crate::foundation::memory;
+
+/// Furthest that unknowns of a grid may lie apart, along an axis, that have to do with each other.
+const FAR: u32 = 8;
+/// Distances between row and column, of all entries, beyond which unknowns are of no grid.
+const MOST: usize = 64;
+
+/// Axes along which unknowns of a grid are parted: along its rows and columns, and aslant.
+pub(super) const AXES: usize = 4;
+
+/// An unknown as its place in a grid along all axes, of which the first two are row and column; of no grid, its number is the
+/// second.
+pub(super) type Item = [u32; AXES];
+
+/// A grid that the unknowns of a matrix lie on, row by row.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Grid {
+    pub(super) columns: u32,
+    /// How far apart unknowns may lie, along each axis, that have to do with each other.
+    pub(super) reach: [u32; AXES],
+}
+
+impl Grid {
+    /// Where an unknown is along all axes.
+    pub(super) fn place(&self, unknown: u32) -> Item {
+        let (row, column) = (unknown / self.columns, unknown % self.columns);
+        [row, column, row + column, row + (self.columns - column)]
+    }
+
+    /// The grid that the distances between rows and columns of the entries tell of, where that is of any use.
+    pub(super) fn recognise(matrix: &Checked<'_>) -> Result<Option<Self>> {
+        let size = matrix.size();
+        let mut seen: Vec<bool> = memory::filled("the order of the matrix", false, size)?;
+        let mut apart: Vec<u32> = Vec::new();
+        for column in 0..size {
+            for &row in matrix.below(column) {
+                let distance = row - column as u32;
+                if !seen[distance as usize] {
+                    seen[distance as usize] = true;
+                    apart.push(distance);
+                    if apart.len() > MOST {
+                        return Ok(None);
+                    }
+                }
+            }
+        }
+        apart.sort_unstable();
+        // Those in a row are 1, 2, ...; those of the next row lie around the number of columns.
+        let beside = (1..).zip(&apart).take_while(|&(i, &d)| i == d).count();
+        let next = &apart[beside..];
+        let near = next.windows(2).take_while(|two| two[1] - two[0] <= 2);
+        let columns = match next.first() {
+            Some(first) => (first + next[near.count()]) / 2,
+            None => size as u32,
+        };
+        let mut reach = [0u32; AXES];
+        let (mut line, mut x) = (0, 0);
+        for column in 0..size {
+            // The first unknown of the line that an entry's row lies in: rows rise.
+            let (mut first, mut down) = (line, 0);
+            for &row in matrix.below(column) {
+                while row - first >= columns && down <= FAR {
+                    first += columns;
+                    down += 1;
+                }
+                let right = (row - first).abs_diff(x);
+                let (u, v) = (
+                    (down + row - first).abs_diff(x),
+                    (down + x).abs_diff(row - first),
+                );
+                reach = [
+                    reach[0].max(down),
+                    reach[1].max(right),
+                    reach[2].max(u),
+                    reach[3].max(v),
+                ];
+            }
+            if reach[0] > FAR || reach[1] > FAR {
+                return Ok(None);
+            }
+            x += 1;
+            if x == columns {
+                (line, x) = (line + columns, 0);
+            }
+        }
+        Ok(Some(Self { columns, reach }))
+    }
+}
+
+/// Which unknowns have to do with each, both ways.
+#[derive(Debug, Default)]
+pub(super) struct Links {
+    starts: Vec<u32>,
+    others: Vec<u32>,
+}
+
+impl Links {
+    pub(super) fn new(matrix: &Checked<'_>) -> Result<Self> {
+        let size = matrix.size();
+        let what = "the order of the matrix";
+        let mut starts: Vec<u32> = memory::filled(what, 0, size + 2)?;
+        for column in 0..size {
+            for &row in matrix.below(column) {
+                starts[row as usize + 2] += 1;
+                starts[column + 2] += 1;
+            }
+        }
+        for i in 2..starts.len() {
+            starts[i] += starts[i - 1];
+        }
+        let mut others: Vec<u32> = memory::filled(what, 0, starts[size + 1] as usize)?;
+        for column in 0..size {
+            for &row in matrix.below(column) {
+                for (from, to) in [(row as usize, column as u32), (column, row)] {
+                    others[starts[from + 1] as usize] = to;
+                    starts[from + 1] += 1;
+                }
+            }
+        }
+        starts.pop();
+        Ok(Self { starts, others })
+    }
+
+    pub(super) fn of(&self, unknown: u32) -> &[u32] {
+        let i = unknown as usize;
+        &self.others[self.starts[i] as usize..self.starts[i + 1] as usize]
+    }
+}

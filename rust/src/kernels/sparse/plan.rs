@@ -1,0 +1,354 @@
+//! The pattern of a factor: which rows each block of it has, and where its numbers lie.
+//!
+//! Of the multifrontal method of Duff and Reid (1983): a block's front holds the columns of its own unknowns, and what these
+//! leave for the blocks that come after it, the rest; that is handed to the parent, whose rows have all of the same.
+
+use std::ops::Range;
+
+use super::order::{Block, Order};
+use super::{Checked, NONE};
+use crate::Result;
+use crate::foundation::memory;
+use crate::foundation::par::Monitor;
+
+/// Rows are handled so many at a time, and so many columns: fronts are filled up to multiples of it.
+pub(super) const TILE: usize = 4;
+
+/// A block of the factor.
+#[derive(Debug, Clone)]
+pub(super) struct Front {
+    /// Its first unknown, in the order of elimination.
+    pub(super) start: usize,
+    /// Unknowns of its own.
+    pub(super) own: usize,
+    /// Where its further rows begin in [`Plan::rows`], and end.
+    pub(super) rows: Range<usize>,
+    /// Where its numbers begin in the factor: of each of its unknowns the rows from that on.
+    pub(super) values: usize,
+    /// The block that gets what is left.
+    pub(super) parent: Option<usize>,
+    /// Blocks that come before its parent, counted from the top: what is left lies in either of two places by turns.
+    pub(super) depth: usize,
+    /// How many of the blocks before it are beneath it.
+    pub(super) beneath: usize,
+}
+
+impl Front {
+    /// Its own unknowns, filled up.
+    pub(super) fn columns(&self) -> usize {
+        self.own.next_multiple_of(TILE)
+    }
+
+    /// Further rows, filled up.
+    pub(super) fn rest(&self) -> usize {
+        self.rows.len().next_multiple_of(TILE)
+    }
+
+    /// All rows.
+    pub(super) fn height(&self) -> usize {
+        self.columns() + self.rest()
+    }
+
+    /// Numbers of the factor.
+    pub(super) fn len(&self) -> usize {
+        self.own * (self.own + 1) / 2 + self.own * self.rows.len()
+    }
+
+    /// Numbers of its own columns while it is worked on.
+    pub(super) fn area(&self) -> usize {
+        self.columns() * self.height()
+    }
+
+    /// Multiplications that it takes, about.
+    pub(super) fn work(&self) -> u64 {
+        let (columns, height) = (self.columns() as u64, self.height() as u64);
+        columns * height * height / 2
+    }
+}
+
+/// The pattern of a factor.
+#[derive(Debug)]
+pub(super) struct Plan {
+    /// The unknown at each place of the order.
+    pub(super) unknown: Vec<u32>,
+    /// How many come first that have to do with no other.
+    pub(super) alone: usize,
+    /// Blocks, each after those beneath it.
+    pub(super) fronts: Vec<Front>,
+    /// Further rows of blocks: places in the order, rising.
+    pub(super) rows: Vec<u32>,
+    /// Which rows of the parent's front these are.
+    pub(super) into: Vec<u32>,
+    /// Numbers of the factor, of all blocks.
+    pub(super) len: usize,
+    /// What is done by itself.
+    pub(super) jobs: Vec<Job>,
+    /// Numbers that the work takes at most, beside those of the factor.
+    pub(super) room: usize,
+}
+
+/// Work on blocks that nothing else is needed for.
+#[derive(Debug)]
+pub(super) enum Job {
+    /// On these, one after the other.
+    Run(Range<usize>),
+    /// On one, after what is beneath it.
+    Join(Vec<Job>, usize),
+}
+
+/// Work that is not worth to be shared, in multiplications.
+const LITTLE: u64 = 1 << 21;
+/// Shares of all work that are not shared any further.
+const SHARES: u64 = 16;
+/// How far down from the top work is shared.
+const DEEP: usize = 6;
+/// The most jobs that one waits for.
+const MOST: usize = 8;
+
+/// The entries of a matrix by the columns of a factor.
+#[derive(Debug)]
+pub(super) struct Entries {
+    /// Where those of each place in the order begin, and the last ones end.
+    pub(super) starts: Vec<u32>,
+    /// Rows of the block's front.
+    pub(super) rows: Vec<u32>,
+    /// The entries.
+    pub(super) values: Vec<f64>,
+}
+
+impl Entries {
+    /// Sorts entries by the one of their two unknowns that is eliminated first; rows are still places in the order.
+    fn new(matrix: &Checked<'_>, unknown: &[u32]) -> Result<Self> {
+        let (what, size) = ("the order of the matrix", unknown.len());
+        let mut place: Vec<u32> = memory::filled(what, 0, size)?;
+        for (at, &unknown) in unknown.iter().enumerate() {
+            place[unknown as usize] = at as u32;
+        }
+        let mut starts: Vec<u32> = memory::filled(what, 0, size + 1)?;
+        for column in 0..size {
+            let own = place[column];
+            for &row in matrix.rows(column) {
+                starts[own.min(place[row as usize]) as usize] += 1;
+            }
+        }
+        let mut sum = 0;
+        for start in &mut starts {
+            sum += *start;
+            *start = sum;
+        }
+        let mut rows: Vec<u32> = memory::filled(what, 0, sum as usize)?;
+        let mut values: Vec<f64> = memory::filled(what, 0.0, sum as usize)?;
+        // From behind: then each start is where it belongs.
+        for column in (0..size).rev() {
+            let own = place[column];
+            let (of, numbers) = (matrix.rows(column), matrix.values(column));
+            for (&row, &value) in of.iter().zip(numbers).rev() {
+                let other = place[row as usize];
+                let at = &mut starts[own.min(other) as usize];
+                *at -= 1;
+                rows[*at as usize] = own.max(other);
+                values[*at as usize] = value;
+            }
+        }
+        Ok(Self {
+            starts,
+            rows,
+            values,
+        })
+    }
+
+    /// Where the entries of places in the order are.
+    pub(super) fn of(&self, places: Range<usize>) -> Range<usize> {
+        self.starts[places.start] as usize..self.starts[places.end] as usize
+    }
+}
+
+impl Plan {
+    /// Plans the factor of a matrix, and sorts its entries.
+    pub(super) fn new(
+        matrix: &Checked<'_>,
+        order: Order,
+        monitor: &Monitor,
+    ) -> Result<(Self, Entries)> {
+        let what = "the pattern of the factor";
+        let mut entries = Entries::new(matrix, &order.unknown)?;
+        let count = order.blocks.len();
+        let size = order.unknown.len();
+        // Where each place of the order is in the front at hand, and in whose front that was.
+        let mut place: Vec<u32> = memory::filled(what, 0, size)?;
+        let mut whose: Vec<u32> = memory::filled(what, NONE, size)?;
+        let mut fronts: Vec<Front> = Vec::with_capacity(count);
+        let (mut rows, mut into): (Vec<u32>, Vec<u32>) = Default::default();
+        // Blocks whose parent is not there yet: the last ones are those of the next.
+        let mut waiting: Vec<usize> = Vec::new();
+        let mut len = 0;
+        for (number, &Block { start, end, parent }) in order.blocks.iter().enumerate() {
+            monitor.check()?;
+            let first = rows.len();
+            let own = entries.of(start as usize..end as usize);
+            let is_child = |&&child: &&usize| order.blocks[child].parent == number as u32;
+            let children = waiting.len() - waiting.iter().rev().take_while(is_child).count();
+            let most: usize = waiting[children..]
+                .iter()
+                .map(|&child| fronts[child].rows.len())
+                .sum();
+            memory::reserve(what, &mut rows, most + own.len())?;
+            let mut gather = |row: u32, rows: &mut Vec<u32>| {
+                if row >= end && whose[row as usize] != number as u32 {
+                    whose[row as usize] = number as u32;
+                    rows.push(row);
+                }
+            };
+            let mut beneath = 0;
+            for &child in &waiting[children..] {
+                for at in fronts[child].rows.clone() {
+                    gather(rows[at], &mut rows);
+                }
+                beneath += fronts[child].beneath + 1;
+            }
+            for &row in &entries.rows[own.clone()] {
+                gather(row, &mut rows);
+            }
+            // Those of each child rise already.
+            rows[first..].sort();
+            let columns = ((end - start) as usize).next_multiple_of(TILE) as u32;
+            for (i, row) in (start..end).enumerate() {
+                place[row as usize] = i as u32;
+            }
+            for (i, &row) in rows[first..].iter().enumerate() {
+                place[row as usize] = columns + i as u32;
+            }
+            memory::reserve(what, &mut into, rows.len() - first)?;
+            into.resize(rows.len(), 0);
+            for child in waiting.drain(children..) {
+                let of = fronts[child].rows.clone();
+                for (into, &row) in into[of.clone()].iter_mut().zip(&rows[of]) {
+                    *into = place[row as usize];
+                }
+            }
+            for row in &mut entries.rows[own] {
+                *row = place[*row as usize];
+            }
+            let front = Front {
+                start: start as usize,
+                own: (end - start) as usize,
+                rows: first..rows.len(),
+                values: len,
+                parent: (parent != NONE).then_some(parent as usize),
+                depth: 0,
+                beneath,
+            };
+            len += front.len();
+            fronts.push(front);
+            waiting.push(number);
+        }
+        for number in (0..count).rev() {
+            if let Some(parent) = fronts[number].parent {
+                fronts[number].depth = fronts[parent].depth + 1;
+            }
+        }
+        let jobs = share_out(&fronts);
+        let room = jobs.iter().map(|job| job.room(&fronts)).sum();
+        let plan = Self {
+            unknown: order.unknown,
+            alone: order.alone,
+            fronts,
+            rows,
+            into,
+            len,
+            jobs,
+            room,
+        };
+        Ok((plan, entries))
+    }
+}
+
+/// Shares the work out: by the matrix alone, whoever does it then.
+fn share_out(fronts: &[Front]) -> Vec<Job> {
+    let mut work: Vec<u64> = fronts.iter().map(Front::work).collect();
+    for (number, front) in fronts.iter().enumerate() {
+        if let Some(parent) = front.parent {
+            work[parent] += work[number];
+        }
+    }
+    let roots = || (0..fronts.len()).filter(|&number| fronts[number].parent.is_none());
+    let total: u64 = roots().map(|root| work[root]).sum();
+    let share = (total / SHARES).max(LITTLE);
+    let mut jobs = Vec::new();
+    let (mut first, mut sum) = (0, 0);
+    for root in roots() {
+        let begin = root - fronts[root].beneath;
+        if sum + work[root] > share {
+            if first < begin {
+                jobs.push(Job::Run(first..begin));
+            }
+            (first, sum) = (begin, 0);
+        }
+        if work[root] > share {
+            jobs.push(Job::of(root, fronts, &work, share, 0));
+            first = root + 1;
+        } else {
+            sum += work[root];
+        }
+    }
+    if first < fronts.len() {
+        jobs.push(Job::Run(first..fronts.len()));
+    }
+    jobs
+}
+
+impl Job {
+    /// The work on a block and all beneath it.
+    fn of(last: usize, fronts: &[Front], work: &[u64], share: u64, level: usize) -> Self {
+        let first = last - fronts[last].beneath;
+        let mut children = Vec::new();
+        let mut end = last;
+        while end > first && children.len() <= MOST {
+            children.push(end - 1);
+            end -= fronts[end - 1].beneath + 1;
+        }
+        if work[last] <= share || level == DEEP || children.len() > MOST {
+            return Self::Run(first..last + 1);
+        }
+        let beneath = children.iter().rev();
+        Self::Join(
+            beneath
+                .map(|&child| Self::of(child, fronts, work, share, level + 1))
+                .collect(),
+            last,
+        )
+    }
+
+    /// Numbers that it takes at most, beside those of the factor.
+    fn room(&self, fronts: &[Front]) -> usize {
+        match self {
+            Self::Run(range) => {
+                let own = fronts[range.clone()].iter().map(Front::area).max();
+                own.unwrap_or(0) + measure_piles(fronts, range.clone()).iter().sum::<usize>()
+            }
+            Self::Join(jobs, last) => {
+                let beneath: usize = jobs.iter().map(|job| job.room(fronts)).sum();
+                beneath + fronts[*last].area() + fronts[*last].rest().pow(2)
+            }
+        }
+    }
+}
+
+/// The most that blocks leave to others while they are worked on, those of even and those of odd depth.
+pub(super) fn measure_piles(fronts: &[Front], range: Range<usize>) -> [usize; 2] {
+    let (mut now, mut most) = ([0; 2], [0; 2]);
+    let mut waiting: Vec<usize> = Vec::new();
+    for number in range {
+        let pile = fronts[number].depth % 2;
+        now[pile] += fronts[number].rest().pow(2);
+        most[pile] = most[pile].max(now[pile]);
+        while let Some(&child) = waiting.last()
+            && fronts[child].parent == Some(number)
+        {
+            now[1 - pile] -= fronts[child].rest().pow(2);
+            waiting.pop();
+        }
+        waiting.push(number);
+    }
+    most
+}
