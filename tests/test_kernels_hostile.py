@@ -28,6 +28,7 @@ from texrs.kernels.mean_shift import mean_shift
 from texrs.kernels.ncc import Correlation
 from texrs.kernels.patch_search import PatchIndex
 from texrs.kernels.poisson import blend, solve, spread
+from texrs.kernels.regions import merge
 from texrs.kernels.seam import OldSeams, Strip, binary_labels, cut, cut_strip, cut_strips
 from texrs.kernels.sparse import Cholesky
 from texrs.kernels.warp import from_points, mesh
@@ -146,6 +147,10 @@ CALLS: Mapping[str, tuple[Callable[..., object], Arguments]] = {
     "poisson.blend": (
         blend,
         {"source": NOISE, "target": OTHER, "mask": INSIDE, "screening": 0.0, "mixed": True, "wrap": False},
+    ),
+    "regions.merge": (
+        merge,
+        {"image": NOISE, "scale": 0.5, "blur": 0.4, "least": 5, "wrap": (False, True), "progress": None},
     ),
     "seam.cut": (cut, CUT),
     "seam.OldSeams": (cut_old, {"kept": SEAMS, "ab": SEAMS, "ba": SEAMS}),

@@ -1,10 +1,12 @@
-//! Correlations and mean shifts: within their range, and as worked out window by window.
+//! Correlations, mean shifts and regions: within their range, and as worked out window by window, or edge by edge.
 
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
+use texrs::grid::Grid;
 use texrs::mean_shift::{Options, filter};
 use texrs::ncc::Correlation;
+use texrs::regions;
 use texrs_fuzz::{Draw, agreed, speaks};
 
 /// The correlation of two lists of numbers, where both vary.
@@ -91,11 +93,60 @@ fn shifted(draw: &mut Draw<'_>) {
     }
 }
 
+/// Regions are numbered by their first pixels, each is whole, and none is too small that is not alone.
+fn merged(draw: &mut Draw<'_>) {
+    let shape = [draw.within(0..=12), draw.within(0..=12), draw.within(0..=4)];
+    let image = draw.reals(shape.iter().product());
+    let options = regions::Options {
+        scale: f64::from(draw.real()),
+        blur: f64::from(draw.real()) * 2.0,
+        least: draw.within(0..=20),
+        wrap: draw.flags(),
+    };
+    let Some(found) = agreed(|monitor| regions::merge(&image, shape, &options, monitor)) else {
+        return;
+    };
+    let grid = Grid::new([shape[0], shape[1]], options.wrap).unwrap();
+    assert_eq!(found.len(), grid.len());
+    let mut areas: Vec<usize> = Vec::new();
+    for &label in &found {
+        let label = usize::try_from(label).unwrap();
+        assert!(label <= areas.len());
+        areas.resize(areas.len().max(label + 1), 0);
+        areas[label] += 1;
+    }
+    assert!(areas.len() == 1 || areas.iter().all(|&n| n >= options.least));
+    let mut seen = vec![false; found.len()];
+    for (first, &label) in found.iter().enumerate() {
+        if seen[first] || found[..first].contains(&label) {
+            assert!(seen[first], "a region in two pieces");
+            continue;
+        }
+        let mut stack = vec![first];
+        seen[first] = true;
+        while let Some(i) = stack.pop() {
+            let point = grid.point(i);
+            for (down, right) in (-1..=1).flat_map(|d| (-1..=1).map(move |r| (d, r))) {
+                let row = grid.inside(0, point[0] as isize + down);
+                let column = grid.inside(1, point[1] as isize + right);
+                let (Some(row), Some(column)) = (row, column) else {
+                    continue;
+                };
+                let j = grid.index([row, column]);
+                if found[j] == label && !seen[j] {
+                    seen[j] = true;
+                    stack.push(j);
+                }
+            }
+        }
+    }
+}
+
 fuzz_target!(|bytes: &[u8]| {
     let mut draw = Draw::new(bytes);
-    if draw.flag() {
-        correlated(&mut draw);
-    } else {
-        shifted(&mut draw);
+    match draw.within(0..=2) {
+        0 => correlated(&mut draw),
+        1 => shifted(&mut draw),
+        _ => merged(&mut draw),
     }
 });

@@ -20,6 +20,7 @@ __all__ = [
     "gather",
     "jitter",
     "mean_shift",
+    "merge_regions",
     "outlines",
     "philox",
     "place",
@@ -161,6 +162,14 @@ def mean_shift(
     wrap: Sequence[bool],
     progress: Callable[[float], object] | None,
 ) -> NDArray[float32]: ...
+def merge_regions(
+    image: NDArray[float32],
+    scale: float,
+    blur: float,
+    least: int,
+    wrap: Sequence[bool],
+    progress: Callable[[float], object] | None,
+) -> NDArray[int32]: ...
 def seam_cut(
     a: NDArray[float32],
     b: NDArray[float32],

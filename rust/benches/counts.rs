@@ -13,6 +13,7 @@ use texrs::mean_shift;
 use texrs::par::{self, Monitor};
 use texrs::patch_search::{Exemplar, Index, Pick, Query};
 use texrs::poisson::{self, Domain, Edge, Problem};
+use texrs::regions;
 use texrs::seam::stitch::{Overlap, Stitcher};
 use texrs::stitcher::{self, Adjacency, Elements, Given, Source, Weights};
 
@@ -151,6 +152,18 @@ fn mean_shifting() {
     measured(|| mean_shift::filter(&data, [side, side, 3], &options, &Monitor::default()).unwrap());
 }
 
+fn merging() {
+    let side = 128;
+    let data = image(side, 0);
+    let options = regions::Options {
+        scale: 0.2,
+        blur: 0.4,
+        least: 24,
+        wrap: [false; 2],
+    };
+    measured(|| regions::merge(&data, [side, side, 3], &options, &Monitor::default()).unwrap());
+}
+
 fn stitching() {
     let side = 96;
     let grid = Grid::new([side; 2], [false; 2]).unwrap();
@@ -235,13 +248,14 @@ fn correction() {
 }
 
 fn main() {
-    let all: [(&str, fn()); 8] = [
+    let all: [(&str, fn()); 9] = [
         ("coherence", correction),
         ("complete", completion),
         ("gather", gathering),
         ("mean_shift", mean_shifting),
         ("patch_search", patch_search),
         ("poisson", poisson),
+        ("regions", merging),
         ("seam", seam),
         ("stitcher", stitching),
     ];

@@ -6,6 +6,7 @@ mod mean_shift;
 mod ncc;
 mod patch_search;
 mod poisson;
+mod regions;
 mod seam;
 mod sparse;
 mod stitcher;
@@ -66,6 +67,7 @@ criterion_group!(
     ncc::bench,
     patch_search::bench,
     poisson::bench,
+    regions::bench,
     seam::bench,
     sparse::bench,
     stitcher::bench,

@@ -28,6 +28,7 @@
 //! | [`ncc`] | normalised cross-correlation of a template with each window of an image |
 //! | [`nearby`] | sums over what lies near by, of values at few points of an image |
 //! | [`mean_shift`] | joint spatial and range filtering |
+//! | [`regions`] | regions of one colour: the graph-based merge |
 //! | [`sparse`] | symmetric positive definite systems: factored once, solved many times |
 //! | [`image_io`] | 8/16-bit and float image files, with limits |
 //!
@@ -53,6 +54,6 @@ pub use engine::{appearance, blocks, coherence, guide, optimize, pyramid, stitch
 pub use foundation::error::{Error, Result};
 pub use foundation::{error, fixed, grid, hash, par, pca};
 pub use kernels::{
-    complete, distance, gather, image_io, mean_shift, ncc, nearby, patch_search, poisson, seam,
-    sparse, warp,
+    complete, distance, gather, image_io, mean_shift, ncc, nearby, patch_search, poisson, regions,
+    seam, sparse, warp,
 };

@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from texrs._typing import Bools, Floats, Labels
 from texrs.kernels.mean_shift import mean_shift
+from texrs.kernels.regions import merge
 
 __all__ = ["Regions", "mark_smooth"]
 
 SPATIAL_RADIUS, RANGE_RADIUS = 6, 14 / 255
 """Of the mean-shift filter: pixels, and colour units of [0, 1]."""
-MERGE_SCALE, MERGE_BLUR, MERGE_MINIMUM = 60, 0.4, 24
-"""k, sigma and least area in pixels of the graph-based merge, colours in 0..255."""
+MERGE_SCALE, MERGE_BLUR, MERGE_MINIMUM = 60 / 255, 0.4, 24
+"""Of the graph-based merge: scale in colour units of [0, 1], pixels, and pixels of area."""
 
 FINE, AROUND = 1.0, 2.0
 """Standard deviations in pixels of the Gaussians below which changes are grain, and over which its amount is averaged."""
@@ -32,7 +33,7 @@ TWO_KINDS = 0.75
 class Regions:
     """An image in regions of one colour."""
 
-    region: NDArray[np.intp]
+    region: Labels
     """(H, W): the region of each pixel, from 0."""
     area: NDArray[np.float64]
     colour: NDArray[np.float64]
@@ -42,11 +43,10 @@ class Regions:
     def of(cls, rgb: Floats, watch: Callable[[], object] = int) -> Regions:
         """Filter an image, and merge what is alike; ``watch`` is called along the way."""
         from skimage.color import rgb2lab
-        from skimage.segmentation import felzenszwalb
 
         filtered: Floats = mean_shift(rgb, SPATIAL_RADIUS, RANGE_RADIUS, progress=lambda stage, share: watch())
         watch()
-        region = felzenszwalb(filtered.astype(np.float64), MERGE_SCALE, MERGE_BLUR, MERGE_MINIMUM)
+        region = merge(filtered, MERGE_SCALE, blur=MERGE_BLUR, least=MERGE_MINIMUM)
         watch()
         area = np.bincount(region.ravel()).astype(np.float64)
         lab = rgb2lab(filtered).reshape(-1, 3)

@@ -13,6 +13,7 @@ mod ncc;
 mod nearby;
 mod patch_search;
 mod poisson;
+mod regions;
 mod seam;
 mod sparse;
 mod stitcher;
@@ -139,6 +140,8 @@ mod _rust {
     use super::patch_search::PatchIndex;
     #[pymodule_export]
     use super::poisson::{poisson, poisson_spread};
+    #[pymodule_export]
+    use super::regions::merge_regions;
     #[pymodule_export]
     use super::seam::{seam_cut, seam_labels, seam_strips};
     #[pymodule_export]
