@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from texrs._cache import content_hash
 from texrs._typing import Bools
 from texrs.errors import InvalidInput
-from texrs.papers.splice.factors import factorise
+from texrs.papers.splice.factors import factorise, make_triangle
 
 __all__ = ["choose_coarseness", "make_energy_matrix", "minimise_energy"]
 
@@ -28,6 +28,8 @@ LOOSE = 1e-2
 """Weight of the equations of what is not rigid: without them it would have none, and nothing would move."""
 TIE = 1e-5
 """Weight of equal displacements of neighbours: long joints that nothing else holds do not slide freely."""
+STEPS = ((0, 0), (0, 1), (0, 2), (1, -1), (1, 0), (1, 1), (2, 0))
+"""How far down and to the right of a pixel others lie that equations speak of together with it."""
 MOST = 1 << 19
 """Pixels of a connected figure beyond which those are solved for that are as many as can be, two, four, ... apart."""
 
@@ -61,12 +63,14 @@ def minimise_energy(rigid: Bools, pins: NDArray[np.intp], shift: Points, *, upri
     at = pins[:, 0] * shape[1] + pins[:, 1]
     out = np.empty((*shape, 2))
     keys = [content_hash("energy", np.packbits(rigid), shape, at, upright and axis, upright) for axis in (0, 1)]
-    # Without the decoupling both axes have one matrix.
-    factors = factorise({keys[axis]: partial(make_energy_matrix, rigid, at, axis, upright=upright) for axis in (0, 1)})
-    for axis in (0, 1):
-        right = np.zeros(rigid.size)
-        np.add.at(right, at, GOAL * shift[:, axis])
-        out[..., axis] = factors[keys[axis]].solve(right).reshape(shape)
+    # Without the decoupling both axes have one matrix, and are solved for together.
+    factors = factorise(
+        {keys[axis]: partial(make_energy_triangle, rigid, at, axis, upright=upright) for axis in (0, 1)}
+    )
+    right = np.zeros((rigid.size, 2))
+    np.add.at(right, at, GOAL * shift)
+    for axes in ([0, 1],) if keys[0] == keys[1] else ([0], [1]):
+        out[..., axes] = factors[keys[axes[0]]].solve(right[:, axes]).reshape(*shape, len(axes))
     return out if step == 1 else _upsample(out, whole, step)
 
 
@@ -97,35 +101,55 @@ def _upsample(coarse: NDArray[np.float64], shape: Sequence[int], step: int) -> N
 
 def make_energy_matrix(rigid: Bools, pins: NDArray[np.intp], axis: int, *, upright: bool, loose: float = LOOSE) -> Any:
     """Return the matrix of Eq. 5 for the displacement along an axis: lambda_G P + lambda_R (1 - U)^T w (1 - U)."""
-    from scipy.sparse import dia_array
+    from scipy.sparse import tril
 
+    lower = make_energy_triangle(rigid, pins, axis, upright=upright, loose=loose)
+    return (lower + tril(lower, -1).T).tocsc()
+
+
+def make_energy_triangle(
+    rigid: Bools, pins: NDArray[np.intp], axis: int, *, upright: bool, loose: float = LOOSE
+) -> Any:
+    """Return the lower triangle of that matrix, of which `texrs.kernels.sparse` reads no more."""
     coupling, small = (0.0, 1.0) if upright else (1.0, 1e-3)
-    size, columns = rigid.size, rigid.shape[1]
     u = weigh_neighbours(rigid, axis, coupling, small)
     u /= u.sum(axis=0)
     root = np.sqrt(RIGID * np.where(rigid, 1.0, loose))
-    steps = (-columns, columns, -1, 1)
-    # A diagonal is stored by its columns.
-    bands = [root.ravel(), *(np.roll(-(root * b).ravel(), step) for b, step in zip(u, steps, strict=True))]
-    equations = dia_array((np.array(bands), [0, *steps]), shape=(size, size)).tocsr()
-    goal = np.asarray(np.bincount(pins, minlength=size) * GOAL, np.float64)
-    return (equations.T @ equations + dia_array(tie_diagonals(rigid.shape, goal), shape=(size, size))).tocsc()
+    # The equation of each pixel, by the pixels that it speaks of: those above, below, to the left, to the right, and its own.
+    terms = {step: -(root * b) for step, b in zip(((-1, 0), (1, 0), (0, -1), (0, 1)), u, strict=True)}
+    terms[0, 0] = root
+    goal = np.asarray(np.bincount(pins, minlength=rigid.size) * GOAL, np.float64).reshape(rigid.shape)
+    ties = tie_neighbours(rigid.shape, goal)
+    bands = []
+    for down, right in STEPS:
+        # Summed over the equations that speak of both pixels, in the order of their own.
+        band = np.zeros(rigid.shape)
+        for one in ((1, 0), (0, 1), (0, 0), (0, -1), (-1, 0)):
+            other = (one[0] + down, one[1] + right)
+            if other in terms:
+                _add_shifted(band, terms[one] * terms[other], one)
+        bands.append(band + ties[down, right] if (down, right) in ties else band)
+    return make_triangle(rigid.shape, STEPS, bands)
 
 
-def tie_diagonals(shape: tuple[int, ...], goal: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[int]]:
-    """Return the diagonals of lambda_G P, and of the weak ties between all neighbours."""
-    diagonal = goal.reshape(shape).copy()
-    below, right = np.zeros(shape), np.zeros(shape)
-    below[1:], right[:, 1:] = -TIE, -TIE
+def _add_shifted(band: Points, product: Points, step: tuple[int, int]) -> None:
+    """Add what equations give to the pixel that lies a step from their own."""
+    to, of = (
+        tuple(slice(max(0, sign * s), n - max(0, -sign * s)) for s, n in zip(step, band.shape, strict=True))
+        for sign in (1, -1)
+    )
+    band[to] += product[of]
+
+
+def tie_neighbours(shape: tuple[int, ...], goal: Points) -> dict[tuple[int, int], Points]:
+    """Return lambda_G P, with the weak ties between all neighbours, by how far apart pixels lie."""
+    diagonal = goal.copy()
     for axis in range(2):
         d = np.moveaxis(diagonal, axis, 0)
         d[:-1] += TIE
         d[1:] += TIE
-    # Diagonals are stored by their columns; the matrix is symmetric.
-    upper = [below.ravel(), right.ravel()]
-    steps = [shape[1], 1]
-    lower = [np.roll(b, -s) for b, s in zip(upper, steps, strict=True)]
-    return np.array([diagonal.ravel(), *upper, *lower]), [0, *steps, *(-s for s in steps)]
+    tie = np.full(shape, -TIE)
+    return {(0, 0): diagonal, (1, 0): tie, (0, 1): tie}
 
 
 def weigh_neighbours(rigid: Bools, axis: int, coupling: float, small: float) -> NDArray[np.float64]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from texrs._cache import content_hash
 from texrs._typing import Bools
-from texrs.papers.splice.factors import factorise
+from texrs.papers.splice.factors import factorise, make_triangle
 
 __all__ = ["STEP", "interpolate"]
 
@@ -66,8 +66,8 @@ def _solve_laplace(constrained: Bools, displacement: NDArray[np.float32]) -> NDA
     flow[:, 1:] += out[:, :-1]
     flow[:, :, :-1] += out[:, :, 1:]
     flow[:, :, 1:] += out[:, :, :-1]
-    out[:, free] = solver.solve(flow[:, free].T).T
-    return out
+    np.copyto(flow, out, where=constrained)
+    return np.ascontiguousarray(solver.solve(flow.reshape(2, -1).T).T).reshape(out.shape)
 
 
 def _upsample(coarse: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float32]:
@@ -98,24 +98,16 @@ def _smooth(field: NDArray[np.float32], wide: NDArray[np.float32]) -> None:
 
 
 def _make_laplacian(free: Bools) -> Any:
-    """Return the sparse matrix of the Laplace equation at the free pixels, the others being given."""
-    from scipy.sparse import coo_array
-
-    count = int(np.count_nonzero(free))
-    number = np.full(free.shape, -1, np.int64)
-    number[free] = np.arange(count)
+    """Return the lower triangle of the Laplace equation at the free pixels, the others being given: each stands for itself."""
     degree = np.zeros(free.shape)
-    rows, columns = [], []
+    bands = []
     for axis in range(2):
-        d, n = (np.moveaxis(a, axis, 0) for a in (degree, number))
-        f: Bools = np.moveaxis(free, axis, 0)
+        d, f = (np.moveaxis(a, axis, 0) for a in (degree, free))
         d[:-1] += 1
         d[1:] += 1
-        both = f[:-1] & f[1:]
-        columns.append(n[:-1][both])
-        rows.append(n[1:][both])
-    below, left = np.concatenate(rows), np.concatenate(columns)
-    own = np.arange(count)
-    values = np.concatenate([degree[free], np.full(len(below), -1.0)])
-    at = (np.concatenate([own, np.maximum(below, left)]), np.concatenate([own, np.minimum(below, left)]))
-    return coo_array((values, at), shape=(count, count)).tocsc()
+        band = np.zeros(free.shape)
+        along = np.moveaxis(band, axis, 0)
+        along[:-1][np.logical_and(f[:-1], f[1:])] = -1
+        bands.append(band)
+    shape = (free.shape[0], free.shape[1])
+    return make_triangle(shape, ((0, 0), (0, 1), (1, 0)), (np.where(free, degree, 1), bands[1], bands[0]))
