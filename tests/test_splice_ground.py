@@ -113,6 +113,26 @@ def test_without_ground_to_speak_of_it_is_warped_as_before() -> None:
     assert result.report["blend"] == 0
 
 
+def test_what_is_kept_of_a_texture_changes_nothing() -> None:
+    from dataclasses import replace
+
+    from texrs.papers.splice.entry import CACHES
+
+    def splice_anew(entry: Elements, seed: int) -> np.ndarray:
+        for cache in CACHES:
+            cache.clear()
+        return np.asarray(texrs.splice(entry, LAYOUT, seed=seed).image)
+
+    discs = make_discs(shadow=True)
+    # Of the same elements, in other colours.
+    other = replace(discs, image=255 - discs.image)
+    fresh = [splice_anew(entry, seed) for entry in (discs, other) for seed in (1, 2)]
+    for _ in range(2):
+        again = [texrs.splice(entry, LAYOUT, seed=seed).image for entry in (discs, other) for seed in (1, 2)]
+        assert all((a == b).all() for a, b in zip(fresh, again, strict=True))
+    assert not (fresh[0] == fresh[1]).all()
+
+
 @pytest.mark.parametrize("blend", [-1.0, float("nan"), "soft"])
 def test_bad_weights(blend: object) -> None:
     with pytest.raises(texrs.errors.InvalidInput, match="blend: needs a number"):

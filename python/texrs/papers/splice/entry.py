@@ -68,17 +68,31 @@ def check_entry(entry: Elements, name: str) -> Elements:
     return replace(entry, points=points)
 
 
-def remember(count: int) -> Callable[[Making[P, T]], Making[P, T]]:
-    """Let a function keep what it last made of the mask, points, layout, wrap and labels of so many entries, and the rest."""
+def remember(
+    count: int, *, seen: bool = False, size: Callable[[Any], int] | None = None
+) -> Callable[[Making[P, T]], Making[P, T]]:
+    """Let a function keep what it last made of the mask, points, layout, wrap and labels of so many entries, and the rest.
+
+    Parameters
+    ----------
+    count : int
+        How many results are kept, or how large they are together.
+    seen : bool
+        Whether it also looks at the picture, and at the box of an element.
+    size : callable, optional
+        How large a result is; each counts 1 by default.
+
+    """
 
     def decorate(make: Making[P, T]) -> Making[P, T]:
-        cache: Cache[bytes, T] = Cache(count)
+        cache: Cache[bytes, T] = Cache(count, size)
         CACHES.append(cache)
 
         @wraps(make)
         def recall(entry: Elements, /, *rest: P.args, **options: P.kwargs) -> T:
             content = (np.packbits(entry.mask), entry.points, entry.mask.shape, entry.layout, entry.wrap, entry.known)
-            key = content_hash(*content, rest, sorted(options.items()))
+            shown = (np.asarray(entry.image), entry.box) if seen else ()
+            key = content_hash(*content, *shown, rest, sorted(options.items()))
             return cache.get_or_make(key, lambda: make(entry, *rest, **options))
 
         return recall

@@ -7,12 +7,13 @@ it in even light (`light`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_image, guidance
+from texrs._cache import Cache
 from texrs._engine.pyramid import ONE, Region, to_fixed
 from texrs._progress import stage
 from texrs._typing import Bools, Floats, Progress
@@ -21,6 +22,7 @@ from texrs.exemplar import Exemplar
 from texrs.growth import patch_side
 from texrs.growth.start import OVERLAP, weights_of
 from texrs.kernels.seam import cut
+from texrs.papers.splice.entry import remember
 from texrs.papers.splice.foreground import Foreground, split_foreground
 from texrs.papers.splice.light import Light, measure_light
 from texrs.papers.splice.matching import Match
@@ -46,6 +48,8 @@ LEAST = 0.02
 ENOUGH = 0.15
 """Share of the texture that is neither element nor matte from which on ground can be made of it: of less, it shows what lies
 in it again and again."""
+KEPT, PIXEL, GROUNDS = 1 << 27, 64, 2
+"""Bytes of what is known of textures that are kept, and what a pixel of one takes; completed grounds that are kept of each."""
 CANDIDATES = 4
 """Places that are tried for each patch of the ground."""
 
@@ -65,6 +69,8 @@ class Scene:
         scraps of foreground that are of none.
     certain : (h, w) bool
         Where a matte is beyond doubt.
+    grounds : Cache
+        The texture's ground, completed, by the seed of that.
 
     """
 
@@ -72,8 +78,10 @@ class Scene:
     light: Light | None
     own: NDArray[np.int32]
     certain: Bools
+    grounds: Cache[int, NDArray[np.int32]] = field(default_factory=lambda: Cache(GROUNDS))
 
 
+@remember(KEPT, seen=True, size=lambda scene: min(scene.own.size * PIXEL, KEPT))
 def survey(a: Elements, *, narrow: bool = False) -> Scene:
     """Tell elements with their mattes from ground, and take off what light there is on them.
 
@@ -117,9 +125,12 @@ def lay_ground(
     sized = label.shape == scene.own.shape
     if (match.shift == match.shift[0]).all() and (match.shift.any() or not sized):
         return None
-    bare = complete_ground(scene.a, scene.own, seed, watch)
+    bare = scene.grounds.get(seed)
     if bare is None:
-        return None
+        bare = complete_ground(scene.a, scene.own, seed, watch)
+        if bare is None:
+            return None
+        scene.grounds.put(seed, bare)
     ground = grow_ground(scene.a, bare, label.shape, seed, watch)
     element = np.concatenate([[-1], match.extension.element[match.assigned]])[label]
     places = cut_in(scene, ground, draft.places, label, element, mirrored=draft.mirrored)
