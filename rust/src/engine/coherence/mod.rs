@@ -12,6 +12,7 @@
 //! Coordinates and vectors are whole numbers, so a cost is exact and the least is found whatever the order.
 
 mod boxes;
+mod level;
 mod pass;
 mod similar;
 mod tree;
