@@ -36,6 +36,7 @@ KERNELS = {
     "sparse": "_rust.Cholesky(*matrix, 1 << 32)",
     "gather": "_rust.gather([image], (False, False), np.zeros(0, np.uint16), points, 'linear')",
     "nearby": "_rust.sum_nearby(corner, np.ones(1, np.float32), (side, side), True, (1.0, 0.5))",
+    "smooth": "_rust.smooth(image.reshape(-1), image.shape, [((0.5, 0.25), 'reflect')] * 2 + [((), 'reflect')])",
     "place": "_rust.place(one, (0, 0), (512, 512), ((1, 0.1), (0, 1)), (0.5, 0), (side, side), 1.0)",
     "points": "_rust.warp_points(corners, corners, (side, side))",
     "warp": "_rust.warp_mesh((side, side), places.reshape(-1, 2), np.zeros(side * side, np.uint8), (side, side), None)",

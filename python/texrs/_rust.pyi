@@ -31,6 +31,7 @@ __all__ = [
     "seam_strips",
     "set_threads",
     "similar",
+    "smooth",
     "sum_nearby",
     "uniform",
     "upsample",
@@ -55,6 +56,9 @@ def gather(
 def outlines(
     labels: NDArray[int32], windows: Sequence[tuple[int, Sequence[int], Sequence[int]]]
 ) -> list[NDArray[float32] | None]: ...
+def smooth(
+    values: NDArray[float32] | NDArray[float64], shape: Sequence[int], axes: Sequence[tuple[Sequence[float], str]]
+) -> NDArray[Any]: ...
 def sum_nearby(
     points: NDArray[int64], values: NDArray[float32], shape: Sequence[int], cyclic: bool, window: Sequence[float]
 ) -> NDArray[float32]: ...

@@ -27,6 +27,7 @@
 //! | [`gather`] | an exemplar of any type looked up through coordinates |
 //! | [`ncc`] | normalised cross-correlation of a template with each window of an image |
 //! | [`nearby`] | sums over what lies near by, of values at few points of an image |
+//! | [`smooth`] | arrays smoothed along their axes, as by a Gaussian |
 //! | [`mean_shift`] | joint spatial and range filtering |
 //! | [`regions`] | regions of one colour: the graph-based merge |
 //! | [`sparse`] | symmetric positive definite systems: factored once, solved many times |
@@ -55,5 +56,5 @@ pub use foundation::error::{Error, Result};
 pub use foundation::{error, fixed, grid, hash, par, pca};
 pub use kernels::{
     complete, distance, gather, image_io, mean_shift, ncc, nearby, patch_search, poisson, regions,
-    seam, sparse, warp,
+    seam, smooth, sparse, warp,
 };

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._engine.smoothing import smooth
 from texrs.errors import InvalidInput
 
 __all__ = ["Points", "directions", "mark_inner", "nearest_distances", "spacing"]
@@ -76,8 +77,6 @@ def directions(points: Points, *, most: int = 3) -> tuple[float, ...]:
     [0.0, 90.0]
 
     """
-    from scipy.ndimage import gaussian_filter1d
-
     scale = spacing(points)
     away = points - points.mean(axis=0)
     # Points within a disc: the outline of any other shape has directions of its own.
@@ -92,8 +91,7 @@ def directions(points: Points, *, most: int = 3) -> tuple[float, ...]:
     width = int(bins.max()) + 1 + WIDE_BINS
     counts = np.bincount((bins + np.arange(180) * width).ravel(), minlength=180 * width).reshape(180, width)
     fine, coarse = (
-        s * (gaussian_filter1d(counts.astype(np.float64), s / 0.05, axis=1, mode="constant") ** 2).sum(axis=1)
-        for s in (FINE, COARSE)
+        s * (smooth(counts.astype(np.float64), (0, s / 0.05), mode="constant") ** 2).sum(axis=1) for s in (FINE, COARSE)
     )
     # Against the outline of the whole: a cloud without lines varies as much at both widths.
     power = fine / coarse

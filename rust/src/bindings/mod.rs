@@ -15,6 +15,7 @@ mod patch_search;
 mod poisson;
 mod regions;
 mod seam;
+mod smooth;
 mod sparse;
 mod stitcher;
 mod warp;
@@ -146,6 +147,8 @@ mod _rust {
     use super::seam::{seam_cut, seam_labels, seam_strips};
     #[pymodule_export]
     use super::set_threads;
+    #[pymodule_export]
+    use super::smooth::smooth;
     #[pymodule_export]
     use super::sparse::Cholesky;
     #[pymodule_export]

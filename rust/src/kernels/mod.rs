@@ -11,5 +11,6 @@ pub mod patch_search;
 pub mod poisson;
 pub mod regions;
 pub mod seam;
+pub mod smooth;
 pub mod sparse;
 pub mod warp;

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from texrs._arrays import as_image, guidance
 from texrs._cache import Cache
 from texrs._engine.pyramid import ONE, Region, to_fixed
+from texrs._engine.smoothing import smooth
 from texrs._progress import stage
 from texrs._typing import Bools, Floats, Progress
 from texrs.elements import Elements
@@ -219,7 +220,7 @@ def find_owners(guide: Floats, a: Elements, parts: Foreground) -> tuple[NDArray[
 
 def measure_matte(guide: Floats, a: Elements, parts: Foreground, away: Floats) -> Bools:
     """Return what looks alike around elements, and unlike the ground, in a square around their middles."""
-    from scipy.ndimage import gaussian_filter, label
+    from scipy.ndimage import label
 
     sure = away > BESIDE
     reach = int(max(a.box) / 2 + ROOM * spacing(a.points))
@@ -227,8 +228,8 @@ def measure_matte(guide: Floats, a: Elements, parts: Foreground, away: Floats) -
     none = np.zeros((2 * reach + 1, 2 * reach + 1), bool)
     if sure.mean() < LEAST or not len(middles):
         return none
-    weight = np.maximum(gaussian_filter(sure.astype(np.float32), LOCAL), 1e-3)
-    around = [gaussian_filter(np.where(sure, guide[..., c], 0), LOCAL) / weight for c in range(guide.shape[-1])]
+    weight = np.maximum(smooth(sure.astype(np.float32), LOCAL), 1e-3)
+    around = [smooth(np.where(sure, guide[..., c], 0), LOCAL) / weight for c in range(guide.shape[-1])]
     usual: Floats = np.stack(around, axis=-1)
     apart = guide - usual
     deviation = float(np.sqrt((apart[sure] ** 2).mean())) + 1 / 255
@@ -242,7 +243,7 @@ def measure_matte(guide: Floats, a: Elements, parts: Foreground, away: Floats) -
         total += np.where(seen[..., np.newaxis], padded[window], 0)
         count += seen
     mean = total / np.maximum(count, 1)[..., np.newaxis]
-    unlike = gaussian_filter(np.sqrt((mean**2).mean(axis=-1)) / deviation, 1.0)
+    unlike = smooth(np.sqrt((mean**2).mean(axis=-1)) / deviation, 1.0)
     alike = (unlike > max(UNLIKE, 2.5 / np.sqrt(len(middles)))) & (count > SEEN * len(middles))
     pieces, _ = label(alike)
     middle = pieces[reach, reach]

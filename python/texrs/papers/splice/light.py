@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._arrays import as_image, to_unit
+from texrs._engine.smoothing import Edge, smooth
 from texrs._typing import Array, Bools, Floats, Labels
 from texrs.elements import Elements
 from texrs.point_sets import spacing
@@ -98,21 +99,19 @@ def measure_light(a: Elements, ground: Bools, elements: Labels) -> Light | None:
         The element of each pixel, counted from 1; 0 elsewhere.
 
     """
-    from scipy.ndimage import gaussian_filter
-
     image = as_image(a.image)
     if image.dtype.kind in "bi" or not ground.any():
         return None
     unit = to_unit(image)
     channels = unit.shape[-1] - (unit.shape[-1] in (2, 4))
-    modes = ["wrap" if w else "nearest" for w in a.wrap]
+    modes: list[Edge] = ["wrap" if w else "nearest" for w in a.wrap]
     sigma = WIDE * spacing(a.points)
 
-    def smooth(values: NDArray[np.float32]) -> Floats:
-        return np.asarray(gaussian_filter(values, sigma, mode=modes, truncate=3.0), np.float32)
+    def spread(values: NDArray[np.float32]) -> Floats:
+        return smooth(values, sigma, mode=modes, truncate=3.0)
 
-    weight = np.maximum(smooth(ground.astype(np.float32)), 1e-4)
-    shown = [smooth(np.where(ground, unit[..., c], 0).astype(np.float32)) / weight for c in range(channels)]
+    weight = np.maximum(spread(ground.astype(np.float32)), 1e-4)
+    shown = [spread(np.where(ground, unit[..., c], 0).astype(np.float32)) / weight for c in range(channels)]
     field: Floats = np.stack(shown, axis=-1)
     rest = (unit[..., :channels] - field)[ground]
     field -= field[ground].mean(axis=0)
