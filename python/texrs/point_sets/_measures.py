@@ -20,6 +20,8 @@ PEAK, CLEAR = 1.3, 6.0
 """How far a direction must stand out: from the median one, and in spreads of all directions."""
 FINE, COARSE = 0.15, 0.8
 """Widths, in spacings, of the Gaussians that points are drawn as: lines show at the first, outlines at both."""
+FEW = 4096
+"""Pairs of points whose distances are worked out, all of them."""
 WIDE_BINS = 64
 """Room at the ends for the wider ones."""
 
@@ -29,6 +31,12 @@ def nearest_distances(points: Points, count: int, among: Points | None = None) -
     from scipy.spatial import cKDTree
 
     own = among is None
+    if among is not None and count <= len(among) and len(points) * len(among) <= FEW:
+        # The same distances, without the time that a tree takes to grow.
+        rows, columns = (points[:, None, axis] - among[None, :, axis] for axis in range(2))
+        squared = np.partition(rows * rows + columns * columns, count - 1, axis=1)[:, :count]
+        squared.sort(axis=1)
+        return np.asarray(np.sqrt(squared), np.float64)
     tree = cKDTree(points if among is None else among)
     found = tree.query(points, k=[*range(1 + own, count + 1 + own)])[0]
     return np.asarray(found, np.float64)

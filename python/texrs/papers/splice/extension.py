@@ -19,7 +19,7 @@ from texrs.elements import Elements, Layout
 from texrs.errors import InvalidInput
 from texrs.limits._estimates import BEYOND
 from texrs.papers.splice.entry import remember
-from texrs.papers.splice.foreground import Foreground, split_foreground
+from texrs.papers.splice.foreground import split_foreground
 from texrs.papers.splice.sowing import sow_elements
 from texrs.point_sets import Fold, PointLayout
 
@@ -29,6 +29,8 @@ Points = NDArray[np.float64]
 Places = NDArray[np.int32]
 Copies = tuple[Points, NDArray[np.intp], Bools]
 """Elements of a texture that goes on: where they lie, which of its elements they are, along which axes they are mirrored."""
+Placed = tuple[Copies, Labels, list[int], list[tuple[NDArray[np.intp], NDArray[np.intp]]]]
+"""Copies, the number of each pixel's element among those that are kept, which these are, and what `_place_elements` turns."""
 
 FREE, SOWN_FREE = 0.9, 0.75
 """Share of an element, with what lies around it, that must be free where it is put; and where it was sown, so that it fits."""
@@ -93,6 +95,8 @@ def extend(
     first = low + offset
     pixel, mirrored = _unfold(layout, low, high)
     mask: Bools = entry.mask[pixel[..., 0], pixel[..., 1]]
+    if whole and entry.layout == Layout.DISJOINT:
+        return _stamp(entry, pixel, mask, mirrored, _place_copies(entry, _as_pair(low), _as_pair(high)), first)
     places, of, flips = layout.within(low.astype(np.float64), (high - 1).astype(np.float64))
     inside = np.asarray(((places >= -0.5) & (places <= shape - 0.5)).all(axis=1) & ~flips.any(axis=1))
     if not whole:
@@ -102,7 +106,12 @@ def extend(
     originals = 0 if whole else int(np.count_nonzero(inside))
     places = places + (offset - first)
     if entry.layout == Layout.DISJOINT:
-        return _stamp(entry, pixel, mask, mirrored, (places, of, flips), first, originals)
+        own: Bools | None = None
+        if originals:
+            own = np.zeros(mask.shape, bool)
+            own[tuple(slice(-int(f), -int(f) + int(n)) for f, n in zip(first, shape, strict=True))] = True
+        placed = _place_elements(entry, mask.shape, (places, of, flips), own, originals)
+        return _stamp(entry, pixel, mask, mirrored, placed, first, originals, own)
     none = np.zeros(mask.shape, np.int32)
     origin = (int(first[0]), int(first[1]))
     points, rest = places + first, np.zeros((0, 2))
@@ -125,7 +134,8 @@ def sow(entry: Elements, size: tuple[int, int], margin: int) -> Extension | None
     flips = np.repeat(beyond[:, np.newaxis], 2, axis=1)
     mask: Bools = entry.mask[pixel[..., 0], pixel[..., 1]]
     # They have room for themselves, if not for what lies around them.
-    return _stamp(entry, pixel, mask, mirrored, (found.points - low, found.of, flips), low + offset, 0, free=SOWN_FREE)
+    placed = _place_elements(entry, mask.shape, (found.points - low, found.of, flips), least=SOWN_FREE)
+    return _stamp(entry, pixel, mask, mirrored, placed, low + offset)
 
 
 def _unfold(layout: PointLayout, low: NDArray[np.intp], high: NDArray[np.intp]) -> tuple[Places, Bools]:
@@ -141,12 +151,21 @@ def _unfold(layout: PointLayout, low: NDArray[np.intp], high: NDArray[np.intp]) 
 def count_elements(entry: Elements, size: tuple[int, int], margin: int) -> int:
     """Count the elements that `extend` finds, without what it makes of them."""
     layout, low, high = _find_bounds(entry, size, margin, exact=False)
-    places, of, flips = layout.within(low.astype(np.float64), (high - 1).astype(np.float64))
-    if entry.layout != Layout.DISJOINT:
-        return len(of)
-    check_memory(int(np.prod(high - low)) * BEYOND)
-    instance = np.zeros(high - low, np.int32)
-    return len(_place_elements(entry, instance, (places - low, of, flips), None)[0])
+    if entry.layout == Layout.DISJOINT:
+        return len(_place_copies(entry, _as_pair(low), _as_pair(high))[2])
+    return len(layout.within(low.astype(np.float64), (high - 1).astype(np.float64))[1])
+
+
+@remember(2)
+def _place_copies(entry: Elements, low: tuple[int, int], high: tuple[int, int]) -> Placed:
+    """Put every whole element where the picture goes on with it, in a box of its own pixels."""
+    check_memory((high[0] - low[0]) * (high[1] - low[1]) * BEYOND)
+    places, of, flips = _reflect_all(entry).within(np.array(low, np.float64), np.array(high, np.float64) - 1)
+    return _place_elements(entry, (high[0] - low[0], high[1] - low[1]), (places - low, of, flips))
+
+
+def _as_pair(place: NDArray[np.intp]) -> tuple[int, int]:
+    return int(place[0]), int(place[1])
 
 
 @remember(64)
@@ -162,15 +181,20 @@ def _find_bounds(
     shape = np.array(entry.mask.shape)
     offset = (np.array(size) - shape) // 2  # Of the picture in the output.
     disjoint = entry.layout == Layout.DISJOINT
-    if disjoint or exact:
-        # The elements that the border cuts are left out, or wanted: no pixel is in the way.
-        points = split_foreground(entry).points if disjoint else entry.points
-        ends = [(-0.5, n - 0.5) if w else (0.0, n - 1.0) for n, w in zip(shape, entry.wrap, strict=True)]
-        folds = [Fold(*e, w) for e, w in zip(ends, entry.wrap, strict=True)]
-        layout = PointLayout(points, (folds[0], folds[1]), 0.0)
-    else:
-        layout = lay_out(entry, beyond=False)
+    layout = _reflect_all(entry) if disjoint or exact else lay_out(entry, beyond=False)
     return layout, np.minimum(-margin - offset, 0), np.maximum(np.array(size) + margin - offset, shape)
+
+
+def _reflect_all(entry: Elements) -> PointLayout:
+    """Return the layout of a texture that is reflected at its very ends, or goes around.
+
+    The elements that the border cuts are left out, or wanted: no pixel is in the way.
+    """
+    shape = entry.mask.shape
+    points = split_foreground(entry).points if entry.layout == Layout.DISJOINT else entry.points
+    ends = [(-0.5, n - 0.5) if w else (0.0, n - 1.0) for n, w in zip(shape, entry.wrap, strict=True)]
+    folds = [Fold(*e, w) for e, w in zip(ends, entry.wrap, strict=True)]
+    return PointLayout(points, (folds[0], folds[1]), 0.0)
 
 
 def _stamp(
@@ -178,32 +202,28 @@ def _stamp(
     pixel: Places,
     mask: Bools,
     mirrored: Bools,
-    copies: Copies,
+    placed: Placed,
     first: NDArray[np.intp],
-    originals: int,
-    *,
-    free: float = FREE,
+    originals: int = 0,
+    inside: Bools | None = None,
 ) -> Extension:
-    """Put every whole element where the picture goes on with it, the right way round; the originals in any case."""
+    """Return a texture that goes on with its elements where they were put, the right way round.
+
+    What no element claims of the picture itself, ``inside``, belongs to it as it is.
+    """
     from scipy.ndimage import label
 
-    places, of, _ = copies
+    (places, of, _), instance, kept, turns = placed
     parts = split_foreground(entry)
-    shape = np.array(entry.mask.shape)
     known = parts.region[pixel[..., 0], pixel[..., 1]] > 0
-    turned = mirrored.any(axis=-1) & known
     # Mirrored elements make room for those that are turned back.
-    instance = np.zeros(mask.shape, np.int32)
-    inside = np.zeros(mask.shape, bool)
-    if originals:
-        inside[tuple(slice(-int(f), -int(f) + int(n)) for f, n in zip(first, shape, strict=True))] = True
-    kept, turns = _place_elements(entry, instance, copies, inside if originals else None, originals, least=free)
+    turned = mirrored.any(axis=-1) & known
     for at, pixels in turns:
         pixel.reshape(-1, 2)[at] = pixels
         mirrored.reshape(-1, 2)[at] = False
     stray = (turned | known | mask) & (instance == 0)
-    # What no element claims belongs to the picture as it is.
-    stray &= ~inside
+    if inside is not None:
+        stray &= ~inside
     if not kept:
         raise InvalidInput("a: the border cuts every element; splicing needs some that are whole")
     chosen = np.array(kept)
@@ -228,71 +248,66 @@ def _stamp(
 
 def _place_elements(
     entry: Elements,
-    instance: Labels,
+    shape: tuple[int, ...],
     copies: Copies,
-    inside: Bools | None,
+    inside: Bools | None = None,
     originals: int = 0,
     *,
     least: float = FREE,
-) -> tuple[list[int], list[tuple[NDArray[np.intp], NDArray[np.intp]]]]:
-    """Write into the pixels of each element its number, if it has room: the originals always, others not ``inside``.
+) -> Placed:
+    """Give the pixels of each element its number, if it has room: the originals always, others not ``inside``.
 
-    Returns
-    -------
-    kept : list of int
-        Which of the copies these are.
-    turns : list of (n) and (n, 2) intp
-        Of those that are turned back, where they lie and the pixels that they show.
-
+    Of those that are turned back, where they lie and the pixels that they show come last. Places of those that are kept are
+    then where their centres are in whole pixels from the texture's own.
     """
     places, of, flips = copies
     parts = split_foreground(entry)
-    limits, width = np.array(instance.shape), instance.shape[1]
+    instance = np.zeros(shape, np.int32)
+    limits, width = np.array(shape), shape[1]
     spots, centres = _round_half_up(places), _round_half_up(parts.points)
     wanted = parts.whole[of]
     wanted[:originals] = True
-    shapes, reach = _list_shapes(entry, parts, np.unique(of[wanted]).tolist(), centres, width)
+    shown, away, reach = _list_shapes(entry)
+    # All copies of an element share how far its pixels lie from its centre, in an array of that width.
+    steps = {i: away[i] @ (width, 1) for i in np.unique(of[wanted]).tolist()}
     beyond = ((spots + reach[0, of] < 0) | (spots + reach[1, of] >= limits)).any(axis=1)
     beyond[:originals] = False
     number = instance.reshape(-1)
-    kept, turns = [], []
+    kept: list[int] = []
+    turns: list[tuple[NDArray[np.intp], NDArray[np.intp]]] = []
     for k in np.flatnonzero(wanted & ~beyond).tolist():
         i = int(of[k])
-        pixels, steps = shapes[i]
-        at = steps + (int(spots[k, 0]) * width + int(spots[k, 1]))
+        at = steps[i] + (int(spots[k, 0]) * width + int(spots[k, 1]))
         free = number.take(at) == 0
         crowded = np.count_nonzero(free) < least * len(free)
         if k >= originals and (crowded or (inside is not None and inside.take(at).any())):
             continue
         kept.append(k)
-        # Where its centre is in whole pixels from the texture's own.
         places[k] = spots[k] - centres[i] + parts.points[i]
         number[at[free]] = len(kept)
         if flips[k].any():
-            turns.append((at[free], pixels[free]))
-    return kept, turns
+            turns.append((at[free], shown[i][free]))
+    return copies, instance, kept, turns
 
 
-def _list_shapes(
-    entry: Elements, parts: Foreground, wanted: list[int], centres: NDArray[np.intp], width: int
-) -> tuple[dict[int, tuple[NDArray[np.intp], NDArray[np.intp]]], NDArray[np.intp]]:
-    """Return of each wanted element its pixels and how far they lie from its centre, in an array of that width.
-
-    And how far the first and the last of them do, (2, elements, 2). All copies of an element share that.
-    """
-    shape = np.array(entry.mask.shape)
-    order = np.argsort(parts.region, axis=None, kind="stable")
-    begin = np.searchsorted(parts.region.ravel()[order], np.arange(len(parts.points) + 2))
-    shapes: dict[int, tuple[NDArray[np.intp], NDArray[np.intp]]] = {}
-    reach = np.zeros((2, len(parts.points), 2), np.intp)
-    for i in wanted:
-        pixels = np.stack(np.divmod(order[begin[i + 1] : begin[i + 2]], shape[1]), axis=-1)
-        away = pixels - centres[i]
-        away -= np.where(entry.wrap, np.rint(away / shape).astype(np.intp) * shape, 0)
-        shapes[i] = pixels, away @ (width, 1)
-        if len(away):
-            reach[:, i] = away.min(axis=0), away.max(axis=0)
-    return shapes, reach
+@remember(4)
+def _list_shapes(entry: Elements) -> tuple[list[NDArray[np.intp]], list[NDArray[np.intp]], NDArray[np.intp]]:
+    """Return of each element its pixels, how far they lie from its centre, and the first and the last of that, (2, n, 2)."""
+    parts, shape = split_foreground(entry), np.array(entry.mask.shape)
+    centres, count = _round_half_up(parts.points), len(parts.points)
+    at = np.flatnonzero(parts.region)
+    owner = parts.region.take(at)
+    order = np.argsort(owner, kind="stable")
+    pixels = np.stack(np.divmod(at[order], shape[1]), axis=-1)
+    away = pixels - centres[owner[order] - 1]
+    away -= np.where(entry.wrap, np.rint(away / shape).astype(np.intp) * shape, 0)
+    ends = np.cumsum(np.bincount(owner, minlength=count + 1)[1:])
+    reach = np.zeros((2, count, 2), np.intp)
+    parted = [np.split(values, ends[:-1]) for values in (pixels, away)]
+    for i, own in enumerate(parted[1]):
+        if len(own):
+            reach[:, i] = own.min(axis=0), own.max(axis=0)
+    return parted[0], parted[1], reach
 
 
 def _round_half_up(place: Points) -> NDArray[np.intp]:
