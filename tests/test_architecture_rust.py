@@ -19,6 +19,7 @@ WITHIN = {
         "optimize": {"appearance", "guide"},
         "coherence": {"appearance"},
         "stitcher": {"guide"},
+        "quilt": {"stitcher"},
     },
 }
 """What modules use of their own layer. The foundation and the bindings are of one piece."""

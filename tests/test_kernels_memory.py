@@ -32,6 +32,7 @@ KERNELS = {
     "jitter": "_rust.jitter(start, region, none, 4096, 1, 0)",
     "stitcher's source": "_rust.Stitcher(flat, (side, side), (False, False), numbers, depth, bytes_, no_costs)",
     "stitcher": "source.stitch(half, still, patch, weights, (0.1, 4.0, 1.0), 1, none, no_places, none, None, None)",
+    "quilt": "_rust.quilt([(image, None)], pixels, patches_of, patched, begin, [], None)",
     "stitcher of samples": "_rust.PatchSamples(flat, np.zeros(side * side, np.float32), (0.1, 0.1))",
     "sparse": "_rust.Cholesky(*matrix, 1 << 32)",
     "gather": "_rust.gather([image], (False, False), np.zeros(0, np.uint16), points, 'linear')",
@@ -73,6 +74,10 @@ sets = _rust.similar(looks, 2, 7, 8, None)
 source = _rust.Stitcher(image[:96, :96].reshape(-1, 3), (96, 96), (False, False), numbers, depth, bytes_, no_costs)
 patch, weights = (64.0, 0.2, 1, 0.0, False, False), (0.1, 1.0, 1.0, 0.15, 0.5, 0.0, 0.0, 0.03, 0.5)
 corner, corners = np.zeros((1, 2), np.int64), np.array([(0, 0), (0, side - 1), (side - 1, 0), (side - 1, side - 1.0)])
+many = side * side
+pixels = (np.zeros(many, np.uint16), points, np.zeros(many, bool), np.zeros(many, np.uint32))
+patches_of, begin = _rust.PatchSamples(flat, np.zeros(many, np.float32), (0.1, 0.1)), (((0, 64, 0, 0),) * 2, 0, (0, 0))
+patched = ((side, side), (False, False), (64, 64), False, None)
 matrix = [each for each in _list_entries(diags_array([-1.0, 4.1, -1.0], offsets=[-128, 0, 128], shape=(side * 64,) * 2))]
 clean = (TexrsError, MemoryError)
 _rust.poisson(image[:16, :16].copy(), None, 0.01, ('free', 'free'), None, None)

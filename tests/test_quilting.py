@@ -8,12 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import texrs
+from reference import quilting as reference
 from texrs import SourceMap, samples
 from texrs.blending import measure_visibility
 from texrs.quilting import Picture, quilt
-from texrs.quilting._finder import halve
 from texrs.quilting._quilt import find_calm_lines
-from texrs.quilting._windows import Span, Window, divide_axis, plan_waves
+from texrs.quilting._windows import divide_axis, plan_waves
 
 
 def picture(image: np.ndarray, *, mirrored: bool = False) -> Picture:
@@ -136,23 +136,29 @@ def test_a_texture_smaller_than_a_patch_is_stitched_around(pebbles: np.ndarray, 
         assert (ends <= 1).mean() > 0.5
 
 
-@given(start=st.integers(0, 60), extent=st.integers(1, 64), wrap=st.booleans())
-def test_surroundings_are_the_pixels_beside(start: int, extent: int, wrap: bool) -> None:
-    length = 64
-    if not wrap:
-        start = min(start, length - extent)
-    span = Span(start, extent, 0, 0)
-    window = Window(span, Span(0, 1, 0, 0))
-    around = window.surround((length, 1), (wrap, False))
-    lines = np.arange(length)[:, np.newaxis]
-    seen = lines[around.index][:, 0].tolist()
-    own = [(start + i) % length for i in range(extent)]
-    assert seen[around.inner[0]] == own
-    others = {(start - 1) % length, (start + extent) % length} - set(own) if wrap else {start - 1, start + extent}
-    expected = set(own) | {line for line in others if 0 <= line < length}
-    assert around.closed[0] == (wrap and extent + 2 > length)
-    assert set(seen) == (set(own) if around.closed[0] else expected)
-    assert len(seen) == len(set(seen))
+@pytest.mark.parametrize("wrap", [(True, True), (True, False), (False, False)])
+@pytest.mark.parametrize("size", [(40, 41), (100, 130)])
+@pytest.mark.parametrize("kind", ["plain", "mirrored", "regular", "fixed", "waves"])
+def test_it_is_that_of_the_slow_twin(
+    monkeypatch: pytest.MonkeyPatch, wrap: tuple[bool, bool], size: tuple[int, int], kind: str
+) -> None:
+    image = samples.bricks((96, 144)).image if kind == "regular" else samples.pebbles((96, 144)).image
+    pictures, asked = [picture(image)], {"patch": 36, "overlap": 11, "wrap": wrap, "size": size}
+    if kind == "mirrored":
+        pictures.append(picture(image, mirrored=True))
+    elif kind == "regular":
+        lattice = np.array([[0.0, 12.0], [24.0, 12.0]])
+        pictures = [Picture(p.colours, p.source, p.depth, True, lattice) for p in pictures]
+    elif kind == "fixed":
+        asked |= {"fixed": 0, "size": (min(size[0], 60), size[1])}
+    elif kind == "waves":
+        monkeypatch.setattr("texrs.quilting.LARGE", 0)
+        asked |= {"size": (100, 260)}
+    found = made(pictures, **asked)
+    monkeypatch.setattr("texrs.quilting.stitch", reference.stitch)
+    expected = made(pictures, **asked)
+    assert (found.coordinates == expected.coordinates).all()
+    assert (found.label == expected.label).all()
 
 
 def test_a_calm_line_is_no_edge() -> None:
@@ -163,11 +169,6 @@ def test_a_calm_line_is_no_edge() -> None:
     assert 20 not in found
     assert min(found) >= 1
     assert max(found) <= 64
-
-
-def test_halve() -> None:
-    image = np.arange(30, dtype=np.float32).reshape(5, 6, 1)
-    assert halve(image)[..., 0].tolist() == [[3.5, 5.5, 7.5], [15.5, 17.5, 19.5]]
 
 
 @given(
@@ -191,14 +192,14 @@ def test_patches_of_a_wave_lie_apart(
     for wave in waves:
         near = np.zeros((height, width), int)
         for window in wave:
-            near[window.surround((height, width), wrap).index] += 1
+            near[reference.surround(window, (height, width), wrap)[0]] += 1
             # All that it says to meet above and before it lies there already.
-            at, known = window.index((height, width)), window.mark_known()
+            at, known = reference.index(window, (height, width)), reference.mark_known(window)
             if window.rows.after == 0:
                 assert covered[at][known].all()
         assert near.max() == 1
         for window in wave:
-            covered[window.index((height, width))] = True
+            covered[reference.index(window, (height, width))] = True
 
 
 def test_waves_are_the_same_for_any_number_of_threads(monkeypatch: pytest.MonkeyPatch, pebbles: np.ndarray) -> None:

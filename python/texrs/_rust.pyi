@@ -26,6 +26,7 @@ __all__ = [
     "place",
     "poisson",
     "poisson_spread",
+    "quilt",
     "seam_cut",
     "seam_labels",
     "seam_strips",
@@ -42,6 +43,8 @@ __all__ = [
 VERSION: Final[str]
 
 _Pasting: TypeAlias = tuple[tuple[int, ...], NDArray[uint32], NDArray[float32], NDArray[bool_], NDArray[bool_]]
+
+_Window: TypeAlias = Sequence[Sequence[int]]
 
 def set_threads(threads: int) -> int: ...
 def philox(counter: tuple[int, int, int, int] | Sequence[int], key: tuple[int, int] | Sequence[int]) -> list[int]: ...
@@ -174,6 +177,15 @@ def merge_regions(
     wrap: Sequence[bool],
     progress: Callable[[float], object] | None,
 ) -> NDArray[int32]: ...
+def quilt(
+    pictures: Sequence[tuple[NDArray[float32], Sequence[Sequence[float]] | None]],
+    pixels: tuple[NDArray[uint16], NDArray[float32], NDArray[bool_], NDArray[uint32]],
+    samples: PatchSamples,
+    options: tuple[Sequence[int], Sequence[bool], Sequence[int], bool, int | None],
+    first: tuple[_Window, int, Sequence[int]],
+    waves: Sequence[Sequence[_Window]],
+    progress: Callable[[float], object] | None,
+) -> tuple[NDArray[uint32], NDArray[uint32]]: ...
 def seam_cut(
     a: NDArray[float32],
     b: NDArray[float32],

@@ -41,6 +41,7 @@
 //! | [`pyramid`] | from one resolution to the next |
 //! | [`optimize`] | coordinates corrected until every window is like one of the exemplar -> `appearance`, `guide` |
 //! | [`stitcher`] | patches pulled through frames, cut where it shows least, healed -> `guide` |
+//! | [`quilt`] | patches of pictures, chosen one by one and cut in -> `stitcher` |
 //! | [`coherence`] | k-coherence: similarity sets, and correction among their candidates -> `appearance` |
 //!
 //! The topmost layer, `bindings`, is the Python module `texrs._rust` (feature `python`).
@@ -51,7 +52,7 @@ mod engine;
 mod foundation;
 mod kernels;
 
-pub use engine::{appearance, blocks, coherence, guide, optimize, pyramid, stitcher};
+pub use engine::{appearance, blocks, coherence, guide, optimize, pyramid, quilt, stitcher};
 pub use foundation::error::{Error, Result};
 pub use foundation::{error, fixed, grid, hash, par, pca};
 pub use kernels::{

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -399,7 +399,7 @@ class Samples:
     """
 
     def __init__(self, colours: Floats, depth: Floats, weights: tuple[float, float]) -> None:
-        self._inner = _rust.PatchSamples(np.ascontiguousarray(colours), np.ascontiguousarray(depth), weights)
+        self.inner: Final = _rust.PatchSamples(np.ascontiguousarray(colours), np.ascontiguousarray(depth), weights)
 
     def judge(self, pasting: Pasting, patches: NDArray[np.uint32]) -> list[float]:
         """Return what the seams of a window cost once each of some patches is cut into it, alone.
@@ -412,9 +412,9 @@ class Samples:
             The sample that each pixel would show; of pixels outside the mask any.
 
         """
-        return self._inner.judge(pasting.pack(), patches.reshape(len(patches), -1))
+        return self.inner.judge(pasting.pack(), patches.reshape(len(patches), -1))
 
     def cut(self, pasting: Pasting, patch: NDArray[np.uint32]) -> tuple[Bools, Floats]:
         """Cut a patch (h, w) into a window: the pixels that take it, and the window's seams as they are then."""
-        take, seams = self._inner.cut(pasting.pack(), patch.reshape(-1))
+        take, seams = self.inner.cut(pasting.pack(), patch.reshape(-1))
         return take.reshape(patch.shape), seams.reshape(*patch.shape, 2)

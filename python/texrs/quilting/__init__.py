@@ -28,10 +28,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from texrs._engine.noise import uniform
-from texrs._threads import SideBySide
-from texrs.kernels.patch_search import Match
-from texrs.quilting._finder import Finder
-from texrs.quilting._quilt import Picture, Quilt
+from texrs.quilting._quilt import Picture, finish, stitch
 from texrs.quilting._windows import divide_axis, plan_waves
 from texrs.source_map import SourceMap
 
@@ -82,21 +79,15 @@ def quilt(
     sides = [min(p.colours.shape[axis] for p in pictures) for axis in range(2)]
     rows, columns = (divide_axis(size[a], sides[a], min(patch, sides[a]), overlap, wrap[a]) for a in range(2))
     shape = (rows[0].extent, columns[0].extent)
-    finder = Finder([p.colours for p in pictures], shape, fixed)
-    canvas = Quilt(pictures, size, wrap)
-    first, *waves = plan_waves(rows, columns, at_once=AT_ONCE if size[0] * size[1] > LARGE else 1)
+    [first], *waves = plan_waves(rows, columns, at_once=AT_ONCE if size[0] * size[1] > LARGE else 1)
     which = int(uniform(seed, 0, 0, 0, 3) * len(pictures))
     free = [n - m + 1 for n, m in zip(pictures[which].colours.shape, shape, strict=False)]
     row, column = (
-        first[0].corner[axis] if axis == fixed else int(uniform(seed, 1 + axis, 0, 0, 3) * n)
+        first.corner[axis] if axis == fixed else int(uniform(seed, 1 + axis, 0, 0, 3) * n)
         for axis, n in enumerate(free)
     )
-    canvas.lay(first[0], Match(0.0, which, row, column))
-    with SideBySide(AT_ONCE) as beside:
-        for number, wave in enumerate(waves, 1):
-            progress(number / (1 + len(waves)))
-            canvas.paste(wave, finder, beside)
+    place, label = stitch(pictures, size, wrap, fixed, (first, which, (row, column)), waves, progress)
     progress(1.0)
     # A cyclic texture may begin anywhere.
     rolled = {axis: uniform(seed, axis, 0, 0, 6) for axis in range(2) if wrap[axis]}
-    return canvas.finish(rolled)
+    return finish(pictures, place, label, rolled)

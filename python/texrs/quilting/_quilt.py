@@ -1,44 +1,26 @@
-"""A quilt in the making: patches cut in one by one, the one that shows and repeats the least."""
+"""What a quilt is made from, and what becomes of it: the patches themselves are chosen and cut in by compiled code."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._engine.stitcher import FREE, Pasting, Samples
-from texrs._threads import SideBySide
+from texrs import _rust
+from texrs._engine.stitcher import Samples
 from texrs._typing import Bools, Floats
-from texrs.kernels.patch_search import Match
-from texrs.quilting._finder import Finder
-from texrs.quilting._windows import Surroundings, Window
+from texrs.quilting._windows import Window
 from texrs.source_map import SourceMap
 from texrs.source_map._pixels import Pixels
 
-POOL = (48, 96)
-"""Matches that are looked at for what they repeat; more on a lattice, where many are out of step."""
-CANDIDATES = 3
-"""Matches of the pool that are cut in."""
-REPETITION, GOOD, ON_LATTICE = 10.0, 0.1, 2.5
-"""Charge for showing what all other patches show, in units of a match that is better than all but this share: where few
-places fit, as between things on plain ground, others would tear what they are put on. And on a lattice, where all places are
-much alike and must meet exactly, in units of a typical match."""
 COLOUR, DEPTH = 1.0, 1.0
 """What a seam costs: squared differences of the colours, and the depth inside of elements of the pixels that meet there."""
-CONTINUATION = 2.0
-"""Charge for going on with the piece of the exemplar that lies there already, in units of a typical match."""
-IN_STEP, AS_WELL = 0.15, 1.3
-"""How far a patch of what repeats on a lattice may be out of step, in shifts of the lattice, and by what factor a match that is
-in step may be worse: where a lattice is only about regular, what fits is more than what is in step."""
 CELL = 8
-"""Use is counted in cells of so many pixels a side, and overlaps are compared on as many rows and columns."""
+"""Use is counted in cells of so many pixels a side."""
 CALM, RUN = 64, 9
 """Lines that are looked at for a calm one; pixels of a line that make a visible piece of an edge."""
-MIRRORED, NEAR = 0.02, 8.0
-"""Share of its overlap on which a patch may show the mirror image of what lies there, within so many pixels: a cell, or the
-axis of a mirror could lie between two lines that are compared."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,147 +38,83 @@ class Picture:
     """(2, 2): the lattice, a shift (row, column) in each column, where the texture has it too."""
 
 
-class Quilt:
-    """The texture in the making.
+def stitch(
+    pictures: Sequence[Picture],
+    size: tuple[int, int],
+    wrap: tuple[bool, bool],
+    fixed: int | None,
+    first: tuple[Window, int, tuple[int, int]],
+    waves: Sequence[Sequence[Window]],
+    progress: Callable[[float], object],
+) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
+    """Fill a texture with patches: one laid whole, then one cut into each window.
 
     The pixels of all pictures stand in one row; what a texture shows at a pixel is a place in that row.
+
+    Parameters
+    ----------
+    pictures, size, wrap, fixed
+        As for `texrs.quilting.quilt`.
+    first : (Window, int, (int, int))
+        A window, and the picture and the place in it whose patch it shows.
+    waves : sequence of sequences of Window
+        The others: those of a wave lie apart, and are chosen side by side.
+    progress : callable
+        Called with the share that is done.
+
+    Returns
+    -------
+    place, label : (H, W) uint32
+        The place in the row that each pixel shows, and the number of its patch.
+
     """
+    channels = pictures[0].colours.shape[2]
+    pixels = Pixels.chain([p.source for p in pictures])
+    colours = np.concatenate([p.colours.reshape(-1, channels) for p in pictures])
+    depth = np.concatenate([p.depth.ravel() for p in pictures])
+    hands = np.concatenate([mark_hands(p.source).ravel() for p in pictures])
+    cells = np.concatenate([number_cells(p.source).ravel() for p in pictures])
+    window, picture, corner = first
+    return _rust.quilt(
+        [
+            (np.ascontiguousarray(p.colours), None if p.lattice is None else np.asarray(p.lattice, float).tolist())
+            for p in pictures
+        ],
+        (
+            np.ascontiguousarray(pixels.exemplar),
+            np.ascontiguousarray(pixels.coordinates),
+            np.ascontiguousarray(hands),
+            cells.astype(np.uint32),
+        ),
+        Samples(colours, depth, (COLOUR, DEPTH)).inner,
+        (size, wrap, window.shape, pictures[0].regular, fixed),
+        (window.pack(), picture, corner),
+        [[each.pack() for each in wave] for wave in waves],
+        progress,
+    )
 
-    def __init__(self, pictures: Sequence[Picture], size: tuple[int, int], wrap: tuple[bool, bool]) -> None:
-        channels = pictures[0].colours.shape[2]
-        self.pictures = pictures
-        self.size = size
-        self.wrap = wrap
-        self.place = np.full(size, FREE, np.uint32)
-        self.label = np.zeros(size, np.uint32)
-        self.seams = np.zeros((*size, 2), np.float32)
-        self.pastes = 0
-        self.pixels = Pixels.chain([p.source for p in pictures])
-        self.all_colours = np.concatenate([p.colours.reshape(-1, channels) for p in pictures])
-        depth = np.concatenate([p.depth.ravel() for p in pictures])
-        self.samples = Samples(self.all_colours, depth, (COLOUR, DEPTH))
-        self.all_hands = np.concatenate([mark_hands(p.source).ravel() for p in pictures])
-        self.cells = np.concatenate([number_cells(p.source).ravel() for p in pictures])
-        self.used = np.zeros(int(self.cells.max()) + 1)
-        self.steps: dict[int, NDArray[np.float64]] = {}
 
-    def list_places(self, matches: Sequence[Match], window: Window, step: int = 1) -> NDArray[np.uint32]:
-        """Return the places in the row that matches copy, or of each ``step``-th row and column: (matches, rows, columns)."""
-        which = [m.exemplar for m in matches]
-        rows, columns = (np.arange(0, n, step) for n in window.shape)
-        width, first = self.pixels.shapes[which, 1], self.pixels.first[which]
-        corner = first + np.array([m.row for m in matches]) * width + [m.column for m in matches]
-        lines = corner[:, np.newaxis] + np.multiply.outer(width, rows)
-        return np.asarray(lines[..., np.newaxis] + columns, np.uint32)
+def finish(
+    pictures: Sequence[Picture],
+    place: NDArray[np.uint32],
+    label: NDArray[np.uint32],
+    rolled: Mapping[int, float],
+) -> SourceMap:
+    """Return the map into the exemplars; the arrays are used up.
 
-    def paste(self, windows: Sequence[Window], finder: Finder, beside: SideBySide) -> None:
-        """Cut a patch into each of some windows that lie apart: each is chosen as if it were the first of them."""
-        chosen = beside.do(lambda window, _: self.choose(window, finder), windows)
-        for window, (match, around, taken, seams) in zip(windows, chosen, strict=True):
-            self.seams[around.index] = seams
-            self.lay(window, match, taken[around.inner])
-
-    def choose(self, window: Window, finder: Finder) -> tuple[Match, Surroundings, Bools, Floats]:
-        """Cut the most promising matches into what is there, and return the one that shows and repeats the least.
-
-        With it, the window and what is beside it, which pixels of these take the patch, and the seams that there are then.
-        """
-        old, known = self.place[window.index(self.size)], window.mark_known()
-        colours = self.all_colours.take(old, axis=0, mode="clip")
-        regular = self.pictures[0].regular
-        pool = finder.find_pool(colours, known, POOL[regular], window.corner)
-        shown = self.list_places(pool, window, CELL)
-        good, usual = np.quantile([m.cost for m in pool], (GOOD, 0.5)).tolist()
-        usual = usual or 1.0
-        charges = (ON_LATTICE if regular else REPETITION * (good or usual) / usual) * self.measure_repetition(shown)
-        continued, mirrored = self.measure_likeness(shown, known, old)
-        charges += CONTINUATION * continued
-        free = np.flatnonzero(mirrored <= MIRRORED) if (mirrored <= MIRRORED).any() else np.arange(len(pool))
-        free = self.keep_in_step(pool, free, window)
-        best = sorted(free.tolist(), key=lambda k: pool[k].cost / usual + charges[k])[:CANDIDATES]
-        exact = finder.refine([pool[k] for k in best], colours, known)
-        around = window.surround(self.size, self.wrap)
-        pasting = self.open_pasting(window, around)
-        patches = np.zeros((len(best), *pasting.shown.shape), np.uint32)
-        patches[:, *around.inner] = self.list_places(exact, window)
-        seams = self.samples.judge(pasting, patches)
-        least = float(np.median(seams)) or 1.0
-        if regular:
-            # A seam through plain ground would not tell a place that is out of step.
-            charges += [m.cost / usual for m in pool]
-        chosen = min(range(len(best)), key=lambda i: seams[i] / least + charges[best[i]])
-        return exact[chosen], around, *self.samples.cut(pasting, patches[chosen])
-
-    def lay(self, window: Window, match: Match, mask: Bools | None = None) -> None:
-        """Lay a patch, or what of it a mask marks."""
-        at, [places] = window.index(self.size), self.list_places([match], window)
-        self.steps.setdefault(match.exemplar, np.subtract(window.corner, (match.row, match.column)).astype(np.float64))
-        self.place[at] = places if mask is None else np.where(mask, places, self.place[at])
-        self.label[at] = self.pastes if mask is None else np.where(mask, np.uint32(self.pastes), self.label[at])
-        self.used[np.unique(self.cells[places[::CELL, ::CELL]])] += 1
-        self.pastes += 1
-
-    def open_pasting(self, window: Window, around: Surroundings) -> Pasting:
-        """Return what lies where a patch is to lie and beside it, and what it may cover of it."""
-        shown = self.place[around.index]
-        mask, core = np.zeros(shown.shape, bool), np.zeros(shown.shape, bool)
-        mask[around.inner], core[around.inner] = True, window.mark_core()
-        for axis in np.flatnonzero(around.closed):
-            # It meets itself there, so its ends stay what they are.
-            for line in (0, -1):
-                ends = np.moveaxis(mask, axis, 0)[line]
-                ends &= np.moveaxis(shown, axis, 0)[line] == FREE
-        return Pasting(shown, self.seams[around.index], mask, core)
-
-    def measure_likeness(
-        self, shown: NDArray[np.uint32], known: Bools, old: NDArray[np.uint32]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the shares of its overlap on which each match shows what lies there, and the mirror image of it."""
-        seen = known[::CELL, ::CELL]
-        there, here = old[::CELL, ::CELL][seen], shown[:, seen]
-        near = self.pixels.exemplar[here] == self.pixels.exemplar[there]
-        for axis in range(2):
-            place = self.pixels.coordinates[:, axis]
-            near &= np.abs(place[here] - place[there]) <= NEAR
-        turned = self.all_hands[here] != self.all_hands[there]
-        return (near & ~turned).mean(axis=1), (near & turned).mean(axis=1)
-
-    def keep_in_step(self, pool: Sequence[Match], free: NDArray[np.intp], window: Window) -> NDArray[np.intp]:
-        """Return those of some matches that are in step with what their pictures show elsewhere, if these match as well."""
-        away = np.zeros(len(free))
-        for k, m in enumerate(pool[i] for i in free.tolist()):
-            lattice = self.pictures[m.exemplar].lattice
-            if lattice is not None and m.exemplar in self.steps:
-                moved = np.subtract(window.corner, (m.row, m.column)) - self.steps[m.exemplar]
-                times = np.linalg.solve(lattice, moved)
-                # The nearest shift is one of the four around.
-                around = np.floor(times)[:, np.newaxis] + [[0, 0, 1, 1], [0, 1, 0, 1]]
-                rest = np.linalg.norm(moved[:, np.newaxis] - lattice @ around, axis=0).min()
-                away[k] = rest / np.linalg.norm(lattice, axis=0).min()
-        kept = free[away <= IN_STEP]
-        least, least_kept = (min((pool[i].cost for i in rows.tolist()), default=np.inf) for rows in (free, kept))
-        return kept if least_kept <= AS_WELL * least else free
-
-    def measure_repetition(self, shown: NDArray[np.uint32]) -> NDArray[np.float64]:
-        """Return how much of each match others show: 0 nothing, 1 what they all do."""
-        shares: NDArray[np.float64] = self.used[self.cells[shown]].mean(axis=(1, 2)) / self.pastes
-        return shares
-
-    def finish(self, rolled: Mapping[int, float]) -> SourceMap:
-        """Return the map into the exemplars; the quilt is used up.
-
-        The axes in ``rolled`` begin at one of the calm lines, so that the border of the texture does not follow an edge: at
-        the first one for 0, and at the last for 1.
-        """
-        del self.seams
-        for axis, chance in rolled.items():
-            lines = np.moveaxis(self.place, axis, 0)
-            found = find_calm_lines(self.all_colours[lines[: CALM + 1]])
-            start = found[int(chance * len(found))]
-            # One after the other, so that no more than one is there twice.
-            self.place = np.roll(self.place, -start, axis)
-            self.label = np.roll(self.label, -start, axis)
-        return SourceMap.pick([p.source for p in self.pictures], self.place, self.label, overwrite=True)
+    The axes in ``rolled`` begin at one of the calm lines, so that the border of the texture does not follow an edge: at
+    the first one for 0, and at the last for 1.
+    """
+    channels = pictures[0].colours.shape[2]
+    colours = np.concatenate([p.colours.reshape(-1, channels) for p in pictures])
+    for axis, chance in rolled.items():
+        lines = np.moveaxis(place, axis, 0)
+        found = find_calm_lines(colours[lines[: CALM + 1]])
+        start = found[int(chance * len(found))]
+        # One after the other, so that no more than one is there twice.
+        place = np.roll(place, -start, axis)
+        label = np.roll(label, -start, axis)
+    return SourceMap.pick([p.source for p in pictures], place, label, overwrite=True)
 
 
 def number_cells(source: SourceMap) -> NDArray[np.int64]:

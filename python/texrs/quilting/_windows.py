@@ -4,13 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from itertools import pairwise
-from typing import Any
-
-import numpy as np
-
-from texrs._typing import Bools
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,55 +57,9 @@ class Window:
         """Its first row and column."""
         return self.rows.start, self.columns.start
 
-    def mark_known(self) -> Bools:
-        """Mark what other patches cover."""
-        known = np.zeros(self.shape, bool)
-        for axis, span in enumerate((self.rows, self.columns)):
-            lines = np.moveaxis(known, axis, 0)
-            lines[: span.before] = True
-            lines[span.extent - span.after :] = True
-        return known
-
-    def mark_core(self) -> Bools:
-        """Mark the middle, which the patch covers in any case: what no other does, or else where its overlaps meet."""
-        rows, columns = (
-            slice(min(s.before, s.extent - s.after - 1), max(s.before, s.extent - s.after - 1) + 1)
-            for s in (self.rows, self.columns)
-        )
-        core = np.zeros(self.shape, bool)
-        core[rows, columns] = True
-        return core
-
-    def index(self, size: tuple[int, int]) -> Any:
-        """Return the index of its pixels in a texture of this size, around the edges."""
-        return index_box([(s.start, s.start + s.extent) for s in (self.rows, self.columns)], size)
-
-    def surround(self, size: tuple[int, int], wrap: tuple[bool, bool]) -> Surroundings:
-        """Return the patch and the pixels beside it, as far as there are others."""
-        ends, inner, closed = [], [], []
-        for span, length, cyclic in zip((self.rows, self.columns), size, wrap, strict=True):
-            low, high = span.start - 1, span.start + span.extent + 1
-            own = cyclic and high - low > length
-            if own:
-                low, high = low + 1, high - 1
-            elif not cyclic:
-                low, high = max(low, 0), min(high, length)
-            ends.append((low, high))
-            inner.append(slice(span.start - low, span.start - low + span.extent))
-            closed.append(own)
-        return Surroundings(index_box(ends, size), (inner[0], inner[1]), (closed[0], closed[1]))
-
-
-@dataclass(frozen=True, slots=True)
-class Surroundings:
-    """Where a patch lies, with the pixels beside it."""
-
-    index: Any
-    """Of them all in the texture."""
-    inner: tuple[slice, slice]
-    """The patch among them."""
-    closed: tuple[bool, bool]
-    """Axes around which it goes, so that beside it there is only itself."""
+    def pack(self) -> tuple[tuple[int, int, int, int], tuple[int, int, int, int]]:
+        """Return its spans as plain numbers."""
+        return astuple(self.rows), astuple(self.columns)
 
 
 def plan_waves(rows: Sequence[Span], columns: Sequence[Span], at_once: int) -> list[list[Window]]:
@@ -137,10 +86,3 @@ def plan_waves(rows: Sequence[Span], columns: Sequence[Span], at_once: int) -> l
         for time in range(len(columns) + 2 * (len(band) - 1)):
             waves.append([Window(r, columns[time - 2 * k]) for k, r in band if 0 <= time - 2 * k < len(columns)])
     return waves
-
-
-def index_box(ends: Sequence[tuple[int, int]], size: tuple[int, int]) -> Any:
-    """Return the index of a box in a texture of this size, around the edges."""
-    if all(low >= 0 and high <= n for (low, high), n in zip(ends, size, strict=True)):
-        return tuple(slice(low, high) for low, high in ends)
-    return np.ix_(*(np.arange(low, high) % n for (low, high), n in zip(ends, size, strict=True)))

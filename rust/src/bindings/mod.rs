@@ -13,6 +13,7 @@ mod ncc;
 mod nearby;
 mod patch_search;
 mod poisson;
+mod quilt;
 mod regions;
 mod seam;
 mod smooth;
@@ -141,6 +142,8 @@ mod _rust {
     use super::patch_search::PatchIndex;
     #[pymodule_export]
     use super::poisson::{poisson, poisson_spread};
+    #[pymodule_export]
+    use super::quilt::quilt;
     #[pymodule_export]
     use super::regions::merge_regions;
     #[pymodule_export]

@@ -338,7 +338,7 @@ type PyReadonlyArray3In<'py> = numpy::PyReadonlyArray3<'py, i16>;
 
 /// Samples that patches are cut from, in a row.
 #[pyclass(frozen)]
-pub(super) struct PatchSamples(Samples);
+pub(super) struct PatchSamples(pub(super) Samples);
 
 /// What a window shows, the seams of it, the points that a patch covers, and those that must take it.
 type PastingIn<'py> = (

@@ -6,6 +6,7 @@ pub mod coherence;
 pub mod guide;
 pub mod optimize;
 pub mod pyramid;
+pub mod quilt;
 pub mod stitcher;
 
 #[cfg(test)]

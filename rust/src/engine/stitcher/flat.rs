@@ -4,7 +4,7 @@
 //! sample.
 
 use super::canvas::{FREE, Window};
-use super::cut::{Cutter, Proposal};
+use super::cut::{Cutter, Cutting, Proposal};
 use super::source::Source;
 use super::view::View;
 use super::weights::Weights;
@@ -97,6 +97,49 @@ impl Samples {
         values.into_iter().collect()
     }
 
+    /// How many samples there are.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// Cuts that one of some patches into a window which is chosen by what the seams would cost with each, as
+    /// [`Self::judge`] says; returns its number too.
+    ///
+    /// # Errors
+    /// As of [`Self::judge`].
+    pub fn cut_best(
+        &self,
+        pasting: &Pasting<'_>,
+        patches: &[&[u32]],
+        choose: impl FnOnce(&[f64]) -> usize,
+        monitor: &Monitor,
+    ) -> Result<(usize, Pasted)> {
+        let (window, view) = self.open(pasting)?;
+        let cutter = self.cutter();
+        let [judged, last] = [JUDGED, CUT].map(|sizes| side(&window, sizes));
+        let tried = par::map(patches.len(), |k| {
+            let patch = self.propose(pasting, &window, patches[k])?;
+            cutter.cut_between(&view, &patch, judged, monitor)
+        });
+        let mut tried = tried.into_iter().collect::<Result<Vec<_>>>()?;
+        let values: Vec<f64> = tried.iter().map(|cut| cut.value).collect();
+        let chosen = choose(&values);
+        let patch = self.propose(pasting, &window, patches[chosen])?;
+        // Where all cuts are between points, it is made already.
+        let coarse = if judged == last {
+            tried.swap_remove(chosen)
+        } else {
+            cutter.cut_between(&view, &patch, last, monitor)?
+        };
+        let cut = cutter.refine_within(&view, &patch, coarse, REACH, monitor)?;
+        Ok((chosen, paste(pasting, cut)))
+    }
+
     /// Cuts a patch into a window: between any of its points, unless it is very large.
     ///
     /// # Errors
@@ -107,14 +150,7 @@ impl Samples {
         let cutter = self.cutter();
         let coarse = cutter.cut_between(&view, &patch, side(&window, CUT), monitor)?;
         let cut = cutter.refine_within(&view, &patch, coarse, REACH, monitor)?;
-        let mut seams = pasting.seams.to_vec();
-        for (i, axis, cost) in cut.seams {
-            seams[i as usize][usize::from(axis)] = cost;
-        }
-        Ok(Pasted {
-            take: cut.take,
-            seams,
-        })
+        Ok(paste(pasting, cut))
     }
 
     fn cutter(&self) -> Cutter<'_, 2> {
@@ -198,6 +234,18 @@ impl Samples {
                 self.count
             ),
         ))
+    }
+}
+
+/// What a cut makes of a window.
+fn paste(pasting: &Pasting<'_>, cut: Cutting<2>) -> Pasted {
+    let mut seams = pasting.seams.to_vec();
+    for (i, axis, cost) in cut.seams {
+        seams[i as usize][usize::from(axis)] = cost;
+    }
+    Pasted {
+        take: cut.take,
+        seams,
     }
 }
 

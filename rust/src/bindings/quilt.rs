@@ -1,0 +1,86 @@
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
+    PyUntypedArrayMethods,
+};
+use pyo3::prelude::*;
+
+use super::stitcher::PatchSamples;
+use super::{grouped, run};
+use crate::engine::quilt::{Options, Picture, Pixels, Quilt, Span, Window};
+use crate::foundation::memory;
+
+/// Colours, and the lattice.
+type PictureIn<'py> = (PyReadonlyArray3<'py, f32>, Option<[[f64; 2]; 2]>);
+/// Exemplar, coordinates, hand and cell of all pixels.
+type PixelsIn<'py> = (
+    PyReadonlyArray1<'py, u16>,
+    PyReadonlyArray2<'py, f32>,
+    PyReadonlyArray1<'py, bool>,
+    PyReadonlyArray1<'py, u32>,
+);
+/// Size, wrap, patch, whether it is regular, and the fixed axis.
+type OptionsIn = ([usize; 2], [bool; 2], [usize; 2], bool, Option<usize>);
+/// Start, extent, overlap before and after, along rows and columns.
+type WindowIn = [[usize; 4]; 2];
+/// What each pixel shows, and of which patch.
+type QuiltOut<'py> = (Bound<'py, PyArray2<u32>>, Bound<'py, PyArray2<u32>>);
+
+/// Patches of pictures stitched into a texture; the first window takes the patch at (picture, row, column).
+#[pyfunction]
+#[allow(clippy::too_many_arguments)] // the arguments of the Python function
+pub(super) fn quilt<'py>(
+    py: Python<'py>,
+    pictures: Vec<PictureIn<'py>>,
+    pixels: PixelsIn<'py>,
+    samples: PyRef<'py, PatchSamples>,
+    options: OptionsIn,
+    first: (WindowIn, usize, [usize; 2]),
+    waves: Vec<Vec<WindowIn>>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<QuiltOut<'py>> {
+    let mut all = Vec::with_capacity(pictures.len());
+    for (colours, lattice) in &pictures {
+        all.push(Picture {
+            colours: memory::copied("pictures", colours.as_slice()?)?,
+            shape: [colours.shape()[0], colours.shape()[1]],
+            lattice: *lattice,
+        });
+    }
+    let (exemplar, coordinates, hands, cells) = &pixels;
+    let pixels = Pixels {
+        exemplar: memory::copied("pixels", exemplar.as_slice()?)?,
+        coordinates: memory::copied("pixels", grouped("pixels", coordinates.as_slice()?)?)?,
+        hands: memory::copied("pixels", hands.as_slice()?)?,
+        cells: memory::copied("pixels", cells.as_slice()?)?,
+    };
+    let (size, wrap, patch, regular, fixed) = options;
+    let options = Options {
+        size,
+        wrap,
+        patch,
+        regular,
+        fixed,
+    };
+    let span = |[start, extent, before, after]: [usize; 4]| Span {
+        start,
+        extent,
+        before,
+        after,
+    };
+    let window = |window: WindowIn| Window(window.map(span));
+    let waves: Vec<Vec<Window>> = waves
+        .into_iter()
+        .map(|wave| wave.into_iter().map(window).collect())
+        .collect();
+    let samples = &samples.0;
+    let (place, label) = run(py, progress, |monitor| {
+        let mut quilt = Quilt::new(all, pixels, samples, options)?;
+        quilt.lay_first(&window(first.0), first.1, first.2)?;
+        quilt.paste(&waves, monitor)?;
+        Ok(quilt.into_map())
+    })?;
+    Ok((
+        PyArray1::from_vec(py, place).reshape(size)?,
+        PyArray1::from_vec(py, label).reshape(size)?,
+    ))
+}

@@ -1,0 +1,145 @@
+//! Where patches lie.
+
+/// The part of an axis that a patch covers, and its overlaps with patches that lie there already.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Span {
+    /// The first point.
+    pub start: usize,
+    /// Points.
+    pub extent: usize,
+    /// Overlap at its beginning.
+    pub before: usize,
+    /// Overlap at its end.
+    pub after: usize,
+}
+
+/// Rows and columns that a patch covers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Window(pub [Span; 2]);
+
+/// A box of a texture; it may reach over the ends of cyclic axes.
+pub(super) struct Box2 {
+    ends: [[i64; 2]; 2],
+}
+
+/// A window and the pixels beside it, as far as there are others.
+pub(super) struct Around {
+    pub bounds: Box2,
+    /// Where the window begins in it.
+    pub inner: [usize; 2],
+    /// Axes around which the window goes, so that beside it there is only itself.
+    closed: [bool; 2],
+}
+
+impl Box2 {
+    pub(super) fn shape(&self) -> [usize; 2] {
+        self.ends.map(|[low, high]| (high - low) as usize)
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.shape().iter().product()
+    }
+
+    /// Its points in a texture of a size, around the edges.
+    pub(super) fn points(&self, size: [usize; 2]) -> impl Iterator<Item = usize> + use<> {
+        let [rows, columns] = self.ends;
+        let around = |i: i64, axis: usize| i.rem_euclid(size[axis] as i64) as usize;
+        let lines: Vec<usize> = (rows[0]..rows[1]).map(|r| around(r, 0) * size[1]).collect();
+        let columns: Vec<usize> = (columns[0]..columns[1]).map(|c| around(c, 1)).collect();
+        lines
+            .into_iter()
+            .flat_map(move |line| columns.clone().into_iter().map(move |c| line + c))
+    }
+}
+
+impl Window {
+    /// Whether it is one of a texture and of its patches.
+    pub(super) fn fits(&self, size: [usize; 2], patch: [usize; 2]) -> bool {
+        (0..2).all(|a| {
+            let span = &self.0[a];
+            span.extent == patch[a]
+                && span.start < size[a]
+                && span.extent <= size[a]
+                && span.before < span.extent
+                && span.after < span.extent
+        })
+    }
+
+    pub(super) fn corner(&self) -> [usize; 2] {
+        self.0.map(|span| span.start)
+    }
+
+    pub(super) fn shape(&self) -> [usize; 2] {
+        self.0.map(|span| span.extent)
+    }
+
+    pub(super) fn bounds(&self) -> Box2 {
+        Box2 {
+            ends: self
+                .0
+                .map(|s| [s.start as i64, (s.start + s.extent) as i64]),
+        }
+    }
+
+    /// What other patches cover.
+    pub(super) fn known(&self) -> Vec<bool> {
+        let [rows, columns] = self.0.map(|s| {
+            let line = move |i: usize| i < s.before || i >= s.extent - s.after;
+            (0..s.extent).map(line).collect::<Vec<bool>>()
+        });
+        rows.iter()
+            .flat_map(|&r| columns.iter().map(move |&c| r || c))
+            .collect()
+    }
+
+    /// The middle, which the patch covers in any case: what no other does, or else where its overlaps meet.
+    fn is_core(&self, point: [usize; 2]) -> bool {
+        (0..2).all(|a| {
+            let s = &self.0[a];
+            let end = (s.extent - s.after).saturating_sub(1);
+            (s.before.min(end)..=s.before.max(end)).contains(&point[a])
+        })
+    }
+
+    /// With the pixels beside it.
+    pub(super) fn around(&self, size: [usize; 2], wrap: [bool; 2]) -> Around {
+        let mut around = Around {
+            bounds: self.bounds(),
+            inner: [0; 2],
+            closed: [false; 2],
+        };
+        for axis in 0..2 {
+            let [low, high] = &mut around.bounds.ends[axis];
+            let (start, length) = (*low, size[axis] as i64);
+            around.closed[axis] = wrap[axis] && *high - *low + 2 > length;
+            if around.closed[axis] {
+                continue;
+            }
+            (*low, *high) = (*low - 1, *high + 1);
+            if !wrap[axis] {
+                (*low, *high) = ((*low).max(0), (*high).min(length));
+            }
+            around.inner[axis] = (start - *low) as usize;
+        }
+        around
+    }
+}
+
+impl Around {
+    /// What the patch of a window covers of it, and what it must.
+    pub(super) fn masks(&self, window: &Window, shown: &[u32]) -> (Vec<bool>, Vec<bool>) {
+        let ([rows, columns], width) = (window.shape(), self.bounds.shape()[1]);
+        let (mut mask, mut core) = (vec![false; shown.len()], vec![false; shown.len()]);
+        for r in 0..rows {
+            for c in 0..columns {
+                let i = (self.inner[0] + r) * width + self.inner[1] + c;
+                // Where it goes around it meets itself, so its ends stay what they are.
+                let end = self.closed[0] && (r == 0 || r + 1 == rows)
+                    || self.closed[1] && (c == 0 || c + 1 == columns);
+                mask[i] = !end || shown[i] == super::FREE;
+                core[i] = window.is_core([r, c]);
+            }
+        }
+        (mask, core)
+    }
+}
