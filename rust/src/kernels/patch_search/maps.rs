@@ -206,6 +206,23 @@ impl Index {
             if monitor.check().is_err() {
                 return;
             }
+            if let Some(open) = &self.open[exemplar] {
+                map.costs.resize(map.valid[0] * map.valid[1], f32::INFINITY);
+                let columns = of.shape[1];
+                let first = open.partition_point(|&at| (at as usize) < corner[0] * columns);
+                for &at in &open[first..] {
+                    let (r, c) = (at as usize / columns, at as usize % columns);
+                    if r >= corner[0] + map.valid[0] {
+                        break;
+                    }
+                    if (corner[1]..corner[1] + map.valid[1]).contains(&c) {
+                        let cost = prepared.cost(&of.data, of.shape, [r, c]) / unit;
+                        map.costs[(r - corner[0]) * map.valid[1] + c - corner[1]] = cost as f32;
+                    }
+                }
+                map.update();
+                return;
+            }
             for r in corner[0]..corner[0] + map.valid[0] {
                 for c in corner[1]..corner[1] + map.valid[1] {
                     let allowed = of.allowed.as_ref().is_none_or(|a| a[r * of.shape[1] + c]);
@@ -242,6 +259,12 @@ impl Index {
             return Err(Error::value("patch", message));
         }
         let samples = (p * q * self.channels) as f64;
+        // Of those that are listed no others are scored.
+        let open = self.exemplars.iter().zip(&self.open).map(|(e, open)| {
+            let all = along(e.shape[0], p) * along(e.shape[1], q);
+            open.as_ref().map_or(all, |open| open.len().min(all))
+        });
+        let positions: usize = open.sum();
         if positions as f64 * samples * DIRECT < self.plan.work {
             self.evaluate(query, monitor, workspace)?;
         } else {

@@ -93,6 +93,8 @@ pub struct Index {
     spectra: OnceLock<Spectra>,
     /// The same exemplars at half the resolution, if patches bear it.
     half: OnceLock<Option<Box<Index>>>,
+    /// Of exemplars in which few positions are allowed: these, in their order.
+    open: Vec<Option<Vec<u32>>>,
     mean: Vec<f64>,
     scale: f64,
     workspaces: Pool<Workspace>,
@@ -187,6 +189,7 @@ impl Index {
                     .map(move |corner| Block { exemplar, corner })
             })
             .collect();
+        let open = exemplars.iter().map(list_open).collect();
         Ok(Self {
             spectra: OnceLock::new(),
             half: OnceLock::new(),
@@ -195,6 +198,7 @@ impl Index {
             max_patch,
             plan,
             blocks,
+            open,
             mean,
             scale,
             workspaces: Pool(Mutex::default()),
@@ -427,6 +431,17 @@ fn sum(values: &[f64], of: impl Fn(f64) -> f64) -> f64 {
         }
     }
     lanes.iter().sum::<f64>() + rest.iter().map(|&x| of(x)).sum::<f64>()
+}
+
+/// One position of so many, at most, is allowed where these are listed.
+const FEW: usize = 4;
+
+/// The positions that are allowed in an exemplar, if few are.
+fn list_open(exemplar: &Exemplar) -> Option<Vec<u32>> {
+    let allowed = exemplar.allowed.as_ref()?;
+    let count = allowed.iter().filter(|&&open| open).count();
+    let open = || allowed.iter().enumerate().filter(|(_, open)| **open);
+    (count <= allowed.len() / FEW).then(|| open().map(|(at, _)| at as u32).collect())
 }
 
 /// Mean of each channel, and a power of two above all distances from it.

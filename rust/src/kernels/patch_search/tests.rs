@@ -169,6 +169,34 @@ fn half_the_resolution_keeps_to_what_is_allowed() {
 }
 
 #[test]
+fn few_allowed_positions_are_scored_one_by_one() {
+    // The larger ones take several blocks.
+    let mut all = vec![
+        exemplar([30, 200], 2, 1, 9),
+        exemplar([190, 170], 2, 2, 9),
+        exemplar([20, 20], 2, 3, 9),
+    ];
+    for (e, part) in all.iter_mut().zip([40, 9, 2]) {
+        let noise = noise(e.shape[0] * e.shape[1], 7, part);
+        e.allowed = Some(noise.iter().map(|&x| x == 0.0).collect());
+    }
+    let (patch, weight) = (noise(9 * 7 * 2, 4, 9), noise(9 * 7, 5, 3));
+    let query = Query {
+        patch: &patch,
+        weight: &weight,
+        shape: [9, 7],
+    };
+    let wanted = naive(&all, 2, &query);
+    let index = Index::new(all, 2, [12, 12]).unwrap();
+    assert!(index.open[0].is_some() && index.open[1].is_some() && index.open[2].is_none());
+    let pick = Pick {
+        count: 40,
+        ..Pick::default()
+    };
+    assert_eq!(best(&index, &query, &pick), wanted[..40]);
+}
+
+#[test]
 fn flat_exemplars_and_unknown_patches_give_the_first_positions() {
     let flat = Exemplar {
         data: vec![3.0; 40 * 50],
