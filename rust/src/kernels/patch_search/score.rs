@@ -200,12 +200,20 @@ impl Prepared {
     ) -> f64 {
         #[cfg(target_arch = "x86_64")]
         if let Some(simd) = V3::try_new() {
-            return self.cost_by(data, shape, at, bound, |lanes, patch, weight, samples| {
-                simd.vectorize(
-                    #[inline(always)]
-                    || add_v3(simd, lanes, patch, weight, samples),
-                );
-            });
+            // All rows in one call: of a patch that is little known they are short.
+            return simd.vectorize(
+                #[inline(always)]
+                || {
+                    self.cost_by(
+                        data,
+                        shape,
+                        at,
+                        bound,
+                        #[inline(always)]
+                        |lanes, patch, weight, samples| add_v3(simd, lanes, patch, weight, samples),
+                    )
+                },
+            );
         }
         self.cost_by(data, shape, at, bound, add)
     }
