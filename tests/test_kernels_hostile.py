@@ -28,6 +28,7 @@ from texrs.kernels.mean_shift import mean_shift
 from texrs.kernels.ncc import Correlation
 from texrs.kernels.patch_search import PatchIndex
 from texrs.kernels.poisson import blend, solve, spread
+from texrs.kernels.reconstruction import reconstruct
 from texrs.kernels.regions import merge
 from texrs.kernels.seam import OldSeams, Strip, binary_labels, cut, cut_strip, cut_strips
 from texrs.kernels.sparse import Cholesky
@@ -147,6 +148,10 @@ CALLS: Mapping[str, tuple[Callable[..., object], Arguments]] = {
     "poisson.blend": (
         blend,
         {"source": NOISE, "target": OTHER, "mask": INSIDE, "screening": 0.0, "mixed": True, "wrap": False},
+    ),
+    "reconstruction.reconstruct": (
+        reconstruct,
+        {"seed": NOISE[..., 0] - 0.2, "mask": NOISE[..., 0], "wrap": (True, False)},
     ),
     "regions.merge": (
         merge,

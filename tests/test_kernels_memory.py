@@ -16,6 +16,7 @@ KERNELS = {
     "patch_search": "_rust.PatchIndex([image], [None], (64, 64))",
     "ncc": "_rust.Correlation(image)",
     "mean_shift": "_rust.mean_shift(image, 1, 0.1, 1, 1.0, (False, False), None)",
+    "reconstruction": "_rust.reconstruct(one, one, (False, False))",
     "regions": "_rust.merge_regions(image, 0.2, 0.4, 24, (False, False), None)",
     "seam": "_rust.seam_cut(image, other, whole, whole, None, disc, None, None, 'gradient', (False, False))",
     "labels": "_rust.seam_labels(two, (one, one), (one, one), (False, False))",

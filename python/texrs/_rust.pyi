@@ -27,6 +27,7 @@ __all__ = [
     "poisson",
     "poisson_spread",
     "quilt",
+    "reconstruct",
     "seam_cut",
     "seam_labels",
     "seam_strips",
@@ -186,6 +187,7 @@ def quilt(
     waves: Sequence[Sequence[_Window]],
     progress: Callable[[float], object] | None,
 ) -> tuple[NDArray[uint32], NDArray[uint32]]: ...
+def reconstruct(seed: NDArray[float32], mask: NDArray[float32], wrap: Sequence[bool]) -> NDArray[float32]: ...
 def seam_cut(
     a: NDArray[float32],
     b: NDArray[float32],

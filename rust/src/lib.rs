@@ -29,6 +29,7 @@
 //! | [`nearby`] | sums over what lies near by, of values at few points of an image |
 //! | [`smooth`] | arrays smoothed along their axes, as by a Gaussian |
 //! | [`mean_shift`] | joint spatial and range filtering |
+//! | [`reconstruction`] | grey-scale reconstruction: what is left of an image without its small domes |
 //! | [`regions`] | regions of one colour: the graph-based merge |
 //! | [`sparse`] | symmetric positive definite systems: factored once, solved many times |
 //! | [`image_io`] | 8/16-bit and float image files, with limits |
@@ -56,6 +57,6 @@ pub use engine::{appearance, blocks, coherence, guide, optimize, pyramid, quilt,
 pub use foundation::error::{Error, Result};
 pub use foundation::{error, fixed, grid, hash, par, pca};
 pub use kernels::{
-    complete, distance, gather, image_io, mean_shift, ncc, nearby, patch_search, poisson, regions,
-    seam, smooth, sparse, warp,
+    complete, distance, gather, image_io, mean_shift, ncc, nearby, patch_search, poisson,
+    reconstruction, regions, seam, smooth, sparse, warp,
 };

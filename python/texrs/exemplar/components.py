@@ -14,6 +14,7 @@ import numpy as np
 from texrs._typing import Bools, Floats, Labels
 from texrs.exemplar.merging import join_least_parted
 from texrs.exemplar.shapes import Shapes, list_borders, renumber
+from texrs.kernels.reconstruction import reconstruct
 
 __all__ = ["fill_crescents", "find_elements", "split_touching"]
 
@@ -74,7 +75,7 @@ def _clean_layer(mask: Bools, least: float) -> Bools:
 def split_touching(mask: Bools, crease: Floats) -> Labels:
     """Part the things of a mask that touch each other."""
     from scipy import ndimage
-    from skimage.morphology import local_maxima, reconstruction
+    from skimage.morphology import local_maxima
     from skimage.segmentation import watershed
 
     outline = mask & ~ndimage.binary_erosion(mask, SQUARE, border_value=1)
@@ -92,7 +93,7 @@ def split_touching(mask: Bools, crease: Floats) -> Labels:
     distance = ndimage.gaussian_filter(distance.astype(np.float32), 1.0)
     # Of logarithms, so that a neck is measured by the width of what it joins.
     height = np.log(np.maximum(distance, 0.5))
-    tops = local_maxima(reconstruction(height - np.float32(np.log(NECK)), height)) & mask
+    tops = local_maxima(reconstruct(height - np.float32(np.log(NECK)), height)) & mask
     seeds, count = ndimage.label(tops, SQUARE)
     parts = watershed(-distance, seeds, mask=mask).astype(np.int32)
     peak = np.maximum(_measure_maxima(distance, parts, count), 1e-6)

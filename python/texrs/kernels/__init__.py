@@ -3,9 +3,33 @@
 Each is a noun of the literature and knows nothing of the papers that use it.
 """
 
-from texrs.kernels import complete, gather, mean_shift, ncc, patch_search, poisson, regions, seam, sparse, warp
+from texrs.kernels import (
+    complete,
+    gather,
+    mean_shift,
+    ncc,
+    patch_search,
+    poisson,
+    reconstruction,
+    regions,
+    seam,
+    sparse,
+    warp,
+)
 
-__all__ = ["complete", "gather", "mean_shift", "ncc", "patch_search", "poisson", "regions", "seam", "sparse", "warp"]
+__all__ = [
+    "complete",
+    "gather",
+    "mean_shift",
+    "ncc",
+    "patch_search",
+    "poisson",
+    "reconstruction",
+    "regions",
+    "seam",
+    "sparse",
+    "warp",
+]
 
 
 def __dir__() -> list[str]:

@@ -14,6 +14,7 @@ mod nearby;
 mod patch_search;
 mod poisson;
 mod quilt;
+mod reconstruction;
 mod regions;
 mod seam;
 mod smooth;
@@ -144,6 +145,8 @@ mod _rust {
     use super::poisson::{poisson, poisson_spread};
     #[pymodule_export]
     use super::quilt::quilt;
+    #[pymodule_export]
+    use super::reconstruction::reconstruct;
     #[pymodule_export]
     use super::regions::merge_regions;
     #[pymodule_export]

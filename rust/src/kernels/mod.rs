@@ -9,6 +9,7 @@ pub mod ncc;
 pub mod nearby;
 pub mod patch_search;
 pub mod poisson;
+pub mod reconstruction;
 pub mod regions;
 pub mod seam;
 pub mod smooth;
