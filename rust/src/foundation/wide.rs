@@ -93,6 +93,30 @@ macro_rules! widest_fn {
 }
 pub(crate) use widest_fn;
 
+macro_rules! four {
+    ($($name:ident $instruction:ident $operator:tt),*) => {$(
+        /// Of four numbers each, by one instruction of all x86-64: left to itself, the compiler takes many of them one by one
+        /// where a function has more numbers than there are registers.
+        #[allow(unsafe_code)] // arrays as registers
+        #[inline(always)]
+        pub(crate) fn $name(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
+            #[cfg(target_arch = "x86_64")]
+            {
+                use std::arch::x86_64::{__m128, $instruction};
+                use std::mem::transmute;
+                // SAFETY: registers of 16 bytes, of which any bits are numbers; all x86-64 has these instructions.
+                unsafe {
+                    let [a, b] = [a, b].map(|x| transmute::<[f32; 4], __m128>(x));
+                    transmute::<__m128, [f32; 4]>($instruction(a, b))
+                }
+            }
+            #[cfg(not(target_arch = "x86_64"))]
+            std::array::from_fn(|k| a[k] $operator b[k])
+        }
+    )*};
+}
+four!(add_four _mm_add_ps +, subtract_four _mm_sub_ps -, multiply_four _mm_mul_ps *);
+
 /// Squared differences of eight numbers, added in pairs; those of twelve bits fit. One instruction of all x86-64 multiplies and
 /// adds, which the compiler does not find in plain code: it takes four times as many.
 #[allow(unsafe_code)] // arrays as registers

@@ -4,10 +4,12 @@
 //! None is normalised: there and back multiplies by the number of points. Real lines go two at a time, as one complex line
 //! (Press et al., *Numerical Recipes*, 12.3).
 
+mod lanes;
 mod volumes;
 
 use std::sync::Arc;
 
+pub(crate) use lanes::{LANES, Lanes};
 pub(crate) use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftDirection, FftNum, FftPlanner, FftPlannerScalar};
 pub(crate) use volumes::Volumes;

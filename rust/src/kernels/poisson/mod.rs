@@ -12,6 +12,7 @@ mod multigrid;
 mod sweep;
 mod transform;
 
+use crate::foundation::fft::{LANES, Lanes};
 use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::foundation::wide::wide;
@@ -55,8 +56,8 @@ pub struct Problem<'a> {
     pub domain: Domain<'a>,
 }
 
-/// Rows that a task takes at a time; even, since transforms take two.
-const ROWS: usize = 8;
+/// Rows that a task takes at a time: as many as are transformed at once.
+const ROWS: usize = 2 * LANES;
 
 /// The solution. Without screening, and with nothing fixed, the mean of the image is kept.
 pub fn solve(problem: &Problem<'_>, monitor: &Monitor) -> Result<Vec<f32>> {
@@ -250,27 +251,29 @@ fn rectangle(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) {
     let transform = Transform::new(domain.edges[1], slots);
     monitor.expect((2 * rows + slots) as u64);
 
-    // 1. Transformed along the rows, two at a time.
+    // 1. Transformed along the rows: pairs of them side by side, of which those that lack are nothing.
     par::chunks_mut(inner, ROWS * width, |_, out| {
         if monitor.check().is_err() {
             return;
         }
         let mut scratch = transform::Scratch::default();
-        let mut lines = [vec![0.0; channels * slots], vec![0.0; channels * slots]];
-        for pair in out.chunks_mut(2 * width) {
-            for (line, row) in lines.iter_mut().zip(pair.chunks_exact(width)) {
-                for (c, line) in line.chunks_exact_mut(slots).enumerate() {
-                    let samples = row[left * channels + c..].iter().step_by(channels);
-                    line.iter_mut().zip(samples).for_each(|(l, s)| *l = *s);
-                }
+        let mut lines = [(); 2].map(|()| vec![Lanes::default(); channels * slots]);
+        for (r, row) in out.chunks_exact(width).enumerate() {
+            for (c, line) in lines[r % 2].chunks_exact_mut(slots).enumerate() {
+                let samples = row[left * channels + c..].iter().step_by(channels);
+                line.iter_mut()
+                    .zip(samples)
+                    .for_each(|(l, s)| l.0[r / 2] = *s);
             }
-            let [a, b] = &mut lines;
-            for (a, b) in a.chunks_exact_mut(slots).zip(b.chunks_exact_mut(slots)) {
-                transform.forward(a, b, &mut scratch);
-            }
-            for (line, row) in lines.iter().zip(pair.chunks_exact_mut(width)) {
-                row[..line.len()].copy_from_slice(line);
-            }
+        }
+        let [a, b] = &mut lines;
+        for (a, b) in a.chunks_exact_mut(slots).zip(b.chunks_exact_mut(slots)) {
+            transform.forward(a, b, &mut scratch);
+        }
+        for (r, row) in out.chunks_exact_mut(width).enumerate() {
+            row.iter_mut()
+                .zip(&lines[r % 2])
+                .for_each(|(s, l)| *s = l.0[r / 2]);
         }
         let _ = monitor.advance((out.len() / width) as u64);
     });
@@ -313,32 +316,27 @@ fn rectangle(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) {
             return;
         }
         let mut scratch = transform::Scratch::default();
-        let mut lines = [vec![0.0; slots], vec![0.0; slots]];
-        for (pair, out) in out.chunks_mut(2 * width).enumerate() {
-            let first = chunk * ROWS + 2 * pair;
-            let present = out.len() / width;
-            for c in 0..channels {
-                for (r, line) in lines.iter_mut().take(present).enumerate() {
-                    for (p, part) in line.chunks_mut(PANEL).enumerate() {
-                        let from = &panels[(p * channels + c) * rows + first + r];
-                        match <&mut [f32; PANEL]>::try_from(&mut *part) {
-                            Ok(whole) => *whole = *from,
-                            Err(_) => part.copy_from_slice(&from[..part.len()]),
-                        }
-                    }
-                }
-                let [a, b] = &mut lines;
-                transform.inverse(a, b, &mut scratch);
-                for (out, line) in out.chunks_exact_mut(width).zip(&lines) {
-                    let samples = out[left * channels + c..].iter_mut().step_by(channels);
-                    samples.zip(line).for_each(|(o, l)| *o = *l);
+        let mut lines = [(); 2].map(|()| vec![Lanes::default(); slots]);
+        for c in 0..channels {
+            for r in 0..out.len() / width {
+                for (p, part) in lines[r % 2].chunks_mut(PANEL).enumerate() {
+                    let from = &panels[(p * channels + c) * rows + chunk * ROWS + r];
+                    part.iter_mut().zip(from).for_each(|(l, s)| l.0[r / 2] = *s);
                 }
             }
-            if left > 0 {
-                for out in out.chunks_exact_mut(width) {
-                    out[..channels].fill(0.0);
-                    out[width - channels..].fill(0.0);
-                }
+            let [a, b] = &mut lines;
+            transform.inverse(a, b, &mut scratch);
+            for (r, row) in out.chunks_exact_mut(width).enumerate() {
+                let samples = row[left * channels + c..].iter_mut().step_by(channels);
+                samples
+                    .zip(&lines[r % 2])
+                    .for_each(|(s, l)| *s = l.0[r / 2]);
+            }
+        }
+        if left > 0 {
+            for row in out.chunks_exact_mut(width) {
+                row[..channels].fill(0.0);
+                row[width - channels..].fill(0.0);
             }
         }
         let _ = monitor.advance((out.len() / width) as u64);

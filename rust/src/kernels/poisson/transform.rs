@@ -1,20 +1,20 @@
 //! Transforms along one axis that turn its second difference into a multiplication.
 //!
 //! Sines for fixed ends, cosines for free ends, the real Fourier series for a cyclic axis; each by one complex transform
-//! of the axis's own length for two rows at a time (Press et al., *Numerical Recipes*, 12.4; Makhoul, *A fast cosine
+//! of the axis's own length for two rows at a time, and several such pairs side by side (Press et al., *Numerical Recipes*, 12.4; Makhoul, *A fast cosine
 //! transform in one and two dimensions*, IEEE ASSP 1980).
 
 use std::f64::consts::PI;
 
 use super::Edge;
-use crate::foundation::fft::{Code, Complex, Lines, split};
+use crate::foundation::fft::{Code, Complex, LANES, Lanes, Lines, split};
 use crate::foundation::functions::sincos;
 
 /// The transform of an axis of `len` unknowns.
 pub(super) struct Transform {
     edge: Edge,
     len: usize,
-    lines: Lines<f32>,
+    lines: Lines<Lanes>,
     /// Sines of the folding, or half-sample rotations.
     twiddles: Vec<Complex<f32>>,
     /// Eigenvalue of each coefficient.
@@ -24,8 +24,8 @@ pub(super) struct Transform {
 /// Working memory of a transform.
 #[derive(Default)]
 pub(super) struct Scratch {
-    line: Vec<Complex<f32>>,
-    work: Vec<Complex<f32>>,
+    line: Vec<Complex<Lanes>>,
+    work: Vec<Complex<Lanes>>,
 }
 
 impl Transform {
@@ -64,8 +64,8 @@ impl Transform {
         }
     }
 
-    /// Coefficients of two rows, in place.
-    pub(super) fn forward(&self, a: &mut [f32], b: &mut [f32], scratch: &mut Scratch) {
+    /// Coefficients of pairs of rows, in place: the first of each in `a`, the second in `b`.
+    pub(super) fn forward(&self, a: &mut [Lanes], b: &mut [Lanes], scratch: &mut Scratch) {
         let Scratch { line, work } = scratch;
         match self.edge {
             Edge::Fixed => self.sines(a, b, 1.0, line, work),
@@ -88,8 +88,8 @@ impl Transform {
         }
     }
 
-    /// Rows of two sets of coefficients, in place.
-    pub(super) fn inverse(&self, a: &mut [f32], b: &mut [f32], scratch: &mut Scratch) {
+    /// Rows of pairs of sets of coefficients, in place.
+    pub(super) fn inverse(&self, a: &mut [Lanes], b: &mut [Lanes], scratch: &mut Scratch) {
         let Scratch { line, work } = scratch;
         let n = self.len;
         match self.edge {
@@ -97,15 +97,15 @@ impl Transform {
             Edge::Fixed => self.sines(a, b, 2.0 / (n + 1) as f32, line, work),
             Edge::Free => {
                 line.clear();
-                let norm = 1.0 / n as f32;
+                let norm = Lanes::all(1.0 / n as f32);
                 line.push(Complex::new(a[0], b[0]) * norm);
                 // (a - i a2) + i (b - i b2), turned by half a sample.
                 let ends = a[1..].iter().zip(a[1..].iter().rev());
                 let others = b[1..].iter().zip(b[1..].iter().rev());
                 let turned = ends.zip(others).zip(&self.twiddles[1..]);
-                line.extend(
-                    turned.map(|(((a, a2), (b, b2)), t)| Complex::new(a + b2, b - a2) * *t * norm),
-                );
+                line.extend(turned.map(|(((a, a2), (b, b2)), t)| {
+                    Complex::new(*a + *b2, *b - *a2) * spread(t) * norm
+                }));
                 self.lines.inverse(line, work);
                 for j in 0..n.div_ceil(2) {
                     (a[2 * j], b[2 * j]) = (line[j].re, line[j].im);
@@ -118,7 +118,7 @@ impl Transform {
             Edge::Wrap => {
                 line.clear();
                 line.resize(n, Complex::default());
-                let norm = 1.0 / n as f32;
+                let norm = Lanes::all(1.0 / n as f32);
                 line[0] = Complex::new(a[0], b[0]) * norm;
                 for k in 1..n.div_ceil(2) {
                     let u = Complex::new(a[2 * k - 1], a[2 * k]) * norm;
@@ -139,11 +139,11 @@ impl Transform {
 
     fn sines(
         &self,
-        a: &mut [f32],
-        b: &mut [f32],
+        a: &mut [Lanes],
+        b: &mut [Lanes],
         factor: f32,
-        line: &mut Vec<Complex<f32>>,
-        work: &mut Vec<Complex<f32>>,
+        line: &mut Vec<Complex<Lanes>>,
+        work: &mut Vec<Complex<Lanes>>,
     ) {
         line.clear();
         line.push(Complex::default());
@@ -151,34 +151,42 @@ impl Transform {
         let others = b.iter().zip(b.iter().rev());
         let folded = ends.zip(others).zip(&self.twiddles[1..]);
         line.extend(folded.map(|(((a1, a2), (b1, b2)), s)| {
+            let (s, half) = (Lanes::all(s.re), Lanes::all(0.5));
             Complex::new(
-                s.re * (a1 + a2) + 0.5 * (a1 - a2),
-                s.re * (b1 + b2) + 0.5 * (b1 - b2),
+                s * (*a1 + *a2) + half * (*a1 - *a2),
+                s * (*b1 + *b2) + half * (*b1 - *b2),
             )
         }));
         self.lines.forward(line, work);
         // Odd coefficients are a running sum, kept in f64 so that it does not drift.
-        let (mut sum_a, mut sum_b) = (0.5 * f64::from(line[0].re), 0.5 * f64::from(line[0].im));
-        (a[0], b[0]) = (factor * sum_a as f32, factor * sum_b as f32);
+        let (mut sum_a, mut sum_b) = ([0.0; LANES], [0.0; LANES]);
+        let run = |sum: &mut [f64; LANES], part: f64, next: Lanes| {
+            for (sum, next) in sum.iter_mut().zip(next.0) {
+                *sum += part * f64::from(next);
+            }
+            Lanes(std::array::from_fn(|k| factor * sum[k] as f32))
+        };
+        a[0] = run(&mut sum_a, 0.5, line[0].re);
+        b[0] = run(&mut sum_b, 0.5, line[0].im);
+        let minus = Lanes::all(-factor);
         let mirrored = line[1..].iter().zip(line[1..].iter().rev());
         let slots = a[1..].chunks_mut(2).zip(b[1..].chunks_mut(2));
         for ((a, b), (&z, &mirror)) in slots.zip(mirrored) {
             let (u, v) = split(z, mirror);
-            (a[0], b[0]) = (-factor * u.im, -factor * v.im);
-            sum_a += f64::from(u.re);
-            sum_b += f64::from(v.re);
+            (a[0], b[0]) = (minus * u.im, minus * v.im);
+            let next = (run(&mut sum_a, 1.0, u.re), run(&mut sum_b, 1.0, v.re));
             if let ([_, a], [_, b]) = (a, b) {
-                (*a, *b) = (factor * sum_a as f32, factor * sum_b as f32);
+                (*a, *b) = next;
             }
         }
     }
 
     fn cosines(
         &self,
-        a: &mut [f32],
-        b: &mut [f32],
-        line: &mut Vec<Complex<f32>>,
-        work: &mut Vec<Complex<f32>>,
+        a: &mut [Lanes],
+        b: &mut [Lanes],
+        line: &mut Vec<Complex<Lanes>>,
+        work: &mut Vec<Complex<Lanes>>,
     ) {
         let n = self.len;
         line.clear();
@@ -194,10 +202,17 @@ impl Transform {
         let slots = a[1..].iter_mut().zip(&mut b[1..]);
         for (((a, b), (&z, &mirror)), t) in slots.zip(mirrored).zip(&self.twiddles[1..]) {
             let (u, v) = split(z, mirror);
+            let t = spread(t);
             *a = u.re * t.re + u.im * t.im;
             *b = v.re * t.re + v.im * t.im;
         }
     }
+}
+
+/// The same number for all pairs.
+#[inline(always)]
+fn spread(z: &Complex<f32>) -> Complex<Lanes> {
+    Complex::new(Lanes::all(z.re), Lanes::all(z.im))
 }
 
 #[cfg(test)]
@@ -237,21 +252,27 @@ mod tests {
             seed: u64,
         ) {
             let noise = crate::foundation::hash::Noise::new(seed);
-            let row = |r: u32| -> Vec<f32> { (0..n as u32).map(|i| noise.uniform([i, r, 0, 0]) as f32 - 0.5).collect() };
-            let (first, second) = (row(0), row(1));
+            let rows: [Vec<f32>; 2 * LANES] = std::array::from_fn(|r| {
+                (0..n as u32).map(|i| noise.uniform([i, r as u32, 0, 0]) as f32 - 0.5).collect()
+            });
+            let beside = |first: usize| -> Vec<Lanes> {
+                (0..n).map(|i| Lanes(std::array::from_fn(|k| rows[first + 2 * k][i]))).collect()
+            };
             let transform = Transform::new(edge, n);
             let mut scratch = Scratch::default();
-            let (mut a, mut b) = (first.clone(), second.clone());
+            let (mut a, mut b) = (beside(0), beside(1));
             transform.forward(&mut a, &mut b, &mut scratch);
             for (k, &l) in transform.eigenvalues.iter().enumerate() {
-                a[k] *= l as f32;
+                a[k] = a[k] * Lanes::all(l as f32);
             }
             transform.inverse(&mut a, &mut b, &mut scratch);
-            for (x, y) in a.iter().zip(difference(&first, edge)) {
-                prop_assert!((x - y).abs() < 1e-4, "{} {}", x, y);
-            }
-            for (x, y) in b.iter().zip(&second) {
-                prop_assert!((x - y).abs() < 1e-5, "{} {}", x, y);
+            for k in 0..LANES {
+                for (x, y) in a.iter().zip(difference(&rows[2 * k], edge)) {
+                    prop_assert!((x.0[k] - y).abs() < 1e-4, "{:?} {}", x, y);
+                }
+                for (x, y) in b.iter().zip(&rows[2 * k + 1]) {
+                    prop_assert!((x.0[k] - y).abs() < 1e-5, "{:?} {}", x, y);
+                }
             }
         }
     }
