@@ -322,3 +322,26 @@ def test_progress_rises_and_stops_the_work():
         segment(image, progress=progress)
     assert len(shares) == 4
     assert all(0 < a < b < 1 for a, b in pairwise(shares))
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 6), (6, 1), (2, 3), (20, 31)])
+def test_what_is_widened_and_what_lies_at_borders_is_as_others_have_it(shape):
+    from scipy import ndimage
+
+    from texrs.exemplar.shapes import list_borders, narrow, widen
+
+    random, square = np.random.default_rng(1), np.ones((3, 3), bool)
+    for share in (0.1, 0.5, 0.9):
+        values, mask = random.random(shape).astype(np.float32), random.random(shape) < share
+        for reach in (1, 2, 3):
+            assert (widen(values, reach) == ndimage.maximum_filter(values, 2 * reach + 1)).all()
+            assert (widen(mask, reach) == ndimage.maximum_filter(mask, 2 * reach + 1)).all()
+        for beyond in (False, True):
+            assert (narrow(mask, beyond=beyond) == ndimage.binary_erosion(mask, square, border_value=beyond)).all()
+        labels = random.integers(0, 3, shape).astype(np.int32)
+        place = np.arange(labels.size).reshape(shape)
+        first = np.concatenate([place[:-1].ravel(), place[:, :-1].ravel()])
+        second = np.concatenate([place[1:].ravel(), place[:, 1:].ravel()])
+        differ = labels.ravel()[first] != labels.ravel()[second]
+        for found, expected in zip(list_borders(labels), (first, second), strict=True):
+            assert (found == expected[differ]).all()

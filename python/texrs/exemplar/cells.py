@@ -23,7 +23,7 @@ from texrs.errors import InvalidInput
 from texrs.exemplar.contours import measure_moments, trace
 from texrs.exemplar.evidence import to_lab
 from texrs.exemplar.merging import join_parts, measure_usual_area
-from texrs.exemplar.shapes import Shapes, mark_outlines
+from texrs.exemplar.shapes import Shapes, mark_outlines, widen
 
 __all__ = ["Cells", "find_cells", "take_cells"]
 
@@ -332,11 +332,11 @@ def _measure_relief(light: Floats, width: float) -> Floats:
 
 def _judge(labels: Labels, relief: Floats, width: float, polarity: int) -> _Tessellation:
     """Weigh how closed the joints of each cell are, how free of joints it is inside, and how alike all are."""
-    from scipy.ndimage import distance_transform_edt, maximum_filter
+    from scipy.ndimage import distance_transform_edt
 
     count = int(labels.max())
     outline = mark_outlines(labels)
-    ridge = maximum_filter(relief, 3) > 0.5
+    ridge = widen(relief) > 0.5
     # Beyond what lines drawn at random would meet.
     chance = min(0.9, float(ridge.mean()))
     closed = np.clip((_average(ridge, labels, outline, count) - chance) / (1 - chance), 0, 1)

@@ -13,7 +13,7 @@ import numpy as np
 
 from texrs._typing import Bools, Floats, Labels
 from texrs.exemplar.merging import join_least_parted
-from texrs.exemplar.shapes import Shapes, list_borders, renumber
+from texrs.exemplar.shapes import Shapes, list_borders, narrow, renumber, widen
 from texrs.kernels.reconstruction import reconstruct
 
 __all__ = ["fill_crescents", "find_elements", "split_touching"]
@@ -55,7 +55,7 @@ def _clean_layer(mask: Bools, least: float) -> Bools:
     """Smooth the outline of a layer by a pixel, and drop its specks."""
     from scipy import ndimage
 
-    mask = ndimage.binary_opening(ndimage.binary_closing(np.pad(mask, 2, mode="edge"), SQUARE), SQUARE)
+    mask = widen(narrow(narrow(widen(np.pad(mask, 2, mode="edge")))))
     pieces, _ = ndimage.label(mask[2:-2, 2:-2], SQUARE)
     kept = np.bincount(pieces.ravel()) >= least
     kept[0] = False
@@ -78,10 +78,10 @@ def split_touching(mask: Bools, crease: Floats) -> Labels:
     from skimage.morphology import local_maxima
     from skimage.segmentation import watershed
 
-    outline = mask & ~ndimage.binary_erosion(mask, SQUARE, border_value=1)
+    outline = mask & ~narrow(mask, beyond=True)
     if not outline.any():
         return mask.astype(np.int32)
-    depth = ndimage.maximum_filter(crease, 3)
+    depth = widen(crease)
     typical = max(float(np.median(depth[outline])), 1e-6)
     lines, _ = ndimage.label(mask & (crease > LINE * typical), SQUARE)
     long = np.bincount(lines.ravel()) >= LEAST_LINE

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from texrs._show import brief
 from texrs._typing import Floats
 from texrs.exemplar.regularity import FRACTIONS, WINDOW, Lattice, bend, correlate, crop_light
+from texrs.exemplar.shapes import widen
 from texrs.kernels.gather import gather
 from texrs.source_map import SourceMap
 
@@ -171,9 +172,7 @@ def find_joints(light: NDArray[np.float64]) -> tuple[float, ...]:
 
 def repeats(lattice: Lattice, courses: Courses, level: Floats) -> bool:
     """Whether a level image correlates better with itself at the places of a lattice than elsewhere along the same courses."""
-    from scipy.ndimage import maximum_filter
-
-    correlation = maximum_filter(correlate(crop_light(level)), 5)
+    correlation = widen(correlate(crop_light(level)), 2)
     reach = np.array(correlation.shape) // 2
     vectors = turn(courses.slope, courses.axis) @ lattice.vectors
     times = np.arange(-max(reach), max(reach) + 1) if min(reach) < 30 else np.arange(-30, 31)

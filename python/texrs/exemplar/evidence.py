@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from texrs._typing import Bools, Floats, Labels
-from texrs.exemplar.shapes import mark_outlines, measure_solidity
+from texrs.exemplar.shapes import mark_outlines, measure_solidity, widen
 
 __all__ = ["Evidence", "measure_contrast", "measure_creases", "to_lab", "weigh_evidence"]
 
@@ -67,10 +67,8 @@ def measure_contrast(lab: Floats) -> Floats:
 
 def weigh_evidence(elements: Labels, crease: Floats, contrast: Floats) -> Evidence:
     """Weigh elements against the image that they were found in."""
-    from scipy.ndimage import maximum_filter
-
     outline = mark_outlines(elements)
-    far = ~maximum_filter(outline, 2 * CLEAR + 1)
+    far = ~widen(outline, CLEAR)
     covered = elements > 0
     edge, within, around = outline & covered, far & covered, far & ~covered
 
@@ -84,6 +82,6 @@ def weigh_evidence(elements: Labels, crease: Floats, contrast: Floats) -> Eviden
         largest=float(area.max(initial=0)) / elements.size,
         spread=float(area.std() / area.mean()) if len(area) else 0.0,
         solidity=measure_solidity(elements),
-        inside=max(ratio(contrast, within), ratio(maximum_filter(crease, 3), within)),
+        inside=max(ratio(contrast, within), ratio(widen(crease), within)),
         outside=ratio(contrast, around),
     )

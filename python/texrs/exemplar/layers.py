@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs._typing import Bools, Floats, Labels
+from texrs.exemplar.shapes import widen
 from texrs.kernels.mean_shift import mean_shift
 from texrs.kernels.regions import merge
 
@@ -90,7 +91,7 @@ def mark_smooth(rgb: Floats) -> Bools | None:
 
     The amount of grain is relative to the lightness: of one material in light and in shade it is the same.
     """
-    from scipy.ndimage import binary_dilation, gaussian_filter
+    from scipy.ndimage import gaussian_filter
     from skimage.filters import threshold_otsu
 
     light = rgb.mean(axis=-1)
@@ -104,4 +105,4 @@ def mark_smooth(rgb: Floats) -> Bools | None:
     if between < TWO_KINDS * float(amount.var()):
         return None
     # Grain is averaged beyond outlines, so what is smooth comes out smaller.
-    return np.asarray(binary_dilation(smooth, np.ones((3, 3), bool)), bool)
+    return np.asarray(widen(smooth), bool)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from texrs._progress import ask
 from texrs._show import brief
 from texrs._typing import Floats
+from texrs.exemplar.shapes import widen
 from texrs.source_map import SourceMap
 
 __all__ = [
@@ -208,14 +209,12 @@ def correlate(picture: Floats) -> Floats:
 
 def _fit_lattice(correlation: Floats) -> Lattice | None:
     """Find the lattice of the highest mean correlation; of those nearly as high, the one of the smallest cell."""
-    from scipy.ndimage import maximum_filter
-
     reach = np.array(correlation.shape) // 2
-    tolerant = maximum_filter(correlation, 5)
+    tolerant = widen(correlation, 2)
     rows, columns = (np.arange(-r, r + 1) for r in reach)
     far = np.add.outer(rows**2, columns**2) > SHORTEST**2
     half = (rows[:, None] > 0) | ((rows[:, None] == 0) & (columns > 0))
-    peaks = np.argwhere((maximum_filter(correlation, 7) == correlation) & far & half)
+    peaks = np.argwhere((widen(correlation, 3) == correlation) & far & half)
     value = correlation[tuple(peaks.T)]
     order = np.lexsort((peaks[:, 1], peaks[:, 0], -value))[:PEAKS]
     vectors = [v - reach for v in peaks[order]]

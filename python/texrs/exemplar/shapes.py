@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._typing import Bools, Labels
+from texrs._typing import Array, Bools, Labels
 
-__all__ = ["Shapes", "list_borders", "mark_outlines", "measure_solidity", "renumber"]
+__all__ = ["Shapes", "list_borders", "mark_outlines", "measure_solidity", "narrow", "renumber", "widen"]
 
 TURN = 2 * np.pi / 32
 """Angle between the directions in which shapes are measured: hulls come out at most 2 % too large."""
@@ -76,13 +76,35 @@ def measure_solidity(elements: Labels) -> float:
 
 def list_borders(labels: Labels) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the flat places of all neighbours along rows and columns whose labels differ."""
-    place = np.arange(labels.size).reshape(labels.shape)
-    first = [place[:-1].ravel(), place[:, :-1].ravel()]
-    second = [place[1:].ravel(), place[:, 1:].ravel()]
-    a, b = np.concatenate(first), np.concatenate(second)
-    flat = labels.ravel()
-    differ = flat[a] != flat[b]
-    return a[differ], b[differ]
+    width = labels.shape[1]
+    down = np.flatnonzero(labels[1:] != labels[:-1])
+    along = np.flatnonzero(labels[:, 1:] != labels[:, :-1])
+    along += along // max(width - 1, 1)
+    return np.concatenate([down, along]), np.concatenate([down + width, along + 1])
+
+
+def widen(values: Array, reach: int = 1) -> Array:
+    """Return the greatest value within so many pixels of each along rows and columns; True is more than False.
+
+    As `scipy.ndimage.maximum_filter` and `binary_dilation`, in a fraction of their time.
+    """
+    for axis in range(2):
+        wide = values.copy()
+        for step in range(1, reach + 1):
+            before, after = ((*(slice(None),) * axis, part) for part in (slice(None, -step), slice(step, None)))
+            np.maximum(wide[after], values[before], out=wide[after])
+            np.maximum(wide[before], values[after], out=wide[before])
+        values = wide
+    return values
+
+
+def narrow(mask: Bools, *, beyond: bool = False) -> Bools:
+    """Return a mask without what lies beside what is not in it; beyond its edges everything is, or nothing."""
+    narrowed: Bools = ~widen(~mask)
+    if not beyond:
+        for edge in (narrowed[0], narrowed[-1], narrowed[:, 0], narrowed[:, -1]):
+            edge[...] = False
+    return narrowed
 
 
 def mark_outlines(labels: Labels) -> Bools:
