@@ -5,6 +5,11 @@ use super::grid::{AXES, Grid, Item, Links};
 use crate::Result;
 use crate::foundation::memory;
 
+/// A level of more than one in so many unknowns is wide.
+const MANY: usize = 4;
+/// How many times as many others as is usual hubs have to do with.
+const HUB: usize = 4;
+
 /// What becomes of a part.
 pub(super) enum Cut {
     /// It is eliminated at once.
@@ -112,29 +117,55 @@ impl Scratch {
             self.counts[self.level[item[1] as usize] as usize] += 1;
         }
         let cut = match choose(&self.counts, 1) {
-            Some((_, at)) => {
-                let (at, level) = (at as u32, std::mem::take(&mut self.level));
-                let cut = self.share_out(part, |item| {
-                    let own = level[item[1] as usize];
-                    let parts = || {
-                        let mut others = links.of(item[1]).iter();
-                        // Those of another part are none.
-                        others.any(|&other| level[other as usize] == at + 1)
-                    };
-                    if own < at || (own == at && !parts()) {
-                        0
-                    } else {
-                        1 + usize::from(own == at)
-                    }
-                });
-                self.level = level;
-                cut
+            Some((_, at)) if self.counts[at] as usize > part.len() / MANY => {
+                // Levels are wide where a few have to do with most.
+                let hubs = self.list_hubs(part, links);
+                self.cut_at(part, links, at, &hubs)
             }
+            Some((_, at)) => self.cut_at(part, links, at, &[]),
             None => Cut::Leaf,
         };
         for item in part.iter() {
             self.level[item[1] as usize] = NONE;
         }
+        cut
+    }
+
+    /// Lists what has to do with many times as many of a part as others have, in order.
+    fn list_hubs(&self, part: &[Item], links: &Links) -> Vec<u32> {
+        let inside = |&&other: &&u32| self.level[other as usize] != NONE;
+        let degree = |item: &Item| links.of(item[1]).iter().filter(inside).count();
+        let total: usize = part.iter().map(degree).sum();
+        let mut hubs: Vec<u32> = (part.iter())
+            .filter(|item| degree(item) * part.len() > HUB * total)
+            .map(|item| item[1])
+            .collect();
+        hubs.sort_unstable();
+        hubs
+    }
+
+    /// Parts unknowns along a level, or by hubs, where there are some and these are fewer.
+    fn cut_at(&mut self, part: &mut [Item], links: &Links, at: usize, hubs: &[u32]) -> Cut {
+        if (1..self.counts[at] as usize).contains(&hubs.len()) {
+            return self.share_out(part, |item| {
+                2 * usize::from(hubs.binary_search(&item[1]).is_ok())
+            });
+        }
+        let (at, level) = (at as u32, std::mem::take(&mut self.level));
+        let cut = self.share_out(part, |item| {
+            let own = level[item[1] as usize];
+            let parts = || {
+                let mut others = links.of(item[1]).iter();
+                // Those of another part are none.
+                others.any(|&other| level[other as usize] == at + 1)
+            };
+            if own < at || (own == at && !parts()) {
+                0
+            } else {
+                1 + usize::from(own == at)
+            }
+        });
+        self.level = level;
         cut
     }
 

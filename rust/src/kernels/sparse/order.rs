@@ -67,6 +67,9 @@ pub(super) fn dissect(matrix: &Checked<'_>, monitor: &Monitor) -> Result<Order> 
     // The last part first: read backwards, every block comes after its children.
     while let Some((first, end, parent)) = tasks.pop() {
         monitor.check()?;
+        if first == end {
+            continue;
+        }
         let part = &mut items[first..end];
         let cut = match (part.len() > LEAF, grid) {
             (false, _) => Cut::Leaf,

@@ -170,7 +170,10 @@ fn what_is_no_grid_is_solved() {
     let all: Vec<_> = (0..60)
         .flat_map(|i| (0..i).map(move |j| (i, j, 1.0)))
         .collect();
+    // Each of these has to do with one or both of two.
+    let hubs: Vec<_> = (2..4000).flat_map(|i| [(0, i, 1.0), (1, i, 1.0)]).collect();
     for (size, pairs) in [
+        (4000, hubs),
         (5000, chain),
         (3000, star),
         (2000, comb),
