@@ -162,7 +162,12 @@ class Search:
             ask()
             off = windows - mean
             ask()
-            together = np.cov(off.T)
+            together = np.zeros((off.shape[1], off.shape[1]))
+            for part in range(0, len(off), AT_ONCE):
+                ask()
+                some = off[part : part + AT_ONCE]
+                together += some.T @ some
+            together /= len(off) - 1
             ask()
             spread, axes = np.linalg.eigh(together)
             ask()
