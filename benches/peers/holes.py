@@ -20,6 +20,7 @@ from frame import Arrays, Row, Side, Timed, Work
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))  # For fillers, which tables use too.
 PATCH = 9
+GIVEN = 32
 EVEN = 2.0
 """Grey levels of deviation, below which a patch shows nothing."""
 TEXTURES = ("brick", "grass", "gravel")
@@ -40,6 +41,13 @@ def fill_by_texrs(given: Arrays) -> Work:
     import texrs
 
     return lambda: [texrs.complete(image, given["hole"]).image for image in given["images"]]
+
+
+def fill_by_one_size(given: Arrays) -> Work:
+    """With the size of patches given, as the others have one: by default several are tried, and the best is kept."""
+    import texrs
+
+    return lambda: [texrs.complete(image, given["hole"], patch=GIVEN).image for image in given["images"]]
 
 
 def fill_by_opencv(given: Arrays) -> Work:
@@ -104,13 +112,13 @@ def _error(result: Any) -> list[float]:
 
 
 ROWS = {
-    f"holes-{side}": Row(
+    f"holes-{side}{suffix}": Row(
         "9",
-        f"three holes of {side // 4}² filled in {side}² RGB",
+        f"three holes of {side // 4}² filled in {side}² RGB{how}",
         "the mean patch error over the holes, 1 - correlation; texrs is to have none larger",
         lambda side=side: make_holes(side),
         {
-            "texrs": _with(fill_by_texrs),
+            "texrs": _with(fill),
             "Resynthesizer": _with(fill_by_program),
             "OpenCV shift maps": _with(fill_by_opencv),
         },
@@ -120,4 +128,8 @@ ROWS = {
         shown="patch error",
     )
     for side, most in ((256, 69), (512, 420))
+    for suffix, how, fill in (
+        ("", ", as it is by default", fill_by_texrs),
+        ("-given", f", by patches of {GIVEN}", fill_by_one_size),
+    )
 }
