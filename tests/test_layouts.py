@@ -249,3 +249,18 @@ def test_what_is_no_layout_gets_a_sentence(make: Callable[[], object], words: st
 def test_drawings_are_bounded() -> None:
     with pytest.raises(LimitExceeded, match="size"):
         layouts.lattice(100_000, (0, 9), (9, 0))
+
+
+def test_few_points_are_compared_one_by_one() -> None:
+    from scipy.spatial import cKDTree
+
+    from texrs.point_sets import nearest_distances
+
+    random = np.random.default_rng(4)
+    for few, many in ((1, 8), (12, 60), (40, 300)):
+        points, among = random.random((few, 2)) * 50, random.random((many, 2)) * 50
+        among[:few] = points
+        found = nearest_distances(points, 7, among)
+        assert (found == cKDTree(among).query(points, k=[*range(1, 8)])[0]).all()
+    # Fewer than are asked for.
+    assert np.isinf(nearest_distances(points, 7, among[:3])[:, 3:]).all()
