@@ -228,9 +228,10 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
             Some(&kind) => Some(kind),
         };
         let (mut candidates, mut count) = ([([0; D], 0i32); CORNERS * LARGEST], 0usize);
+        let mut before = [i32::MIN; LARGEST];
         let sets = similar.chunks_exact(self.k).take(seen.len());
         for (set, &rest) in sets.zip(&rests) {
-            for &similar in set {
+            for (&similar, before) in set.iter().zip(&mut before) {
                 let candidate = add(unpack(similar).map(|x: i32| x * ONE), rest);
                 let there = nearest(candidate);
                 let Some(number) = self.appearance.inside(there) else {
@@ -239,7 +240,12 @@ impl<'a, const D: usize, const N: usize> Level<'a, D, N> {
                 if wanted.is_some_and(|kind| self.kinds.samples[number] != kind) {
                     continue;
                 }
-                candidates[count] = (candidate, self.table.at(self.settle(there)));
+                // Within a piece of the exemplar, what one neighbour knows the next one knows too.
+                let centre = self.table.at(self.settle(there));
+                if std::mem::replace(before, centre) == centre {
+                    continue;
+                }
+                candidates[count] = (candidate, centre);
                 count += 1;
             }
         }
