@@ -7,9 +7,9 @@ Each side of a row works in a process of its own, in one thread, and takes its t
 besides falls on all alike. Seconds are those of the processor, but where threads are compared. Megabytes are those that the
 first time of the work took beyond what was there when all was ready. The floor is what copying the input once takes: nothing
 can be faster. The libraries of others live in an environment of their own (`make bench` makes .venv-peers): some are under the
-GPL, none is ever loaded beside texrs. Programs of others are found by a variable or on the PATH: RESYNTHESIZER and QUILTING,
-which `holes.py` and `synthesis.py` describe. Who is missing is named with how to get it. Figures of papers are of
-other hardware, and say so. The page "Performance" of the documentation is drawn from what is written.
+GPL, none is ever loaded beside texrs. Programs of others are found by a variable or on the PATH: RESYNTHESIZER, QUILTING,
+LEFEBVRE and APPEARANCE, which `holes.py` and `synthesis.py` describe. Who is missing is named with how to get it. Figures of
+papers are of other hardware, and say so. The page "Performance" of the documentation is drawn from what is written.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ PROGRAMS = {
     "Resynthesizer": ("RESYNTHESIZER", "built by hand, as benches/peers/holes.py says"),
     "MarH19's quilting in C": ("QUILTING", "built by hand, as benches/peers/synthesis.py says"),
     "Nanored4498's C++ of Lefebvre and Hoppe 2005": ("LEFEBVRE", "built by hand, as benches/peers/synthesis.py says"),
+    "anikabahl76's Python of Lefebvre and Hoppe 2006": ("APPEARANCE", "found as benches/peers/synthesis.py says"),
 }
 NEEDS = {
     "PyMaxflow": "maxflow",
@@ -55,7 +56,7 @@ def look_for(who: str, python: Path) -> str:
         return ""
     if who in PROGRAMS:
         variable, how = PROGRAMS[who]
-        return "" if os.access(os.environ.get(variable, ""), os.X_OK) else f"{variable}=PROGRAM, {how}"
+        return "" if os.access(os.environ.get(variable, ""), os.X_OK) else f"{variable}=..., {how}"
     module = NEEDS.get(who, "scipy")
     try:
         found = subprocess.run([python, "-c", f"import {module}"], capture_output=True, check=False).returncode == 0

@@ -2,7 +2,7 @@
 
 Results are textures of their own, which nothing makes equal: compared is that each is of the size.
 
-Two programs of others take part where a variable names them. Their sources have no licence, so they are neither part of texrs
+Three programs of others take part where a variable names them. Their sources have no licence, so they are neither part of texrs
 nor linked to it, and whoever builds them does that for themselves:
 
 - QUILTING IN.ppm OUT.png BLOCK OVERLAP COUNT makes COUNT x COUNT blocks and prints the processor seconds that `image_quilting`
@@ -11,12 +11,15 @@ nor linked to it, and whoever builds them does that for themselves:
 - LEFEBVRE IN.ppm OUT.ppm makes a texture of twice the side and prints the processor seconds that `synthesize` of
   github.com/Nanored4498/Texture-Synthesis took, without its `-c`, two passes: its `main` less what it writes, compiled without
   OpenMP and with `stbi_write_png` replaced by nothing.
+- APPEARANCE is the folder `code` of github.com/anikabahl76/appearance-space-texture-synthesis, in Python.
 """
 
 from __future__ import annotations
 
 import os
+import resource
 import subprocess
+import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -80,6 +83,64 @@ def correct_by_program(given: Arrays) -> Work:
     return lambda: run_program("LEFEBVRE", given, "ppm")
 
 
+def make_small_bricks() -> dict[str, Any]:
+    """A picture, 64²."""
+    return {"image": make_bricks()["image"][:64, :64]}
+
+
+def run_process(given: Arrays, command: list[str], made: str, where: str | None = None) -> Timed:
+    """Let a command make a picture of one that it finds in a folder; all of its process counts."""
+    from skimage import io
+
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    with tempfile.TemporaryDirectory() as folder:
+        io.imsave(f"{folder}/in.png", given["image"], check_contrast=False)
+        single = {"RAYON_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MPLBACKEND": "Agg"}
+        words = [word.format(folder=folder) for word in command]
+        subprocess.run(
+            words, check=True, cwd=where or folder, env={**os.environ, **single}, capture_output=True, timeout=600
+        )
+        image = io.imread(made.format(folder=folder))
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return Timed(image, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+
+
+def start_texrs(given: Arrays) -> Work:
+    """The command, from its start to its end: imports and the analysis of the exemplar take most of it."""
+    words = ["synthesize", "in.png", "-o", "out.png", "--size", "512", "--method", "paper-compensated", "--quiet"]
+    return lambda: run_process(given, [sys.executable, "-m", "texrs", *words], "{folder}/out.png")
+
+
+def start_program(given: Arrays) -> Work:
+    """The same of the program, eight times the side of its example: its scale is twice that."""
+    where = os.environ["APPEARANCE"]
+    words = ["lefebvre_hoppe_synthesis.py", "--data", "{folder}", "--image_path", "in.png", "--scale", "16"]
+    return lambda: run_process(given, [sys.executable, *words], f"{where}/../out/lefebvre_hoppe_in.png", where)
+
+
+def make_floor() -> dict[str, Any]:
+    """Discs on a floor seen aslant."""
+    from texrs import samples
+
+    return {"image": samples.tilted_discs((128, 128)).image}
+
+
+def slope_by_texrs(given: Arrays) -> Work:
+    """All of the verb; what is known of the exemplar is kept from the first time."""
+    import texrs
+
+    return lambda: texrs.perspective(given["image"], size=256).image
+
+
+def compare_by_texrs(given: Arrays) -> Work:
+    """Of every sample, the two likest ones that lie more than three samples off, of all of the volume."""
+    import texrs
+    from texrs._engine.coherence import find_similar
+
+    level = texrs.Exemplar(given["image"], axes=3).analyse().levels[-1]
+    return lambda: find_similar(level, k=3, n=7, numbers=8).sets
+
+
 def make_particles() -> dict[str, Any]:
     """A volume, 64³."""
     from texrs import samples
@@ -138,6 +199,7 @@ def _size(result: Any) -> list[float]:
 
 QUILTING = "MarH19's quilting in C"
 CORRECTING = "Nanored4498's C++ of Lefebvre and Hoppe 2005"
+PROCESS = "anikabahl76's Python of Lefebvre and Hoppe 2006"
 PATCHES: dict[str, Side] = {"texrs": quilt_by_texrs, QUILTING: quilt_by_program}
 ROWS = {
     "quilt-512": Row(
@@ -159,6 +221,33 @@ ROWS = {
         _size,
         asked={CORRECTING: 60},
         most_ms=16,
+    ),
+    "process-512": Row(
+        "11",
+        "appearance-space synthesis, 64² to 512², the whole process of a command",
+        "of one size",
+        make_small_bricks,
+        {"texrs": start_texrs, PROCESS: start_program},
+        _size,
+        asked={PROCESS: 30},
+    ),
+    "perspective-256": Row(
+        "12",
+        "a floor seen aslant, 128² to 256², as texrs.perspective makes it",
+        "of the size",
+        make_floor,
+        {"texrs": slope_by_texrs},
+        _size,
+        most_ms=1300,
+    ),
+    "sets-64": Row(
+        "13",
+        "similarity sets of 64³, k = 3, of all samples more than three apart; all pairs take 1.7 s at least",
+        "of the size",
+        make_particles,
+        {"texrs": compare_by_texrs},
+        _size,
+        most_ms=1700,
     ),
     "solid-128": Row(
         "13",
