@@ -86,6 +86,7 @@ def quilt(
         first.corner[axis] if axis == fixed else int(uniform(seed, 1 + axis, 0, 0, 3) * n)
         for axis, n in enumerate(free)
     )
+    progress(0.0)  # A small texture is done before the kernel first asks.
     place, label = stitch(pictures, size, wrap, fixed, (first, which, (row, column)), waves, progress)
     progress(1.0)
     # A cyclic texture may begin anywhere.
