@@ -188,6 +188,40 @@ impl Default for Taps {
     }
 }
 
+impl Taps {
+    /// Lays `W` taps along each axis, of which the first is so far from where the coordinate is rounded down to; returns how
+    /// many there are. That `W` is known lets loops be unrolled.
+    #[inline(always)]
+    fn lay<const D: usize, const W: usize>(
+        &mut self,
+        grid: &Grid<D>,
+        at: [f32; D],
+        first: isize,
+        weigh: impl Fn(f64) -> [f64; W],
+    ) -> usize {
+        let strides = grid.strides();
+        let mut count = 1;
+        self.at[0] = (0, 1.0);
+        for axis in 0..D {
+            let base = floor(f64::from(at[axis]));
+            // Beyond what can be counted the base is not below it.
+            let weights = weigh((f64::from(at[axis]) - base as f64).clamp(0.0, 1.0));
+            let places: [usize; W] = std::array::from_fn(|k| {
+                grid.resolve(axis, base.saturating_add(first + k as isize)) * strides[axis]
+            });
+            // From behind, so that what there is is read before it is replaced.
+            for k in (0..W).rev() {
+                for tap in 0..count {
+                    let (index, so_far) = self.at[tap];
+                    self.at[k * count + tap] = (index + places[k], so_far * weights[k]);
+                }
+            }
+            count *= W;
+        }
+        count
+    }
+}
+
 /// From here on every `f32` is whole.
 const WHOLE: f32 = (1 << 23) as f32;
 
@@ -217,28 +251,11 @@ fn look_up<T: Element, const D: usize>(
         return;
     }
     let clip = interpolation == Interpolation::Cubic;
-    let strides = grid.strides();
-    let mut count = 1;
-    taps.at[0] = (0, 1.0);
-    for axis in 0..D {
-        let base = floor(f64::from(at[axis]));
-        // Beyond what can be counted the base is not below it.
-        let t = (f64::from(at[axis]) - base as f64).clamp(0.0, 1.0);
-        let (weights, first): (&[f64], isize) = if clip {
-            (&catmull_rom(t), -1)
-        } else {
-            (&[1.0 - t, t], 0)
-        };
-        // From behind, so that what there is is read before it is replaced.
-        for (k, &weight) in weights.iter().enumerate().rev() {
-            let i = grid.resolve(axis, base.saturating_add(first + k as isize)) * strides[axis];
-            for tap in 0..count {
-                let (index, so_far) = taps.at[tap];
-                taps.at[k * count + tap] = (index + i, so_far * weight);
-            }
-        }
-        count *= weights.len();
-    }
+    let count = if clip {
+        taps.lay(grid, at, -1, catmull_rom)
+    } else {
+        taps.lay(grid, at, 0, |t| [1.0 - t, t])
+    };
     let (taps, n) = (&taps.at[..count], exemplar.channels);
     match n {
         3 => weighted::<T, 3>(exemplar.data, n, taps, clip, out),
