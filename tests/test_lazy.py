@@ -435,6 +435,20 @@ def test_a_cluster_blames_no_task_that_waits_behind_the_one_that_ends_its_worker
     assert isinstance(found[0], lazy.WorkerLost)
 
 
+@pytest.mark.parametrize("error", [AssertionError(), OSError("timed out"), ValueError("no port")])
+def test_a_scheduler_that_does_not_answer_is_named(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Deaf(Client):
+        def __init__(self, *_: object, **__: object) -> None:
+            raise error
+
+        def __del__(self) -> None:
+            """Nothing began."""
+
+    monkeypatch.setattr("distributed.Client", Deaf)
+    with pytest.raises(texrs.errors.InvalidInput, match="scheduler: none answers at '-5' \\((Asser|timed|no port)"):
+        list(workers.run(read_limits, [0], "-5"))
+
+
 def read_limits(number: int) -> texrs.limits.Limits:
     """Return the limits that a worker goes by."""
     return texrs.limits.current()
