@@ -300,7 +300,7 @@ def _as_client(scheduler: Scheduler) -> tuple[Any, bool]:
     try:
         return Client(scheduler, timeout="10s", set_as_default=False), True
     except (OSError, ValueError, TimeoutError, AssertionError) as error:
-        # A client asserts, now and then, that another one has ended which found nobody either.
+        # Seen where other clients before this one found nobody: then distributed asserts, and says nothing.
         raise InvalidInput(f"scheduler: none answers at {scheduler!r} ({str(error) or type(error).__name__})") from None
 
 
