@@ -120,3 +120,27 @@ def test_threads_do_not_matter(threads):
 def test_bad_input_names_the_argument(arguments, names):
     with pytest.raises(InvalidInput, match=f"^{names}"):
         gather(*arguments)
+
+
+@pytest.mark.parametrize("interpolation", ["nearest", "linear", "cubic"])
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("dtype", [np.float16, np.float32, np.float64])
+def test_what_is_not_finite_is_refused_where_it_is_looked_up(interpolation, bad, dtype):
+    image = np.ones((9, 9, 2), dtype)
+    image[4, 4, 1] = bad
+    assert (gather(image, [[[0.5, 8.0], [1.0, 1.25]]], interpolation=interpolation) == 1).all()
+    for at in ([4, 4], [3.6, 4.3], [4.4, 3.75]):
+        with pytest.raises(InvalidInput, match=r"^exemplars: 1 of 162 values are NaN or infinite"):
+            gather(image, [[[0, 0], at]], interpolation=interpolation)
+
+
+def test_sums_beyond_the_largest_float_are_kept_as_they_come():
+    largest = np.finfo(np.float32).max
+    image = np.full((4, 4), largest)
+    assert (gather(image, [[1.5, 1.5], [2, 2]]) == largest).all()
+
+
+def test_what_is_nowhere_finite_is_refused():
+    for interpolation in ("nearest", "linear", "cubic"):
+        with pytest.raises(InvalidInput, match=r"^exemplars: 36 of 36 values"):
+            gather(np.full((6, 6), np.nan), [[2.5, 2.25]], interpolation=interpolation)

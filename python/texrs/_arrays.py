@@ -73,20 +73,22 @@ FEW = 4
 """Channels that pictures have, at most, as far as their order is guessed."""
 
 
-def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int = 2) -> Array:
+def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int = 2, finite: bool = True) -> Array:
     """Check an image (or a volume, with ``axes=3``) and return it with its channels last, contiguous.
 
     Parameters
     ----------
     value : array_like, path_like or PIL.Image.Image
         Shape (H, W) or (H, W, C); with ``axes=3`` (D, H, W) or (D, H, W, C). Integers, floats of 16, 32 or 64 bit, or bool.
-        Floats must be finite. `as_ndarray` says what else is taken.
+        `as_ndarray` says what else is taken.
     name : str
         The argument's name, for messages.
     minimum : int
         The least length of an axis.
     axes : int
         Number of axes without the channels.
+    finite : bool
+        Whether floats must be finite, for which all of them are read.
 
     Returns
     -------
@@ -126,7 +128,8 @@ def as_image(value: object, name: str = "image", *, minimum: int = 1, axes: int 
     if array.size == 0 or min(array.shape[:axes]) < minimum:
         raise InvalidInput(f"{name}: each side must be at least {max(minimum, 1)}, got shape {array.shape[:axes]}")
     array = _make_contiguous(array, name, array.dtype.newbyteorder("="))
-    check_finite(array, name)
+    if finite:
+        check_finite(array, name)
     return array
 
 

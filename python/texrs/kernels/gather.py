@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from texrs import _rust
-from texrs._arrays import as_array, as_choice, as_image, as_list, as_ndarray, as_wrap
+from texrs._arrays import as_array, as_choice, as_image, as_list, as_ndarray, as_wrap, check_finite
 from texrs._typing import Array, Floats, Interpolation
 from texrs.errors import InvalidInput
 
@@ -37,8 +37,8 @@ def gather(
     Parameters
     ----------
     exemplars : (h, w[, C]) or (d, h, w[, C]) array_like, or a list or tuple of them
-        Bool, integers, floats of 16, 32 or 64 bit, finite; several must agree in dtype and channels,
-        not in size.
+        Bool, integers, floats of 16, 32 or 64 bit, finite where they are looked up; several must agree in dtype and
+        channels, not in size.
     coordinates : (..., 2) or (..., 3) array_like
         (row, column) or (plane, row, column), in samples, as float32; sample centres are at the integers. Finite.
     which : (...) array_like of int, optional
@@ -57,7 +57,7 @@ def gather(
     Raises
     ------
     InvalidInput
-        Coordinates that are not finite, an index beyond the exemplars, or exemplars that do not agree.
+        Coordinates or samples that are not finite, an index beyond the exemplars, or exemplars that do not agree.
 
     References
     ----------
@@ -78,7 +78,7 @@ def gather(
     several = [as_ndarray(e, "exemplars", axes=axes) for e in as_list(exemplars)]
     if not several:
         raise InvalidInput("exemplars: at least one is needed, got none")
-    images = [as_image(e, "exemplars", axes=axes) for e in several]
+    images = [as_image(e, "exemplars", axes=axes, finite=False) for e in several]
     kinds = {(e.dtype.str, e.shape[-1]) for e in images}
     if len(kinds) > 1:
         raise InvalidInput(f"exemplars: must agree in dtype and channels, got {sorted(kinds)}")
@@ -96,6 +96,10 @@ def gather(
     out = _rust.gather(
         [_to_kernel(e, how) for e in images], as_wrap(wrap, axes=axes), index.reshape(-1), points.reshape(-1, axes), how
     )
+    if out.dtype.kind == "f" and not np.isfinite(out).all():
+        # Seen by what came out, for a few pixels of a large exemplar are soon looked up, and all of it is not soon read.
+        for image in images:
+            check_finite(image, "exemplars")
     if dtype == np.bool_ or out.dtype == np.uint32:
         out = out.view(dtype)
     elif dtype != out.dtype:

@@ -288,8 +288,11 @@ fn weighted<T: Element, const C: usize>(
         }
     }
     for (c, value) in out.iter_mut().enumerate() {
-        *value = T::from_f64(if clip {
-            sum[c].clamp(low[c], high[c])
+        // By comparisons, for NaN has no range: it stays what it is.
+        *value = T::from_f64(if clip && sum[c] < low[c] {
+            low[c]
+        } else if clip && sum[c] > high[c] {
+            high[c]
         } else {
             sum[c]
         });
@@ -322,6 +325,14 @@ mod tests {
         let mut out = [T::default()];
         gather(&[exemplar], &[], &[at], how, &mut out, &Monitor::default()).unwrap();
         out[0]
+    }
+
+    #[test]
+    fn samples_that_are_no_numbers_stay_so() {
+        let data = [f32::NAN; 36];
+        for how in [Interpolation::Linear, Interpolation::Cubic] {
+            assert!(at(&data, [6, 6], false, [2.5, 2.25], how).is_nan());
+        }
     }
 
     #[test]

@@ -116,16 +116,16 @@ impl Index {
         workspace.prepared.normalise(&self.mean, self.scale);
         let prepared = &workspace.prepared;
         let layers = self.channels + 1;
-        let mut scratch = self.scratch.take();
         workspace
             .multipliers
             .resize_with(layers, Multiplier::default);
-        for (layer, multiplier) in workspace.multipliers.iter_mut().enumerate() {
+        par::chunks_mut(&mut workspace.multipliers, 1, |layer, multiplier| {
+            let mut scratch = self.scratch.take();
             let row = |r: usize, out: &mut [f32]| prepared.kernel_row(layer, r, out);
             self.plan
-                .multiplier(query.shape[0], row, multiplier, &mut scratch);
-        }
-        self.scratch.give(scratch);
+                .multiplier(query.shape[0], row, &mut multiplier[0], &mut scratch);
+            self.scratch.give(scratch);
+        });
 
         let multipliers = &workspace.multipliers;
         let spectra = self.spectra();
