@@ -8,12 +8,15 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from enum import StrEnum
+from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 import pytest
 import typer
 
 import texrs
+from texrs import io
 from texrs.cli import COMMANDS, _elements, _maps, app
 from texrs.cli._options import MISSING, Option, Options, describe
 from texrs.cli._texts import About
@@ -213,6 +216,16 @@ def test_help_loads_nothing_that_it_does_not_need() -> None:
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
         assert done.stdout.startswith("Usage: texrs")
         assert not unneeded & set(done.stderr.split())
+
+
+def test_growing_a_picture_loads_neither_scipy_nor_scikit_image(tmp_path: Path) -> None:
+    picture = np.random.default_rng(0).integers(0, 255, (32, 32, 3), dtype=np.uint8)
+    io.write(tmp_path / "in.png", picture)
+    words = ["synthesize", "in.png", "-o", "out.png", "--size", "48", "--method", "paper-compensated", "--quiet"]
+    code = f"import sys; from texrs.cli import main; main({words}); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path)
+    assert io.read(tmp_path / "out.png").shape == (48, 48, 3)
+    assert not {"scipy", "skimage"} & set(done.stdout.split())
 
 
 def test_a_word_means_the_same_in_every_command() -> None:

@@ -96,6 +96,8 @@ def run_process(given: Arrays, command: list[str], made: str, where: str | None 
     with tempfile.TemporaryDirectory() as folder:
         io.imsave(f"{folder}/in.png", given["image"], check_contrast=False)
         single = {"RAYON_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MPLBACKEND": "Agg"}
+        # Byte code is kept, as it is wherever a program is installed: the first time, which is not counted, writes it.
+        single["PYTHONDONTWRITEBYTECODE"] = ""
         words = [word.format(folder=folder) for word in command]
         subprocess.run(
             words, check=True, cwd=where or folder, env={**os.environ, **single}, capture_output=True, timeout=600

@@ -9,7 +9,6 @@ from __future__ import annotations
 from math import ceil
 
 import numpy as np
-from scipy import ndimage
 
 from texrs._arrays import as_image, guidance
 from texrs._progress import answering
@@ -77,6 +76,8 @@ def fill_in_depth(
     tuple or None
         None where too little of the plane is known.
     """
+    from scipy import ndimage
+
     # What is interpolated from pixels of the hole is not known.
     whole: Bools = ndimage.minimum_filter(usable, TAPS, mode="nearest")
     if not whole.any():

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import ndimage
 
 from texrs._typing import Bools, Floats
 
 
 def blur(values: Floats, sigma: float) -> Floats:
     """Return values blurred by a Gaussian, or by three boxes of its variance where that is cheaper."""
+    from scipy import ndimage
+
     if sigma < 3:
         return np.asarray(ndimage.gaussian_filter(values, sigma, mode="nearest"))
     for width in _choose_boxes(sigma):

@@ -6,7 +6,6 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from texrs._arrays import as_bool, as_choice, as_image, as_int, as_mask, exp_single, log_single
 from texrs._typing import Array, Bools, Floats
@@ -196,6 +195,8 @@ def _count_outlines(mask: Bools, known: Bools | None) -> NDArray[np.uint8]:
 
 def _mark_middles(mask: Bools, known: Bools | None) -> NDArray[np.uint16]:
     """Put 2 at the middle of each feature; 1 if the border or a hole cuts it, for half of those have theirs beyond."""
+    from scipy import ndimage
+
     labels, number = ndimage.label(mask if known is None else mask & known, np.ones((3, 3)))
     cut = np.zeros(number + 1, np.bool_)
     for border in (labels[0], labels[-1], labels[:, 0], labels[:, -1]):
@@ -215,6 +216,8 @@ def _mark_middles(mask: Bools, known: Bools | None) -> NDArray[np.uint16]:
 
 def _measure_as_printed(mask: Bools, known: Bools | None, window: int | None) -> Floats:
     """Equations 1 and 2 as printed: zeros beyond the border, and larger scales where more is marked."""
+    from scipy import ndimage
+
     marked = (mask if known is None else mask & known).astype(np.float32)
     count = ndimage.uniform_filter(marked, window or _PAPER_WINDOW, mode="constant")
     middle = (float(count.min()) + float(count.max())) / 2

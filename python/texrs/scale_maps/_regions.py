@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from texrs._arrays import try_array
 from texrs._typing import Floats
@@ -117,6 +116,8 @@ def _as_numbers(region: object) -> list[float] | None:
 
 def _measure_polygon(points: NDArray[np.float64], size: tuple[int, ...]) -> NDArray[np.float64]:
     """Return how far each pixel is outside a polygon, by the even-odd rule."""
+    from scipy import ndimage
+
     inside = np.zeros(size, np.bool_)
     rows, columns = np.arange(size[0])[:, np.newaxis], np.arange(size[1])
     for (r0, c0), (r1, c1) in zip(points, np.roll(points, -1, axis=0), strict=True):

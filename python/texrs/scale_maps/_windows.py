@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from texrs._typing import Array, Bools, Floats
 
@@ -115,6 +114,8 @@ class Lattice:
 
 def smooth(logs: Floats, known: Bools, rounds: int, *, size: int = 3, share: float = 0.8) -> Floats:
     """Bring values towards the mean and the median of those around them (equation 2), by ``share`` the mean."""
+    from scipy import ndimage
+
     values = np.where(known, logs, 0)
     weights = ndimage.uniform_filter(known.astype(np.float32), size, mode="nearest")
     for _ in range(rounds):
