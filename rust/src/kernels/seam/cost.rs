@@ -131,22 +131,36 @@ pub(super) fn capacity(cost: f64, scale: f64) -> i32 {
     (cost * scale + 0.5) as i32
 }
 
-/// Refuses negative and non-finite entries.
-pub(super) fn check_costs(argument: &'static str, costs: &[f32]) -> Result<()> {
-    // One comparison that NaN fails too.
-    match costs
-        .iter()
-        .position(|&c| !(0.0..f32::INFINITY).contains(&c))
-    {
-        None => Ok(()),
-        Some(at) => Err(Error::value(
+/// Costs looked at side by side.
+const LANES: usize = 16;
+
+/// The largest entry, 0 of none; refuses negative and non-finite ones.
+pub(super) fn check_costs(argument: &'static str, costs: &[f32]) -> Result<f32> {
+    // One comparison that NaN fails too; several entries at a time, within which nothing has to be decided.
+    let sound = |c: f32| (0.0..f32::INFINITY).contains(&c);
+    let (mut largest, mut bad) = ([0.0f32; LANES], [0u32; LANES]);
+    let (blocks, rest) = costs.as_chunks::<LANES>();
+    for block in blocks {
+        for l in 0..LANES {
+            bad[l] |= u32::from(!sound(block[l]));
+            largest[l] = if block[l] > largest[l] {
+                block[l]
+            } else {
+                largest[l]
+            };
+        }
+    }
+    if bad.contains(&1) || !rest.iter().all(|&c| sound(c)) {
+        let at = costs.iter().position(|&c| !sound(c)).unwrap_or(0);
+        return Err(Error::value(
             argument,
             format!(
                 "{} at {at}; finite values of at least 0 are allowed",
                 costs[at]
             ),
-        )),
+        ));
     }
+    Ok(rest.iter().chain(&largest).copied().fold(0.0, f32::max))
 }
 
 /// Refuses arrays of another length.

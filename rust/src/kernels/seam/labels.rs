@@ -47,13 +47,15 @@ pub fn least_energy<const D: usize>(energy: &Energy<'_, D>, monitor: &Monitor) -
     let mut largest = 0.0f32;
     for costs in energy.forward.iter().chain(&energy.backward) {
         check_len("pairwise", n, costs.len())?;
-        check_costs("pairwise", costs)?;
-        largest = costs.iter().fold(largest, |m, &c| m.max(c));
+        largest = largest.max(check_costs("pairwise", costs)?);
     }
-    let bad = |u: &[f32; 2]| {
-        u.iter().any(|c| c.is_nan() || *c == f32::NEG_INFINITY) || u.iter().all(|c| c.is_infinite())
+    // Two that are above minus infinity, and of which one is below infinity; NaN is neither.
+    let sound = |&[a, b]: &[f32; 2]| {
+        (a > f32::NEG_INFINITY)
+            & (b > f32::NEG_INFINITY)
+            & ((a < f32::INFINITY) | (b < f32::INFINITY))
     };
-    if let Some(at) = energy.unary.iter().position(bad) {
+    if let Some(at) = energy.unary.iter().position(|u| !sound(u)) {
         return Err(Error::value(
             "unary",
             format!(
@@ -84,7 +86,11 @@ pub fn least_energy<const D: usize>(energy: &Energy<'_, D>, monitor: &Monitor) -
     let terminal: Vec<i32> = energy
         .unary
         .iter()
-        .map(|u| (difference(u) * scale).clamp(-most, most).round() as i32)
+        .map(|u| {
+            let steps = (difference(u) * scale).clamp(-most, most);
+            // `f64::round` is a call where the CPU is not known to have it.
+            (steps + 0.5f64.copysign(steps)) as i32
+        })
         .collect();
     let graph = Graph {
         grid: energy.grid,
