@@ -2,6 +2,7 @@
 //! scale).
 
 use crate::engine::appearance::{CHANNELS, Colour};
+use crate::foundation::error::check_shape;
 use crate::{Error, Result};
 
 /// Samples that are drawn from, at least, as a part of all: those whose first values are nearest to the wanted one.
@@ -56,13 +57,7 @@ impl<'a> Guide<'a> {
             ("guide of the output", points * values, output.len()),
             ("weight of the guide", weights, weight.len()),
         ] {
-            if expected != got {
-                return Err(Error::Shape {
-                    argument,
-                    expected: vec![expected],
-                    got: vec![got],
-                });
-            }
+            check_shape(argument, &[expected], got)?;
         }
         let within = |x: &i16| (-2048..2048).contains(x);
         if !exemplar.as_flattened().iter().chain(output).all(within) {

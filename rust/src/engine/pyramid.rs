@@ -1,5 +1,6 @@
 //! From one resolution to the next.
 
+use crate::foundation::error::check_shape;
 use crate::foundation::fixed::{Frames, ONE, Place, add, apply};
 use crate::foundation::grid::Region;
 use crate::foundation::{memory, par};
@@ -33,13 +34,7 @@ pub fn upsample<const D: usize>(
             ));
         }
     }
-    if parents.len() != from.grid.len() {
-        return Err(Error::Shape {
-            argument: "parents",
-            expected: coarse.to_vec(),
-            got: vec![parents.len()],
-        });
-    }
+    check_shape("parents", &coarse, parents.len())?;
     frames.check(to.grid.len())?;
     let mut places = memory::filled("the places of a region", [0; D], to.grid.len())?;
     par::chunks_mut(&mut places, CHUNK, |chunk, places| {

@@ -50,6 +50,19 @@ pub enum Error {
 /// Results of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
+/// Refuses an array of `got` values where one of a shape is needed.
+pub(crate) fn check_shape(argument: &'static str, expected: &[usize], got: usize) -> Result<()> {
+    let product = |n: usize, &side: &usize| n.checked_mul(side);
+    if expected.iter().try_fold(1, product) == Some(got) {
+        return Ok(());
+    }
+    Err(Error::Shape {
+        argument,
+        expected: expected.to_vec(),
+        got: vec![got],
+    })
+}
+
 impl Error {
     /// An [`Error::Value`].
     pub fn value(argument: &'static str, message: impl Into<String>) -> Self {

@@ -4,6 +4,7 @@
 //! nearest mark along each column, then the lower envelope of parabolas along each row. Squares are whole numbers, so the
 //! distances are exact.
 
+use crate::foundation::error::check_shape;
 use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
@@ -33,12 +34,12 @@ pub fn outlines(
     pieces: &[Piece],
     monitor: &Monitor,
 ) -> Result<Vec<Option<Vec<f32>>>> {
-    if shape.contains(&0) || shape[0].checked_mul(shape[1]) != Some(labels.len()) {
-        return Err(Error::Shape {
-            argument: "labels",
-            expected: shape.to_vec(),
-            got: vec![labels.len()],
-        });
+    check_shape("labels", &shape, labels.len())?;
+    if labels.is_empty() {
+        return Err(Error::value(
+            "labels",
+            format!("{shape:?} has an empty axis"),
+        ));
     }
     let fits = |n: &usize| (1..=MOST).contains(n);
     if let Some(piece) = pieces.iter().find(|p| !p.shape.iter().all(fits)) {

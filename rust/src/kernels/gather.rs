@@ -5,6 +5,7 @@
 //! (Catmull-Rom: Keys, *Cubic convolution interpolation*, IEEE ASSP 1981, a = -1/2) is clipped to the range of its taps,
 //! so that it neither rings nor leaves the range of the data, high dynamic range included.
 
+use crate::foundation::error::check_shape;
 use crate::foundation::grid::Grid;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
@@ -73,15 +74,7 @@ pub struct Exemplar<'a, T, const D: usize> {
 impl<'a, T, const D: usize> Exemplar<'a, T, D> {
     /// A view of `grid.len() * channels` samples.
     pub fn new(data: &'a [T], grid: Grid<D>, channels: usize) -> Result<Self> {
-        if grid.len().checked_mul(channels) != Some(data.len()) {
-            let mut expected = grid.shape().to_vec();
-            expected.push(channels);
-            return Err(Error::Shape {
-                argument: "exemplar",
-                expected,
-                got: vec![data.len()],
-            });
-        }
+        check_shape("exemplar", &[grid.len(), channels], data.len())?;
         Ok(Self {
             data,
             grid,
@@ -117,20 +110,10 @@ pub fn gather<T: Element, const D: usize>(
             format!("must agree in channels, got {all:?}"),
         ));
     }
-    if !which.is_empty() && which.len() != coordinates.len() {
-        return Err(Error::Shape {
-            argument: "exemplar",
-            expected: vec![coordinates.len()],
-            got: vec![which.len()],
-        });
+    if !which.is_empty() {
+        check_shape("which", &[coordinates.len()], which.len())?;
     }
-    if out.len() != coordinates.len() * channels {
-        return Err(Error::Shape {
-            argument: "out",
-            expected: vec![coordinates.len(), channels],
-            got: vec![out.len()],
-        });
-    }
+    check_shape("out", &[coordinates.len(), channels], out.len())?;
     if let Some(&bad) = which.iter().find(|&&e| usize::from(e) >= exemplars.len()) {
         let allowed = exemplars.len();
         return Err(Error::value(

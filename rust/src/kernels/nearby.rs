@@ -3,6 +3,7 @@
 //!
 //! Each point adds to those above and below it, and takes what was added beside it. Sums run in `f64`, the farthest first.
 
+use crate::foundation::error::check_shape;
 use crate::foundation::grid::Grid;
 use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
@@ -24,13 +25,7 @@ pub fn sums(
     window: &[f64],
     monitor: &Monitor,
 ) -> Result<Vec<f32>> {
-    if values.len() != points.len() {
-        return Err(Error::Shape {
-            argument: "values",
-            expected: vec![points.len()],
-            got: vec![values.len()],
-        });
-    }
+    check_shape("values", &[points.len()], values.len())?;
     let image = Grid::new(shape, [cyclic; 2])?;
     let inside = |point: &&[i64; 2]| (0..2).all(|a| (0..shape[a] as i64).contains(&point[a]));
     if points.iter().filter(inside).count() != points.len() {

@@ -10,6 +10,7 @@
 
 use std::collections::VecDeque;
 
+use crate::foundation::error::check_shape;
 use crate::foundation::grid::Grid;
 use crate::foundation::memory;
 use crate::foundation::par::Monitor;
@@ -27,13 +28,7 @@ pub fn reconstruct(
     monitor: &Monitor,
 ) -> Result<Vec<f32>> {
     for (argument, values) in [("seed", seed), ("mask", mask)] {
-        if values.len() != grid.len() {
-            return Err(Error::Shape {
-                argument,
-                expected: grid.shape().to_vec(),
-                got: vec![values.len()],
-            });
-        }
+        check_shape(argument, &grid.shape(), values.len())?;
         if values.iter().any(|x| x.is_nan()) {
             return Err(Error::value(argument, "numbers are needed, got NaN"));
         }

@@ -3,6 +3,7 @@
 //! Sums run in double precision, from the middle on and then the farthest first, and are rounded to the array's type after each
 //! axis: as `scipy.ndimage.correlate1d` has it, byte for byte.
 
+use crate::foundation::error::check_shape;
 use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::foundation::wide::wide_fn;
@@ -91,13 +92,7 @@ pub fn smooth<T: Number>(
     axes: &[Axis],
     monitor: &Monitor,
 ) -> Result<()> {
-    if memory::product("shape", shape)? != values.len() {
-        return Err(Error::Shape {
-            argument: "values",
-            expected: shape.to_vec(),
-            got: vec![values.len()],
-        });
-    }
+    check_shape("values", shape, values.len())?;
     if axes.len() != shape.len() {
         let message = format!("one is needed a side, got {} for {shape:?}", axes.len());
         return Err(Error::value("axes", message));

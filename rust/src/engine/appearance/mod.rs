@@ -11,7 +11,9 @@
 mod apron;
 mod projection;
 mod table;
+mod window;
 
+use crate::foundation::error::check_shape;
 use crate::foundation::fixed::{BITS, ONE, Place};
 use crate::foundation::functions::exp;
 use crate::foundation::grid::Grid;
@@ -24,6 +26,8 @@ use crate::{Error, Result};
 pub use apron::Apron;
 use projection::Projection;
 pub use table::Parts;
+pub(crate) use window::Centres;
+use window::{check_sides, numbers, window};
 
 /// Numbers of an appearance vector.
 pub const KEEP: usize = 24;
@@ -55,8 +59,6 @@ const LONGEST: usize = 2048;
 const LANES: usize = 16;
 /// Places that differ by less are of one piece of the exemplar: rounding moves them by half a sample.
 const SAME: i32 = ONE * 3 / 4;
-/// Samples along an axis, at most: places have 12 of 32 bits after the point, and steps must fit too.
-const SIDE: usize = 1 << 18;
 /// Points a task takes at a time.
 const CHUNK: usize = 1024;
 
@@ -90,17 +92,11 @@ impl<const D: usize> Appearance<D> {
         radius: usize,
         monitor: &Monitor,
     ) -> Result<Self> {
-        if !(1..=CHANNELS).contains(&channels)
-            || grid.len().checked_mul(channels) != Some(colours.len())
-        {
-            let mut expected = grid.shape().to_vec();
-            expected.push(channels.clamp(1, CHANNELS));
-            return Err(Error::Shape {
-                argument: "colours",
-                expected,
-                got: vec![colours.len()],
-            });
+        if !(1..=CHANNELS).contains(&channels) {
+            let message = format!("1 to {CHANNELS} are allowed, got {channels}");
+            return Err(Error::value("channels", message));
         }
+        check_shape("colours", &[grid.len(), channels], colours.len())?;
         memory::room("the appearance of the exemplar", grid.len(), 96)?;
         if let Some(bad) = colours.iter().find(|x| !x.is_finite()) {
             return Err(Error::value("colours", format!("{bad} is not finite")));
@@ -434,75 +430,6 @@ pub fn distance(a: &Feature, b: &Feature) -> i32 {
 fn gap(a: i32, b: i32, n: i32, wrap: bool) -> i32 {
     let d = (a - b).abs();
     if wrap { d.min(n - d) } else { d }
-}
-
-/// Samples whose windows lie inside an exemplar.
-pub(crate) struct Centres<const D: usize> {
-    ranges: [[i32; 2]; D],
-}
-
-impl<const D: usize> Centres<D> {
-    pub(crate) fn len(&self) -> usize {
-        self.ranges
-            .iter()
-            .map(|r| (r[1] - r[0] + 1) as usize)
-            .product()
-    }
-
-    pub(crate) fn get(&self, mut number: usize) -> [i32; D] {
-        let mut sample = [0; D];
-        for axis in (0..D).rev() {
-            let [low, high] = self.ranges[axis];
-            let n = (high - low + 1) as usize;
-            sample[axis] = low + (number % n) as i32;
-            number /= n;
-        }
-        sample
-    }
-}
-
-/// Numbers of a window.
-fn numbers<const D: usize>(radius: usize, channels: usize) -> usize {
-    let side = radius.saturating_mul(2).saturating_add(1);
-    side.saturating_pow(D as u32).saturating_mul(channels)
-}
-
-/// Refuses exemplars in which windows of `radius` do not fit, and those that 32 bits cannot address with their rim.
-fn check_sides<const D: usize>(grid: &Grid<D>, radius: usize) -> Result<()> {
-    let (shape, least) = (grid.shape(), 2 * radius + 2);
-    if shape.iter().any(|&n| n < least) {
-        return Err(Error::value(
-            "exemplar",
-            format!(
-                "{shape:?} is too small for windows of radius {radius}: sides of at least {least} are needed"
-            ),
-        ));
-    }
-    let wide = shape.map(|n| n.saturating_add(least));
-    let points = wide.iter().fold(1usize, |n, &side| n.saturating_mul(side));
-    if shape.iter().any(|&n| n > SIDE) || points > i32::MAX as usize {
-        return Err(Error::Limit {
-            what: format!("an exemplar of {shape:?}"),
-            needed: format!("{points} samples with its rim"),
-            limit: format!("{} samples, {SIDE} along an axis", i32::MAX),
-        });
-    }
-    Ok(())
-}
-
-/// The offsets of a window, in row-major order.
-fn window<const D: usize>(radius: usize) -> Vec<[i32; D]> {
-    let side = 2 * radius + 1;
-    (0..side.pow(D as u32))
-        .map(|mut k| {
-            let mut offset = [0; D];
-            for axis in (0..D).rev() {
-                offset[axis] = (k % side) as i32 - radius as i32;
-                k /= side;
-            }
-            offset
-        })
-        .collect()
 }
 
 /// Colours less their mean, with the farthest at the end of 12 bits.

@@ -22,6 +22,7 @@ pub use similar::{Similarity, similar};
 
 use crate::Result;
 use crate::engine::appearance::{Appearance, KEEP};
+use crate::foundation::error::check_shape;
 use crate::foundation::fixed::Place;
 use crate::foundation::grid::Region;
 use crate::foundation::hash::Noise;
@@ -44,20 +45,10 @@ pub fn jitter<const D: usize>(
     seed: u64,
     level: u32,
 ) -> Result<()> {
-    if !held.is_empty() && held.len() != places.len() {
-        return Err(crate::Error::Shape {
-            argument: "held",
-            expected: vec![places.len()],
-            got: vec![held.len()],
-        });
+    if !held.is_empty() {
+        check_shape("held", &[places.len()], held.len())?;
     }
-    if places.len() != region.grid.len() {
-        return Err(crate::Error::Shape {
-            argument: "places",
-            expected: region.grid.shape().to_vec(),
-            got: vec![places.len()],
-        });
-    }
+    check_shape("places", &region.grid.shape(), places.len())?;
     if reach > i32::MAX as u32 {
         let message = format!("up to {} is allowed, got {reach}", i32::MAX);
         return Err(crate::Error::value("reach", message));

@@ -3,6 +3,7 @@
 use super::level::Level;
 use super::{CHUNK, FEW, LARGEST, Similarity};
 use crate::engine::appearance::{Appearance, KEEP};
+use crate::foundation::error::check_shape;
 use crate::foundation::fixed::{Frames, Place};
 use crate::foundation::grid::Region;
 use crate::foundation::memory;
@@ -77,13 +78,7 @@ pub fn correct<const D: usize>(
             if kinds.samples.is_empty() { 0 } else { points },
         ),
     ] {
-        if length != wanted {
-            return Err(Error::Shape {
-                argument,
-                expected: vec![wanted],
-                got: vec![length],
-            });
-        }
+        check_shape(argument, &[wanted], length)?;
     }
     memory::room("the similarity sets", similarity.sets.len(), 8)?;
     // Each sample once, for divisions cost more than all else here.

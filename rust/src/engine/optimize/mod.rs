@@ -22,6 +22,7 @@ mod vote;
 
 use crate::engine::appearance::{Appearance, UNIT};
 use crate::engine::guide::Guide;
+use crate::foundation::error::check_shape;
 use crate::foundation::fixed::{Frames, Place, add, apply};
 use crate::foundation::grid::Region;
 use crate::foundation::memory;
@@ -92,12 +93,9 @@ pub fn correct<const D: usize>(
     monitor: &Monitor,
 ) -> Result<(usize, f64)> {
     let points = region.grid.len();
-    if places.len() != points || !(held.is_empty() || held.len() == points) {
-        return Err(Error::Shape {
-            argument: "places",
-            expected: region.grid.shape().to_vec(),
-            got: vec![places.len()],
-        });
+    check_shape("places", &region.grid.shape(), places.len())?;
+    if !held.is_empty() {
+        check_shape("held", &region.grid.shape(), held.len())?;
     }
     if !(1..=2).contains(&options.reach) || options.vote > appearance.radius() {
         return Err(Error::value(

@@ -15,6 +15,7 @@ mod pool;
 mod window;
 
 use crate::engine::stitcher::{Pasted, Pasting, Samples};
+use crate::foundation::error::check_shape;
 use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::kernels::patch_search::{Exemplar, Index, Match};
@@ -132,13 +133,7 @@ impl<'a> Quilt<'a> {
             pixels.cells.len(),
             samples.len(),
         ] {
-            if got != count {
-                return Err(Error::Shape {
-                    argument: "pixels",
-                    expected: vec![count],
-                    got: vec![got],
-                });
-            }
+            check_shape("pixels", &[count], got)?;
         }
         let fits = |p: &Picture| (0..2).all(|a| (1..=p.shape[a]).contains(&options.patch[a]));
         if let Some(bad) = pictures.iter().find(|p| !fits(p)) {

@@ -8,12 +8,14 @@ use std::collections::HashMap;
 
 use super::canvas::{Canvas, Window};
 use super::chart::{Chart, difference, mean};
-use super::cut::{Cutter, Run, runs};
+use super::cut::Cutter;
 use super::pair::{Judge, distances};
+use super::runs::{Run, runs};
 use super::search::{Charges, Index};
 use super::source::Source;
 use super::view::Looks;
 use super::{Balance, Given, Options, Patch, Stitching, Weights, enlargement};
+use crate::foundation::error::check_shape;
 use crate::foundation::fixed::{Frames, Place};
 use crate::foundation::grid::{Grid, Region};
 use crate::foundation::hash::Noise;
@@ -75,7 +77,7 @@ pub fn judge<const D: usize>(
     weights: Weights,
 ) -> Result<Vec<[f32; D]>> {
     for got in [places.len(), patches.len()] {
-        check_length("places", grid, got)?;
+        check_shape("places", &grid.shape(), got)?;
     }
     let mut looks = Looks::default();
     looks.fit(grid.len());
@@ -283,7 +285,7 @@ fn paint<const D: usize>(
 ) -> Result<Canvas<D>> {
     let grid = region.grid;
     for got in [places.len(), patches.len(), seams.len()] {
-        check_length("places", &grid, got)?;
+        check_shape("places", &grid.shape(), got)?;
     }
     if patches.iter().any(|&p| p as usize >= table.len()) {
         return Err(Error::value("patches", "a number that the table lacks"));
@@ -296,7 +298,7 @@ fn paint<const D: usize>(
             .map(|(frame, &p)| difference(&table[p as usize].frame, frame))
             .collect(),
         Frames::Dense(_) => {
-            check_length("distortion", &grid, distortion.len())?;
+            check_shape("distortion", &grid.shape(), distortion.len())?;
             distortion
         }
     };
@@ -308,16 +310,5 @@ fn paint<const D: usize>(
         distortion,
         free: 0,
         part: true,
-    })
-}
-
-fn check_length<const D: usize>(argument: &'static str, grid: &Grid<D>, got: usize) -> Result<()> {
-    if got == grid.len() {
-        return Ok(());
-    }
-    Err(Error::Shape {
-        argument,
-        expected: grid.shape().to_vec(),
-        got: vec![got],
     })
 }

@@ -3,8 +3,8 @@
 //! Lombaert, Sun, Grady and Xu, *A multilevel banded graph cuts method for fast image segmentation*, ICCV 2005: large windows
 //! are cut between blocks first, and then only points along that cut are free. They would take most of the time otherwise.
 
-use super::cut::Run;
 use super::pair::{Capacities, capacity};
+use super::runs::Run;
 use super::view::Tie;
 use crate::Result;
 use crate::foundation::grid::Grid;

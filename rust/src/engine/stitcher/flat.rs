@@ -8,6 +8,7 @@ use super::cut::{Cutter, Cutting, Proposal};
 use super::source::Source;
 use super::view::View;
 use super::weights::Weights;
+use crate::foundation::error::check_shape;
 use crate::foundation::fixed::{ONE, Place};
 use crate::foundation::grid::Grid;
 use crate::foundation::par::{self, Monitor};
@@ -168,13 +169,7 @@ impl Samples {
             ("mask", pasting.mask.len()),
             ("core", pasting.core.len()),
         ] {
-            if got != n {
-                return Err(Error::Shape {
-                    argument,
-                    expected: pasting.shape.to_vec(),
-                    got: vec![got],
-                });
-            }
+            check_shape(argument, &pasting.shape, got)?;
         }
         let costs = pasting.seams.as_flattened();
         if !costs.iter().all(|s| (0.0..=f32::MAX).contains(s)) {
@@ -205,13 +200,7 @@ impl Samples {
         window: &'a Window<2>,
         samples: &[u32],
     ) -> Result<Proposal<'a, 2>> {
-        if samples.len() != pasting.mask.len() {
-            return Err(Error::Shape {
-                argument: "patches",
-                expected: pasting.shape.to_vec(),
-                got: vec![samples.len()],
-            });
-        }
+        check_shape("patches", &pasting.shape, samples.len())?;
         for (&sample, _) in samples.iter().zip(pasting.mask).filter(|(_, mask)| **mask) {
             self.find("patches", sample)?;
         }

@@ -8,7 +8,8 @@ use std::collections::{HashMap, HashSet, VecDeque};
 
 use super::canvas::{Window, is_patch};
 use super::chart::{Chart, flood};
-use super::cut::{Cutting, widen};
+use super::cut::Cutting;
+use super::runs::widen;
 use super::{Patch, Stitching};
 use crate::Result;
 use crate::foundation::fixed::{Frames, Place};

@@ -23,6 +23,7 @@ mod heal;
 mod mesh;
 mod pair;
 mod recover;
+mod runs;
 mod search;
 mod source;
 mod view;

@@ -1,5 +1,6 @@
 //! What patches are cut from: an exemplar's samples, with what is known of the elements that they belong to.
 
+use crate::foundation::error::check_shape;
 use crate::foundation::fixed::{BITS, ONE, Place, nearest};
 use crate::foundation::grid::Grid;
 use crate::foundation::memory;
@@ -68,24 +69,15 @@ impl<const D: usize> Source<D> {
         adjacency: Adjacency<'_>,
     ) -> Result<Self> {
         let n = grid.len();
-        if !(1..=CHANNELS).contains(&channels) || n.checked_mul(channels) != Some(colours.len()) {
-            return Err(Error::Shape {
-                argument: "colours",
-                expected: vec![n, channels.clamp(1, CHANNELS)],
-                got: vec![colours.len()],
-            });
-        }
+        check_channels(channels)?;
+        check_shape("colours", &[n, channels], colours.len())?;
         for (argument, got) in [
             ("labels", elements.labels.len()),
             ("depth", elements.depth.len()),
             ("classes", adjacency.classes.len()),
         ] {
-            if got != 0 && got != n {
-                return Err(Error::Shape {
-                    argument,
-                    expected: vec![n],
-                    got: vec![got],
-                });
+            if got != 0 {
+                check_shape(argument, &[n], got)?;
             }
         }
         if !colours
@@ -146,16 +138,8 @@ impl<const D: usize> Source<D> {
         depth: &[f32],
     ) -> Result<Self> {
         let n = depth.len();
-        if !(1..=CHANNELS).contains(&channels)
-            || n > grid.len()
-            || n.checked_mul(channels) != Some(colours.len())
-        {
-            return Err(Error::Shape {
-                argument: "colours",
-                expected: vec![n, channels.clamp(1, CHANNELS)],
-                got: vec![colours.len()],
-            });
-        }
+        check_channels(channels)?;
+        check_shape("colours", &[n.min(grid.len()), channels], colours.len())?;
         if !colours.iter().chain(depth).all(|x| x.is_finite()) {
             return Err(Error::value("colours", "finite values are allowed"));
         }
@@ -343,4 +327,12 @@ fn spread(colours: &[f32], channels: usize) -> ([f32; CHANNELS], f32) {
     }
     let deviation = (total / channels as f64) as f32;
     (mean, if deviation > 1e-6 { deviation } else { 1.0 })
+}
+
+fn check_channels(channels: usize) -> Result<()> {
+    if (1..=CHANNELS).contains(&channels) {
+        return Ok(());
+    }
+    let message = format!("1 to {CHANNELS} are allowed, got {channels}");
+    Err(Error::value("channels", message))
 }

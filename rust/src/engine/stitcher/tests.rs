@@ -4,9 +4,9 @@ use proptest::prelude::*;
 
 use super::canvas::{Canvas, FREE};
 use super::chart::Chart;
-use super::cut::runs;
 use super::energy::Energy;
 use super::pair::Capacities;
+use super::runs::runs;
 use super::search::{Charges, Index};
 use super::source::CHANNELS;
 use super::view::Tie;

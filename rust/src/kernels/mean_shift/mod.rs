@@ -9,6 +9,7 @@
 
 mod window;
 
+use crate::foundation::error::check_shape;
 use crate::foundation::grid::Grid;
 use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
@@ -53,12 +54,9 @@ pub fn filter(
 ) -> Result<Vec<f32>> {
     let [rows, columns, channels] = shape;
     let grid = Grid::new([rows, columns], options.wrap)?;
-    if channels == 0 || grid.len().checked_mul(channels) != Some(image.len()) {
-        return Err(Error::Shape {
-            argument: "image",
-            expected: shape.to_vec(),
-            got: vec![image.len()],
-        });
+    check_shape("image", &shape, image.len())?;
+    if channels == 0 {
+        return Err(Error::value("image", "needs a channel"));
     }
     memory::room("the image and its filtered copy", image.len(), 16)?;
     if options.radius > MAX_RADIUS {

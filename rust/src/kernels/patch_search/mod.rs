@@ -13,17 +13,19 @@ mod filter;
 mod half;
 mod maps;
 mod score;
+mod spectra;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, OnceLock};
 
-use crate::foundation::functions::power_below;
+use crate::foundation::error::check_shape;
 use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
 use filter::{Plan, Scratch};
 use maps::Workspace;
 use score::Prepared;
+use spectra::{Spectra, moments};
 
 /// What is searched: samples in row-major order, channels last.
 #[derive(Debug, Clone, Default)]
@@ -99,20 +101,6 @@ pub struct Index {
     scale: f64,
     workspaces: Pool<Workspace>,
     scratch: Pool<Scratch>,
-}
-
-/// What the filter knows of the exemplars.
-struct Spectra {
-    /// Interleaved: of each block the channels, then the squares.
-    values: Vec<f32>,
-    /// Mean of each layer of each block, taken out before the transform, and the 2-norm of what is left.
-    levels: Vec<Level>,
-}
-
-#[derive(Clone, Copy, Default)]
-struct Level {
-    mean: f64,
-    norm: f64,
 }
 
 #[derive(Clone, Copy)]
@@ -204,63 +192,6 @@ impl Index {
             workspaces: Pool(Mutex::default()),
             scratch: Pool(Mutex::default()),
         })
-    }
-
-    fn spectra(&self) -> &Spectra {
-        once(&self.spectra, || {
-            let layers = self.channels + 1;
-            let levels = par::map(self.blocks.len() * layers, |i| {
-                self.level(self.blocks[i / layers], i % layers)
-            });
-            let layer = 2 * self.plan.len();
-            let mut values = vec![0.0; layer * levels.len()];
-            par::chunks_mut(&mut values, layer, |i, out| {
-                let mut scratch = self.scratch.take();
-                let (block, l) = (self.blocks[i / layers], i % layers);
-                let rows = self.exemplars[block.exemplar].shape[0] - block.corner[0];
-                let row = |r: usize, out: &mut [f32]| {
-                    let samples = self.layer_row(block, l, r);
-                    for (out, x) in out.iter_mut().zip(samples) {
-                        *out = (x - levels[i].mean) as f32;
-                    }
-                };
-                self.plan.spectrum(rows, row, out, &mut scratch);
-                self.scratch.give(scratch);
-            });
-            Spectra { values, levels }
-        })
-    }
-
-    /// Row `r` of a layer of a block: a channel less its mean, or the sum of the squares of all, in units of the scale.
-    fn layer_row(&self, block: Block, layer: usize, r: usize) -> impl Iterator<Item = f64> {
-        let Exemplar { data, shape, .. } = &self.exemplars[block.exemplar];
-        let [first, left] = block.corner;
-        let width = self.plan.size[1].min(shape[1] - left);
-        let start = ((first + r) * shape[1] + left) * self.channels;
-        let pixels = data[start..][..width * self.channels].chunks_exact(self.channels);
-        pixels.map(move |pixel| {
-            let distance = |c: usize| (f64::from(pixel[c]) - self.mean[c]) / self.scale;
-            if layer < self.channels {
-                distance(layer)
-            } else {
-                (0..self.channels).map(|c| distance(c).powi(2)).sum()
-            }
-        })
-    }
-
-    fn level(&self, block: Block, layer: usize) -> Level {
-        let shape = self.exemplars[block.exemplar].shape;
-        let rows = self.plan.size[0].min(shape[0] - block.corner[0]);
-        let mut samples = Vec::new();
-        for r in 0..rows {
-            samples.extend(self.layer_row(block, layer, r));
-        }
-        let mean = sum(&samples, |x| x) / samples.len() as f64;
-        let squares = sum(&samples, |x| (x - mean) * (x - mean));
-        Level {
-            mean,
-            norm: 1.01 * squares.sqrt(),
-        }
     }
 
     /// Channels of the exemplars.
@@ -421,18 +352,6 @@ fn order(a: &Match, b: &Match) -> std::cmp::Ordering {
         .then_with(|| (a.exemplar, a.row, a.column).cmp(&(b.exemplar, b.row, b.column)))
 }
 
-/// The sum of what is made of each value, some side by side.
-fn sum(values: &[f64], of: impl Fn(f64) -> f64) -> f64 {
-    let (chunks, rest) = values.as_chunks::<8>();
-    let mut lanes = [0.0; 8];
-    for chunk in chunks {
-        for (lane, &x) in lanes.iter_mut().zip(chunk) {
-            *lane += of(x);
-        }
-    }
-    lanes.iter().sum::<f64>() + rest.iter().map(|&x| of(x)).sum::<f64>()
-}
-
 /// One position of so many, at most, is allowed where these are listed.
 const FEW: usize = 4;
 
@@ -444,84 +363,12 @@ fn list_open(exemplar: &Exemplar) -> Option<Vec<u32>> {
     (count <= allowed.len() / FEW).then(|| open().map(|(at, _)| at as u32).collect())
 }
 
-/// Mean of each channel, and a power of two above all distances from it.
-fn moments(exemplars: &[Exemplar], channels: usize) -> (Vec<f64>, f64) {
-    let mut mean = vec![0.0; channels];
-    let mut range = vec![[f32::INFINITY, f32::NEG_INFINITY]; channels];
-    let mut count = 0;
-    for e in exemplars {
-        match channels {
-            1 => tally::<8>(&e.data, channels, &mut mean, &mut range),
-            3 => tally::<24>(&e.data, channels, &mut mean, &mut range),
-            _ => tally::<0>(&e.data, channels, &mut mean, &mut range),
-        }
-        count += e.data.len() / channels;
-    }
-    mean.iter_mut().for_each(|m| *m /= count as f64);
-    let far = mean
-        .iter()
-        .zip(range)
-        .flat_map(|(m, r)| r.map(|x| (f64::from(x) - m).abs()));
-    let far = far.fold(0.0, f64::max);
-    let scale = if far > 0.0 {
-        // The smallest power of two that is no less.
-        let below = power_below(far);
-        if below < far { 2.0 * below } else { below }
-    } else {
-        1.0
-    };
-    (mean, scale)
-}
-
-/// Adds samples to the sum of each channel, and widens its range; `LANES` of them side by side, which are whole pixels, or a
-/// pixel at a time if 0: a sum alone would wait for each addition.
-fn tally<const LANES: usize>(
-    data: &[f32],
-    channels: usize,
-    sum: &mut [f64],
-    range: &mut [[f32; 2]],
-) {
-    // Samples are numbers, for which comparisons are less work than `min` and `max`.
-    let least = |a: f32, b: f32| if b < a { b } else { a };
-    let most = |a: f32, b: f32| if b > a { b } else { a };
-    let mut sums = [0.0f64; LANES];
-    let mut ranges = [[f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]];
-    let mut chunks = data.chunks_exact(if LANES == 0 { channels } else { LANES });
-    if LANES > 0 {
-        for chunk in &mut chunks {
-            for l in 0..LANES {
-                sums[l] += f64::from(chunk[l]);
-                ranges[0][l] = least(ranges[0][l], chunk[l]);
-                ranges[1][l] = most(ranges[1][l], chunk[l]);
-            }
-        }
-    }
-    for l in 0..LANES {
-        let k = l % channels;
-        sum[k] += sums[l];
-        range[k] = [
-            least(range[k][0], ranges[0][l]),
-            most(range[k][1], ranges[1][l]),
-        ];
-    }
-    let rest = if LANES > 0 { chunks.remainder() } else { data };
-    for pixel in rest.chunks_exact(channels) {
-        for (k, &x) in pixel.iter().enumerate() {
-            sum[k] += f64::from(x);
-            range[k] = [least(range[k][0], x), most(range[k][1], x)];
-        }
-    }
-}
-
 fn check_exemplar(exemplar: &Exemplar, channels: usize) -> Result<()> {
     let [rows, columns] = exemplar.shape;
-    let pixels = rows.checked_mul(columns).filter(|&n| n > 0 && n < LONGEST);
-    if pixels.and_then(|n| n.checked_mul(channels)) != Some(exemplar.data.len()) {
-        return Err(Error::Shape {
-            argument: "exemplars",
-            expected: vec![rows, columns, channels],
-            got: vec![exemplar.data.len()],
-        });
+    check_shape("exemplars", &[rows, columns, channels], exemplar.data.len())?;
+    if exemplar.data.is_empty() || exemplar.data.len() / channels >= LONGEST {
+        let message = format!("1 to {LONGEST} positions are allowed, got {rows} x {columns}");
+        return Err(Error::value("exemplars", message));
     }
     // Block by block, within which nothing has to be decided.
     let sound = |block: &[f32]| block.iter().fold(true, |all, x| all & x.is_finite());
@@ -533,12 +380,8 @@ fn check_exemplar(exemplar: &Exemplar, channels: usize) -> Result<()> {
         ));
     }
     match &exemplar.allowed {
-        Some(allowed) if Some(allowed.len()) != pixels => Err(Error::Shape {
-            argument: "allowed",
-            expected: vec![rows, columns],
-            got: vec![allowed.len()],
-        }),
-        _ => Ok(()),
+        Some(allowed) => check_shape("allowed", &exemplar.shape, allowed.len()),
+        None => Ok(()),
     }
 }
 

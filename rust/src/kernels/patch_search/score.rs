@@ -5,6 +5,7 @@ use std::arch::x86_64::{__m128, __m256d};
 
 use super::Query;
 #[cfg(target_arch = "x86_64")]
+use crate::foundation::error::check_shape;
 use crate::foundation::wide::{V3, cast};
 use crate::{Error, Result};
 
@@ -44,20 +45,10 @@ impl Prepared {
     /// Takes over a query after checking it.
     pub(super) fn fill(&mut self, query: &Query<'_>, channels: usize) -> Result<()> {
         let [rows, columns] = query.shape;
-        let pixels = rows.checked_mul(columns).filter(|&n| n > 0);
-        if pixels.and_then(|n| n.checked_mul(channels)) != Some(query.patch.len()) {
-            return Err(Error::Shape {
-                argument: "patch",
-                expected: vec![rows, columns, channels],
-                got: vec![query.patch.len()],
-            });
-        }
-        if Some(query.weight.len()) != pixels {
-            return Err(Error::Shape {
-                argument: "weight",
-                expected: vec![rows, columns],
-                got: vec![query.weight.len()],
-            });
+        check_shape("patch", &[rows, columns, channels], query.patch.len())?;
+        check_shape("weight", &query.shape, query.weight.len())?;
+        if query.weight.is_empty() {
+            return Err(Error::value("patch", "has no pixels"));
         }
         if let Some(bad) = query.weight.iter().find(|w| !w.is_finite() || **w < 0.0) {
             let message = format!("must be finite and not negative, got {bad}");

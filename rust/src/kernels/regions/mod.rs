@@ -15,6 +15,7 @@ mod dormant;
 mod forest;
 mod weights;
 
+use crate::foundation::error::check_shape;
 use crate::foundation::grid::Grid;
 use crate::foundation::memory;
 use crate::foundation::par::Monitor;
@@ -54,12 +55,9 @@ pub fn merge(
 ) -> Result<Vec<i32>> {
     let [rows, columns, channels] = shape;
     let grid = Grid::new([rows, columns], options.wrap)?;
-    if channels == 0 || grid.len().checked_mul(channels) != Some(image.len()) {
-        return Err(Error::Shape {
-            argument: "image",
-            expected: shape.to_vec(),
-            got: vec![image.len()],
-        });
+    check_shape("image", &shape, image.len())?;
+    if channels == 0 {
+        return Err(Error::value("image", "needs a channel"));
     }
     let frame = Frame::new(&grid)?;
     check(image, options)?;

@@ -162,15 +162,3 @@ pub(super) fn check_costs(argument: &'static str, costs: &[f32]) -> Result<f32> 
     }
     Ok(rest.iter().chain(&largest).copied().fold(0.0, f32::max))
 }
-
-/// Refuses arrays of another length.
-pub(super) fn check_len(argument: &'static str, expected: usize, got: usize) -> Result<()> {
-    if expected == got {
-        return Ok(());
-    }
-    Err(Error::Shape {
-        argument,
-        expected: vec![expected],
-        got: vec![got],
-    })
-}

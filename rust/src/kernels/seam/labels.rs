@@ -2,9 +2,10 @@
 //! differ (Greig, Porteous, Seheult, *Exact maximum a posteriori estimation for binary images*, J. Royal Statistical
 //! Society B 1989).
 
-use super::cost::{capacity, check_costs, check_len, finest};
+use super::cost::{capacity, check_costs, finest};
 use super::links;
 use super::maxflow::{Graph, Solver};
+use crate::foundation::error::check_shape;
 use crate::foundation::grid::Grid;
 use crate::foundation::memory;
 use crate::foundation::par::Monitor;
@@ -42,11 +43,11 @@ pub struct Labels {
 /// labels or that are minus infinity.
 pub fn least_energy<const D: usize>(energy: &Energy<'_, D>, monitor: &Monitor) -> Result<Labels> {
     let n = energy.grid.len();
-    check_len("unary", n, energy.unary.len())?;
+    check_shape("unary", &[n], energy.unary.len())?;
     memory::room("the graph of the labels", n, 64 * D)?;
     let mut largest = 0.0f32;
     for costs in energy.forward.iter().chain(&energy.backward) {
-        check_len("pairwise", n, costs.len())?;
+        check_shape("pairwise", &[n], costs.len())?;
         largest = largest.max(check_costs("pairwise", costs)?);
     }
     // Two that are above minus infinity, and of which one is below infinity; NaN is neither.

@@ -1,7 +1,8 @@
 //! Two images on one canvas: where each covers it, what is tied to which, and where both meet.
 
-use super::cost::{Cost, check_costs, check_len};
+use super::cost::{Cost, check_costs};
 use super::planar::ring::Side;
+use crate::foundation::error::check_shape;
 use crate::foundation::grid::Grid;
 use crate::{Error, Result};
 
@@ -79,16 +80,16 @@ impl<'a, const D: usize> Overlap<'a, D> {
             });
         }
         let samples = n.saturating_mul(self.channels);
-        check_len("a", samples, self.a.len())?;
-        check_len("b", samples, self.b.len())?;
-        check_len("mask_a", n, self.mask_a.len())?;
-        check_len("mask_b", n, self.mask_b.len())?;
+        check_shape("a", &[samples], self.a.len())?;
+        check_shape("b", &[samples], self.b.len())?;
+        check_shape("mask_a", &[n], self.mask_a.len())?;
+        check_shape("mask_b", &[n], self.mask_b.len())?;
         for (argument, core, mask) in [
             ("core_a", self.core_a, self.mask_a),
             ("core_b", self.core_b, self.mask_b),
         ] {
             if let Some(core) = core {
-                check_len(argument, n, core.len())?;
+                check_shape(argument, &[n], core.len())?;
                 if let Some(at) = (0..n).find(|&i| core[i] && !mask[i]) {
                     return Err(Error::value(
                         argument,
@@ -112,12 +113,12 @@ impl<'a, const D: usize> Overlap<'a, D> {
             ));
         }
         if let Some(penalty) = self.penalty {
-            check_len("penalty", n, penalty.len())?;
+            check_shape("penalty", &[n], penalty.len())?;
             check_costs("penalty", penalty)?;
         }
         if let Some(old) = self.old {
             for costs in old.kept.iter().chain(&old.ab).chain(&old.ba) {
-                check_len("old", n, costs.len())?;
+                check_shape("old", &[n], costs.len())?;
                 check_costs("old", costs)?;
             }
         }

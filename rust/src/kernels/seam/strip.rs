@@ -3,9 +3,10 @@
 //! Efros and Freeman, *Image quilting for texture synthesis and transfer*, SIGGRAPH 2001, with the seam free to turn back:
 //! the exact minimum cut (see [`super::planar`]).
 
-use super::cost::{Cost, Pair, check_costs, check_len};
+use super::cost::{Cost, Pair, check_costs};
 use super::planar::{LONGEST, Strip, least_seam, longest};
 use super::stitch::Stitched;
+use crate::foundation::error::check_shape;
 use crate::foundation::grid::Grid;
 use crate::foundation::memory;
 use crate::foundation::par::Monitor;
@@ -169,10 +170,10 @@ fn weigh<const C: usize>(pasted: &Pasted<'_>) -> Result<[Vec<f32>; 2]> {
         ));
     }
     let samples = n.saturating_mul(pasted.channels);
-    check_len("a", samples, pasted.a.len())?;
-    check_len("b", samples, pasted.b.len())?;
+    check_shape("a", &[samples], pasted.a.len())?;
+    check_shape("b", &[samples], pasted.b.len())?;
     if let Some(penalty) = pasted.penalty {
-        check_len("penalty", n, penalty.len())?;
+        check_shape("penalty", &[n], penalty.len())?;
         check_costs("penalty", penalty)?;
     }
     let pair = Pair::<C> {

@@ -24,6 +24,7 @@ mod trees;
 
 use std::collections::VecDeque;
 
+use crate::foundation::error::check_shape;
 use crate::foundation::grid::Grid;
 use crate::foundation::par::Monitor;
 use crate::{Error, Result};
@@ -178,13 +179,7 @@ impl<const D: usize> Solver<D> {
         let points = graph.grid.len();
         let arrays = graph.forward.iter().chain(&graph.backward);
         for got in arrays.map(|a| a.len()).chain([graph.terminal.len()]) {
-            if got != points {
-                return Err(Error::Shape {
-                    argument: "capacities",
-                    expected: vec![points],
-                    got: vec![got],
-                });
-            }
+            check_shape("capacities", &[points], got)?;
         }
         self.offsets = layout.offsets();
         self.nodes.clear();

@@ -25,6 +25,7 @@ mod innermost;
 pub mod ring;
 mod search;
 
+use crate::foundation::error::check_shape;
 use crate::foundation::par::Monitor;
 use crate::{Error, Result};
 use dual::Dual;
@@ -129,8 +130,8 @@ fn check(strip: &Strip<'_>) -> Result<()> {
             limit: format!("{} pixels", i32::MAX / 2),
         });
     }
-    crate::kernels::seam::cost::check_len("across", pixels, strip.across.len())?;
-    crate::kernels::seam::cost::check_len("along", pixels, strip.along.len())?;
+    check_shape("across", &[pixels], strip.across.len())?;
+    check_shape("along", &[pixels], strip.along.len())?;
     let longest = longest(columns, strip.across, strip.along, u64::from);
     if longest >= LONGEST {
         return Err(Error::value(

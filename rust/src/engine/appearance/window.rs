@@ -1,0 +1,76 @@
+//! Windows of an exemplar: which of its points lie in one, and where one lies inside.
+
+use crate::foundation::grid::Grid;
+use crate::{Error, Result};
+
+/// Samples along an axis, at most: places have 12 of 32 bits after the point, and steps must fit too.
+const SIDE: usize = 1 << 18;
+
+/// Samples whose windows lie inside an exemplar.
+pub(crate) struct Centres<const D: usize> {
+    pub(super) ranges: [[i32; 2]; D],
+}
+
+impl<const D: usize> Centres<D> {
+    pub(crate) fn len(&self) -> usize {
+        self.ranges
+            .iter()
+            .map(|r| (r[1] - r[0] + 1) as usize)
+            .product()
+    }
+
+    pub(crate) fn get(&self, mut number: usize) -> [i32; D] {
+        let mut sample = [0; D];
+        for axis in (0..D).rev() {
+            let [low, high] = self.ranges[axis];
+            let n = (high - low + 1) as usize;
+            sample[axis] = low + (number % n) as i32;
+            number /= n;
+        }
+        sample
+    }
+}
+
+/// Numbers of a window.
+pub(super) fn numbers<const D: usize>(radius: usize, channels: usize) -> usize {
+    let side = radius.saturating_mul(2).saturating_add(1);
+    side.saturating_pow(D as u32).saturating_mul(channels)
+}
+
+/// Refuses exemplars in which windows of `radius` do not fit, and those that 32 bits cannot address with their rim.
+pub(super) fn check_sides<const D: usize>(grid: &Grid<D>, radius: usize) -> Result<()> {
+    let (shape, least) = (grid.shape(), 2 * radius + 2);
+    if shape.iter().any(|&n| n < least) {
+        return Err(Error::value(
+            "exemplar",
+            format!(
+                "{shape:?} is too small for windows of radius {radius}: sides of at least {least} are needed"
+            ),
+        ));
+    }
+    let wide = shape.map(|n| n.saturating_add(least));
+    let points = wide.iter().fold(1usize, |n, &side| n.saturating_mul(side));
+    if shape.iter().any(|&n| n > SIDE) || points > i32::MAX as usize {
+        return Err(Error::Limit {
+            what: format!("an exemplar of {shape:?}"),
+            needed: format!("{points} samples with its rim"),
+            limit: format!("{} samples, {SIDE} along an axis", i32::MAX),
+        });
+    }
+    Ok(())
+}
+
+/// The offsets of a window, in row-major order.
+pub(super) fn window<const D: usize>(radius: usize) -> Vec<[i32; D]> {
+    let side = 2 * radius + 1;
+    (0..side.pow(D as u32))
+        .map(|mut k| {
+            let mut offset = [0; D];
+            for axis in (0..D).rev() {
+                offset[axis] = (k % side) as i32 - radius as i32;
+                k /= side;
+            }
+            offset
+        })
+        .collect()
+}
