@@ -5,10 +5,13 @@
 //! 2008). What is solved for is the correction `v - I`: it is small, so that `f32` is enough, and nothing where values
 //! are kept.
 //!
-//! A rectangle is solved directly: a transform along the rows, then tridiagonal systems across them. Pixels under a mask
-//! are solved by conjugate gradients preconditioned with multigrid.
+//! A rectangle is solved directly: of every fourth row a transform along it, then tridiagonal systems across them; the
+//! rows between follow from systems along them. Pixels under a mask are solved by conjugate gradients preconditioned with
+//! multigrid.
 
+mod along;
 mod multigrid;
+mod reduce;
 mod sweep;
 mod transform;
 
@@ -17,7 +20,8 @@ use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::foundation::wide::wide;
 use crate::{Error, Result};
-use sweep::PANEL;
+use reduce::Level;
+use sweep::{PANEL, Systems};
 use transform::Transform;
 
 /// What happens at both ends of an axis.
@@ -97,17 +101,24 @@ pub fn solve(problem: &Problem<'_>, monitor: &Monitor) -> Result<Vec<f32>> {
 pub fn spread(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) -> Result<()> {
     domain.check("flow", flow.len())?;
     let [rows, columns, channels] = domain.shape;
-    // A transposed copy, or levels of a pyramid.
+    // Half of the rows, half of these and their transposed copy, or levels of a pyramid.
     memory::room("the solution", rows * columns, 12 * channels + 32)?;
     if !flow.is_empty() {
         match domain.mask {
             Some(mask) if !mask.iter().all(|&m| m) => {
                 match inner_rectangle(mask, [rows, columns]) {
-                    Some(window) => cut_out(domain, window, flow, monitor),
+                    Some(window) => rectangle(domain, [Edge::Fixed; 2], window, flow, monitor),
                     None => multigrid::spread(domain, mask, flow, monitor)?,
                 }
             }
-            _ => rectangle(domain, flow, monitor),
+            _ => {
+                // All but the ring that fixed edges keep.
+                let window = [0, 1].map(|axis| {
+                    let ring = usize::from(domain.edges[axis] == Edge::Fixed);
+                    (ring, domain.shape[axis].saturating_sub(2 * ring))
+                });
+                rectangle(domain, domain.edges, window, flow, monitor);
+            }
         }
     }
     monitor.check()
@@ -127,31 +138,6 @@ fn inner_rectangle(mask: &[bool], shape: [usize; 2]) -> Option<[(usize, usize); 
     };
     let is_one = inside && mask.chunks_exact(columns).enumerate().all(whole);
     is_one.then(|| [(top, bottom + 1 - top), (left, right + 1 - left)])
-}
-
-/// Solves a rectangle within the image as an image of its own, with a ring of fixed pixels around it.
-fn cut_out(
-    domain: &Domain<'_>,
-    [(top, rows), (left, columns)]: [(usize, usize); 2],
-    flow: &mut [f32],
-    monitor: &Monitor,
-) {
-    let [_, width, channels] = domain.shape;
-    let inner = Domain {
-        shape: [rows + 2, columns + 2, channels],
-        edges: [Edge::Fixed; 2],
-        mask: None,
-        ..*domain
-    };
-    let line = (columns + 2) * channels;
-    let start = |r: usize| ((top - 1 + r) * width + left - 1) * channels;
-    let cut = (0..rows + 2).flat_map(|r| &flow[start(r)..][..line]);
-    let mut part: Vec<f32> = cut.copied().collect();
-    rectangle(&inner, &mut part, monitor);
-    flow.fill(0.0);
-    for (r, row) in part.chunks_exact(line).enumerate() {
-        flow[start(r)..][..line].copy_from_slice(row);
-    }
 }
 
 impl Domain<'_> {
@@ -231,25 +217,87 @@ fn lack(out: &mut [f32], wanted: Option<&[f32]>, from: &[f32], to: &[f32], sign:
     }
 }
 
-/// Solves all that edges do not fix. Coefficients take the place of the rows that they are of, one channel after another.
-fn rectangle(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) {
-    let [height, columns, channels] = domain.shape;
-    let width = columns * channels;
-    let [top, left] = domain.edges.map(|e| usize::from(e == Edge::Fixed));
-    let (rows, slots) = (
-        height.saturating_sub(2 * top),
-        columns.saturating_sub(2 * left),
-    );
-    if rows == 0 || slots == 0 || channels == 0 {
+/// Solves a window (first and number of rows, of columns); 0 around it.
+fn rectangle(
+    domain: &Domain<'_>,
+    edges: [Edge; 2],
+    [(top, rows), (left, slots)]: [(usize, usize); 2],
+    flow: &mut [f32],
+    monitor: &Monitor,
+) {
+    let [_, columns, channels] = domain.shape;
+    let layout = Layout {
+        width: columns * channels,
+        first: left * channels,
+        len: slots * channels,
+    };
+    if rows == 0 || layout.len == 0 {
         return flow.fill(0.0);
     }
-    if top > 0 {
-        flow[..width].fill(0.0);
-        flow[(height - 1) * width..].fill(0.0);
+    let (above, rest) = flow.split_at_mut(top * layout.width);
+    let (inner, below) = rest.split_at_mut(rows * layout.width);
+    above.fill(0.0);
+    below.fill(0.0);
+    for row in inner.chunks_exact_mut(layout.width) {
+        row[..layout.first].fill(0.0);
+        row[layout.first + layout.len..].fill(0.0);
     }
-    let inner = &mut flow[top * width..][..rows * width];
-    let transform = Transform::new(domain.edges[1], slots);
-    monitor.expect((2 * rows + slots) as u64);
+    let field = Field {
+        channels,
+        edge: edges[1],
+        screening: domain.screening,
+        transform: Transform::new(edges[1], slots),
+    };
+    let shifts = field.transform.eigenvalues.iter();
+    let shifts = shifts.map(|e| e + domain.screening).collect();
+    let level = Level {
+        systems: Systems::new(edges[0], shifts),
+        layout,
+        base: None,
+        ahead: 0,
+    };
+    reduce::solve(&field, &level, inner, monitor);
+}
+
+/// What hangs on the columns alone.
+struct Field {
+    channels: usize,
+    /// Of the columns.
+    edge: Edge,
+    screening: f64,
+    transform: Transform,
+}
+
+/// Where what is solved lies in an array: so many samples of each row, from one on.
+#[derive(Clone, Copy)]
+struct Layout {
+    width: usize,
+    first: usize,
+    len: usize,
+}
+
+impl Layout {
+    /// What is solved of a row.
+    fn row<'a>(&self, rows: &'a [f32], r: usize) -> &'a [f32] {
+        self.of(&rows[r * self.width..])
+    }
+
+    fn of<'a>(&self, row: &'a [f32]) -> &'a [f32] {
+        &row[self.first..][..self.len]
+    }
+
+    fn of_mut<'a>(&self, row: &'a mut [f32]) -> &'a mut [f32] {
+        &mut row[self.first..][..self.len]
+    }
+}
+
+/// Solves rows in place by transforms along them, and adds to them what they are based on. Coefficients take the place of
+/// the rows that they are of, one channel after another.
+fn transformed(field: &Field, level: &Level<'_>, inner: &mut [f32], monitor: &Monitor) {
+    let (transform, channels) = (&field.transform, field.channels);
+    let (layout, width) = (level.layout, level.layout.width);
+    let (rows, slots) = (inner.len() / width, layout.len / channels);
+    monitor.expect((2 * rows + slots) as u64 + level.ahead);
 
     // 1. Transformed along the rows: pairs of them side by side, of which those that lack are nothing.
     par::chunks_mut(inner, ROWS * width, |_, out| {
@@ -260,7 +308,7 @@ fn rectangle(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) {
         let mut lines = [(); 2].map(|()| vec![Lanes::default(); channels * slots]);
         for (r, row) in out.chunks_exact(width).enumerate() {
             for (c, line) in lines[r % 2].chunks_exact_mut(slots).enumerate() {
-                let samples = row[left * channels + c..].iter().step_by(channels);
+                let samples = layout.of(row)[c..].iter().step_by(channels);
                 line.iter_mut()
                     .zip(samples)
                     .for_each(|(l, s)| l.0[r / 2] = *s);
@@ -271,9 +319,8 @@ fn rectangle(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) {
             transform.forward(a, b, &mut scratch);
         }
         for (r, row) in out.chunks_exact_mut(width).enumerate() {
-            row.iter_mut()
-                .zip(&lines[r % 2])
-                .for_each(|(s, l)| *s = l.0[r / 2]);
+            let row = layout.of_mut(row).iter_mut();
+            row.zip(&lines[r % 2]).for_each(|(s, l)| *s = l.0[r / 2]);
         }
         let _ = monitor.advance((out.len() / width) as u64);
     });
@@ -290,21 +337,17 @@ fn rectangle(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) {
         let present = PANEL.min(slots - first);
         for (c, lines) in panel.chunks_exact_mut(rows).enumerate() {
             for (r, line) in lines.iter_mut().enumerate() {
-                let from = &spectrum[r * width + c * slots + first..][..present];
+                let from = &layout.row(spectrum, r)[c * slots + first..][..present];
                 match <&[f32; PANEL]>::try_from(from) {
                     Ok(whole) => *line = *whole,
                     Err(_) => line[..present].copy_from_slice(from),
                 }
             }
         }
-        let shifts = std::array::from_fn(|l| {
-            let eigenvalue = transform.eigenvalues.get(first + l);
-            eigenvalue.map_or(1.0, |e| e + domain.screening)
-        });
-        let mut scratch = sweep::Scratch::default();
+        let (systems, mut scratch) = (level.systems.panel(first), sweep::Scratch::default());
         wide(
             #[inline(always)]
-            || sweep::solve(domain.edges[0], &shifts, rows, panel, &mut scratch),
+            || sweep::solve(&systems, rows, panel, &mut scratch),
         );
         let _ = monitor.advance(present as u64);
     });
@@ -327,16 +370,15 @@ fn rectangle(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) {
             let [a, b] = &mut lines;
             transform.inverse(a, b, &mut scratch);
             for (r, row) in out.chunks_exact_mut(width).enumerate() {
-                let samples = row[left * channels + c..].iter_mut().step_by(channels);
+                let samples = layout.of_mut(row)[c..].iter_mut().step_by(channels);
                 samples
                     .zip(&lines[r % 2])
                     .for_each(|(s, l)| *s = l.0[r / 2]);
             }
         }
-        if left > 0 {
-            for row in out.chunks_exact_mut(width) {
-                row[..channels].fill(0.0);
-                row[width - channels..].fill(0.0);
+        if let Some(base) = level.base {
+            for (r, row) in (chunk * ROWS..).zip(out.chunks_exact_mut(width)) {
+                base.add_to(layout.of_mut(row), r);
             }
         }
         let _ = monitor.advance((out.len() / width) as u64);

@@ -51,51 +51,130 @@ struct Lines<T> {
     values: Vec<[T; PANEL]>,
 }
 
-/// Below this sum of eigenvalue and screening the condition of a system is beyond what `f32` carries.
+/// `(2 + shift) x[r] - x[r-1] - x[r+1]` across the rows, for each of the coefficients.
+pub(super) struct Systems {
+    pub(super) edge: Edge,
+    pub(super) shifts: Vec<f64>,
+    /// What the first and the last row have more of themselves, where they do.
+    pub(super) ends: [Option<Vec<f64>>; 2],
+    /// How often they have been squared.
+    pub(super) times: usize,
+    /// Below this shift the condition of a system is beyond what `f32` carries.
+    stiff: f64,
+}
+
+impl Systems {
+    pub(super) fn new(edge: Edge, shifts: Vec<f64>) -> Self {
+        // Of each neighbour that lacks one less.
+        let end = (edge == Edge::Free).then(|| vec![-1.0; shifts.len()]);
+        Self {
+            edge,
+            shifts,
+            ends: [end.clone(), end],
+            times: 0,
+            stiff: STIFF,
+        }
+    }
+
+    /// Whether those of every second row tell the rest: not where one has a solution but for a constant, which is chosen by
+    /// the mean of all rows, nor beyond what `f32` holds.
+    pub(super) fn can_be_squared(&self) -> bool {
+        let fixed = self.edge == Edge::Fixed;
+        let unique = |&shift: &f64| fixed || shift > f64::EPSILON;
+        self.shifts.iter().all(|s| unique(s) && *s < 1e9)
+    }
+
+    /// Those of every second row, of which the first and last row may be ends: with a = 2 + shift, a^2 - 2, and a b - 1
+    /// for an end whose own was b.
+    pub(super) fn squared(&self, kept: [bool; 2]) -> Self {
+        let end = |k: usize| {
+            let own = |i: usize| self.ends[k].as_ref().map_or(0.0, |own| own[i]);
+            let more = |(i, shift): (usize, &f64)| 1.0 + (2.0 + shift) * own(i);
+            let of_all = || self.shifts.iter().enumerate().map(more).collect();
+            (kept[k] && self.edge != Edge::Wrap).then(of_all)
+        };
+        let square = |shift: f64| shift * (shift + 4.0);
+        Self {
+            edge: self.edge,
+            shifts: self.shifts.iter().copied().map(square).collect(),
+            ends: [end(0), end(1)],
+            times: self.times + 1,
+            stiff: square(self.stiff),
+        }
+    }
+
+    /// Shifts and ends of the coefficients from `first`; those that lack are no matter.
+    pub(super) fn panel(&self, first: usize) -> Panel {
+        let own = &self.shifts[first..];
+        let of = |all: &[f64], lacking: f64| {
+            std::array::from_fn(|l| all.get(first + l).copied().unwrap_or(lacking))
+        };
+        Panel {
+            edge: self.edge,
+            stiff: own.iter().take(PANEL).any(|&s| s < self.stiff),
+            shifts: of(&self.shifts, 1.0),
+            ends: self
+                .ends
+                .each_ref()
+                .map(|end| end.as_ref().map_or([0.0; PANEL], |end| of(end, 0.0))),
+        }
+    }
+}
+
+/// Systems side by side.
+pub(super) struct Panel {
+    edge: Edge,
+    stiff: bool,
+    shifts: [f64; PANEL],
+    ends: [[f64; PANEL]; 2],
+}
+
+/// What is too small a shift of a system for `f32`, before it is squared.
 const STIFF: f64 = 4e-3;
 
-/// Solves `(D + shift) x = r` in place for each channel of a panel, D the second difference along the rows.
+/// Solves the systems in place for each channel of a panel.
 ///
 /// `panel` holds for each channel its rows of [`PANEL`] coefficients. A singular system (free or cyclic, no shift) gets
 /// the solution whose mean is zero.
 #[inline(always)]
 pub(super) fn solve(
-    edge: Edge,
-    shifts: &[f64; PANEL],
+    systems: &Panel,
     rows: usize,
     panel: &mut [[f32; PANEL]],
     scratch: &mut Scratch,
 ) {
-    if shifts.iter().copied().fold(f64::INFINITY, f64::min) < STIFF {
-        sweep(edge, shifts, rows, panel, &mut scratch.double);
+    if systems.stiff {
+        sweep(systems, rows, panel, &mut scratch.double);
     } else {
-        sweep(edge, shifts, rows, panel, &mut scratch.single);
+        sweep(systems, rows, panel, &mut scratch.single);
     }
 }
 
 #[inline(always)]
-fn sweep<T: Real>(
-    edge: Edge,
-    shifts: &[f64; PANEL],
-    rows: usize,
-    panel: &mut [[f32; PANEL]],
-    lines: &mut Lines<T>,
-) {
+fn sweep<T: Real>(systems: &Panel, rows: usize, panel: &mut [[f32; PANEL]], lines: &mut Lines<T>) {
+    let &Panel {
+        edge, shifts, ends, ..
+    } = systems;
     let one = [T::of(1.0); PANEL];
     let zero = [T::default(); PANEL];
     let singular: [bool; PANEL] =
         std::array::from_fn(|l| edge != Edge::Fixed && shifts[l] <= f64::EPSILON);
     let cyclic = edge == Edge::Wrap && rows > 1;
     let diagonal = |row: usize| -> [T; PANEL] {
-        let ends = usize::from(row == 0) + usize::from(row + 1 == rows);
         let neighbours = match edge {
-            Edge::Free => 2 - ends,
-            Edge::Wrap if rows == 1 => 0,
-            _ => 2,
+            Edge::Wrap if rows == 1 => 0.0,
+            _ => 2.0,
         };
         let mut out = [T::default(); PANEL];
         for l in 0..PANEL {
-            let own = neighbours as f64 + shifts[l];
+            let mut own = neighbours;
+            if row == 0 {
+                own += ends[0][l];
+            }
+            if row + 1 == rows {
+                own += ends[1][l];
+            }
+            own += shifts[l];
             // Sherman and Morrison: the corners of a cyclic system are a product of two vectors.
             out[l] = T::of(match (cyclic, row == 0, row + 1 == rows) {
                 (true, true, _) => 2.0 * own,
