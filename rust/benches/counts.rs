@@ -131,7 +131,7 @@ fn poisson() {
         gradients: Some([&data[1], &data[2]]),
         domain: Domain {
             shape: [side, side, 3],
-            edges: [Edge::Free; 2],
+            edges: [Edge::Fixed; 2],
             screening: 0.01,
             mask: None,
         },
