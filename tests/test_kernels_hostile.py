@@ -137,6 +137,7 @@ CALLS: Mapping[str, tuple[Callable[..., object], Arguments]] = {
         PatchIndex,
         {"images": [NOISE, OTHER[:7]], "allowed": [EVERYWHERE, None], "max_patch": (4, 5)},
     ),
+    "patch_search.PatchIndex.again": (INDEX.again, {"allowed": [EVERYWHERE, None], "max_patch": 4}),
     "patch_search.PatchIndex.best": (INDEX.best, PATCH | PICK),
     "patch_search.PatchIndex.best_among": (INDEX.best_among, PATCH | PICK | {"candidates": [(0, 1, 2), (1, 3, 4)]}),
     "patch_search.PatchIndex.cost_map": (INDEX.cost_map, PATCH | {"exemplar": 1}),

@@ -109,5 +109,22 @@ def test_refuses_with_a_reason(make, message):
         make()
 
 
+def test_an_index_made_again_finds_what_a_new_one_finds():
+    images = [integers(i, (80, 70 + i, 3)) for i in range(2)]
+    allowed = [integers(9, (80, 70), 3) > 0, None]
+    patch, weight = images[0][30:54, 20:44] / 2.0, integers(3, (24, 24), 4)
+    again = PatchIndex(images, max_patch=40).again(allowed=allowed, max_patch=24)
+    new = PatchIndex(images, allowed=allowed, max_patch=24)
+    assert again.shapes == new.shapes
+    assert again.max_patch == new.max_patch == (24, 24)
+    assert again.best(patch, weight, count=5) == new.best(patch, weight, count=5)
+    with pytest.raises(InvalidInput, match="allowed: needs a list of 2"):
+        again.again(allowed=allowed[0])
+    with pytest.raises(InvalidInput, match=r"allowed\[1\]: needs shape"):
+        again.again(allowed=[None, allowed[0]])
+    with pytest.raises(InvalidInput, match="max_patch"):
+        again.again(max_patch=0)
+
+
 def test_nothing_allowed_gives_nothing():
     assert PatchIndex(np.zeros((9, 9)), allowed=np.zeros((9, 9), bool)).best(np.zeros((3, 3))) == []

@@ -26,7 +26,7 @@ fuzz_target!(|bytes: &[u8]| {
             };
             let n: usize = shape.iter().product();
             Exemplar {
-                data: draw.values(n * channels),
+                data: draw.values(n * channels).into(),
                 shape,
                 allowed: draw.flag().then(|| draw.mask(n)),
             }

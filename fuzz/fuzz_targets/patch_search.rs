@@ -15,7 +15,12 @@ fuzz_target!(|bytes: &[u8]| {
             let n: usize = shape.iter().product();
             let scale = [1.0, 255.0, 1e-6, 1e12][draw.within(0..=3)];
             Exemplar {
-                data: draw.reals(n * channels).iter().map(|x| x * scale).collect(),
+                data: draw
+                    .reals(n * channels)
+                    .iter()
+                    .map(|x| x * scale)
+                    .collect::<Vec<_>>()
+                    .into(),
                 shape,
                 allowed: draw.flag().then(|| draw.mask(n)),
             }

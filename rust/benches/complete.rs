@@ -30,7 +30,7 @@ pub(crate) fn bench(c: &mut Criterion) {
             .map(|i| reach(i / side, i % side))
             .collect();
         let exemplar = Exemplar {
-            data: data.clone(),
+            data: data.clone().into(),
             shape: [side; 2],
             allowed: Some(allowed),
         };

@@ -49,7 +49,7 @@ fn gathering() {
 
 fn index(side: usize, patch: usize, allowed: Option<Vec<bool>>) -> Index {
     let exemplar = Exemplar {
-        data: image(side, 0),
+        data: image(side, 0).into(),
         shape: [side; 2],
         allowed,
     };

@@ -15,7 +15,7 @@ pub(crate) fn bench(c: &mut Criterion) {
             60.0 * wave + 30.0 * noise.uniform([i as u32, 0, 0, 0]) as f32
         };
         let exemplar = Exemplar {
-            data: (0..side * side * 3).map(sample).collect(),
+            data: (0..side * side * 3).map(sample).collect::<Vec<_>>().into(),
             shape: [side; 2],
             allowed: None,
         };

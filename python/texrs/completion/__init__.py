@@ -181,7 +181,6 @@ def complete(
 
     check_work("complete", pictures, shapes[0], "image", method=method)
     watch("complete", 0.0)
-    made = Filling(map_untouched(shapes), 0.0, 0, [], True)
     scales: list[Floats] | None = None
     measured: list[Sizes | None] = [None, None]
     if open_.any():
@@ -208,6 +207,8 @@ def complete(
             seed=seed,
             progress=progress,
         )
+    else:
+        made = Filling(map_untouched(shapes), 0.0, 0, [], True)
     places, count = made.source, made.count
     new = find_places(places.label)
     # What is kept maps to itself; of patches every coordinate is whole, but where they are seen in depth.

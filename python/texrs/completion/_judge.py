@@ -50,7 +50,7 @@ def judge_seams(filled: Filled, source: Floats, free: Bools, wrap: tuple[bool, b
         torn = filled.label != np.roll(filled.label, -1, axis)
         if not closed:
             np.moveaxis(torn, axis, 0)[-1] = False
-        row, column = np.nonzero(torn)
+        row, column = np.unravel_index(np.flatnonzero(torn), torn.shape)
         here: Places = (row, column)
         step = np.zeros(2, np.intp)
         step[axis] = 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from texrs.completion._judge import Filled
 from texrs.exemplar.patches import index_patches, place_patches
 from texrs.exemplar.symmetry import Flip
 from texrs.kernels.complete import complete as fill
+from texrs.kernels.patch_search import PatchIndex
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,6 +31,8 @@ class Scene:
     """(h, w): what of it may be copied."""
     wrap: tuple[bool, bool]
     """Axes along which the picture is cyclic."""
+    _made: dict[tuple[Flip, ...], PatchIndex] = field(default_factory=dict, repr=False)
+    """An index of each set of mirror images, whatever the size of the patches."""
 
     @property
     def itself(self) -> bool:
@@ -55,10 +58,13 @@ class Scene:
 
     def fill(self, side: int, mirrors: Sequence[Flip], seed: int, progress: Callable[[float], object]) -> Filled:
         """Fill the holes with patches of a size."""
+        turned = tuple(mirrors)
+        index = index_patches(self.source, side, mirrors, self.free, self._made.get(turned))
+        self._made.setdefault(turned, index)
         filled = fill(
             self.colours,
             self.known,
-            index_patches(self.source, side, mirrors, self.free),
+            index,
             patch=side,
             keep=self.keep,
             wrap=self.wrap,

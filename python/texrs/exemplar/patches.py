@@ -15,7 +15,9 @@ from texrs.kernels.patch_search import PatchIndex
 __all__ = ["choose_usual_side", "index_patches", "mark_corners", "place_patches"]
 
 
-def index_patches(guide: Floats, side: int, mirrors: Sequence[Flip], free: Bools | None = None) -> PatchIndex:
+def index_patches(
+    guide: Floats, side: int, mirrors: Sequence[Flip], free: Bools | None = None, like: PatchIndex | None = None
+) -> PatchIndex:
     """Return an index of the square patches of an exemplar, in each of its mirror images.
 
     Parameters
@@ -28,10 +30,14 @@ def index_patches(guide: Floats, side: int, mirrors: Sequence[Flip], free: Bools
         The mirror images: the images of the index.
     free : (H, W) bool, optional
         What patches may show; by default all.
+    like : PatchIndex, optional
+        An index of the same exemplar in the same mirror images, for patches of another size.
 
     """
-    pictures = [flip(guide, mirror) for mirror in mirrors]
     allowed = None if free is None else [mark_corners(flip(free, mirror), side) for mirror in mirrors]
+    if like is not None:
+        return like.again(allowed=allowed, max_patch=side)
+    pictures = [flip(guide, mirror) for mirror in mirrors]
     return PatchIndex(pictures, allowed=allowed, max_patch=side)
 
 

@@ -22,7 +22,7 @@ from texrs._arrays import (
     as_tuple,
     check_finite,
 )
-from texrs._typing import Floats
+from texrs._typing import Bools, Floats
 from texrs.errors import InvalidInput
 
 __all__ = ["Match", "PatchIndex"]
@@ -125,18 +125,48 @@ class PatchIndex:
         channels = [a.shape[2] for a in arrays]
         if len(set(channels)) > 1:
             raise InvalidInput(f"images: must agree in channels, got {channels}")
-        mask_name = "allowed" if single else "allowed[{}]"
-        checked = [
-            None if m is None else as_mask(m, mask_name.format(i), a.shape[:2])
-            for i, (m, a) in enumerate(zip(masks, arrays, strict=True))
-        ]
-        rows, columns = (64, 64) if max_patch is None else as_size(max_patch, "max_patch")
         self.shapes: tuple[tuple[int, ...], ...] = tuple(a.shape for a in arrays)
         """Shape (H, W, C) of each image."""
-        self._index = _rust.PatchIndex(arrays, checked, (rows, columns))
+        self._index = _rust.PatchIndex(arrays, _check_masks(masks, self.shapes, single), _as_patch(max_patch))
 
     def __repr__(self) -> str:
         return f"PatchIndex(shapes={self.shapes}, max_patch={self.max_patch})"
+
+    def again(self, *, allowed: object = None, max_patch: int | tuple[int, int] | None = None) -> PatchIndex:
+        """Return an index of the same images for patches of another size, or where other positions may be used.
+
+        What hangs on the images alone is worked out once for all.
+
+        Parameters
+        ----------
+        allowed : (H, W) array_like of bool, or a list or tuple of them, optional
+            Which positions may be used; by default all.
+        max_patch : int or (rows, columns), optional
+            Size of the largest patch that will be looked for, in pixels. By default 64, or what fits into the images.
+
+        Returns
+        -------
+        PatchIndex
+            It finds what one that is made anew finds.
+
+        Raises
+        ------
+        InvalidInput
+            A mask that does not fit its image.
+
+        Examples
+        --------
+        >>> index = PatchIndex(np.arange(20.0).reshape(4, 5), max_patch=1)
+        >>> index.again(max_patch=2).best([[6, 7], [11, 12]])
+        [Match(cost=0.0, exemplar=0, row=1, column=1)]
+
+        """
+        single = len(self.shapes) == 1 and not isinstance(allowed, list | tuple)
+        masks = _check_masks(_as_masks(allowed, len(self.shapes), single), self.shapes, single)
+        made = PatchIndex.__new__(PatchIndex)
+        made.shapes = self.shapes
+        made._index = self._index.again(masks, _as_patch(max_patch))
+        return made
 
     @property
     def max_patch(self) -> tuple[int, int]:
@@ -304,6 +334,19 @@ def _as_masks(allowed: object, images: int, single: bool) -> list[object]:
     if not isinstance(allowed, list | tuple) or len(allowed) != images:
         raise InvalidInput(f"allowed: needs a list of {images} masks (or None), one an image")
     return list(allowed)
+
+
+def _check_masks(masks: list[object], shapes: Sequence[tuple[int, ...]], single: bool) -> list[Bools | None]:
+    name = "allowed" if single else "allowed[{}]"
+    return [
+        None if mask is None else as_mask(mask, name.format(i), shape[:2])
+        for i, (mask, shape) in enumerate(zip(masks, shapes, strict=True))
+    ]
+
+
+def _as_patch(max_patch: int | tuple[int, int] | None) -> tuple[int, int]:
+    rows, columns = (64, 64) if max_patch is None else as_size(max_patch, "max_patch")
+    return rows, columns
 
 
 def _as_floats(value: object, name: str) -> Floats:

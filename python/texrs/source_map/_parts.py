@@ -57,12 +57,8 @@ class Parted(ABC):
             extent = array.shape[:-1] if name == "coordinates" else array.shape
             if array.dtype != dtype or extent != shape:
                 raise InvalidInput(f"{name}: needs {np.dtype(dtype)} over {shape}, got {array.dtype} {array.shape}")
-        if not isinstance(self.frame, Frames | np.ndarray | None):
-            raise InvalidInput(f"frame: needs a NumPy array, a field or None, got {type(self.frame).__name__}")
-        if isinstance(self.frame, Frames):
-            if self.frame.axes != axes:
-                raise InvalidInput(f"frame: the field has {self.frame.axes} axes, the map {axes}")
-        elif self.frame is not None:
+        # Whether it is a field is asked last: to look at all that a protocol names takes as long as all else here.
+        if isinstance(self.frame, np.ndarray):
             table = self.frame.ndim == 3
             wanted = self.frame.shape[:1] if table else shape
             if self.frame.dtype != np.float32 or self.frame.shape != (*wanted, axes, axes):
@@ -71,6 +67,11 @@ class Parted(ABC):
                 )
             if table and self.label.size and int(self.label.max()) >= len(self.frame):
                 raise InvalidInput(f"frame: has {len(self.frame)} rows, but labels reach {int(self.label.max())}")
+        elif self.frame is not None:
+            if not isinstance(self.frame, Frames):
+                raise InvalidInput(f"frame: needs a NumPy array, a field or None, got {type(self.frame).__name__}")
+            if self.frame.axes != axes:
+                raise InvalidInput(f"frame: the field has {self.frame.axes} axes, the map {axes}")
         if not isinstance(self.shapes, Sequence) or not all(_is_shape(s, axes) for s in self.shapes):
             raise InvalidInput(f"shapes: each needs {axes} sides, integers of at least 1, got {self.shapes}")
         if self.exemplar.size and int(self.exemplar.max()) >= len(self.shapes):

@@ -28,7 +28,7 @@ impl PatchIndex {
         for (i, e) in exemplars.iter().enumerate() {
             let mask = allowed.get(i).and_then(Option::as_ref);
             all.push(Exemplar {
-                data: memory::copied("exemplars", e.as_slice()?)?,
+                data: memory::copied("exemplars", e.as_slice()?)?.into(),
                 shape: [e.shape()[0], e.shape()[1]],
                 allowed: match mask {
                     Some(mask) => Some(memory::copied("allowed", mask.as_slice()?)?),
@@ -37,6 +37,22 @@ impl PatchIndex {
             });
         }
         run(py, None, |_| Index::new(all, channels, max_patch)).map(Self)
+    }
+
+    fn again(
+        &self,
+        py: Python<'_>,
+        allowed: Vec<Option<PyReadonlyArray2<'_, bool>>>,
+        max_patch: [usize; 2],
+    ) -> PyResult<Self> {
+        let mut masks = Vec::with_capacity(allowed.len());
+        for mask in &allowed {
+            masks.push(match mask {
+                Some(mask) => Some(memory::copied("allowed", mask.as_slice()?)?),
+                None => None,
+            });
+        }
+        run(py, None, |_| self.0.again(masks, max_patch)).map(Self)
     }
 
     #[getter]

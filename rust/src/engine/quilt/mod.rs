@@ -143,8 +143,8 @@ impl<'a> Quilt<'a> {
         if options.fixed.is_some_and(|axis| axis > 1) {
             return Err(Error::value("fixed", "an axis, 0 or 1, is allowed"));
         }
-        let exemplar = |data, shape| Exemplar {
-            data,
+        let exemplar = |data: Vec<f32>, shape| Exemplar {
+            data: data.into(),
             shape,
             allowed: None,
         };

@@ -9,7 +9,7 @@ use super::{Options, Patch};
 use crate::foundation::grid::Grid;
 use crate::foundation::hash::Noise;
 use crate::foundation::par::Monitor;
-use crate::kernels::patch_search::{Exemplar, Index, Match, Pick};
+use crate::kernels::patch_search::{Index, Match, Pick};
 use crate::{Error, Result};
 
 /// How many patches away a repetition counts.
@@ -31,26 +31,16 @@ pub(super) struct Chooser<'a> {
     options: &'a Options,
     grid: Grid<2>,
     /// For each exemplar the first one that it is a mirror image of (or is itself), and along which axes.
-    turned: Vec<(usize, [bool; 2])>,
+    turned: &'a [(usize, [bool; 2])],
 }
 
 impl<'a> Chooser<'a> {
     pub(super) fn new(index: &'a Index, options: &'a Options, grid: Grid<2>) -> Self {
-        let all = index.exemplars();
-        let turns = [[false, true], [true, false], [true, true]];
-        let turned = (0..all.len())
-            .map(|k| {
-                (0..k)
-                    .flat_map(|first| turns.map(|flip| (first, flip)))
-                    .find(|&(first, flip)| mirrors(&all[first], &all[k], index.channels(), flip))
-                    .unwrap_or((k, [false; 2]))
-            })
-            .collect();
         Self {
             index,
             options,
             grid,
-            turned,
+            turned: index.turned(),
         }
     }
 
@@ -148,40 +138,6 @@ fn overlap(a: [isize; 2], b: [isize; 2], patch: [usize; 2]) -> f64 {
         left as f64 / patch[axis] as f64
     };
     along(0) * along(1)
-}
-
-/// Whether one exemplar is the other one mirrored.
-fn mirrors(one: &Exemplar, other: &Exemplar, channels: usize, flip: [bool; 2]) -> bool {
-    one.shape == other.shape
-        && match channels {
-            1 => turned::<1>(one, other, channels, flip),
-            3 => turned::<3>(one, other, channels, flip),
-            _ => turned::<0>(one, other, channels, flip),
-        }
-}
-
-/// [`mirrors`] for two of the same shape, with `C` channels where that is known, so that pixels are compared at once.
-fn turned<const C: usize>(
-    one: &Exemplar,
-    other: &Exemplar,
-    channels: usize,
-    flip: [bool; 2],
-) -> bool {
-    let n = if C == 0 { channels } else { C };
-    let [rows, columns] = one.shape;
-    let line = |r: usize| r * columns * n..(r + 1) * columns * n;
-    (0..rows).all(|r| {
-        let back = if flip[0] { rows - 1 - r } else { r };
-        let (a, b) = (&one.data[line(r)], &other.data[line(back)]);
-        if !flip[1] {
-            return a == b;
-        }
-        let pairs = a.chunks_exact(n).zip(b.chunks_exact(n).rev());
-        // No early end within a row, nor within a pixel: a mirror has to be seen to its end anyway.
-        pairs.fold(true, |same, (a, b)| {
-            (0..n).fold(same, |same, k| same & (a[k] == b[k]))
-        })
-    })
 }
 
 /// Any allowed place, drawn: nothing is known that could match.

@@ -141,8 +141,10 @@ impl Window {
         if paper {
             overlap.cost = Cost::Difference;
         }
-        let cut = stitcher.cut(&overlap, monitor)?;
-        Ok(Some((cut.value + border, cut.b)))
+        // No less than what is left of the bound, however that is rounded.
+        let left = (bound - border).next_up();
+        let cut = stitcher.cut_within(&overlap, left, monitor)?;
+        Ok(cut.map(|cut| (cut.value + border, cut.b)))
     }
 
     /// What a cut leaves as it is: pixels to keep, and the rim, which is tied to what is there, except at the edges of the

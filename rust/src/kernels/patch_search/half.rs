@@ -5,7 +5,8 @@
 
 use std::ops::RangeInclusive;
 
-use super::{Exemplar, Index, Match, Pick, Query, check_pick, once};
+use super::checks::check_pick;
+use super::{Exemplar, Index, Match, Pick, Query, once};
 use crate::Result;
 use crate::foundation::par::{self, Monitor};
 
@@ -69,10 +70,15 @@ impl Index {
             if !self.max_patch.iter().all(enough) || !self.exemplars.iter().all(large) {
                 return None;
             }
-            let exemplars = par::map(self.exemplars.len(), |i| {
-                halve(&self.exemplars[i], self.channels)
+            let halves = self.known.halves(&self.exemplars, self.channels);
+            let exemplars = par::map(self.exemplars.len(), |i| Exemplar {
+                data: halves.data[i].clone(),
+                shape: self.exemplars[i].shape.map(|n| n / 2),
+                allowed: halve_allowed(&self.exemplars[i]),
             });
-            let smaller = Self::new(exemplars, self.channels, self.max_patch.map(|n| n / 2));
+            let known = halves.known.clone();
+            let max_patch = self.max_patch.map(|n| n / 2);
+            let smaller = Self::with(exemplars, self.channels, max_patch, known);
             smaller.ok().map(Box::new)
         })
         .as_deref()
@@ -84,7 +90,8 @@ fn stands_for(whole: &Exemplar, axis: usize, at: usize) -> RangeInclusive<usize>
     (2 * at).saturating_sub(1)..=(2 * at + 1).min(whole.shape[axis] - 1)
 }
 
-fn halve(whole: &Exemplar, channels: usize) -> Exemplar {
+/// The samples of an exemplar at half the resolution.
+pub(super) fn halve(whole: &Exemplar, channels: usize) -> Vec<f32> {
     let [rows, columns] = whole.shape.map(|n| n / 2);
     let width = whole.shape[1] * channels;
     let mut data = vec![0.0; rows * columns * channels];
@@ -97,8 +104,13 @@ fn halve(whole: &Exemplar, channels: usize) -> Exemplar {
             _ => halve_line::<0>(up, down, channels, out),
         }
     }
-    let shape = [rows, columns];
-    let allowed = whole.allowed.as_ref().map(|allowed| {
+    data
+}
+
+/// The positions there that stand for one that is allowed.
+fn halve_allowed(whole: &Exemplar) -> Option<Vec<bool>> {
+    let [rows, columns] = whole.shape.map(|n| n / 2);
+    whole.allowed.as_ref().map(|allowed| {
         let mut any = Vec::with_capacity(rows * columns);
         let mut line = vec![false; whole.shape[1]];
         for r in 0..rows {
@@ -114,12 +126,7 @@ fn halve(whole: &Exemplar, channels: usize) -> Exemplar {
             }));
         }
         any
-    });
-    Exemplar {
-        data,
-        shape,
-        allowed,
-    }
+    })
 }
 
 /// The means of two by two samples of two lines; of `C` channels where that is known, so that loops over them unroll.

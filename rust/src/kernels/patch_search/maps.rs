@@ -1,5 +1,6 @@
 //! The maps of filtered costs of one search, and how the true minimum is taken from them.
 
+use super::costs::Map;
 use super::filter::Multiplier;
 use super::score::Prepared;
 use super::{Block, Index, Match, Pick, Query, too_dear};
@@ -26,17 +27,6 @@ pub(super) struct Workspace {
     scored: Vec<Candidate>,
 }
 
-/// The filtered costs of one block; infinite where not allowed.
-#[derive(Default)]
-pub(super) struct Map {
-    costs: Vec<f32>,
-    /// Rows and columns.
-    valid: [usize; 2],
-    least: f32,
-    /// Filtered costs are within this of the true ones (in the filter's unit), but for their own rounding.
-    absolute: f64,
-}
-
 /// A position that may be the best: exemplar, row, column.
 #[derive(Clone, Copy, Default)]
 struct Candidate {
@@ -47,45 +37,6 @@ struct Candidate {
 impl Workspace {
     pub(super) fn maps(&self) -> &[Map] {
         &self.maps
-    }
-}
-
-impl Map {
-    pub(super) fn rows(&self) -> impl Iterator<Item = &[f32]> {
-        self.costs.chunks_exact(self.valid[1].max(1))
-    }
-
-    /// How far a filtered cost may be from the true one.
-    pub(super) fn error(&self, cost: f32) -> f64 {
-        self.absolute + f64::from(f32::EPSILON) * f64::from(cost).abs()
-    }
-
-    /// Calls `f` for each position that costs at most `limit`; few do, so they are looked for in strides.
-    fn within(&self, limit: f32, mut f: impl FnMut(usize, usize)) {
-        let width = self.valid[1].max(1);
-        for (i, chunk) in self.costs.chunks(16).enumerate() {
-            let least = chunk
-                .iter()
-                .fold(f32::INFINITY, |a, &b| if b < a { b } else { a });
-            if least <= limit {
-                for (k, _) in chunk.iter().enumerate().filter(|&(_, &cost)| cost <= limit) {
-                    let at = 16 * i + k;
-                    f(at / width, at % width);
-                }
-            }
-        }
-    }
-
-    fn update(&mut self) {
-        let mut lanes = [f32::INFINITY; 16];
-        let (chunks, rest) = self.costs.as_chunks::<16>();
-        for chunk in chunks {
-            for (lane, &cost) in lanes.iter_mut().zip(chunk) {
-                *lane = if cost < *lane { cost } else { *lane };
-            }
-        }
-        let all = rest.iter().chain(&lanes);
-        self.least = all.copied().fold(f32::INFINITY, f32::min);
     }
 }
 
@@ -113,7 +64,9 @@ impl Index {
     ) -> Result<(f64, f64)> {
         self.check_size(query)?;
         workspace.prepared.fill(query, self.channels)?;
-        workspace.prepared.normalise(&self.mean, self.scale);
+        workspace
+            .prepared
+            .normalise(&self.known.mean, self.known.scale);
         let prepared = &workspace.prepared;
         let layers = self.channels + 1;
         workspace
@@ -191,9 +144,11 @@ impl Index {
         workspace: &mut Workspace,
     ) -> Result<()> {
         workspace.prepared.fill(query, self.channels)?;
-        workspace.prepared.normalise(&self.mean, self.scale);
+        workspace
+            .prepared
+            .normalise(&self.known.mean, self.known.scale);
         let prepared = &workspace.prepared;
-        let unit = prepared.largest_cost(self.scale);
+        let unit = prepared.largest_cost(self.known.scale);
         workspace.maps.resize_with(self.blocks.len(), Map::default);
         par::chunks_mut(&mut workspace.maps, 1, |b, maps| {
             let map = &mut maps[0];
@@ -378,10 +333,10 @@ impl Index {
             if rows.is_empty() || columns.is_empty() {
                 continue;
             }
-            for r in rows {
+            for r in rows.clone() {
                 map.costs[r * map.valid[1]..][columns.clone()].fill(f32::INFINITY);
             }
-            map.update();
+            map.update_rows(rows);
         }
     }
 }

@@ -9,29 +9,33 @@
 //! number of threads, any block size and any CPU, with ties to the lowest (exemplar, row, column). Means are removed before
 //! the transforms, which is what makes the bound tight: on photographs it lets a handful of positions through.
 
+mod checks;
+mod costs;
 mod filter;
 mod half;
+mod known;
 mod maps;
 mod score;
 mod spectra;
 
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
 
-use crate::foundation::error::check_shape;
 use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
+use checks::{check_exemplar, check_pick, check_side};
 use filter::{Plan, Scratch};
+use known::Known;
 use maps::Workspace;
 use score::Prepared;
-use spectra::{Spectra, moments};
+use spectra::Spectra;
 
 /// What is searched: samples in row-major order, channels last.
 #[derive(Debug, Clone, Default)]
 pub struct Exemplar {
-    /// `rows * columns * channels` finite samples.
-    pub data: Vec<f32>,
+    /// `rows * columns * channels` finite samples; several indices may look into them.
+    pub data: Arc<Vec<f32>>,
     /// Rows and columns.
     pub shape: [usize; 2],
     /// Which positions (top-left corners) may be used, `rows * columns`; all if absent.
@@ -97,8 +101,8 @@ pub struct Index {
     half: OnceLock<Option<Box<Index>>>,
     /// Of exemplars in which few positions are allowed: these, in their order.
     open: Vec<Option<Vec<u32>>>,
-    mean: Vec<f64>,
-    scale: f64,
+    /// What hangs on the samples alone.
+    known: Arc<Known>,
     workspaces: Pool<Workspace>,
     scratch: Pool<Scratch>,
 }
@@ -138,9 +142,6 @@ fn once<T>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> &T {
     cell.get_or_init(|| made)
 }
 
-/// More samples than this in one exemplar cannot be addressed by a candidate.
-const LONGEST: usize = u32::MAX as usize;
-
 impl Index {
     /// Makes exemplars ready to be searched for patches of up to `max_patch` rows and columns.
     pub fn new(exemplars: Vec<Exemplar>, channels: usize, max_patch: [usize; 2]) -> Result<Self> {
@@ -151,15 +152,22 @@ impl Index {
             );
             return Err(Error::value("exemplars", message));
         }
-        if max_patch.contains(&0) {
-            return Err(Error::value(
-                "max_patch",
-                format!("each side must be at least 1, got {max_patch:?}"),
-            ));
-        }
+        check_side(max_patch)?;
         for exemplar in &exemplars {
             check_exemplar(exemplar, channels)?;
         }
+        let data: Vec<_> = exemplars.iter().map(|e| &e.data[..]).collect();
+        let known = Arc::new(Known::of(&data, channels));
+        Self::with(exemplars, channels, max_patch, known)
+    }
+
+    /// Makes exemplars ready of which all is known but where they are looked into, and for what.
+    fn with(
+        exemplars: Vec<Exemplar>,
+        channels: usize,
+        max_patch: [usize; 2],
+        known: Arc<Known>,
+    ) -> Result<Self> {
         let samples = exemplars.iter().map(|e| e.data.len()).sum();
         memory::room("what patches are searched in", samples, 24)?;
         let longest = |axis: usize| exemplars.iter().map(|e| e.shape[axis]).max().unwrap_or(1);
@@ -167,7 +175,6 @@ impl Index {
         let shapes: Vec<_> = exemplars.iter().map(|e| e.shape).collect();
         let plan = Plan::new(&shapes, max_patch, channels + 1);
 
-        let (mean, scale) = moments(&exemplars, channels);
         let blocks: Vec<Block> = shapes
             .iter()
             .enumerate()
@@ -187,8 +194,7 @@ impl Index {
             plan,
             blocks,
             open,
-            mean,
-            scale,
+            known,
             workspaces: Pool(Mutex::default()),
             scratch: Pool(Mutex::default()),
         })
@@ -361,39 +367,6 @@ fn list_open(exemplar: &Exemplar) -> Option<Vec<u32>> {
     let count = allowed.iter().filter(|&&open| open).count();
     let open = || allowed.iter().enumerate().filter(|(_, open)| **open);
     (count <= allowed.len() / FEW).then(|| open().map(|(at, _)| at as u32).collect())
-}
-
-fn check_exemplar(exemplar: &Exemplar, channels: usize) -> Result<()> {
-    let [rows, columns] = exemplar.shape;
-    check_shape("exemplars", &[rows, columns, channels], exemplar.data.len())?;
-    if exemplar.data.is_empty() || exemplar.data.len() / channels >= LONGEST {
-        let message = format!("1 to {LONGEST} positions are allowed, got {rows} x {columns}");
-        return Err(Error::value("exemplars", message));
-    }
-    // Block by block, within which nothing has to be decided.
-    let sound = |block: &[f32]| block.iter().fold(true, |all, x| all & x.is_finite());
-    let block = exemplar.data.chunks(4096).find(|block| !sound(block));
-    if let Some(bad) = block.and_then(|block| block.iter().find(|x| !x.is_finite())) {
-        return Err(Error::value(
-            "exemplars",
-            format!("all samples must be finite, got {bad}"),
-        ));
-    }
-    match &exemplar.allowed {
-        Some(allowed) => check_shape("allowed", &exemplar.shape, allowed.len()),
-        None => Ok(()),
-    }
-}
-
-fn check_pick(pick: &Pick) -> Result<()> {
-    if pick.count == 0 {
-        return Err(Error::value("count", "must be at least 1, got 0"));
-    }
-    if pick.ratio.is_nan() || pick.ratio < 1.0 {
-        let message = format!("must be at least 1, got {}", pick.ratio);
-        return Err(Error::value("ratio", message));
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -52,7 +52,7 @@ impl Index {
         let start = ((first + r) * shape[1] + left) * self.channels;
         let pixels = data[start..][..width * self.channels].chunks_exact(self.channels);
         pixels.map(move |pixel| {
-            let distance = |c: usize| (f64::from(pixel[c]) - self.mean[c]) / self.scale;
+            let distance = |c: usize| (f64::from(pixel[c]) - self.known.mean[c]) / self.known.scale;
             if layer < self.channels {
                 distance(layer)
             } else {
@@ -90,17 +90,17 @@ fn sum(values: &[f64], of: impl Fn(f64) -> f64) -> f64 {
 }
 
 /// Mean of each channel, and a power of two above all distances from it.
-pub(super) fn moments(exemplars: &[Exemplar], channels: usize) -> (Vec<f64>, f64) {
+pub(super) fn moments(all: &[&[f32]], channels: usize) -> (Vec<f64>, f64) {
     let mut mean = vec![0.0; channels];
     let mut range = vec![[f32::INFINITY, f32::NEG_INFINITY]; channels];
     let mut count = 0;
-    for e in exemplars {
+    for data in all {
         match channels {
-            1 => tally::<8>(&e.data, channels, &mut mean, &mut range),
-            3 => tally::<24>(&e.data, channels, &mut mean, &mut range),
-            _ => tally::<0>(&e.data, channels, &mut mean, &mut range),
+            1 => tally::<8>(data, channels, &mut mean, &mut range),
+            3 => tally::<24>(data, channels, &mut mean, &mut range),
+            _ => tally::<0>(data, channels, &mut mean, &mut range),
         }
-        count += e.data.len() / channels;
+        count += data.len() / channels;
     }
     mean.iter_mut().for_each(|m| *m /= count as f64);
     let far = mean

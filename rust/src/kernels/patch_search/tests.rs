@@ -47,7 +47,7 @@ fn noise(n: usize, seed: u64, levels: u64) -> Vec<f32> {
 
 fn exemplar(shape: [usize; 2], channels: usize, seed: u64, levels: u64) -> Exemplar {
     Exemplar {
-        data: noise(shape[0] * shape[1] * channels, seed, levels),
+        data: noise(shape[0] * shape[1] * channels, seed, levels).into(),
         shape,
         allowed: None,
     }
@@ -91,7 +91,7 @@ fn a_copied_patch_is_found_where_it_was_taken() {
 fn half_the_resolution_finds_what_is_there() {
     let wave = |r: usize, c: usize| (r as f32 / 5.0).sin() * 90.0 + (c as f32 / 7.0).cos() * 60.0;
     let mut e = exemplar([90, 81], 1, 5, 40);
-    for (i, x) in e.data.iter_mut().enumerate() {
+    for (i, x) in Arc::make_mut(&mut e.data).iter_mut().enumerate() {
         *x += wave(i / 81, i % 81);
     }
     let index = Index::new(vec![exemplar([40, 33], 1, 2, 256), e.clone()], 1, [33, 33]).unwrap();
@@ -197,9 +197,41 @@ fn few_allowed_positions_are_scored_one_by_one() {
 }
 
 #[test]
+fn an_index_made_again_finds_what_a_new_one_finds() {
+    let mut all = vec![exemplar([70, 90], 3, 1, 256), exemplar([64, 50], 3, 2, 256)];
+    let first = Index::new(all.clone(), 3, [40, 40]).unwrap();
+    let samples = noise(24 * 20 * 3, 3, 256);
+    let query = Query {
+        patch: &samples,
+        weight: &[1.0; 24 * 20],
+        shape: [24, 20],
+    };
+    let pick = Pick {
+        count: 9,
+        separation: 4,
+        ratio: 3.0,
+    };
+    let good = |index: &Index| {
+        let monitor = Monitor::default();
+        par::install(2, || index.good(&query, &pick, &monitor))
+            .unwrap()
+            .unwrap()
+    };
+    good(&first);
+    all[0].allowed = Some((0..70 * 90).map(|i| i % 3 > 0).collect());
+    let masks = all.iter().map(|e| e.allowed.clone()).collect();
+    let again = first.again(masks, [24, 24]).unwrap();
+    let new = Index::new(all, 3, [24, 24]).unwrap();
+    assert_eq!(good(&again), good(&new));
+    assert_eq!(best(&again, &query, &pick), best(&new, &query, &pick));
+    assert!(first.again(vec![None], [24, 24]).is_err());
+    assert!(first.again(vec![None, Some(vec![true])], [24, 24]).is_err());
+}
+
+#[test]
 fn flat_exemplars_and_unknown_patches_give_the_first_positions() {
     let flat = Exemplar {
-        data: vec![3.0; 40 * 50],
+        data: vec![3.0; 40 * 50].into(),
         shape: [40, 50],
         allowed: None,
     };
@@ -225,7 +257,9 @@ fn flat_exemplars_and_unknown_patches_give_the_first_positions() {
 fn the_extremes_of_f32_neither_panic_nor_lose_the_minimum() {
     for (high, low) in [(1e38f32, 1.0f32), (1e-38, 1e-40), (1.0, 1e30), (1.0, 1e-30)] {
         let mut e = exemplar([60, 60], 1, 3, 100);
-        e.data.iter_mut().for_each(|x| *x *= high / 100.0);
+        Arc::make_mut(&mut e.data)
+            .iter_mut()
+            .for_each(|x| *x *= high / 100.0);
         let patch: Vec<f32> = noise(144, 5, 50).iter().map(|x| x * low).collect();
         let query = Query {
             patch: &patch,
@@ -317,7 +351,7 @@ proptest! {
         shape in [20usize..200, 20usize..150], patch in [4usize..20, 4usize..20], seed: u64, scale in 1e-3f32..1e3, mean in -1e3f32..1e3,
     ) {
         let mut e = exemplar(shape, 2, seed, 256);
-        e.data.iter_mut().for_each(|x| *x = *x * scale + mean);
+        Arc::make_mut(&mut e.data).iter_mut().for_each(|x| *x = *x * scale + mean);
         let samples: Vec<f32> = noise(patch[0] * patch[1] * 2, seed ^ 1, 256).iter().map(|x| x * scale + mean).collect();
         let weight = noise(patch[0] * patch[1], seed ^ 2, 5);
         let query = Query { patch: &samples, weight: &weight, shape: patch };

@@ -88,6 +88,17 @@ impl<const D: usize> Stitcher<D> {
     /// Arrays that do not fit the grid, a penalty or costs of old seams that are negative or not finite, cores that lie
     /// outside the overlap's images or contradict each other, values that are not finite in the overlap.
     pub fn cut(&mut self, overlap: &Overlap<'_, D>, monitor: &Monitor) -> Result<Stitched> {
+        let cut = self.cut_within(overlap, f64::INFINITY, monitor)?;
+        Ok(cut.unwrap_or_else(|| unreachable!("no seam costs more")))
+    }
+
+    /// The least visible seam of an overlap; it may be none where that costs more than `bound`, and no old seam is there.
+    pub(crate) fn cut_within(
+        &mut self,
+        overlap: &Overlap<'_, D>,
+        bound: f64,
+        monitor: &Monitor,
+    ) -> Result<Option<Stitched>> {
         overlap.check()?;
         memory::room("the graph of the seam", overlap.grid.len(), 80 * D)?;
         let mut b: Vec<bool> = overlap
@@ -97,18 +108,25 @@ impl<const D: usize> Stitcher<D> {
             .map(|(&b, &a)| b && !a)
             .collect();
         let Some(window) = overlap.window()? else {
-            return Ok(Stitched {
+            return Ok(Some(Stitched {
                 b,
                 value: 0.0,
                 edges: 0,
-            });
+            }));
         };
         let largest = match overlap.channels {
             1 => self.weigh::<1>(overlap, &window),
             3 => self.weigh::<3>(overlap, &window),
             _ => self.weigh::<0>(overlap, &window),
         }?;
-        self.capacities(overlap, &window, scale(largest));
+        let scale = scale(largest);
+        self.capacities(overlap, &window, scale);
+        // Each edge of a cut may be rounded up by a half, and a point has D edges.
+        let rounded = (D * window.grid.len()) as f64;
+        let most = match overlap.old {
+            None => (bound * scale + rounded) as i64,
+            Some(_) => i64::MAX,
+        };
         let sink = match self.ring(overlap, &window.grid, monitor)? {
             Some(inside) => inside,
             None => {
@@ -118,7 +136,10 @@ impl<const D: usize> Stitcher<D> {
                     forward: std::array::from_fn(|axis| &self.forward[axis][..]),
                     backward: std::array::from_fn(|axis| &self.backward[axis][..]),
                 };
-                self.solver.min_cut(&graph, monitor)?.sink
+                let Some(cut) = self.solver.min_cut_within(&graph, most, monitor)? else {
+                    return Ok(None);
+                };
+                cut.sink
             }
         };
         let inside: Vec<bool> = self.differences.iter().map(|d| !d.is_nan()).collect();
@@ -142,7 +163,7 @@ impl<const D: usize> Stitcher<D> {
                 }
             });
         }
-        Ok(Stitched { b, value, edges })
+        Ok(Some(Stitched { b, value, edges }))
     }
 
     /// What takes B, where that is what a least seam is around: on a plane and without old seams, which cost one way more

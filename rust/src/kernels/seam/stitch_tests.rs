@@ -102,6 +102,23 @@ proptest! {
         // Eighteen edges, each rounded to 2^-16.
         prop_assert!(cut.value <= least + 1e-3, "{} against {least}", cut.value);
     }
+
+    #[test]
+    fn only_what_costs_more_than_a_bound_is_not_cut(
+        (a, b) in (floats(400), floats(400)), (mask_a, mask_b) in (bools(400), bools(400)), share in 0.0f64..1.5,
+    ) {
+        let grid = Grid::new([20, 20], [false; 2]).unwrap();
+        let overlap = Overlap::new(grid, 1, &a, &b, &mask_a, &mask_b);
+        let monitor = Monitor::default();
+        let whole = cut(&overlap, &monitor).unwrap();
+        let within = |bound| Stitcher::default().cut_within(&overlap, bound, &monitor).unwrap();
+        let exact = within(whole.value);
+        prop_assert_eq!(exact.as_ref(), Some(&whole));
+        match within(share * whole.value) {
+            Some(found) => prop_assert_eq!(found, whole),
+            None => prop_assert!(share < 1.0),
+        }
+    }
 }
 
 #[test]

@@ -153,25 +153,39 @@ impl<const D: usize> Solver<D> {
     /// Arrays that do not fit the grid, negative capacities, a pair whose two capacities sum to more than `i32::MAX`, more
     /// than 2^31 points, or a monitor that was cancelled.
     pub fn min_cut(&mut self, graph: &Graph<'_, D>, monitor: &Monitor) -> Result<Cut> {
+        let cut = self.min_cut_within(graph, i64::MAX, monitor)?;
+        Ok(cut.unwrap_or_else(|| unreachable!("no flow is larger")))
+    }
+
+    /// The minimum cut of a graph, if its capacity is at most `most`: where it is more, that is seen as soon as so much flows.
+    pub(crate) fn min_cut_within(
+        &mut self,
+        graph: &Graph<'_, D>,
+        most: i64,
+        monitor: &Monitor,
+    ) -> Result<Option<Cut>> {
         monitor.check()?;
         let layout = Layout::new(graph.grid)?;
         self.build(graph, &layout)?;
         self.sweep(&layout);
         self.plant(&layout);
-        if layout.cyclic.contains(&true) {
-            self.grow::<true>(monitor)?;
+        let within = if layout.cyclic.contains(&true) {
+            self.grow::<true>(most, monitor)?
         } else {
-            self.grow::<false>(monitor)?;
+            self.grow::<false>(most, monitor)?
+        };
+        if !within {
+            return Ok(None);
         }
         let mut sink = Vec::with_capacity(graph.grid.len());
         layout.rows(|_, at, n| {
             let row = &self.nodes[at..at + n];
             sink.extend(row.iter().map(|node| node.tree == Tree::Sink));
         });
-        Ok(Cut {
+        Ok(Some(Cut {
             sink,
             value: self.value,
-        })
+        }))
     }
 
     /// Copies the graph into nodes.

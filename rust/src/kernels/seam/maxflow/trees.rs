@@ -38,10 +38,16 @@ impl<const D: usize> Solver<D> {
         }
     }
 
-    /// Lets both trees grow until nothing is active.
-    pub(super) fn grow<const CYCLIC: bool>(&mut self, monitor: &Monitor) -> Result<()> {
+    /// Lets both trees grow until nothing is active, or more flows than `most`; returns whether no more does.
+    pub(super) fn grow<const CYCLIC: bool>(
+        &mut self,
+        most: i64,
+        monitor: &Monitor,
+    ) -> Result<bool> {
         let mut grown = 0usize;
-        while let Some(p) = self.queue.pop_front() {
+        while self.value <= most
+            && let Some(p) = self.queue.pop_front()
+        {
             if grown.is_multiple_of(BREATH) {
                 monitor.check()?;
             }
@@ -53,7 +59,7 @@ impl<const D: usize> Solver<D> {
                 Tree::Free => {}
             }
         }
-        Ok(())
+        Ok(self.value <= most)
     }
 
     /// Offers the arcs of an active node.

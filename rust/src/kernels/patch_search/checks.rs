@@ -1,0 +1,49 @@
+//! What is refused: exemplars, sizes and choices that cannot be.
+
+use super::{Exemplar, Pick};
+use crate::foundation::error::check_shape;
+use crate::{Error, Result};
+
+/// More samples than this in one exemplar cannot be addressed by a candidate.
+const LONGEST: usize = u32::MAX as usize;
+
+pub(super) fn check_exemplar(exemplar: &Exemplar, channels: usize) -> Result<()> {
+    let [rows, columns] = exemplar.shape;
+    check_shape("exemplars", &[rows, columns, channels], exemplar.data.len())?;
+    if exemplar.data.is_empty() || exemplar.data.len() / channels >= LONGEST {
+        let message = format!("1 to {LONGEST} positions are allowed, got {rows} x {columns}");
+        return Err(Error::value("exemplars", message));
+    }
+    // Block by block, within which nothing has to be decided.
+    let sound = |block: &[f32]| block.iter().fold(true, |all, x| all & x.is_finite());
+    let block = exemplar.data.chunks(4096).find(|block| !sound(block));
+    if let Some(bad) = block.and_then(|block| block.iter().find(|x| !x.is_finite())) {
+        return Err(Error::value(
+            "exemplars",
+            format!("all samples must be finite, got {bad}"),
+        ));
+    }
+    match &exemplar.allowed {
+        Some(allowed) => check_shape("allowed", &exemplar.shape, allowed.len()),
+        None => Ok(()),
+    }
+}
+
+pub(super) fn check_side(max_patch: [usize; 2]) -> Result<()> {
+    if max_patch.contains(&0) {
+        let message = format!("each side must be at least 1, got {max_patch:?}");
+        return Err(Error::value("max_patch", message));
+    }
+    Ok(())
+}
+
+pub(super) fn check_pick(pick: &Pick) -> Result<()> {
+    if pick.count == 0 {
+        return Err(Error::value("count", "must be at least 1, got 0"));
+    }
+    if pick.ratio.is_nan() || pick.ratio < 1.0 {
+        let message = format!("must be at least 1, got {}", pick.ratio);
+        return Err(Error::value("ratio", message));
+    }
+    Ok(())
+}

@@ -1,0 +1,73 @@
+//! The filtered costs of one block, whose least is always known.
+
+use std::ops::Range;
+
+/// The filtered costs of one block; infinite where not allowed.
+#[derive(Default)]
+pub(super) struct Map {
+    pub(super) costs: Vec<f32>,
+    /// Rows and columns.
+    pub(super) valid: [usize; 2],
+    /// The least of each row, and of all.
+    lows: Vec<f32>,
+    pub(super) least: f32,
+    /// Filtered costs are within this of the true ones (in the filter's unit), but for their own rounding.
+    pub(super) absolute: f64,
+}
+
+impl Map {
+    pub(super) fn rows(&self) -> impl Iterator<Item = &[f32]> {
+        self.costs.chunks_exact(self.valid[1].max(1))
+    }
+
+    /// How far a filtered cost may be from the true one.
+    pub(super) fn error(&self, cost: f32) -> f64 {
+        self.absolute + f64::from(f32::EPSILON) * f64::from(cost).abs()
+    }
+
+    /// Calls `f` for each position that costs at most `limit`; few do, so rows and strides that have none are passed over.
+    pub(super) fn within(&self, limit: f32, mut f: impl FnMut(usize, usize)) {
+        for (r, row) in self
+            .rows()
+            .enumerate()
+            .filter(|&(r, _)| self.lows[r] <= limit)
+        {
+            for (i, chunk) in row.chunks(16).enumerate() {
+                if lowest(chunk) <= limit {
+                    for (k, _) in chunk.iter().enumerate().filter(|&(_, &cost)| cost <= limit) {
+                        f(r, 16 * i + k);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Looks for the least of all rows.
+    pub(super) fn update(&mut self) {
+        self.lows.clear();
+        self.lows.resize(self.valid[0], f32::INFINITY);
+        self.update_rows(0..self.valid[0]);
+    }
+
+    /// Looks for the least of rows that have changed.
+    pub(super) fn update_rows(&mut self, rows: Range<usize>) {
+        let width = self.valid[1];
+        for r in rows {
+            self.lows[r] = lowest(&self.costs[r * width..][..width]);
+        }
+        self.least = lowest(&self.lows);
+    }
+}
+
+/// The least of costs, none of which is NaN.
+fn lowest(costs: &[f32]) -> f32 {
+    let mut lanes = [f32::INFINITY; 16];
+    let (chunks, rest) = costs.as_chunks::<16>();
+    let less = |a: f32, b: f32| if b < a { b } else { a };
+    for chunk in chunks {
+        for (lane, &cost) in lanes.iter_mut().zip(chunk) {
+            *lane = less(*lane, cost);
+        }
+    }
+    rest.iter().chain(&lanes).copied().fold(f32::INFINITY, less)
+}
