@@ -154,7 +154,7 @@ def test_wrong_arrays_get_a_sentence():
         (lambda: appearance.correct(good[:-1], region, frames), "places: needs int32 of 286 numbers"),
         (lambda: appearance.correct(good, region, frames[:, :1]), "frames"),
         (lambda: appearance.correct(good, region, np.repeat(frames, 3, axis=0)), "frames"),
-        (lambda: appearance.correct(good, region, frames, held=np.zeros(3, bool)), "places"),
+        (lambda: appearance.correct(good, region, frames, held=np.zeros(3, bool)), "held"),
         (lambda: appearance.correct(good, region, frames, reach=3), "reach: needs an integer from 1 to 2"),
         (lambda: appearance.correct(good, region, frames, vote=3), "vote: needs an integer from 0 to 2"),
         (lambda: appearance.correct(good, region_of(3), frames), "region: the exemplar has 2 axes"),
