@@ -336,15 +336,17 @@ def _run_cluster(
         return [row.popleft() if row is rows[slot] else row.pop() for _ in range(min(at_once, -(-len(row) // 2)))]
 
     def submit(slot: int, some: list[int], alone: bool) -> None:
+        # What may end its worker brings the task along, and goes to any: a cluster that has just lost all of its workers waits
+        # for what was lost with them, and never gives to new ones what was meant for one that is gone.
         future = client.submit(
             _do_there,
-            there,
+            payload if alone else there,
             some,
             threads_each,
             most,
             key=f"texrs-{name}-{some[0]}-{len(some)}{'-alone' * alone}",
-            workers=[slots[slot]],
-            allow_other_workers=True,
+            workers=None if alone else [slots[slot]],
+            allow_other_workers=not alone,
             pure=False,
         )
         known[future] = slot, some, alone
@@ -383,10 +385,13 @@ def _run_cluster(
         client.cancel([there, *known])
 
 
-def _do_there(work: Work, some: Sequence[int], count: int | None, most: dict[str, Any]) -> tuple[list[Any], float]:
+def _do_there(
+    task: Work | bytes, some: Sequence[int], count: int | None, most: dict[str, Any]
+) -> tuple[list[Any], float]:
     """Do some tasks within the limits of who asked for them; return what they return, and the seconds that it took."""
     from distributed import get_worker
 
     begun = time.monotonic()
+    work = pickle.loads(task) if isinstance(task, bytes) else task
     with within(**most), threads(count or max(1, get_worker().state.nthreads)):
         return [work(number) for number in some], time.monotonic() - begun
