@@ -20,7 +20,7 @@ from texrs.errors import TexrsError
 
 FEW = 6
 """Values of each argument that are tried by `make test`."""
-SKIPPED = {"scheduler", "function", "make"}
+SKIPPED = {"scheduler", "function", "make", "each"}
 """Arguments that start processes, or whose own errors are whoever gave them."""
 
 

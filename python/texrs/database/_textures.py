@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs import io
-from texrs._arrays import as_bool, as_image, as_int
+from texrs._arrays import as_bool, as_image, as_instance, as_int, as_items
 from texrs._cache import Cache
+from texrs._calls import check_call
 from texrs._progress import answering, listen
 from texrs._typing import Array, Path, Progress
 from texrs.database._folder import NAME, Folder, Record, check_free, restore_option
@@ -428,6 +429,8 @@ class TextureDatabase:
 
         """
         progress = listen(progress)
+        if each is not None:
+            check_call(as_instance(each, "each", Callable), "each", "a", "b", "result")
         side = as_int(cell, "cell", 16, 1024)
         down, across = (self._choose(names, which) for names, which in ((rows, "rows"), (columns, "columns")))
         kept: Cache[str, Elements] = Cache(KEPT, count_bytes)
@@ -472,14 +475,15 @@ class TextureDatabase:
 
     def _choose(self, names: Sequence[str] | None, which: str) -> tuple[str, ...]:
         """Return names that are there; all by default."""
-        chosen = tuple(self) if names is None else tuple(names)
-        if not chosen or isinstance(names, str):
-            raise InvalidInput(
-                f"{which}: no textures to splice" if not chosen else f"{which}: needs several names, got {names!r}"
-            )
-        for name in chosen:
+        if isinstance(names, str):
+            raise InvalidInput(f"{which}: needs several names, got {names!r}")
+        chosen = []
+        for name in self if names is None else as_items(names, which):
             self._find_record(name)
-        return chosen
+            chosen.append(name)
+        if not chosen:
+            raise InvalidInput(f"{which}: no textures to splice")
+        return tuple(chosen)
 
     def _read_entry(self, kept: Cache[str, Elements], name: str) -> Elements:
         return kept.get_or_make(name, partial(self.analyse, name))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from texrs._arrays import as_image, guidance
 from texrs._typing import Array, Bools
-from texrs.elements._layout import Layout
+from texrs.elements._layout import Layout, as_layout
 from texrs.elements._mask import to_lab
 from texrs.point_sets import find_courses, find_lattice, spacing
 
@@ -77,7 +77,7 @@ class Arrangement:
             )
         elif self.courses is not None:
             words.append(f"in {len(self.courses)} courses")
-        rest = {"disjoint": "ground", "jointed": "joints", "connected": "openings"}[str(layout)]
+        rest = {"disjoint": "ground", "jointed": "joints", "connected": "openings"}[str(as_layout(layout))]
         return f"{', '.join(words)}; {rest} {'darker' if self.darker else 'lighter'}"
 
 

@@ -96,7 +96,7 @@ class Elements:
     known: Labels | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "layout", Layout(self.layout))
+        object.__setattr__(self, "layout", as_layout(self.layout))
 
     def __repr__(self) -> str:
         rows, columns = self.image.shape[:2]

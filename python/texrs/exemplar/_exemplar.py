@@ -10,7 +10,18 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
-from texrs._arrays import MAX_PIXELS, as_image, as_instance, as_int, as_items, as_ndarray, as_wrap, guidance, to_unit
+from texrs._arrays import (
+    MAX_PIXELS,
+    as_axes,
+    as_image,
+    as_instance,
+    as_int,
+    as_items,
+    as_ndarray,
+    as_wrap,
+    guidance,
+    to_unit,
+)
 from texrs._cache import Cache, content_hash
 from texrs._engine.coherence import Similarity, find_similar
 from texrs._engine.stitcher import Stitcher
@@ -519,6 +530,7 @@ def as_exemplar(value: object, name: str = "exemplar", *, axes: int = 2, minimum
     True
 
     """
+    axes, minimum = as_axes(axes), as_int(minimum, "minimum", 0, 2**31)
     if isinstance(value, Exemplar):
         if value.axes != axes:
             raise InvalidInput(f"{name}: needs an Exemplar with axes={axes}, got one with axes={value.axes}")

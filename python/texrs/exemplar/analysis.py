@@ -103,6 +103,8 @@ class Analysis:
         True
 
         """
+        if not isinstance(arrays, Mapping) or not all(isinstance(name, str) for name in arrays):
+            raise InvalidInput(f"arrays: needs arrays by their names, got {type(arrays).__name__}")
         # Single numbers come back from a file as arrays of one.
         mine = {name: a.reshape(()) if a.size == 1 else a for name, a in arrays.items() if "/" in name}
         count = len({name.split("/")[0] for name in mine})

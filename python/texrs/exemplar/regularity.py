@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import as_float, as_int, as_tuple, as_wrap
 from texrs._progress import ask
 from texrs._show import brief
 from texrs._typing import Floats
@@ -46,6 +47,8 @@ BENT = 0.15
 PARTS, FRACTIONS = 2.0**8, 2.0**20
 """Of a pixel to which periods are known, and of 1 to which matrices are: what is calculated with them is exact on every
 processor."""
+FARTHEST = 4096.0
+"""Pixels up to which shifts are listed."""
 LEANS = 3.0
 """Standard errors of a lattice that leans for one that counts: a wall that was taken a little aslant leans by up to 10."""
 FINE, BLOCKS = (0.7, 1.5), 4
@@ -106,8 +109,8 @@ class Lattice:
 
         Raises
         ------
-        TypeError
-            Not a number.
+        InvalidInput
+            Not a number from 0 to 4096.
 
         Examples
         --------
@@ -117,7 +120,7 @@ class Lattice:
 
         """
         a, b = np.array(self.a), np.array(self.b)
-        reach = max(reach, *(float(np.hypot(*v)) for v in (a, b, a + b, a - b)))
+        reach = max(as_float(reach, "reach", 0, FARTHEST), *(float(np.hypot(*v)) for v in (a, b, a + b, a - b)))
         most = int(max(reach / np.hypot(*a), reach / np.hypot(*b)) * 2) + 2
         found = [i * a + j * b for i in range(-most, most + 1) for j in range(-most, most + 1) if i or j]
         found.sort(key=lambda v: (int(v @ v), tuple(v)))
@@ -154,7 +157,9 @@ class Lattice:
 
         """
         vectors = self.vectors
-        sides = np.diag(np.array(size, np.float64))
+        lengths = [as_int(n, "size", 1, 2**31) for n in as_tuple(size, "size", 2, "2 integers, rows and columns")]
+        wrap = as_wrap(wrap)
+        sides = np.diag(np.array(lengths, np.float64))
         # The shift of the lattice that is nearest to each side.
         nearest = np.where(wrap, vectors @ np.rint(np.linalg.solve(vectors, sides)), sides)
         if abs(np.linalg.det(nearest)) < 0.5 * abs(np.linalg.det(sides)):

@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_choice, as_image, as_instance, as_int, as_list, as_rgb, to_unit, try_array
+from texrs._arrays import as_choice, as_float, as_image, as_instance, as_int, as_list, as_rgb, to_unit, try_array
 from texrs._cache import content_hash
 from texrs._engine.noise import uniform
 from texrs._progress import ask, listen
@@ -104,7 +104,7 @@ class ElementOptions:
 
         Raises
         ------
-        IndexError
+        InvalidInput
             The list has no such entry.
 
         Examples
@@ -116,7 +116,9 @@ class ElementOptions:
         16
 
         """
-        return replace(self, labels=self.labels[number]) if isinstance(self.labels, list | tuple) else self
+        if not isinstance(self.labels, list | tuple):
+            return self
+        return replace(self, labels=self.labels[as_int(number, "number", 0, len(self.labels) - 1)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -198,6 +200,11 @@ class Segmentation:
         (H, W) float32
             0 at the outlines of elements and outside, 1 from ``reach`` pixels on.
 
+        Raises
+        ------
+        InvalidInput
+            No distance: numbers from 1e-6 to 1e9 are allowed.
+
         Examples
         --------
         >>> from texrs import Exemplar, samples
@@ -206,6 +213,7 @@ class Segmentation:
         (0.0, 1.0)
 
         """
+        reach = as_float(reach, "reach", 1e-6, 1e9)
         from scipy.ndimage import distance_transform_edt
 
         labels = np.pad(self.elements, 1, mode="edge")

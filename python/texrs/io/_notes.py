@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from texrs._checks import as_int
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Notes:
@@ -60,6 +62,7 @@ class Notes:
         (False, True)
 
         """
+        channels = as_int(channels, "channels", 1, 64)
         space = b"RGB " if channels in (3, 4) else b"GRAY" if channels in (1, 2) else b""
         fits = self.profile is not None and self.profile[16:20] == space
         return replace(self, profile=self.profile if fits else None)

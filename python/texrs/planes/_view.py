@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 
 import numpy as np
 
@@ -141,7 +142,7 @@ class View:
         ((64, 96), True)
 
         """
-        rows, columns = as_size(list(as_items(shape, "shape"))[:2], "shape")
+        rows, columns = as_size(list(islice(as_items(shape, "shape"), 2)), "shape")
         size = rows, columns
         ground = None if self.ground is None else as_mask(self.ground, "ground", size)
         if ground is not None and not ground.any():

@@ -376,6 +376,7 @@ class SourceMap(Parted):
         [[[1.0, 2.0], [0.0, 0.0]]]
 
         """
+        overwrite = as_bool(overwrite, "overwrite")
         several = [as_instance(each, "maps", SourceMap) for each in as_items(maps, "maps")]
         # Of a masked array its values count.
         place, label = (np.asarray(v) if isinstance(v, np.ndarray) else v for v in (place, label))

@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_bool, as_choice, as_float, as_int
+from texrs._arrays import as_bool, as_choice, as_float, as_instance, as_int
 from texrs._show import brief
 from texrs._typing import Array, Bools, Interpolation
 from texrs.errors import InvalidInput
@@ -138,6 +138,9 @@ class Finish:
         (True, False)
 
         """
+        if not isinstance(parts, Mapping) or not isinstance(parts.get("finish"), np.ndarray):
+            raise InvalidInput("parts: needs arrays by their names, finish among them")
+        shape, shapes = as_instance(shape, "shape", tuple), as_instance(shapes, "shapes", tuple)
         words: dict[str, Any] = json.loads(parts["finish"].tobytes())
         # Files of before there was flattening say nothing of it.
         if not isinstance(words, dict) or {"flatten", *words} != set(PLAIN):
