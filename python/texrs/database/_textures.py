@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texrs import io
-from texrs._arrays import as_bool, as_image, as_instance, as_int, as_items
+from texrs._arrays import as_bool, as_image, as_int, as_items
 from texrs._cache import Cache
 from texrs._calls import check_call
 from texrs._progress import answering, listen
@@ -430,7 +430,9 @@ class TextureDatabase:
         """
         progress = listen(progress)
         if each is not None:
-            check_call(as_instance(each, "each", Callable), "each", "a", "b", "result")
+            if not callable(each):
+                raise InvalidInput(f"each: needs a function to call, or None; got {each!r}")
+            check_call(each, "each", "a", "b", "result")
         side = as_int(cell, "cell", 16, 1024)
         down, across = (self._choose(names, which) for names, which in ((rows, "rows"), (columns, "columns")))
         kept: Cache[str, Elements] = Cache(KEPT, count_bytes)

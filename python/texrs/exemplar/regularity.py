@@ -158,10 +158,10 @@ class Lattice:
         """
         vectors = self.vectors
         lengths = [as_int(n, "size", 1, 2**31) for n in as_tuple(size, "size", 2, "2 integers, rows and columns")]
-        wrap = as_wrap(wrap)
+        cyclic = as_wrap(wrap)
         sides = np.diag(np.array(lengths, np.float64))
         # The shift of the lattice that is nearest to each side.
-        nearest = np.where(wrap, vectors @ np.rint(np.linalg.solve(vectors, sides)), sides)
+        nearest = np.where(cyclic, vectors @ np.rint(np.linalg.solve(vectors, sides)), sides)
         if abs(np.linalg.det(nearest)) < 0.5 * abs(np.linalg.det(sides)):
             return None
         turned = np.rint(sides @ np.linalg.inv(nearest) * FRACTIONS) / FRACTIONS
