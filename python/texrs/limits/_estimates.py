@@ -118,21 +118,25 @@ def memory(
     result = shapes[0][:axes] if size is None else _as_shape(size, axes, "size")
     from numpy import dtype as make_dtype
 
+    # Which goes by the limits that are found here.
+    from texrs._checks import as_bool
+
     try:
         itemsize = make_dtype(dtype).itemsize
-    except TypeError:
+    except (TypeError, ValueError):
         raise InvalidInput(f"dtype: needs one of NumPy, got {dtype!r}") from None
     costs = COSTS[verb]
-    cost = costs[method] if method in costs else costs[None]
+    cost = costs[method if isinstance(method, str) and method in costs else None]
     colours = itemsize * math.prod(shapes[0][axes:])
     pixels = sum(math.prod(shape[:axes]) for shape in shapes)
-    return int(cost.count(pixels, len(shapes), math.prod(result[:axes]), colours, bool(field)))
+    return int(cost.count(pixels, len(shapes), math.prod(result[:axes]), colours, as_bool(field, "field")))
 
 
 def _list_shapes(value: object) -> list[object]:
     """Return one shape, or several, as a list of them."""
-    several = list(value) if isinstance(value, Sequence) and not isinstance(value, str | bytes) else []
-    return several if several and isinstance(several[0], Sequence) else [value]
+    if isinstance(value, Sequence) and not isinstance(value, str | bytes | range) and len(value) > 0:
+        return list(value) if isinstance(value[0], Sequence) else [value]
+    return [value]
 
 
 def _as_shape(value: Any, axes: int, name: str = "exemplar") -> tuple[int, ...]:

@@ -12,10 +12,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float, as_int, to_unit
+from texrs._arrays import as_float, as_int, as_one, to_unit
 from texrs._progress import answering, listen
 from texrs._typing import Array, Floats, Path, Progress
 from texrs.errors import InvalidInput
+from texrs.io._files import as_path
 from texrs.materials import Map, Role
 from texrs.painting._baking import bake_points, fill_between, lean
 from texrs.painting._directions import follow
@@ -114,7 +115,8 @@ class Painted:
         for name, pixels in self.maps.items():
             role = (usual | self.roles)[name]
             maps[name] = Map(pixels, role, "srgb" if role.coloured and pixels.dtype.kind in "ui" else "linear")
-        return write_mesh(path, self.vertices, self.faces, self.uv, maps, self.relief, depth)
+        depth = as_one(depth, "depth", 8, 16, None)
+        return write_mesh(as_path(path), self.vertices, self.faces, self.uv, maps, self.relief, depth)
 
 
 def paint(
