@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_float, as_image, as_int, as_items, as_size, guidance, try_array
+from texrs._arrays import as_float, as_image, as_int, as_size, as_tuple, guidance, try_array
 from texrs._conversion import as_ndarray
 from texrs._progress import answering, ask, listen
 from texrs._typing import Array, Floats, Interpolation, Path, Progress
@@ -66,9 +66,7 @@ def slices(volume: ArrayLike, at: Sequence[int] | None = None, *, gap: int = 2) 
     """
     volume = as_ndarray(volume, "volume", axes=3)
     v = as_image(volume, "volume", axes=3)
-    places = [n // 2 for n in v.shape[:3]] if at is None else list(as_items(at, "at"))
-    if len(places) != 3:
-        raise InvalidInput(f"at: needs plane, row and column, got {at!r}")
+    places = [n // 2 for n in v.shape[:3]] if at is None else list(as_tuple(at, "at", 3, "plane, row and column"))
     places = [as_int(p, "at", -n, n - 1) for p, n in zip(places, v.shape[:3], strict=True)]
     space = as_int(gap, "gap", 0, 1024)
     cuts = [np.take(v, place, axis=axis) for axis, place in enumerate(places)]
@@ -272,9 +270,8 @@ def turntable(
     count, side, above, period = check_turntable(frames, size, elevation, seconds)
     if not str(path).lower().endswith(".gif"):
         raise FileError(f"{path}: needs a name that ends in .gif")
-    if not isinstance(background, Sequence | np.ndarray) or len(background) != 3:
-        raise InvalidInput(f"background: needs three integers, got {background!r}")
-    ground = np.array([as_int(b, "background", 0, 255) for b in background], np.float32)
+    shade = as_tuple(background, "background", 3, "three integers")
+    ground = np.array([as_int(b, "background", 0, 255) for b in shade], np.float32)
     colours = guidance(as_image(volume, "volume", axes=3))
     half = np.array(colours.shape[:3]) / 2
     wide = float(np.hypot(half[0], half[2]))
