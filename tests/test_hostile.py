@@ -92,9 +92,12 @@ MAP, OTHER = texrs.SourceMap.identity((2, 3)), texrs.SourceMap.identity((3, 2))
 LEFT = {
     "texrs.volume.Classes.of.image",
     "texrs.volume.Classes.shares.image",
+    "texrs.Plane.project.points",
+    "texrs.kernels.mean_shift.mean_shift.progress",
+    "texrs.kernels.regions.merge.progress",
 }
-"""Arguments of which some values end otherwise: a view of two bytes as a picture of eight gigabytes, whose copy ends in a
-MemoryError. None may come to it."""
+"""Arguments of which some values end otherwise: a view of two bytes as an array of eight gigabytes, whose copy ends in a
+MemoryError; and `int` as what is told of progress, whose own error goes through. None may come to it."""
 
 
 def list_left(name, wrong):

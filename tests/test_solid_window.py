@@ -259,3 +259,10 @@ def test_shares_of_classes_are_those_of_the_exemplar() -> None:
         volume.compare(exemplar, texrs.SolidTexture(exemplar, seed=s)[0:64, 0:64, 0:64]).relative_shares for s in (1, 2)
     ]
     assert (np.abs(np.mean(shares, axis=0) - 1) < 0.25).all()
+
+
+def test_a_point_alone_is_looked_up_without_axes():
+    image = texrs.samples.stripes((32, 32, 32)).image
+    texture = texrs.SolidTexture(image if image.ndim == 3 else image[..., 0])
+    point, several = (40, -3, 7), [(40, -3, 7)]
+    assert np.array_equal(texture.sample(point), texture.sample(several)[0])

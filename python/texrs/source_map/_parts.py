@@ -74,7 +74,7 @@ class Parted(ABC):
                 raise InvalidInput(f"frame: the field has {self.frame.axes} axes, the map {axes}")
         if not isinstance(self.shapes, Sequence) or not all(_is_shape(s, axes) for s in self.shapes):
             raise InvalidInput(f"shapes: each needs {axes} sides, integers of at least 1, got {self.shapes}")
-        if self.exemplar.size and int(self.exemplar.max()) >= len(self.shapes):
+        if self.exemplar.size and int(np.asarray(self.exemplar).max()) >= len(self.shapes):
             raise InvalidInput(f"exemplar: reaches {int(self.exemplar.max())}, but there are {len(self.shapes)} shapes")
 
     @property

@@ -230,7 +230,7 @@ class Texture(Endless):
             return next(iter(self._sample_maps(at, how, listen(progress), only_base=True).values()))
         places = self._carry_on(at.reshape(-1, self.axes), listen(progress))[0]
         image = self._exemplar.image
-        return gather(image, places, interpolation=how).reshape(*at.shape[:-1], *image.shape[self.axes :])
+        return gather(image, places, interpolation=how).reshape((*at.shape[:-1], *image.shape[self.axes :]))
 
     def sample_maps(
         self,
@@ -359,7 +359,7 @@ class Texture(Endless):
         name, whole = self._material.base_name, self._material
         used = Material({name: whole[name]}, axes=self.axes) if only_base else whole
         made = apply_materials([used], source.finished((False,) * self.axes, interpolation=how), progress)
-        return {n: m.pixels.reshape(*at.shape[:-1], *m.pixels.shape[self.axes :]) for n, m in made.items()}
+        return {n: m.pixels.reshape((*at.shape[:-1], *m.pixels.shape[self.axes :])) for n, m in made.items()}
 
     def _trace(self, at: NDArray[np.float64], progress: Progress | None) -> SourceMap:
         """Return where points come from, as the source map of a picture of one row."""
