@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from texrs._cache import Cache
 from texrs._engine.pyramid import ONE, Region, to_fixed
 from texrs._engine.stitcher import Shown
-from texrs._progress import answering, stage
+from texrs._progress import answering, ask, stage
 from texrs._typing import Floats, Progress
 from texrs.exemplar import Exemplar
 from texrs.exemplar.regularity import find_lattice
@@ -187,6 +187,11 @@ class Layers:
         """Cut a patch into what the layer below shows in a box."""
         region = self._region(key)
         frames, last = to_fixed(self.field, region), key[0] == len(self.shifts) - 1
+        # Boxes are made sooner than a kernel looks up from its work.
+        if advance is None:
+            ask()
+        else:
+            advance(0.0)
         with answering(advance, 0.0):
             stitcher = self.exemplar.stitcher
         shown = stitcher.cover(
