@@ -118,18 +118,17 @@ def memory(
     result = shapes[0][:axes] if size is None else _as_shape(size, axes, "size")
     from numpy import dtype as make_dtype
 
-    # Which goes by the limits that are found here.
-    from texrs._checks import as_bool
-
     try:
         itemsize = make_dtype(dtype).itemsize
     except (TypeError, ValueError):
         raise InvalidInput(f"dtype: needs one of NumPy, got {dtype!r}") from None
+    if not isinstance(field, bool):
+        raise InvalidInput(f"field: needs True or False, got {field!r}")
     costs = COSTS[verb]
     cost = costs[method if isinstance(method, str) and method in costs else None]
     colours = itemsize * math.prod(shapes[0][axes:])
     pixels = sum(math.prod(shape[:axes]) for shape in shapes)
-    return int(cost.count(pixels, len(shapes), math.prod(result[:axes]), colours, as_bool(field, "field")))
+    return int(cost.count(pixels, len(shapes), math.prod(result[:axes]), colours, field))
 
 
 def _list_shapes(value: object) -> list[object]:
