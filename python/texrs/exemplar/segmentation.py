@@ -213,9 +213,9 @@ class Segmentation:
         (0.0, 1.0)
 
         """
-        reach = as_float(reach, "reach", 1e-6, 1e9)
         from scipy.ndimage import distance_transform_edt
 
+        reach = as_float(reach, "reach", 1e-6, 1e9)
         labels = np.pad(self.elements, 1, mode="edge")
         outline = mark_outlines(labels)
         if not outline.any():
