@@ -24,8 +24,9 @@ fn frame<const D: usize>(draw: &mut Draw<'_>) -> Frame<D> {
 
 fn check<const D: usize>(draw: &mut Draw<'_>, longest: usize) {
     let (wrap, channels) = (draw.flags(), draw.within(0..=4));
-    // With checked addresses, windows of a thousand numbers take half a minute.
-    let radius = draw.within(0..=if D > 2 && channels > 1 { 2 } else { 3 });
+    // The axes of a window take the square of its numbers: wide ones, up to 343 a channel, are drawn seldom.
+    let widest = if draw.seldom(32) { 3 } else { 4 - D };
+    let radius = draw.within(0..=if channels > 1 { widest.min(2) } else { widest });
     let exemplar = Grid::new(draw.shape::<D>(1..=longest), wrap).unwrap();
     let colours = draw.reals(exemplar.len() * channels);
     let made = agreed(|_| Ok(Appearance::new(&colours, exemplar, channels, radius)?.parts()));
