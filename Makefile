@@ -108,6 +108,7 @@ audit: $(VENV)/.tools
 lint-rust: | requirements
 	cargo fmt --check
 	cargo clippy --all-targets --quiet --features python -- -D warnings
+	cargo clippy --quiet --features python,portable -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --quiet --features python
 	$(PYTHON) .ci/third-party --check
 

@@ -1,7 +1,7 @@
 //! Wide registers, chosen at run time: the only file that names pulp, and the only one with unsafe code. No operation is
 //! fused or reordered, so the values are those of plain code.
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 pub(crate) use pulp::{cast, x86::V3};
 
 /// Runs `work` compiled for the widest registers that the CPU has, as far as it is inlined: the closure and what it calls
@@ -9,7 +9,7 @@ pub(crate) use pulp::{cast, x86::V3};
 #[allow(unsafe_code)] // behind the question whether the CPU has the feature
 #[inline]
 pub(crate) fn wide<R>(work: impl FnOnce() -> R) -> R {
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
     {
         #[target_feature(enable = "avx2")]
         #[inline]
@@ -38,12 +38,12 @@ macro_rules! wide_fn {
         $access fn $name $(<const $n: $kind>)? ($($argument: $type),*) $(-> $out)? {
             #[inline(always)]
             fn any $(<const $n: $kind>)? ($($argument: $type),*) $(-> $out)? $body
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
             #[target_feature(enable = "avx2")]
             fn avx2 $(<const $n: $kind>)? ($($argument: $type),*) $(-> $out)? {
                 any $(::<$n>)? ($($argument),*)
             }
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
             if is_x86_feature_detected!("avx2") {
                 // SAFETY: the CPU has the feature that the function is compiled for.
                 return unsafe { avx2 $(::<$n>)? ($($argument),*) };
@@ -68,7 +68,7 @@ macro_rules! widest_fn {
         $access fn $name($($argument: $type),*) $(-> $out)? {
             #[inline(always)]
             fn any<const $rows: usize>($($argument: $type),*) $(-> $out)? $body
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
             {
                 #[target_feature(enable = "avx512f")]
                 fn avx512($($argument: $type),*) $(-> $out)? {
@@ -100,7 +100,7 @@ macro_rules! four {
         #[allow(unsafe_code)] // arrays as registers
         #[inline(always)]
         pub(crate) fn $name(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
             {
                 use std::arch::x86_64::{__m128, $instruction};
                 use std::mem::transmute;
@@ -110,7 +110,7 @@ macro_rules! four {
                     transmute::<__m128, [f32; 4]>($instruction(a, b))
                 }
             }
-            #[cfg(not(target_arch = "x86_64"))]
+            #[cfg(any(not(target_arch = "x86_64"), feature = "portable"))]
             std::array::from_fn(|k| a[k] $operator b[k])
         }
     )*};
@@ -122,7 +122,7 @@ four!(add_four _mm_add_ps +, subtract_four _mm_sub_ps -, multiply_four _mm_mul_p
 #[allow(unsafe_code)] // arrays as registers
 #[inline(always)]
 pub(crate) fn square_apart(a: &[i16; 8], b: &[i16; 8]) -> [i32; 4] {
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
     {
         use std::arch::x86_64::{__m128i, _mm_madd_epi16, _mm_sub_epi16};
         use std::mem::transmute;
@@ -135,7 +135,7 @@ pub(crate) fn square_apart(a: &[i16; 8], b: &[i16; 8]) -> [i32; 4] {
             transmute::<__m128i, [i32; 4]>(_mm_madd_epi16(d, d))
         }
     }
-    #[cfg(not(target_arch = "x86_64"))]
+    #[cfg(any(not(target_arch = "x86_64"), feature = "portable"))]
     std::array::from_fn(|pair| {
         let square = |k: usize| i32::from(a[k].wrapping_sub(b[k])).pow(2);
         square(2 * pair) + square(2 * pair + 1)

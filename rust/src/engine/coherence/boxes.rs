@@ -119,7 +119,7 @@ fn found(limit: i32, apart: impl Fn(usize, usize) -> i32) -> Found {
 }
 
 /// The same in the registers that nearly every x86-64 has.
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 pub(super) mod v3 {
     use std::arch::x86_64::__m256i;
 

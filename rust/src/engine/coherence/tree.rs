@@ -3,7 +3,7 @@
 use super::boxes::{Boxes, WIDTH, extent, pairs};
 use super::{FEW, apart, boxes};
 use crate::foundation::par;
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 use crate::foundation::wide::V3;
 
 /// Vectors of a leaf: as many blocks as a node has children.
@@ -88,7 +88,7 @@ impl<const D: usize, const N: usize> Tree<D, N> {
         allowed: impl Fn([i32; D]) -> bool,
     ) -> Nearest {
         // Measured: twice as fast as with the baseline instructions.
-        #[cfg(target_arch = "x86_64")]
+        #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
         if let Some(simd) = V3::try_new() {
             return simd.vectorize(
                 #[inline(always)]

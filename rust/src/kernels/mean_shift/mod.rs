@@ -13,7 +13,7 @@ use crate::foundation::error::check_shape;
 use crate::foundation::grid::Grid;
 use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 use crate::foundation::wide::{V3, wide_fn};
 use crate::{Error, Result};
 use window::{Planes, Sums, window, window_any};
@@ -126,7 +126,7 @@ fn step(
 
 /// The pixels of a row, by the fastest way to sum a window on this CPU.
 fn filter_row(planes: &Planes, options: &Options, channels: usize, row: usize, out: &mut [f32]) {
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
     if let Some(simd) = V3::try_new() {
         match channels {
             1 => return climb_wide::<1>(simd, planes, options, row, out),
@@ -143,7 +143,7 @@ fn filter_row(planes: &Planes, options: &Options, channels: usize, row: usize, o
     }
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 wide_fn! {
     /// [`climb`] with windows that are summed in wide registers.
     fn climb_wide<const C: usize>(simd: V3, planes: &Planes, options: &Options, row: usize, out: &mut [f32]) {

@@ -217,7 +217,7 @@ fn fold(lanes: &Lanes) -> f32 {
 
 /// [`window`] in the registers that nearly every x86-64 has: the same lanes, the same operations in the same order.
 /// Measured: five times as fast as what the compiler makes of it.
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 pub(super) mod v3 {
     use std::arch::x86_64::_CMP_LE_OQ;
 

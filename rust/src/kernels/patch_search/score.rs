@@ -1,11 +1,11 @@
 //! A query made ready, and the exact score of one position.
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 use std::arch::x86_64::{__m128, __m256d};
 
 use super::Query;
-#[cfg(target_arch = "x86_64")]
 use crate::foundation::error::check_shape;
+#[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 use crate::foundation::wide::{V3, cast};
 use crate::{Error, Result};
 
@@ -189,7 +189,7 @@ impl Prepared {
         at: [usize; 2],
         bound: f64,
     ) -> f64 {
-        #[cfg(target_arch = "x86_64")]
+        #[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
         if let Some(simd) = V3::try_new() {
             // All rows in one call: of a patch that is little known they are short.
             return simd.vectorize(
@@ -262,7 +262,7 @@ fn add(lanes: &mut [f64; LANES], patch: &[f32], weight: &[f32], samples: &[f32])
 
 /// [`add`] in wide registers, the same operations in the same order. Measured: twice as fast as what the compiler makes of
 /// it.
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(feature = "portable")))]
 #[inline(always)]
 fn add_v3(simd: V3, lanes: &mut [f64; LANES], patch: &[f32], weight: &[f32], samples: &[f32]) {
     let V3 { avx, .. } = simd;
