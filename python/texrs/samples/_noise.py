@@ -61,7 +61,8 @@ def clouds(
     from scipy import fft
 
     white = rng.standard_normal(tuple(shape), dtype=np.float32)
-    spectrum = fft.rfftn(white)
+    # In double: compilers fuse products and sums for some processors, which in single precision is seen.
+    spectrum = fft.rfftn(white.astype(np.float64))
     axes = len(shape)
     square = np.zeros(spectrum.shape, np.float32)
     for axis, count in enumerate(shape):
@@ -76,7 +77,7 @@ def clouds(
     weight = np.zeros_like(square)
     weight[inside] = single(np.power, square[inside], power)
     noise = fft.irfftn(spectrum * weight, tuple(shape))
-    return np.asarray(noise / np.float32(max(float(noise.std(dtype=np.float64)), 1e-12)), np.float32)
+    return np.asarray(noise / max(float(noise.std()), 1e-12), np.float32)
 
 
 def blur(field: Floats, sigma: float) -> Floats:
