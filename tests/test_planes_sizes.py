@@ -46,9 +46,10 @@ def test_a_plane_is_one(slant: float, tilt: float) -> None:
 
 
 def test_few_things_that_differ_by_chance_are_no_curve() -> None:
-    found = planes.measure(look("bricks", Plane((256, 320), 0, 90)))
-    assert found.shape == "even"
-    assert found.confidence < SURE
+    for seed in (0, 1):
+        found = planes.measure(look("bricks", Plane((256, 320), 0, 90), seed=seed))
+        assert found.shape in ("even", "plane")
+        assert np.abs(found.scale - 1).max() < 0.05
     slope = np.linspace(-0.5, 0.5, 200)
     assert weigh_bands([slope, slope, slope]) == 1
     assert weigh_bands([0.5 * slope, 0.7 * slope, slope]) < 0.4

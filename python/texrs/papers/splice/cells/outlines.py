@@ -122,7 +122,7 @@ def _match_from(goal: NDArray[np.float32], fine: NDArray[np.float32], start: int
                 np.copyto(back[i - 1, to], np.int8(k), where=shorter)
         if i < points:
             away = fine[:, FINE * i : FINE * i + wide] - goal[:, i, None]
-            least += np.einsum("cwn,cwn->wn", away, away)
+            least += (away * away).sum(axis=0)
         total = least
     at = np.full(count, APART)
     rows = np.arange(count)
@@ -149,7 +149,7 @@ def interpolate(at: Polygons, outline: Polygons, values: Polygons) -> NDArray[np
 
     """
     away = (outline[:, None] - at[:, :, None]).astype(np.float32)
-    length = np.hypot(away[..., 0], away[..., 1]) + np.float32(1e-4)
+    length = np.sqrt(away[..., 0] ** 2 + away[..., 1] ** 2) + np.float32(1e-4)
     after, length_after = np.roll(away, -1, axis=2), np.roll(length, -1, axis=2)
     cross = away[..., 0] * after[..., 1] - away[..., 1] * after[..., 0]
     dot = away[..., 0] * after[..., 0] + away[..., 1] * after[..., 1]
@@ -158,4 +158,6 @@ def interpolate(at: Polygons, outline: Polygons, values: Polygons) -> NDArray[np
     weight = (np.roll(seen, 1, axis=2) + seen) / length
     total = weight.sum(axis=2, keepdims=True)
     weight /= np.where(np.abs(total) > 1e-12, total, 1)
-    return np.asarray(weight @ values.astype(np.float32), np.float32)
+    # Not as a product of matrices, whose sums go in another order on another processor.
+    few = values.astype(np.float32)[:, None]
+    return np.stack([(weight * few[..., k]).sum(axis=2) for k in range(2)], axis=-1)
