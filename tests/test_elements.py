@@ -10,9 +10,10 @@ import pytest
 import texrs
 from element_checks import passes, score
 from texrs import elements, samples
+from texrs._arrays import to_lab
 from texrs.elements import Elements, ElementSearch, Layout, _proposal, analyse
 from texrs.elements._consensus import extend_mask
-from texrs.elements._mask import cut_foreground, to_lab
+from texrs.elements._mask import cut_foreground
 from texrs.elements._mixture import Mixture
 from texrs.elements._search import Detections, Template, threshold_otsu
 from texrs.elements._separation import reconcile
@@ -436,7 +437,7 @@ def lay_tiles(shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
 def test_a_proposed_layout_is_jointed_where_the_picture_falls_into_cells() -> None:
     image, middles = lay_tiles((192, 192))
     away = _proposal.measure_distance((192, 192), middles, (41, 41), (False, False))
-    thing, _ = _proposal.compare_things(_proposal.to_lab(image), away, middles)
+    thing, _ = _proposal.compare_things(to_lab(image), away, middles)
     assert thing >= _proposal.THING
     layout, sure = _proposal._choose_layout(image, away, middles, None)
     assert layout != Layout.DISJOINT

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from texrs import samples
+from texrs._arrays import to_lab
 from texrs._rust import set_threads
 from texrs.errors import InvalidInput
 from texrs.exemplar import ElementOptions, segment
 from texrs.exemplar.components import fill_crescents, find_elements
-from texrs.exemplar.evidence import measure_creases, to_lab
+from texrs.exemplar.evidence import measure_creases
 from texrs.exemplar.regularity import Lattice, find_lattice, measure_direction, measure_polarity
 from texrs.exemplar.shapes import Shapes, measure_solidity
 

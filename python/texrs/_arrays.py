@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike
+from numpy.typing import ArrayLike, DTypeLike
 
 from texrs._checks import (
     MAX_PIXELS,
@@ -63,8 +63,10 @@ __all__ = [
     "check_work",
     "exp_single",
     "guidance",
+    "hypot_single",
     "log_single",
     "power_single",
+    "to_lab",
     "to_unit",
     "try_array",
 ]
@@ -275,6 +277,13 @@ def as_rgb(unit: Floats) -> Floats:
     return unit[..., :3] if unit.shape[-1] >= 3 else np.repeat(unit[..., :1], 3, axis=-1)
 
 
+def to_lab(unit: Floats) -> Floats:
+    """Return CIE Lab / 100 of colours, so that a just visible difference is about 0.02; of the same bits on any processor."""
+    from skimage.color import rgb2lab
+
+    return np.asarray(rgb2lab(as_rgb(unit).astype(np.float64)) / 100, np.float32)
+
+
 def as_mask(value: object, name: str, shape: Sequence[int | str]) -> Bools:
     """Check a mask, bool or integers of which zero means False, and return a copy (see `as_array`).
 
@@ -299,6 +308,11 @@ def log_single(values: Array) -> Floats:
 def exp_single(values: Array) -> Floats:
     """Return exponentials in single precision, of the same bits on any processor."""
     return np.exp(values, dtype=np.float64).astype(np.float32)
+
+
+def hypot_single(rows: ArrayLike, columns: ArrayLike) -> Floats:
+    """Return lengths of vectors in single precision, of the same bits on any processor."""
+    return np.asarray(np.hypot(rows, columns, dtype=np.float64), np.float32)
 
 
 def power_single(values: Array, exponent: float) -> Floats:

@@ -120,6 +120,16 @@ def splice_jointed_elements() -> Parts:
 
 
 @case
+def splice_of_cells() -> Parts:
+    target = entry("pebbles", 128, 128, seed=1)
+    parts: dict[str, object] = {}
+    for name, size in (("net", (112, 128)), ("bricks", (128, 128))):
+        found = parts_of(texrs.splice(entry(name, 128, 128), target, size, seed=1), report=("cells",))
+        parts |= {f"{name} {part}": value for part, value in found.items()}
+    return parts
+
+
+@case
 def splice_as_printed() -> Parts:
     parts: dict[str, object] = {}
     for name in ("dots", "net", "bricks"):
@@ -192,8 +202,11 @@ def self_splice_in_another_size() -> Parts:
 @case
 def segments() -> Parts:
     parts: dict[str, object] = {}
-    for name, options in SEGMENTED.items():
-        found = segment(colour(name, 96, 96), options)
+    pictures = {name: colour(name, 96, 96) for name in SEGMENTED}
+    # Of few colours, among which much ties.
+    pictures["few colours"] = colour("pebbles", 64, 64) & 0xE0
+    for name, picture in pictures.items():
+        found = segment(picture, SEGMENTED.get(name, ElementOptions()))
         parts |= {
             f"{name} layers": found.layers,
             f"{name} elements": found.elements,

@@ -7,6 +7,7 @@ import numpy as np
 import texrs
 from texrs import scale_maps
 from texrs.blending import blend
+from texrs.kernels import warp
 from truth.exemplars import box, channels, clear, colour, deep, floats, grey, normals, sample
 from truth.table import Parts, case, parts_of, rounded
 
@@ -97,7 +98,7 @@ def scale_maps_measured() -> Parts:
         "known": scale_maps.from_mask(floor.mask, window=40, known=known),
         "area": scale_maps.from_mask(mask, measure="area"),
     }
-    return {"mask": mask, **{name: rounded(scale) for name, scale in measured.items()}}
+    return {"mask": mask, "picture": scale_maps.picture(floor.scale_map), **measured}
 
 
 @case
@@ -253,3 +254,11 @@ def source_maps() -> Parts:
         "composed frame": tiled.frame_array(),
         "reuse": [reuse.verbatim, reuse.largest, reuse.regions],
     }
+
+
+@case
+def warped_by_points() -> Parts:
+    source = np.array([[r, c] for r in (0, 30, 63) for c in (0, 40, 79)])
+    target = source + np.random.default_rng(2).integers(-9, 10, source.shape) * (source % 9 > 0)
+    found = warp.from_points(source, target, (64, 80))
+    return {"coordinates": found.coordinates, "triangle": found.triangle, "frames": found.frames}

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_image, check_work, guidance
+from texrs._arrays import as_image, check_work, guidance, to_lab
 from texrs._progress import answering, listen
 from texrs._typing import Array, Bools, Floats, Progress
 from texrs.elements import _mask
@@ -244,7 +244,7 @@ def _extend(
     if said or how.literal or start.layout != Layout.DISJOINT or not len(parted.points):
         return start, parted
     sure = parted.made_by == "cut"
-    found = extend_mask(_mask.to_lab(guide), parted.mask, parted.points, start.box.size, how.wrap, sure=sure)
+    found = extend_mask(to_lab(guide), parted.mask, parted.points, start.box.size, how.wrap, sure=sure)
     if found is None:
         return start, parted
     points = np.clip(found.points, 0, np.array(found.mask.shape) - 1)
@@ -255,7 +255,7 @@ def _extend(
 def _cut(guide: Floats, given: Arguments, start: Start, found: Detections, how: Settings) -> Bools:
     """Cut the foreground out by its colours (section 3.3)."""
     mask = _mask.cut_foreground(
-        _mask.to_lab(guide),
+        to_lab(guide),
         np.concatenate([[start.box.centre], found.pixels]),
         start.box.size,
         np.zeros(guide.shape[:2], bool) if start.background is None else start.background,

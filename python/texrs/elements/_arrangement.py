@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_image, guidance
+from texrs._arrays import as_image, guidance, to_lab
 from texrs._typing import Array, Bools
 from texrs.elements._layout import Layout, as_layout
-from texrs.elements._mask import to_lab
 from texrs.point_sets import find_courses, find_lattice, spacing
 
 __all__ = ["Arrangement", "describe_arrangement"]

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from texrs._arrays import to_lab
 from texrs._typing import Floats
 from texrs.elements._arguments import LEAST, Box
-from texrs.elements._mask import round_to_odd, to_lab
+from texrs.elements._mask import round_to_odd
 from texrs.elements._separation import rank_pieces
 from texrs.exemplar.regularity import find_lattice
 from texrs.exemplar.segmentation import ElementOptions, segment

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import to_lab
 from texrs._typing import Bools, Floats, Labels, Progress
 from texrs.elements._arguments import LEAST, Arguments, Box, as_box
 from texrs.elements._layout import Layout
-from texrs.elements._mask import to_lab
 from texrs.elements._proposal import CELLS, THING, Start, compare_things, measure_distance, shrink
 from texrs.elements._search import Detections
 from texrs.elements._separation import Separation, find_nearest_pixels

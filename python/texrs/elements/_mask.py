@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_rgb
+from texrs._arrays import exp_single
 from texrs._engine.noise import uniform
 from texrs._typing import Bools, Floats
 from texrs.elements._layout import Layout
@@ -34,13 +34,6 @@ WHOLE = 0.35
 """Distance from the border, as a share of the box, from which on what was found is taken as an example."""
 ALIKE = 0.3
 """Share of what may be a net, those colours least like the background, that it is learnt from."""
-
-
-def to_lab(guide: Floats) -> Floats:
-    """Return Lab / 100, so that a just visible difference is about 0.02."""
-    from skimage.color import rgb2lab
-
-    return np.asarray(rgb2lab(as_rgb(guide)) / 100, np.float32)
 
 
 def ellipse(box: tuple[int, int], share: float = 1.0) -> Bools:
@@ -212,7 +205,7 @@ def _measure_smoothness_costs(colours: Floats, wrap: Wrap, model: Model) -> Sequ
     mean = float(np.concatenate([s.ravel() for s in inner]).mean(dtype=np.float64))
     scale = 1 / max(2 * mean, 1e-12) if model == "mixture" else 255**2 / 2
     strength = SMOOTH if model == "mixture" else 1.0
-    return [(strength * np.exp(-s * scale)).astype(np.float32) for s in squares]
+    return [np.float32(strength) * exp_single(-s * scale) for s in squares]
 
 
 def tidy_mask(mask: Bools, area: float, *, net: bool = False) -> Bools:

@@ -16,12 +16,13 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import hypot_single, to_lab
 from texrs._progress import answering
 from texrs._typing import Bools, Floats
 from texrs.elements._arguments import LEAST, Arguments, Box, as_box
 from texrs.elements._boxes import propose_boxes, resize_box
 from texrs.elements._layout import Layout
-from texrs.elements._mask import disc, round_to_odd, to_lab
+from texrs.elements._mask import disc, round_to_odd
 from texrs.elements._search import Detections, describe_appearance, search_similar
 from texrs.elements._separation import find_nearest_pixels, label_components
 from texrs.errors import InvalidInput
@@ -255,7 +256,7 @@ def _measure_closure(window: Floats, centre: NDArray[np.float64], size: tuple[in
     away = np.maximum(np.hypot(y[:, np.newaxis], x), 1e-6)
     # In units of the box, in which an oblong thing is round.
     slope = rows * size[0], columns * size[1]
-    total = np.hypot(*slope) * (away < WIDE)
+    total = hypot_single(*slope) * (away < WIDE)
     outward = (slope[0] * y[:, np.newaxis] + slope[1] * x) / away * (away < WIDE)
     change = float(total.sum())
     if change < 1e-9:

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from texrs._arrays import to_lab
 from texrs._typing import Floats, Labels
 from texrs.exemplar.components import find_elements
-from texrs.exemplar.evidence import Evidence, measure_contrast, measure_creases, to_lab, weigh_evidence
+from texrs.exemplar.evidence import Evidence, measure_contrast, measure_creases, weigh_evidence
 from texrs.exemplar.layers import Regions, mark_smooth
 
 __all__ = ["USUAL_LAYERS", "Features", "find_foreground"]

@@ -15,13 +15,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float, as_image, as_rgb, guidance
+from texrs._arrays import as_float, as_image, guidance, to_lab
 from texrs._progress import ask
 from texrs._show import brief
 from texrs._typing import Array, Bools, Floats, Labels, Progress
 from texrs.errors import InvalidInput
 from texrs.exemplar.contours import measure_moments, trace
-from texrs.exemplar.evidence import to_lab
 from texrs.exemplar.merging import join_parts, measure_usual_area
 from texrs.exemplar.shapes import Shapes, mark_outlines, widen
 
@@ -174,7 +173,7 @@ def find_cells(
 
     """
     pixels = as_image(image, "image", minimum=16)
-    lab = to_lab(as_rgb(guidance(pixels)))
+    lab = to_lab(guidance(pixels))
     light = lab[..., 0]
     if joints is not None:
         joints = np.asarray(joints)
@@ -229,7 +228,7 @@ def take_cells(labels: Labels, image: object) -> Cells:
     joint = (labels == 0) | mark_outlines(full)
     outlines = trace(full, np.arange(1, int(full.max()) + 1))
     moments = measure_moments(outlines)
-    relief, light = joint.astype(np.float32), to_lab(as_rgb(guidance(as_image(image))))[..., 0]
+    relief, light = joint.astype(np.float32), to_lab(guidance(as_image(image)))[..., 0]
     sure, polarity = np.ones(len(outlines)), _compare(light, relief)
     whole = _mark_whole(full)
     return Cells(full, outlines, moments.centre, moments.area, moments.angle, whole, sure, relief, 1.0, polarity)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from texrs._arrays import log_single
 from texrs._typing import Bools, Floats, Labels
 from texrs.exemplar.merging import join_least_parted
 from texrs.exemplar.shapes import Shapes, list_borders, narrow, renumber, widen
@@ -92,7 +93,7 @@ def split_touching(mask: Bools, crease: Floats) -> Labels:
     distance = ndimage.distance_transform_edt(free)[margin:-margin, margin:-margin]
     distance = ndimage.gaussian_filter(distance.astype(np.float32), 1.0)
     # Of logarithms, so that a neck is measured by the width of what it joins.
-    height = np.log(np.maximum(distance, 0.5))
+    height = log_single(np.maximum(distance, 0.5))
     tops = local_maxima(reconstruct(height - np.float32(np.log(NECK)), height)) & mask
     seeds, count = ndimage.label(tops, SQUARE)
     parts = watershed(-distance, seeds, mask=mask).astype(np.int32)

@@ -6,22 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from texrs._arrays import hypot_single
 from texrs._typing import Bools, Floats, Labels
 from texrs.exemplar.shapes import mark_outlines, measure_solidity, widen
 
-__all__ = ["Evidence", "measure_contrast", "measure_creases", "to_lab", "weigh_evidence"]
+__all__ = ["Evidence", "measure_contrast", "measure_creases", "weigh_evidence"]
 
 CREASE = 1.5
 """Standard deviation in pixels of the Gaussian under which creases are looked for."""
 CONTRAST, CLEAR = 2.0, 2
 """Standard deviation of the Gaussian under which contrasts are looked for, and how far inside is away from an outline."""
-
-
-def to_lab(rgb: Floats) -> Floats:
-    """Return CIE Lab, its lightness in 0..1."""
-    from skimage.color import rgb2lab
-
-    return np.asarray(rgb2lab(rgb), np.float32) / np.float32(100)
 
 
 def measure_creases(lab: Floats) -> Floats:
@@ -30,7 +24,7 @@ def measure_creases(lab: Floats) -> Floats:
 
     light = lab[..., 0]
     rows, columns, mixed = (gaussian_filter(light, CREASE, order=o) for o in ((2, 0), (0, 2), (1, 1)))
-    largest = (rows + columns) / 2 + np.hypot((rows - columns) / 2, mixed)
+    largest = (rows + columns) / 2 + hypot_single((rows - columns) / 2, mixed)
     return np.asarray(np.maximum(largest, 0) * CREASE**2, np.float32)
 
 

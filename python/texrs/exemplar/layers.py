@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import log_single, to_lab
 from texrs._typing import Bools, Floats, Labels
 from texrs.exemplar.shapes import widen
 from texrs.kernels.mean_shift import mean_shift
@@ -43,14 +44,12 @@ class Regions:
     @classmethod
     def of(cls, rgb: Floats, watch: Callable[[], object] = int) -> Regions:
         """Filter an image, and merge what is alike; ``watch`` is called along the way."""
-        from skimage.color import rgb2lab
-
         filtered: Floats = mean_shift(rgb, SPATIAL_RADIUS, RANGE_RADIUS, progress=lambda stage, share: watch())
         watch()
         region = merge(filtered, MERGE_SCALE, blur=MERGE_BLUR, least=MERGE_MINIMUM)
         watch()
         area = np.bincount(region.ravel()).astype(np.float64)
-        lab = rgb2lab(filtered).reshape(-1, 3)
+        lab = 100 * to_lab(filtered).reshape(-1, 3)
         colour = np.stack([np.bincount(region.ravel(), lab[:, c]) / area for c in range(3)], axis=-1)
         return cls(region, area, colour)
 
@@ -96,7 +95,7 @@ def mark_smooth(rgb: Floats) -> Bools | None:
 
     light = rgb.mean(axis=-1)
     fine = np.abs(light - gaussian_filter(light, FINE))
-    amount = np.log((gaussian_filter(fine, AROUND) + 1e-3) / (gaussian_filter(light, AROUND) + 0.02))
+    amount = log_single((gaussian_filter(fine, AROUND) + 1e-3) / (gaussian_filter(light, AROUND) + 0.02))
     if np.ptp(amount) < 1e-6:
         return None
     smooth = amount < threshold_otsu(amount)

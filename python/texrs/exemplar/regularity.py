@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_float, as_int, as_tuple, as_wrap
+from texrs._arrays import as_float, as_int, as_tuple, as_wrap, hypot_single
 from texrs._progress import ask
 from texrs._show import brief
 from texrs._typing import Floats
@@ -164,7 +164,8 @@ class Lattice:
         nearest = np.where(cyclic, vectors @ np.rint(np.linalg.solve(vectors, sides)), sides)
         if abs(np.linalg.det(nearest)) < 0.5 * abs(np.linalg.det(sides)):
             return None
-        turned = np.rint(sides @ np.linalg.inv(nearest) * FRACTIONS) / FRACTIONS
+        # Without a negative zero.
+        turned = np.rint(sides @ np.linalg.inv(nearest) * FRACTIONS) / FRACTIONS + 0.0
         return turned if np.abs(turned - np.eye(2)).max() <= BENT else None
 
 
@@ -178,7 +179,7 @@ def find_lattice(guide: Floats) -> Lattice | None:
     if light.std() < 1e-4:
         return None
     rows, columns = np.gradient(gaussian_filter(light, 1.0))
-    edges = np.hypot(rows, columns)
+    edges = hypot_single(rows, columns)
     found = []
     for picture in (light, np.minimum(edges, np.quantile(edges, 0.95))):
         ask()
@@ -203,7 +204,9 @@ def correlate(picture: Floats) -> Floats:
     height, width = picture.shape
     flat = gaussian_filter(picture, 1.0) - uniform_filter(picture, min(picture.shape) // 2)
     size = tuple(next_fast_len(2 * n, real=True) for n in picture.shape)
-    product = irfft2(np.abs(rfft2(flat, size)) ** 2, size)
+    # In double precision: in single, transforms end in other bits on other processors.
+    spectrum = rfft2(flat.astype(np.float64), size)
+    product = irfft2(spectrum.real**2 + spectrum.imag**2, size)
     rows, columns = (int(REACH * n) for n in picture.shape)
     near = np.roll(product, (rows, columns), (0, 1))[: 2 * rows + 1, : 2 * columns + 1]
     shift = np.abs(np.arange(-rows, rows + 1)), np.abs(np.arange(-columns, columns + 1))

@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import log_single
+from texrs._arrays import hypot_single, log_single
 from texrs._engine.pyramid import ONE
 from texrs._engine.stitcher import Stitcher
 from texrs._typing import Array, Bools, Floats
@@ -357,7 +357,7 @@ class Copies(Sheet):
         """Return a share of the exemplar; less where the map changes by much within that."""
         logs = log_single(target)
         down, right = (np.gradient(logs, axis=k) if n > 1 else np.zeros_like(logs) for k, n in enumerate(logs.shape))
-        steep = np.hypot(down, right)
+        steep = hypot_single(down, right)
         return min(COPIED * float(np.sqrt(np.prod(self.shape))), VARIES / max(float(np.quantile(steep, 0.75)), 1e-6))
 
     def frames(

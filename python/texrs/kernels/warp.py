@@ -194,7 +194,11 @@ def from_points(
     frames[0] = np.eye(2)
     edges = [(p[:, 1:] - p[:, :1]).transpose(0, 2, 1) for p in (before, after)]
     sound = np.abs(np.linalg.det(edges[1])) > 1e-9  # The others are not drawn.
-    frames[1:][sound] = edges[0][sound] @ np.linalg.inv(edges[1][sound])
+    # By sums of two products: the last bits of inverses and of matrix products hang on the processor.
+    (a, b), (c, d) = np.moveaxis(edges[1][sound], 0, -1)
+    inverse = np.moveaxis(np.array([[d, -b], [-c, a]]) / (a * d - b * c), -1, 0)
+    drawn = edges[0][sound]
+    frames[1:][sound] = drawn[..., :1] * inverse[:, :1] + drawn[..., 1:] * inverse[:, 1:]
     triangle = triangle.reshape(out)
     return Triangles(_fill_holes(found.reshape(*out, 2), triangle > 0, sides), triangle, frames)
 

@@ -181,7 +181,7 @@ class _Plane:
         """Return the scale at every pixel, (H, W)."""
         _, w = self._offset(self.pixels())
         (a, b), (c, d) = self.stretch
-        return np.asarray(w**1.5 / sqrt(a * d - b * c))
+        return np.asarray(w * np.sqrt(w) / sqrt(a * d - b * c))
 
     def jacobian(self) -> NDArray[np.float64]:
         """Return dS/dp at every pixel, (H, W, 2, 2)."""

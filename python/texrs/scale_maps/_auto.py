@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from texrs._arrays import as_float, as_image, as_mask, guidance
+from texrs._arrays import as_float, as_image, as_mask, guidance, log_single
 from texrs._progress import ask
 from texrs._typing import Bools, Floats
 from texrs.errors import InvalidInput
@@ -87,7 +87,7 @@ def auto_mask(image: object, *, detail: float | None = None, trend: Trend = "pla
     for _ in range(_ROUNDS - 1):
         ask()
         mask = (centre.sample(octaves) > around.sample(octaves)) & seen
-        octaves = np.log2(_measure(mask, trend, seen))
+        octaves = log_single(_measure(mask, trend, seen)) / np.float32(np.log(2))
     lighter = centre.sample(octaves) - around.sample(octaves)
     return ((lighter if cells.cell == 1 else cells.spread(lighter)) > 0) & there
 
@@ -114,7 +114,7 @@ def take_grey(colours: Floats, known: Bools) -> Floats:
     axis = axes[:, -1] if axes[:, -1].sum() >= 0 else -axes[:, -1]
     if colours.shape[2] * float(light[known].var()) >= _LIGHT * values[-1]:
         return light
-    return np.asarray(np.einsum("hwc,c->hw", colours, axis), np.float32)
+    return np.asarray(np.einsum("hwc,c->hw", colours, axis, dtype=np.float64), np.float32)
 
 
 class _Blurs:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 from collections.abc import Callable, Mapping, Sequence
+from math import log
 from typing import Any
 
 import numpy as np
@@ -91,7 +92,7 @@ def edit(scale: object, steps: Sequence[Mapping[str, Any] | str] | str) -> Float
         except InvalidInput as error:
             raise InvalidInput(f"steps: step {number}, {operation}: {error}") from None
         # What was beyond the limits already may stay there.
-        low, high = np.minimum(logs, np.log(np.float32(_LEAST))), np.maximum(logs, np.log(np.float32(_LARGEST)))
+        low, high = np.minimum(logs, np.float32(log(_LEAST))), np.maximum(logs, np.float32(log(_LARGEST)))
         logs = np.clip(changed, low, high).astype(np.float32)
     # What no step reached is what it was, to the last bit.
     return keep_kind(np.where(logs == before, given, exp_single(logs)), find_kind(scale))

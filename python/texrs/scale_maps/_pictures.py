@@ -134,7 +134,7 @@ def picture(scale: object, largest: float | None = None) -> NDArray[np.uint8]:
     (64, 120, 3)
 
     """
-    logs: Floats = np.log2(as_map(scale))
+    logs = np.log2(as_map(scale), dtype=np.float64).astype(np.float32)
     if largest is None:
         reach = min(6.0, max(0.5, ceil(2 * float(np.abs(logs).max()) - 0.01) / 2))
     else:

@@ -87,8 +87,8 @@ class Plane:
         # What is level to nine digits is level: rounded by itself, its noise would stay.
         down = round(rise[0] / slope, 9) + 0.0, round(rise[1] / slope, 9) + 0.0
         down = down[0] / hypot(*down), down[1] / hypot(*down)
-        residual = float(np.sqrt(np.mean((np.log(surface) - logs) ** 2)))
-        # So do those of exponentials.
+        # So do those of exponentials and logarithms.
+        residual = round(float(np.sqrt(np.mean((np.log(surface) - logs) ** 2))), 9)
         least, largest = (float(f"{f:.9g}") for f in (least, largest))
         return cls(middle, at, slope, down, (-down[1], down[0]), least, largest, residual, power)
 

@@ -22,6 +22,8 @@ _POINTS = 2**14
 """A surface of at most six numbers needs no more."""
 _FEWEST = 256
 _ROUNDS = 30
+_DIGITS = 10
+"""Of a fit, after the point; where its terms are about 1."""
 _TUNING = 1.345
 """Of Huber's weights, in standard deviations: 95 % as good as least squares where nothing is amiss."""
 
@@ -109,7 +111,8 @@ def _fit_robustly(basis: NDArray[np.float64], values: NDArray[np.float64]) -> ND
         before = found
         # Sums in one order, whatever number of threads a matrix product would take.
         normal, right = np.einsum("ni,nj->ij", weighted, basis), np.einsum("ni,n->i", weighted, values)
-        found = np.linalg.lstsq(normal, right, rcond=1e-10)[0]
+        # The last bits of a least squares fit hang on the processor.
+        found = np.linalg.lstsq(normal, right, rcond=1e-10)[0].round(_DIGITS)
         away = np.abs(values - np.einsum("ni,i->n", basis, found))
         spread = 1.4826 * np.median(away)
         if spread < 1e-9 or np.abs(found - before).max() < 1e-7:

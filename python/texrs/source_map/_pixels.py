@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -137,7 +137,7 @@ class Pixels:
             at = place[band]
             coordinates[band], exemplar[band] = self.coordinates[at], self.exemplar[at]
             if rest is not None:
-                coordinates[band] += np.einsum("...ij,...j->...i", self.frames(at), rest[band])
+                coordinates[band] += turn_places(self.frames(at), rest[band])
             if frames is not None:
                 frames[band] = self.frames(at)
                 if frame is not None:
@@ -148,6 +148,11 @@ class Pixels:
             frames = self.frames_of(inner_of)
             frames = frames if frame is None else chain_frames(frames, frame[outer_of])
         return coordinates, exemplar, label, frames
+
+
+def turn_places(frames: NDArray[np.float32], places: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
+    """Return products of matrices and vectors, in double precision for the same reason as in `chain_frames`."""
+    return np.asarray(np.einsum("...ij,...j->...i", frames, places, dtype=np.float64), np.float32)
 
 
 def chain_frames(inner: NDArray[np.float32], outer: NDArray[np.float32]) -> NDArray[np.float32]:

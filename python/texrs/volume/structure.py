@@ -361,7 +361,8 @@ def _average_frequency(arrays: list[Floats], side: int) -> float:
         power = np.zeros(at.shape)
         for start in product(*(_list_starts(n, side) for n in v.shape)):
             part = v[tuple(slice(s, s + side) for s in start)]
-            power += np.abs(np.fft.rfftn((part - part.mean(dtype=np.float64)) * weights)) ** 2
+            spectrum = np.fft.rfftn((part - part.mean(dtype=np.float64)) * weights)
+            power += spectrum.real**2 + spectrum.imag**2
         power *= share
         if power.sum() > 1e-20 * part.size:
             found.append(float((power * at).sum() / power.sum()))

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from texrs._arrays import exp_single, log_single
 from texrs._typing import Bools, Floats
 from texrs.kernels.seam import binary_labels
 from texrs.source_map import SourceMap
@@ -100,7 +101,7 @@ def draw_territories(
     if ((shares == 0) | (shares == 1)).all():
         return np.asarray(np.broadcast_to(shares.argmax(axis=-1), size), np.uint16)
     with np.errstate(divide="ignore"):
-        scores = np.log(np.broadcast_to(shares, (*size, count))).astype(np.float32)
+        scores = log_single(np.broadcast_to(shares, (*size, count)))
     for which in range(count):
         scores[..., which] -= np.log(-np.log(draw_noise(size, territory, (seed, which))))
     due = np.broadcast_to(shares, (*size, count)).mean(axis=(0, 1))
@@ -178,7 +179,7 @@ def measure_ends(layer: Layer) -> NDArray[np.float32]:
         colours, depth = np.roll(layer.colours, -1, axis), np.roll(layer.depth, -1, axis)
         things = np.roll(layer.things, -1, axis)
         edge = np.abs(layer.colours - colours).sum(axis=-1)
-        ground = CREASE + (1 - CREASE) * np.exp(-edge / max(2 * float(edge.mean()), 1e-6))
+        ground = CREASE + (1 - CREASE) * exp_single(-edge / max(2 * float(edge.mean()), 1e-6))
         plain = ground + DEEP * np.minimum(layer.depth, depth)
         ends[axis, 0] = np.where(layer.things & ~things, OUTLINE, plain)
         ends[axis, 1] = np.where(things & ~layer.things, OUTLINE, plain)

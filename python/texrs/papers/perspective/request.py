@@ -9,7 +9,17 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from texrs import scale_maps
-from texrs._arrays import as_choice, as_float, as_method, as_seed, as_size, as_wrap, check_work, power_single
+from texrs._arrays import (
+    as_choice,
+    as_float,
+    as_method,
+    as_seed,
+    as_size,
+    as_wrap,
+    check_work,
+    log_single,
+    power_single,
+)
 from texrs._typing import Array, Floats, Interpolation
 from texrs.errors import InvalidInput
 from texrs.exemplar import Exemplar, as_exemplar
@@ -136,7 +146,7 @@ class Request:
         kinds = find_kind(scale) or said, find_kind(scale if target is None else target) or said
         if surface is None:
             wanted = scale_maps.resample(mine if asked is None else asked, shape)
-            check_wrap(np.log(wanted), wanted, closed, asked is None)
+            check_wrap(log_single(wanted), wanted, closed, asked is None)
         else:
             sizes = measure_sizes(surface)
             wanted, kinds = sizes.astype(np.float32), (kinds[0], "area")
@@ -203,7 +213,7 @@ def check_wrap(values: Array, target: Floats, wrap: Sequence[bool], stretched: b
         inner = float(np.abs(np.diff(values, axis=axis)).max(initial=0.0))
         across = float(np.abs(np.take(values, 0, axis) - np.take(values, -1, axis)).max())
         if across > 2 * inner + 0.02:
-            ratio = np.exp(np.abs(np.log(np.take(target, 0, axis)) - np.log(np.take(target, -1, axis))).max())
+            ratio = np.exp(np.abs(np.subtract(*log_single(np.take(target, [0, -1], axis).swapaxes(0, axis)))).max())
             name = ("rows", "columns")[axis]
             way = "give a target that repeats" if stretched else "make it repeat"
             raise InvalidInput(

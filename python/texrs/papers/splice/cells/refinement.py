@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from texrs._arrays import as_image, guidance
+from texrs._arrays import as_image, guidance, hypot_single
 from texrs._engine.pyramid import ONE, Region
 from texrs._typing import Floats, Progress
 from texrs.elements import Elements
@@ -82,7 +82,7 @@ def refine_charts(
 def _measure_least(frames: Floats) -> Floats:
     """Return the lesser singular value of matrices (..., 2, 2)."""
     (a, b), (c, d) = np.moveaxis(frames, (-2, -1), (0, 1))
-    return np.asarray(np.abs(np.hypot(a + d, b - c) - np.hypot(a - d, b + c)) / 2, np.float32)
+    return np.asarray(np.abs(hypot_single(a + d, b - c) - hypot_single(a - d, b + c)) / 2, np.float32)
 
 
 def _measure_grain(a: Elements, cells: Cells) -> float:
