@@ -13,7 +13,7 @@ from texrs import DeformationOptions, ElementOptions, elements
 from texrs.elements import Elements
 from texrs.exemplar import segment
 from truth.exemplars import clear, colour, deep, floats, sample
-from truth.table import Parts, case, parts_of, rounded
+from truth.table import Parts, case, parts_of
 
 DESIGNED = ("elements", "kind", "rotate", "shares", "holes", "operations")
 
@@ -230,14 +230,14 @@ SEGMENTED = {
 def found_in(entry: Elements) -> Parts:
     """Return what an analysis finds; similarities come of Fourier transforms."""
     return {
-        "points": rounded(entry.points),
+        "points": entry.points,
         "mask": entry.mask,
         "box": entry.box,
         "layout": entry.layout,
-        "scores": rounded(entry.scores),
-        "directions": rounded(entry.directions),
-        "angles": rounded(entry.angles),
-        "scales": rounded(entry.scales),
+        "scores": entry.scores,
+        "directions": entry.directions,
+        "angles": entry.angles,
+        "scales": entry.scales,
     }
 
 

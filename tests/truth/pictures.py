@@ -9,7 +9,7 @@ from texrs import scale_maps
 from texrs.blending import blend
 from texrs.kernels import warp
 from truth.exemplars import box, channels, clear, colour, deep, floats, grey, normals, sample
-from truth.table import Parts, case, parts_of, rounded
+from truth.table import Parts, case, parts_of
 
 # --- Samples ---------------------------------------------------------------------------------------------------------
 
@@ -126,7 +126,7 @@ def scale_maps_edited() -> Parts:
         "filled": scale_maps.extend(edited, ~box((96, 112), (20, 60), (30, 90))),
     }
     seen = {"grey": scale_maps.encode(edited), "picture": scale_maps.picture(edited, 4)}
-    return {name: rounded(scale) for name, scale in maps.items()} | seen
+    return maps | seen
 
 
 # --- tile and complete -----------------------------------------------------------------------------------------------

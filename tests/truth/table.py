@@ -47,11 +47,6 @@ def parts_of(result: Synthesis, *, report: Sequence[str] = (), stages: Sequence[
     }
 
 
-def rounded(values: Any) -> np.ndarray:
-    """Return floats as whole numbers of 1e-4."""
-    return np.rint(np.asarray(values, np.float64) * 1e4).astype(np.int64)
-
-
 def witness(parts: Parts) -> dict[str, str]:
     """Return the line that is stored of each part of a result."""
     return {name: line(part) for name, part in parts.items()}
