@@ -101,7 +101,8 @@ impl Band<'_> {
                 let u = (py * (c[1] - a[1]) - px * (c[0] - a[0])) * scale;
                 let v = ((b[0] - a[0]) * px - (b[1] - a[1]) * py) * scale;
                 let w = 1.0 - u - v;
-                if u < SLACK || v < SLACK || w < SLACK {
+                let inside = u >= SLACK && v >= SLACK && w >= SLACK;
+                if !inside {
                     continue;
                 }
                 let at = y * self.columns + x;
@@ -158,7 +159,9 @@ impl Band<'_> {
                     u += along_u;
                     v += along_v;
                     let (u, v) = (here_u, here_v);
-                    if (u < SLACK) | (v < SLACK) | (u + v > 1.0 - SLACK) {
+                    // Not so where products overflow, and these are no numbers.
+                    let inside = (u >= SLACK) & (v >= SLACK) & (u + v <= 1.0 - SLACK);
+                    if !inside {
                         continue;
                     }
                     let at = y * self.columns + x;

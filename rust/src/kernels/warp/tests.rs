@@ -133,3 +133,13 @@ fn bad_points_are_refused() {
     assert!(refused(&[three[0], three[0], three[1]], &three).contains("same place"));
     assert!(refused(&three, &[[f64::NAN, 0.0], three[1], three[2]]).contains("finite"));
 }
+
+#[test]
+fn triangles_whose_products_overflow_are_not_drawn() {
+    let (far, wide) = (-1e300, -1e10);
+    let target = [[far, wide], [far, wide + 1.0], [5.0, 5.0], [5.0, 6.0]];
+    let found = warp([2, 2], &target, &[0; 4], [9, 9]);
+    for (place, triangle) in found.places.iter().zip(&found.triangle) {
+        assert_eq!(*triangle == 0, place[0].is_nan() || place[1].is_nan());
+    }
+}
