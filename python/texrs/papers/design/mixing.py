@@ -103,7 +103,7 @@ def draw_territories(
     with np.errstate(divide="ignore"):
         scores = log_single(np.broadcast_to(shares, (*size, count)))
     for which in range(count):
-        scores[..., which] -= np.log(-np.log(draw_noise(size, territory, (seed, which))))
+        scores[..., which] -= log_single(-log_single(draw_noise(size, territory, (seed, which))))
     due = np.broadcast_to(shares, (*size, count)).mean(axis=(0, 1))
     for _ in range(4 * ROUNDS):
         wanted = scores.argmax(axis=-1)
