@@ -120,6 +120,22 @@ def test_workers_of_a_run_that_ends_end_too_and_the_store_is_gone_on_with(files:
     assert np.array_equal(lazy.open(files / "a.zarr").compute(), texrs.PlaneTexture(WEAVE, seed=3)[0:130, 0:130])
 
 
+def test_a_worker_that_leaves_tells_nothing_of_what_is_half_made() -> None:
+    code = """
+from texrs._chunks import workers
+class Half:
+    def __del__(self):
+        raise ValueError("half made")
+workers._BUSY = True
+try:
+    workers._leave(15, None)
+finally:
+    Half()
+"""
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stdout, ran.stderr) == (1, "", "")
+
+
 def test_what_has_no_room_is_said_before_the_work(
     files: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

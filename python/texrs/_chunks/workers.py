@@ -7,6 +7,7 @@ import multiprocessing
 import os
 import pickle
 import signal
+import sys
 import threading
 import time
 import warnings
@@ -142,8 +143,9 @@ def _leave(number: int, frame: Any) -> None:
         os._exit(1)
     if not _LEAVING:
         _LEAVING = True
-        # Libraries warn of what they cannot end, as of coroutines that nobody awaits now.
+        # Libraries tell of what they cannot end: coroutines that nobody awaits now, and what was only half made.
         warnings.simplefilter("ignore")
+        sys.unraisablehook = lambda told: None
         raise SystemExit(1)
 
 
