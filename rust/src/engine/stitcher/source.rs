@@ -60,7 +60,7 @@ impl<const D: usize> Source<D> {
     /// Prepares `colours`, points of `grid` by `channels`. A cyclic axis is one along which the exemplar repeats.
     ///
     /// # Errors
-    /// Arrays of other sizes, colours that are not finite, and classes that the table lacks.
+    /// Arrays of other sizes, colours that are not finite, and classes that the table lacks or costs that it may not have.
     pub fn new(
         colours: &[f32],
         grid: Grid<D>,
@@ -80,13 +80,11 @@ impl<const D: usize> Source<D> {
                 check_shape(argument, &[n], got)?;
             }
         }
-        if !colours
-            .iter()
-            .chain(elements.depth)
-            .chain(adjacency.costs)
-            .all(|x| x.is_finite())
-        {
+        if !colours.iter().chain(elements.depth).all(|x| x.is_finite()) {
             return Err(Error::value("colours", "finite values are allowed"));
+        }
+        if !adjacency.costs.iter().all(|c| (0.0..=f32::MAX).contains(c)) {
+            return Err(Error::value("costs", "those of at least 0 are allowed"));
         }
         let classes = (adjacency.costs.len() as f64).sqrt() as usize;
         if classes * classes != adjacency.costs.len()

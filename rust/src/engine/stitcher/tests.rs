@@ -355,6 +355,7 @@ fn bad_arrays_and_options_are_refused() {
     assert!(new(&colours, 1, &[], &[f32::INFINITY; 64], &[], &[]).is_err());
     assert!(new(&colours, 1, &[], &[], &[2; 64], &[0.0; 4]).is_err());
     assert!(new(&colours, 1, &[], &[], &[1; 64], &[0.0; 3]).is_err());
+    assert!(new(&colours, 1, &[], &[], &[1; 64], &[0.0, 1.0, -1.0, 0.0]).is_err());
     let source = source([16, 16], [false; 2]);
     let region = region([9, 9], [false; 2]);
     let frames = Frames::Constant(identity());
