@@ -70,7 +70,9 @@ def _look_beyond(
 ) -> tuple[Floats, Bools]:
     """Return what the patch of each place shows a step on, and whether that is known."""
     label = filled.label[place]
-    at = filled.coordinates[place] + filled.frames[label] @ way.astype(np.float32)
+    # By a sum of two products, which is the same on all processors.
+    down, right = np.moveaxis(filled.frames[label] * way.astype(np.float32), -1, 0)
+    at = filled.coordinates[place] + (down + right)
     row, column = np.rint(at).astype(np.intp).T
     height, width = free.shape
     inside = (label > 0) & (row >= 0) & (row < height) & (column >= 0) & (column < width)

@@ -118,7 +118,8 @@ def _compare(
     """Return how much each target's profile differs from each cell's, at the best turn, and which turn that is."""
     flat = turned.reshape(-1, RAYS)
     own = (theirs**2).mean(axis=1)[:, None]
-    square = own + (flat**2).mean(axis=1) - 2 * theirs @ flat.T / RAYS
+    # Cells that are alike must be so to the last bit, which in products of matrices hangs on the processor and the place.
+    square = (own + (flat**2).mean(axis=1) - 2 * theirs @ flat.T / RAYS).round(9)
     cost = np.sqrt(np.maximum(square, 0) / own).reshape(len(theirs), *turned.shape[:2]) + TURN * np.abs(angles) / 90
     which = cost.argmin(axis=2)
     return np.take_along_axis(cost, which[..., None], axis=2)[..., 0], which
