@@ -426,7 +426,7 @@ def test_short_tasks_of_a_cluster_are_handed_out_together(client: Client) -> Non
 
 def test_a_cluster_blames_no_task_that_waits_behind_the_one_that_ends_its_worker() -> None:
     with (
-        dask.config.set({"distributed.scheduler.allowed-failures": 3}),
+        dask.config.set({"distributed.scheduler.allowed-failures": 1}),
         LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster,
         Client(cluster, set_as_default=False) as alone,
     ):

@@ -255,10 +255,8 @@ def test_classes_stay_classes_and_progress_can_stop() -> None:
 
 def test_shares_of_classes_are_those_of_the_exemplar() -> None:
     exemplar = samples.particles().image
-    shares = [
-        volume.compare(exemplar, texrs.SolidTexture(exemplar, seed=s)[0:64, 0:64, 0:64]).relative_shares for s in (1, 2)
-    ]
-    assert (np.abs(np.mean(shares, axis=0) - 1) < 0.25).all()
+    shares = volume.compare(exemplar, texrs.SolidTexture(exemplar, seed=1)[0:64, 0:64, 0:64]).relative_shares
+    assert (np.abs(shares - 1) < 0.25).all()
 
 
 def test_a_point_alone_is_looked_up_without_axes():

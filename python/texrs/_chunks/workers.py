@@ -125,13 +125,18 @@ def _begin(payload: bytes, count: int, stop: Any, most: dict[str, Any]) -> None:
 
 def _heed(stop: Any) -> None:
     """Wait for word to stop, or for the end of who started this process: nobody else would end it then."""
+    told = False
     with suppress(EOFError, OSError):
         stop.recv_bytes()
+        told = True
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGTERM)
     else:
         _thread.interrupt_main(signal.SIGTERM)
-    time.sleep(GRACE)
+    late = time.monotonic() + GRACE
+    # Who said it also ends this process, when it has cleared up.
+    while time.monotonic() < late and (told or _BUSY):
+        time.sleep(0.01)
     os._exit(1)
 
 
