@@ -1,7 +1,8 @@
 """What all tests share."""
 
 import functools
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -39,6 +40,14 @@ def draw_once(make: Callable[..., samples.Sample]) -> Callable[..., samples.Samp
 for name, generator in samples._GENERATORS.items():
     samples._GENERATORS[name] = draw_once(generator)
     setattr(samples, name, samples._GENERATORS[name])
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _no_waiting_for_a_disk() -> Iterator[None]:
+    """Sync nothing in this process: on a slow disk tests would take minutes longer. In what order is tested by itself."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda number: None)
+        yield
 
 
 @pytest.fixture
