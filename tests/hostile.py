@@ -12,6 +12,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from decimal import Decimal
+from enum import Enum
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
@@ -149,6 +150,27 @@ def list_hostile(valid: object) -> Iterator[object]:
 
 # --- calls that are right ----------------------------------------------------------------------------------------------
 
+SOLID = "texrs.SolidTexture(texrs.samples.stripes((32, 32, 32)).image, quality='fast')"
+TILES = "texrs.TileSet(texrs.samples.pebbles((96, 96)).image, 32)"
+MAPS = "texrs.Material({'albedo': texrs.samples.stripes((32, 32, 32)).image}, axes=3)"
+EXAMPLES = {
+    "texrs.SolidTexture.window": f"{SOLID}.window((-3, 4, 5), (6, 7, 8))",
+    "texrs.SolidTexture.estimate_memory": f"{SOLID}.estimate_memory(64)",
+    "texrs.SolidTexture.sample": f"{SOLID}.sample([[3, 4, 5.5]])",
+    "texrs.SolidTexture.sample_maps": f"texrs.SolidTexture({MAPS}, quality='fast').sample_maps([[3, 4, 5.5]])",
+    "texrs.SolidTexture.trace": f"{SOLID}.trace([[3, 4, 5.5]])",
+    "texrs.SolidTexture.read_part": f"{SOLID}.read_part((-3, 4, 5), (6, 7, 8))",
+    "texrs.SolidTexture.to_dask": f"{SOLID}.to_dask((6, 7, 8), 16, origin=(-3, 4, 5))",
+    "texrs.SolidTexture.to_zarr": f"{SOLID}.to_zarr('solid.zarr', (6, 7, 8), 16, origin=(-3, 4, 5))",
+    "texrs.SolidTexture.to_file": f"{SOLID}.to_file('solid.npy', (6, 7, 8), 16, origin=(-3, 4, 5))",
+    "texrs.TileSet.to_dask": f"{TILES}.to_dask((40, 50), 32, origin=(-3, 5))",
+    "texrs.TileSet.to_zarr": f"{TILES}.to_zarr('tiles.zarr', (40, 50), 32, origin=(-3, 5))",
+    "texrs.TileSet.to_file": f"{TILES}.to_file('tiles.npy', (40, 50), 32, origin=(-3, 5))",
+    "texrs.Material.get": f"{MAPS}.get('height', None)",
+    "texrs.exemplar.Analysis": "texrs.exemplar.Analysis(texrs.Exemplar(texrs.samples.dots((32, 32)).image).analyse().levels)",
+}
+"""Calls of methods that classes share, where the documentation's examples call them of another class."""
+
 
 def public_modules() -> list[ModuleType]:
     """Return all modules that are public."""
@@ -174,8 +196,8 @@ def public_calls() -> dict[str, tuple[Callable[..., Any], Callable[..., Any]]]:
             if inspect.isfunction(thing):
                 found[full] = thing, inspect.unwrap(thing)
             elif inspect.isclass(thing):
-                if inspect.isfunction(vars(thing).get("__init__")):
-                    found[full] = thing, vars(thing)["__init__"]
+                if inspect.isfunction(thing.__init__) and not issubclass(thing, Enum):
+                    found[full] = thing, thing.__init__
                 for method, value in inspect.getmembers(thing):
                     own = inspect.getattr_static(thing, method)
                     if method.startswith("_") or not inspect.isroutine(value) or not inspect.isroutine(own):
@@ -246,7 +268,7 @@ class Call:
 
 
 def record(name: str, place: Path) -> Call | None:
-    """Run the examples of a function, and return their last call of it; None where there is none."""
+    """Run the examples of a function, and return their last call of it; None where it takes nothing that could be wrong."""
     thing, function = public_calls()[name]
     found: dict[str, Any] = {}
     # Those of a method may stand where its class is described.
@@ -260,8 +282,11 @@ def record(name: str, place: Path) -> Call | None:
                 found.clear()
                 found.update(frame.f_locals)
 
+    if not set(inspect.signature(thing).parameters) - {"self"}:
+        return None
     space: dict[str, Any] = {**function.__globals__, "__name__": "__main__"}
-    for text in (inspect.getdoc(thing), inspect.getdoc(owner) if owner is not None else None):
+    own = f">>> import numpy, texrs\n>>> made = {EXAMPLES[name]}\n" if name in EXAMPLES else None
+    for text in (own, inspect.getdoc(thing), inspect.getdoc(owner) if owner is not None else None):
         with keep_folders(place), contextlib.redirect_stdout(io.StringIO()):
             for example in doctest.DocTestParser().get_examples(text or ""):
                 code = compile(example.source, "<example>", "single")
@@ -275,7 +300,7 @@ def record(name: str, place: Path) -> Call | None:
         if found:
             break
     else:
-        return None
+        raise LookupError(f"{name}: no example calls it, nor one of EXAMPLES")
     if inspect.isclass(thing):
         found.pop("self", None)
     elif "self" in found:

@@ -149,6 +149,14 @@ def test_what_has_no_room_is_said_before_the_work(
     assert sorted(files.iterdir()) == before
 
 
+def test_what_no_file_can_hold_is_said_before_the_work(files: Path) -> None:
+    tiles = texrs.TileSet(WEAVE, 32)
+    before = sorted(files.iterdir())
+    with pytest.raises(texrs.errors.FileError, match="the disk has no room for its 12884901888.00 GiB"):
+        tiles.to_file(files / "out.npy", 2**31)
+    assert sorted(files.iterdir()) == before
+
+
 def test_a_window_of_a_picture(files: Path) -> None:
     words = ["synthesize", f"{files}/weave.png", "-o", f"{files}/far.png", "--size", "40x30", "--origin"]
     assert main([*words, "1000000,-7", "-q"]) == 0

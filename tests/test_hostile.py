@@ -67,7 +67,7 @@ def try_values(name, place, count):
     """Call a function with some of the hostile values of each argument, or all; return the calls, and what came out wrong."""
     call = hostile.record(name, place)
     if call is None:
-        pytest.skip("has no example that calls it")
+        return 0, []
     calls, wrong = 0, []
     for parameter in inspect.signature(call.function).parameters.values():
         if parameter.name in SKIPPED or parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
@@ -93,11 +93,13 @@ LEFT = {
     "texrs.volume.Classes.of.image",
     "texrs.volume.Classes.shares.image",
     "texrs.Plane.project.points",
+    "texrs.Material.get.key",
     "texrs.kernels.mean_shift.mean_shift.progress",
     "texrs.kernels.regions.merge.progress",
 }
 """Arguments of which some values end otherwise: a view of two bytes as an array of eight gigabytes, whose copy ends in a
-MemoryError; and `int` as what is told of progress, whose own error goes through. None may come to it."""
+MemoryError; `int` as what is told of progress, whose own error goes through; and keys that cannot be hashed, of which all
+mappings say the same. None may come to it."""
 
 
 def list_left(name, wrong):

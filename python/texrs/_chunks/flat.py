@@ -40,6 +40,8 @@ HEADER = ".nhdr"
 """Of the file beside raw samples, which says what they are."""
 BLOCK = 2**24
 """Bytes that are written at once where a system cannot take room beforehand."""
+LARGEST = 2**63 - 1
+"""Bytes of a file, for whatever system."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,7 +214,7 @@ def fill(
         with io.atomic(_name_journal(part)) as temporary:
             temporary.write_text("\n".join([line, *map(str, sorted(done)), ""]), encoding="utf-8")
     except OSError as error:
-        if error.errno == errno.ENOSPC:
+        if error.errno in (errno.ENOSPC, errno.EFBIG):
             part.unlink(missing_ok=True)
             size = prod(shape) * dtype.itemsize / 2**30
             raise FileError(f"{target}: the disk has no room for its {size:.2f} GiB; nothing was begun") from None
@@ -289,6 +291,8 @@ def _take_room(part: FilePath, header: bytes, size: int) -> None:
     """Make a file of a header and so many bytes, which are on the disk: later nothing fails for want of room."""
     _name_journal(part).unlink(missing_ok=True)
     whole = len(header) + size
+    if whole > LARGEST:
+        raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
     with part.open("wb") as file:
         file.write(header)
         file.flush()

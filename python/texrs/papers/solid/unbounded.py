@@ -94,7 +94,18 @@ class Texture(Endless):
         return self._world.cached
 
     def clear(self) -> None:
-        """Forget what is kept."""
+        """Forget what is kept: what is looked at again is made again.
+
+        Examples
+        --------
+        >>> import texrs
+        >>> plane = texrs.PlaneTexture(texrs.samples.weave((64, 64)).image, seed=2)
+        >>> first = plane[0:20, 0:20]
+        >>> plane.clear()
+        >>> plane.cached
+        0
+
+        """
         self._world.clear()
 
     def __repr__(self) -> str:
@@ -156,6 +167,14 @@ class Texture(Endless):
             The window would take more memory than allowed.
         Cancelled
             The work was stopped.
+
+        Examples
+        --------
+        >>> import texrs
+        >>> plane = texrs.PlaneTexture(texrs.samples.weave((64, 64)).image, seed=2)
+        >>> part = plane.window((-40, 990), (20, 30))
+        >>> part.image.shape, bool((part.image == plane[-40:-20, 990:1020]).all())
+        ((20, 30, 3), True)
 
         """
         progress = listen(progress)
@@ -334,7 +353,7 @@ class Texture(Endless):
         beside = 0 if self._quality == "fast" else WORK
         return estimate_bytes(self._exemplar.pixels, region, self._field, self._quality) + beside + self._cache_bytes
 
-    def look_up(
+    def _look_up(
         self, origin: Sequence[int], size: Sequence[int], names: Sequence[str], progress: Progress | None = None
     ) -> Material:
         """Return some maps of a material in a window, without what else `window` makes."""
