@@ -167,6 +167,9 @@ EXAMPLES = {
     "texrs.TileSet.to_zarr": f"{TILES}.to_zarr('tiles.zarr', (40, 50), 32, origin=(-3, 5))",
     "texrs.TileSet.to_file": f"{TILES}.to_file('tiles.npy', (40, 50), 32, origin=(-3, 5))",
     "texrs.Material.get": f"{MAPS}.get('height', None)",
+    "texrs.Material.__contains__": f"'height' in {MAPS}",
+    "texrs.TextureDatabase.__getitem__": "texrs.TextureDatabase('base')['rock']",
+    "texrs.TextureDatabase.__contains__": "'rock' in texrs.TextureDatabase('base')",
     "texrs.exemplar.Analysis": "texrs.exemplar.Analysis(texrs.Exemplar(texrs.samples.dots((32, 32)).image).analyse().levels)",
 }
 """Calls of methods that classes share, where the documentation's examples call them of another class."""
@@ -180,6 +183,10 @@ def public_modules() -> list[ModuleType]:
         found.append(module)
         left += [m for m in (getattr(module, n) for n in module.__all__) if isinstance(m, ModuleType)]
     return sorted(found, key=lambda m: m.__name__)
+
+
+OPERATORS = ("__getitem__", "__contains__", "__call__")
+"""Methods that have no other name."""
 
 
 @cache
@@ -200,7 +207,11 @@ def public_calls() -> dict[str, tuple[Callable[..., Any], Callable[..., Any]]]:
                     found[full] = thing, thing.__init__
                 for method, value in inspect.getmembers(thing):
                     own = inspect.getattr_static(thing, method)
-                    if method.startswith("_") or not inspect.isroutine(value) or not inspect.isroutine(own):
+                    if (
+                        (method.startswith("_") and method not in OPERATORS)
+                        or not inspect.isroutine(value)
+                        or not inspect.isroutine(own)
+                    ):
                         continue
                     call = own.__func__ if isinstance(own, classmethod | staticmethod) else value
                     if inspect.isfunction(call):
