@@ -60,6 +60,9 @@ pub struct Problem<'a> {
     pub domain: Domain<'a>,
 }
 
+/// Screening that leaves nothing of a flow that `f32` could tell; more would be beyond its range.
+const STRONGEST: f64 = 1e30;
+
 /// Rows that a task takes at a time: as many as are transformed at once.
 const ROWS: usize = 2 * LANES;
 
@@ -100,6 +103,10 @@ pub fn solve(problem: &Problem<'_>, monitor: &Monitor) -> Result<Vec<f32>> {
 /// the sum of the differences to the neighbours; 0 where values are kept.
 pub fn spread(domain: &Domain<'_>, flow: &mut [f32], monitor: &Monitor) -> Result<()> {
     domain.check("flow", flow.len())?;
+    let domain = &Domain {
+        screening: domain.screening.min(STRONGEST),
+        ..*domain
+    };
     let [rows, columns, channels] = domain.shape;
     // Half of the rows, half of these and their transposed copy, or levels of a pyramid.
     memory::room("the solution", rows * columns, 12 * channels + 32)?;
