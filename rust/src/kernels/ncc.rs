@@ -10,7 +10,7 @@
 //! variance correlates with nothing, instead of dividing by zero; everything is f64 and the answer is rounded to 20
 //! bits, so that what a threshold decides hangs on no transform's last bits.
 
-use crate::foundation::fft::{Code, Complex, Images, Scratch};
+use crate::foundation::fft::{Complex, Images, Scratch};
 use crate::foundation::memory;
 use crate::foundation::par::{self, Monitor};
 use crate::{Error, Result};
@@ -48,7 +48,7 @@ impl Correlation {
         finite(image, "image")?;
         memory::room("the correlation", image.len(), 48)?;
         // Windows that lie inside the image meet nothing of what comes round, so its own size is enough.
-        let plan = Images::new(shape.map(quick), Code::Same);
+        let plan = Images::new(shape.map(quick));
         let channels = par::map(image.len() / points, |c| {
             let values = &image[c * points..][..points];
             let mean = mean(values);

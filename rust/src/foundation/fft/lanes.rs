@@ -114,7 +114,7 @@ impl FromPrimitive for Lanes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::foundation::fft::{Code, Complex, Lines};
+    use crate::foundation::fft::{Complex, Lines};
     use crate::foundation::hash::Noise;
 
     #[test]
@@ -131,12 +131,12 @@ mod tests {
                     Complex::new(part(0), part(1))
                 })
                 .collect();
-            Lines::new(len, Code::Same).forward(&mut together, &mut Vec::new());
+            Lines::new(len).forward(&mut together, &mut Vec::new());
             for line in 0..LANES {
                 let mut alone: Vec<Complex<f32>> = (0..len)
                     .map(|k| Complex::new(sample(line, k, 0), sample(line, k, 1)))
                     .collect();
-                Lines::new(len, Code::Same).forward(&mut alone, &mut Vec::new());
+                Lines::new(len).forward(&mut alone, &mut Vec::new());
                 for (a, b) in alone.iter().zip(&together) {
                     assert_eq!(a.re.to_bits(), b.re.0[line].to_bits(), "{len}");
                     assert_eq!(a.im.to_bits(), b.im.0[line].to_bits(), "{len}");

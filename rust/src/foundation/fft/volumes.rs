@@ -1,6 +1,6 @@
 //! Transforms of real volumes, by all threads; an image is a volume of one row a plane.
 
-use super::{Code, Complex, Lines, join, split};
+use super::{Complex, Lines, join, split};
 use crate::foundation::par;
 
 /// Transforms of real volumes of one size, of `f32`.
@@ -17,7 +17,7 @@ impl Volumes {
     pub(crate) fn new(size: [usize; 3]) -> Self {
         Self {
             size,
-            lines: size.map(|n| Lines::new(n, Code::Same)),
+            lines: size.map(Lines::new),
         }
     }
 

@@ -3,7 +3,7 @@
 //! An exemplar is cut into overlapping blocks whose spectra are kept (overlap-save: Oppenheim and Schafer,
 //! *Discrete-Time Signal Processing*, 8.7.3). Blocks stay in the second-level cache and are the grain of parallelism.
 
-use crate::foundation::fft::{self, Code, Complex, Images};
+use crate::foundation::fft::{self, Complex, Images};
 use crate::foundation::wide::wide_fn;
 
 /// Values multiplied at a time.
@@ -73,7 +73,7 @@ impl Plan {
             size,
             step: [size[0] - patch[0] + 1, size[1] - patch[1] + 1],
             work: best,
-            images: Images::new(size, Code::Fastest),
+            images: Images::fastest(size),
         }
     }
 

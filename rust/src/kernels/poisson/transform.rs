@@ -7,7 +7,7 @@
 use std::f64::consts::PI;
 
 use super::Edge;
-use crate::foundation::fft::{Code, Complex, LANES, Lanes, Lines, split};
+use crate::foundation::fft::{Complex, LANES, Lanes, Lines, split};
 use crate::foundation::functions::sincos;
 
 /// The transform of an axis of `len` unknowns.
@@ -58,7 +58,7 @@ impl Transform {
         Self {
             edge,
             len,
-            lines: Lines::new(size, Code::Same),
+            lines: Lines::new(size),
             twiddles,
             eigenvalues,
         }
