@@ -145,3 +145,13 @@ def test_items_that_are_stopped_have_not_failed(tmp_path: Path):
     # While it is made, and when it is.
     assert told.count(0.0) > 1
     assert told[-1] == 1.0
+
+
+def test_who_listens_outside_is_asked_from_within():
+    """A verb that is called without progress hands on what its own blocks ask."""
+    told = []
+    with answering(told.append, "outer"):
+        inner = listen(None)
+        with answering(inner, "inner", 0.5):
+            ask()
+    assert told == ["outer"]

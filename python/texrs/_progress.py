@@ -49,8 +49,11 @@ def answering(progress: Callable[..., object] | None, *place: str | float) -> It
 def ask() -> None:
     """Ask who listens, if anyone does, whether to go on; for loops of what is used by many, and knows of no progress."""
     asked = _ASKED.get()
-    if asked is None:
-        return
+    if asked is not None:
+        _tell(asked)
+
+
+def _tell(asked: Callable[[], object]) -> None:
     # What a listener does is not watched itself.
     token = _ASKED.set(None)
     try:
@@ -98,7 +101,9 @@ def listen(progress: Progress | bool | None) -> Progress | None:
 
 def _choose(progress: Progress | bool | None) -> Progress | None:
     if progress is None or progress is False:
-        return None if _ASKED.get() is None else lambda stage, share: ask()
+        # Who listens here: from within another block of `answering` nobody else would be found.
+        asked = _ASKED.get()
+        return None if asked is None else lambda stage, share: _tell(asked)
     if progress is True:
         return _make_bar() or show_lines(lambda line: print(line, file=sys.stderr, flush=True))
     if not callable(progress) or isinstance(progress, type):
