@@ -159,7 +159,6 @@ EXAMPLES = {
     "texrs.SolidTexture.sample": f"{SOLID}.sample([[3, 4, 5.5]])",
     "texrs.SolidTexture.sample_maps": f"texrs.SolidTexture({MAPS}, quality='fast').sample_maps([[3, 4, 5.5]])",
     "texrs.SolidTexture.trace": f"{SOLID}.trace([[3, 4, 5.5]])",
-    "texrs.SolidTexture.read_part": f"{SOLID}.read_part((-3, 4, 5), (6, 7, 8))",
     "texrs.SolidTexture.to_dask": f"{SOLID}.to_dask((6, 7, 8), 16, origin=(-3, 4, 5))",
     "texrs.SolidTexture.to_zarr": f"{SOLID}.to_zarr('solid.zarr', (6, 7, 8), 16, origin=(-3, 4, 5))",
     "texrs.SolidTexture.to_file": f"{SOLID}.to_file('solid.npy', (6, 7, 8), 16, origin=(-3, 4, 5))",
@@ -172,7 +171,7 @@ EXAMPLES = {
     "texrs.TextureDatabase.__contains__": "'rock' in texrs.TextureDatabase('base')",
     "texrs.exemplar.Analysis": "texrs.exemplar.Analysis(texrs.Exemplar(texrs.samples.dots((32, 32)).image).analyse().levels)",
 }
-"""Calls of methods that classes share, where the documentation's examples call them of another class."""
+"""Calls that no example of the documentation makes: most are of methods that classes share, shown of another one."""
 
 
 def public_modules() -> list[ModuleType]:

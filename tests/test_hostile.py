@@ -100,8 +100,8 @@ LEFT = {
     "texrs.kernels.regions.merge.progress",
 }
 """Arguments of which some values end otherwise: a view of two bytes as an array of eight gigabytes, whose copy ends in a
-MemoryError; `int` as what is told of progress, whose own error goes through; and keys of a material, which is
-a mapping, that are not there or cannot be hashed: a KeyError or TypeError, as of all. None may come to it."""
+MemoryError; `int` as what is told of progress, whose own error goes through; and keys of a material, which is a mapping, that
+are not there or cannot be hashed: a KeyError or TypeError, as of all. None may come to it."""
 
 
 def list_left(name, wrong):

@@ -55,7 +55,7 @@ class InParts(ABC):
     axes: ClassVar[int]
 
     @abstractmethod
-    def read_part(self, origin: int | Sequence[int], shape: int | Sequence[int]) -> Part:
+    def _read_part(self, origin: int | Sequence[int], shape: int | Sequence[int]) -> Part:
         """Check where a part begins, and that it lies within the world; return what reads it."""
 
     @share_words
@@ -104,7 +104,7 @@ class InParts(ABC):
         True
 
         """
-        part = self.read_part(origin, shape)
+        part = self._read_part(origin, shape)
         return make_dask(part.reader, shape, chunks, self.axes, part.name(map))
 
     @share_words
@@ -179,7 +179,7 @@ class InParts(ABC):
         ((100, 100, 3), 5, 5, 0)
 
         """
-        part = self.read_part(origin, shape)
+        part = self._read_part(origin, shape)
         return write_image(
             part.reader,
             shape,
@@ -262,7 +262,7 @@ class InParts(ABC):
         ((100, 90, 3), 4, True)
 
         """
-        part, grid = self.read_part(origin, shape), Grid.of(shape, chunks, self.axes)
+        part, grid = self._read_part(origin, shape), Grid.of(shape, chunks, self.axes)
         steps = check_spacing(path, spacing, self.axes)
         filled = fill(part.reader, part.name(map), grid, path, scheduler=scheduler, threads=threads, progress=progress)
         write_filled(filled, path, steps)

@@ -171,7 +171,7 @@ def write_file(
     watch: Progress,
 ) -> Stored:
     """Fill the part file of a name, and let what it becomes say how it was made."""
-    part = whole.read_part(asked.origin, grid.shape)
+    part = whole._read_part(asked.origin, grid.shape)
     check_suffix(out, whole.axes, part.reader.maps[part.base], grid.chunks)
     header = str(Path(out).with_suffix(HEADER)) if Path(out).suffix.lower() == RAW else None
     # That it can be written, over nothing of somebody else's, is checked before the work.

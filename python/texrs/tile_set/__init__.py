@@ -294,34 +294,8 @@ class TileSet(InParts):
                 made[tuple(here)] = atlas[tuple(there)]
         return out
 
-    def read_part(self, origin: int | Sequence[int], shape: int | Sequence[int]) -> Part:
-        """Return what reads a part of the world, once it was checked to lie within.
-
-        Parameters
-        ----------
-        origin : int or (int, int)
-            First pixel, of the world; any integers within 10^15.
-        shape : int or (rows, columns)
-            Of the part, in pixels.
-
-        Returns
-        -------
-        Part
-            What `texrs.lazy` makes chunks of.
-
-        Raises
-        ------
-        InvalidInput
-            Not such an origin or size.
-
-        Examples
-        --------
-        >>> import texrs
-        >>> tiles = texrs.TileSet(texrs.samples.pebbles((96, 96)).image, 32, seed=1)
-        >>> tiles.read_part((5, 5), (64, 64)) is not None
-        True
-
-        """
+    def _read_part(self, origin: int | Sequence[int], shape: int | Sequence[int]) -> Part:
+        """Check where a part begins, and how large it is; return what reads it."""
         as_sides(shape, "shape", 2)
         start = self._as_origin(origin)
         return Part(_Reader(self, start), start, self._base)

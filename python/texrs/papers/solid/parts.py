@@ -51,34 +51,8 @@ class Endless(InParts):
     def _look_up(self, origin: Sequence[int], size: Sequence[int], names: Sequence[str]) -> Material:
         """Return some maps of a material in a window."""
 
-    def read_part(self, origin: int | Sequence[int], shape: int | Sequence[int]) -> Part:
-        """Return what reads a part of the world, once it was checked to lie within.
-
-        Parameters
-        ----------
-        origin : int, or one an axis
-            First voxel, of the world; any integers within 10^9.
-        shape : int, or one an axis
-            Of the part, in voxels, which end within 10^9 too.
-
-        Returns
-        -------
-        Part
-            What `texrs.lazy` makes chunks of.
-
-        Raises
-        ------
-        InvalidInput
-            Not such an origin or shape.
-
-        Examples
-        --------
-        >>> import texrs
-        >>> plane = texrs.PlaneTexture(texrs.samples.weave((64, 64)).image, seed=2)
-        >>> plane.read_part(-40, (100, 10**6)).origin
-        (-40, -40)
-
-        """
+    def _read_part(self, origin: int | Sequence[int], shape: int | Sequence[int]) -> Part:
+        """Check where a part begins, and that it lies within the world; return what reads it."""
         start, sides = as_origin(origin, self.axes), as_sides(shape, "shape", self.axes)
         if any(o + n > FAR for o, n in zip(start, sides, strict=True)):
             raise InvalidInput(f"origin, shape: need to lie within {FAR}, got {start} and {sides}")
