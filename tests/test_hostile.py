@@ -16,6 +16,7 @@ import pytest
 
 import hostile
 import texrs
+from texrs import samples
 from texrs.errors import TexrsError
 
 FEW = 6
@@ -63,6 +64,15 @@ def _limited():
     resource.setrlimit(resource.RLIMIT_AS, limits)
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _drawn_anew():
+    """Have examples call the generators of samples themselves: of what was drawn before, a copy is given without a call."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name in samples._GENERATORS:
+            patch.setattr(samples, name, inspect.unwrap(getattr(samples, name)))
+        yield
+
+
 def try_values(name, place, count):
     """Call a function with some of the hostile values of each argument, or all; return the calls, and what came out wrong."""
     call = hostile.record(name, place)
@@ -107,6 +117,14 @@ are not there or cannot be hashed: a KeyError or TypeError, as of all. None may 
 def list_left(name, wrong):
     """Return what came out wrong of arguments that are not known to be left."""
     return [each for each in wrong if f"{name}.{each.partition(',')[0]}" not in LEFT]
+
+
+@pytest.mark.parametrize("name", samples._GENERATORS)
+def test_a_sample_that_was_drawn_before_is_called_again(name, tmp_path):
+    kept, _ = hostile.public_calls()[f"texrs.samples.{name}"]
+    first = hostile.record(f"texrs.samples.{name}", tmp_path)
+    kept(**first.arguments)
+    assert hostile.record(f"texrs.samples.{name}", tmp_path).arguments == first.arguments
 
 
 @pytest.mark.parametrize("name", NAMES[::12])
