@@ -59,7 +59,7 @@ COSTS: dict[str, dict[str | None, Cost]] = {
     "extend": {None: Cost(0, 0, 384, fixed=20e6)},
     "rectify": {None: Cost(0, 0, 78, fixed=12e6)},
     "remove": {None: Cost(0, 0, 360, fixed=16e6)},
-    "analyse": {None: Cost(440, 0, 0, fixed=16e6)},
+    "analyse": {None: Cost(480, 0, 0, fixed=14e6)},
     "TileSet": {None: Cost(1000, 680, 90)},
 }
 """By verb, and by the ``method`` or the ``quality`` that takes another amount than the others."""
