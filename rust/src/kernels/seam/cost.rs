@@ -20,6 +20,14 @@ pub const SHORTEST: f32 = 1e-4;
 /// Keeps the gradient cost finite where both images are flat.
 const FLAT: f32 = 0.05;
 
+/// How far two pixels may be apart: both ends of an edge together stay finite, and so does a gradient cost. Infinitely much by
+/// infinitely steep is no number, and no comparison tells that it is none.
+pub(super) const FARTHEST: f32 = f32::MAX / 2.0;
+
+/// Values whose sums and quotients pass what a float can be, among ordinary ones.
+#[cfg(test)]
+pub(super) const EXTREMES: [f32; 8] = [0.0, 0.5, 1.0, 1e30, 1.6e38, -1.6e38, f32::MAX, -f32::MAX];
+
 /// Capacities are costs times a power of two, at most this one.
 const FINEST: f64 = 65536.0;
 /// No single cost becomes a larger capacity: the sums that a solver makes of a node's edges stay within `i32`.

@@ -14,7 +14,7 @@
 //! seam is a pairwise term with one cost a labelling (Kolmogorov and Zabih, *What energy functions can be minimized via
 //! graph cuts?*, PAMI 2004) in place of Kwatra's extra node, which gives the same cuts with fewer nodes.
 
-use super::cost::{Pair, capacity, scale};
+use super::cost::{FARTHEST, Pair, capacity, scale};
 use super::links;
 use super::maxflow::{Graph, Solver};
 use super::overlap::Window;
@@ -211,7 +211,7 @@ impl<const D: usize> Stitcher<D> {
             let at = at as usize;
             if overlap.mask_a[at] && overlap.mask_b[at] {
                 *difference = pair.difference(at);
-                if !difference.is_finite() {
+                if !(0.0..=FARTHEST).contains(difference) {
                     return Err(Error::value(
                         "a, b",
                         format!(
@@ -222,7 +222,7 @@ impl<const D: usize> Stitcher<D> {
                 }
             }
         }
-        let mut largest = 0.0f32;
+        let (mut largest, mut finite) = (0.0f32, true);
         for axis in 0..D {
             self.costs[axis].clear();
             self.costs[axis].resize(n, Costs::default());
@@ -256,12 +256,13 @@ impl<const D: usize> Stitcher<D> {
                     }
                 };
                 largest = largest.max(costs.ab).max(costs.ba);
+                finite &= costs.kept.is_finite();
                 self.costs[axis][i] = costs;
             });
         }
-        if !largest.is_finite() {
+        if !(finite && largest.is_finite()) {
             return Err(Error::value(
-                "penalty",
+                "old, penalty",
                 "too large: an edge costs infinitely much",
             ));
         }

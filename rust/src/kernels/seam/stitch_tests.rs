@@ -1,4 +1,4 @@
-use super::super::cost::Cost;
+use super::super::cost::{Cost, EXTREMES};
 use super::*;
 use proptest::prelude::*;
 
@@ -136,6 +136,32 @@ fn the_seam_runs_where_the_images_agree() {
     assert!((cut.value - 2e-4).abs() < 1e-6);
 }
 
+proptest! {
+    #[test]
+    fn extremes_are_refused_or_cost_something(
+        images in prop::collection::vec(prop::sample::select(EXTREMES.to_vec()), 8),
+        others in prop::collection::vec(prop::sample::select(EXTREMES.to_vec()), 28),
+        gradient in any::<bool>(),
+        penalised in any::<bool>(),
+        seams in any::<bool>(),
+    ) {
+        let others: Vec<f32> = others.iter().map(|x| x.abs()).collect();
+        let old = |k: usize| std::array::from_fn(|axis| &others[4 + 8 * k + 4 * axis..][..4]);
+        let all = [true; 4];
+        let overlap = Overlap {
+            penalty: penalised.then_some(&others[..4]),
+            old: seams.then(|| OldSeams { kept: old(0), ab: old(1), ba: old(2) }),
+            cost: if gradient { Cost::Gradient } else { Cost::Difference },
+            core_a: Some(&[true, false, false, false]),
+            core_b: Some(&[false, false, false, true]),
+            ..Overlap::new(Grid::new([2, 2], [false; 2]).unwrap(), 1, &images[..4], &images[4..], &all, &all)
+        };
+        if let Ok(found) = cut(&overlap, &Monitor::default()) {
+            prop_assert!(found.value.is_finite() && found.value >= 0.0);
+        }
+    }
+}
+
 #[test]
 fn nothing_in_common_is_no_seam() {
     let grid = Grid::new([1, 2], [false; 2]).unwrap();
@@ -179,6 +205,18 @@ fn refuses_contradictions() {
         ..plain
     };
     assert!(refused(unknown).contains("not finite"));
+    // Each of its replacements is a number, both together are none.
+    let (kept, others) = ([[3e38; 2]; 2], [[1.2e38; 2]; 2]);
+    let endless = Overlap {
+        penalty: Some(&[0.5; 2]),
+        old: Some(OldSeams {
+            kept: kept.each_ref().map(|c| &c[..]),
+            ab: others.each_ref().map(|c| &c[..]),
+            ba: others.each_ref().map(|c| &c[..]),
+        }),
+        ..plain
+    };
+    assert!(refused(endless).contains("old, penalty"));
     let short = Overlap { a: &[0.0], ..plain };
     assert!(refused(short).contains("expected shape"));
 }

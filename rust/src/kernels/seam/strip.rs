@@ -3,7 +3,7 @@
 //! Efros and Freeman, *Image quilting for texture synthesis and transfer*, SIGGRAPH 2001, with the seam free to turn back:
 //! the exact minimum cut (see [`super::planar`]).
 
-use super::cost::{Cost, Pair, check_costs};
+use super::cost::{Cost, FARTHEST, Pair, check_costs};
 use super::planar::{LONGEST, Strip, least_seam, longest};
 use super::stitch::Stitched;
 use crate::foundation::error::check_shape;
@@ -187,11 +187,9 @@ fn weigh<const C: usize>(pasted: &Pasted<'_>) -> Result<[Vec<f32>; 2]> {
         _ => pair.differences(),
     };
     // Not the place at once, so that the search takes many at a time.
-    if differences
-        .iter()
-        .fold(false, |bad, d| bad | !d.is_finite())
-    {
-        let at = differences.iter().position(|d| !d.is_finite()).unwrap_or(0);
+    let far = |d: &f32| !(0.0..=FARTHEST).contains(d);
+    if differences.iter().fold(false, |any, d| any | far(d)) {
+        let at = differences.iter().position(far).unwrap_or(0);
         return Err(Error::value(
             "a, b",
             format!("not finite, or too far apart, at {:?}", grid.point(at)),
@@ -215,6 +213,7 @@ fn weigh<const C: usize>(pasted: &Pasted<'_>) -> Result<[Vec<f32>; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kernels::seam::cost::EXTREMES;
     use crate::kernels::seam::stitch::{Overlap, cut as cut_any};
     use proptest::prelude::*;
 
@@ -248,6 +247,30 @@ mod tests {
             prop_assert!((found.value - general.value).abs() < 1e-3, "{} {}", found.value, general.value);
             for p in 0..n {
                 prop_assert!(!(core_a[p] && found.b[p]) && (!core_b[p] || found.b[p]));
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn extremes_are_refused_or_cost_something(
+            images in prop::collection::vec(prop::sample::select(EXTREMES.to_vec()), 12),
+            penalty in prop::collection::vec(prop::sample::select(EXTREMES.to_vec()), 6),
+            gradient in any::<bool>(),
+        ) {
+            let penalty: Vec<f32> = penalty.iter().map(|x| x.abs()).collect();
+            let pasted = Pasted {
+                shape: [2, 3],
+                channels: 1,
+                a: &images[..6],
+                b: &images[6..],
+                axis: 1,
+                cyclic: false,
+                penalty: Some(&penalty),
+                cost: if gradient { Cost::Gradient } else { Cost::Difference },
+            };
+            if let Ok(found) = cut(&pasted, &Monitor::default()) {
+                prop_assert!(found.value.is_finite() && found.value > 0.0);
             }
         }
     }
