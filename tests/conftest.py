@@ -22,14 +22,15 @@ settings.load_profile("fixed")
 
 def draw_once(make: Callable[..., samples.Sample]) -> Callable[..., samples.Sample]:
     """Return a generator that draws a sample once, and gives a copy of it each time: dozens of modules use the same."""
-    kept = functools.cache(make)
+    kept: dict[str, samples.Sample] = {}
 
     @functools.wraps(make)
     def draw(*given: Any, **options: Any) -> samples.Sample:
-        try:
-            drawn = kept(*given, **options)
-        except TypeError:  # A list, or a wrong argument.
-            return make(*given, **options)
+        # As it is written, not what it equals: 64.0 is 64, and is refused.
+        asked = repr((given, options))
+        if asked not in kept:
+            kept[asked] = make(*given, **options)
+        drawn = kept[asked]
         arrays = {f.name: value for f in fields(drawn) if isinstance(value := getattr(drawn, f.name), np.ndarray)}
         return replace(drawn, **{name: array.copy() for name, array in arrays.items()})
 
