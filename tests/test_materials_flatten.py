@@ -115,6 +115,21 @@ def test_linear_light_is_the_same_picture() -> None:
     np.testing.assert_allclose(encode_srgb(flatten(decode_srgb(lit))), encoded, atol=1e-4)
 
 
+@pytest.mark.parametrize("dtype", ["float16", "float32", "float64"])
+@pytest.mark.parametrize("space", ["srgb", "linear"])
+@pytest.mark.parametrize("highest", [1.0, 65504.0, 1e15])
+def test_no_light_is_endless(dtype: str, space: Any, highest: float) -> None:
+    """Lamps, as bright as the dtype allows, become no brighter than that."""
+    kind = np.dtype(dtype)
+    lit = (GRAIN / 200 * RAMP**2).astype(kind)
+    lit[::9, ::11] = min(highest, float(np.finfo(kind).max))
+    assert np.isfinite(flatten(lit, space=space)).all()
+    if kind.itemsize > 2:
+        lit[3, 4] = -1.1e15
+        with pytest.raises(InvalidInput, match=r"image: .*up to 1e\+15.*got 1\.1e\+15"):
+            flatten(lit, space=space)
+
+
 def test_strips_are_not_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     lit = (GRAIN * RAMP).astype(np.uint8)
     whole = flatten(lit)

@@ -45,9 +45,10 @@ def to_share(pixels: Array) -> Floats:
 
 
 def to_pixels(values: Array, dtype: np.dtype[Any]) -> Array:
-    """Return values in a dtype: of integers shares of their range, of which `to_share` is the way back."""
+    """Return values in a dtype, or its largest: of integers shares of their range, of which `to_share` is the way back."""
     if dtype.kind == "f":
-        return values.astype(dtype)
+        most = min(float(np.finfo(dtype).max), float(np.finfo(values.dtype).max))
+        return np.clip(values, -most, most).astype(dtype)
     if dtype == np.bool_:
         return values >= 0.5
     info = np.iinfo(dtype)

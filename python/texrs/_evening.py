@@ -22,6 +22,8 @@ LEAST = 0.02
 """Encoded brightness below which a place is too dark to say how it is lit."""
 STRONGEST = 1.4
 """Logarithm of how much encoded values change at most: to a quarter, or four times."""
+BRIGHTEST = 1e15
+"""Colours of floats at most: their light, a power of them, stays a number."""
 TURNS = 3
 """Of telling bright things from dark ones, and light from both."""
 BINS = 128
@@ -47,7 +49,7 @@ def flatten(
     Parameters
     ----------
     image : (H, W) or (H, W, C) array_like
-        Colours, in any dtype; the last of two or four channels is transparency, which stays.
+        Colours, in any dtype, floats of up to 1e15; the last of two or four channels is transparency, which stays.
     amount : float
         How much of the unevenness is taken out, 0 to 1.
     wrap : bool or (bool, bool)
@@ -60,12 +62,12 @@ def flatten(
     Returns
     -------
     array
-        The same shape and dtype. Values of integers end at their largest.
+        The same shape and dtype. Values end at the largest of the dtype.
 
     Raises
     ------
     InvalidInput
-        Not a picture, or another amount, size or space.
+        Not a picture, colours beyond 1e15, or another amount, size or space.
 
     Examples
     --------
@@ -90,6 +92,9 @@ def flatten(
         raise InvalidInput("image: needs colours, got bool")
     clear = channels in (2, 4)
     colours = channels - clear
+    seen = pixels[..., :colours]
+    if pixels.dtype.kind == "f" and (brightest := max(float(seen.max()), -float(seen.min()))) > BRIGHTEST:
+        raise InvalidInput(f"image: colours of up to {BRIGHTEST:g} are allowed, got {brightest:g}")
     gains = measure(pixels, colours, encoding, over, (cyclic[0], cyclic[1])) * np.float32(share)
     made = pixels.copy()
     if not gains.any():
