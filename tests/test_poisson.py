@@ -117,6 +117,16 @@ def test_blend_touches_nothing_outside_the_mask(dtype, mixed):
     assert not (result == target).all()
 
 
+def test_half_floats_end_at_their_largest():
+    target = np.full((8, 8), 65504, np.float16)
+    source = np.zeros((8, 8), np.float16)
+    source[4, 4] = 1000
+    mask = np.zeros((8, 8), bool)
+    mask[2:6, 2:6] = True
+    assert poisson.blend(source, target, mask).max() == 65504
+    assert poisson.blend(-source, -target, mask).min() == -65504
+
+
 def test_blending_an_image_into_itself_changes_nothing():
     image = np.random.default_rng(7).integers(0, 256, (40, 50, 3), dtype=np.uint8)
     mask = np.zeros((40, 50), bool)

@@ -197,7 +197,7 @@ def blend(
     Returns
     -------
     ndarray
-        Shape and dtype of the target; integers are rounded and clipped.
+        Shape and dtype of the target, within its range; integers are rounded.
 
     Raises
     ------
@@ -274,6 +274,9 @@ def _write_into(onto: Array, solved: Floats, inside: Bools) -> None:
     elif onto.dtype.kind in "ui":
         info = np.iinfo(onto.dtype)
         onto[inside] = np.clip(np.rint(solved[inside].astype(np.float64)), info.min, info.max)
+    elif onto.dtype == np.float16:
+        most = np.float32(np.finfo(np.float16).max)
+        onto[inside] = np.clip(solved[inside], -most, most)
     else:
         onto[inside] = solved[inside]
 
