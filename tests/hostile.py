@@ -10,7 +10,7 @@ import math
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from decimal import Decimal
 from enum import Enum
 from fractions import Fraction
@@ -23,6 +23,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 import texrs
+from texrs.exemplar._exemplar import _FACTS
 
 NUMBERS: tuple[object, ...] = (
     *(True, -1, 0, 1, 2, 7, 2**31 - 1, 2**31, 2**32, 2**63, 2**64, 10**400),
@@ -132,6 +133,52 @@ def distort(array: np.ndarray[Any, Any]) -> Iterator[object]:
             changed = array.copy()
             changed.flat[0] = value
             yield changed
+
+
+EXTREMES = (
+    0.0,
+    0.5,
+    -1.0,
+    1e-40,
+    65504.0,
+    -65504.0,
+    1e15,
+    1e30,
+    -1e30,
+    1.6e38,
+    3.4e38,
+    -3.4e38,
+    1e150,
+    1.7e308,
+    -1.7e308,
+)
+"""Numbers whose sums, products or powers are none, in one dtype or another."""
+
+
+def exaggerate(valid: object, rng: np.random.Generator) -> object:
+    """Return floats of some dtype in place of values that are right: a few of them, half or all are extreme."""
+    if isinstance(valid, list | tuple) and valid and all(isinstance(each, np.ndarray) for each in valid):
+        return type(valid)(exaggerate(each, rng) for each in valid)
+    if not isinstance(valid, np.ndarray) or valid.dtype.kind not in "fu" or not valid.size:
+        return valid
+    kind = np.dtype(("f2", "f4", "f8")[rng.integers(3)])
+    ends = [each for each in EXTREMES if abs(each) <= np.finfo(kind).max]
+    there = rng.random(valid.shape) < (0.02, 0.5, 1)[rng.integers(3)]
+    return np.where(there, rng.choice(ends, valid.shape), np.clip(valid.astype("f8"), -60000, 60000)).astype(kind)
+
+
+def list_floats(made: object) -> Iterator[np.ndarray[Any, Any]]:
+    """Yield the floats that a result holds."""
+    if isinstance(made, np.ndarray | float):
+        if np.asarray(made).dtype.kind == "f":
+            yield np.asarray(made)
+    elif isinstance(made, list | tuple):
+        for each in made:
+            yield from list_floats(each)
+    elif isinstance(made, dict):
+        yield from list_floats(list(made.values()))
+    elif is_dataclass(made):
+        yield from list_floats([getattr(made, field.name) for field in fields(made)])
 
 
 def list_hostile(valid: object) -> Iterator[object]:
@@ -252,9 +299,10 @@ class Call:
 
     def change(self, name: str, value: object) -> object:
         """Call it with another value of one argument."""
-        return self._call(self.arguments | {name: value})
+        return self.call(self.arguments | {name: value})
 
-    def _call(self, given: dict[str, Any]) -> object:
+    def call(self, given: dict[str, Any]) -> object:
+        """Call it with these arguments."""
         positional, named = [], {}
         for p in inspect.signature(self.function).parameters.values():
             if p.name not in given:
@@ -294,6 +342,8 @@ def record(name: str, place: Path) -> Call | None:
 
     if not set(inspect.signature(thing).parameters) - {"self"}:
         return None
+    # What is known of an exemplar is kept: what measures it would not be called again.
+    _FACTS.clear()
     space: dict[str, Any] = {**function.__globals__, "__name__": "__main__"}
     own = f">>> import numpy, texrs\n>>> made = {EXAMPLES[name]}\n" if name in EXAMPLES else None
     for text in (own, inspect.getdoc(thing), inspect.getdoc(owner) if owner is not None else None):

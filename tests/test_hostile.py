@@ -191,3 +191,46 @@ def test_maps_of_no_shape_are_refused(shape):
 def test_what_cannot_be_is_refused_by_name(call, said):
     with pytest.raises(TexrsError, match=f"^{said}"):
         call()
+
+
+MAY_BE_NONE = {
+    "texrs.Plane.project",
+    "texrs.kernels.patch_search.PatchIndex.cost_map",
+    "texrs.kernels.reconstruction.reconstruct",
+    "texrs.volume.autocorrelation",
+    "texrs.volume.compare",
+}
+"""Results that say by no number, or by an infinite one, what is not seen, not allowed or not there, or was given so."""
+
+
+def try_extremes(name, place, count):
+    """Call a function with numbers whose sums are none; return what came out wrong."""
+    call = hostile.record(name, place)
+    rng, wrong = np.random.default_rng(list(name.encode())), []
+    for number in range(0 if call is None else count):
+        given = {k: hostile.exaggerate(v, rng) if rng.random() < 0.7 else v for k, v in call.arguments.items()}
+        try:
+            with texrs.limits.within(seconds=0.3, pixels=2**22, voxels=2**21), end_in(30):
+                made = call.call(given)
+            if name not in MAY_BE_NONE and not all(np.isfinite(each).all() for each in hostile.list_floats(made)):
+                wrong.append(f"call {number}: no numbers")
+        except TexrsError:
+            pass
+        except BaseException as error:
+            wrong.append(f"call {number}: {type(error).__name__}: {error}"[:200])
+    return wrong
+
+
+@pytest.mark.parametrize("name", NAMES[6::12])
+def test_some_numbers_become_numbers(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    warnings.simplefilter("ignore")
+    assert not try_extremes(name, tmp_path, 3)
+
+
+@pytest.mark.fuzz
+@pytest.mark.parametrize("name", NAMES)
+def test_numbers_become_numbers(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    warnings.simplefilter("ignore")
+    assert not try_extremes(name, tmp_path, 20)

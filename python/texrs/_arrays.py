@@ -5,11 +5,12 @@ The checks of what is no array (`texrs._checks`) are at hand here too, for whoev
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from texrs._checks import (
     MAX_PIXELS,
@@ -259,8 +260,15 @@ def to_unit(array: Array) -> Floats:
     low, high = float(array.min()), float(array.max())
     if low >= 0 and high <= 1:
         return array.astype(np.float32)
-    low = min(low, 0.0)
-    return ((array.astype(np.float64) - low) / (high - low or 1.0)).astype(np.float32)
+    return locate(array, min(low, 0.0), high).astype(np.float32)
+
+
+def locate(values: Array, low: float, high: float) -> NDArray[np.float64]:
+    """Return where values lie between two of them, from 0 to 1, though these be farther apart than a double can be."""
+    given = values.astype(np.float64)
+    if math.isinf(high - low):
+        given, low, high = given / 2, low / 2, high / 2
+    return np.asarray((given - low) / (high - low or 1.0))
 
 
 def guidance(pixels: Array) -> Floats:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texrs._arrays import as_image, as_int, as_ndarray
+from texrs._arrays import as_image, as_int, as_ndarray, locate
 from texrs._show import brief
 from texrs._typing import Array
 from texrs.errors import InvalidInput
@@ -261,7 +261,8 @@ def _share_range(first: Array, second: Array) -> tuple[Array, Array]:
     if first.dtype.kind != "f" or (low >= 0 and high <= 1):
         return first, np.clip(second, 0, 1) if second.dtype.kind == "f" else second
     low = min(low, 0.0)
-    return tuple(np.clip((a.astype(np.float64) - low) / (high - low), 0, 1) for a in (first, second))  # type: ignore[return-value]
+    before, after = (np.clip(locate(a, low, high), 0, 1) for a in (first, second))
+    return before, after
 
 
 def _as_labels(array: Array, name: str) -> Array:

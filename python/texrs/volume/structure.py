@@ -142,7 +142,8 @@ def seam_planes(values: ArrayLike, *, wrap: bool | Sequence[bool] = False) -> tu
     31
 
     """
-    v = as_values(values)
+    # Of halves, for two values may differ by more than single precision can be; shares are the same.
+    v = as_values(values) * np.float32(0.5)
     out = []
     for axis, cyclic in enumerate(as_wrap(wrap, axes=v.ndim)):
         others = tuple(a for a in range(v.ndim) if a != axis)
