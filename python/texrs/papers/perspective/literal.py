@@ -158,6 +158,7 @@ class Search:
         for values, share in ((e, 0.95), (scale[..., np.newaxis], 0.99)):
             ask()
             windows = _cut_windows(values, 1)
+            ask()
             mean = windows.mean(axis=0)
             ask()
             off = windows - mean
@@ -177,6 +178,7 @@ class Search:
             parts.append(off @ bases[-1][1])
             variance += float(total[-1])
         vectors = np.concatenate(parts, axis=1)
+        ask()
         # Of windows that are the same the first is found.
         first = np.sort(np.unique(vectors, axis=0, return_index=True)[1])
         ask()
@@ -184,8 +186,13 @@ class Search:
 
     def step(self, x: Doubles, scale: Doubles) -> tuple[Doubles, NDArray[np.intp], float]:
         """Search the nearest window for each of the output's, then average them: a round."""
-        seen = [_cut_windows(v, SPACING) for v in (x, scale[..., np.newaxis])]
-        query = np.concatenate([(w - m) @ b for w, (m, b) in zip(seen, self.bases, strict=True)], axis=1)
+        seen = []
+        for values, (mean, axes) in zip((x, scale[..., np.newaxis]), self.bases, strict=True):
+            ask()
+            off = _cut_windows(values, SPACING) - mean
+            ask()
+            seen.append(off @ axes)
+        query = np.concatenate(seen, axis=1)
         found = []
         for part in range(0, len(query), AT_ONCE):
             ask()
@@ -201,8 +208,8 @@ class Search:
         total, weight = np.zeros_like(x), np.zeros(x.shape[:2])
         best, at = np.full(x.shape[:2], -1.0), np.zeros((*x.shape[:2], 2), np.intp)
         for dy in range(SIDE):
-            ask()
             for dx in range(SIDE):
+                ask()
                 colour = self.e[top + dy, left + dx]
                 w = omega / (1 + _add_excess(excess, colour))  # Eq. 8
                 here = np.ix_(rows + dy, columns + dx)
