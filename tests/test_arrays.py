@@ -259,6 +259,8 @@ def test_wide_integers_are_seen_by_their_own_range():
     for dtype in (np.int32, np.uint32, np.int64, np.uint64):
         assert np.array_equal(to_unit(small.astype(dtype)), to_unit(small.astype(np.uint8)))
     assert to_unit(np.full((2, 2), -4)).tolist() == [[0, 0], [0, 0]]
+    # Two doubles may be farther apart than a double can be.
+    assert to_unit(np.array([[-1.7e308, 0.0, 1.7e308]])).tolist() == [[0, 0.5, 1]]
 
 
 def test_a_mask_may_be_a_file_or_a_coloured_picture(tmp_path: Path):

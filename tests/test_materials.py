@@ -273,3 +273,11 @@ def test_maps_say_what_they_are() -> None:
     assert changed["albedo"].role is Role.COLOUR
     with pytest.raises(InvalidInput, match="there is no map 'colour'"):
         STONES.replace(colour=each.pixels)
+
+
+def test_heights_of_any_range_are_told_apart() -> None:
+    """Two heights may differ by more than single precision can be; what they tell is what their halves tell."""
+    heights = np.linspace(-1, 1, 96, dtype=np.float32).reshape(8, 12) * np.float32(3e38)
+    (wide,), (narrow,) = (Material({"height": h}).features() for h in (heights, heights / 4))
+    assert np.isfinite(wide).all()
+    np.testing.assert_allclose(wide, narrow, atol=1e-6)

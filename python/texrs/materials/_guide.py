@@ -53,6 +53,7 @@ def take_features(pixels: Array, role: Role, space: str, axes: int) -> Floats:
         return vector[..., : min(2, vector.shape[-1])] * np.float32(0.5)
     if role is Role.HEIGHT:
         values = to_unit(image) if image.dtype.kind in "b" else image.astype(np.float32)
+        # Of halves, for two heights may differ by more than single precision can be; shares are the same.
         if float(values.max()) - float(values.min()) > float(np.finfo(np.float32).max):
             values = values * np.float32(0.5)
         low, high = np.quantile(values, [TAILS, 1 - TAILS])
