@@ -12,7 +12,7 @@ PACKAGE = ROOT / "python" / "texrs"
 
 LAYERS = (
     ("_rust", "errors", "_typing"),
-    ("_calls", "_memory"),
+    ("_calls", "_memory", "_notices"),
     ("limits",),
     ("_cache", "_checks", "_digits", "_progress", "_version"),
     ("io",),

@@ -211,7 +211,7 @@ def test_what_names_do_not_say_is_left_out_and_said(tmp_path: Path) -> None:
     io.write(tmp_path / "rock_albedo.png", STONES["albedo"].pixels)
     io.write(tmp_path / "rock_preview.png", np.zeros((8, 8, 3), np.uint8))
     (tmp_path / "licence.txt").write_text("CC0")
-    with pytest.warns(UserWarning, match=r"left out rock_preview\.png"):
+    with pytest.warns(UserWarning, match=r"rock_preview\.png not used"):
         assert list(Material.read(tmp_path)) == ["rock_albedo"]
     with pytest.raises(InvalidInput, match="one size"):
         Material.read(tmp_path, roles={"rock_preview.png": "mask"})

@@ -141,7 +141,7 @@ def test_files_of_other_programs_are_read_by_names(tmp_path: Path) -> None:
     assert back["height"].pixels.ndim == 2
     plain = Material.read(write(tmp_path / "c.exr", [({}, {**colours, "depth.V": one})]), roles={"depth": "height"})
     assert {name: each.role for name, each in plain.items()} == {"colour": Role.COLOUR, "depth": Role.HEIGHT}
-    with pytest.warns(UserWarning, match="left out depth"):
+    with pytest.warns(UserWarning, match="depth not used"):
         assert list(Material.read(tmp_path / "c.exr")) == ["colour"]
     with pytest.raises(InvalidInput, match="there is no layer 'deep'"):
         Material.read(tmp_path / "c.exr", roles={"deep": "height"})

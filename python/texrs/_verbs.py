@@ -9,6 +9,7 @@ from functools import wraps
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast
 
 from texrs._arrays import as_image
+from texrs._notices import Notices, collect, repeat
 from texrs._progress import listen
 from texrs._typing import Array, Progress
 from texrs.errors import InvalidInput, LimitExceeded
@@ -57,6 +58,16 @@ def takes_materials(
 
         @wraps(verb)
         def run(*args: P.args, **kwargs: P.kwargs) -> T:
+            # What was ignored and assumed is in the report, also if the input was read earlier.
+            with collect() as notices:
+                for value in (*args, *kwargs.values()):
+                    for each in _as_list(value):
+                        if isinstance(each, Material):
+                            repeat(each.notices)
+                made: Any = synthesise(*args, **kwargs)
+            return cast(T, _report(made, notices))
+
+        def synthesise(*args: P.args, **kwargs: P.kwargs) -> T:
             if not any(_holds(value) for value in (*args, *kwargs.values())):
                 return verb(*args, **kwargs)
             given = signature.bind(*args, **kwargs)
@@ -108,6 +119,13 @@ def finish(made: Synthesis, materials: list[Material], progress: Progress | None
         report={**made.report, "maps": maps},
         material=material,
     )
+
+
+def _report(made: Any, notices: Notices) -> Any:
+    """Return results whose reports contain the notices."""
+    if isinstance(made, Synthesis):
+        return replace(made, report=notices.add_to(made.report)) if notices else made
+    return (_report(one, notices) for one in made)
 
 
 def _analyse(material: object, guide: Array, name: str, progress: Progress | None) -> Elements:

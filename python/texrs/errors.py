@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["Cancelled", "FileError", "InvalidInput", "LimitExceeded", "TexrsError"]
+__all__ = ["Cancelled", "FileError", "InputWarning", "InvalidInput", "LimitExceeded", "TexrsError"]
 
 
 def __dir__() -> list[str]:
@@ -27,3 +27,7 @@ class FileError(TexrsError, OSError):
 
 class Cancelled(TexrsError):
     """The caller asked to stop; nothing was left half-written."""
+
+
+class InputWarning(UserWarning):
+    """A part of an input was not used, such as a file in a folder whose name gives no role."""

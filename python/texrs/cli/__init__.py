@@ -122,7 +122,7 @@ def make_command(name: str) -> Any:
 
     def limited(**given: Any) -> None:
         # The command itself sees to what may be replaced, before the work.
-        with limit(**{p.name: given[p.name] for p in limits}):
+        with limit(**{p.name: given[p.name] for p in limits}, quiet=given.get("quiet", False)):
             work(**{name: value for name, value in given.items() if name not in ours})
 
     function = as_command(limited, [*parameters, *limits, *forced])

@@ -10,6 +10,8 @@ from typing import Annotated, Any
 import typer
 
 from texrs import limits
+from texrs._notices import collect
+from texrs.cli._console import note
 from texrs.cli._options import make_parameter
 from texrs.cli._outputs import name_arguments
 from texrs.cli._texts import parse_bytes
@@ -23,6 +25,9 @@ OPTIONS: dict[str, tuple[Any, str, str, str]] = {
 }
 
 
+STRICT = Annotated[bool, typer.Option("--strict", help="Fail if a part of an input would be ignored.")]
+
+
 def list_parameters(there: list[inspect.Parameter]) -> list[inspect.Parameter]:
     """Return the options of limits that a command does not have itself."""
     own = {p.name for p in there}
@@ -31,18 +36,24 @@ def list_parameters(there: list[inspect.Parameter]) -> list[inspect.Parameter]:
         if name not in own:
             info = typer.Option(metavar=metavar, help=text, show_default=usual)
             made.append(make_parameter(name, Annotated[kind | None, info], None))
-    return made
+    return [*made, make_parameter("strict", STRICT, False)]
 
 
 @contextmanager
 def limit(
-    *, memory_limit: str | None = None, pixel_limit: int | None = None, time_limit: float | None = None
+    *,
+    memory_limit: str | None = None,
+    pixel_limit: int | None = None,
+    time_limit: float | None = None,
+    strict: bool = False,
+    quiet: bool = False,
 ) -> Iterator[None]:
-    """Hold a command to its limits; what is not given is not limited here."""
+    """Run a command within its limits, and show what it ignores and assumes about its inputs."""
     memory = None if memory_limit is None else parse_bytes(memory_limit)
     with ExitStack() as stack:
         with name_arguments(pixels="--pixel-limit", seconds="--time-limit", memory="--memory-limit"):
             stack.enter_context(
                 limits.within(pixels=pixel_limit, voxels=pixel_limit, memory=memory, seconds=time_limit)
             )
+        stack.enter_context(collect(show=lambda line: note(line, quiet=quiet), strict=strict))
         yield

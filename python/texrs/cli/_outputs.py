@@ -103,7 +103,7 @@ class Command(TyperCommand):
                 title = MAIN
             elif p.name in OUTPUTS or p.name == "each":
                 title = FILES
-            elif p.name in ("count", "quiet", "force", "help", "memory_limit", "pixel_limit", "time_limit"):
+            elif p.name in ("count", "quiet", "force", "help", "memory_limit", "pixel_limit", "time_limit", "strict"):
                 title = WORK
             else:
                 title = getattr(p, "rich_help_panel", None) or MORE

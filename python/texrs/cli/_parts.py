@@ -18,6 +18,7 @@ from texrs._chunks.flat import HEADER, RAW, check_suffix, fill
 from texrs._chunks.grid import Grid
 from texrs._chunks.parts import InParts as Parts
 from texrs._chunks.store import Stored
+from texrs._notices import Notices
 from texrs._typing import Progress
 from texrs.cli import _outputs, _provenance
 from texrs.cli._console import note, show_progress
@@ -63,12 +64,14 @@ class InParts(Verb):
         """Return the verb's own, and those of parts."""
         return [*Verb.make_parameters(self), *make_options()]
 
-    def make(self, *, count: int | None, quiet: bool, variants: int | None = None, **given: Any) -> None:
+    def make(
+        self, *, count: int | None, quiet: bool, notices: Notices, variants: int | None = None, **given: Any
+    ) -> None:
         """Do the command: at once, or in parts where that is asked for."""
         said = {name: given.pop(name, None) for name in OPTIONS}
         out = str(given["out"])
         if not (is_stored(out) or out.lower().endswith(RAW)) and all(value is None for value in said.values()):
-            Verb.make(self, count=count, quiet=quiet, variants=variants, **given)
+            Verb.make(self, count=count, quiet=quiet, notices=notices, variants=variants, **given)
             return
         self.run_parts(given, said, count=count, quiet=quiet)
 

@@ -33,6 +33,7 @@ LEFT = (
     "pixel_limit",
     "time_limit",
     "force",
+    "strict",
     "each",
     "out",
     "map",

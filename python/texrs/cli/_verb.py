@@ -16,6 +16,7 @@ import typer
 
 from texrs import io
 from texrs._arrays import as_int
+from texrs._notices import Notices, collect
 from texrs._threads import threads
 from texrs._typing import Array
 from texrs.cli import _outputs, _provenance
@@ -75,14 +76,17 @@ class Verb:
     def run(self, *, count: int | None, quiet: bool, variants: int | None = None, **given: Any) -> None:
         """Do the command; what is too large is told how it is made."""
         try:
-            self.make(count=count, quiet=quiet, variants=variants, **given)
+            with collect() as notices:
+                self.make(count=count, quiet=quiet, variants=variants, notices=notices, **given)
         except LimitExceeded as error:
             if not self.beyond or not str(error).startswith(("size:", "--size:")):
                 raise
             # How Python makes it does not help here.
             raise LimitExceeded(f"{str(error).partition('; texrs.')[0]}; {self.beyond}") from None
 
-    def make(self, *, count: int | None, quiet: bool, variants: int | None = None, **given: Any) -> None:
+    def make(
+        self, *, count: int | None, quiet: bool, notices: Notices, variants: int | None = None, **given: Any
+    ) -> None:
         """Do the command: what can be checked is checked before any file is read, and before the work."""
         start, options = time.monotonic(), self.options
         stack = Stack.take(given)
@@ -132,10 +136,12 @@ class Verb:
                 call["size"] = size
             if variants is None or self.several is None:
                 made = options.function(**call, progress=progress)
+                made = replace(made, report=notices.add_to(made.report))
                 deliver(made, paths, like=like, **apart)
             else:
                 several = self.several(count=variants, **call, progress=progress)
                 for seed, each, made in zip(itertools.count(given["seed"]), places, several, strict=False):
+                    made = replace(made, report=notices.add_to(made.report))
                     alone = {"--variants": None, "--seed": str(seed) if seed else None}
                     deliver(made, each, like=like, made=_provenance.narrow(options=alone, seed=seed))
                     keep(each["out"] or "")

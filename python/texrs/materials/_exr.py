@@ -17,7 +17,6 @@ layers.
 from __future__ import annotations
 
 import json
-import warnings
 from collections.abc import Mapping
 from pathlib import Path as FilePath
 from typing import Any
@@ -26,6 +25,7 @@ import numpy as np
 
 from texrs._checks import as_float
 from texrs._colours import encode_srgb, to_light, to_pixels
+from texrs._notices import ignore
 from texrs._typing import Array, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.io._files import as_path
@@ -143,7 +143,7 @@ def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map
     if not maps:
         raise FileError(f"{path}: no layer has a name that says what it is for: {', '.join(short)}; say it by roles")
     if left:
-        warnings.warn(f"{path}: left out {', '.join(left)}, whose names do not say what they are for", stacklevel=3)
+        ignore(f"{path}: {', '.join(left)} not used: no role is known for the name")
     weights = {name: told["weight"] for name, told in known.items() if "weight" in told and name in maps}
     return maps, {name: each.role for name, each in maps.items()}, weights
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path as FilePath
@@ -12,6 +11,7 @@ import numpy as np
 from texrs import io
 from texrs._arrays import to_unit
 from texrs._checks import as_instance
+from texrs._notices import ignore
 from texrs._threads import SideBySide
 from texrs._typing import Array, Path
 from texrs.errors import FileError, InvalidInput
@@ -68,7 +68,7 @@ def read_maps(path: Path, roles: dict[str, Role | str], axes: int) -> tuple[dict
     if len(taken) > MOST:
         raise FileError(f"{path}: has {len(taken)} maps, up to {MOST} are allowed")
     if left:
-        warnings.warn(f"{path}: left out {', '.join(left)}, whose names do not say what they are for", stacklevel=4)
+        ignore(f"{path}: {', '.join(left)} not used: no role is known for the name")
     short = shorten([stems[name] for name in taken])
     if len(set(short)) < len(short):
         twice = next(name for name in short if short.count(name) > 1)

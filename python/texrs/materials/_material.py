@@ -12,6 +12,7 @@ import numpy as np
 
 from texrs._arrays import as_axes, as_choice, as_float, as_image, as_instance, as_int
 from texrs._cache import content_hash
+from texrs._notices import Notices, collect
 from texrs._progress import listen
 from texrs._show import as_png
 from texrs._threads import SideBySide
@@ -86,6 +87,7 @@ class Material(Exports):
         if not isinstance(maps, Mapping) or not maps:
             raise InvalidInput("maps: needs a mapping of names to arrays, with at least one")
         self._axes = as_int(axes, "axes", 2, 3)
+        self._notices = Notices()
         for option, given in (("roles", roles), ("spaces", spaces), ("weights", weights)):
             if given is not None and not isinstance(given, Mapping):
                 raise InvalidInput(f"{option}: needs a mapping by the names of maps, got {given!r}")
@@ -175,13 +177,17 @@ class Material(Exports):
         place, axes = as_path(path), as_axes(axes)
         if roles is not None and not isinstance(roles, Mapping):
             raise InvalidInput(f"roles: needs a mapping of names to roles, got {roles!r}")
-        if place.suffix.lower() == ".exr" and not place.is_dir():
-            if axes != 2:
-                raise InvalidInput(f"axes: the layers of {path} are pictures, got {axes}")
-            layers, found, weights = read_exr(path, dict(roles or {}))
-            return cls(layers, roles=found, weights=weights)
-        maps, found = read_maps(path, dict(roles or {}), axes)
-        return cls(maps, roles=found, axes=axes)
+        with collect() as notices:
+            if place.suffix.lower() == ".exr" and not place.is_dir():
+                if axes != 2:
+                    raise InvalidInput(f"axes: the layers of {path} are pictures, got {axes}")
+                layers, found, weights = read_exr(path, dict(roles or {}))
+                made = cls(layers, roles=found, weights=weights)
+            else:
+                maps, found = read_maps(path, dict(roles or {}), axes)
+                made = cls(maps, roles=found, axes=axes)
+        made._notices = notices
+        return made
 
     # --- the maps ----------------------------------------------------------------------------------------------------
 
@@ -217,6 +223,11 @@ class Material(Exports):
     def axes(self) -> int:
         """2 for pictures, 3 for volumes."""
         return self._axes
+
+    @property
+    def notices(self) -> Notices:
+        """What reading the maps ignored and assumed: sentences, in ``ignored`` and ``assumed``."""
+        return self._notices
 
     @property
     def weights(self) -> Mapping[str, float]:
