@@ -117,6 +117,7 @@ lint-python: $(VENV)/.built
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest texrs._rust
+	$(BIN)/python .ci/prose
 
 format: $(VENV)/.tools
 	cargo fmt
