@@ -3,12 +3,17 @@
 from pathlib import Path
 
 import numpy as np
+from PIL import Image, ImageDraw, ImageFont
 from skimage.transform import resize
 
 from texrs.synthesis import preview
 
 FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 GAP = 8
+STRIP = 26
+"""Height of the strip above an image that holds its label, in pixels."""
+INPUT, RESULT = (196, 98, 16), (40, 40, 40)
+"""Colours of the labels of inputs and of results."""
 
 
 def rgb(picture: np.ndarray, height: int | None = None) -> np.ndarray:
@@ -38,3 +43,14 @@ def below(rows: list[np.ndarray]) -> np.ndarray:
     most = max(r.shape[1] for r in rows)
     cells = [np.pad(r, ((0, GAP), (0, most - r.shape[1]), (0, 0)), constant_values=255) for r in rows]
     return np.concatenate(cells, axis=0)[:-GAP]
+
+
+def label(picture: np.ndarray, text: str, height: int, *, given: bool = False) -> np.ndarray:
+    """Return an image with its label on a strip above it; an input is framed and labelled in orange."""
+    shown, colour = rgb(picture, height), INPUT if given else RESULT
+    if given:
+        for edge in (np.s_[:3], np.s_[-3:], np.s_[:, :3], np.s_[:, -3:]):
+            shown[edge] = colour
+    strip = Image.new("RGB", (shown.shape[1], STRIP), "white")
+    ImageDraw.Draw(strip).text((2, 3), text, fill=colour, font=ImageFont.load_default(16))
+    return np.concatenate([np.asarray(strip), shown])

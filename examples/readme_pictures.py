@@ -3,7 +3,7 @@
 import numpy as np
 
 import texrs
-from layout import FOLDER, below, beside
+from layout import FOLDER, below, beside, label
 from texrs import fields, samples, volume
 from texrs.elements import Elements
 
@@ -11,7 +11,7 @@ HEIGHT = 200
 
 
 def four() -> np.ndarray:
-    """Show each system once: what it was given, and what it made of that."""
+    """Show each system once: its inputs, labelled as such, and its result."""
     stones = samples.pebbles((192, 192)).image
     dots, net = (Elements.of_sample(samples.load(name, size=(192, 192))) for name in ("dots", "net"))
     floor = samples.tilted_discs((192, 192))
@@ -19,14 +19,25 @@ def four() -> np.ndarray:
     scale = np.asarray(floor.scale_map, np.float32)
     wood = samples.load("wood_solid").image
     rings = texrs.solid(wood, 96, field=fields.circular(axis="z"), seed=1).image
-    shown = [
-        [stones, texrs.design(stones, (192, 384), seed=3).image],
-        [dots.image, net.image, texrs.splice(dots, net, seed=1).image],
-        [floor.image, texrs.perspective(floor.image, scale, wave.shape, target=wave, seed=1).image],
-        [volume.cube(wood, 150), volume.cube(rings, 300)],
+    large = texrs.design(stones, (192, 384), seed=3).image
+    spliced = texrs.splice(dots, net, seed=1).image
+    grown = texrs.perspective(floor.image, scale, wave.shape, target=wave, seed=1).image
+    rows = [
+        [
+            label(stones, "input", HEIGHT, given=True),
+            label(large, "texrs design", HEIGHT),
+            label(volume.cube(wood, 200), "input", HEIGHT, given=True),
+            label(volume.cube(rings, 200), "texrs solid", HEIGHT),
+        ],
+        [
+            label(dots.image, "input", HEIGHT, given=True),
+            label(net.image, "input: the layout", HEIGHT, given=True),
+            label(spliced, "texrs splice", HEIGHT),
+            label(floor.image, "input", HEIGHT, given=True),
+            label(grown, "texrs perspective", HEIGHT),
+        ],
     ]
-    rows = [beside(pictures, HEIGHT) for pictures in shown]
-    return below([beside([rows[0], rows[3]]), beside([rows[1], rows[2]])])
+    return below([beside(row) for row in rows])
 
 
 def main() -> None:
