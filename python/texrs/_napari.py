@@ -17,11 +17,11 @@ import numpy as np
 from texrs import elements, io
 from texrs._typing import Array
 from texrs.errors import FileError, TexrsError
+from texrs.io._formats import READ_VOLUMES
 from texrs.source_map import SourceMap
 
 LayerData = tuple[Any, dict[str, Any], str]
 """Data, options, and the kind of layer."""
-_SUFFIXES = (".npy", ".npz", ".nrrd", ".nii", ".nii.gz", ".tif", ".tiff", ".vti", ".vtk")
 _BRIGHT = 4
 """Channels up to which a last axis may be colours."""
 
@@ -36,7 +36,7 @@ def get_reader(path: str | Sequence[str]) -> Callable[[str | Sequence[str]], lis
 
     """
     names = [path] if isinstance(path, str | os.PathLike) else list(path)
-    known = [io.is_store(name) or os.fspath(name).lower().endswith(_SUFFIXES) for name in names]
+    known = [io.is_store(name) or os.fspath(name).lower().endswith(READ_VOLUMES) for name in names]
     return read if names and all(known) else None
 
 

@@ -16,14 +16,13 @@ from texrs import io
 from texrs.cli._outputs import SAMPLE
 from texrs.cli._provenance import read_status
 from texrs.errors import FileError, InvalidInput
+from texrs.io._formats import READ_IMAGES, READ_VOLUMES, WRITTEN_IMAGES, WRITTEN_VOLUMES
 from texrs.materials import guess_role
 
 __all__ = ["Job", "Recipe", "check_recipe", "check_results", "list_jobs", "list_maps", "parse_options", "read_recipe"]
 
-PICTURES = (".png", ".tif", ".tiff", ".exr", ".hdr", ".webp", ".jpg", ".jpeg", ".bmp", ".gif", ".npy", ".npz")
-VOLUMES = (".tif", ".tiff", ".npy", ".npz", ".nrrd", ".nii", ".gz", ".vti")
-KEPT = (".png", ".tif", ".tiff", ".exr", ".hdr", ".npy")
-KEPT_VOLUMES = (".tif", ".tiff", ".npy", ".nrrd", ".nii", ".vti")
+KEPT = tuple(s for s in WRITTEN_IMAGES if s not in (".webp", ".jpg", ".jpeg", ".bmp", ".npz"))
+KEPT_VOLUMES = tuple(s for s in WRITTEN_VOLUMES if s not in (".npz", ".nii.gz"))
 """Formats of inputs that results have too; of others the results are .png, or .npy."""
 OF_VOLUMES = ("solid", "slice")
 """Commands that take volumes."""
@@ -142,8 +141,8 @@ def find_inputs(recipe: Recipe) -> list[str]:
             some = [text]
         elif os.path.isdir(text):
             several = [os.path.join(text, name) for name in sorted(os.listdir(text)) if not name.startswith(".")]
-            suffixes = VOLUMES if recipe.verb in OF_VOLUMES else PICTURES
-            some = [p for p in several if (os.path.isfile(p) and Path(p).suffix.lower() in suffixes) or io.is_store(p)]
+            suffixes = READ_VOLUMES if recipe.verb in OF_VOLUMES else READ_IMAGES
+            some = [p for p in several if (os.path.isfile(p) and p.lower().endswith(suffixes)) or io.is_store(p)]
             some = some or [p for p in several if is_material(p, recipe.verb)]
         else:
             several = sorted(glob.glob(text, recursive=True))
@@ -165,7 +164,7 @@ def is_material(path: str, verb: str) -> bool:
 def list_maps(folder: str) -> list[str]:
     """Return the pictures in a folder whose names say what they are for."""
     names = sorted(os.listdir(folder)) if os.path.isdir(folder) else []
-    return [n for n in names if Path(n).suffix.lower() in PICTURES and guess_role(Path(n).stem) is not None]
+    return [n for n in names if n.lower().endswith(READ_IMAGES) and guess_role(Path(n).stem) is not None]
 
 
 def list_jobs(recipe: Recipe) -> Iterator[Job]:

@@ -17,13 +17,14 @@ from texrs.fields._directions import from_directions
 from texrs.fields._field import Field
 from texrs.fields._parse import parse
 from texrs.fields._sampled import from_array
+from texrs.io._formats import READ_VOLUMES, STORE
 
 __all__ = ["FieldLike", "as_field", "read"]
 
 FieldLike: TypeAlias = Field | ArrayLike | os.PathLike[str]
 """What stands for a field: see `as_field`."""
 
-SUFFIXES = (".npy", ".npz", ".nrrd", ".nii", ".nii.gz", ".vti", ".vtk", ".zarr", ".tif", ".tiff")
+SUFFIXES = (*READ_VOLUMES, STORE)
 _OPTIONS = ("along", "order", "up", "signed")
 
 

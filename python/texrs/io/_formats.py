@@ -85,6 +85,13 @@ FORMATS = {
     ".nii.gz": _NIFTI,
     ".vti": _SCIENCE,
 }
+"""The formats that are written, by suffix."""
+WRITTEN_IMAGES = tuple(suffix for suffix, form in FORMATS.items() if form.images)
+WRITTEN_VOLUMES = tuple(suffix for suffix, form in FORMATS.items() if form.volumes)
+READ_IMAGES = (*WRITTEN_IMAGES, ".gif")
+READ_VOLUMES = (*WRITTEN_VOLUMES, ".vtk")
+"""Suffixes of files that hold images or volumes, stores of Zarr apart. All lists of suffixes in texrs come from these."""
+READ = tuple(dict.fromkeys((*READ_IMAGES, *READ_VOLUMES)))
 
 
 def detect_kind(path: Path) -> str:

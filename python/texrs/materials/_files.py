@@ -16,28 +16,14 @@ from texrs._threads import SideBySide
 from texrs._typing import Array, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.io._files import as_path
+from texrs.io._formats import READ
 from texrs.materials._map import Map
 from texrs.materials._mipmaps import halve
 from texrs.materials._roles import Role, as_role, guess_role
 
 __all__ = ["read_maps", "write_maps"]
 
-SUFFIXES = (
-    ".png",
-    ".tif",
-    ".tiff",
-    ".exr",
-    ".hdr",
-    ".webp",
-    ".jpg",
-    ".jpeg",
-    ".bmp",
-    ".npy",
-    ".npz",
-    ".nrrd",
-    ".nii",
-    ".nii.gz",
-)
+SUFFIXES = READ
 """Of files that may be maps."""
 MOST = 64
 """Maps that a material may have."""
