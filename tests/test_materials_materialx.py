@@ -88,7 +88,7 @@ def test_a_document_is_valid_and_names_its_maps(tmp_path: Path) -> None:
     inputs, files = check(paths[0])
     assert {name: path.name for name, path in files.items()} == {
         "colour_image": "my stones_albedo.png",
-        "normal_image": "my stones_nor_dx.png",
+        "normal_image": "my stones_nor_gl.png",
         "roughness_image": "my stones_rough.png",
         "metallic_image": "my stones_metal.png",
         "emission_image": "my stones_glow.exr",

@@ -18,7 +18,8 @@ from texrs.cli import _outputs, _provenance
 from texrs.cli._provenance import check_free
 from texrs.errors import FileError, InvalidInput
 from texrs.materials import Map, Material
-from texrs.materials._files import SMALLER, choose_suffix, convert
+from texrs.materials._converting import convert
+from texrs.materials._files import SMALLER, choose_suffix
 from texrs.materials._packing import pack_maps, unpack_maps
 from texrs.synthesis import Synthesis
 
@@ -116,7 +117,7 @@ class Stack:
             _outputs.check_apart(read, {"out": os.path.join(out, file)})
             check_free(os.path.join(out, file))
             # Tried beside what is there, in the folder or where it will be made.
-            _outputs.check_output(str(there / f".texrs-{file}"), convert(each.pixels, self.depth), material.shape)
+            _outputs.check_output(str(there / f".texrs-{file}"), convert(name, each, self.depth).pixels, material.shape)
 
     def list_maps(self, material: Material) -> Mapping[str, Map]:
         """Return the maps that are written."""

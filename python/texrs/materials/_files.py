@@ -2,29 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from contextlib import ExitStack
+import os
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, suppress
+from io import BytesIO
 from pathlib import Path as FilePath
 
 import numpy as np
 
 from texrs import io
-from texrs._arrays import to_unit
 from texrs._checks import as_instance
 from texrs._notices import ignore
 from texrs._threads import SideBySide
-from texrs._typing import Array, Path
+from texrs._typing import Path
 from texrs.errors import FileError, InvalidInput
 from texrs.io._files import as_path
-from texrs.io._formats import READ
-from texrs.materials._map import Map
+from texrs.io._formats import READ, READ_IMAGES, READ_VOLUMES
+from texrs.materials._converting import choose_dtype, convert
+from texrs.materials._map import Map, find_space
 from texrs.materials._mipmaps import halve
 from texrs.materials._roles import Role, as_role, guess_role
 
 __all__ = ["read_maps", "write_maps"]
 
-SUFFIXES = READ
-"""Of files that may be maps."""
+DOCUMENTS = (".txt", ".md", ".json", ".html", ".htm", ".pdf", ".csv", ".yaml", ".yml", ".toml", ".url")
+"""Suffixes of files that describe maps and never are maps."""
+SYSTEM = ("thumbs.db", "desktop.ini")
+"""Files that file managers leave in folders, besides hidden ones."""
+NAMED = 8
+"""Maximum number of names in a notice."""
 MOST = 64
 """Maps that a material may have."""
 AT_ONCE = 4
@@ -33,13 +39,13 @@ SMALLER = "mipmaps"
 """Folder of what is not a map of the material itself, so that reading finds maps of one size."""
 
 
-def read_maps(path: Path, roles: dict[str, Role | str], axes: int) -> tuple[dict[str, Array], dict[str, Role]]:
+def read_maps(path: Path, roles: dict[str, Role | str], axes: int) -> tuple[dict[str, Map], dict[str, Role]]:
     """Return the maps of a folder and their roles, by the names that they have without what is common to all."""
     folder = as_path(path)
     if not folder.is_dir():
         raise FileError(f"{path}: is not a folder of maps")
-    files = {f.name: f for f in sorted(folder.iterdir()) if f.is_file() and f.name.lower().endswith(SUFFIXES)}
-    stems = {name: _cut_suffix(name) for name in files}
+    files, left = list_files(folder, axes)
+    stems = {name: split_suffix(name)[0] for name in files}
     said: dict[str, Role] = {}
     for name, role in roles.items():
         chosen = [file for file in files if name in (file, stems[file])]
@@ -47,27 +53,85 @@ def read_maps(path: Path, roles: dict[str, Role | str], axes: int) -> tuple[dict
             raise InvalidInput(f"roles: there is no picture {name!r} in {path}; there are {', '.join(files) or 'none'}")
         said |= dict.fromkeys(chosen, as_role(role, f"roles[{name!r}]"))
     found = {name: said.get(name) or guess_role(stems[name]) for name in files}
-    left = [name for name, role in found.items() if role is None]
     taken = {name: role for name, role in found.items() if role is not None}
+    if unknown := [name for name, role in found.items() if role is None]:
+        left["the name gives no role"] = unknown
+    lines = [f"{show_names(names)} not used: {reason}" for reason, names in left.items() if names]
     if not taken:
-        raise FileError(f"{path}: no picture has a name that says what it is for, such as albedo.png; say it by roles")
+        why = f" ({'; '.join(lines)})" if lines else ""
+        raise FileError(
+            f"{path}: no picture has a name that says what it is for, such as albedo.png; say it by roles{why}"
+        )
     if len(taken) > MOST:
         raise FileError(f"{path}: has {len(taken)} maps, up to {MOST} are allowed")
-    if left:
-        ignore(f"{path}: {', '.join(left)} not used: no role is known for the name")
+    for line in lines:
+        ignore(f"{path}: {line}")
     short = shorten([stems[name] for name in taken])
     if len(set(short)) < len(short):
         twice = next(name for name in short if short.count(name) > 1)
         raise FileError(f"{path}: two files are the map {twice}; a material has one of each")
-    read = io.read if axes == 2 else io.read_volume
-    maps = {key: read(files[name]) for key, name in zip(short, taken, strict=True)}
+    maps = {key: read_map(files[name], role, axes) for key, (name, role) in zip(short, taken.items(), strict=True)}
     return maps, dict(zip(short, taken.values(), strict=True))
 
 
-def _cut_suffix(name: str) -> str:
-    """Return a file's name without its suffix, of which some have two parts."""
-    suffix = max((s for s in SUFFIXES if name.lower().endswith(s)), key=len)
-    return name[: -len(suffix)]
+def list_files(folder: FilePath, axes: int) -> tuple[dict[str, FilePath], dict[str, list[str]]]:
+    """Return the files in a folder that may be maps, by name, and the names of all others by the reason."""
+    files: dict[str, FilePath] = {}
+    formats, inner = list[str](), list[str]()
+    known = READ_IMAGES if axes == 2 else READ_VOLUMES
+    for place in sorted(folder.iterdir()):
+        name, lower = place.name, place.name.lower()
+        if name.startswith(".") or lower in SYSTEM or lower.endswith(DOCUMENTS):
+            continue
+        if place.is_dir() and not io.is_store(place):
+            own = name == SMALLER or (place / "report.json").exists()
+            if not own and any(split_suffix(f)[1] for _, _, several in os.walk(place) for f in several):
+                inner.append(name)
+        elif place.is_file() and split_suffix(name, known)[1]:
+            files[name] = place
+        else:
+            formats.append(name)
+    what = "maps" if axes == 2 else "maps of volumes"
+    return files, {
+        f"{what} are not read from files of this format": formats,
+        f"{what} are not read from subfolders": inner,
+    }
+
+
+def split_suffix(name: str, known: Sequence[str] = READ) -> tuple[str, str]:
+    """Return the name of a file without its suffix, and the suffix; an empty one if it is not known."""
+    suffix = max((s for s in known if name.lower().endswith(s)), key=len, default="")
+    return name[: len(name) - len(suffix)], suffix
+
+
+def show_names(names: Sequence[str]) -> str:
+    """Return names on one line, and how many more there are."""
+    shown = ", ".join(names[:NAMED])
+    return shown if len(names) <= NAMED else f"{shown} and {len(names) - NAMED} more"
+
+
+def read_map(file: FilePath, role: Role, axes: int) -> Map:
+    """Return the map in a file; its colours are encoded as the file states, or as is usual."""
+    pixels = (io.read if axes == 2 else io.read_volume)(file)
+    space = find_space(role, pixels.dtype)
+    if space == "srgb":
+        notes = io.read_notes(file)
+        if notes.gamma == 1 and not notes.srgb:
+            space = "linear"
+        if notes.profile is not None and (title := name_profile(notes.profile)) is not None:
+            ignore(f"{file}: the ICC profile {title!r} is not used: maps of a material are read and written as sRGB")
+    return Map(pixels, role, space)
+
+
+def name_profile(profile: bytes) -> str | None:
+    """Return what an ICC profile calls itself, unless it is sRGB."""
+    from PIL import ImageCms
+
+    title = "unknown"
+    # Nothing depends on what a damaged profile contains.
+    with suppress(OSError, ImageCms.PyCMSError):
+        title = " ".join(ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(BytesIO(profile))).split())
+    return None if "srgb" in title.lower() else title
 
 
 def shorten(names: list[str]) -> list[str]:
@@ -111,35 +175,23 @@ def write_maps(
     small: list[FilePath] = []
     (smaller if mipmaps else place).mkdir(parents=True, exist_ok=True)
     with ExitStack() as stack:
-        work: list[tuple[FilePath, Map]] = []
+        work: list[tuple[FilePath, str, Map]] = []
         for name, each in maps.items():
             files.append(place / f"{name}{endings[name]}")
-            work.append((stack.enter_context(io.atomic(files[-1])), each))
-            for level, less in enumerate(halve(each, axes) if mipmaps else (), 1):
+            work.append((stack.enter_context(io.atomic(files[-1])), name, each))
+            for level, less in enumerate(halve(convert(name, each, depth), axes) if mipmaps else (), 1):
                 small.append(smaller / f"{name}.{level}{endings[name]}")
-                work.append((stack.enter_context(io.atomic(small[-1])), less))
+                work.append((stack.enter_context(io.atomic(small[-1])), name, less))
         with SideBySide(AT_ONCE) as beside:
-            beside.do(lambda each, _: write(each[0], convert(each[1].pixels, depth)), work)
+            beside.do(lambda each, _: write(each[0], convert(each[1], each[2], depth).pixels), work)
     return files + small
 
 
 def choose_suffix(each: Map, depth: int | None) -> str:
     """Return the format that keeps a map as it is: PNG for 8 and 16 bit of up to four channels, TIFF or EXR for the rest."""
-    pixels = convert(each.pixels[:1], depth)
-    if pixels.ndim > 3 or (pixels.ndim == 3 and pixels.shape[-1] > 4):
+    shape, dtype = each.pixels.shape, choose_dtype(each.pixels.dtype, depth)
+    if len(shape) > 3 or (len(shape) == 3 and shape[-1] > 4):
         return ".tif"
-    if pixels.dtype in (np.bool_, np.uint8, np.uint16):
+    if dtype in (np.bool_, np.uint8, np.uint16):
         return ".png"
-    return ".exr" if pixels.dtype in (np.float16, np.float32) else ".tif"
-
-
-def convert(pixels: Array, depth: int | None) -> Array:
-    """Return values in so many bits: integers of 8 or 16, floats of 32; as they are where nothing is asked."""
-    if depth is None or pixels.dtype == np.bool_:
-        return pixels
-    if depth == 32:
-        return pixels if pixels.dtype.kind == "f" and pixels.itemsize <= 4 else to_unit(pixels)
-    kind = np.dtype(f"u{depth // 8}")
-    if pixels.dtype == kind:
-        return pixels
-    return np.rint(to_unit(pixels) * np.float64(np.iinfo(kind).max)).astype(kind)
+    return ".exr" if dtype in (np.float16, np.float32) else ".tif"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,12 @@ from texrs._colours import Space
 from texrs._typing import Array
 from texrs.materials._roles import Role
 
-__all__ = ["Map", "Space"]
+__all__ = ["Map", "Space", "find_space"]
+
+
+def find_space(role: Role, dtype: np.dtype[Any]) -> Space:
+    """Return how a file of this dtype encodes a map of this role: integers of colours are sRGB, all else is linear."""
+    return "srgb" if role.coloured and dtype.kind in "ui" else "linear"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -22,7 +22,7 @@ from texrs.errors import InvalidInput
 from texrs.io._files import as_path
 from texrs.materials._exports import Exports
 from texrs.materials._guide import WEIGHTS, make_guides, take_features
-from texrs.materials._map import Map, Space
+from texrs.materials._map import Map, Space, find_space
 from texrs.materials._roles import Role, as_role, guess_role
 from texrs.source_map import SourceMap
 
@@ -120,7 +120,7 @@ class Material(Exports):
         if allowed is not None and image.shape[-1] not in allowed:
             counts = " or ".join(map(str, allowed))
             raise InvalidInput(f"{name}: a map of role {chosen.value} has {counts} channels, got {image.shape[-1]}")
-        usual: Space = "srgb" if chosen.coloured and image.dtype.kind in "ui" else "linear"
+        usual = find_space(chosen, image.dtype)
         if isinstance(value, Map) and chosen == value.role:
             usual = value.space
         if space is not None:

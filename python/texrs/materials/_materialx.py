@@ -16,10 +16,11 @@ from texrs import io
 from texrs._typing import Array, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.io._files import as_path
-from texrs.materials._files import choose_suffix, convert, write_maps
+from texrs.materials._converting import convert
+from texrs.materials._files import choose_suffix, write_maps
 from texrs.materials._light import find_map
 from texrs.materials._map import Map
-from texrs.materials._roles import Role
+from texrs.materials._roles import Role, guess_role
 from texrs.materials._surface import GREY, METAL, ROUGH, list_signed, measure_relief, measure_slopes, take_normals
 
 __all__ = ["write_materialx"]
@@ -27,6 +28,8 @@ __all__ = ["write_materialx"]
 VERSION = "1.38"
 INTEGERS = (np.dtype(np.uint8), np.dtype(np.uint16))
 FLOATS = (np.dtype(np.float16), np.dtype(np.float32))
+UPWARD = {"DirectX": "OpenGL", "directx": "opengl", "DX": "GL", "Dx": "Gl", "dx": "gl"}
+"""Words for normals whose y grows down, and those for the others."""
 SPACES = {"srgb": "srgb_texture", "linear": "lin_rec709"}
 USED = (
     Role.COLOUR,
@@ -51,12 +54,14 @@ def write_materialx(maps: Mapping[str, Map], path: Path, depth: int | None) -> l
         chosen.pop(Role.NORMAL_DX, None)
     if not chosen:
         raise InvalidInput(f"material: none of {', '.join(maps)} is a map that a surface has")
-    stored = {f"{target.stem}_{name}": prepare(maps[name], maps, depth) for name in chosen.values()}
+    names = {name: rename(name, maps[name].role) for name in chosen.values()}
+    chosen = {role: names[name] for role, name in chosen.items()}
+    stored = {f"{target.stem}_{new}": prepare(name, maps, depth) for name, new in names.items()}
     if Role.HEIGHT in chosen and (slopes := measure_slopes(maps, (True, True))) is not None:
         normals = take_normals(maps, {}, slopes, slopes.shape[:2])
-        packed = convert((normals + 1) * np.float32(0.5), depth or 16)
         chosen[Role.NORMAL] = "normal"
-        stored[f"{target.stem}_normal"] = Map(packed, Role.NORMAL, "linear")
+        packed = Map((normals + 1) * np.float32(0.5), Role.NORMAL, "linear")
+        stored[f"{target.stem}_normal"] = convert("normal", packed, depth or 16)
     files = {role: f"{target.stem}_{name}" for role, name in chosen.items()}
     document = compose(
         re.sub(r"\W", "_", target.stem, flags=re.ASCII),
@@ -72,8 +77,26 @@ def write_materialx(maps: Mapping[str, Map], path: Path, depth: int | None) -> l
     return [target, *written]
 
 
-def prepare(each: Map, maps: Mapping[str, Map], depth: int | None) -> Map:
+def rename(name: str, role: Role) -> str:
+    """Return the name of a map that is written with y up, though its own name may say that y is down.
+
+    Examples
+    --------
+    >>> rename("nor_dx", Role.NORMAL_DX), rename("NormalDX", Role.NORMAL_DX), rename("stone_n", Role.NORMAL_DX)
+    ('nor_gl', 'NormalGL', 'stone_n_gl')
+
+    """
+    if not role.normal or (role is Role.NORMAL and guess_role(name) is not Role.NORMAL_DX):
+        return name
+    for down, up in UPWARD.items():
+        if down in name:
+            return up.join(name.rsplit(down, 1))
+    return f"{name}_gl"
+
+
+def prepare(name: str, maps: Mapping[str, Map], depth: int | None) -> Map:
     """Return a map as files of renderers hold it: colours of three or four channels, normals with y up, one number else."""
+    each = maps[name]
     pixels = each.pixels if each.pixels.ndim > 2 else each.pixels[..., np.newaxis]
     if each.role.coloured:
         pixels = spread_grey(pixels)
@@ -81,21 +104,15 @@ def prepare(each: Map, maps: Mapping[str, Map], depth: int | None) -> Map:
         if pixels.dtype in INTEGERS:
             pixels = turn_green(pixels) if each.role is Role.NORMAL_DX else pixels
         else:
-            name = next(n for n, m in maps.items() if m is each)
             pixels = (take_normals({name: each}, list_signed(maps), None, pixels.shape[:2]) + 1) * np.float32(0.5)
         pixels = pixels[..., :3]
     elif each.role is Role.ORM:
         pixels = pixels[..., :3]
     else:
         pixels = pixels[..., 0]
-    if depth is not None:
-        pixels = convert(pixels, depth)
-    elif pixels.dtype.kind == "f":
-        pixels = pixels if pixels.dtype in FLOATS else pixels.astype(np.float32)
-    elif pixels.dtype not in (*INTEGERS, np.dtype(np.bool_)):
-        pixels = convert(pixels, 16)
-    role = Role.NORMAL if each.role.normal else each.role
-    return Map(pixels, role, each.space)
+    if depth is None and pixels.dtype not in (*INTEGERS, *FLOATS, np.dtype(np.bool_)):
+        depth = 32 if pixels.dtype.kind == "f" else 16
+    return convert(name, Map(pixels, Role.NORMAL if each.role.normal else each.role, each.space), depth)
 
 
 def spread_grey(pixels: Array) -> Array:

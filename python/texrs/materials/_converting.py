@@ -1,0 +1,131 @@
+"""Maps in another depth: the same light, directions, shares and labels, encoded as whoever reads the file expects.
+
+==================== =================================== ===================================================
+Role                 Integers                            Floats
+==================== =================================== ===================================================
+colours, emission    sRGB, alpha as a share              linear light
+normals, vectors     0 to the maximum means -1 to 1      as they were: -1 to 1, or shares if none is negative
+labels               whole numbers                       whole numbers
+heights, others      shares; other ranges are spread     as they were
+all other roles      shares                              as they were
+==================== =================================== ===================================================
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from texrs._arrays import to_unit
+from texrs._colours import Space, encode_srgb, to_light, to_pixels
+from texrs._notices import assume, ignore
+from texrs._typing import Array, Floats
+from texrs.errors import InvalidInput
+from texrs.materials._map import Map, find_space
+from texrs.materials._roles import Role
+
+__all__ = ["choose_dtype", "convert"]
+
+SPREAD = (Role.HEIGHT, Role.OTHER)
+"""Roles whose values have no fixed range."""
+WHOLE = 2**24
+"""Single precision holds all whole numbers up to this one."""
+
+
+def choose_dtype(dtype: np.dtype[Any], depth: int | None) -> np.dtype[Any]:
+    """Return the dtype of so many bits: integers of 8 or 16, floats of 32; the same one if none are given."""
+    if depth is None or dtype == np.bool_ or (depth == 32 and dtype.kind == "f" and dtype.itemsize <= 4):
+        return dtype
+    return np.dtype(np.float32 if depth == 32 else f"u{depth // 8}")
+
+
+def convert(name: str, each: Map, depth: int | None) -> Map:
+    """Return a map in so many bits, in the space in which a file of them is read.
+
+    Raises
+    ------
+    InvalidInput
+        Labels are larger than the dtype can hold.
+
+    """
+    pixels, dtype = each.pixels, choose_dtype(each.pixels.dtype, depth)
+    space = find_space(each.role, dtype)
+    if pixels.dtype == dtype and each.space == space:
+        return each
+    if each.role is Role.LABELS:
+        made = keep_labels(name, pixels, dtype)
+    elif space != each.space:
+        made = to_pixels(recode(name, each, space, dtype), dtype)
+    elif dtype.kind == "f":
+        made = read_vectors(pixels, each.role) if pixels.dtype.kind == "i" else to_float(pixels, dtype)
+    else:
+        made = to_pixels(find_shares(name, pixels, each.role), dtype)
+    return Map(made, each.role, space)
+
+
+def keep_labels(name: str, pixels: Array, dtype: np.dtype[Any]) -> Array:
+    """Return labels in another dtype, with the same values."""
+    most = WHOLE if dtype.kind == "f" else np.iinfo(dtype).max
+    low, high = pixels.min(), pixels.max()
+    if high > most or low < (-WHOLE if dtype.kind == "f" else 0):
+        raise InvalidInput(f"{name}: must be labels from 0 to {most} to be written as {dtype}, got {low} to {high}")
+    return pixels.astype(dtype)
+
+
+def recode(name: str, each: Map, space: Space, dtype: np.dtype[Any]) -> Floats:
+    """Return values in the other space; alpha is a share in both."""
+    flat = each.pixels.ndim == 2
+    light = to_light(each.pixels, each.space)
+    if not flat and each.pixels.shape[-1] in (2, 4):
+        light[..., -1:] = to_light(each.pixels[..., -1:], "linear")
+    if space == "linear":
+        return light
+    if dtype.kind != "f":
+        report_cut(name, light)
+    shown = encode_srgb(light)
+    if not flat and each.pixels.shape[-1] in (2, 4):
+        shown[..., -1] = light[..., -1]
+    return shown
+
+
+def to_float(pixels: Array, dtype: np.dtype[Any]) -> Array:
+    """Return integers as shares of their range, and floats as they are."""
+    return to_pixels(pixels, dtype) if pixels.dtype.kind == "f" else to_unit(pixels)
+
+
+def read_vectors(pixels: Array, role: Role) -> Floats:
+    """Return signed integers as floats: of normals and vectors -1 to 1, of others shares."""
+    if role.normal or role is Role.VECTOR:
+        return np.asarray(pixels / np.float32(np.iinfo(pixels.dtype).max), np.float32)
+    return to_unit(pixels)
+
+
+def find_shares(name: str, pixels: Array, role: Role) -> Floats:
+    """Return values as shares, 0 to 1."""
+    kind = pixels.dtype.kind
+    if role.normal or role is Role.VECTOR:
+        if kind == "i":
+            return (read_vectors(pixels, role) + np.float32(1)) * np.float32(0.5)
+        if kind == "f" and pixels.min() < 0:
+            largest = float(np.abs(pixels).max())
+            if role is Role.VECTOR and largest > 1:
+                assume(f"{name}: vectors are written as shares of the largest component, {largest:g}")
+                pixels = pixels / largest
+            return (pixels.astype(np.float32) + np.float32(1)) * np.float32(0.5)
+        return to_unit(pixels) if kind == "u" else pixels.astype(np.float32)
+    if kind != "f":
+        return to_unit(pixels)
+    if role not in SPREAD:
+        report_cut(name, pixels)
+        return pixels.astype(np.float32)
+    low, high = float(pixels.min()), float(pixels.max())
+    if low < 0 or high > 1:
+        assume(f"{name}: values from {min(low, 0):.4g} to {high:.4g} are spread over the range of integers")
+    return to_unit(pixels)
+
+
+def report_cut(name: str, values: Array) -> None:
+    """Report values that integers cannot hold."""
+    if values.min() < 0 or values.max() > 1:
+        ignore(f"{name}: values below 0 and above 1 are not kept: integers end there, floats of 32 bits do not")

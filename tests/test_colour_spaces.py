@@ -1,0 +1,213 @@
+"""Values keep their meaning in every depth and format: written, read again, and compared as light, shares and directions."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import texrs
+from texrs import Material, io
+from texrs.cli import main
+from texrs.errors import InputWarning, InvalidInput
+
+RNG = np.random.default_rng(4)
+TRUTH = RNG.uniform(0.02, 0.98, (12, 10, 4))
+VECTORS = RNG.normal(0, 0.4, (12, 10, 3)) + np.array([0, 0, 1])
+VECTORS /= np.linalg.norm(VECTORS, axis=-1, keepdims=True)
+VECTORS[..., 2] = np.abs(VECTORS[..., 2])
+DTYPES = ("uint8", "uint16", "float16", "float32", "float64")
+TARGETS = [
+    (".png", 8),
+    (".png", 16),
+    (".tif", 8),
+    (".tif", 16),
+    (".tif", 32),
+    (".exr", 32),
+    (".npy", 8),
+    (".npy", 16),
+    (".npy", 32),
+    (None, None),
+    (None, 8),
+    (None, 16),
+    (None, 32),
+]
+CHANNELS = {
+    "colour": (3, 4),
+    "emission": (3,),
+    "normal": (3,),
+    "normal-dx": (3,),
+    "vector": (3,),
+    "orm": (3,),
+    "other": (1, 3),
+}
+"""Of roles; of the rest one."""
+ROLES = (*CHANNELS, "height", "roughness", "metallic", "occlusion", "opacity", "mask")
+FINE = {"uint8": 1 / 255, "uint16": 1 / 65535, "float16": 1e-3, "float32": 1e-6, "float64": 1e-6}
+"""The largest step between values, as stored."""
+COLOURED, DIRECTED = ("colour", "emission"), ("normal", "normal-dx", "vector")
+
+
+def to_srgb(light: NDArray[Any]) -> NDArray[Any]:
+    return np.where(light <= 0.0031308, light * 12.92, 1.055 * light ** (1 / 2.4) - 0.055)
+
+
+def to_linear(shown: NDArray[Any]) -> NDArray[Any]:
+    return np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)
+
+
+def encode(role: str, channels: int, dtype: str, *, signed: bool = False) -> NDArray[Any]:
+    """Return what a file of a dtype holds if it means the truth."""
+    values = (VECTORS + 1) / 2 if role in DIRECTED else TRUTH[..., :channels].copy()
+    if dtype.startswith("f"):
+        return (VECTORS if signed else values[..., 0] if channels == 1 else values).astype(dtype)
+    if role in COLOURED:
+        values[..., :3] = to_srgb(values[..., :3])
+    whole = np.rint(values * np.iinfo(dtype).max).astype(dtype)
+    return whole[..., 0] if channels == 1 else whole
+
+
+def decode(role: str, pixels: NDArray[Any]) -> NDArray[Any]:
+    """Return what the values of a file mean."""
+    if pixels.dtype.kind == "f":
+        values = pixels.astype(float)
+        return (values + 1) / 2 if role in DIRECTED and values.min() < 0 else values
+    values = pixels / np.iinfo(pixels.dtype).max
+    if role in COLOURED:
+        values[..., :3] = to_linear(values[..., :3])
+    return values
+
+
+CASES = [(role, channels, dtype) for role in ROLES for channels in CHANNELS.get(role, (1,)) for dtype in DTYPES]
+
+
+@pytest.mark.parametrize(("role", "channels", "dtype"), CASES)
+def test_every_role_keeps_its_meaning(role: str, channels: int, dtype: str, tmp_path: Path) -> None:
+    given = encode(role, channels, dtype)
+    material = Material({"map": given}, roles={"map": role})
+    truth = (VECTORS + 1) / 2 if role in DIRECTED else TRUTH[..., :channels]
+    truth = truth[..., 0] if channels == 1 else truth
+    for suffix, depth in TARGETS:
+        place = tmp_path / f"{suffix}{depth}"
+        material.save(place, suffix=suffix, depth=depth)  # type: ignore[arg-type]
+        back = Material.read(place, roles={"map": role})["map"]
+        stored = str(back.pixels.dtype)
+        if depth is not None:
+            assert back.depth == depth or (depth == 32 and dtype == "float16" and stored == "float16")
+        # A step of sRGB is up to 2.3 as much light.
+        step = 2.3 * max(FINE[dtype], FINE[stored])
+        assert np.abs(decode(role, back.pixels) - truth).max() < step, (suffix, depth, stored)
+        if stored == dtype:
+            assert (back.pixels == given).all()
+
+
+@pytest.mark.parametrize("role", DIRECTED)
+@pytest.mark.parametrize("dtype", ["float16", "float32", "float64", "int8", "int16"])
+def test_signed_directions_keep_theirs(role: str, dtype: str, tmp_path: Path) -> None:
+    if dtype.startswith("f"):
+        given = encode(role, 3, dtype, signed=True)
+    else:
+        given = np.rint(VECTORS * np.iinfo(dtype).max).astype(dtype)
+    material = Material({"map": given}, roles={"map": role})
+    for depth in (8, 16, 32):
+        material.save(tmp_path / str(depth), depth=depth)  # type: ignore[arg-type]
+        back = Material.read(tmp_path / str(depth), roles={"map": role})["map"].pixels
+        assert np.abs(decode(role, back) - (VECTORS + 1) / 2).max() < 1 / 127
+
+
+def test_the_numbers_that_people_meet(tmp_path: Path) -> None:
+    grey = Material({"albedo": np.full((8, 8, 3), 128, np.uint8)})
+    grey.save(tmp_path / "float", suffix=".exr", depth=32)
+    assert io.read(tmp_path / "float" / "albedo.exr").mean() == pytest.approx(0.2158605, abs=1e-5)
+    light = np.linspace(0.0, 0.4, 64, dtype=np.float32).reshape(8, 8)
+    Material({"albedo": light}).save(tmp_path / "whole", depth=8)
+    assert io.read(tmp_path / "whole" / "albedo.png").mean() == pytest.approx((to_srgb(light) * 255).mean(), abs=0.1)
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_spaces_that_were_stated_hold_on_the_way_out(dtype: str, tmp_path: Path) -> None:
+    """Linear integers and sRGB floats are written as a reader without knowledge of them expects."""
+    whole = dtype.startswith("u")
+    values = TRUTH[..., :3] if whole else to_srgb(TRUTH[..., :3])
+    given = np.rint(values * np.iinfo(dtype).max).astype(dtype) if whole else values.astype(dtype)
+    material = Material({"albedo": given}, spaces={"albedo": "linear" if whole else "srgb"})
+    for depth in (None, 8, 16, 32):
+        material.save(tmp_path / str(depth), depth=depth)  # type: ignore[arg-type]
+        back = Material.read(tmp_path / str(depth))["albedo"].pixels
+        # Half of a linear step near black is many steps of sRGB, but little light.
+        assert np.abs(decode("colour", back) - TRUTH[..., :3]).max() < 2.3 * max(FINE[dtype], FINE[str(back.dtype)])
+
+
+def test_labels_keep_their_numbers(tmp_path: Path) -> None:
+    ids = RNG.integers(0, 200, (8, 8)).astype(np.uint16)
+    for depth in (8, 16, 32):
+        Material({"labels": ids}).save(tmp_path, depth=depth)  # type: ignore[arg-type]
+        suffix = ".exr" if depth == 32 else ".png"
+        assert (io.read(tmp_path / f"labels{suffix}") == ids).all()
+    with pytest.raises(InvalidInput, match="labels from 0 to 255"):
+        Material({"labels": ids + np.uint16(200)}).save(tmp_path, depth=8)
+
+
+def test_values_that_integers_cannot_hold_are_reported(tmp_path: Path) -> None:
+    bright = Material({"albedo": np.full((4, 4, 3), 2, np.float32)})
+    with pytest.warns(InputWarning, match="albedo: values below 0 and above 1 are not kept"):
+        bright.save(tmp_path, depth=8)
+    assert (io.read(tmp_path / "albedo.png") == 255).all()
+    bright.save(tmp_path, depth=32)
+    assert (io.read(tmp_path / "albedo.exr") == 2).all()
+    # Doubles are not brought to 0 to 1.
+    Material({"height": np.array([[-2.0, 3.0]])}).save(tmp_path, depth=32)
+    assert io.read(tmp_path / "height.exr").tolist() == [[-2, 3]]
+
+
+def test_mipmaps_and_packed_maps_follow(tmp_path: Path) -> None:
+    light = TRUTH[..., :3].astype(np.float32)
+    material = Material({"albedo": light, "roughness": light[..., 0], "ao": light[..., 1]})
+    material.save(tmp_path, depth=8, pack="orm", mipmaps=True)
+    assert np.abs(io.read(tmp_path / "orm.png")[..., :2] / 255 - light[..., [1, 0]]).max() < 1 / 255
+    smaller = to_linear(io.read(tmp_path / "mipmaps" / "albedo.1.png") / 255)
+    assert np.abs(smaller - light.reshape(6, 2, 5, 2, 3).mean(axis=(1, 3))).max() < 3 / 255
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("depth", [None, 16, 32])
+def test_layers_of_an_exr_file_are_light(dtype: str, depth: Any, tmp_path: Path) -> None:
+    pixels = encode("colour", 3, dtype)
+    made = {"albedo": pixels.astype(np.float32) if dtype == "float64" else pixels}
+    back = Material.read(Material(made).save_exr(tmp_path / "a.exr", depth=depth))["albedo"].pixels
+    assert np.abs(decode("colour", back) - TRUTH[..., :3]).max() < 2.3 * max(FINE[dtype], FINE[str(back.dtype)])
+
+
+def test_a_linear_png_is_read_as_it_says(tmp_path: Path) -> None:
+    """A gamma of 1 states that the integers are light."""
+    whole = np.rint(TRUTH[..., :3] * 65535).astype(np.uint16)
+    io.write(tmp_path / "albedo.png", whole)
+    io.annotate(tmp_path / "albedo.png", io.Notes(gamma=1.0))
+    material = Material.read(tmp_path)
+    assert material["albedo"].space == "linear"
+    material.save(tmp_path / "new", depth=32)
+    assert np.abs(io.read(tmp_path / "new" / "albedo.exr") - TRUTH[..., :3]).max() < 1e-4
+
+
+def test_commands_write_light(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("rock").mkdir()
+    io.write("rock/albedo.png", np.full((32, 32, 3), 128, np.uint8))
+    io.write("rock/roughness.png", np.full((32, 32), 128, np.uint8))
+    words = ["design", "rock", "--size", "32x32", "-q"]
+    assert main([*words, "-o", "out", "--format", "exr", "--depth", "32"]) == 0
+    assert io.read("out/albedo.exr").mean() == pytest.approx(0.2158605, abs=1e-5)
+    assert io.read("out/roughness.exr").mean() == pytest.approx(128 / 255, abs=1e-6)
+    assert main(["design", "out", "--size", "32x32", "-q", "-o", "back", "--format", "png", "--depth", "8"]) == 0
+    assert (io.read("back/albedo.png") == 128).all()
+    assert (io.read("back/roughness.png") == 128).all()
+
+
+@pytest.mark.parametrize("out", ["a.exr", "a.hdr"])
+def test_a_single_picture_is_not_converted_silently(
+    out: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    io.write(tmp_path / "albedo.png", texrs.samples.pebbles((48, 48)).image)
+    assert main(["tile", str(tmp_path / "albedo.png"), "-o", str(tmp_path / out)]) == 2
+    assert "cannot hold uint8" in capsys.readouterr().err
