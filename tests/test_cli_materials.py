@@ -1,6 +1,7 @@
 """Materials on the command line: folders of maps in, folders of maps out, nothing lost."""
 
 import hashlib
+import json
 import os
 from pathlib import Path
 
@@ -68,7 +69,7 @@ def test_colours_are_brought_into_even_light_and_heights_are_not(here: Path) -> 
 
 def test_what_names_do_not_tell_is_left_out_and_said(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["tile", "rock", "-o", "new"]) == 0
-    assert "left out rock_wet.png" in capsys.readouterr().err
+    assert "rock_wet.png not used: the name gives no role" in capsys.readouterr().err
     assert sorted(p.name for p in Path("new").iterdir()) == ["albedo.png", "height.png"]
 
 
@@ -184,7 +185,12 @@ def test_layers_of_a_file(here: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert io.read("tiled/height.png").dtype == np.uint16
     capsys.readouterr()
     assert main(["info", "new.exr"]) == 0
-    assert "material: 64 x 64, layers albedo (colour, uint8), height (height, uint16)" in capsys.readouterr().out
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[:3] == [
+        "material: 64 x 64, 2 layers",
+        "albedo: colour, sRGB, 3 channels, uint8",
+        "height: height, linear, 1 channel, uint16",
+    ]
     assert main(["rerun", "new.exr", "-q"]) == 0
     assert "the same bytes" in capsys.readouterr().out
 
@@ -208,7 +214,10 @@ def test_what_engines_load(here: Path, capsys: pytest.CaptureFixture[str]) -> No
         assert main(["info", made]) == 0
         assert capsys.readouterr().out.startswith(says)
     assert main(["info", "new"]) == 0
-    assert capsys.readouterr().out.startswith("material: 64 x 64, maps albedo (colour, uint8), height (height, uint16)")
+    assert capsys.readouterr().out.splitlines()[:2] == [
+        "material: 64 x 64, 2 maps",
+        "albedo: colour, sRGB, 3 channels, uint8",
+    ]
     for name in ("bad.glb", "bad.mtlx"):
         Path(name).write_bytes(b"something else")
         assert main(["info", name]) == 2
@@ -265,3 +274,49 @@ def test_nothing_is_lost_and_nothing_half_written(
     assert says in capsys.readouterr().err
     assert files(here) == before
     assert not Path("new").exists()
+
+
+def test_whatever_a_folder_does_not_give_is_reported(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A file of another format, a file without a role, a subfolder: each with its reason, by info, the verb and the report."""
+    Path("rock/rock_normal.tga_").write_bytes(b"1")
+    Path("rock/licence.txt").write_text("CC0")
+    Path("rock/.hidden.png").write_bytes(b"1")
+    Path("rock/Thumbs.db").write_bytes(b"1")
+    for inner, file in (("source", "raw.png"), ("mipmaps", "albedo.1.png"), ("notes", "notes.txt")):
+        Path("rock", inner).mkdir()
+        Path("rock", inner, file).write_bytes(b"1")
+    expected = [
+        "rock: rock_normal.tga_ not used: maps are not read from files of this format",
+        "rock: source not used: maps are not read from subfolders",
+        "rock: rock_wet.png not used: the name gives no role",
+    ]
+    assert main(["info", "rock"]) == 0
+    said = capsys.readouterr()
+    assert [line.removeprefix("texrs: ") for line in said.err.splitlines()] == expected
+    assert said.out.splitlines() == [
+        "material: 64 x 48, 2 maps",
+        "albedo: colour, sRGB, 3 channels, uint8",
+        "height: height, linear, 1 channel, uint16",
+    ]
+    assert main(["tile", "rock", "-o", "new", "--stages", "stages"]) == 0
+    said = capsys.readouterr()
+    assert all(line in said.err for line in expected)
+    assert json.loads(Path("stages/report.json").read_text())["ignored"] == expected
+    for words in (["info", "rock"], ["tile", "rock", "-o", "strict"]):
+        assert main([*words, "--strict"]) == 2
+        assert "rock_normal.tga_" in capsys.readouterr().err
+    Path("rock/rock_albedo.png").unlink()
+    Path("rock/rock_height.png").unlink()
+    assert main(["info", "rock"]) == 2
+    assert "rock_normal.tga_ not used: maps are not read from files of this format" in capsys.readouterr().err
+
+
+def test_a_profile_that_a_folder_loses_is_reported(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from PIL import ImageCms
+
+    lab = ImageCms.ImageCmsProfile(ImageCms.createProfile("LAB")).tobytes()
+    srgb = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    for profile, count in ((srgb, 0), (lab, 1), (b"damaged" * 40, 1)):
+        io.annotate("rock/rock_albedo.png", io.Notes(profile=profile))
+        assert main(["info", "rock"]) == 0
+        assert capsys.readouterr().err.count("ICC profile") == count

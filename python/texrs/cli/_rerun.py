@@ -7,7 +7,6 @@ import os
 import shlex
 import shutil
 import tempfile
-import warnings
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -222,7 +221,8 @@ def info_command(
         say(describe_store(file))
         return
     if os.path.isdir(file):
-        say(describe_material(file, "maps"))
+        for line in describe_material(file, "map"):
+            say(line)
         return
     recipe = Recipe.read(file)
     for line in describe_file(file, recipe):
@@ -263,7 +263,7 @@ def describe_file(file: str, recipe: Recipe | None) -> list[str]:
             except FileError:
                 continue
     if is_stack(file):
-        return [describe_material(file, "layers")]
+        return describe_material(file, "layer")
     volume = recipe is not None and recipe.verb == "solid" and recipe.output == "--out"
     try:
         image, axes = (io.read_volume(file), 3) if volume else (io.read(file), 2)
@@ -282,14 +282,11 @@ def describe_store(path: str) -> str:
     return f"store: {' x '.join(map(str, array.shape))} of {array.dtype}, {array.min()} to {array.max()}"
 
 
-def describe_material(path: str, what: str) -> str:
-    """Return a line about the maps of a folder, or the layers of a file."""
-    with warnings.catch_warnings(record=True) as left:
-        warnings.simplefilter("always")
-        shown = Material.read(path)
-    for warning in left:
-        note(str(warning.message), quiet=False)
-    return f"material: {show_sides(shown.shape)}, {what} {', '.join(map(describe_layer, shown.items()))}"
+def describe_material(path: str, what: str) -> list[str]:
+    """Return lines about the maps of a folder, or the layers of a file; what is not used is a notice."""
+    shown = Material.read(path)
+    first = f"material: {show_sides(shown.shape)}, {len(shown)} {what}{'s'[: len(shown) != 1]}"
+    return [first, *(describe_layer(name, each) for name, each in shown.items())]
 
 
 def describe_scene(file: str) -> str:
@@ -317,10 +314,10 @@ def describe_document(file: str) -> str:
     return f"material: MaterialX {root.get('version', '')}, of {', '.join(dict.fromkeys(names))}"
 
 
-def describe_layer(each: tuple[str, Map]) -> str:
-    """Return the name of a map, and what it is."""
-    name, one = each
-    return f"{name} ({one.role.value}, {one.pixels.dtype})"
+def describe_layer(name: str, each: Map) -> str:
+    """Return the name of a map, its role, how it encodes light, and its samples."""
+    space = "sRGB" if each.space == "srgb" else each.space
+    return f"{name}: {each.role.value}, {space}, {each.channels} channel{'s'[: each.channels != 1]}, {each.pixels.dtype}"
 
 
 def describe_map(file: str) -> list[str]:
