@@ -8,10 +8,11 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from texrs import Material
+from texrs import Material, io
 from texrs._colours import decode_srgb
 from texrs._typing import Array
-from texrs.errors import FileError, InvalidInput, LimitExceeded
+from texrs.cli import main
+from texrs.errors import FileError, InputWarning, InvalidInput, LimitExceeded
 from texrs.io._layers import read_layers
 from texrs.materials import Role
 
@@ -141,12 +142,88 @@ def test_files_of_other_programs_are_read_by_names(tmp_path: Path) -> None:
     assert back["height"].pixels.ndim == 2
     plain = Material.read(write(tmp_path / "c.exr", [({}, {**colours, "depth.V": one})]), roles={"depth": "height"})
     assert {name: each.role for name, each in plain.items()} == {"colour": Role.COLOUR, "depth": Role.HEIGHT}
-    with pytest.warns(UserWarning, match="depth not used"):
-        assert list(Material.read(tmp_path / "c.exr")) == ["colour"]
     with pytest.raises(InvalidInput, match="there is no layer 'deep'"):
         Material.read(tmp_path / "c.exr", roles={"deep": "height"})
     with pytest.raises(FileError, match="no layer has a name"):
-        Material.read(write(tmp_path / "d.exr", [({}, {"beauty.V": one, "glory.V": one})]))
+        Material.read(write(tmp_path / "d.exr", [({}, {"grace.V": one, "glory.V": one})]))
+
+
+def write_render(path: Path) -> Path:
+    """Write what Blender writes: all layers begin with the name of the view layer."""
+    one = draw("float32")
+    passes = {"Combined": "RGBA", "Depth": "Z", "Normal": "XYZ", "DiffCol": "RGB", "Mist": "Z", "IndexOB": "X"}
+    passes |= {"Vector": "XYZW", "UV": "UVA", "CryptoObject00": "rgba", "Puddles": "RGB"}
+    return write(path, [({}, {f"ViewLayer.{name}.{k}": one for name, letters in passes.items() for k in letters})])
+
+
+def test_every_layer_of_a_render_is_used_or_reported(tmp_path: Path) -> None:
+    path = write_render(tmp_path / "render.exr")
+    with pytest.warns(InputWarning) as caught:
+        back = Material.read(path)
+    assert {name: (each.role.value, each.channels) for name, each in back.items()} == {
+        "Combined": ("colour", 4),
+        "Depth": ("other", 1),
+        "DiffCol": ("colour", 3),
+        "IndexOB": ("labels", 1),
+        "Mist": ("other", 1),
+        "Normal": ("normal", 3),
+        "UV": ("other", 3),
+        "Vector": ("other", 4),
+    }
+    assert [str(warning.message) for warning in caught] == back.notices.ignored
+    assert back.notices.ignored == [
+        f"{path}: CryptoObject00 not used: Cryptomatte is not read",
+        f"{path}: Puddles not used: the name gives no role",
+    ]
+    assert back.notices.assumed == [
+        f"{path}: Depth, Mist read as other: a distance from the camera is not a height",
+        f"{path}: IndexOB read as labels",
+        f"{path}: Normal read as tangent-space normals, y up; a render has them in world space",
+    ]
+    assert back.base_name == "Combined"
+    with pytest.warns(InputWarning):
+        stated = Material.read(path, roles={"Depth": "height", "Normal": "vector"})
+    assert stated["Depth"].role is Role.HEIGHT
+    assert stated.notices.assumed == [
+        f"{path}: IndexOB read as labels",
+        f"{path}: Mist read as other: a distance from the camera is not a height",
+    ]
+
+
+def test_a_sky_at_infinity_is_reported(tmp_path: Path) -> None:
+    one = draw("float32")
+    path = write(tmp_path / "a.exr", [({}, {"L.Color.R": one, "L.Depth.Z": np.where(one > 0.5, np.inf, one)})])
+    with pytest.warns(InputWarning, match="Depth not used: it contains infinite values"):
+        assert list(Material.read(path)) == ["Color"]
+
+
+def test_channels_beside_a_picture_are_no_part_of_it(tmp_path: Path) -> None:
+    """A depth beside R, G and B is not their transparency, and a picture says that it is not used."""
+    one = draw("float32")
+    path = write(tmp_path / "a.exr", [({}, {"R": one, "G": one, "B": one, "Z": one})])
+    back = Material.read(path)
+    assert {name: (each.role.value, each.channels) for name, each in back.items()} == {
+        "colour": ("colour", 3),
+        "Z": ("other", 1),
+    }
+    with pytest.warns(InputWarning, match="Z not used: these channels are not part of the picture"):
+        assert io.read(path).shape[2] == 3
+    io.read(write(tmp_path / "b.exr", [({}, {"R": one, "G": one, "B": one, "A": one})]))
+    io.read(write(tmp_path / "c.exr", [({}, {"Z": one})]))
+
+
+def test_a_command_takes_layers_beside_a_picture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    one = draw("float32")
+    path = write(tmp_path / "a.exr", [({}, {"R": one, "G": one, "B": one, "height.Y": one})])
+    assert main(["design", str(path), "--size", "16x16", "-o", str(tmp_path / "out")]) == 0
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["colour.exr", "height.exr"]
+    assert main(["design", str(path), "--size", "16x16", "-o", str(tmp_path / "out.png")]) == 2
+    assert "--out: must be a folder or one .exr file" in capsys.readouterr().err
+    assert not (tmp_path / "out.png").exists()
+    flat = write(tmp_path / "b.exr", [({}, {"R": one, "G": one, "B": one, "Z": one})])
+    assert main(["design", str(flat), "--size", "16x16", "-o", str(tmp_path / "flat.exr")]) == 0
+    assert "Z not used" in capsys.readouterr().err
+    assert main(["design", str(flat), "--size", "16x16", "-o", str(tmp_path / "no.exr"), "--strict"]) == 2
 
 
 def test_the_picture_is_the_display_window(tmp_path: Path) -> None:

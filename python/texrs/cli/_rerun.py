@@ -317,7 +317,9 @@ def describe_document(file: str) -> str:
 def describe_layer(name: str, each: Map) -> str:
     """Return the name of a map, its role, how it encodes light, and its samples."""
     space = "sRGB" if each.space == "srgb" else each.space
-    return f"{name}: {each.role.value}, {space}, {each.channels} channel{'s'[: each.channels != 1]}, {each.pixels.dtype}"
+    return (
+        f"{name}: {each.role.value}, {space}, {each.channels} channel{'s'[: each.channels != 1]}, {each.pixels.dtype}"
+    )
 
 
 def describe_map(file: str) -> list[str]:

@@ -14,12 +14,14 @@ from typing import Annotated, Any
 import typer
 
 from texrs import io
+from texrs._notices import collect
 from texrs.cli import _outputs, _provenance
 from texrs.cli._provenance import check_free
 from texrs.errors import FileError, InvalidInput
+from texrs.io._tags import list_exr_channels
 from texrs.materials import Map, Material
 from texrs.materials._converting import convert
-from texrs.materials._files import SMALLER, choose_suffix
+from texrs.materials._files import SMALLER, choose_suffix, split_suffix
 from texrs.materials._packing import pack_maps, unpack_maps
 from texrs.synthesis import Synthesis
 
@@ -108,6 +110,9 @@ class Stack:
                 )
             _outputs.check_output(out)
             return
+        suffix = split_suffix(out)[1]
+        if suffix and not os.path.isdir(out):
+            raise InvalidInput(f"--out: must be a folder or one {LAYERED} file for the maps of a material, got {out!r}")
         _outputs.check_folder(out)
         there = Path(out)
         while not there.exists():
@@ -191,9 +196,13 @@ def is_stack(text: str) -> bool:
     """Return whether a name is that of a folder, or of an EXR file whose channels are not those of one picture."""
     if os.path.isdir(text):
         return not io.is_store(text)
-    if Path(text).suffix.lower() != LAYERED:
+    if Path(text).suffix.lower() != LAYERED or not os.path.isfile(text):
         return False
-    with suppress(FileError):
+    with suppress(Exception):
+        # Layers have names in front of those of their channels.
+        if any("." in name for name in list_exr_channels(Path(text))):
+            return True
+    with suppress(FileError), collect(show=lambda line: None):
         io.read(text)
         return False
-    return os.path.isfile(text)
+    return True

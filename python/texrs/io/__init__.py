@@ -50,6 +50,7 @@ from math import atan, degrees, prod
 
 import numpy as np
 
+from texrs import _notices
 from texrs._checks import as_items, as_limit, try_array
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
@@ -151,7 +152,11 @@ def read(path: PathLike, *, limit: int | None = None) -> Array:
     if kind == "bmp":
         return _pillow.read_bmp(name, file, limit)
     with _files.translate_errors(name, "decoding"):
-        return _files.turn_upright(*_image_io.decode(name, file, limit))
+        image = _files.turn_upright(*_image_io.decode(name, file, limit))
+        rest = _image_io.list_rest(name, image) if kind == "exr" else []
+    if rest:
+        _notices.ignore(f"{name}: {', '.join(rest)} not used: these channels are not part of the picture")
+    return image
 
 
 def read_fov(path: PathLike) -> float | None:

@@ -8,6 +8,10 @@ import numpy as np
 
 from texrs import _rust
 from texrs._typing import Array
+from texrs.io._tags import list_exr_channels
+
+PICTURES = {1: ("Y",), 2: ("Y", "A"), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
+"""Channels of pictures in EXR files, by their number."""
 
 
 def decode(path: Path, file: bytes, limit: int) -> tuple[Array, int]:
@@ -28,6 +32,14 @@ def encode(path: str | Path, image: Array, format: str) -> bytes:
     return _rust.encode_image(
         _make_printable(path), format, image.dtype.name, (rows, columns, channels), samples
     ).tobytes()
+
+
+def list_rest(path: Path, image: Array) -> list[str]:
+    """Return the channels of an EXR file that are not in its picture."""
+    names = list_exr_channels(path)
+    count = 1 if image.ndim == 2 else image.shape[2]
+    used = names if len(names) == count else PICTURES[count]
+    return [name for name in names if name not in used]
 
 
 def _make_printable(path: str | Path) -> str:

@@ -200,6 +200,20 @@ def _walk_exr(data: bytes) -> tuple[dict[bytes, tuple[bytes, int, int]], int]:
     return found, at
 
 
+def list_exr_channels(path: Path) -> list[str]:
+    """Return the full names of the channels of an OpenEXR file, of its first part if there are several."""
+    with path.open("rb") as file:
+        data = file.read(_MOST)
+    _, at, end = _walk_exr(data)[0][b"channels"]
+    names = []
+    while at < end - 1:
+        stop = data.index(b"\0", at)
+        names.append(data[at:stop].decode("utf-8", "replace"))
+        # Type, linearity and sampling follow each name.
+        at = stop + 17
+    return names
+
+
 def read_exr(path: Path) -> dict[str, Any]:
     """Return what an OpenEXR file of one part says."""
     data = path.read_bytes()

@@ -17,6 +17,7 @@ layers.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from pathlib import Path as FilePath
 from typing import Any
@@ -25,12 +26,12 @@ import numpy as np
 
 from texrs._checks import as_float
 from texrs._colours import encode_srgb, to_light, to_pixels
-from texrs._notices import ignore
+from texrs._notices import assume, ignore
 from texrs._typing import Array, Path
 from texrs.errors import FileError, InvalidInput
 from texrs.io._files import as_path
 from texrs.io._layers import read_layers, write_layers
-from texrs.materials._files import shorten
+from texrs.materials._files import shorten, show_names
 from texrs.materials._map import Map
 from texrs.materials._roles import Role, as_role, guess_role
 
@@ -40,6 +41,16 @@ NAMES = ("Y", "YA", "RGB", "RGBA")
 VECTORS = ("X", "XY", "XYZ", "XYZA")
 ORDER = "RGBXYZUVWA"
 """In which letters of channels follow each other."""
+PASSES = {
+    **dict.fromkeys(["combined", "beauty", "rgba", "rgb", "image", "noisyimage"], Role.COLOUR),
+    **dict.fromkeys(["indexob", "indexma", "objectid", "materialid"], Role.LABELS),
+    **dict.fromkeys(["depth", "z", "mist", "position", "p", "uv", "env", "shadow", "shadowcatcher"], Role.OTHER),
+    **dict.fromkeys(
+        ["diffdir", "diffind", "glossdir", "glossind", "transdir", "transind", "volumedir", "volumeind"], Role.OTHER
+    ),
+    "n": Role.NORMAL,
+}
+"""Roles of the layers of renderers, Blender's first, by their names without capitals; other names are as in folders."""
 PICTURE = "colour"
 """The map whose channels belong to no layer."""
 
@@ -117,35 +128,76 @@ def restore(stored: Array, role: Role, space: str, dtype: np.dtype[Any]) -> Arra
 def read_exr(path: Path, roles: Mapping[str, Role | str]) -> tuple[dict[str, Map], dict[str, Role], dict[str, float]]:
     """Return the maps of a file, a layer each, the roles that were said of them, and the weights."""
     channels, words = read_layers(path)
+    known = parse(words)
     layers: dict[str, dict[str, Array]] = {}
     for full, pixels in channels.items():
         layer, _, letter = full.rpartition(".")
         layers.setdefault(layer or PICTURE, {})[letter] = pixels
-    known = parse(words)
-    short = layers if known else dict(zip(shorten(list(layers)), layers.values(), strict=True))
+    if not known:
+        layers = {name: part for layer, letters in layers.items() for name, part in split_layer(layer, letters).items()}
+        layers = dict(zip(shorten(list(layers)), layers.values(), strict=True))
     said = {name: as_role(role, f"roles[{name!r}]") for name, role in roles.items()}
-    if unknown := said.keys() - short.keys():
-        raise InvalidInput(f"roles: there is no layer {sorted(unknown)[0]!r} in {path}; there are {', '.join(short)}")
+    if unknown := said.keys() - layers.keys():
+        raise InvalidInput(f"roles: there is no layer {sorted(unknown)[0]!r} in {path}; there are {', '.join(layers)}")
     maps: dict[str, Map] = {}
-    for name, letters in short.items():
+    left: dict[str, list[str]] = {}
+    taken: dict[str, list[str]] = {}
+    for name, letters in layers.items():
         stored = join(str(path), name, letters)
-        told = known.get(name, {})
-        role = said.get(name) or (as_role(told["role"], name) if told else guess_role(name))
-        if role is None:
-            continue
-        if told:
+        if name in known:
+            told = known[name]
             first = as_role(told["role"], name)
             pixels = restore(stored, first, told["space"], np.dtype(told["dtype"]))
-            maps[name] = Map(pixels if told["channels"] else pixels[..., 0], role, told["space"])
-        else:
-            maps[name] = Map(stored if stored.shape[-1] > 1 else stored[..., 0], role, "linear")
-    left = [name for name in short if name not in maps]
+            maps[name] = Map(pixels if told["channels"] else pixels[..., 0], said.get(name, first), told["space"])
+            continue
+        role, why = (said[name], "") if name in said else guess_pass(name, stored)
+        if role is None:
+            left.setdefault(why, []).append(name)
+            continue
+        if why:
+            taken.setdefault(why, []).append(name)
+        maps[name] = Map(stored if stored.shape[-1] > 1 else stored[..., 0], role, "linear")
+    lines = [f"{show_names(names)} not used: {why}" for why, names in left.items()]
     if not maps:
-        raise FileError(f"{path}: no layer has a name that says what it is for: {', '.join(short)}; say it by roles")
-    if left:
-        ignore(f"{path}: {', '.join(left)} not used: no role is known for the name")
+        raise FileError(f"{path}: no layer has a name that says what it is for; say it by roles ({'; '.join(lines)})")
+    for line in lines:
+        ignore(f"{path}: {line}")
+    for why, names in taken.items():
+        assume(f"{path}: {show_names(names)} read as {why}")
     weights = {name: told["weight"] for name, told in known.items() if "weight" in told and name in maps}
     return maps, {name: each.role for name, each in maps.items()}, weights
+
+
+def split_layer(name: str, letters: Mapping[str, Array]) -> dict[str, dict[str, Array]]:
+    """Return the picture of a layer, and by names of their own the channels that are no part of it, such as a depth."""
+    picture = next((p for p in ("RGBA", "YA") if p[0] in letters and not {"X", "Y"} <= letters.keys()), None)
+    if picture is None:
+        return {name: dict(letters)}
+    parts = {name: {letter: pixels for letter, pixels in letters.items() if letter in picture}}
+    before = "" if name == PICTURE else f"{name}."
+    return parts | {before + letter: {letter: pixels} for letter, pixels in letters.items() if letter not in picture}
+
+
+def guess_pass(name: str, pixels: Array) -> tuple[Role | None, str]:
+    """Return the role of a layer of another program, and what was assumed; or None, and the reason."""
+    word = re.sub(r"[^a-z0-9]", "", name.rpartition(".")[2].lower())
+    if word.startswith("crypto"):
+        return None, "Cryptomatte is not read"
+    role = PASSES.get(word) or guess_role(name)
+    if role is None:
+        return None, "the name gives no role"
+    if role is Role.VECTOR and pixels.shape[-1] > 3:
+        # Motion to the frame before and to the one after.
+        role = Role.OTHER
+    if role is Role.OTHER and not np.isfinite(pixels).all():
+        return None, "it contains infinite values or NaN"
+    if role.normal:
+        up = "down" if role is Role.NORMAL_DX else "up"
+        return role, f"tangent-space normals, y {up}; a render has them in world space"
+    if role is Role.LABELS:
+        return role, "labels"
+    distance = word in ("depth", "z", "mist")
+    return role, "other: a distance from the camera is not a height" if distance else ""
 
 
 def join(path: str, name: str, letters: Mapping[str, Array]) -> Array:
