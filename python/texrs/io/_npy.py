@@ -15,6 +15,7 @@ from typing import BinaryIO, cast
 import numpy as np
 
 from texrs._checks import as_limit, check_memory
+from texrs._notices import ignore
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, LimitExceeded
@@ -87,7 +88,10 @@ def read_npz(path: Path, limit: int, check: Callable[[Header], object] | None = 
             keys = ", ".join(m.filename.removesuffix(".npy") for m in members[:8])
             raise FileError(f"{path}: needs a single array, or one with the key {_KEY!r}; has {keys or 'no arrays'}")
         with _open_member(path, archive, chosen[0]) as file:
-            return _read_array(path, file, chosen[0].file_size, limit, check)
+            array = _read_array(path, file, chosen[0].file_size, limit, check)
+    if rest := [m.filename.removesuffix(".npy") for m in members if m is not chosen[0]]:
+        ignore(f"{path}: {', '.join(rest)} not used: only the array {_KEY!r} is read")
+    return array
 
 
 def read_headers(path: PathLike) -> dict[str, Header]:

@@ -156,8 +156,9 @@ class Material(Exports):
 
         Warns
         -----
-        UserWarning
-            Pictures or layers are left out, for their names do not say what they are for.
+        InputWarning
+            Files, subfolders or layers are not used: the name gives no role, the format is not read, and so on. `notices`
+            keeps the reasons. Hidden files, texts and what texrs writes beside maps do not count.
 
         Examples
         --------
