@@ -20,14 +20,14 @@ from . import (
 )
 from ._threads import threads
 from ._version import __version__
-from .blending import apply, blend
+from .blending import blend
 from .completion import complete
 from .database import TextureDatabase
 from .elements import Elements
 from .exemplar import ElementOptions, Exemplar
 from .extension import extend
 from .growth.constraints import Constraints, Guide
-from .materials import Material
+from .materials import Material, apply
 from .papers.design import DeformationOptions, design, design_variants
 from .papers.perspective import perspective
 from .papers.solid import solid, synthesize

@@ -201,11 +201,9 @@ def apply(
     finish: Finish | None = None,
     progress: Progress | bool | None = None,
 ) -> Array:
-    """Look a map of the exemplar up through a source map, and finish it as the verb that made it finished its picture.
+    """Look a map up through a source map, and finish it as the verb that made the source map finished its picture.
 
-    ``apply(result.source, exemplar)`` is ``result.image``, bit for bit, but where things are lit anew (`texrs.splice`): seams
-    disappear, samples are interpolated, and what is kept is kept, in the same way. Of a map without a finish nothing is
-    corrected.
+    The kind of the map is stated here; `texrs.apply` takes it from the name of a file.
 
     Parameters
     ----------
@@ -214,15 +212,13 @@ def apply(
     exemplars : (H, W[, C]) or (D, H, W[, C]) array, or a sequence of one an exemplar
         Any map of the exemplar's height and width (and depth), any dtype and channels.
     kind : {"colour", "normal", "vector", "label"}
-        "colour": also heights and whatever else may be mixed; where the finish takes uneven light out, it does so of them too.
-        "normal", "vector": tangent-space normals, directions on the surface, as in `SourceMap.render`. "label": values that
-        have no meaning between them; the nearest sample is taken, and nothing corrected.
+        As in `texrs.apply`.
     green : {"up", "down"}
-        Whether the y of normals and vectors grows up (OpenGL) or down (DirectX).
+        As in `texrs.apply`.
     finish : Finish, optional
         Another finish than that of the map.
     progress : callable or True, optional
-        Called as ``progress("blend", share)`` where seams are corrected; raising stops the work. True shows a bar.
+        As in `texrs.apply`.
 
     Returns
     -------
@@ -234,21 +230,13 @@ def apply(
     InvalidInput
         Another number of exemplars, or of another size, than the map was made from; a kind that is not known.
 
-    See Also
-    --------
-    texrs.SourceMap.render : The look-up alone.
-    blend : The correction alone, in any strength.
-
     Examples
     --------
     >>> import texrs
     >>> pebbles = texrs.samples.pebbles((64, 64)).image
     >>> result = texrs.design(pebbles, 64)
-    >>> bool((texrs.apply(result.source, pebbles) == result.image).all())
+    >>> bool((texrs.blending.apply(result.source, pebbles) == result.image).all())
     True
-    >>> heights = pebbles[..., :1].astype("float32")
-    >>> texrs.apply(result.source, heights).dtype
-    dtype('float32')
 
     """
     progress = listen(progress)

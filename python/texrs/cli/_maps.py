@@ -13,7 +13,7 @@ from texrs import io
 from texrs._arrays import as_float, as_int
 from texrs._evening import flatten
 from texrs._threads import threads
-from texrs.blending import apply
+from texrs._typing import Array
 from texrs.cli import _outputs, _provenance
 from texrs.cli._console import note, show_progress
 from texrs.cli._options import Options, take_options
@@ -21,7 +21,8 @@ from texrs.cli._outputs import Quiet, Threads, describe, make_argument, name_arg
 from texrs.cli._parts import is_stored
 from texrs.cli._provenance import check_free
 from texrs.errors import InvalidInput
-from texrs.materials import Role, guess_role
+from texrs.materials import apply
+from texrs.materials._applying import Green, Kind, choose_finish, choose_kind
 from texrs.source_map import Finish, SourceMap
 
 APPLIED = Options(
@@ -36,7 +37,8 @@ APPLIED = Options(
     },
     optional=dict.fromkeys(
         ("wrap", "interpolation", "antialias", "screening", "across", "outlines", "flatten"), "as the map says"
-    ),
+    )
+    | dict.fromkeys(("kind", "green"), "as the name says"),
 )
 
 
@@ -58,9 +60,8 @@ def apply_command(
     targets = name_targets(groups, out, [source, *maps])
     finish = change_finish(places, values | APPLIED.read(given, which=lambda o: o.file))
     if is_stored(out):
-        plain = {path[0]: v for path, v in values.items() if len(path) == 1}
         with name_arguments(**APPLIED.name_values(given), exemplars=" and ".join(maps)):
-            store_map(places, maps, out, fit(finish, maps, given), plain, count=count, quiet=quiet)
+            store_map(places, maps, out, fit(finish, maps, given), values, count=count, quiet=quiet)
         return
     records = [_provenance.narrow([source, *paths]) for paths in groups]
     for target, made in zip(targets, records, strict=True):
@@ -76,8 +77,8 @@ def apply_command(
             like = replace(io.read_notes(paths[0]).fit(channels), made=None)
             temporary = stack.enter_context(_outputs.write_output(target, like=like, made=made))
             with name_arguments(**APPLIED.name_values(given), exemplars=" and ".join(paths)):
-                plain = {path[0]: v for path, v in values.items() if len(path) == 1}
-                image = apply(places, images, finish=fit(finish, paths, given), **plain)
+                kind, green = read_kind(paths[0], images, places, values)
+                image = apply(places, images, kind=kind, green=green, finish=fit(finish, paths, given))
             if places.axes == 2:
                 io.write(temporary, image)
             else:
@@ -91,7 +92,7 @@ def store_map(
     paths: Sequence[str],
     out: str,
     finish: Finish,
-    given: Mapping[str, Any],
+    values: Mapping[tuple[str, ...], Any],
     *,
     count: int | None,
     quiet: bool,
@@ -103,11 +104,12 @@ def store_map(
             "--blend 0 leaves them as they are, or write to a file"
         )
     read = io.read if places.axes == 2 else io.read_volume
-    images, kind = [read(path) for path in paths], given.get("kind", "colour")
+    images = [read(path) for path in paths]
+    kind, green = read_kind(paths[0], images, places, values)
     if finish.flatten and kind == "colour":
         images = [flatten(image) for image in images]
-    how = {"interpolation": finish.interpolation, "antialias": finish.antialias, **given}
-    how |= {"kind": "colour", "interpolation": "nearest"} if kind == "label" else {}
+    how: dict[str, Any] = {"interpolation": finish.interpolation, "antialias": finish.antialias}
+    how |= {"interpolation": "nearest"} if kind == "label" else {"kind": kind, "green": green}
     running = _provenance.RUNNING.get()
     with show_progress(quiet=quiet) as progress:
         done = places.to_zarr(
@@ -133,11 +135,16 @@ def change_finish(places: SourceMap, values: Mapping[tuple[str, ...], Any]) -> F
     return replace(known, **fields)
 
 
+def read_kind(
+    path: str, images: Sequence[Array], places: SourceMap, values: Mapping[tuple[str, ...], Any]
+) -> tuple[Kind, Green]:
+    """Return how a map is looked up: as the options say, else as its name does."""
+    return choose_kind(path, images, places.axes, values.get(("kind",)), values.get(("green",)))
+
+
 def fit(finish: Finish, paths: Sequence[str], given: Mapping[str, Any]) -> Finish:
     """Return how maps are finished whose names may say that they are no colours, which alone are lit."""
-    role = guess_role(Path(paths[0]).stem)
-    lit = given["finish_flatten"] is not None or role in (None, Role.COLOUR)
-    return finish if lit else replace(finish, flatten=False)
+    return finish if given["finish_flatten"] is not None else choose_finish(finish, paths[0])
 
 
 def group(maps: Sequence[str], count: int) -> list[list[str]]:

@@ -24,7 +24,7 @@ from texrs._version import __version__
 from texrs.errors import InvalidInput
 from texrs.io._annotation import BLANK, hash_file, is_unchanged, name_sidecar, needs_sidecar
 from texrs.materials import guess_role
-from texrs.materials._files import split_suffix
+from texrs.materials._files import read_labels, split_suffix
 
 LEFT = (
     "count",
@@ -192,12 +192,12 @@ def make_record(command: Any, given: Mapping[str, Any], *, force: bool) -> Recor
 
 
 def is_map(path: str, said: Sequence[str]) -> bool:
-    """Return whether a file of a folder is a map of the material in it: by its name, or by what was said of it."""
+    """Return whether a file of a folder is a map of the material in it: by its name, its values, or an option."""
     name = os.path.basename(path)
     stem, suffix = split_suffix(name)
     if not suffix:
         return False
-    return name in said or stem in said or guess_role(stem) is not None
+    return name in said or stem in said or guess_role(stem) is not None or read_labels(Path(path)) is not None
 
 
 @contextmanager

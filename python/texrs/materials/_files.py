@@ -12,13 +12,14 @@ import numpy as np
 
 from texrs import io
 from texrs._checks import as_instance
-from texrs._notices import ignore
+from texrs._notices import assume, ignore
 from texrs._threads import SideBySide
-from texrs._typing import Path
-from texrs.errors import FileError, InvalidInput
-from texrs.io._files import as_path
-from texrs.io._formats import READ, READ_IMAGES, READ_VOLUMES
+from texrs._typing import Array, Path
+from texrs.errors import FileError, InvalidInput, TexrsError
+from texrs.io._files import as_path, find_suffix
+from texrs.io._formats import FORMATS, READ, READ_IMAGES, READ_VOLUMES
 from texrs.materials._converting import choose_dtype, convert
+from texrs.materials._labels import REASON, holds_labels
 from texrs.materials._map import Map, find_space
 from texrs.materials._mipmaps import halve
 from texrs.materials._roles import Role, as_role, guess_role
@@ -54,24 +55,31 @@ def read_maps(path: Path, roles: dict[str, Role | str], axes: int) -> tuple[dict
         said |= dict.fromkeys(chosen, as_role(role, f"roles[{name!r}]"))
     found = {name: said.get(name) or guess_role(stems[name]) for name in files}
     taken = {name: role for name, role in found.items() if role is not None}
-    if unknown := [name for name, role in found.items() if role is None]:
-        left["the name gives no role"] = unknown
-    lines = [f"{show_names(names)} not used: {reason}" for reason, names in left.items() if names]
+    unknown = [name for name, role in found.items() if role is None]
     if not taken:
-        why = f" ({'; '.join(lines)})" if lines else ""
+        left["the name gives no role"] = unknown
+        why = "; ".join(describe_unused(left))
         raise FileError(
-            f"{path}: no picture has a name that says what it is for, such as albedo.png; say it by roles{why}"
+            f"{path}: no picture has a name that says what it is for, such as albedo.png; say it by roles"
+            f"{f' ({why})' if why else ''}"
         )
     if len(taken) > MOST:
         raise FileError(f"{path}: has {len(taken)} maps, up to {MOST} are allowed")
-    for line in lines:
+    maps = {name: read_map(files[name], role, axes) for name, role in taken.items()}
+    shape = next(iter(maps.values())).pixels.shape[:axes]
+    labels = {name: pixels for name in unknown if (pixels := read_labels(files[name], shape)) is not None}
+    left["the name gives no role"] = [name for name in unknown if name not in labels]
+    for line in describe_unused(left):
         ignore(f"{path}: {line}")
-    short = shorten([stems[name] for name in taken])
+    if labels:
+        assume(f"{path}: {show_names(list(labels))} read as {REASON}")
+    maps |= {name: Map(pixels, Role.LABELS, "linear") for name, pixels in labels.items()}
+    short = shorten([stems[name] for name in maps])
     if len(set(short)) < len(short):
         twice = next(name for name in short if short.count(name) > 1)
         raise FileError(f"{path}: two files are the map {twice}; a material has one of each")
-    maps = {key: read_map(files[name], role, axes) for key, (name, role) in zip(short, taken.items(), strict=True)}
-    return maps, dict(zip(short, taken.values(), strict=True))
+    named = dict(zip(short, maps.values(), strict=True))
+    return named, {name: each.role for name, each in named.items()}
 
 
 def list_files(folder: FilePath, axes: int) -> tuple[dict[str, FilePath], dict[str, list[str]]]:
@@ -108,6 +116,24 @@ def show_names(names: Sequence[str]) -> str:
     """Return names on one line, and how many more there are."""
     shown = ", ".join(names[:NAMED])
     return shown if len(names) <= NAMED else f"{shown} and {len(names) - NAMED} more"
+
+
+def read_labels(file: FilePath, shape: tuple[int, ...] | None = None) -> Array | None:
+    """Return the labels in a file whose name gives no role, if its values are labels, of a shape."""
+    form = FORMATS.get(find_suffix(file).lower())
+    if form is None or not any(dtype.kind == "u" for dtype in form.dtypes):
+        return None
+    axes = 2 if shape is None else len(shape)
+    with suppress(TexrsError):
+        pixels = (io.read if axes == 2 else io.read_volume)(file)
+        if shape in (None, pixels.shape[:axes]) and holds_labels(pixels, axes):
+            return pixels
+    return None
+
+
+def describe_unused(left: Mapping[str, Sequence[str]]) -> list[str]:
+    """Return a line for each reason why files are not used."""
+    return [f"{show_names(names)} not used: {reason}" for reason, names in left.items() if names]
 
 
 def read_map(file: FilePath, role: Role, axes: int) -> Map:

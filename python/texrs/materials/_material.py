@@ -12,7 +12,7 @@ import numpy as np
 
 from texrs._arrays import as_axes, as_choice, as_float, as_image, as_instance, as_int
 from texrs._cache import content_hash
-from texrs._notices import Notices, collect
+from texrs._notices import Notices, assume, collect
 from texrs._progress import listen
 from texrs._show import as_png
 from texrs._threads import SideBySide
@@ -22,6 +22,7 @@ from texrs.errors import InvalidInput
 from texrs.io._files import as_path
 from texrs.materials._exports import Exports
 from texrs.materials._guide import WEIGHTS, make_guides, take_features
+from texrs.materials._labels import REASON, holds_labels
 from texrs.materials._map import Map, Space, find_space
 from texrs.materials._roles import Role, as_role, guess_role
 from texrs.source_map import SourceMap
@@ -46,7 +47,8 @@ class Material(Exports):
     Parameters
     ----------
     maps : mapping of str to array or Map
-        By name; the name says the role (see `texrs.materials.guess_role`), where ``roles`` does not. All have the same size.
+        By name; the name gives the role (see `texrs.materials.guess_role`), unless ``roles`` does. Integers that form regions
+        of unrelated values are labels if nothing else is stated (`notices`). All have the same size.
     roles : mapping of str to Role or str, optional
         What maps are for whose name does not say it, or says something else.
     spaces : mapping of str to {"srgb", "linear"}, optional
@@ -87,7 +89,6 @@ class Material(Exports):
         if not isinstance(maps, Mapping) or not maps:
             raise InvalidInput("maps: needs a mapping of names to arrays, with at least one")
         self._axes = as_int(axes, "axes", 2, 3)
-        self._notices = Notices()
         for option, given in (("roles", roles), ("spaces", spaces), ("weights", weights)):
             if given is not None and not isinstance(given, Mapping):
                 raise InvalidInput(f"{option}: needs a mapping by the names of maps, got {given!r}")
@@ -95,7 +96,8 @@ class Material(Exports):
         for option, given in (("roles", said), ("spaces", how), ("weights", share)):
             if unknown := given.keys() - maps.keys():
                 raise InvalidInput(f"{option}: there is no map {sorted(unknown)[0]!r}; there are {', '.join(maps)}")
-        self._maps = {name: self._check(name, each, said.get(name), how.get(name)) for name, each in maps.items()}
+        with collect() as self._notices:
+            self._maps = {name: self._check(name, each, said.get(name), how.get(name)) for name, each in maps.items()}
         sizes = {name: each.pixels.shape[: self._axes] for name, each in self._maps.items()}
         self._shape = next(iter(sizes.values()))
         for name, size in sizes.items():
@@ -112,6 +114,9 @@ class Material(Exports):
         image = as_image(pixels, name, axes=self._axes)
         known = value.role if isinstance(value, Map) else guess_role(name)
         chosen = known if role is None else as_role(role, f"roles[{name!r}]")
+        if chosen is None and holds_labels(image, self._axes):
+            chosen = Role.LABELS
+            assume(f"{name}: read as {REASON}")
         if chosen is None:
             raise InvalidInput(
                 f"{name}: the name does not say what the map is for; say it by roles, as {name!r}: 'other'"

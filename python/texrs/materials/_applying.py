@@ -1,0 +1,139 @@
+"""One map looked up through a source map as its name says, or as its values do."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path as FilePath
+from typing import Literal
+
+from texrs import blending
+from texrs._arrays import as_choice, as_instance, as_list, as_ndarray
+from texrs._notices import assume
+from texrs._progress import listen
+from texrs._typing import Array, Path, Progress
+from texrs.materials._labels import REASON, holds_labels
+from texrs.materials._roles import Role, guess_role
+from texrs.source_map import Finish, SourceMap
+
+__all__ = ["Green", "Kind", "apply", "choose_finish", "choose_kind"]
+
+Kind = Literal["colour", "normal", "vector", "label"]
+Green = Literal["up", "down"]
+
+
+def apply(
+    source: SourceMap,
+    exemplars: Array | Path | Sequence[Array | Path],
+    *,
+    kind: Kind | None = None,
+    green: Green | None = None,
+    finish: Finish | None = None,
+    progress: Progress | bool | None = None,
+) -> Array:
+    """Look a map of the exemplar up through a source map, and finish it as the verb that made it finished its picture.
+
+    ``apply(result.source, exemplar)`` is ``result.image``, bit for bit, except where elements are lit again (`texrs.splice`):
+    seams disappear, samples are interpolated, and known pixels are kept, in the same way. A map without a finish is not
+    corrected.
+
+    Parameters
+    ----------
+    source : SourceMap
+        Of a picture or a volume.
+    exemplars : (H, W[, C]) or (D, H, W[, C]) array or path_like, or a sequence of one an exemplar
+        Any map of the exemplar's height and width (and depth), any dtype and channels. The name of a file gives its role, as
+        in a folder of maps (`texrs.materials.guess_role`).
+    kind : {"colour", "normal", "vector", "label"}, optional
+        "colour": also heights and all other values that may be mixed; if the finish removes uneven light, it does so here.
+        "normal", "vector": tangent-space normals, directions on the surface, as in `SourceMap.render`. "label": values without
+        a meaning between them; the nearest sample is taken, and nothing is corrected. Default: as the name of the file says;
+        without a role, "label" for integers that form regions of unrelated values, else "colour".
+    green : {"up", "down"}, optional
+        Direction in which the y of normals and vectors grows: up (OpenGL) or down (DirectX). Default: as the name of the file
+        says, else "up".
+    finish : Finish, optional
+        Another finish than that of the map.
+    progress : callable or True, optional
+        Called as ``progress("blend", share)`` while seams are corrected; raising stops the work. True shows a bar.
+
+    Returns
+    -------
+    array
+        Shape of the output with the map's channels, in the map's dtype.
+
+    Raises
+    ------
+    InvalidInput
+        Another number of exemplars, or of another size, than the map was made from; a kind that is not known.
+    FileError
+        A file cannot be read.
+
+    See Also
+    --------
+    texrs.SourceMap.render : The look-up alone.
+    texrs.blend : The correction alone, in any strength.
+
+    Examples
+    --------
+    >>> import texrs
+    >>> pebbles = texrs.samples.pebbles((64, 64)).image
+    >>> result = texrs.design(pebbles, 64)
+    >>> bool((texrs.apply(result.source, pebbles) == result.image).all())
+    True
+    >>> heights = pebbles[..., :1].astype("float32")
+    >>> texrs.apply(result.source, heights).dtype
+    dtype('float32')
+
+    """
+    progress = listen(progress)
+    as_instance(source, "source", SourceMap)
+    given = as_list(exemplars)
+    several = [as_ndarray(each, "exemplars", axes=source.axes) for each in given]
+    name = os.fspath(given[0]) if given and isinstance(given[0], str | os.PathLike) else None
+    if finish is None and source.finish is not None:
+        finish = choose_finish(source.finish, name)
+    kind, green = choose_kind(name, several, source.axes, kind, green)
+    return blending.apply(source, several, kind=kind, green=green, finish=finish, progress=progress)
+
+
+def choose_kind(
+    name: str | None, pixels: Sequence[Array], axes: int, kind: Kind | None = None, green: Green | None = None
+) -> tuple[Kind, Green]:
+    """Return how a map is looked up: as stated, as the name of its file says, or as its values do; report the last two."""
+    if kind is not None:
+        as_choice(kind, "kind", ("colour", "normal", "vector", "label"))
+    if green is not None:
+        as_choice(green, "green", ("up", "down"))
+    role = None if name is None else guess_role(FilePath(name).stem)
+    title, usual = name or "exemplars", find_kind(role)
+    found = kind or usual
+    if role is None and kind is None and pixels and all(holds_labels(each, axes) for each in pixels):
+        found = "label"
+        assume(f"{title}: read as {REASON}")
+    y: Green = green or ("down" if role is Role.NORMAL_DX else "up")
+    if kind is None and role is not None and usual in ("normal", "vector"):
+        assume(f"{title}: read as {usual}s, y {y}")
+    elif kind is None and role is not None and usual == "label":
+        assume(f"{title}: read as labels, the values of which are not mixed")
+    elif green is None and found in ("normal", "vector"):
+        assume(f"{title}: read with y {y}")
+    return found, y
+
+
+def find_kind(role: Role | None) -> Kind:
+    """Return how maps of a role are looked up."""
+    if role is None:
+        return "colour"
+    if role.labelled:
+        return "label"
+    if role.normal:
+        return "normal"
+    return "vector" if role is Role.VECTOR else "colour"
+
+
+def choose_finish(finish: Finish, name: str | None) -> Finish:
+    """Return a finish that removes uneven light from colours alone."""
+    role = None if name is None else guess_role(FilePath(name).stem)
+    return replace(finish, flatten=False) if finish.flatten and role not in (None, Role.COLOUR) else finish

