@@ -118,3 +118,22 @@ def test_a_picture_is_enough(files, capsys):
     assert run(files, "perspective @torn.png -o @twice.png") == 0
     assert "no plane was found surely" in capsys.readouterr().err
     assert io.read(files / "twice.png").shape[:2] == tuple(2 * n for n in io.read(files / "torn.png").shape[:2])
+
+
+def test_the_name_of_a_target_says_where_its_y_grows(files, capsys):
+    rows, columns = np.indices((64, 64)) / 63 * 1.2 - 0.6
+    up = np.dstack([columns * 0.3, rows, np.sqrt(np.maximum(1 - 0.09 * columns**2 - rows**2, 0))])
+    whole = np.rint((up + 1) * 127.5).astype(np.uint8)
+    io.write(files / "ball_normal_gl.png", whole)
+    io.write(files / "ball_normal_dx.png", np.dstack([whole[..., 0], 255 - whole[..., 1], whole[..., 2]]))
+    line = "perspective @floor.png --scale-map front --size 64x64 -q -o @{}.png --target @ball_normal_{}.png".format
+    assert run(files, line("gl", "gl")) == 0
+    assert run(files, line("dx", "dx").replace("-q ", "")) == 0
+    said = capsys.readouterr().err
+    assert "ball_normal_dx.png: read with y down, because of its name" in said
+    assert "ball_normal_dx.png: read as normals of a surface" in said
+    assert (io.read(files / "gl.png") == io.read(files / "dx.png")).all()
+    assert run(files, line("told", "dx") + " --target-green up") == 0
+    assert run(files, line("other", "gl") + " --target-green down") == 0
+    assert (io.read(files / "told.png") == io.read(files / "other.png")).all()
+    assert (io.read(files / "told.png") != io.read(files / "gl.png")).any()

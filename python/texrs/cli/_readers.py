@@ -10,6 +10,7 @@ import numpy as np
 
 from texrs import io, samples
 from texrs._arrays import as_image
+from texrs._notices import assume, ignore
 from texrs._typing import Array, Floats
 from texrs.cli._outputs import SAMPLE, name_arguments
 from texrs.cli._texts import PLANE, About, parse_numbers, read_json
@@ -107,6 +108,8 @@ def read_scale_map(path: str, encoding: str = "log2") -> Floats:
 
     values, kind = io.read(path), parse_kind(io.read_description(path))
     if values.dtype.kind == "f":
+        if values.ndim == 3 and (values != values[..., :1]).any():
+            ignore(f"{path}: only the first of {values.shape[2]} channels is used: a scale map has one")
         scale = np.asarray(values if values.ndim == 2 else values[..., 0], np.float32)
     else:
         levels: Any = encoding
@@ -129,8 +132,12 @@ def read_target(text: str) -> Any:
         return io.read_volume(text)
     if values.ndim == 3 and values.shape[2] == 2:
         return values
-    colours = values.ndim == 3 and values.shape[2] >= 3 and bool((values[..., :3] != values[..., :1]).any())
-    return values[..., :3] if colours else read_scale_map(text)
+    if values.ndim == 2 or values.shape[2] < 3 or not (values[..., :3] != values[..., :1]).any():
+        return read_scale_map(text)
+    assume(f"{text}: read as normals of a surface")
+    if values.shape[2] > 3:
+        ignore(f"{text}: {values.shape[2] - 3} of {values.shape[2]} channels not used: normals have three")
+    return values[..., :3]
 
 
 def read_field(text: str, size: tuple[int, ...]) -> Any:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import wraps
+from pathlib import Path
 from typing import Any
 
 from texrs import io
+from texrs._notices import assume
 from texrs._typing import Array
 from texrs.cli import _outputs
 from texrs.cli._kinds import (
@@ -34,7 +36,7 @@ from texrs.cli._options import Options
 from texrs.cli._texts import PLANE
 from texrs.cli._verb import Verb
 from texrs.errors import InvalidInput
-from texrs.materials import Material
+from texrs.materials import Material, Role, guess_role
 from texrs.synthesis import Synthesis
 
 # --- the verbs -------------------------------------------------------------------------------------------------------
@@ -80,8 +82,9 @@ def make_verb(name: str) -> Verb:
                 arguments={"exemplar": EXAMPLE},
                 kinds={"scale_map": SEEN, "target": TARGET, "direction": DIRECTION},
                 names={"kind": "scale-kind"},
+                optional={"target_green": "as the name says"},
             )
-            return Verb(options, times=2, shape="target", says=tell_sizes, knows=read_exemplar_camera)
+            return Verb(options, times=2, shape="target", says=tell_sizes, knows=read_cameras)
         case "rectify":
             from texrs.rectification import rectify
 
@@ -132,6 +135,17 @@ def tell_sizes(result: Synthesis) -> str:
     if found["plane"] is not None:
         where += f" (slant {found['plane']['slant']:.0f}, tilt {found['plane']['tilt']:.0f})"
     return f", sizes measured {where} with a confidence of {found['confidence']:.2f}"
+
+
+def read_cameras(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
+    """Return the angle of view that an exemplar states, and where the y of a target's normals grows, by its name."""
+    found = read_exemplar_camera(given)
+    target = given["target"] or ""
+    if not target.startswith(PLANE) and guess_role(Path(target).stem) is Role.NORMAL_DX:
+        found["target_green",] = "down"
+        if given["target_green"] is None:
+            assume(f"{target}: read with y down, because of its name")
+    return found
 
 
 def read_exemplar_camera(given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:

@@ -37,7 +37,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -69,6 +69,7 @@ def perspective(
     size: int | Sequence[int] | None = None,
     *,
     target: Array | Plane | str | None = None,
+    target_green: Literal["up", "down"] = "up",
     kind: Kind | None = None,
     fov: float | None = None,
     direction: float | Array | Field | str | None = None,
@@ -101,6 +102,8 @@ def perspective(
         (`texrs.scale_maps.jacobians_of_normals`, `texrs.scale_maps.jacobians_of_coordinates`, `texrs.Plane.jacobians`). One of
         another size is stretched to that of the result, its borders on the borders (`texrs.scale_maps.resample`). None:
         ``scale_map``, stretched.
+    target_green : {"up", "down"}
+        Direction in which the y of normals in ``target`` grows: up (OpenGL) or down (DirectX).
     kind : {"width", "area"}, optional
         What maps hold that do not say so themselves (`texrs.scale_maps.ScaleMap`): "width", widths across the slope; "area",
         square roots of areas. None: what the scale map fits best, as a map of a plane; the target holds the same.
@@ -187,6 +190,7 @@ def perspective(
             scale_map,
             size,
             target=target,
+            target_green=target_green,
             kind=kind,
             fov=fov,
             direction=direction,

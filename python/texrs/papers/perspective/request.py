@@ -106,6 +106,7 @@ class Request:
         size: int | Sequence[int] | None,
         *,
         target: Array | Plane | str | None,
+        target_green: Literal["up", "down"],
         kind: Kind | None,
         fov: float | None,
         direction: object,
@@ -129,7 +130,8 @@ class Request:
         angle = FOV if fov is None else as_float(fov, "fov", 1, 170)
         if fov is not None and (isinstance(scale_map, Plane) or is_words(scale_map)):
             raise InvalidInput("fov: the plane has one already")
-        asked = as_target(target)
+        as_choice(target_green, "target_green", ("up", "down"))
+        asked = as_target(target, target_green)
         if size is None:
             size = find_size(asked) or [2 * n for n in known.shape]
         sides = as_size(size)

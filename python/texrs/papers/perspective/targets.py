@@ -8,7 +8,7 @@ pixel the step on the texture that a step in the picture is.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeAlias, TypeGuard
+from typing import Literal, TypeAlias, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +34,7 @@ Surface: TypeAlias = NDArray[np.float64]
 """Jacobians (rows, columns, 2, 2)."""
 
 
-def as_target(target: object) -> Plane | str | Floats | Surface | None:
+def as_target(target: object, green: Literal["up", "down"] = "up") -> Plane | str | Floats | Surface | None:
     """Check a target before its size is known: a plane, its words, a scale map, or Jacobians."""
     if target is None or isinstance(target, Plane):
         return target
@@ -49,7 +49,7 @@ def as_target(target: object) -> Plane | str | Floats | Surface | None:
         if given.shape[2] == 2 and given.dtype.kind != "f":
             raise InvalidInput(f"target: coordinates (rows, columns, 2) need floats, got {given.dtype}")
         try:
-            made = jacobians_of_coordinates(given) if given.shape[2] == 2 else jacobians_of_normals(given)
+            made = jacobians_of_coordinates(given) if given.shape[2] == 2 else jacobians_of_normals(given, green=green)
         except InvalidInput as error:
             raise InvalidInput(f"target: {error}") from None
         return as_jacobians(made, "target")
