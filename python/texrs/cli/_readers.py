@@ -43,9 +43,13 @@ def read_example(text: str, about: About, *, finite: bool = True) -> Any:
     """Read a picture, or a material: a folder of maps, or an EXR file of several layers."""
     from texrs.cli._stacks import is_stack
 
+    from texrs.materials import Material, Role, guess_role
+
     if text.startswith(SAMPLE) or not is_stack(text):
+        role = None if text.startswith(SAMPLE) else guess_role(Path(text).stem)
+        if role is not None and (role.normal or role.labelled or role is Role.VECTOR):
+            assume(f"{text}: read as colours; the role {role.value} of its name counts in a folder of maps")
         return read_picture(text, finite=finite)
-    from texrs.materials import Material
 
     with name_arguments(roles="--role", maps=text):
         return Material.read(text, roles=about.roles)

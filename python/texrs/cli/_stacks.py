@@ -110,8 +110,8 @@ class Stack:
                 )
             _outputs.check_output(out)
             return
-        suffix = split_suffix(out)[1]
-        if suffix and not os.path.isdir(out):
+        # `texrs rerun` gives a name with .npz to results that it does not need.
+        if split_suffix(out)[1] not in ("", ".npz") and not os.path.isdir(out):
             raise InvalidInput(f"--out: must be a folder or one {LAYERED} file for the maps of a material, got {out!r}")
         _outputs.check_folder(out)
         there = Path(out)

@@ -35,7 +35,7 @@ WHOLE = 2**24
 
 def choose_dtype(dtype: np.dtype[Any], depth: int | None) -> np.dtype[Any]:
     """Return the dtype of so many bits: integers of 8 or 16, floats of 32; the same one if none are given."""
-    if depth is None or dtype == np.bool_ or (depth == 32 and dtype.kind == "f" and dtype.itemsize <= 4):
+    if depth is None or dtype == np.bool_:
         return dtype
     return np.dtype(np.float32 if depth == 32 else f"u{depth // 8}")
 
