@@ -121,6 +121,17 @@ def test_every_verb_takes_a_folder(here: Path, capsys: pytest.CaptureFixture[str
     assert capsys.readouterr().out.count("the same bytes") == len(again) + 1
 
 
+@pytest.mark.parametrize("verb", [*VERBS, "info", "analyse", "tiles"])
+def test_no_command_ignores_a_file_silently(here: Path, capsys: pytest.CaptureFixture[str], verb: str) -> None:
+    """Each reads the folder before it works, so that a strict run fails at once."""
+    io.write("hole.png", np.pad(np.full((8, 8), 255, np.uint8), 28))
+    words = VERBS.get(verb, f"{verb} rock").split()
+    out = {"info": [], "analyse": ["-o", "new.npz"]}.get(verb, ["-o", "new"])
+    assert main([*words, *out, "--strict"]) == 2
+    assert "rock: rock_wet.png not used: the name gives no role; this is an error" in capsys.readouterr().err
+    assert not Path("new").exists()
+
+
 def test_a_layout_may_be_that_of_a_material(here: Path) -> None:
     """Of the second only where things lie counts: the result is a picture, as the first is."""
     io.write("dots.png", samples.dots((64, 64)).image)
@@ -215,7 +226,7 @@ def test_what_engines_load(here: Path, capsys: pytest.CaptureFixture[str]) -> No
         assert capsys.readouterr().out.startswith(says)
     assert main(["info", "new"]) == 0
     assert capsys.readouterr().out.splitlines()[:2] == [
-        "material: 64 x 64, 2 maps",
+        "material: 64 x 64, 3 maps",
         "albedo: colour, sRGB, 3 channels, uint8",
     ]
     for name in ("bad.glb", "bad.mtlx"):
