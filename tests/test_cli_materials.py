@@ -331,3 +331,23 @@ def test_a_profile_that_a_folder_loses_is_reported(here: Path, capsys: pytest.Ca
         io.annotate("rock/rock_albedo.png", io.Notes(profile=profile))
         assert main(["info", "rock"]) == 0
         assert capsys.readouterr().err.count("ICC profile") == count
+
+
+def test_primaries_and_gamma_that_a_folder_loses_are_reported(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    wide = (0.32168, 0.33767, 0.713, 0.293, 0.165, 0.83, 0.128, 0.044)
+    plain = (0.3127, 0.329, 0.64, 0.33, 0.3, 0.6, 0.15, 0.06)
+    png, exr = Path("rock/rock_albedo.png"), Path("rock/rock_diffuse.exr")
+    io.write(exr, io.read(png).astype(np.float32))
+    for file, notes, words in (
+        (png, io.Notes(primaries=wide), "the primaries 0.713, 0.293, 0.165, 0.83, 0.128, 0.044 are not used"),
+        (exr, io.Notes(primaries=wide), "the primaries 0.713, 0.293, 0.165, 0.83, 0.128, 0.044 are not used"),
+        (png, io.Notes(gamma=1 / 1.8), "the gamma 0.556 is not used"),
+        (png, io.Notes(primaries=plain, gamma=1 / 2.2), ""),
+        (exr, io.Notes(primaries=plain), ""),
+    ):
+        kept = file.read_bytes()
+        io.annotate(file, notes)
+        assert main(["info", "rock"]) == 0
+        said = capsys.readouterr().err
+        assert (f"{file}: {words}" in said) if words else (str(file) not in said)
+        file.write_bytes(kept)

@@ -42,7 +42,6 @@ def match_alpha(image: Any, like: Array | None) -> Any:
 def read_example(text: str, about: About, *, finite: bool = True) -> Any:
     """Read a picture, or a material: a folder of maps, or an EXR file of several layers."""
     from texrs.cli._stacks import is_stack
-
     from texrs.materials import Material, Role, guess_role
 
     if text.startswith(SAMPLE) or not is_stack(text):

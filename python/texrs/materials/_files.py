@@ -20,7 +20,7 @@ from texrs.io._files import as_path, find_suffix
 from texrs.io._formats import FORMATS, READ, READ_IMAGES, READ_VOLUMES
 from texrs.materials._converting import choose_dtype, convert
 from texrs.materials._labels import REASON, holds_labels
-from texrs.materials._map import Map, find_space
+from texrs.materials._map import Map, Space, find_space
 from texrs.materials._mipmaps import halve
 from texrs.materials._roles import Role, as_role, guess_role
 
@@ -32,6 +32,8 @@ SYSTEM = ("thumbs.db", "desktop.ini")
 """Files that file managers leave in folders, besides hidden ones."""
 NAMED = 8
 """Maximum number of names in a notice."""
+PRIMARIES = (0.3127, 0.329, 0.64, 0.33, 0.3, 0.6, 0.15, 0.06)
+"""White, red, green and blue of sRGB: x and y of each."""
 MOST = 64
 """Maps that a material may have."""
 AT_ONCE = 4
@@ -140,13 +142,26 @@ def read_map(file: FilePath, role: Role, axes: int) -> Map:
     """Return the map in a file; its colours are encoded as the file states, or as is usual."""
     pixels = (io.read if axes == 2 else io.read_volume)(file)
     space = find_space(role, pixels.dtype)
-    if space == "srgb":
+    if role.coloured:
         notes = io.read_notes(file)
-        if notes.gamma == 1 and not notes.srgb:
+        if space == "srgb" and notes.gamma == 1 and not notes.srgb:
             space = "linear"
-        if notes.profile is not None and (title := name_profile(notes.profile)) is not None:
-            ignore(f"{file}: the ICC profile {title!r} is not used: maps of a material are read and written as sRGB")
+        report_colours(file, notes, space)
     return Map(pixels, role, space)
+
+
+def report_colours(file: Path, notes: io.Notes, space: Space) -> None:
+    """Report what a file states of its colours, if they are not those of sRGB, in which maps are read and written."""
+    stated = []
+    if notes.profile is not None and (title := name_profile(notes.profile)) is not None:
+        stated.append(f"the ICC profile {title!r}")
+    if notes.primaries is not None and np.abs(np.subtract(notes.primaries, PRIMARIES)).max() > 0.01:
+        stated.append(f"the primaries {', '.join(f'{n:.3g}' for n in notes.primaries[2:])}")
+    if space == "srgb" and notes.gamma is not None and abs(notes.gamma - 1 / 2.2) > 0.01:
+        stated.append(f"the gamma {notes.gamma:.3g}")
+    if stated and not notes.srgb:
+        verb = "are" if len(stated) > 1 or "primaries" in stated[0] else "is"
+        ignore(f"{file}: {' and '.join(stated)} {verb} not used: colours of maps are read and written as sRGB")
 
 
 def name_profile(profile: bytes) -> str | None:
