@@ -39,7 +39,7 @@ SLOW = 5.0
 """Seconds of this process after which a file took too long."""
 MEMORY = 2 << 30
 """Bytes beside what there is at the beginning."""
-WRITABLE = (".png", ".tif", ".webp", ".bmp", ".npy", ".npz", ".exr", ".hdr")
+WRITABLE = (".png", ".tif", ".webp", ".bmp", ".tga", ".dds", ".npy", ".npz", ".exr", ".hdr")
 VOLUMES = (".tif", ".npy", ".npz", ".nrrd", ".nii", ".nii.gz", ".vti")
 RECIPE = 'verb = "design"\ninputs = ["*.png"]\nout = "out"\nseeds = "0-3"\n[presets.one]\nrotate = 0\nsize = "64x64"\n'
 
@@ -69,6 +69,13 @@ def make_files(folder: Path) -> Iterator[tuple[Path, list[Reader]]]:
         "a.gif": make.pillow(image, "GIF"),
         "a.jpg": make.pillow(image, "JPEG", exif=b"Exif\0\0" + make.exif(6)),
         "lzw.tif": make.pillow(image, "TIFF", compression="tiff_lzw"),
+        "ink.jpg": make.pillow(make.picture((24, 20, 4)), "JPEG", mode="CMYK"),
+        "ink.tif": make.pillow(make.picture((24, 20, 4)), "TIFF", mode="CMYK"),
+        "run.tga": make.pillow(image, "TGA", compression="tga_rle"),
+        "bc3.dds": make.pillow(make.picture((24, 20, 4)), "DDS", pixel_format="DXT5"),
+        "a.psd": make.psd(image),
+        "a.avif": make.pillow(image, "AVIF"),
+        "palette.png": make.palette_png(np.arange(64).reshape(8, 8) % 4, np.eye(4, 3) * 255),
         "packbits.tif": make.pillow(image, "TIFF", compression="packbits"),
         "deflate.tif": make.pillow(image, "TIFF", compression="tiff_adobe_deflate"),
         "v.vtk": b"# vtk DataFile Version 3.0\nv\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 4 3 2\nSPACING 1 1 1\n"

@@ -51,11 +51,22 @@ def exif(orientation, order="<"):
     return mark + struct.pack(order + "IH", 8, 1) + entry + struct.pack(order + "I", 0)
 
 
-def pillow(array, kind, **options):
-    """Encode by Pillow."""
+def pillow(array, kind, mode=None, **options):
+    """Encode by Pillow; as a mode whose channels have other names, if one is given."""
     file = io.BytesIO()
-    Image.fromarray(array).save(file, kind, **options)
+    image = Image.fromarray(array)
+    if mode is not None:
+        image = Image.frombytes(mode, image.size, array.tobytes())
+    image.save(file, kind, **options)
     return file.getvalue()
+
+
+def psd(array, bits=8, mode=3, resources=b""):
+    """A PSD file by hand: a header, resources, no layers, and the flattened picture."""
+    rows, columns, channels = array.shape
+    head = b"8BPS" + struct.pack(">H6xHIIHH", 1, channels, rows, columns, bits, mode)
+    sections = struct.pack(">II", 0, len(resources)) + resources + struct.pack(">I", 0)
+    return head + sections + b"\0\0" + np.moveaxis(array, -1, 0).tobytes()
 
 
 def palette_png(indices, colours, transparent=None):
@@ -135,3 +146,54 @@ def mutations(file, count, rng):
             if not data:
                 break
         yield bytes(data)
+
+
+def exr_with_chroma(luminance, red, blue):
+    """An EXR file of floats by hand, uncompressed: luminance, and chroma of every second row and column."""
+    rows, columns = luminance.shape
+
+    def attribute(name, kind, data):
+        return name + b"\0" + kind + b"\0" + struct.pack("<i", len(data)) + data
+
+    planes = ((b"BY", blue, 2), (b"RY", red, 2), (b"Y", luminance, 1))
+    channels = b"".join(name + b"\0" + struct.pack("<iiii", 2, 0, step, step) for name, _, step in planes) + b"\0"
+    box = struct.pack("<4i", 0, 0, columns - 1, rows - 1)
+    head = b"v/1\x01" + struct.pack("<i", 2)
+    head += attribute(b"channels", b"chlist", channels) + attribute(b"compression", b"compression", b"\0")
+    head += attribute(b"dataWindow", b"box2i", box) + attribute(b"displayWindow", b"box2i", box)
+    head += attribute(b"lineOrder", b"lineOrder", b"\0") + attribute(
+        b"pixelAspectRatio", b"float", struct.pack("<f", 1)
+    )
+    head += attribute(b"screenWindowCenter", b"v2f", bytes(8)) + attribute(
+        b"screenWindowWidth", b"float", struct.pack("<f", 1)
+    )
+    head += b"\0"
+    lines, at = [], len(head) + 8 * rows
+    offsets = b""
+    for row in range(rows):
+        data = b"".join(p[row // step].astype("<f4").tobytes() for _, p, step in planes if row % step == 0)
+        offsets += struct.pack("<Q", at)
+        lines.append(struct.pack("<ii", row, len(data)) + data)
+        at += len(lines[-1])
+    return head + offsets + b"".join(lines)
+
+
+def ink_profile(corners):
+    """An ICC profile of CMYK by hand: CIELAB at the 16 corners of the cube of inks, and linear between them."""
+    table = np.asarray(corners, float).reshape(16, 3)
+    codes = np.rint(np.column_stack([table[:, 0] * 2.55, table[:, 1:] + 128])).astype(np.uint8)
+    lut = b"mft1" + bytes(4) + bytes((4, 3, 2, 0)) + struct.pack(">9i", *(65536 if i % 4 == 0 else 0 for i in range(9)))
+    lut += bytes(range(256)) * 4 + codes.tobytes() + bytes(range(256)) * 3
+    lut += bytes(-len(lut) % 4)
+    text = b"desc" + bytes(4) + struct.pack(">I", 5) + b"inks\0" + bytes(78)
+    text += bytes(-len(text) % 4)
+    white = b"XYZ " + bytes(4) + struct.pack(">3i", 63190, 65536, 54061)
+    tags = {b"desc": text, b"wtpt": white, b"A2B0": lut, b"A2B1": lut, b"cprt": b"text" + bytes(4) + b"none"}
+    at, entries, body = 128 + 4 + 12 * len(tags), b"", b""
+    for name, data in tags.items():
+        entries += name + struct.pack(">II", at + len(body), len(data))
+        body += data
+    size = at + len(body)
+    head = struct.pack(">I4sI4s4s4s", size, bytes(4), 0x02400000, b"prtr", b"CMYK", b"Lab ")
+    head += struct.pack(">6H", 2026, 1, 1, 0, 0, 0) + b"acsp" + bytes(28) + struct.pack(">3i", 63190, 65536, 54061)
+    return head.ljust(128, b"\0") + struct.pack(">I", len(tags)) + entries + body

@@ -22,6 +22,7 @@ LOSSLESS = [
     *((".png", dtype, c) for dtype in ("uint8", "uint16") for c in (1, 2, 3, 4)),
     *((".exr", dtype, c) for dtype in ("float16", "float32") for c in (1, 2, 3, 4)),
     *((".webp", "uint8", c) for c in (3, 4)),
+    *((suffix, "uint8", c) for suffix in (".tga", ".dds") for c in (1, 2, 3, 4)),
     *((".bmp", "uint8", c) for c in (1, 3)),
     *((".tif", dtype, c) for dtype in TIFF for c in (1, 2, 3, 4, 5)),
     (".tiff", "uint8", 3),
@@ -176,7 +177,8 @@ def test_gif_gives_the_first_frame(tmp_path):
     frames = [make.Image.fromarray(np.full((4, 5), value, np.uint8)) for value in (40, 90)]
     path = tmp_path / "two.gif"
     frames[0].save(path, save_all=True, append_images=frames[1:], duration=10)
-    assert_array_equal(tio.read(path), np.full((4, 5, 3), 40, np.uint8))
+    with pytest.warns(InputWarning, match="frame 2 not used"):
+        assert_array_equal(tio.read(path), np.full((4, 5, 3), 40, np.uint8))
     frames[0].save(path, transparency=frames[0].getpixel((0, 0)))
     back = tio.read(path)
     assert back.shape[2] in (3, 4)
@@ -232,8 +234,8 @@ def test_any_layout_is_written(tmp_path):
         (".png", np.zeros((2, 2, 3), np.float32), r"\.exr, \.hdr, \.npy, \.npz, \.tif, \.tiff can"),
         (".png", np.zeros((2, 2, 5), np.uint8), "uint8 with 5 channels; .npy, .npz, .tif, .tiff"),
         (".jpg", np.zeros((2, 2), np.uint16), "uint16 with 1 channel; .npy, .npz, .png, .tif"),
-        (".jpg", np.zeros((2, 2, 4), np.uint8), ".png, .tif, .tiff, .webp can"),
-        (".webp", np.zeros((2, 2), np.uint8), ".bmp, .jpeg, .jpg, .npy, .npz, .png, .tif, .tiff"),
+        (".jpg", np.zeros((2, 2, 4), np.uint8), ".png, .tga, .tif, .tiff, .webp can"),
+        (".webp", np.zeros((2, 2), np.uint8), ".bmp, .dds, .jpeg, .jpg, .jxl, .npy, .npz, .png, .tga, .tif, .tiff"),
         (".hdr", np.zeros((2, 2, 4), np.float32), ".exr"),
         (".hdr", np.zeros((2, 2, 3), np.float64), ".npy, .npz, .tif, .tiff can"),
         (".hdr", np.full((2, 2, 3), -1, np.float32), "negative"),
@@ -282,7 +284,7 @@ def test_names(tmp_path, name):
 @pytest.mark.parametrize(
     ("name", "says"),
     [
-        ("a.gif", "is not one that is written: .png"),
+        ("a.psd", "is not one that is written: .png"),
         ("a", "the suffix '' is not"),
         ("missing/a.png", "there is no folder"),
         ("file/a.png", "there is no folder"),

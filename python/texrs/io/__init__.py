@@ -10,32 +10,42 @@ Suffix                dtypes                                      Channels   Los
 ``.webp``             bool, uint8                                 3, 4       nothing
 ``.jpg`` ``.jpeg``    bool, uint8                                 1, 3       JPEG, quality 95
 ``.bmp``              bool, uint8                                 1, 3       nothing
+``.gif``              bool, uint8, up to 256 colours              3, 4       nothing
+``.tga``              bool, uint8                                 1, 2, 3, 4 nothing
+``.dds``              bool, uint8, uncompressed                   1, 2, 3, 4 nothing
+``.avif`` (b)         bool, uint8                                 3, 4       AVIF, quality 95
+``.jxl`` (b)          bool, uint8                                 1, 2, 3, 4 nothing
 ``.npy`` ``.npz``     bool, (u)int8/16/32/64, float16/32/64       1 to 64    nothing
-``.nrrd`` (b)         bool, (u)int8/16/32/64, float32/64          1 to 64    nothing
-``.nii`` (b)          bool, (u)int8/16/32/64, float32/64          1 to 64    nothing
-``.nii.gz`` (b)       the same                                    1 to 64    nothing
-``.vti`` (c)          bool, (u)int8/16/32/64, float32/64          1 to 64    nothing
-``.zarr`` (d)         bool, (u)int8/16/32/64, float16/32/64       1 to 64    nothing
+``.nrrd`` (c)         bool, (u)int8/16/32/64, float32/64          1 to 64    nothing
+``.nii`` (c)          bool, (u)int8/16/32/64, float32/64          1 to 64    nothing
+``.nii.gz`` (c)       the same                                    1 to 64    nothing
+``.vti`` (d)          bool, (u)int8/16/32/64, float32/64          1 to 64    nothing
+``.zarr`` (e)         bool, (u)int8/16/32/64, float16/32/64       1 to 64    nothing
 ===================== =========================================== ========== ====================
 
 (a) Of the largest channel of each pixel, with which the three share an exponent.
 
-(b) Volumes alone; needs the extra: ``pip install texrs[vol]``.
+(b) AVIF needs Pillow 11.3 or newer, JPEG XL a plugin: ``pip install pillow-jxl-plugin``.
 
-(c) Volumes alone, for ParaView; read in every encoding that VTK writes.
+(c) Volumes alone; needs the extra: ``pip install texrs[vol]``.
 
-(d) A folder: OME-Zarr of one level; needs the extra: ``pip install texrs[dask]``. Any arrays and OME-Zarr images are read, and
+(d) Volumes alone, for ParaView; read in every encoding that VTK writes.
+
+(e) A folder: OME-Zarr of one level; needs the extra: ``pip install texrs[dask]``. Any arrays and OME-Zarr images are read, and
 VTK's structured points (``.vtk``); textures without borders write stores of any size (`texrs.SolidTexture.to_zarr`).
+
+PSD is read also: its flattened picture, 8 bits a channel. Pillow decodes JPEG, GIF, BMP, TGA, DDS, PSD, AVIF and JPEG XL, and
+layouts of DDS from BC1 to BC7. The package tifffile reads TIFF. Some compressed TIFF files need the extra: ``pip install
+texrs[tiff]``. CMYK becomes sRGB by the profile of the file. Frames and pages that are not read are reported.
 
 Volumes are written to ``.tif``, ``.tiff``, ``.npy``, ``.npz`` and to the last five, which also keep
 the distances between voxels (`read_spacing`). What is (plane, row, column) here is z, y, x there, and x runs fastest
 in the file. Volumes larger than memory are written slab by slab (`write_slabs`), surfaces as
-``.stl`` (`write_surface`). GIF is read, its first frame. A dtype that a format cannot hold is
-refused, never converted; bool is written as 0 and 255 (to ``.npy`` and ``.npz`` as it is). A single
-channel is read without a channel axis (from ``.npy`` and ``.npz`` as it was written). ``.npz``
-files have the key ``image``.
+``.stl`` (`write_surface`). A dtype that a format cannot hold is refused, never converted; bool is written as 0 and 255 (to
+``.npy`` and ``.npz`` as it is). An alpha channel that is opaque is left out where the format has none. A single channel is read
+without a channel axis (from ``.npy`` and ``.npz`` as it was written). ``.npz`` files have the key ``image``.
 
-Files are recognised by their content when read and by their suffix when written. Headers are
+Files are recognised by their content when read, TGA by its suffix, and by their suffix when written. Headers are
 compared with the limit before memory is used. What a file says beside its values, as ICC profiles, densities and
 how texrs made it, is read by `read_notes` and written by `annotate`. All files are written to a temporary name and
 renamed. What goes wrong is a `texrs.errors.FileError`, `~texrs.errors.LimitExceeded` or
@@ -55,7 +65,7 @@ from texrs._checks import as_items, as_limit, try_array
 from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, InvalidInput
-from texrs.io import _descriptions, _files, _image_io, _npy, _pillow, _slabs, _stores, _tiff, _volumes
+from texrs.io import _descriptions, _files, _image_io, _npy, _origins, _pillow, _slabs, _stores, _tiff, _volumes
 from texrs.io._annotation import annotate, read_notes
 from texrs.io._files import atomic, find_suffix
 from texrs.io._formats import FORMATS, STORE, VOLUMES, as_spacing, check, detect_kind
@@ -101,16 +111,16 @@ def read(path: PathLike, *, limit: int | None = None) -> Array:
     Parameters
     ----------
     path : path_like
-        PNG, TIFF, EXR, HDR, WebP, JPEG, GIF (the first frame), BMP, .npy, .npz or the folder of a Zarr store, whichever
-        its content says it is.
+        PNG, TIFF, EXR, HDR, WebP, JPEG, GIF, BMP, TGA, DDS, PSD, AVIF, JPEG XL, .npy, .npz or the folder of a Zarr store,
+        whichever its content says it is (TGA: its suffix). The first frame of an animation.
     limit : int, optional
         Pixels that the image may have, and a sixteenth of the bytes; by default those that `texrs.limits` allows.
 
     Returns
     -------
     ndarray
-        Shape (H, W) or (H, W, C); the dtype is that of the file. Palettes are applied, samples of
-        less than 8 bit spread to 8, and the Exif orientation of JPEG, TIFF, PNG and WebP obeyed.
+        Shape (H, W) or (H, W, C); the dtype is that of the file. Palettes are applied, and samples of less than 8 bit
+        spread to 8. CMYK is converted to sRGB. The Exif orientation of JPEG, TIFF, PNG, WebP and AVIF is obeyed.
 
     Raises
     ------
@@ -137,7 +147,7 @@ def read(path: PathLike, *, limit: int | None = None) -> Array:
     kind = detect_kind(name)
     if kind == "tiff":
         planes, orientation = _tiff.read_tiff(name, limit)
-        return _tiff.take_image(name, planes, orientation)
+        return _origins.mark(_tiff.take_image(name, planes, orientation), name, False)
     if kind in ("npy", "npz"):
         return read_numpy(name, kind, limit, 2)
     if kind == "zarr":
@@ -145,18 +155,16 @@ def read(path: PathLike, *, limit: int | None = None) -> Array:
     if kind in VOLUMES:
         raise FileError(f"{name}: is a {kind} file, which holds a volume; texrs.io.read_volume reads it")
     file = _files.load(name, limit)
-    if kind == "jpeg":
-        return _pillow.read_jpeg(name, file, limit)
-    if kind == "gif":
-        return _pillow.read_gif(name, file, limit)
-    if kind == "bmp":
-        return _pillow.read_bmp(name, file, limit)
-    with _files.translate_errors(name, "decoding"):
-        image = _files.turn_upright(*_image_io.decode(name, file, limit))
-        rest = _image_io.list_rest(name, image) if kind == "exr" else []
-    if rest:
-        _notices.ignore(f"{name}: {', '.join(rest)} not used: these channels are not part of the picture")
-    return image
+    if kind in _pillow.DECODED:
+        array = _pillow.read(name, kind, file, limit)
+    else:
+        with _files.translate_errors(name, "decoding"):
+            array = _files.turn_upright(*_image_io.decode(name, file, limit))
+            rest = _image_io.list_rest(name, array) if kind == "exr" else []
+        if rest:
+            _notices.ignore(f"{name}: {', '.join(rest)} not used: these channels are not part of the picture")
+    _pillow.ignore_frames(name, kind, file)
+    return _origins.mark(array, name, kind == "gif" or _pillow.is_indexed(name, kind, file))
 
 
 def read_fov(path: PathLike) -> float | None:
@@ -482,8 +490,8 @@ def _write(
             return
         if array.ndim == 3 and array.shape[2] == 1:
             array = array[..., 0]
-        if suffix in (".jpg", ".jpeg", ".bmp"):
-            file = _pillow.encode(array, ".bmp" if suffix == ".bmp" else ".jpg")
+        if suffix in _pillow.SAVED and suffix != ".png":
+            file = _pillow.encode(target, array, suffix)
         else:
             file = _image_io.encode(target, array, suffix[1:])
             if suffix == ".png" and description is not None:

@@ -8,12 +8,13 @@ import re
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from texrs._checks import as_instance
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError
-from texrs.io import _chunks, _files, _tags, _texts
+from texrs.io import _chunks, _files, _pillow, _tags, _texts
 from texrs.io._formats import detect_kind
 from texrs.io._notes import Notes
 from texrs.io._stores import is_store
@@ -36,6 +37,7 @@ _READERS: dict[str, Callable[[Path], dict[str, object]]] = {
     "npz": _texts.read_npz,
     "html": _texts.read_html,
     "json": _texts.read_json,
+    **{kind: partial(_pillow.read_notes, kind=kind) for kind in ("psd", "avif", "jxl")},
 }
 _WRITERS: dict[str, Callable[[Path, Notes], None]] = {
     "png": _chunks.write_png,
@@ -116,6 +118,9 @@ def read_notes(path: PathLike) -> Notes:
         # Whatever a file holds, nothing depends on what it says of itself.
         with suppress(Exception):
             found = _READERS[kind](name)
+    with suppress(Exception):
+        if (colours := _pillow.read_palette(name, kind)) is not None:
+            found["palette"] = colours.tobytes()
     if "made" not in found:
         with suppress(Exception):
             found |= _texts.read_json(name_sidecar(Path(os.path.realpath(name))))
@@ -168,6 +173,7 @@ def annotate(path: PathLike, notes: Notes, beside: PathLike | None = None) -> Pa
     )
     with _files.translate_errors(name, "writing what it says of itself"):
         # Of a table of tags what is said moves what lies around it, so it is said first, and filled in.
+        notes = replace(notes, palette=None)
         first = notes if kind in _IN_PLACE and not apart else replace(notes, made=None)
         kind = "" if apart and kind == "exr" else kind
         if kind in _WRITERS and first != Notes():

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from texrs._checks import as_float, as_tuple, check_memory
+from texrs._notices import assume
 from texrs._typing import Array
 from texrs.errors import FileError, InvalidInput
 from texrs.io import _files, _npy, _stores, _volumes, _vtk
@@ -26,6 +27,10 @@ MAGIC = (
     (b"GIF87a", "gif"),
     (b"GIF89a", "gif"),
     (b"BM", "bmp"),
+    (b"DDS ", "dds"),
+    (b"8BPS", "psd"),
+    (b"\xff\x0a", "jxl"),
+    (b"\0\0\0\x0cJXL ", "jxl"),
     (_npy.MAGIC, "npy"),
     (b"PK\x03\x04", "npz"),
     (_volumes.NRRD_MAGIC, "nrrd"),
@@ -35,6 +40,11 @@ MAGIC = (
     (b"<?xml", "vti"),
     (_vtk.LEGACY_MAGIC, "vtk"),
     *((magic, "nii") for magic in _volumes.NIFTI_MAGIC),
+)
+
+NAMES = (
+    *("PNG", "TIFF", "EXR", "HDR", "WebP", "JPEG", "GIF", "BMP", "DDS", "PSD", "AVIF", "JPEG XL"),
+    *(".npy", ".npz", "NRRD", "NIfTI", ".vti", ".vtk", "Zarr"),
 )
 
 _NUMBERS = frozenset(np.dtype(kind) for kind in ("?", "u1", "i1", "u2", "i2", "u4", "i4", "f2", "f4", "f8"))
@@ -78,6 +88,11 @@ FORMATS = {
     ".jpg": _JPEG,
     ".jpeg": _JPEG,
     ".bmp": Format(_SMALL, range(1, 4, 2), 2**15),
+    ".gif": Format(_SMALL, range(3, 5), 2**16 - 1),
+    ".tga": Format(_SMALL, range(1, 5), 2**16 - 1),
+    ".dds": Format(_SMALL, range(1, 5), 2**16),
+    ".avif": Format(_SMALL, range(3, 5), 2**16),
+    ".jxl": Format(_SMALL, range(1, 5)),
     ".npy": _NUMPY,
     ".npz": _NUMPY,
     ".nrrd": _SCIENCE,
@@ -88,7 +103,7 @@ FORMATS = {
 """The formats that are written, by suffix."""
 WRITTEN_IMAGES = tuple(suffix for suffix, form in FORMATS.items() if form.images)
 WRITTEN_VOLUMES = tuple(suffix for suffix, form in FORMATS.items() if form.volumes)
-READ_IMAGES = (*WRITTEN_IMAGES, ".gif")
+READ_IMAGES = (*WRITTEN_IMAGES, ".psd")
 READ_VOLUMES = (*WRITTEN_VOLUMES, ".vtk")
 """Suffixes of files that hold images or volumes, stores of Zarr apart. All lists of suffixes in texrs come from these."""
 READ = tuple(dict.fromkeys((*READ_IMAGES, *READ_VOLUMES)))
@@ -106,9 +121,12 @@ def detect_kind(path: Path) -> str:
             return kind
     if start.startswith(b"RIFF") and start[8:12] == b"WEBP":
         return "webp"
-    raise FileError(
-        f"{path}: its content is none of PNG, TIFF, EXR, HDR, WebP, JPEG, GIF, BMP, .npy, .npz, NRRD, NIfTI, .vti, .vtk, Zarr"
-    )
+    if start[4:12] in (b"ftypavif", b"ftypavis"):
+        return "avif"
+    # TGA has no signature.
+    if path.suffix.lower() == ".tga":
+        return "tga"
+    raise FileError(f"{path}: its content is none of {', '.join(NAMES)}")
 
 
 def keeps_spacing(suffix: str) -> bool:
@@ -125,6 +143,18 @@ def as_spacing(spacing: Sequence[float] | None, suffix: str) -> tuple[float, ...
     return tuple(as_float(s, "spacing", 1e-12, 1e12) for s in steps)
 
 
+def _drop_alpha(array: Array, form: Format, axes: int, suffix: str) -> Array:
+    """Return an image without its alpha channel, if that is opaque and the format has no place for it."""
+    channels = array.shape[axes] if array.ndim > axes else 1
+    if channels not in (2, 4) or channels in form.channels or channels - 1 not in form.channels:
+        return array
+    whole = 1.0 if array.dtype.kind == "f" else True if array.dtype == np.bool_ else np.iinfo(array.dtype).max
+    if not (array[..., -1] == whole).all():
+        return array
+    assume(f"{suffix} file: written without the alpha channel, which is opaque")
+    return np.ascontiguousarray(array[..., :-1])
+
+
 def check(value: object, suffix: str, axes: int) -> Array:
     """Return what is to be written, contiguous and in native byte order."""
     try:
@@ -139,6 +169,7 @@ def check(value: object, suffix: str, axes: int) -> Array:
     check_memory(array.size * array.itemsize, "array")
     array = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("="))
     form, volume = _NUMPY if suffix == STORE else FORMATS[suffix], axes == 3
+    array = _drop_alpha(array, form, axes, suffix)
     channels = array.shape[axes] if array.ndim > axes else 1
     if not form.holds(array.dtype, channels, volume):
         common = sorted(FORMATS, key=lambda suffix: (not FORMATS[suffix].images, suffix))
@@ -148,6 +179,12 @@ def check(value: object, suffix: str, axes: int) -> Array:
         raise InvalidInput(f"array: {suffix} cannot hold {what}; {can}")
     if max(array.shape[:axes]) > form.longest:
         raise InvalidInput(f"array: a side of {suffix} may have {form.longest} pixels, got shape {array.shape}")
+    if suffix == ".gif":
+        colours = np.unique(array.reshape(-1, channels), axis=0)
+        if len(colours) > 256:
+            raise InvalidInput(f"array: .gif cannot hold {len(colours)} colours, only 256; .png and .webp can")
+        if channels == 4 and ((colours[:, 3] % 255).any() or (colours[:, 3] == 0).sum() > 1):
+            raise InvalidInput("array: .gif cannot hold more than one transparent colour; .png and .webp can")
     if suffix == ".hdr" and not (np.isfinite(array).all() and (array >= 0).all()):
         raise InvalidInput("array: .hdr cannot hold negative, infinite or NaN values; .exr, .npy and .tif can")
     return array

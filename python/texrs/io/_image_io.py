@@ -8,10 +8,19 @@ import numpy as np
 
 from texrs import _rust
 from texrs._typing import Array
+from texrs.errors import FileError
 from texrs.io._tags import list_exr_channels
 
 PICTURES = {1: ("Y",), 2: ("Y", "A"), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
 """Channels of pictures in EXR files, by their number."""
+
+OF_TIFF = (np.dtype(np.uint8), np.dtype(np.uint16), np.dtype(np.float32))
+"""Samples of TIFF that are decoded."""
+SUBSAMPLED = (
+    "holds luminance and subsampled chroma (channels such as Y, RY, BY), which are not read; "
+    "convert it to R, G and B, for example with ImageMagick: magick IN.exr OUT.exr"
+)
+"""Neither the compiled decoder nor the Python package OpenEXR converts these channels to colours."""
 
 
 def decode(path: Path, file: bytes, limit: int) -> tuple[Array, int]:
@@ -20,7 +29,12 @@ def decode(path: Path, file: bytes, limit: int) -> tuple[Array, int]:
     Palettes are applied and samples of less than 8 bit spread to 8. The limit, in pixels and in a sixteenth of the bytes,
     is compared with the header before anything is decoded.
     """
-    samples, dtype, shape, orientation = _rust.decode_image(_make_printable(path), file, limit)
+    try:
+        samples, dtype, shape, orientation = _rust.decode_image(_make_printable(path), file, limit)
+    except FileError as error:
+        if "subsampling" not in str(error):
+            raise
+        raise FileError(f"{path}: {SUBSAMPLED}") from None
     pixels: Array = samples.view(dtype).reshape(shape)
     return pixels[..., 0] if shape[2] == 1 else pixels, orientation
 

@@ -17,6 +17,7 @@ from texrs._typing import Array
 from texrs._typing import Path as PathLike
 from texrs.errors import FileError, LimitExceeded
 from texrs.io._files import as_path, atomic, check_file, check_size, translate_errors
+from texrs.io._image_io import SUBSAMPLED
 
 __all__ = ["read_layers", "write_layers"]
 
@@ -67,7 +68,7 @@ def read_layers(path: PathLike, *, limit: int | None = None) -> tuple[dict[str, 
             title = str(head.get("name", "")) if len(parts) > 1 else ""
             for key, channel in file.channels(number).items():
                 if (channel.xSampling, channel.ySampling) != (1, 1):
-                    raise FileError(f"{name}: the channel {key} is subsampled, which is not read")
+                    raise FileError(f"{name}: {SUBSAMPLED}")
                 found[f"{title}.{key}" if title else key] = place(channel.pixels, head)
     words = parts[0].get(ATTRIBUTE)
     return found, words if isinstance(words, str) else None

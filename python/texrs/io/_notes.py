@@ -25,6 +25,8 @@ class Notes:
         Chromaticities x and y of white, red, green and blue.
     made : str, optional
         JSON: how texrs made the file.
+    palette : bytes, optional
+        Colours of an indexed image in the order of the file, four bytes each: red, green, blue, alpha.
 
     Examples
     --------
@@ -40,6 +42,7 @@ class Notes:
     gamma: float | None = None
     primaries: tuple[float, ...] | None = None
     made: str | None = None
+    palette: bytes | None = None
 
     def fit(self, channels: int) -> Notes:
         """Return what is true of a picture of so many channels: a profile is of grey or of colours.

@@ -1,54 +1,165 @@
-"""JPEG, GIF and BMP, which hold nothing but 8 bits, by imageio and Pillow.
+"""Images that Pillow decodes: JPEG, GIF, BMP, TGA, DDS, PSD, AVIF, JPEG XL, and TIFF files that tifffile alone cannot.
 
-The header is read here first. Pillow would warn of large images and of broken Exif blocks; the
-limit of the caller is in force instead, and the blocks are taken off.
+Pillow reads the header first. The limit of the caller is compared with the size in the header before pixels are decoded.
 """
 
 from __future__ import annotations
 
+import threading
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from importlib import import_module
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from texrs import _rust
+from texrs._checks import as_limit
+from texrs._notices import assume, ignore
 from texrs._typing import Array
 from texrs.errors import FileError, LimitExceeded
-from texrs.io._files import check_size, translate_errors, turn_upright
+from texrs.io._files import check_size, describe_error, translate_errors, turn_upright
 
 EXIF, FOCAL = 0x8769, 0xA405
-"""Tags of Exif: where what cameras say begins, and FocalLengthIn35mmFilm."""
+"""Tags of Exif: the directory of the camera, and FocalLengthIn35mmFilm."""
 MOST = 3.0, 2000.0
 """Focal lengths that are believed."""
-QUALITY = 95
-"""Of JPEG files that are written; colour is not subsampled."""
+KINDS = {
+    "jpeg": "JPEG",
+    "gif": "GIF",
+    "bmp": "BMP",
+    "tga": "TGA",
+    "dds": "DDS",
+    "psd": "PSD",
+    "avif": "AVIF",
+    "jxl": "JXL",
+    "png": "PNG",
+    "webp": "WEBP",
+    "tiff": "TIFF",
+}
+"""Pillow's names of formats."""
+DECODED = ("jpeg", "gif", "bmp", "tga", "dds", "psd", "avif", "jxl")
+"""Formats of images that only Pillow decodes."""
+ANIMATED = ("gif", "png", "webp", "avif", "jxl")
+SAVED: dict[str, tuple[str, dict[str, Any]]] = {
+    # Colour is not subsampled.
+    ".jpg": ("JPEG", {"quality": 95, "subsampling": 0}),
+    ".jpeg": ("JPEG", {"quality": 95, "subsampling": 0}),
+    ".png": ("PNG", {}),
+    ".gif": ("GIF", {}),
+    ".bmp": ("BMP", {}),
+    ".tga": ("TGA", {}),
+    ".dds": ("DDS", {}),
+    # One thread, because the bytes must not depend on the machine.
+    ".avif": ("AVIF", {"quality": 95, "subsampling": "4:4:4", "max_threads": 1, "autotiling": False}),
+    ".jxl": ("JXL", {"lossless": True}),
+}
+INDEXED = (".png", ".gif", ".bmp", ".tga")
+"""Suffixes of files that can hold a palette."""
+PLUGINS = {"jxl": ("pillow_jxl", "jxlpy.JXLImagePlugin")}
+NEEDS = {
+    "jxl": "JPEG XL needs a plugin of Pillow: pip install pillow-jxl-plugin",
+    "avif": "AVIF needs Pillow 11.3 or newer: pip install -U pillow",
+}
+_DTYPES = {"L": "u1", "RGB": "u1", "RGBA": "u1", "LA": "u1", "I;16": "u2", "I;16B": "u2", "I": "i4", "F": "f4"}
+"""The samples of a mode of Pillow."""
+_QUIET = threading.RLock()
 
 
-def read_jpeg(path: Path, file: bytes, limit: int) -> Array:
-    """Decode a JPEG file and turn it upright."""
-    sides, channels, orientation, stripped = _strip_jpeg(path, file)
-    if channels not in (1, 3):
-        raise FileError(f"{path}: is a JPEG with {channels} channels (CMYK); grey and RGB are read, convert it first")
-    return turn_upright(_decode(path, stripped, ".jpg", sides, channels, limit), orientation)
+def read(path: Path, kind: str, file: bytes, limit: int) -> Array:
+    """Decode an image, the first frame if there are several, and turn it upright."""
+    with translate_errors(path, "decoding"), _open(path, kind, file) as image:
+        _check_size(path, image, limit)
+        _check_whole(path, kind, image, file)
+        array = _take_pixels(path, image.convert("RGBA") if kind == "gif" else image)
+        # These modes of Pillow have an alpha channel whether the file has one or not.
+        if (image.mode == "P" or kind in ("gif", "dds")) and array.shape[2:] == (4,) and (array[..., 3] == 255).all():
+            array = np.ascontiguousarray(array[..., :3])
+        orientation = _rust.exif_orientation(bytes(image.info.get("exif", b"")).removeprefix(b"Exif\0\0"))
+    return turn_upright(array, orientation)
 
 
-def read_gif(path: Path, file: bytes, limit: int) -> Array:
-    """Decode the first frame of a GIF file to RGB, or RGBA where a pixel is transparent."""
-    array = _decode(path, file, ".gif", _read_gif_size(path, file), 4, limit, mode="RGBA")
-    return array if (array[..., 3] != 255).any() else np.ascontiguousarray(array[..., :3])
+def read_pages(path: Path, dtype: np.dtype[Any], sides: Sequence[int], pages: Sequence[int]) -> Array:
+    """Decode pages of a TIFF file to pages, rows, columns, channels, without loss except of CMYK."""
+    several = []
+    with _open(path, "tiff") as image:
+        for page in pages:
+            with _silence():
+                image.seek(page)
+                pixels = _take_pixels(path, image)
+            if pixels.shape[:2] != tuple(sides):
+                raise FileError(f"{path}: page {page + 1} has another size in Pillow than in tifffile")
+            # Modes of Pillow have no sign of their own, and int16 becomes int32.
+            if pixels.dtype.kind == dtype.kind == "i" and dtype.itemsize == 2:
+                pixels = pixels.astype(dtype)
+            if pixels.itemsize == dtype.itemsize and dtype.kind in "ui":
+                pixels = pixels.view(dtype)
+            if pixels.dtype != dtype and image.mode != "CMYK" and dtype != np.bool_:
+                raise FileError(f"{path}: Pillow reads {dtype} as {pixels.dtype}")
+            several.append(pixels if pixels.ndim == 3 else pixels[..., np.newaxis])
+    return np.stack(several)
 
 
-def read_bmp(path: Path, file: bytes, limit: int) -> Array:
-    """Decode a BMP file."""
-    if int.from_bytes(file[14:18], "little") == 12:
-        sides = tuple(int.from_bytes(file[i : i + 2], "little") for i in (20, 18))
-    else:
-        sides = tuple(abs(int.from_bytes(file[i : i + 4], "little", signed=True)) for i in (22, 18))
-    array = _decode(path, file, ".bmp", sides, 4, limit)
-    return array.astype(np.uint8) * np.uint8(255) if array.dtype == np.bool_ else array
+def measure(data: bytes) -> int:
+    """Return the number of samples that the header of a strip or tile states, which is a picture file itself."""
+    from PIL import Image
+
+    with _silence(), Image.open(BytesIO(data), formats=("JPEG", "JPEG2000", "PNG", "WEBP")) as image:
+        return int(image.width * image.height * len(image.getbands()))
+
+
+def count_frames(path: Path, kind: str) -> int:
+    """Return the number of frames of an animation; 1 for all other files, and for damaged ones."""
+    if kind not in ANIMATED:
+        return 1
+    with suppress(Exception), _silence(), _open(path, kind) as image:
+        return int(getattr(image, "n_frames", 1))
+    return 1
+
+
+def ignore_frames(path: Path, kind: str, file: bytes) -> None:
+    """Report the frames of an animation that are not used."""
+    # PNG and WebP are rarely animated: do not import Pillow for them.
+    if kind in ANIMATED and (kind not in ("png", "webp") or b"acTL" in file[:4096] or b"ANIM" in file[:64]):
+        count = count_frames(path, kind)
+        if count > 1:
+            ignore(f"{path}: frame{f's 2 to {count}' if count > 2 else ' 2'} not used")
+
+
+def is_indexed(path: Path, kind: str, file: bytes | None = None) -> bool:
+    """Return whether an image has a palette."""
+    if kind == "png":
+        # The type of the colours: do not import Pillow for the others.
+        with path.open("rb") as opened:
+            return (opened.read(26) if file is None else file[:26])[25:] == b"\x03"
+    if kind not in ("gif", "bmp", "tga", "dds", "psd"):
+        return False
+    with suppress(Exception), _open(path, kind, file) as image:
+        return image.mode == "P" or kind == "gif"
+    return False
+
+
+def read_palette(path: Path, kind: str) -> Array | None:
+    """Return the colours of an indexed image, (N, 4) of uint8 in the order of the file; None for all others."""
+    if not is_indexed(path, kind):
+        return None
+    with suppress(Exception), _silence(), _open(path, kind) as image:
+        _check_size(path, image, as_limit(None))
+        image.load()
+        image.apply_transparency()
+        colours = image.getpalette("RGBA") or [value for grey in range(256) for value in (grey, grey, grey, 255)]
+        return np.array(colours, np.uint8).reshape(-1, 4)
+    return None
+
+
+def read_notes(path: Path, kind: str) -> dict[str, object]:
+    """Return the ICC profile of a file."""
+    with _open(path, kind) as image:
+        profile = image.info.get("icc_profile")
+    return {"profile": bytes(profile)} if profile else {}
 
 
 def read_focal(path: Path) -> float | None:
@@ -66,96 +177,175 @@ def read_focal(path: Path) -> float | None:
     return focal if MOST[0] <= focal <= MOST[1] else None
 
 
-def encode(array: Array, suffix: str) -> bytes:
-    """Encode uint8 pixels as JPEG or BMP."""
-    import imageio.v3 as iio
+def encode(path: Path, array: Array, suffix: str, palette: Array | None = None) -> bytes:
+    """Encode uint8 pixels; with a palette, as indices into it."""
+    from PIL import Image
 
-    options: dict[str, Any] = {"quality": QUALITY, "subsampling": 0} if suffix == ".jpg" else {}
-    file = iio.imwrite("<bytes>", array, extension=suffix, plugin="pillow", is_batch=False, **options)
-    assert isinstance(file, bytes)
-    return file
+    name, options = SAVED[suffix]
+    if name == "JXL":
+        _load_plugins("jxl")
+    Image.init()
+    if name not in Image.SAVE:
+        raise FileError(f"{path}: cannot be written; {NEEDS[suffix[1:]]}")
+    if suffix == ".gif" and palette is None:
+        palette = np.unique(array.reshape(-1, array.shape[2]), axis=0)
+    image = Image.fromarray(array) if palette is None else _index(array, palette)
+    if palette is not None and (palette[:, 3:] < 255).any() and suffix in (".png", ".gif"):
+        clear = palette[:, 3]
+        options = options | {"transparency": clear.tobytes() if suffix == ".png" else int(clear.argmin())}
+    file = BytesIO()
+    image.save(file, name, **options)
+    return file.getvalue()
 
 
-def _decode(
-    path: Path, file: bytes, suffix: str, sides: tuple[int, ...], channels: int, limit: int, mode: str | None = None
-) -> Array:
-    pixels = check_size(path, sides, channels, 1, limit)
-    import imageio.v3 as iio
+def write_indexed(path: Path, array: Array, palette: bytes) -> bool:
+    """Write an image with a palette; return False if the format or the palette cannot hold it."""
+    suffix, table = path.suffix.lower(), np.frombuffer(palette, np.uint8).reshape(-1, 4)
+    if suffix not in INDEXED or find_indices(array, table) is None:
+        return False
+    clear, half = (table[:, 3] == 0).sum(), (table[:, 3] % 255).any()
+    if suffix != ".png" and (half or clear > (suffix == ".gif")):
+        return False
+    with translate_errors(path, "writing"):
+        path.write_bytes(encode(path, array, suffix, table))
+    return True
 
-    with translate_errors(path, "decoding"), _silence(path, pixels):
-        array = iio.imread(file, extension=suffix, plugin="pillow", index=0, mode=mode)
-    if array.dtype not in (np.uint8, np.bool_) or array.ndim not in (2, 3):
-        raise FileError(f"{path}: decoded to {array.dtype} of shape {array.shape}, not to an image")
-    return array
+
+def find_indices(array: Array, palette: Array) -> Array | None:
+    """Return the place of each pixel's colour in a palette; None if a colour is not in it."""
+    if array.dtype != np.uint8 or (array.ndim, *array.shape[2:]) not in ((2,), (3, 3), (3, 4)):
+        return None
+    pixels, table = (_pack(a.reshape(-1, a.shape[-1] if a.ndim > 1 else 1)) for a in (_spread(array), palette))
+    order = np.argsort(table, kind="stable")
+    at = np.searchsorted(table, pixels, sorter=order)
+    found = order[np.minimum(at, len(table) - 1)]
+    if (table[found] != pixels).any():
+        return None
+    return found.astype(np.uint8).reshape(array.shape[:2])
+
+
+def _spread(array: Array) -> Array:
+    """Return grey pixels as colours."""
+    return np.repeat(array[..., np.newaxis], 3, axis=2) if array.ndim == 2 else array
+
+
+def _pack(colours: Array) -> Array:
+    """Return each colour as one number; colours without alpha are opaque."""
+    whole = np.full((len(colours), 4), 255, np.uint32)
+    whole[:, : colours.shape[1]] = colours
+    return whole @ np.array([1 << 24, 1 << 16, 1 << 8, 1], np.uint32)
+
+
+def _index(array: Array, palette: Array) -> Any:
+    """Return an image of Pillow that has a palette."""
+    from PIL import Image
+
+    indices = find_indices(array, palette)
+    assert indices is not None
+    image = Image.fromarray(indices)
+    image.putpalette(np.ascontiguousarray(palette[:, :3]).tobytes(), "RGB")
+    return image
 
 
 @contextmanager
-def _silence(path: Path, pixels: int) -> Iterator[None]:
-    """Keep Pillow's own limit from warning of an image that the caller's limit allows."""
-    from PIL import Image
-
-    most = Image.MAX_IMAGE_PIXELS
-    if most is None or pixels <= most:
+def _silence() -> Iterator[None]:
+    """Suppress the warnings of Pillow about headers, one thread at a time: filters of warnings belong to all threads."""
+    with _QUIET, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
         yield
-        return
-    if pixels > 2 * most:
+
+
+def _load_plugins(kind: str) -> None:
+    """Import the plugins of Pillow that are installed for a format."""
+    for module in PLUGINS.get(kind, ()):
+        with suppress(ImportError):
+            import_module(module)
+
+
+@contextmanager
+def _open(path: Path, kind: str, file: bytes | None = None) -> Iterator[Any]:
+    """Open an image and read only its header."""
+    from PIL import Image, UnidentifiedImageError
+
+    _load_plugins(kind)
+    Image.init()
+    name = KINDS[kind]
+    if name not in Image.OPEN or (kind == "avif" and name not in Image.SAVE):
+        raise FileError(f"{path}: cannot be decoded; {NEEDS.get(kind, f'this Pillow has no {name}')}")
+    try:
+        with _silence():
+            image = Image.open(path if file is None else BytesIO(file), formats=(name,))
+    except Image.DecompressionBombError:
+        assert Image.MAX_IMAGE_PIXELS is not None
         raise LimitExceeded(
-            f"{path}: has {pixels} pixels, more than the limit of Pillow, {2 * most} "
-            "(PIL.Image.MAX_IMAGE_PIXELS), which decodes this format"
-        )
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-        yield
+            f"{path}: has more than the limit of Pillow, {2 * Image.MAX_IMAGE_PIXELS} pixels "
+            "(twice PIL.Image.MAX_IMAGE_PIXELS), which decodes this format"
+        ) from None
+    except UnidentifiedImageError:
+        raise FileError(
+            f"{path}: is cut off, corrupt, or a kind of {name} that Pillow does not read; "
+            "save it with 8 bits a channel, or as PNG or TIFF"
+        ) from None
+    except NotImplementedError as error:
+        raise FileError(
+            f"{path}: is a kind of {name} that Pillow does not read ({describe_error(error)}); save it as PNG or TIFF"
+        ) from None
+    with image:
+        yield image
 
 
-def _strip_jpeg(path: Path, file: bytes) -> tuple[tuple[int, int], int, int, bytes]:
-    """Return sides, channels, orientation, and the file without what does not say how its pixels are coded.
-
-    Only the segments before the first scan are walked through (ITU-T T.81, annex B).
-    """
-    sides, channels, orientation = (0, 0), 0, 1
-    parts, at = [file[:2]], 2
-    while at + 4 <= len(file) and file[at] == 0xFF:
-        marker = file[at + 1]
-        if marker == 0xFF:  # Fill byte.
-            at += 1
-            continue
-        if marker == 0xDA:  # Start of scan: the rest is pixels.
-            if channels == 0:
-                break
-            return sides, channels, orientation, b"".join([*parts, file[at:]])
-        length = int.from_bytes(file[at + 2 : at + 4], "big")
-        segment = file[at : at + 2 + length]
-        if length < 2 or len(segment) < 2 + length:
-            break
-        if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):  # Start of frame.
-            if channels or len(segment) < 10:
-                break
-            sides, channels = (int.from_bytes(segment[5:7], "big"), int.from_bytes(segment[7:9], "big")), segment[9]
-        if marker == 0xE1 and segment[4:10] == b"Exif\0\0":
-            orientation = _rust.exif_orientation(segment[10:])
-        # Of the application's segments, only JFIF and Adobe say how pixels are coded.
-        if marker == 0xEE or not (0xE1 <= marker <= 0xEF or marker == 0xFE):
-            parts.append(segment)
-        at += 2 + length
-    raise FileError(f"{path}: is cut off or corrupt; its JPEG header does not reach the pixels")
+def _check_size(path: Path, image: Any, limit: int) -> None:
+    check_size(path, image.size[::-1], max(len(image.getbands()), 4), 1, limit)
 
 
-def _read_gif_size(path: Path, file: bytes) -> tuple[int, int]:
-    """Return the sides of the screen, or of the first frame where that reaches beyond it."""
-    cut = FileError(f"{path}: is cut off or corrupt; its GIF header does not reach the pixels")
-    if len(file) < 13:
-        raise cut
-    columns, rows = (int.from_bytes(file[i : i + 2], "little") for i in (6, 8))
-    at = 13 + (3 << ((file[10] & 7) + 1) if file[10] & 0x80 else 0)
-    while at + 10 <= len(file):
-        if file[at] == 0x2C:  # Image descriptor.
-            left, top, width, height = (int.from_bytes(file[at + i : at + i + 2], "little") for i in (1, 3, 5, 7))
-            return max(rows, top + height), max(columns, left + width)
-        if file[at] != 0x21:  # Not an extension.
-            break
-        at += 2
-        while at < len(file) and file[at]:
-            at += 1 + file[at]
-        at += 1
-    raise cut
+def _check_whole(path: Path, kind: str, image: Any, file: bytes) -> None:
+    """Check facts that Pillow leaves open."""
+    if kind == "dds":
+        if (
+            image.tile
+            and image.tile[0][0] == "dds_rgb"
+            and len(file) - 128 < image.width * image.height * (image.tile[0][3][0] // 8)
+        ):
+            raise FileError(f"{path}: is cut off; not all of its pixels are there")
+        if getattr(image, "pixel_format", "").startswith("BC6H"):
+            assume(f"{path}: {image.pixel_format} holds floats; read as 8 bits, values above 1 as 1")
+    if kind == "psd" and any(number == 1057 and data[4:5] == b"\0" for number, _, data in image.resources):
+        raise FileError(f"{path}: holds no flattened picture; save it with 'maximize compatibility', or as TIFF or PNG")
+
+
+def _take_pixels(path: Path, image: Any) -> Array:
+    """Return the pixels of the current frame, (H, W) or (H, W, C)."""
+    mode = image.mode
+    if mode in ("P", "PA"):
+        image = image.convert("RGBA" if image.has_transparency_data else "RGB")
+    elif mode == "CMYK":
+        image = _convert_inks(path, image)
+    elif mode in ("1", "YCbCr", "RGBX"):
+        image = image.convert("L" if mode == "1" else "RGB")
+    elif mode not in _DTYPES:
+        raise FileError(f"{path}: holds colours of the mode {mode}; save it as RGB or grey")
+    array = np.array(image)
+    if array.ndim not in (2, 3) or array.dtype.kind not in "uif":
+        raise FileError(f"{path}: decoded to {array.dtype} of shape {array.shape}, not to an image")
+    return array.astype(array.dtype.newbyteorder("="), copy=False)
+
+
+def _convert_inks(path: Path, image: Any) -> Any:
+    """Return CMYK as sRGB: by the profile of the file, or by the formula of Pillow."""
+    from PIL import ImageCms
+
+    with suppress(ImageCms.PyCMSError, OSError):
+        profile = image.info.get("icc_profile")
+        if profile:
+            converted = ImageCms.profileToProfile(
+                image,
+                ImageCms.ImageCmsProfile(BytesIO(profile)),
+                ImageCms.createProfile("sRGB"),
+                renderingIntent=ImageCms.Intent.RELATIVE_COLORIMETRIC,
+                outputMode="RGB",
+                flags=ImageCms.Flags.BLACKPOINTCOMPENSATION,
+            )
+            assume(f"{path}: CMYK converted to sRGB by its profile")
+            return converted
+    assume(f"{path}: CMYK without a profile that can be used; converted to RGB by Pillow's formula")
+    return image.convert("RGB")

@@ -1,4 +1,4 @@
-"""TIFF, images and stacks, by tifffile; LZW, which it cannot decode alone, by the compiled one."""
+"""TIFF, images and stacks, by tifffile; what it cannot decode without imagecodecs, by Pillow or the compiled decoder."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import lzma
 import threading
 import zlib
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from math import inf, prod
 from pathlib import Path
@@ -15,9 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from texrs._notices import ignore
 from texrs._typing import Array
 from texrs.errors import FileError
-from texrs.io import _image_io
+from texrs.io import _image_io, _pillow
 from texrs.io._files import check_file, check_size, load, translate_errors, turn_upright
 
 _LZW, _JPEG = 5, 7
@@ -29,6 +30,8 @@ _UNFOLDING: dict[int, float] = {
     **dict.fromkeys(_ZSTD, inf),
 }
 """By compression, into how many bytes one is made at most; those of PackBits are collected in a list, at nine bytes each."""
+_PICTURES = frozenset({6, 7, 33003, 33004, 33005, 34712, 34933, 50001})
+"""Compressions whose strips and tiles are JPEG, JPEG 2000, PNG and WebP files."""
 _HARMLESS = 2**26
 """Bytes that a strip may unfold to, at most, without being looked at."""
 _DICTIONARY = 2**28
@@ -36,7 +39,7 @@ _DICTIONARY = 2**28
 _ORIENTATION = 274
 _SHAPING = frozenset({256, 257, 258, 259, 262, 266, 273, 277, 278, 279, 284, 317, 320, 322, 323, 324, 325, 338, 339})
 """Tags that say how the pixels lie. tifffile goes on without a tag that it cannot read."""
-_WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB, _PALETTE, _YCBCR = 0, 1, 2, 3, 6
+_WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB, _PALETTE, _SEPARATED, _YCBCR = 0, 1, 2, 3, 5, 6
 
 
 def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
@@ -63,15 +66,19 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
         _check_segments(path, series, length)
         tag = first.tags.get(_ORIENTATION)
         orientation = int(tag.value) if tag is not None and tag.value in range(1, 9) else 1
-        if first.compression not in tifffile.TIFF.DECOMPRESSORS:
-            grey_or_rgb = first.photometric in (_WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB)
-            if first.compression == _LZW and sides[0] == 1 and grey_or_rgb:
-                array, _ = _image_io.decode(path, load(path, limit), limit)
-                return array.reshape(*sides, channels), orientation
-            scheme = getattr(first.compression, "name", first.compression)
-            raise FileError(f"{path}: is compressed by {scheme}; to read it, install the package imagecodecs")
+        _report_others(path, tif, series)
+        if first.photometric == _SEPARATED or first.compression not in tifffile.TIFF.DECOMPRESSORS:
+            return _read_otherwise(path, series, sides, channels, limit), orientation
         _check_unfolded(path, tif.filehandle, series)
-        array = series.asarray(maxworkers=1)
+        try:
+            array = series.asarray(maxworkers=1)
+        except Exception as error:
+            # tifffile learns late that a predictor or a width of samples needs imagecodecs, which in turn refuses strips that
+            # are filled up. Pillow reads both. It prints a line for a corrupt strip, so do not ask it about those.
+            reasons = ("imagecodecs", "INSUFFICIENT_SPACE")
+            if not isinstance(error, ImportError) and not any(reason in str(error) for reason in reasons):
+                raise
+            return _read_otherwise(path, series, sides, channels, limit), orientation
         if array.shape != series.shape:
             raise FileError(f"{path}: is cut off or corrupt; not all of its pixels are there")
         order = [a for a in series.axes if a not in "YXSC"] + [a for a in "YXCS" if a in series.axes]
@@ -79,10 +86,51 @@ def read_tiff(path: Path, limit: int) -> tuple[Array, int]:
         return _apply_colours(path, np.ascontiguousarray(array), first), orientation
 
 
+def _read_otherwise(path: Path, series: Any, sides: tuple[int, int, int], channels: int, limit: int) -> Array:
+    """Return planes, rows, columns, channels of what tifffile cannot decode alone."""
+    first, size = series.keyframe, dict(zip(series.axes, series.shape, strict=True))
+    outer = series.axes[: len(series.axes) - len(first.axes)]
+    pages = [page.index for page in series.pages if page is not None]
+    plain = first.photometric in (_WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB) and len(pages) == first.planarconfig == 1
+    compiled = plain and first.compression == _LZW and series.dtype in _image_io.OF_TIFF
+    # The compiled decoder is quiet about corrupt strips, but does not know all tiles.
+    if compiled and not first.is_tiled and (channels > 1 or series.dtype.kind == "u"):
+        return _image_io.decode(path, load(path, limit), limit)[0].reshape(*sides, channels)
+    with suppress(FileError, OSError, ValueError, SyntaxError, TypeError, KeyError):
+        if set(first.axes) <= set("YXS") and len(pages) == prod(size[a] for a in outer):
+            array = _pillow.read_pages(path, series.dtype, sides[1:], pages)
+            array = array.reshape(*(size[a] for a in outer), *array.shape[1:])
+            if "C" in outer:
+                array = np.moveaxis(array, outer.index("C"), -2)
+            return np.ascontiguousarray(array.reshape(*sides, -1))
+    with suppress(FileError):
+        if compiled:
+            return _image_io.decode(path, load(path, limit), limit)[0].reshape(*sides, channels)
+    scheme = getattr(first.compression, "name", first.compression)
+    colours = getattr(first.photometric, "name", first.photometric)
+    raise FileError(
+        f"{path}: is corrupt, or needs the package imagecodecs (pip install texrs[tiff]); "
+        f"it holds {colours} colours of {series.dtype}, compressed by {scheme}"
+    )
+
+
+def _report_others(path: Path, tif: Any, series: Any) -> None:
+    """Report the pages of a file that are not in the series that is read, reduced copies apart."""
+    taken = {page.index for page in series.pages if page is not None}
+    # Only the first page of a contiguous stack is listed.
+    if all(page is not None for page in series.pages):
+        unused = sum(page.index not in taken and not page.is_reduced for page in tif.pages)
+        if unused:
+            ignore(f"{path}: {unused} of {len(tif.pages)} pages not used: their size or type is not that of the first")
+
+
 def take_image(path: Path, planes: Array, orientation: int) -> Array:
     """Return the only plane of a file."""
     if planes.shape[0] != 1:
-        raise FileError(f"{path}: holds {planes.shape[0]} planes; texrs.io.read_volume reads them as a volume")
+        raise FileError(
+            f"{path}: holds {planes.shape[0]} planes; texrs.io.read_volume reads them as a volume, "
+            "for texrs solid and texrs slice; for a picture, save one page alone"
+        )
     return turn_upright(planes[0, ..., 0] if planes.shape[3] == 1 else planes[0], orientation)
 
 
@@ -168,12 +216,12 @@ def _check_unfolded(path: Path, file: Any, series: Any) -> None:
     """Check that no strip or tile unfolds to far more than its pixels need, which tifffile without imagecodecs does first."""
     for page in series.pages:
         key = None if page is None else page.keyframe
-        if key is None or key.compression not in _UNFOLDING:
+        if key is None or (key.compression not in _UNFOLDING and key.compression not in _PICTURES):
             continue
         # Careless writers fill up.
         most = 2 * prod(key.chunks) * max(key.dtype.itemsize, 1) + 2**16
         for offset, count in zip(page.dataoffsets, page.databytecounts, strict=True):
-            if count * _UNFOLDING[key.compression] <= max(most, _HARMLESS):
+            if count * _UNFOLDING.get(key.compression, inf) <= max(most, _HARMLESS):
                 continue
             file.seek(offset)
             data = file.read(count)
@@ -186,6 +234,8 @@ def _check_unfolded(path: Path, file: Any, series: Any) -> None:
 
 def _measure(compression: int, data: bytes, most: int) -> int:
     """Return how many bytes data unfold to, or more than ``most`` where they are more."""
+    if compression in _PICTURES:
+        return _pillow.measure(data)
     if compression in _DEFLATE:
         return len(zlib.decompressobj().decompress(data, most + 1))
     if compression == _LZMA:
